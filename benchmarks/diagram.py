@@ -1,0 +1,40 @@
+"""The 601-point diagram of Fig. 11: 1000 periods of transient, 200 kept, through the public `sweep`."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+from timing import interleaved, medians
+
+import nonsmooth as ns
+
+Verdict = tuple[str, str, str, bool]
+
+
+def run(effort: float) -> tuple[list[str], list[Verdict]]:
+    system = ns.models.discontinuous_support().with_parameters(omega=3.69, g=-0.0045)
+    values = np.linspace(0.2, 0.5, 601)
+    transient = int(1000 * effort)
+    sweep = partial(ns.sweep, system, "rho", values, transient=transient, keep=200, progress=False)
+    t = medians(
+        interleaved(
+            {
+                "up": partial(sweep, direction="up"),
+                "both": partial(sweep, direction="both"),
+                "each from rest": partial(sweep, direction=None),
+            }
+        )
+    )
+    lines = [
+        "## Fig. 11: 601 points, 1000 periods of transient, 200 kept (true extremes, period numbers), wall time",
+        "",
+        "| direction | seconds | microseconds per period |",
+        "|---|---|---|",
+        *(
+            f"| {name} | {seconds:.2f} | {1e6 * seconds / (601 * (transient + 200) * (2 if name == 'both' else 1)):.2f} |"
+            for name, seconds in t.items()
+        ),
+        "",
+    ]
+    return lines, [("601-point diagram of Fig. 11, rho rising", "under 1.5 s", f"{t['up']:.2f} s", t["up"] < 1.5)]

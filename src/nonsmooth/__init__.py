@@ -1,0 +1,1 @@
+"""Non-smooth (piecewise-smooth) dynamical systems, from the equations to the measured twin."""

@@ -1,0 +1,52 @@
+"""The command ``nonsmooth``: one sub-command per file, errors as one message, Ctrl-C as one line."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+
+from nonsmooth.cli import models, reproduce, run, show
+from nonsmooth.errors import SolveError
+from nonsmooth.results.provenance import package_version
+
+__all__ = ["main"]
+
+_COMMANDS = (run, reproduce, models, show)
+#: What a user can have caused and mend. Anything else is a fault of the package and keeps its traceback.
+_USER_ERRORS = (ValueError, TypeError, OSError, SolveError)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; returns the exit code: 0 done, 2 wrong input, 130 interrupted."""
+    parser = _parser()
+    options = parser.parse_args(arguments)
+    try:
+        code: int = options.run(options)
+        return code
+    except KeyboardInterrupt:
+        print("nonsmooth: interrupted", file=sys.stderr)
+        return 130
+    except _USER_ERRORS as error:
+        if options.traceback:
+            raise
+        print(f"nonsmooth: {error}", file=sys.stderr)
+        return 2
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="nonsmooth",
+        description="Piecewise-smooth dynamical systems: simulate, sweep, and reproduce published studies.",
+        epilog="`nonsmooth COMMAND --help` explains a command.",
+    )
+    parser.add_argument("--version", action="version", version=f"nonsmooth {package_version()}")
+    parser.add_argument("--traceback", action="store_true", help="show where in the program an error arose")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    for command in _COMMANDS:
+        command.add(commands)
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())

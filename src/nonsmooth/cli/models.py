@@ -1,0 +1,31 @@
+"""``nonsmooth models``: the published oscillators that come ready."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+__all__ = ["add"]
+
+
+def add(commands: Any) -> None:
+    """Declare the sub-command."""
+    parser = commands.add_parser(
+        "models", help="list the models that come ready", description="List the models that come ready."
+    )
+    parser.add_argument("name", nargs="?", help="show this model's equations and parameters")
+    parser.set_defaults(run=_run)
+
+
+def _run(options: argparse.Namespace) -> int:
+    from nonsmooth import models
+    from nonsmooth.cli.study import named_model
+
+    if options.name is not None:
+        print(named_model(options.name))
+        return 0
+    width = max(map(len, models.names()))
+    for name in models.names():
+        summary = (getattr(models, name).__doc__ or "").strip().partition("\n")[0]
+        print(f"{name:{width}}  {summary}")
+    return 0

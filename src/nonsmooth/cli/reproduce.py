@@ -1,0 +1,50 @@
+"""``nonsmooth reproduce STUDY``: the figures, data and report of a published paper."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import pkgutil
+import sys
+from pathlib import Path
+from typing import Any
+
+__all__ = ["add"]
+
+
+def add(commands: Any) -> None:
+    """Declare the sub-command."""
+    parser = commands.add_parser(
+        "reproduce",
+        help="reproduce a published study",
+        description="Compute the figures, the data and the report of a published study.",
+    )
+    parser.add_argument("study", help="the study, for example savi2007")
+    parser.add_argument(
+        "--figure", type=int, action="append", metavar="N", help="only this figure of the paper; may be repeated"
+    )
+    parser.add_argument("--out", type=Path, metavar="DIR", help="where to write (default: out/STUDY)")
+    parser.add_argument("--quick", action="store_true", help="coarser grids and shorter runs: a first look")
+    parser.add_argument("--quiet", action="store_true", help="no progress bars")
+    parser.set_defaults(run=_run)
+
+
+def _run(options: argparse.Namespace) -> int:
+    from nonsmooth import studies
+    from nonsmooth.system.names import unknown
+
+    known = sorted(module.name for module in pkgutil.iter_modules(studies.__path__) if module.ispkg)
+    if options.study not in known:
+        raise ValueError(unknown(options.study, "a study", "this package", known))
+    _draw_without_screen()
+    study = importlib.import_module(f"nonsmooth.studies.{options.study}")
+    out = options.out or Path("out") / options.study
+    study.reproduce(out=out, figures=options.figure, quick=options.quick, progress=not options.quiet)
+    print(f"written to {out}", file=sys.stderr)
+    return 0
+
+
+def _draw_without_screen() -> None:
+    import matplotlib as mpl
+
+    mpl.use("Agg")

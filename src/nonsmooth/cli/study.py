@@ -1,0 +1,216 @@
+"""Study files: TOML that says which system, which verb with which options, and where the result goes.
+
+``[system]`` names the model, its parameters and, with ``smoothed``, the band of the smoothed switch; the one table
+named after a verb holds the verb's options; ``[output]`` says what to keep. Keys are strict: an unknown one is an
+error that names the nearest, because a misspelt option that is silently ignored makes a wrong figure.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import inspect
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from nonsmooth.system.names import unknown
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Study", "load_model", "named_model", "read_study"]
+
+VERBS = ("simulate", "sweep", "frequency_response", "poincare")
+_SYSTEM_KEYS = ("model", "parameters", "smoothed")
+_OUTPUT_KEYS = ("data", "figure", "x", "y")
+#: Arguments of verbs that a file cannot hold (functions) or that belong to the command line.
+_NOT_IN_FILES = ("progress", "ramps", "client", "store")
+_FIGURES = {
+    "simulate": "phase_portrait", "sweep": "bifurcation", "frequency_response": "frequency_response",
+    "poincare": "section",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study file that has been read and checked."""
+
+    path: Path
+    system: Any
+    verb: str
+    options: Mapping[str, Any]
+    output: Mapping[str, str] = field(default_factory=dict)
+
+    def compute(self, *, progress: bool = False) -> xr.Dataset:
+        """Call the verb."""
+        import nonsmooth
+
+        verb = getattr(nonsmooth, self.verb)
+        extra = {"progress": progress} if "progress" in inspect.signature(verb).parameters else {}
+        result: xr.Dataset = verb(self.system, **self.options, **extra)
+        return result
+
+    def write(self, result: xr.Dataset) -> list[Path]:
+        """Save the data and draw the figure that ``[output]`` asks for; returns what was written."""
+        folder, written = self.path.parent, []
+        if "data" in self.output:
+            from nonsmooth.results.store import save
+
+            written.append(save(result, _with_folder(folder / self.output["data"])))
+        if "figure" in self.output:
+            import matplotlib as mpl
+
+            mpl.use("Agg")
+            from nonsmooth import plot
+
+            named = {axis: self.output[axis] for axis in ("x", "y") if axis in self.output}
+            ax = getattr(plot, _FIGURES[self.verb])(result, **named)
+            written.append(plot.save_figure(ax, _with_folder(folder / self.output["figure"])))
+        return written
+
+
+def read_study(path: Path) -> Study:
+    """Read and check a study file.
+
+    Raises
+    ------
+    ValueError
+        Not TOML, an unknown table or key, no verb or two, a value that cannot be read; the message names the
+        file and the table.
+    """
+    try:
+        document = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise ValueError(f"{path}: no such study file") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path}: is not a TOML file: {error}") from None
+    where = str(path)
+    _check_keys(document, ("system", *VERBS, "output"), where, "a table")
+    for name, table in document.items():
+        if not isinstance(table, dict):
+            raise ValueError(f"{where}: `{name}` must be a table: write [{name}] and its keys below it")
+    verbs = [name for name in document if name in VERBS]
+    if len(verbs) != 1:
+        raise ValueError(
+            f"{where}: a study runs exactly one verb, this one has {verbs or 'none'}; add one table of: {', '.join(VERBS)}"
+        )
+    if "system" not in document:
+        raise ValueError(f'{where}: needs a table [system] with at least model = "..."')
+    output = document.get("output", {})
+    _check_keys(output, _OUTPUT_KEYS, f"{where}, table [output]", "a key")
+    system = _system(document["system"], path)
+    options = _options(verbs[0], document[verbs[0]], where)
+    return Study(path, system, verbs[0], options, output)
+
+
+def named_model(name: str) -> Any:
+    """The ready model of that name, with its published parameters."""
+    from nonsmooth import models
+
+    if name not in models.names():
+        raise ValueError(unknown(name, "a model", "nonsmooth.models", models.names()))
+    return getattr(models, name)()
+
+
+def load_model(text: str, folder: Path) -> Any:
+    """A system from ``"name"`` (of ``nonsmooth.models``) or ``"file.py:object"``, the file relative to ``folder``.
+
+    The object is a ``System`` or a function without arguments that returns one. The file is executed.
+    """
+    from nonsmooth.system.system import System
+
+    file, colon, name = text.rpartition(":")
+    if not colon:
+        return named_model(text)
+    source = folder / file
+    if not source.is_file():
+        raise ValueError(f"{source}: no such file (asked for by model = {text!r})")
+    spec = importlib.util.spec_from_file_location(source.stem, source)
+    if spec is None or spec.loader is None:
+        raise ValueError(f"{source}: is not a Python file (model = {text!r})")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    if not hasattr(module, name):
+        raise ValueError(f"{source}: {unknown(name, 'an object', source.name, _public(module))}")
+    found = getattr(module, name)
+    system = found() if callable(found) and not isinstance(found, System) else found
+    if not isinstance(system, System):
+        raise ValueError(f"{source}: {name!r} is a {type(system).__name__}, not a System nor a function that returns one")
+    return system
+
+
+def _system(table: Mapping[str, Any], path: Path) -> Any:
+    where = f"{path}, table [system]"
+    _check_keys(table, _SYSTEM_KEYS, where, "a key")
+    if not isinstance(table.get("model"), str):
+        raise ValueError(f'{where}: needs model = "name" (see `nonsmooth models`) or model = "file.py:object"')
+    system = load_model(table["model"], path.parent)
+    if "parameters" in table:
+        system = system.with_parameters(table["parameters"])
+    if "smoothed" in table:
+        system = system.smoothed(table["smoothed"])
+    return system
+
+
+def _options(verb: str, table: Mapping[str, Any], where: str) -> dict[str, Any]:
+    """The verb's own parameters are the allowed keys, so that a new option needs no change here."""
+    import nonsmooth
+
+    signature = inspect.signature(getattr(nonsmooth, verb)).parameters
+    allowed = [name for name in list(signature)[1:] if name not in _NOT_IN_FILES]
+    place = f"{where}, table [{verb}]"
+    _check_keys(table, allowed, place, "a key")
+    missing = [name for name in allowed if signature[name].default is inspect.Parameter.empty and name not in table]
+    if missing:
+        raise ValueError(f"{place}: needs {', '.join(missing)}; all keys: {', '.join(allowed)}")
+    readers = {"values": _values, "section": _section, "start": _start}
+    return {name: readers[name](value, place) if name in readers else value for name, value in table.items()}
+
+
+def _values(value: Any, place: str) -> Any:
+    import numpy as np
+
+    if isinstance(value, dict):
+        _check_keys(value, ("from", "to", "n"), f"{place}, values", "a key")
+        if set(value) == {"from", "to", "n"}:
+            return np.linspace(value["from"], value["to"], value["n"])
+    elif isinstance(value, list):
+        return np.array(value, dtype=float)
+    raise ValueError(f"{place}: values is {value!r}; give a list or {{ from = ..., to = ..., n = ... }}")
+
+
+def _section(value: Any, place: str) -> Any:
+    import nonsmooth
+
+    if not isinstance(value, dict):
+        raise ValueError(f"{place}: section is {value!r}; give {{ phase = 0.25 }} or {{ indicator = \"name\" }}")
+    kind = nonsmooth.Poincare if "indicator" in value else nonsmooth.Stroboscopic
+    _check_keys(value, list(inspect.signature(kind).parameters), f"{place}, section", "a key")
+    return kind(**value)
+
+
+def _start(value: Any, place: str) -> Any:
+    import nonsmooth
+
+    if isinstance(value, dict) and "seed" in value:
+        _check_keys(value, ("n", "low", "high", "seed"), f"{place}, start", "a key")
+        return nonsmooth.random_starts(**value)
+    return value
+
+
+def _check_keys(table: Mapping[str, Any], allowed: Iterable[str], where: str, what: str) -> None:
+    known = list(allowed)
+    for key in table:
+        if key not in known:
+            raise ValueError(f"{where}: {unknown(key, what, 'this place', known)}")
+
+
+def _public(module: Any) -> list[str]:
+    return [name for name in vars(module) if not name.startswith("_")]
+
+
+def _with_folder(path: Path) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    return path

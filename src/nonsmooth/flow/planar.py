@@ -1,0 +1,164 @@
+"""The engine of the exact flow for two states: affine indicators and resets, harmonic forcing.
+
+It only packs a system into the arrays of ``kernels.planar`` and unpacks what comes back.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.flow.engine import Chain, FloatArray, Log, SectionPlan, State
+from nonsmooth.kernels import codes
+
+if TYPE_CHECKING:
+    from nonsmooth.system.linear import LinearForm
+    from nonsmooth.system.traced import Traced
+
+__all__ = ["PlanarEngine", "is_planar"]
+
+DIVERGENCE = 1e9  # in units of a state's scale
+
+
+def is_planar(traced: Traced, form: LinearForm | None) -> bool:
+    """Whether the fast kernel covers the system: two states, everything affine, no memory, no mode that lacks one."""
+    return (
+        form is not None
+        and len(traced.u) == 2
+        and form.affine_indicators
+        and form.affine_resets
+        and not traced.memory_names
+        and not any(any(lacking) for lacking in traced.lacking)
+    )
+
+
+@dataclass
+class Tables:
+    """Arrays of the kernel for P parameter points, and scratch memory for each thread that asks for it."""
+
+    linear: tuple[Any, ...]
+    period: FloatArray
+    module: ModuleType
+    sizes: tuple[int, int, int, int]
+
+    def scratch(self) -> tuple[Any, ...]:
+        work: tuple[Any, ...] = self.module.scratch(*self.sizes)
+        return work
+
+
+@dataclass
+class PlanarEngine:
+    """``Engine`` over ``kernels.planar`` for one system's traced form."""
+
+    traced: Traced
+    form: LinearForm
+    scale: FloatArray  # (2,)
+    name: str = "exact"
+    net: tuple[Any, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.net = pack_net(self.traced)
+
+    def prepare(self, points: FloatArray) -> Tables:
+        t = self.form.evaluate(points)
+        n_points, n_modes = t.b.shape[:2]
+        n_i, n_h = t.ia.shape[1], len(self.form.multiples)
+        if self.form.affine_outputs:
+            outputs = (t.oa, t.ob, t.oc, t.os)
+        else:
+            shape = (n_points, 0, n_modes)
+            outputs = (np.zeros((*shape, 2)), np.zeros(shape), np.zeros((*shape, n_h)), np.zeros((*shape, n_h)))
+        multiples = np.array(self.form.multiples, dtype=np.int64)
+        with np.errstate(divide="ignore"):
+            period = np.where(t.omega > 0.0, 2.0 * np.pi / t.omega, np.inf)
+        linear = (
+            t.A, t.b, t.c, t.s, multiples, t.omega, period,
+            t.ia, t.ib, t.ic, t.is_, *outputs, t.ra, t.rb, t.rc, t.rs,
+        )  # fmt: skip
+        from nonsmooth.kernels.planar_module import planar_module
+
+        return Tables(linear, period, planar_module(n_h), (n_modes, n_i, outputs[0].shape[1], len(self.net[1])))
+
+    def chain(
+        self, tables: Tables, first: int, last: int, state: State, starts: FloatArray | None,
+        plan: SectionPlan, transient: int, keep: int, out: Chain,
+    ) -> None:  # fmt: skip
+        rows = self._with_section(plan)
+        carry = starts is None
+        tables.module.chain(
+            first, last, int(carry), np.zeros((1, 2)) if starts is None else starts,
+            state.u, state.clock, state.counters,
+            *tables.linear, self.net[0], rows, *self.net[2:],
+            plan.phase, np.array([plan.indicator, plan.rising, plan.mode, plan.after, plan.every]), plan.t_max,
+            transient, keep, DIVERGENCE * self.scale,
+            out.section, out.maximum, out.minimum, out.indicator_max, out.indicator_min, out.output_max, out.output_min,
+            out.crossings, out.contacts, out.elapsed, out.section_time, out.section_mode, out.status,
+            *tables.scratch(),
+        )  # fmt: skip
+        if carry:
+            state.settled = True
+
+    def record(self, tables: Tables, state: State, until: float, samples: FloatArray) -> Log:
+        n = len(samples)
+        sample_u, sample_mode = np.full((n, 2), np.nan), np.full(n, -1, dtype=np.int64)
+        sample_segment = np.zeros(n, dtype=np.int64)
+        size = 1024
+        logs = [*_crossing_log(size), *_touch_log(size)]
+        progress = np.zeros(5, dtype=np.int64)
+        scratch = tables.scratch()
+        state.counters[1] = int(state.settled)
+        while True:
+            code = tables.module.record(
+                state.u, state.clock, state.counters, *tables.linear, *self.net,
+                until, samples, progress, DIVERGENCE * self.scale,
+                sample_u, sample_mode, sample_segment, *logs, *scratch,
+            )  # fmt: skip
+            if code != codes.LOG_FULL:
+                break
+            size *= 2
+            grown = [*_crossing_log(size), *_touch_log(size)]
+            for old, new in zip(logs, grown, strict=True):
+                new[: len(old)] = old
+            logs = grown
+        state.settled = True
+        _, n_c, n_t = progress[:3]
+        memory = np.zeros((n, 0))
+        return Log(
+            sample_u, memory, sample_mode, sample_segment,
+            *(log[:n_c] for log in logs[:4]), np.zeros((n_c, 0)), *(log[:n_t] for log in logs[4:]), int(code),
+        )  # fmt: skip
+
+    def _with_section(self, plan: SectionPlan) -> np.ndarray:
+        """The rows of the net, its last two being the section's (rising, falling)."""
+        rows: np.ndarray = self.net[1].copy()
+        rows[-2:, 0] = max(plan.indicator, 0)
+        return rows
+
+
+def _crossing_log(n: int) -> list[np.ndarray]:
+    return [np.zeros(n), np.zeros(n, dtype=np.int64), np.zeros((n, 2)), np.zeros((n, 2))]
+
+
+def _touch_log(n: int) -> list[np.ndarray]:
+    return [np.zeros(n), np.zeros(n, dtype=np.int64), np.zeros((n, 2)), np.zeros(n)]
+
+
+def pack_net(traced: Traced) -> tuple[Any, ...]:
+    """Transitions, rows (and two more for a section), row starts, outgoing lists by mode, trigger phases."""
+    integer = np.int64
+    transitions = np.array(
+        [(t.target, t.reset is not None, t.contact) for t in traced.transitions], dtype=integer
+    ).reshape(-1, 3)
+    rows = [(r.indicator, r.sign, r.strict) for t in traced.transitions for r in t.rows]
+    row_start = np.cumsum([0] + [len(t.rows) for t in traced.transitions], dtype=integer)
+    leaving = [
+        [j for j, t in enumerate(traced.transitions) if t.source == mode] for mode in range(len(traced.mode_names))
+    ]
+    mode_start = np.cumsum([0] + [len(one) for one in leaving], dtype=integer)
+    mode_list = np.array([j for one in leaving for j in one], dtype=integer)
+    at = np.array([-1.0 if t.at is None else t.at for t in traced.transitions], dtype=float)
+    both = np.array([*rows, (0, 1, 1), (0, -1, 1)], dtype=integer).reshape(-1, 3)
+    return transitions, both, row_start, mode_start, mode_list, at

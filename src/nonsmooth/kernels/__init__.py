@@ -1,0 +1,6 @@
+"""Compiled numerics: steppers, crossing location, hybrid loops, variational flow.
+
+A kernel takes arrays and scalars, writes into arrays and returns an integer status (``codes``); it never
+raises, prints or knows units. Modules of this room are imported where they are first used, because importing
+one compiles its kernels (or loads them from the cache, see ``cache``).
+"""

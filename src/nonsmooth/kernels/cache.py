@@ -1,0 +1,309 @@
+"""The compile cache of all Numba code: the package's kernels and the modules generated for a model.
+
+Numba's own disk cache looks only at the file a function stands in, so an edit in another kernel file would
+run stale code, and it cannot write beside a read-only install. Here one file per compiled function lives in
+``cache_folder()``; its name is a hash of the source, the signature, the versions and the CPU, so nothing is
+ever stale, entries never change, and several processes need no lock.
+
+Everything that leans on private parts of Numba (a dispatcher's ``_cache``, ``CompileResult._reduce``) stands
+in this file; ``tests/kernels/test_cache.py`` covers it. Checked with Numba 0.60 to 0.68.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import getpass
+import hashlib
+import importlib.util
+import inspect
+import os
+import pickle
+import re
+import sys
+import tempfile
+import threading
+import time
+import uuid
+from collections.abc import Callable, Iterator
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import llvmlite
+import numba
+from numba.core.caching import _Cache
+from numba.core.compiler import CompileResult
+
+__all__ = ["cache_folder", "cache_statistics", "device", "inline", "kernel", "load_module"]
+
+# Kernels allocate nothing (scratch is an argument), so they need no reference counts: "_nrt" off saves a third.
+_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": False, "_nrt": False}
+_UNUSED_DAYS = 90.0
+_lock = threading.Lock()
+
+
+# --------------------------------------------------------------------------------------------------------------
+# Folders and files
+
+
+def cache_folder() -> Path:
+    """The folder of compiled code; it is made if need be.
+
+    Returns
+    -------
+    Path
+        The environment variable ``NONSMOOTH_CACHE_DIR`` where set, else the user's cache folder of the
+        platform, else (neither can be written) a private folder among the temporary files.
+
+    Raises
+    ------
+    PermissionError
+        ``NONSMOOTH_CACHE_DIR`` is set and cannot be written.
+    """
+    return _usable_folder(os.environ.get("NONSMOOTH_CACHE_DIR", ""))
+
+
+@cache
+def _usable_folder(chosen: str) -> Path:
+    if chosen:
+        folder = Path(chosen).expanduser().absolute()
+        if not _writable(folder):
+            raise PermissionError(f"NONSMOOTH_CACHE_DIR={chosen} cannot be written: choose another folder or unset it")
+        return folder
+    if sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+    elif sys.platform == "darwin":
+        base = Path.home() / "Library" / "Caches"
+    else:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    folder = base / "nonsmooth"
+    if _writable(folder):
+        return folder
+    # Compiled code is executed, so a folder that somebody else could have made must not be trusted.
+    folder = Path(tempfile.gettempdir()) / f"nonsmooth-{getpass.getuser()}"
+    if _writable(folder, mode=0o700) and (not hasattr(os, "getuid") or folder.stat().st_uid == os.getuid()):
+        return folder
+    return Path(tempfile.mkdtemp(prefix="nonsmooth-"))
+
+
+def _writable(folder: Path, mode: int = 0o777) -> bool:
+    try:
+        folder.mkdir(parents=True, exist_ok=True, mode=mode)
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError:
+        return False
+    return True
+
+
+def _write_atomically(path: Path, data: bytes) -> None:
+    """Another process sees the whole file or none; the last of several writers of the same content wins."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    unfinished = path.with_name(f"{path.name}.{uuid.uuid4().hex[:12]}.tmp")
+    try:
+        unfinished.write_bytes(data)
+        os.replace(unfinished, path)
+    except OSError:
+        with contextlib.suppress(OSError):
+            unfinished.unlink()
+        if not path.exists():  # Windows refuses to replace a file that another process reads
+            raise
+
+
+def _mark_used(path: Path) -> None:
+    with contextlib.suppress(OSError):
+        if time.time() - path.stat().st_mtime > 86400.0:
+            os.utime(path)
+
+
+def _prune(folder: Path) -> None:
+    """Remove what no process has used for a long time: edits of the source leave entries behind."""
+    oldest = time.time() - 86400.0 * _UNUSED_DAYS
+    for path in folder.iterdir():
+        with contextlib.suppress(OSError):
+            if path.is_file() and path.stat().st_mtime < oldest:
+                path.unlink()
+
+
+# --------------------------------------------------------------------------------------------------------------
+# What a compiled function depends on
+
+
+@cache
+def _kernel_sources() -> dict[str, str]:
+    """Stem -> text of every file of this room, as they stand when the process first compiles something."""
+    return {path.stem: path.read_text(encoding="utf-8") for path in sorted(Path(__file__).parent.rglob("*.py"))}
+
+
+@cache
+def _source_stamp(text: str) -> str:
+    """Hash of a source text and of every kernel file it may import, through any number of files.
+
+    A file counts as imported when its stem occurs as a word: this can only err towards recompiling.
+    """
+    sources = _kernel_sources()
+    reached: set[str] = set()
+    pending = [text]
+    while pending:
+        found = sources.keys() & set(re.findall(r"\w+", pending.pop()))
+        pending.extend(sources[stem] for stem in found - reached)
+        reached |= found
+    digest = hashlib.sha256(text.encode())
+    for stem in sorted(reached):
+        digest.update(f"\0{stem}\0{sources[stem]}".encode())
+    return digest.hexdigest()
+
+
+@cache
+def _file_stamp(path: str) -> str:
+    return _source_stamp(Path(path).read_text(encoding="utf-8"))
+
+
+class _ContentCache(_Cache):  # type: ignore[misc,unused-ignore]
+    """Numba's cache protocol over one immutable file per function, signature, source, version and CPU."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._name = function.__qualname__
+        config = numba.config
+        self._origin = (
+            _file_stamp(inspect.getfile(function)),
+            f"{function.__module__}.{self._name}",
+            sys.version_info[:2],
+            numba.__version__,
+            llvmlite.__version__,
+            (config.OPT, config.BOUNDSCHECK, config.DEBUGINFO_DEFAULT, config.USING_SVML),
+        )
+
+    @property
+    def cache_path(self) -> str:
+        return str(cache_folder() / "compiled")
+
+    def _path(self, signature: Any, codegen: Any) -> Path:
+        key = repr((self._origin, str(signature), codegen.magic_tuple()))
+        return Path(self.cache_path) / f"{self._name}-{hashlib.sha256(key.encode()).hexdigest()[:32]}.nbc"
+
+    def load_overload(self, sig: Any, target_context: Any) -> CompileResult | None:
+        target_context.refresh()
+        path = self._path(sig, target_context.codegen())
+        try:
+            payload = pickle.loads(path.read_bytes())
+        except FileNotFoundError:
+            return None
+        except Exception:  # a damaged entry (full disk, lost power) is compiled anew and replaced
+            return None
+        _mark_used(path)
+        return CompileResult._rebuild(target_context, *payload)
+
+    def save_overload(self, sig: Any, data: CompileResult) -> None:
+        if data.library.has_dynamic_globals or any(not part.can_cache for part in data.lifted):
+            raise RuntimeError(
+                f"kernel {self._name!r} cannot be cached: it refers to a large global array, a function pointer or "
+                "a Python object; pass it as an argument"
+            )
+        path = self._path(sig, data.codegen)
+        with contextlib.suppress(OSError):  # a full disk costs a compile in the next process, not this run
+            _write_atomically(path, numba.core.serialize.dumps(data._reduce()))
+            _prune(path.parent)
+
+    def enable(self) -> None:
+        """Always enabled."""
+
+    def disable(self) -> None:
+        """Always enabled."""
+
+    def flush(self) -> None:
+        """Entries never become stale."""
+
+
+# --------------------------------------------------------------------------------------------------------------
+# What the other rooms use
+
+
+def kernel(signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any]:
+    """Compile a function for exactly one signature when its module is imported, through the disk cache.
+
+    Parameters
+    ----------
+    signature
+        A Numba signature, as text or object. Arguments may be functions: ``types.FunctionType(signature)``.
+    **options
+        Further options of ``numba.njit``; ``nogil``, ``error_model="numpy"`` and no ``fastmath`` are set.
+
+    Returns
+    -------
+    decorator
+        It gives a dispatcher that accepts this signature only, so that no second version is ever compiled
+        silently. With ``NUMBA_DISABLE_JIT=1`` the function itself.
+    """
+
+    def decorate(function: Callable[..., Any]) -> Any:
+        dispatcher = numba.njit(**{**_OPTIONS, **options})(function)
+        if dispatcher is not function:
+            dispatcher._cache = _ContentCache(function)
+            dispatcher.compile(signature)
+            dispatcher.disable_compile()
+        return dispatcher
+
+    return decorate
+
+
+def device(function: Callable[..., Any]) -> Any:
+    """Mark a small function used inside kernels: compiled into each caller for the types it is called with.
+
+    It has no signature and no cache entry of its own, and costs nothing when its callers are loaded from disk.
+    """
+    return numba.njit(**_OPTIONS)(function)
+
+
+def inline(function: Callable[..., Any]) -> Any:
+    """Like :func:`device`, but always inlined: for the few small functions of the innermost loops.
+
+    An array argument is seven machine words and a reference count; a call that passes ten arrays costs more than
+    the dozen multiplications behind it. Every call site grows the caller and its compile time, so use it sparingly.
+    """
+    return numba.njit(**_OPTIONS, forceinline=True)(function)
+
+
+def load_module(source: str, stem: str) -> ModuleType:
+    """Write a generated module under a name that is a hash of its content, and import it.
+
+    Parameters
+    ----------
+    source
+        Text of the module. Its kernels are decorated with :func:`kernel`.
+    stem
+        Beginning of the file's name: an identifier.
+
+    Returns
+    -------
+    module
+        The same object for the same text, however often it is asked for in this process.
+    """
+    name = f"{stem}_{hashlib.sha256(source.encode()).hexdigest()[:20]}"
+    with _lock:
+        full_name = f"nonsmooth_generated_{name}"
+        if full_name in sys.modules:
+            return sys.modules[full_name]
+        path = cache_folder() / "generated" / f"{name}.py"
+        data = source.encode()
+        if not path.exists() or path.read_bytes() != data:
+            _write_atomically(path, data)
+            _prune(path.parent)
+        _mark_used(path)
+        spec = importlib.util.spec_from_file_location(full_name, path)
+        assert spec is not None and spec.loader is not None
+        module = importlib.util.module_from_spec(spec)
+        sys.modules[full_name] = module  # before it runs: Numba's cache entries name the module
+        try:
+            spec.loader.exec_module(module)
+        except BaseException:
+            del sys.modules[full_name]
+            raise
+    return module
+
+
+def cache_statistics(module: ModuleType) -> Iterator[tuple[str, int, int]]:
+    """(name, loads from disk, compiles) of every kernel in a module; the tests assert that nothing is compiled."""
+    for name, value in vars(module).items():
+        if hasattr(value, "stats") and hasattr(value, "py_func"):
+            yield name, sum(value.stats.cache_hits.values()), sum(value.stats.cache_misses.values())

@@ -1,0 +1,206 @@
+"""The first transition inside one step, and how conditions are judged just after a jump.
+
+``net`` describes the system in integers: (first, outgoing) lists the transitions of each mode in declared order;
+``transitions`` rows are source, target, first row, last row + 1, contact, reset; ``rows`` are indicator, sign, strict;
+``at`` holds the phase of time-triggered transitions.
+
+A transition fires where the least of its rows rises through zero. The sign of an indicator is remembered from step to
+step (``side``: -1, 1, or 0 where nothing was established), so that no change falls between two steps.
+"""
+
+from math import fabs, sqrt
+
+from .cache import device
+from .polynomial import NONE, bounds, dense, first_crossing, load, shift, strip
+
+__all__ = ["NOISE", "earliest", "holding", "holds", "section_crossing", "sides_at", "snap"]
+
+NOISE = 3.6e-15  # 16 roundings: an indicator this small against its own scale is zero
+
+
+@device
+def snap(C, m, n, n_indicators, h, scale, measured, side):
+    """After-limits: set what is zero within rounding to zero in the jets of the indicators, and find their signs.
+
+    ``side`` becomes the sign of the first coefficient that does not vanish (0: the indicator vanishes identically).
+    ``measured`` is the size of indicators known to be zero here: their rounding error, seen.
+    """
+    for i in range(n_indicators):
+        noise = max(NOISE * scale[i], 4.0 * measured[i])
+        sign, power = 0, 1.0
+        for k in range(m + 1):
+            c = C[n + i, k]
+            if fabs(c) * power > noise:
+                sign = 1 if c > 0.0 else -1
+                break
+            C[n + i, k] = 0.0
+            power *= h
+        side[i] = sign
+
+
+@device
+def holds(k, net, side):
+    """Whether all rows of transition k hold by the signs ``side``."""
+    transitions, rows = net[2], net[3]
+    for r in range(transitions[k, 2], transitions[k, 3]):
+        s = rows[r, 1] * side[rows[r, 0]]
+        if s < 0 or (s == 0 and rows[r, 2] == 1):
+            return False
+    return transitions[k, 3] > transitions[k, 2]
+
+
+@device
+def holding(mode, net, side):
+    """The first transition out of ``mode`` whose rows all hold by the after-limit signs, or -1."""
+    first, outgoing = net[0], net[1]
+    for j in range(first[mode], first[mode + 1]):
+        if holds(outgoing[j], net, side):
+            return outgoing[j]
+    return -1
+
+
+@device
+def _error(a, m, tail, slack, scale):
+    """Bound for what the polynomial lacks: its last terms, or the step's own error estimate; 0 where it is rounding."""
+    error = tail * (fabs(a[m]) + 0.1 * fabs(a[m - 1])) + slack * scale
+    return error if error > NOISE * scale else 0.0
+
+
+@device
+def _others_hold(r0, lo, hi, x, C, m, n, powers, rows, scale, a, d):
+    """Whether the other rows hold where row r0 crosses; one that vanishes there is judged by what it does next."""
+    i0 = rows[r0, 0]
+    m0 = load(C, n + i0, rows[r0, 1], m, powers, a)
+    shift(a, m0, x, 1.0, d)
+    noise = NOISE * scale[i0]
+    doubt = 1e-15 + noise / (fabs(d[1]) + sqrt(noise * (fabs(d[2]) + noise)))  # of x itself
+    for r in range(lo, hi):
+        if r == r0:
+            continue
+        i = rows[r, 0]
+        mr = load(C, n + i, rows[r, 1], m, powers, a)
+        v = dense(a, mr, x)
+        noise = NOISE * scale[i]
+        if v > 1.0e3 * noise + doubt * scale[i]:
+            continue
+        shift(a, mr, x, 1.0, d)
+        if v > noise + doubt * fabs(d[1]):
+            continue
+        if v < -(noise + doubt * fabs(d[1])):
+            return False
+        sign = 0
+        for k in range(1, mr + 1):
+            if fabs(d[k]) > noise:
+                sign = 1 if d[k] > 0.0 else -1
+                break
+        if sign < 0 or (sign == 0 and rows[r, 2] == 1):
+            return False
+    return True
+
+
+@device
+def _fires(lo, hi, C, m, n, powers, rows, side, side_next, scale, tail, slack, a, d, stack, found):
+    """Where the conjunction of rows lo..hi-1 first becomes true on the step, and the row that makes it so."""
+    cursor, begun = 0.0, False
+    for _ in range(64):
+        best, best_row = NONE, -1
+        for r in range(lo, hi):
+            i, sign = rows[r, 0], rows[r, 1]
+            mr = load(C, n + i, sign, m, powers, a)
+            error = _error(a, mr, tail, slack, scale[i])
+            before = 0 if begun else sign * side[i]
+            if begun:
+                shift(a, mr, cursor, 1.0 - cursor, a)
+                if fabs(a[0]) <= NOISE * scale[i]:
+                    a[0] = 0.0
+            mr = strip(a, mr)
+            if mr < 0:
+                continue
+            x = first_crossing(a, mr, 1, before, error, stack, found)
+            side_next[i] = sign * found[1]
+            if x != NONE and cursor + x * (1.0 - cursor) < best:
+                best, best_row = cursor + x * (1.0 - cursor), r
+        if best == NONE:
+            return NONE, -1
+        if hi - lo == 1 or _others_hold(best_row, lo, hi, best, C, m, n, powers, rows, scale, a, d):
+            return best, best_row
+        if best >= 1.0:
+            side_next[rows[best_row, 0]] = rows[best_row, 1]
+            return NONE, -1
+        cursor, begun = best, True
+    return NONE, -1
+
+
+@device
+def earliest(mode, C, m, n, powers, net, side, side_next, scale, tail, slack, a, d, stack, found):
+    """(x, transition, row): the first transition out of ``mode`` on the step, at the fraction x of it; x = NONE: none.
+
+    A transition is out of the question as soon as one of its rows is certainly <= 0 throughout. Where two fire
+    together, the one declared first is taken.
+    """
+    first, outgoing, transitions, rows, _ = net
+    best, which, hit = NONE, -1, -1
+    for j in range(first[mode], first[mode + 1]):
+        k = outgoing[j]
+        lo, hi = transitions[k, 2], transitions[k, 3]
+        dead, opened = False, False
+        for r in range(lo, hi):
+            i, sign = rows[r, 0], rows[r, 1]
+            mr = load(C, n + i, sign, m, powers, a)
+            error = _error(a, mr, tail, slack, scale[i])
+            mr = strip(a, mr)
+            if mr < 0:
+                if rows[r, 2] == 1:
+                    dead = True
+                    break
+                continue
+            low, high = bounds(a, mr)
+            if high + error <= 0.0:
+                side_next[i] = -sign
+                dead = True
+                break
+            if low - error > 0.0 and sign * side[i] >= 0:
+                side_next[i] = sign
+            else:
+                opened = True
+        if dead or not opened:
+            continue
+        x, r = _fires(lo, hi, C, m, n, powers, rows, side, side_next, scale, tail, slack, a, d, stack, found)
+        if x < best * (1.0 - 1e-14):
+            best, which, hit = x, k, r
+    return best, which, hit
+
+
+@device
+def section_crossing(C, row, m, way, before, cursor, powers, scale, a, stack, found):
+    """The next x > cursor (fraction of the step) where a row changes sign in the direction ``way``, or NONE."""
+    mr = load(C, row, 1, m, powers, a)
+    if cursor > 0.0:
+        shift(a, mr, cursor, 1.0 - cursor, a)
+        if fabs(a[0]) <= NOISE * scale:
+            a[0] = 0.0
+        before = 0
+    mr = strip(a, mr)
+    if mr < 0:
+        found[1] = 0
+        return NONE
+    low, high = bounds(a, mr)
+    if (low > 0.0 and before >= 0) or (high < 0.0 and before <= 0):
+        found[1] = 1 if low > 0.0 else -1
+        return NONE
+    x = first_crossing(a, mr, way, before, 0.0, stack, found)
+    return NONE if x == NONE else cursor + x * (1.0 - cursor)
+
+
+@device
+def sides_at(C, m, n, n_indicators, x, powers, scale, a, side):
+    """Signs of the indicators just before x: where a step is cut although no transition fires there."""
+    for i in range(n_indicators):
+        mr = load(C, n + i, 1, m, powers, a)
+        v, slope = a[mr], 0.0
+        for k in range(mr - 1, -1, -1):
+            slope = slope * x + v
+            v = v * x + a[k]
+        if fabs(v) <= NOISE * scale[i]:
+            v = -slope
+        side[i] = 1 if v > 0.0 else (-1 if v < 0.0 else 0)

@@ -1,0 +1,204 @@
+"""One leg of a planar trajectory and what happens at its end: jumps, after-limits, start rules.
+
+A leg is one step of the mode, or its part up to the first crossing, section return or stop. ``w`` holds
+(x, v, 1, cos k_1 w t, sin k_1 w t, ...), ``s`` is the time since the start of the forcing period.
+
+``transitions`` rows: target, has reset, is contact. ``rows`` rows: functional, sign, strict; the last two belong to
+the Poincare section (rising, falling). ``mode_start``/``mode_list``: outgoing transitions of a mode in declared order.
+"""
+
+from math import cos, fabs, isfinite, sin
+
+from .cache import device, inline
+from .codes import BEYOND_STOP, OK
+from .planar_search import dense, place, search, slope_of, to_node, value_of
+from .planar_tables import HARMONICS, NODES, M
+
+EPS = 2.3e-16
+
+
+@inline
+def set_phase(w, s, rates):
+    """Harmonics of the forcing at the time s in the period."""
+    for h in range(HARMONICS):
+        w[3 + 2 * h] = cos(rates[h] * s)
+        w[4 + 2 * h] = sin(rates[h] * s)
+
+
+@inline
+def rounding(fun, mode, f, at, w):
+    """Below this the row fun[mode, f, at:] is zero within rounding at w."""
+    total = fabs(fun[mode, f, at] * w[0]) + fabs(fun[mode, f, at + 1] * w[1]) + fabs(fun[mode, f, at + 2])
+    for j in range(3, M):
+        total += fabs(fun[mode, f, at + j] * w[j])
+    return 16.0 * EPS * total
+
+
+@inline
+def mark_zeros(fun, mode, w, zero):
+    """Which indicators are zero within rounding at w."""
+    for f in range(zero.shape[0]):
+        zero[f] = 1 if fabs(value_of(fun, mode, f, w)) <= rounding(fun, mode, f, 0, w) else 0
+
+
+@device
+def sign_of_derivatives(prop, rot, fun, field, mode, rates, w, f, wn, scr, mark):
+    """Sign of the first derivative of functional f, from the second to the fourth, that is not zero."""
+    place(prop, rot, field, mode, rates, w, 0, wn, scr, mark)
+    mark[0] = -1
+    for k in range(2, 5):
+        total = fun[mode, f, 0] * scr[0, k] + fun[mode, f, 1] * scr[1, k]
+        size = fabs(fun[mode, f, 0] * scr[0, k]) + fabs(fun[mode, f, 1] * scr[1, k])
+        for j in range(3, M):
+            total += fun[mode, f, j] * scr[j - 1, k]
+            size += fabs(fun[mode, f, j] * scr[j - 1, k])
+        if fabs(total) > 64.0 * EPS * size:
+            return 1 if total > 0.0 else -1
+    return 0
+
+
+@inline
+def sign_after(prop, rot, fun, field, mode, rates, w, f, zero, wn, scr, mark):
+    """Sign (-1, 0, 1) of functional f just after w along the mode: its value's, or its first non-zero derivative's."""
+    if f >= zero.shape[0] or zero[f] == 0:
+        return 1 if value_of(fun, mode, f, w) > 0.0 else -1
+    slope = slope_of(fun, mode, f, w)
+    if fabs(slope) > rounding(fun, mode, f, M, w):
+        return 1 if slope > 0.0 else -1
+    return sign_of_derivatives(prop, rot, fun, field, mode, rates, w, f, wn, scr, mark)
+
+
+@inline
+def next_holding(prop, rot, fun, field, mode, rates, w, rows, row_start, mode_start, mode_list, zero, wn, scr, mark):
+    """The first outgoing transition (in declared order) whose rows all hold just after w, or -1."""
+    for k in range(mode_start[mode], mode_start[mode + 1]):
+        t = mode_list[k]
+        lo = row_start[t]
+        hi = row_start[t + 1]
+        holds = lo < hi
+        for r in range(lo, hi):
+            sign = sign_after(prop, rot, fun, field, mode, rates, w, rows[r, 0], zero, wn, scr, mark) * rows[r, 1]
+            if sign < 0 or (sign == 0 and rows[r, 2] != 0):
+                holds = False
+                break
+        if holds:
+            return t
+    return -1
+
+
+@device
+def settle(
+    prop, rot, fun, field, mode, rates, w, transitions, rows, row_start, mode_start, mode_list, zero, wn, scr, mark
+):
+    """Start rule: transitions without a reset that already hold are taken, each mode at most once.
+
+    Returns (mode, status): BEYOND_STOP where one with a reset holds."""
+    visited = 1 << mode
+    for _ in range(64):
+        mark_zeros(fun, mode, w, zero)
+        t = next_holding(
+            prop, rot, fun, field, mode, rates, w, rows, row_start, mode_start, mode_list, zero, wn, scr, mark
+        )
+        if t < 0:
+            return mode, OK
+        if transitions[t, 1] != 0:
+            return mode, BEYOND_STOP
+        if (visited >> transitions[t, 0]) & 1:
+            return mode, OK
+        mode = transitions[t, 0]
+        visited |= 1 << mode
+    return mode, OK
+
+
+@inline
+def jump(i, t, fired, fun, w, wn, transitions, ra, rb, rc, rs, zero):
+    """Take transition t (its functional ``fired`` has just crossed; -1: a time trigger). Returns the new mode."""
+    mode = transitions[t, 0]
+    if transitions[t, 1] != 0:
+        for r in range(2):
+            wn[r] = ra[i, t, r, 0] * w[0] + ra[i, t, r, 1] * w[1] + rb[i, t, r]
+            for h in range(HARMONICS):
+                wn[r] += rc[i, t, h, r] * w[3 + 2 * h] + rs[i, t, h, r] * w[4 + 2 * h]
+        w[0] = wn[0]
+        w[1] = wn[1]
+        fired = -1
+    mark_zeros(fun, mode, w, zero)
+    if fired >= 0:
+        zero[fired] = 1
+    return mode
+
+
+@inline
+def trigger(mode, s, period, mode_start, mode_list, at):
+    """Time to the next time-triggered transition of the mode, and that transition (-1: none)."""
+    wait = 1e300
+    which = -1
+    for k in range(mode_start[mode], mode_start[mode + 1]):
+        t = mode_list[k]
+        if at[t] >= 0.0:
+            r = at[t] * period - s
+            if r <= 0.0:
+                r += period
+            if r < wait:
+                wait = r
+                which = t
+    return wait, which
+
+
+@inline
+def leg(
+    prop, rot, fun, field, info, mode, rates, w, r_max, rows, row_start, mode_start, mode_list,
+    surface, direction, surface_mode, zero, w1, wn, wp, wq, scr, mark, points, end, found,
+):  # fmt: skip
+    """March one step of the mode, or less: to r_max, or to the first crossing or section return.
+
+    ``end`` receives w at the leg's end, w1 stands at the end of the whole step. Returns (time marched, transition or
+    -1, section direction or 0); ``found[0]`` is the functional that crossed.
+    """
+    mark[0] = -1
+    to_node(prop, rot, mode, NODES, w, w1)
+    step = info[mode, 0]
+    best = min(step, r_max)
+    fired = -1
+    crossed = 0
+    functional = -1
+    n_rows = rows.shape[0]
+    start = mode_start[mode]
+    n_own = mode_start[mode + 1] - start
+    n_all = n_own + 2 if surface >= 0 and (surface_mode < 0 or surface_mode == mode) else n_own
+    for k in range(n_all):
+        t = -1
+        sense = 0
+        if k < n_own:
+            t = mode_list[start + k]
+            lo = row_start[t]
+            hi = row_start[t + 1]
+        else:
+            sense = 1 - 2 * (k - n_own)
+            lo = n_rows - 2 + k - n_own
+            hi = lo + 1
+        if lo == hi or direction * sense < 0:
+            continue
+        tau = search(
+            prop, rot, fun, field, info, mode, rates, w, w1, rows, lo, hi, zero, best, wn, wp, wq, scr, mark, points,
+            found,
+        )  # fmt: skip
+        if tau >= 0.0 and (tau < best or (fired < 0 and crossed == 0 and tau <= best)):
+            best = tau
+            fired = t
+            crossed = sense
+            functional = found[0]
+    found[0] = functional
+    if fired < 0 and crossed == 0 and r_max >= step:
+        for j in range(M):
+            end[j] = w1[j]
+        best = step
+    else:
+        dense(prop, rot, field, info, mode, rates, w, best, wn, scr, mark, end)
+    return best, fired, crossed
+
+
+@inline
+def bounded(w, limit):
+    """Finite and below the limits of divergence."""
+    return isfinite(w[0]) and isfinite(w[1]) and fabs(w[0]) < limit[0] and fabs(w[1]) < limit[1]

@@ -1,0 +1,29 @@
+"""The planar kernels for a given number of harmonics.
+
+The four planar files are written once, with the number of harmonics a constant at the top; here their text is
+joined into one module with that constant set, so that every inner loop has constant bounds (a factor of two).
+"""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+
+from nonsmooth.kernels.cache import load_module
+
+__all__ = ["planar_module"]
+
+PARTS = ("planar_tables", "planar_search", "planar_march", "planar")
+
+
+@cache
+def planar_module(harmonics: int) -> ModuleType:
+    """The module with ``chain``, ``record`` and ``scratch`` for forcing with ``harmonics`` >= 0 harmonics."""
+    folder = Path(__file__).parent
+    text = "\n".join((folder / f"{part}.py").read_text(encoding="utf-8") for part in PARTS)
+    text = re.sub(r"^from \.planar_\w+ import (\([^)]*\).*|[^(\n]*)$", "", text, flags=re.MULTILINE)
+    text = re.sub(r"^from \.(\w+) import", r"from nonsmooth.kernels.\1 import", text, flags=re.MULTILINE)
+    text = re.sub(r"^HARMONICS = 1$", f"HARMONICS = {harmonics}", text, flags=re.MULTILINE)
+    return load_module(text, f"planar_{harmonics}")

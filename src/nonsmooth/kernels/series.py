@@ -1,0 +1,385 @@
+"""The hybrid loop of the series methods: steps, crossings, jumps, sections and records of one trajectory.
+
+Every step is a polynomial in the local time for each row (states, indicators, outputs): the Taylor jet itself, or the
+quintic of a Runge-Kutta-Fehlberg step. Crossings, sections, extremes, touches and samples are read off it. Steps end
+exactly at stops: the phase of a section, the end of a period, time-triggered transitions, the end of the run.
+
+The places in ``choice``, ``control``, ``tally`` and ``memo`` have names in ``series_places``; ``net`` is described in
+``crossing``, ``work`` (scratch) in ``flow.series_tables``.
+"""
+
+from math import fabs, inf, log
+
+from .cache import device
+from .codes import DIVERGED, LOG_FULL, NO_CONVERGENCE, NOT_GUARANTEED, OK
+from .crossing import NOISE, earliest, holds, section_crossing, sides_at
+from .polynomial import NONE
+from .rkf45 import first_step, hermite, quiet, stages, transit
+from .series_node import begin, count_pass, leap, look, meets_section, next_is_edge, open_window
+from .series_places import (
+    AFTER, BEGUN, CORNERS, CROSSINGS, DOUBTFUL, EXACT, HALVINGS, JUMPS, LOCATE, METHOD, MOST_STEPS, N_INDICATORS,
+    N_OUTPUTS, N_PARAMETERS, ORDER, PERIOD, PHASE, RECORD, RISING, RKF45, RTOL, SAMPLES, SECTION, SECTION_MODE,
+    SEGMENT, SETTLED, SINCE_CROSSING, SINCE_RETURN, SMOOTH_INDICATORS, STEP, STEPS, STEPS_IN_RETURN, T_MAX, TAYLOR,
+    TOUCHES, TRANSIENT, UNTIL, WINDOW,
+)  # fmt: skip
+from .taylor import dense_states, fill_powers, step_length
+from .watch import extend, extend_at_node, extend_corners, sample, touches, write_sample
+
+__all__ = ["march"]
+
+
+@device
+def next_stop(mode, t, base, period, phase, until, net):
+    """The next time at which a step must end."""
+    stop = period if until < 0.0 else min(period, until - base)
+    if t < phase < stop:
+        stop = phase
+    transitions, at = net[2], net[4]
+    for k in range(at.shape[0]):
+        if at[k] >= 0.0 and transitions[k, 0] == mode and t < at[k] * period < stop:
+            stop = at[k] * period
+    return stop
+
+
+@device
+def triggered(mode, t, period, net):
+    """The time-triggered transition out of ``mode`` at the time t of the period, or -1."""
+    transitions, at = net[2], net[4]
+    for k in range(at.shape[0]):
+        if at[k] >= 0.0 and transitions[k, 0] == mode and at[k] * period == t:
+            return k
+    return -1
+
+
+@device
+def no_doubt(C, m, n, n_indicators, h, scale):
+    """Shorten an exact step until the series of nonlinear indicators has converged as well."""
+    for _ in range(60):
+        worst, power = 0.0, h ** (m - 1)
+        for i in range(n_indicators):
+            if scale[i] > 0.0:
+                worst = max(worst, (fabs(C[n + i, m - 1]) * power + fabs(C[n + i, m]) * power * h) / scale[i])
+        if not (worst > 1e-16):
+            break
+        h *= 0.8
+    return h
+
+
+@device
+def failed(u, n, largest):
+    """Whether the state has left every bound."""
+    for i in range(n):
+        if not (fabs(u[i]) <= largest[i]):
+            return True
+    return False
+
+
+@device
+def polished(values, mode, t, q, C, m, n, row, h, tau, u_dense, vals):
+    """A zero of the interpolated row ``row`` (an indicator's), moved to the zero of the indicator of the dense state."""
+    at = tau
+    for _ in range(4):
+        dense_states(C, m, n, at, u_dense)
+        values(mode, t + at, u_dense, q, vals)
+        slope = 0.0
+        for k in range(m, 0, -1):
+            slope = slope * at + k * C[n + row, k]
+        if slope == 0.0:
+            break
+        move = vals[row] / slope
+        if not (fabs(at - move - tau) <= 1e-3 * h and 0.0 <= at - move <= h):
+            break
+        at -= move
+        if fabs(move) <= 4e-16 * h:
+            break
+    return at
+
+
+@device
+def at_end(C, m, row, h):
+    """Value and slope of a row at the end of a part of the step."""
+    v, slope = C[row, m], 0.0
+    for k in range(m - 1, -1, -1):
+        slope = slope * h + v
+        v = v * h + C[row, k]
+    return v, slope
+
+
+@device
+def march(
+    field, jet, values, jump, net, lacking, smooth, choice, control, norms, exact_steps, u, q, clock, counters, work,
+    sections, extremes, tally, memo, times, samples, crossings, touch_log,
+):  # fmt: skip
+    """Run one trajectory until its section returns are counted or its time is reached. Returns a status."""
+    C, W, J0, J1, K, powers, a, d, vals, u_new, q_new = work[:11]
+    scale, measured, side, side_next, rise, usual, _, stack, found, u_dense, u_before = work[11:]
+    n, n_indicators, order, method = u.shape[0], choice[N_INDICATORS], choice[ORDER], choice[METHOD]
+    rows, n_modes = n + n_indicators + choice[N_OUTPUTS], lacking.shape[0]
+    rkf, record, section = method == RKF45, choice[RECORD] == 1, choice[SECTION]
+    degree = 5 if rkf else order
+    rtol, fixed, period, phase, until, t_max = (
+        control[RTOL], control[STEP], control[PERIOD], control[PHASE], control[UNTIL], control[T_MAX],
+    )  # fmt: skip
+    log_rtol, tail, forced = log(rtol), (1.0 if method == TAYLOR else 0.0), period < inf
+    mode, t, status, zero_row, take = counters[0], clock[0], OK, -1, False
+
+    if tally[BEGUN] == 0:
+        tally[BEGUN] = 1
+        for i in range(n_indicators):
+            scale[i], measured[i], side[i] = 0.0, 0.0, 0
+        rise[:] = 0
+        usual[:] = 0.0
+        mode, status = begin(
+            jet, jump, mode, t, u, q, tally[SETTLED], choice, norms, log_rtol, rtol, fixed, exact_steps, net, work
+        )
+        tally[READY] = 1
+        if section >= 0:  # a start on the section is no return, nor is a carried state left there
+            X = J0 if rkf else C
+            if fabs(X[n + section, 0]) <= 1e-9 * scale[section]:
+                X[n + section, 0] = 0.0
+                side[section] = 0
+        if not record and choice[TRANSIENT] == 0:
+            open_window(tally, memo, clock, t, extremes)
+            take = True
+    ready = tally[READY] == 1
+
+    while status == OK:
+        if record and (
+            crossings.shape[0] - tally[CROSSINGS] < n_modes + 4
+            or touch_log.shape[0] - tally[TOUCHES] < (net[3].shape[0] + 1) * (degree + 1)
+        ):
+            status = LOG_FULL
+            break
+        if not ready:
+            look(jet, mode, t, u, q, False, choice, norms, log_rtol, rtol, fixed, exact_steps, work)
+            if zero_row >= 0:
+                (J0 if rkf else C)[n + zero_row, 0] = 0.0
+                side[zero_row] = 0
+                zero_row = -1
+            ready = True
+        if take:
+            extend_at_node(J0 if rkf else C, rows, lacking, mode, n, extremes)
+            take = False
+        watched = record or tally[WINDOW] == 1
+
+        # --- the length of the step
+        base = clock[1] * period if forced else 0.0
+        stop = next_stop(mode, t, base, period, phase, until, net)
+        remaining = stop - t
+        if fixed > 0.0:
+            h = fixed
+        elif rkf:
+            h = usual[mode] if usual[mode] > 0.0 else first_step(J0, u, n, norms[1], rtol)
+        elif method == TAYLOR:
+            h = step_length(C, order, n, n_indicators, u, norms[0], scale, log_rtol)
+        else:
+            h = exact_steps[mode]
+            if choice[SMOOTH_INDICATORS] == 1:
+                h = no_doubt(C, order, n, n_indicators, h, scale)
+        if not (h > 1e-16 * t):
+            status = DIVERGED
+            break
+        if section >= 0:
+            wait = t_max - memo[SINCE_RETURN]
+            if wait <= 1e-12 * t_max or tally[STEPS_IN_RETURN] > MOST_STEPS or memo[SINCE_RETURN] > 1e100:
+                status = NO_CONVERGENCE
+                break
+            h = min(h, wait)
+        if h == inf and remaining == inf:  # a polynomial solution: any length is right
+            h = max(1.0, memo[SINCE_RETURN])
+        planned = h
+        if rkf and fixed <= 0.0:
+            h = min(h, 1.1 * transit(mode, J0, n, net))
+        landing = h >= remaining * (1.0 - 1e-13)
+        if landing:
+            h = remaining
+        elif fixed <= 0.0 and h > 0.5 * remaining:
+            h = 0.5 * remaining
+
+        # --- the step, and the first transition on it
+        pending, hit, x, calm, halvings, error = -1, -1, NONE, False, 0, 0.0
+        while True:
+            if rkf:
+                k1 = K[0]
+                for i in range(n):
+                    k1[i] = J0[i, 1]
+                error = stages(field, mode, t, u, q, h, n, K, fixed <= 0.0, norms[1], rtol)
+                if fixed <= 0.0 and not (error <= 1.0):
+                    h *= max(0.2, 0.9 * error**-0.2) if error < inf else 0.1
+                    planned, landing = h, False
+                    if not (h > 1e-16 * t):
+                        status = DIVERGED
+                        break
+                    continue
+                jet(mode, 2, t + h, K[7], q, J1, W)
+            for i in range(n_indicators):
+                side_next[i] = 0
+            slack = rtol * error if rkf and fixed <= 0.0 else 0.0
+            if rkf:
+                calm = choice[LOCATE] == 0 or quiet(
+                    mode, J0, J1, n, h, net, side, side_next, scale, slack, section, choice[SECTION_MODE]
+                )
+                if calm and not watched:
+                    break
+                hermite(J0, J1, rows, h, C)
+            fill_powers(h, degree, powers)
+            if calm or choice[LOCATE] == 0:
+                break
+            found[0] = 0
+            for i in range(n_indicators):
+                side_next[i] = 0
+            x, pending, hit = earliest(
+                mode, C, degree, n, powers, net, side, side_next, scale, tail, slack, a, d, stack, found
+            )
+            if found[0] == 0 or fixed > 0.0 or halvings == HALVINGS:
+                if found[0] == 1:
+                    tally[DOUBTFUL] = 1
+                break
+            h *= 0.5  # a graze nearer than the polynomial is sure of
+            landing = False
+            halvings += 1
+        if status != OK:
+            break
+        if rkf:
+            growth = min(5.0, 0.9 * error**-0.2) if error > 0.0 else 5.0
+            usual[mode] = growth * h if growth < 1.0 else max(planned, growth * h)
+        part = h
+        if pending >= 0:
+            part = x * h
+            if rkf:
+                part = polished(values, mode, t, q, C, degree, n, net[3][hit, 0], h, part, u_dense, vals)
+
+        # --- passes of a Poincare section before that
+        edge = False
+        if section >= 0 and not calm and (choice[SECTION_MODE] < 0 or choice[SECTION_MODE] == mode):
+            cursor, limit, before = 0.0, part / h, side[section]
+            while cursor < 1.0:
+                x = section_crossing(
+                    C, n + section, degree, choice[RISING], before, cursor, powers, scale[section], a, stack, found
+                )
+                side_next[section] = found[1]
+                if x == NONE or (pending >= 0 and x >= limit * (1.0 - 1e-10)):
+                    break
+                tau = x * h
+                if rkf:
+                    tau = polished(values, mode, t, q, C, degree, n, section, h, tau, u_dense, vals)
+                if next_is_edge(choice, tally):
+                    edge, pending, part = True, -1, tau
+                    break
+                dense_states(C, degree, n, tau, u_dense)
+                count_pass(choice, tally, memo, clock, t + tau, period, mode, u_dense, sections, extremes)
+                memo[SINCE_RETURN] = -tau
+                cursor, before = x, 0
+
+        # --- what is observed on the step, then its end
+        cut = edge or pending >= 0
+        if watched:
+            fill_powers(part, degree, powers)
+            if record:
+                tally[SAMPLES] = sample(
+                    times, tally[SAMPLES], base, t, part, C, degree, n, q, choice[N_PARAMETERS], mode, tally[SEGMENT],
+                    u_dense, samples,
+                )  # fmt: skip
+                tally[TOUCHES] = touches(
+                    mode, t + base, part, C, degree, n, powers, net, scale, rise, a, d, stack, found, u_dense,
+                    touch_log, tally[TOUCHES],
+                )  # fmt: skip
+            else:
+                extend(C, degree, rows, powers, lacking, mode, n, smooth, extremes, a, stack)
+                if choice[CORNERS] == 1:
+                    extend_corners(
+                        values, mode, t, part, C, degree, n, n_indicators, q, smooth, extremes, u_dense, vals
+                    )
+        slope_before, value_before = 0.0, 0.0
+        if pending >= 0 and section >= 0:
+            value_before, slope_before = at_end(C, degree, n + section, part)
+        if rkf and not cut:
+            new = K[7]
+            for i in range(n):
+                u[i] = new[i]
+        else:
+            dense_states(C, degree, n, part, u)
+        if edge:
+            sides_at(C, degree, n, n_indicators, part / h, powers, scale, a, side)
+        landing = landing and not cut
+        t = stop if landing else t + part
+        memo[SINCE_RETURN] += part
+        memo[SINCE_CROSSING] += part
+        tally[STEPS] += 1
+        tally[STEPS_IN_RETURN] += 1
+        if failed(u, n, norms[2]):
+            status = DIVERGED
+            break
+
+        # --- the instant at its end
+        mode_before = mode
+        ready = False
+        arrived = landing and record and stop == until - base
+        if not cut:
+            for i in range(n_indicators):
+                side[i] = side_next[i]
+            if rkf:
+                for i in range(rows):
+                    J0[i, 0], J0[i, 1], J0[i, 2] = J1[i, 0], J1[i, 1], J1[i, 2]
+                for i in range(n_indicators):
+                    scale[i] = max(scale[i], fabs(J0[n + i, 0]))
+                ready = True
+            if choice[LOCATE] == 0:
+                if not ready:
+                    look(jet, mode, t, u, q, False, choice, norms, log_rtol, rtol, fixed, exact_steps, work)
+                    ready = True
+                pending = judged_at_end(mode, J0 if rkf else C, n, n_indicators, net, work[13], side_next, visited=work[17])
+        for i in range(n):
+            u_before[i] = u[i]
+        if landing and stop == period:
+            clock[1] += 1.0
+            t = 0.0
+            if record:
+                tally[JUMPS] = 0
+        if landing and pending < 0:
+            pending = triggered(mode, t, period, net)
+        if pending >= 0:
+            counters[1] = hit
+            mode, status = leap(
+                jet, values, jump, pending, hit, mode, t, clock, u, q, choice, norms, log_rtol, rtol, fixed, period,
+                exact_steps, lacking, net, work, extremes, tally, memo, crossings,
+            )  # fmt: skip
+            if hit >= 0 and usual[mode] <= 0.0:
+                usual[mode] = planned
+            rise[:] = 0
+            ready = True
+            if record and not forced:
+                tally[JUMPS] = 0
+            if status != OK:
+                break
+        passed = edge or (landing and t == phase)
+        if pending >= 0 and section >= 0 and hit >= 0:
+            X = J0 if rkf else C
+            meets = meets_section(
+                choice, value_before, slope_before, X[n + section, 0], X[n + section, 1], NOISE * scale[section]
+            )
+            passed = meets and (
+                choice[SECTION_MODE] < 0 or choice[SECTION_MODE] == (mode if choice[AFTER] == 1 else mode_before)
+            )
+        if passed:
+            after = choice[AFTER] == 1 or pending < 0
+            seen = count_pass(
+                choice, tally, memo, clock, t, period, mode if after else mode_before, u if after else u_before,
+                sections, extremes,
+            )  # fmt: skip
+            if edge:
+                zero_row = section
+            if seen == 2:
+                break
+            take = seen == 1
+        if arrived:
+            while tally[SAMPLES] < times.shape[0] and times[tally[SAMPLES]] <= until:
+                write_sample(samples, tally[SAMPLES], u, n, q, choice[N_PARAMETERS], mode, tally[SEGMENT])
+                tally[SAMPLES] += 1
+            break
+
+    counters[0], clock[0] = mode, t
+    tally[READY] = 1 if ready else 0
+    if status == OK and tally[DOUBTFUL] == 1:
+        status = NOT_GUARANTEED
+    return status

@@ -1,0 +1,196 @@
+"""What happens at one instant: the jets there, start rules, jumps with their chains, and returns to the section."""
+
+from math import fabs, inf
+
+from .cache import device
+from .codes import BEYOND_STOP, CHATTER, NO_CONVERGENCE, OK, TOO_MANY_CROSSINGS
+from .crossing import NOISE, holding, holds, snap
+from .rkf45 import first_step
+from .series_places import (
+    AFTER, CROSSINGS, ELAPSED, EVERY, EXACT, KEEP, KEPT_CONTACTS, KEPT_CROSSINGS, JUMPS, LONGEST, METHOD, MOST_JUMPS,
+    MOST_RAPID, N_INDICATORS, N_OUTPUTS, N_PARAMETERS, ORDER, PASSES, PERIOD, RAPID, RECORD, RETURNS, RISING, RKF45,
+    RTOL, SECTION, SECTION_MODE, SEGMENT, SINCE_CROSSING, SINCE_RETURN, STEP, STEPS_IN_RETURN, TRANSIENT, WINDOW,
+    WINDOW_FRACTION, WINDOW_PERIODS,
+)  # fmt: skip
+from .taylor import step_length
+from .watch import extend_at_node, forget
+
+__all__ = ["begin", "count_pass", "leap", "look"]
+
+
+@device
+def look(jet, mode, t, u, q, fresh, choice, norms, log_rtol, rtol, fixed, exact_steps, work):
+    """Jets at (t, u). At a fresh node (a start, or after a jump) also the after-limits."""
+    C, W, J0, scale, measured, side, usual = work[0], work[1], work[2], work[11], work[12], work[13], work[16]
+    n, n_indicators = u.shape[0], choice[N_INDICATORS]
+    if choice[METHOD] == RKF45:
+        m = 4 if fresh else 2
+        jet(mode, m, t, u, q, J0, W)
+        X = J0
+    else:
+        m = choice[ORDER]
+        jet(mode, m, t, u, q, C, W)
+        X = C
+    if fresh:
+        h = usual[mode]
+        if fixed > 0.0:
+            h = fixed
+        elif choice[METHOD] == EXACT:
+            h = exact_steps[mode]
+        elif choice[METHOD] == RKF45:
+            if h <= 0.0:
+                h = first_step(X, u, n, norms[1], rtol)
+        else:
+            h = step_length(X, m, n, n_indicators, u, norms[0], scale, log_rtol)
+        if not (h < inf):
+            h = 1.0
+        for i in range(n_indicators):
+            if scale[i] == 0.0:
+                scale[i] = max(fabs(X[n + i, 0]), fabs(X[n + i, 1]) * h)
+        snap(X, m, n, n_indicators, h, scale, measured, side)
+    for i in range(n_indicators):
+        scale[i] = max(scale[i], fabs(X[n + i, 0]))
+
+
+@device
+def begin(jet, jump, mode, t, u, q, settled, choice, norms, log_rtol, rtol, fixed, exact_steps, net, work):
+    """The start rule: (mode, status). Transitions without reset that hold already are taken, each mode at most once."""
+    first, outgoing, transitions = net[0], net[1], net[2]
+    side, visited, u_new, q_new = work[13], work[17], work[9], work[10]
+    for i in range(visited.shape[0]):
+        visited[i] = 0
+    visited[mode] = 1
+    look(jet, mode, t, u, q, True, choice, norms, log_rtol, rtol, fixed, exact_steps, work)
+    while settled == 0:
+        k = -1
+        for j in range(first[mode], first[mode + 1]):
+            o = outgoing[j]
+            if holds(o, net, side):
+                if transitions[o, 5] == 1:
+                    return mode, BEYOND_STOP
+                if visited[transitions[o, 1]] == 0:
+                    k = o
+                    break
+        if k < 0:
+            break
+        jump(k, t, u, q, u_new, q_new)
+        u[:] = u_new
+        q[:] = q_new
+        mode = transitions[k, 1]
+        visited[mode] = 1
+        look(jet, mode, t, u, q, True, choice, norms, log_rtol, rtol, fixed, exact_steps, work)
+    return mode, OK
+
+
+@device
+def leap(
+    jet, values, jump, pending, hit, mode, t, clock, u, q, choice, norms, log_rtol, rtol, fixed, period, exact_steps,
+    lacking, net, work, extremes, tally, memo, crossings,
+):  # fmt: skip
+    """Take the transition ``pending`` (its row ``hit`` crossed; -1: none) and those that then hold: (mode, status)."""
+    transitions, rows = net[2], net[3]
+    C, J0, vals, measured, side = work[0], work[2], work[8], work[12], work[13]
+    u_new, q_new = work[9], work[10]
+    n, n_parameters = u.shape[0], choice[N_PARAMETERS]
+    scale_of_time = max(memo[LONGEST], memo[SINCE_CROSSING])
+    memo[LONGEST] = scale_of_time
+    if period < inf:
+        scale_of_time = period
+    tally[RAPID] = tally[RAPID] + 1 if memo[SINCE_CROSSING] < 1e-12 * scale_of_time else 0
+    memo[SINCE_CROSSING] = 0.0
+    if hit >= 0:
+        values(mode, t, u, q, vals)
+        measured[rows[hit, 0]] = fabs(vals[rows[hit, 0]])
+    for turn in range(lacking.shape[0] + 3):
+        jump(pending, t, u, q, u_new, q_new)
+        if choice[RECORD] == 1:
+            row = tally[CROSSINGS]
+            crossings[row, 0] = t + (clock[1] * period if period < inf else 0.0)
+            crossings[row, 1] = pending
+            for i in range(n):
+                crossings[row, 2 + i] = u[i]
+                crossings[row, 2 + n + i] = u_new[i]
+            for i in range(q.shape[0] - n_parameters):
+                crossings[row, 2 + 2 * n + i] = q_new[n_parameters + i]
+            tally[CROSSINGS] += 1
+        u[:] = u_new
+        q[:] = q_new
+        mode = transitions[pending, 1]
+        tally[SEGMENT] += 1
+        tally[JUMPS] += 1
+        if tally[WINDOW] == 1:
+            tally[KEPT_CROSSINGS] += 1
+            tally[KEPT_CONTACTS] += transitions[pending, 4]
+        look(jet, mode, t, u, q, True, choice, norms, log_rtol, rtol, fixed, exact_steps, work)
+        if tally[WINDOW] == 1:
+            all_rows = n + choice[N_INDICATORS] + choice[N_OUTPUTS]
+            extend_at_node(J0 if choice[METHOD] == RKF45 else C, all_rows, lacking, mode, n, extremes)
+        if hit >= 0 and turn == 0:
+            measured[rows[hit, 0]] = 0.0
+        if tally[JUMPS] > MOST_JUMPS:
+            return mode, TOO_MANY_CROSSINGS
+        pending = holding(mode, net, side)
+        if pending < 0:
+            return mode, CHATTER if tally[RAPID] > MOST_RAPID else OK
+    return mode, CHATTER
+
+
+@device
+def next_is_edge(choice, tally):
+    """Whether the next pass of the section opens or closes the kept window."""
+    if (tally[PASSES] + 1) % choice[EVERY] != 0:
+        return False
+    r = tally[RETURNS] + 1
+    return r in (choice[TRANSIENT], choice[TRANSIENT] + choice[KEEP])
+
+
+@device
+def count_pass(choice, tally, memo, clock, t, period, mode, u, sections, extremes):
+    """Count a pass of the section at the time t of the period. Returns 1 where the window opens, 2 where it closes."""
+    tally[PASSES] += 1
+    if tally[PASSES] % choice[EVERY] != 0:
+        return 0
+    memo[SINCE_RETURN] = 0.0
+    tally[JUMPS] = 0
+    tally[STEPS_IN_RETURN] = 0
+    tally[RETURNS] += 1
+    row = tally[RETURNS] - choice[TRANSIENT] - 1
+    if row >= 0:
+        n = u.shape[0]
+        for i in range(n):
+            sections[row, i] = u[i]
+        sections[row, n] = t + (clock[1] * period if period < inf else 0.0)
+        sections[row, n + 1] = mode
+    if row + 1 == choice[KEEP]:
+        span = (clock[1] - memo[WINDOW_PERIODS]) * period if period < inf else 0.0
+        memo[ELAPSED] = span + (t - memo[WINDOW_FRACTION])
+        return 2
+    if row == -1:
+        open_window(tally, memo, clock, t, extremes)
+        return 1
+    return 0
+
+
+@device
+def open_window(tally, memo, clock, t, extremes):
+    """From here on extremes and crossings are kept."""
+    tally[WINDOW] = 1
+    tally[KEPT_CROSSINGS] = 0
+    tally[KEPT_CONTACTS] = 0
+    memo[WINDOW_PERIODS] = clock[1]
+    memo[WINDOW_FRACTION] = t
+    forget(extremes)
+
+
+@device
+def meets_section(choice, before, slope_before, after, slope_after, noise):
+    """Whether a transition at this instant is also a pass of the section: its indicator is zero before the jump.
+
+    The direction may be that of the arrival or, where the indicator stays zero, of the departure (an impact does
+    both)."""
+    if fabs(before) > noise:
+        return False
+    way = choice[RISING]
+    if way == 0 or slope_before * way > 0.0:
+        return True
+    return fabs(after) <= noise and slope_after * way > 0.0

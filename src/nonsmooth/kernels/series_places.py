@@ -1,0 +1,28 @@
+"""Places in the integer and float arrays that the series kernels share with their driver."""
+
+# Methods
+TAYLOR, RKF45, EXACT = 0, 1, 2
+
+# choice: what is asked for
+METHOD, ORDER, LOCATE, TRANSIENT, KEEP, SECTION, RISING, SECTION_MODE, AFTER, EVERY = range(10)
+RECORD, N_PARAMETERS, N_INDICATORS, N_OUTPUTS, CORNERS, SMOOTH_INDICATORS = range(10, 16)
+N_CHOICE = 16
+
+# control: tolerances and times (the phase in time units, -1 where the section is not stroboscopic)
+RTOL, STEP, PERIOD, PHASE, T_MAX, UNTIL = range(6)
+N_CONTROL = 6
+
+# tally: what has been counted; kept when a full log makes the kernel return and be called again
+BEGUN, SETTLED, RETURNS, PASSES, SAMPLES, CROSSINGS, TOUCHES, JUMPS, WINDOW = range(9)
+KEPT_CROSSINGS, KEPT_CONTACTS, RAPID, DOUBTFUL, STEPS, STEPS_IN_RETURN, SEGMENT, READY = range(9, 17)
+N_TALLY = 17
+
+# memo: times that go with them
+SINCE_RETURN, SINCE_CROSSING, LONGEST, WINDOW_FRACTION, WINDOW_PERIODS, ELAPSED = range(6)
+N_MEMO = 6
+
+# limits
+MOST_JUMPS = 1000  # transitions within one return or period
+MOST_RAPID = 50  # transitions in a row closer than 1e-12 of the time scale
+MOST_STEPS = 2_000_000  # within one return or period
+HALVINGS = 8  # of a step whose polynomial leaves a graze undecided

@@ -1,0 +1,56 @@
+"""Length of a Taylor step and evaluation of its polynomials.
+
+The order follows from the tolerance, p = ceil(1 - ln(rtol) / 2), and the length from the last two coefficients
+(Jorba and Zou, Exp. Math. 14 (2005) 99-117): a term c_p h^p may be rtol times the size of its row.
+"""
+
+from math import exp, fabs, inf, log
+
+from .cache import device
+
+__all__ = ["dense_states", "fill_powers", "step_length"]
+
+
+@device
+def step_length(C, order, n, n_indicators, u, weight, scale, log_rtol):
+    """h such that the last two terms are rtol (|u_i| + weight_i), for an indicator rtol times its own scale.
+
+    ``inf`` where the last coefficients vanish (a polynomial solution), NaN where they are not finite.
+    """
+    last, before = 0.0, 0.0
+    for i in range(n):
+        w = 1.0 / (fabs(u[i]) + weight[i])
+        last = max(last, fabs(C[i, order]) * w)
+        before = max(before, fabs(C[i, order - 1]) * w)
+        if not (last < inf and before < inf):
+            return float("nan")
+    for i in range(n_indicators):
+        if scale[i] > 0.0:
+            w = 1.0 / scale[i]
+            last = max(last, fabs(C[n + i, order]) * w)
+            before = max(before, fabs(C[n + i, order - 1]) * w)
+    power = inf
+    if last > 0.0:
+        power = (log_rtol - log(last)) / order
+    if before > 0.0 and order > 1:
+        power = min(power, (log_rtol - log(before)) / (order - 1))
+    return inf if power > 300.0 else exp(power)
+
+
+@device
+def fill_powers(h, m, powers):
+    """powers[k] = h^k, k = 0..m."""
+    power = 1.0
+    for k in range(m + 1):
+        powers[k] = power
+        power *= h
+
+
+@device
+def dense_states(C, m, n, tau, out):
+    """States at the local time tau of the step."""
+    for i in range(n):
+        v = C[i, m]
+        for k in range(m - 1, -1, -1):
+            v = v * tau + C[i, k]
+        out[i] = v

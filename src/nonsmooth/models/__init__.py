@@ -1,0 +1,15 @@
+"""Published oscillators, ready to run: each is a function that returns a `System`.
+
+Parameters are given by name: ``discontinuous_support(omega=3.69, g=-0.0045)``.
+"""
+
+from nonsmooth.models.discontinuous_support import discontinuous_support
+from nonsmooth.models.impact_oscillator import impact_oscillator
+from nonsmooth.models.relief_valve import relief_valve
+
+__all__ = ["discontinuous_support", "impact_oscillator", "names", "relief_valve"]
+
+
+def names() -> tuple[str, ...]:
+    """Return the names of all models, in alphabetical order."""
+    return tuple(sorted(name for name in __all__ if name != "names"))

@@ -1,0 +1,63 @@
+r"""A harmonically forced oscillator that hits a rigid stop: the rigid relative of the discontinuous support.
+
+Dankowicz & Schilder, *Recipes for Continuation* (SIAM 2013), Ex. 15.2. Known in closed form: the orbit
+that does not reach the stop grazes it at A = d sqrt((k - omega^2)^2 + (c omega)^2) (0.1 at the default values); the
+monodromy matrix of an orbit with one impact per period T has the determinant e^2 exp(-c T).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.system.transition import Transition
+
+if TYPE_CHECKING:
+    from nonsmooth.system.system import System
+
+__all__ = ["impact_oscillator"]
+
+
+def _motion(t: Any, u: Any, p: Any) -> Any:
+    x, v = u
+    return v, p.A * np.cos(p.omega * t) - p.k * x - p.c * v
+
+
+def _stop(t: Any, u: Any, p: Any) -> Any:
+    return u.x - p.d
+
+
+def _rebound(t: Any, u: Any, p: Any) -> Any:
+    return u.x, -p.e * u.v
+
+
+def impact_oscillator(**parameters: float) -> System:
+    r"""Return the impact oscillator :math:`\ddot x + c \dot x + k x = A \cos \omega t`, :math:`\dot x^+ = -e \dot x^-`
+    at :math:`x = d`.
+
+    Parameters
+    ----------
+    **parameters : float
+        ``k`` 1, ``c`` 0.1, ``omega`` 1, ``d`` 1 (the stop), ``e`` 0.8 (restitution), ``A`` 1; dimensionless.
+
+    Returns
+    -------
+    System
+        One mode ``motion``; indicator ``stop`` (x - d); one transition into the same mode with a reset.
+
+    References
+    ----------
+    H. Dankowicz, F. Schilder, *Recipes for Continuation*, SIAM 2013, Ex. 15.2.
+    """
+    from nonsmooth.system.system import System
+
+    system = System(
+        name="impact oscillator",
+        states={"x": "", "v": ""},
+        parameters={"k": 1.0, "c": 0.1, "omega": 1.0, "d": 1.0, "e": 0.8, "A": 1.0},
+        modes={"motion": _motion},
+        indicators={"stop": _stop},
+        transitions=[Transition("motion", "motion", when="stop > 0", reset=_rebound)],
+    )
+    return system.with_parameters(parameters) if parameters else system

@@ -1,0 +1,155 @@
+r"""Which mode rules where: the regions of a system in the plane of two states, sharp or smoothed.
+
+With the signed indicators :math:`g_r` of the condition under which the first mode is left, the margin is
+:math:`\mu = \min_r g_r`. A sharp system is in :math:`G_-` where :math:`\mu < 0` and in :math:`G_+` where
+:math:`\mu > 0`, parted by the surfaces :math:`S_r` on which :math:`g_r` is the least and zero. A smoothed one
+has bands :math:`|\mu| < \eta` in their place. For the discontinuous support these are Eqs. (4)-(5) and
+(9)-(10), Fig. 2a and 2b, of Savi et al., J. Sound Vib. 301 (2007) 59-73.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.plot import style
+from nonsmooth.plot.labels import name_with_unit
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from nonsmooth.system.system import System
+
+__all__ = ["regions"]
+
+_FILLS = {"G_-": "#FFFFFF", "G_+": "#D6E6F2", "S": ("#F7D9B8", "#CDE8DC", "#EED3E2")}
+_LINES = ("second", "third", "fourth")
+_GRID = 401
+
+
+def regions(
+    system: System,
+    ax: Axes | None = None,
+    *,
+    xlim: tuple[float, float],
+    ylim: tuple[float, float],
+    x: str | None = None,
+    y: str | None = None,
+    t: float = 0.0,
+) -> Axes:
+    """Draw the regions of a system's first mode (G-), of the mode it changes to (G+), and what parts them.
+
+    Parameters
+    ----------
+    system
+        As it is, or smoothed: then the bands S_a, S_b, ... take the place of the surfaces.
+    ax
+        Where to draw; a new one-column figure if None.
+    xlim, ylim
+        The part of the plane, in the states' units. A band of half-width eta shows if they are a few eta wide.
+    x, y
+        The states of the axes; by default the first two. Other states are zero.
+    t
+        The time, for indicators that depend on it.
+
+    Raises
+    ------
+    ValueError
+        A name that is no state, or a system whose first mode is never left by a condition.
+    """
+    names = _states(system, x, y)
+    first, second = np.meshgrid(np.linspace(*xlim, _GRID), np.linspace(*ylim, _GRID))
+    margins = _margins(system, names, first, second, t)
+    with style.axes(ax, ratio=0.85) as drawn:
+        if system.is_smoothed:
+            _draw_bands(drawn, first, second, margins)
+        else:
+            _draw_surfaces(drawn, first, second, margins)
+        drawn.set(
+            xlim=xlim, ylim=ylim, xlabel=name_with_unit(names[0], system.states[names[0]]),
+            ylabel=name_with_unit(names[1], system.states[names[1]]),
+        )  # fmt: skip
+    return drawn
+
+
+def _states(system: System, *given: str | None) -> list[str]:
+    known = list(system.states)
+    if len(known) < 2:
+        raise ValueError(f"regions are drawn in the plane of two states; {system.name!r} has {known}")
+    names = [known[i] if name is None else name for i, name in enumerate(given)]
+    for name in names:
+        if name not in known:
+            raise ValueError(f"{name!r} is not a state of {system.name!r}; states: {', '.join(known)}")
+    return names
+
+
+def _margins(system: System, names: list[str], first: Any, second: Any, t: float) -> NDArray[np.float64]:
+    """The signed indicators of the condition that leaves the first mode, in units of eta where smoothed: (R, ...)."""
+    import sympy as sp
+
+    sharp = system.smoothed(None).traced
+    rows = next((item.rows for item in sharp.transitions if item.source == 0 and item.rows), None)
+    if rows is None:
+        raise ValueError(f"no condition on the state leaves the first mode of {system.name!r}: it has no regions")
+    eta = system.eta if system.is_smoothed else 1.0
+    values = dict(zip(sharp.p, (system.values[name] for name in sharp.parameter_names), strict=True))
+    values |= dict.fromkeys(sharp.m, 0.0) | {sharp.t: t}
+    values |= {symbol: 0.0 for symbol, name in zip(sharp.u, sharp.state_names, strict=True) if name not in names}
+    axes = [sharp.u[sharp.state_names.index(name)] for name in names]
+    margins = []
+    for row in rows:
+        width = eta[sharp.indicator_names[row.indicator]] if isinstance(eta, dict) else eta
+        evaluate = sp.lambdify(axes, row.sign * sharp.indicators[row.indicator].subs(values) / width, "numpy")
+        margins.append(np.broadcast_to(evaluate(first, second), first.shape))
+    return np.array(margins, dtype=float)
+
+
+def _draw_bands(ax: Axes, x: Any, y: Any, margins: NDArray[np.float64]) -> None:
+    least = margins.min(axis=0)
+    _fill(ax, x, y, least + 1, _FILLS["G_-"], "$G_-$")
+    _fill(ax, x, y, 1 - least, _FILLS["G_+"], "$G_+$")
+    for r, others in _others(margins):
+        inside = np.maximum(np.abs(margins[r]) - 1, margins[r] - others)
+        _fill(ax, x, y, inside, _FILLS["S"][r % 3], _surface_name(r, len(margins)))
+        ax.contour(x, y, inside, levels=[0], colors=style.COLORS[_LINES[r % 3]], linewidths=0.8)
+
+
+def _draw_surfaces(ax: Axes, x: Any, y: Any, margins: NDArray[np.float64]) -> None:
+    least = margins.min(axis=0)
+    _fill(ax, x, y, least, _FILLS["G_-"], r"$\tilde G_-$")
+    _fill(ax, x, y, -least, _FILLS["G_+"], r"$\tilde G_+$")
+    for r, others in _others(margins):
+        here = np.where(margins[r] <= others, margins[r], np.nan)
+        color = style.COLORS[_LINES[r % 3]]
+        drawn = ax.contour(x, y, here, levels=[0], colors=color, linewidths=1.4)
+        lines = [path.vertices for path in drawn.get_paths() if len(path.vertices)]
+        if lines:
+            longest = max(lines, key=len)
+            name = _surface_name(r, len(margins)).replace("S", r"\tilde S")
+            ax.annotate(name, longest[len(longest) // 2], (5, 2), textcoords="offset points", color=color)
+
+
+def _others(margins: NDArray[np.float64]) -> list[tuple[int, NDArray[np.float64]]]:
+    """For each row, the least of the other rows (infinite where there is one row only)."""
+    infinite = np.full((1, *margins.shape[1:]), np.inf)
+    return [
+        (r, np.concatenate([np.delete(margins, r, axis=0), infinite]).min(axis=0)) for r in range(len(margins))
+    ]
+
+
+def _surface_name(r: int, count: int) -> str:
+    return "$S$" if count == 1 else f"$S_{chr(ord('a') + r)}$"
+
+
+def _fill(ax: Axes, x: Any, y: Any, outside: NDArray[np.float64], color: str, name: str) -> None:
+    """Fill where ``outside`` is negative, and write the name where there is most room."""
+    from scipy.ndimage import distance_transform_edt
+
+    if not (outside < 0).any():
+        return
+    ax.contourf(x, y, outside, levels=[-np.inf, 0], colors=[color])
+    room = distance_transform_edt(np.pad(outside < 0, 1))[1:-1, 1:-1]
+    at = np.unravel_index(room.argmax(), room.shape)
+    ax.text(x[at], y[at], name, ha="center", va="center")

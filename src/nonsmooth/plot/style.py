@@ -1,0 +1,100 @@
+"""How every figure looks: journal column widths, small fonts, colours that colour-blind readers can tell apart.
+
+A plot function given no axes draws on its own, in this style. Given axes, it leaves the caller's style alone;
+keep a ``with nonsmooth.plot.journal():`` block around making the figure and drawing on it to get it.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["COLORS", "COLUMN", "PAGE", "axes", "journal", "save_figure"]
+
+#: Widths of one column (84 mm) and of the page (174 mm), in inches.
+COLUMN = 84 / 25.4
+PAGE = 174 / 25.4
+
+#: What a colour stands for. The palette is that of Okabe and Ito (2008), told apart by all common colour visions.
+COLORS = {
+    "first": "#0072B2",  # blue: the first mode, the rising sweep
+    "second": "#D55E00",  # vermilion: the other modes, the falling sweep
+    "section": "#000000",
+    "third": "#009E73",
+    "fourth": "#CC79A7",
+    "zone": "#E69F00",  # filled areas only, drawn pale
+    "muted": "#7F7F7F",
+}
+
+_RC: dict[str, Any] = {
+    "figure.figsize": (COLUMN, COLUMN * 0.72),
+    "figure.dpi": 150,
+    "figure.constrained_layout.use": True,
+    "savefig.dpi": 600,
+    "font.family": "serif",
+    "font.serif": ["STIX Two Text", "Times New Roman", "STIXGeneral"],
+    "mathtext.fontset": "stix",
+    "font.size": 8,
+    "axes.labelsize": 8,
+    "axes.titlesize": 8,
+    "axes.linewidth": 0.6,
+    "axes.formatter.use_mathtext": True,
+    "axes.formatter.limits": (-2, 4),
+    "axes.formatter.useoffset": False,
+    "xtick.labelsize": 7,
+    "ytick.labelsize": 7,
+    "xtick.direction": "in",
+    "ytick.direction": "in",
+    "xtick.top": True,
+    "ytick.right": True,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "legend.fontsize": 7,
+    "legend.frameon": False,
+    "lines.linewidth": 0.8,
+    "lines.markersize": 3,
+    "pdf.fonttype": 42,  # TrueType: text stays text, as journals ask
+    "svg.fonttype": "none",
+}
+
+
+@contextmanager
+def journal() -> Iterator[None]:
+    """The package's style, for the figures made inside the ``with`` block."""
+    import matplotlib as mpl
+
+    with mpl.rc_context(_RC):
+        yield
+
+
+@contextmanager
+def axes(ax: Axes | None, *, width: float = COLUMN, ratio: float = 0.72) -> Iterator[Axes]:
+    """The axes to draw on: the given ones as they are, or a new figure of one column in the journal style."""
+    if ax is not None:
+        yield ax
+        return
+    import matplotlib.pyplot as plt
+
+    with journal():
+        yield plt.figure(figsize=(width, width * ratio)).add_subplot()
+
+
+def save_figure(figure: Figure | Axes, path: str | os.PathLike[str]) -> Path:
+    """Save a figure (or the figure of some axes) in the format of the path's ending.
+
+    Lines and text stay vectors in PDF and SVG; point clouds are pixels at 600 dpi. The file holds no date,
+    so equal input gives equal files.
+    """
+    target = Path(path)
+    owner = getattr(figure, "figure", figure)
+    metadata: dict[str, Any] | None = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}.get(target.suffix)
+    with journal():
+        owner.savefig(target, metadata=metadata)
+    return target

@@ -1,0 +1,28 @@
+"""Progress of long work: a bar on a terminal, nothing anywhere else."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+__all__ = ["progress"]
+
+
+@contextmanager
+def progress(total: int, label: str, enabled: bool = True) -> Iterator[Callable[[int], None]]:
+    """A bar of ``total`` steps on stderr; yields ``advance(n)``, which any thread may call.
+
+    No bar is drawn, and nothing is imported, when ``enabled`` is False, when there is nothing to do or when
+    stderr is not a terminal. The bar is wiped when the block ends, by an exception too.
+    """
+    if not enabled or total <= 0 or not sys.stderr.isatty():
+        yield lambda n=1: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(label, total=total)
+        yield lambda n=1: bar.advance(task, n)

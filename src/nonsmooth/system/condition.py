@@ -1,0 +1,54 @@
+"""The conditions of transitions: signs of indicators joined by ``and``, and nothing else."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.system.names import unknown
+
+__all__ = ["GRAMMAR", "condition_text", "read_condition"]
+
+GRAMMAR = "<indicator> > 0  or  <indicator> < 0,  joined by 'and'"
+_SIGN = re.compile(r"\s*([A-Za-z_]\w*)\s*([<>])\s*0(?:\.0*)?\s*\Z")
+
+
+def read_condition(text: object, indicators: Sequence[str], label: str) -> tuple[tuple[str, int], ...]:
+    """Return the (indicator, sign) pairs of a condition.
+
+    Parameters
+    ----------
+    text : str
+        For example ``"penetration > 0 and separation < 0"``.
+    indicators : sequence of str
+        Names that may occur.
+    label : str
+        The transition, for the message.
+
+    Raises
+    ------
+    SystemDefinitionError
+        Outside the grammar, an unknown indicator, or the same indicator asked to have both signs.
+    """
+    if not isinstance(text, str):
+        raise SystemDefinitionError(f"{label}: `when` must be a string of the form: {GRAMMAR}; not {text!r}")
+    signs: dict[str, int] = {}
+    for part in re.split(r"\band\b", text):
+        match = _SIGN.match(part)
+        if match is None:
+            raise SystemDefinitionError(
+                f"{label}: cannot read {part.strip()!r} in the condition {text!r}; the grammar is: {GRAMMAR}. "
+                f"('or' is a second transition; anything else is a new indicator.)"
+            )
+        name, sign = match[1], 1 if match[2] == ">" else -1
+        if name not in indicators:
+            raise SystemDefinitionError(f"{label}: {unknown(name, 'an indicator', 'this system', indicators)}")
+        if signs.setdefault(name, sign) != sign:
+            raise SystemDefinitionError(f"{label}: {text!r} asks for both signs of {name!r} at once")
+    return tuple(signs.items())
+
+
+def condition_text(rows: Sequence[tuple[str, int]]) -> str:
+    """Return the condition as the user would write it; inverse of `read_condition`."""
+    return " and ".join(f"{name} {'>' if sign > 0 else '<'} 0" for name, sign in rows)

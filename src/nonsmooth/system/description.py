@@ -1,0 +1,203 @@
+"""From what the user wrote to a checked description made of expressions only.
+
+Every inconsistency is found here, before anything is compiled; what remains holds no functions, so that
+it can be stored as text and read back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import sympy as sp
+
+from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.system.domain import Domain
+from nonsmooth.system.equations import TracedBand, TracedSurface, trace_band, trace_surface, trace_system
+from nonsmooth.system.mode import Band, Mode
+from nonsmooth.system.names import check_names, unknown
+from nonsmooth.system.parameter import Parameter, finite_number
+from nonsmooth.system.period import check_period, forcing_period, timed_expressions
+from nonsmooth.system.scalar import to_expression
+from nonsmooth.system.symmetry import Symmetry, trace_symmetry
+from nonsmooth.system.traced import Traced
+from nonsmooth.system.tracing import Symbols, call_scalar
+from nonsmooth.system.transition import Surface, Transition
+
+__all__ = ["Description", "describe"]
+
+
+@dataclass(frozen=True)
+class Description:
+    """A system without the present values of its parameters: what all its copies share."""
+
+    name: str
+    states: Mapping[str, str]
+    parameters: Mapping[str, Parameter]  # with the values first given
+    memory: Mapping[str, tuple[float, str]]
+    scale: Mapping[str, float]
+    outputs: Mapping[str, str]
+    traced: Traced
+    surfaces: tuple[TracedSurface, ...] = ()
+    bands: tuple[TracedBand, ...] = ()
+    symmetry: Symmetry | None = None
+    explicit_time: bool = False  # depends on the time, and not periodically
+    variants: dict[Any, Any] = field(default_factory=dict, compare=False, repr=False)  # a cache, see variant.py
+
+    @property
+    def symbol_names(self) -> dict[sp.Symbol, str]:
+        """How the symbols are written in text: ``t``, ``u.x``, ``p.k`` (memory is read as ``p.`` too)."""
+        t = self.traced
+        names = {t.t: "t"}
+        names |= {s: f"u.{name}" for s, name in zip(t.u, t.state_names, strict=True)}
+        names |= {s: f"p.{name}" for s, name in zip(t.p, t.parameter_names, strict=True)}
+        return names | {s: f"p.{name}" for s, name in zip(t.m, t.memory_names, strict=True)}
+
+
+def describe(
+    *,
+    name: str,
+    states: Mapping[str, str] | Sequence[str],
+    parameters: Mapping[str, Any],
+    modes: Mapping[str, Callable[..., Any] | Mode],
+    indicators: Mapping[str, Callable[..., Any]] | None,
+    transitions: Sequence[Transition | Surface],
+    memory: Mapping[str, Any] | None,
+    outputs: Mapping[str, Any] | None,
+    symmetry: Any,
+    scale: Mapping[str, float] | None,
+    period: Any,
+    bands: Mapping[str, Band] | None,
+) -> Description:
+    """Check everything, call each function once with symbols, and return the description."""
+    units = _units(states, "states", name)
+    if not units:
+        raise SystemDefinitionError(f"{name!r}: a system needs at least one state")
+    _is_mapping(parameters, "parameters", name, '{"m": (0.838, "kg"), "k": 8.47}')
+    known = {key: Parameter.read(key, given) for key, given in parameters.items()}
+    _is_mapping(modes, "modes", name, '{"free": free, "contact": contact}')
+    if not modes:
+        raise SystemDefinitionError(f"{name!r}: a system needs at least one mode")
+    indicators = dict(indicators or {})
+    remembered = {key: _memory(key, given) for key, given in _units(memory or {}, "memory", name, raw=True).items()}
+    shown = {key: _output(key, given) for key, given in (outputs or {}).items()}
+    bands = dict(bands or {})
+    inside = {key for band in bands.values() for key in (band.write or {})}
+    check_names(
+        {
+            "state": units, "parameter": known, "memory": remembered, "mode": modes, "indicator": indicators,
+            "output": shown, "memory of a band": sorted(inside),
+        },
+        name,
+    )  # fmt: skip
+    symbols = Symbols(
+        name, units, {k: v.unit for k, v in known.items()}, {k: unit for k, (_, unit) in remembered.items()}
+    )
+    kinds = {key: _mode(mode, key, units) for key, mode in modes.items()}
+    traced = trace_system(name, symbols, kinds, indicators, transitions, shown)
+    surfaces = tuple(trace_surface(item, traced) for item in transitions if isinstance(item, Surface))
+    values = {symbol: known[key].value for key, symbol in symbols.p.items()}
+    traced, explicit = _with_period(traced, symbols, values, period)
+    if symmetry is not None:
+        Domain(traced).check({key: parameter.value for key, parameter in known.items()})
+    return Description(
+        name=name, states=units, parameters=known, memory=remembered,
+        scale=_scale(scale, units, name), outputs={key: unit for key, (_, unit) in shown.items()},
+        traced=traced, surfaces=surfaces,
+        bands=tuple(trace_band(key, band, traced, symbols, shown, known) for key, band in bands.items()),
+        symmetry=None if symmetry is None else trace_symmetry(symmetry, traced, symbols, values),
+        explicit_time=explicit,
+    )  # fmt: skip
+
+
+def _is_mapping(given: Any, what: str, system: str, example: str) -> None:
+    if not isinstance(given, Mapping):
+        raise SystemDefinitionError(f"{system!r}: `{what}` must be a mapping such as {example}, not {given!r}")
+
+
+def _units(given: Any, what: str, system: str, raw: bool = False) -> dict[str, Any]:
+    """Names with units from a mapping, or from a sequence of names (no units)."""
+    if isinstance(given, str) or not isinstance(given, (Mapping, Sequence)):
+        raise SystemDefinitionError(f"{system!r}: `{what}` must map names to units, not {given!r}")
+    if not isinstance(given, Mapping):
+        return dict.fromkeys(given, "")
+    for key, unit in given.items():
+        if not raw and not isinstance(unit, str):
+            raise SystemDefinitionError(f"{system!r}: the unit of {key!r} must be a string, not {unit!r}")
+    return dict(given)
+
+
+def _memory(key: str, given: Any) -> tuple[float, str]:
+    """``"m/s"`` or ``(initial value, "m/s")``."""
+    if isinstance(given, str):
+        return 0.0, given
+    read = Parameter.read(key, given)
+    return read.value, read.unit
+
+
+def _output(key: str, given: Any) -> tuple[Any, str]:
+    """A function or a mapping mode -> function, alone or with a unit."""
+    function, unit = (given if len(given) == 2 else (None, None)) if isinstance(given, (tuple, list)) else (given, "")
+    if not (callable(function) or isinstance(function, Mapping)) or not isinstance(unit, str):
+        raise SystemDefinitionError(
+            f"output {key!r} must be a function f(t, u, p) or a mapping mode -> function, alone or as "
+            f"(function, unit); not {given!r}"
+        )
+    return function, unit
+
+
+def _mode(given: Any, key: str, states: Mapping[str, str]) -> tuple[Callable[..., Any], tuple[str, ...]]:
+    mode = given if isinstance(given, Mode) else Mode(given)
+    own = tuple(states) if mode.states is None else tuple(mode.states)
+    for name in own:
+        if name not in states:
+            raise SystemDefinitionError(f"mode {key!r}: {unknown(name, 'a state', 'the system', states)}")
+    if not own or len(set(own)) != len(own):
+        raise SystemDefinitionError(f"mode {key!r}: its states {list(own)} must be at least one, all different")
+    return mode.field, own
+
+
+def _scale(given: Mapping[str, float] | None, states: Mapping[str, str], system: str) -> dict[str, float]:
+    scale = dict.fromkeys(states, 1.0)
+    for key, value in (given or {}).items():
+        if key not in states:
+            raise SystemDefinitionError(f"scale: {unknown(key, 'a state', repr(system), states)}")
+        scale[key] = finite_number(value, f"the scale of {key!r}")
+        if scale[key] <= 0:
+            raise SystemDefinitionError(f"the scale of {key!r} is its typical size and must be positive, not {value}")
+    return scale
+
+
+def _with_period(
+    traced: Traced, symbols: Symbols, values: Mapping[sp.Symbol, float], given: Any
+) -> tuple[Traced, bool]:
+    """Return the system with its period, and whether it depends on the time without one."""
+    expressions = timed_expressions(traced)
+    timed = any(traced.t in expression.free_symbols for expression in expressions.values())
+    found = forcing_period(tuple(expressions.values()), traced.t, set(symbols.p.values()))
+    if given is None:
+        period = found
+    elif callable(given):
+        period = call_scalar(given, (symbols.parameters(),), "`period`")
+        if not period.free_symbols <= set(symbols.p.values()):
+            raise SystemDefinitionError(f"`period` may depend on the parameters only, not {period}")
+    else:
+        number = finite_number(given, "`period`")
+        if number <= 0:
+            raise SystemDefinitionError(f"`period` must be positive, not {number}")
+        period = to_expression(number)
+    if period is None and (jump := next((j for j in traced.transitions if j.at is not None), None)):
+        raise SystemDefinitionError(
+            f"transition {jump.label}: `at` is a phase of the forcing, but no forcing period can be read off the "
+            f"equations; give period= (a number, or a function of p)"
+        )
+    traced = replace(traced, period=period)
+    if period is not None and timed and period != found:
+        Domain(traced).check({name: values[symbol] for name, symbol in symbols.p.items()})
+        check_period(expressions, traced.t, values, float(period.subs(values)), _plain(period, symbols))
+    return traced, timed and period is None
+
+
+def _plain(expression: sp.Expr, symbols: Symbols) -> str:
+    return str(expression.subs({symbol: sp.Symbol(name) for name, symbol in symbols.p.items()}))

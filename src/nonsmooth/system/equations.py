@@ -1,0 +1,227 @@
+"""Calling the user's functions: from checked parts of a description to expressions and integers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import sympy as sp
+
+from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.system.condition import read_condition
+from nonsmooth.system.mode import Band
+from nonsmooth.system.names import unknown
+from nonsmooth.system.parameter import Parameter
+from nonsmooth.system.scalar import Scalar
+from nonsmooth.system.traced import Row, Traced, TracedTransition
+from nonsmooth.system.tracing import Symbols, call_scalar, call_vector, refuse_corners
+from nonsmooth.system.transition import Surface, Transition
+
+__all__ = ["TracedBand", "TracedSurface", "trace_band", "trace_surface", "trace_system"]
+
+
+@dataclass(frozen=True)
+class TracedSurface:
+    """A Filippov surface in integers: where ``indicator`` is negative the mode is ``below``."""
+
+    indicator: int
+    below: int
+    above: int
+
+
+@dataclass(frozen=True)
+class TracedBand:
+    """The prescribed field in the band of an indicator; ``eta`` and ``memory`` are its own symbols."""
+
+    indicator: int
+    eta: sp.Symbol
+    field: tuple[sp.Expr, ...]
+    memory: tuple[tuple[str, str, sp.Symbol, sp.Expr], ...]  # name, unit, symbol, written at entry
+    outputs: Mapping[int, sp.Expr]
+
+
+def trace_system(
+    name: str,
+    symbols: Symbols,
+    modes: Mapping[str, tuple[Callable[..., Any], tuple[str, ...]]],
+    indicators: Mapping[str, Callable[..., Any]],
+    transitions: Sequence[Transition | Surface],
+    outputs: Mapping[str, tuple[Any, str]],
+) -> Traced:
+    """Trace everything but the period. ``modes``: name -> (function, its states); ``outputs``: name -> (f, unit)."""
+    time, p = Scalar(symbols.t), symbols.parameters()
+    moving = {symbols.t, *symbols.u.values()}
+    everything = tuple(symbols.u)
+    fields, lacking = [], []
+    for key, (function, own) in modes.items():
+        what = f"the vector field of mode {key!r}"
+        part = call_vector(function, (time, symbols.states(own, f"mode {key!r}"), p), own, what)
+        for entry in part:
+            refuse_corners(entry, moving, what)
+        whole = dict(zip(own, part, strict=True))
+        fields.append(tuple(whole.get(state, sp.Integer(0)) for state in everything))
+        lacking.append(tuple(state not in own for state in everything))
+    surfaces_of = []
+    for key, function in indicators.items():
+        what = f"indicator {key!r}"
+        expression = call_scalar(function, (time, symbols.states(), p), what)
+        refuse_corners(expression, moving, what)
+        if not expression.free_symbols & set(symbols.u.values()):
+            raise SystemDefinitionError(
+                f"{what} never involves the state ({expression}): nothing can cross it. "
+                f"For a switch at a given time use Transition(..., at=phase)"
+            )
+        surfaces_of.append(expression)
+    owned = {key: own for key, (_, own) in modes.items()}
+    jumps = []
+    for item in transitions:
+        if isinstance(item, Surface):
+            jumps += _surface_jumps(item, owned, indicators)
+        elif isinstance(item, Transition):
+            jumps.append(_jump(item, symbols, time, owned, indicators, surfaces_of))
+        else:
+            raise SystemDefinitionError(
+                f"{name!r}: `transitions` is a list of ns.Transition and ns.Surface, not {item!r}"
+            )
+    return Traced(
+        name=name, t=symbols.t, u=tuple(symbols.u.values()), p=tuple(symbols.p.values()),
+        m=tuple(symbols.m.values()), state_names=everything, parameter_names=tuple(symbols.p),
+        memory_names=tuple(symbols.m), mode_names=tuple(modes), indicator_names=tuple(indicators),
+        output_names=tuple(outputs), fields=tuple(fields), lacking=tuple(lacking),
+        indicators=tuple(surfaces_of), transitions=tuple(jumps),
+        outputs=tuple(_trace_output(k, f, symbols, time, owned) for k, (f, _) in outputs.items()), period=None,
+    )  # fmt: skip
+
+
+def _mode_index(name: str, label: str, modes: Mapping[str, Any]) -> int:
+    if name not in modes:
+        raise SystemDefinitionError(f"transition {label}: {unknown(name, 'a mode', 'this system', modes)}")
+    return list(modes).index(name)
+
+
+def _surface_jumps(
+    item: Surface, modes: Mapping[str, tuple[str, ...]], indicators: Mapping[str, Any]
+) -> list[TracedTransition]:
+    below, above = (_mode_index(end, item.label, modes) for end in (item.below, item.above))
+    if item.indicator not in indicators:
+        raise SystemDefinitionError(
+            f"{item.label}: {unknown(item.indicator, 'an indicator', 'this system', indicators)}"
+        )
+    if set(modes[item.below]) != set(modes[item.above]):
+        raise SystemDefinitionError(f"{item.label}: both modes must have the same states")
+    i = list(indicators).index(item.indicator)
+    return [
+        TracedTransition(below, above, (Row(i, 1),), contact=below == 0, label=f"{item.below} -> {item.above}"),
+        TracedTransition(above, below, (Row(i, -1),), contact=above == 0, label=f"{item.above} -> {item.below}"),
+    ]
+
+
+def trace_surface(item: Surface, traced: Traced) -> TracedSurface:
+    """Return a surface in integers; its names were checked when its transitions were made."""
+    modes = traced.mode_names
+    return TracedSurface(traced.indicator_names.index(item.indicator), modes.index(item.below), modes.index(item.above))
+
+
+def _jump(
+    item: Transition,
+    symbols: Symbols,
+    time: Any,
+    modes: Mapping[str, tuple[str, ...]],
+    indicators: Mapping[str, Any],
+    expressions: Sequence[sp.Expr],
+) -> TracedTransition:
+    label = f"transition {item.label}"
+    source, target = (_mode_index(end, item.label, modes) for end in (item.source, item.target))
+    before, after, order = modes[item.source], modes[item.target], list(indicators)
+    rows: tuple[Row, ...] = ()
+    if item.when is not None:
+        rows = tuple(Row(order.index(key), sign) for key, sign in read_condition(item.when, order, label))
+    hidden = {symbols.u[state]: state for state in symbols.u if state not in before}
+    for row in rows:
+        for symbol in expressions[row.indicator].free_symbols & hidden.keys():
+            raise SystemDefinitionError(
+                f"{label}: the indicator {order[row.indicator]!r} involves the state {hidden[symbol]!r}, which mode "
+                f"{item.source!r} does not have"
+            )
+    u, p = symbols.states(before, f"mode {item.source!r}"), symbols.parameters()
+    reset = None
+    if item.reset is not None:
+        part = call_vector(item.reset, (time, u, p), after, f"the reset of {label}")
+        whole = dict(zip(after, part, strict=True))
+        reset = tuple(whole.get(state, sp.Integer(0)) for state in symbols.u)
+    elif not set(after) <= set(before):
+        new = [state for state in after if state not in before]
+        raise SystemDefinitionError(
+            f"{label}: mode {item.target!r} has states that mode {item.source!r} lacks ({', '.join(new)}); "
+            f"give a `reset` that returns all of {', '.join(after)}"
+        )
+    writes = []
+    for key, function in (item.write or {}).items():
+        if key not in symbols.m:
+            raise SystemDefinitionError(f"{label}: {unknown(key, 'memory', 'this system', list(symbols.m))}")
+        value = call_scalar(function, (time, u, p), f"what {label} writes to {key!r}")
+        writes.append((list(symbols.m).index(key), value))
+    contact = source == 0 or reset is not None
+    return TracedTransition(source, target, rows, item.at, reset, tuple(writes), contact, item.label)
+
+
+def _trace_output(
+    key: str, given: Any, symbols: Symbols, time: Any, modes: Mapping[str, tuple[str, ...]]
+) -> tuple[sp.Expr, ...]:
+    p = symbols.parameters()
+    if isinstance(given, Mapping):
+        for mode in given:
+            if mode not in modes:
+                raise SystemDefinitionError(f"output {key!r}: {unknown(mode, 'a mode', 'this system', modes)}")
+        if missing := [mode for mode in modes if mode not in given]:
+            raise SystemDefinitionError(f"output {key!r} is not given in mode {missing[0]!r}")
+        return tuple(
+            call_scalar(given[mode], (time, symbols.states(own, f"mode {mode!r}"), p), f"output {key!r} in {mode!r}")
+            for mode, own in modes.items()
+        )
+    expression = call_scalar(given, (time, symbols.states(), p), f"output {key!r}")
+    for mode, own in modes.items():
+        if expression.free_symbols & {symbol for state, symbol in symbols.u.items() if state not in own}:
+            raise SystemDefinitionError(
+                f"output {key!r} uses a state that mode {mode!r} does not have; give a mapping mode -> function"
+            )
+    return (expression,) * len(modes)
+
+
+def trace_band(
+    key: str,
+    band: Band,
+    traced: Traced,
+    symbols: Symbols,
+    outputs: Mapping[str, Any],
+    parameters: Mapping[str, Parameter],
+) -> TracedBand:
+    """Trace the field, memory and outputs prescribed in the band of the indicator ``key``."""
+    what = f"the band of {key!r}"
+    if key not in traced.indicator_names:
+        raise SystemDefinitionError(f"bands: {unknown(key, 'an indicator', 'this system', traced.indicator_names)}")
+    if not isinstance(band, Band):
+        raise SystemDefinitionError(f"{what} must be an ns.Band, not {band!r}")
+    if "eta" in parameters:
+        raise SystemDefinitionError(f"{what}: `eta` is the width of the band; the parameter `eta` must be renamed")
+    eta = sp.Symbol("p_eta", real=True)
+    own, time = {}, Scalar(symbols.t)
+    plain = symbols.parameters({"eta": eta})
+    memory = []
+    for name, given in (band.write or {}).items():
+        function, unit = given if isinstance(given, tuple) else (given, "")
+        own[name] = sp.Symbol(f"m_{name}", real=True)
+        value = call_scalar(function, (time, symbols.states(), plain), f"what {what} writes to {name!r}")
+        memory.append((name, unit, own[name], value))
+    p = symbols.parameters({"eta": eta, **own})
+    vector = call_vector(band.field, (time, symbols.states(), p), tuple(symbols.u), what)
+    for entry in vector:
+        refuse_corners(entry, {symbols.t, *symbols.u.values()}, what)
+    shown = {}
+    for name, function in (band.outputs or {}).items():
+        if name not in outputs:
+            raise SystemDefinitionError(f"{what}: {unknown(name, 'an output', 'this system', list(outputs))}")
+        expression = call_scalar(function, (time, symbols.states(), p), f"output {name!r} in {what}")
+        shown[list(outputs).index(name)] = expression
+    return TracedBand(traced.indicator_names.index(key), eta, vector, tuple(memory), shown)

@@ -1,0 +1,93 @@
+"""Which names may be used, and helpful answers to those that may not.
+
+A parameter's name becomes a dim of a result and a state's name a coordinate, so that the names the
+results use themselves are reserved.
+"""
+
+from __future__ import annotations
+
+import difflib
+import keyword
+from collections.abc import Iterable, Mapping
+
+from nonsmooth.errors import SystemDefinitionError
+
+__all__ = ["RESERVED", "check_names", "unknown"]
+
+RESERVED = frozenset(
+    [
+        # dims of results
+        "time", "state", "iterate", "point", "crossing", "touch", "direction", "start", "mode", "status", "method", "jump",
+        "special", "multiplier", "exponent", "attractor", "segment", "indicator", "part", "memory", "sample",
+        # variables of results
+        "section", "maximum", "minimum", "amplitude", "residual", "period", "period_number", "crossings_per_period",
+        "contacts_per_period", "clearance", "signature", "stable", "label", "kind", "transition",
+        "floquet_multipliers",
+        # arguments of the user's functions
+        "u", "t", "p",
+    ]
+)  # fmt: skip
+
+
+def check_names(groups: Mapping[str, Iterable[str]], system: str) -> None:
+    """Check that all names are identifiers, not reserved, and different across all ``groups``.
+
+    Parameters
+    ----------
+    groups : mapping of str to iterable of str
+        What the names are ("state", "parameter", ...) and the names.
+    system : str
+        Name of the system, for the message.
+    """
+    seen: dict[str, str] = {}
+    for what, names in groups.items():
+        for name in names:
+            if not isinstance(name, str):
+                raise SystemDefinitionError(f"{system!r}: the name of a {what} must be a string, not {name!r}")
+            if not name.isidentifier() or keyword.iskeyword(name) or name.startswith("_"):
+                hint = f"; try {name}_" if keyword.iskeyword(name) else ""
+                raise SystemDefinitionError(
+                    f"{system!r}: {name!r} cannot name a {what}: it must be a Python identifier that is no keyword "
+                    f"and does not begin with an underscore{hint}"
+                )
+            if name in RESERVED:
+                raise SystemDefinitionError(
+                    f"{system!r}: {name!r} cannot name a {what}: the results use this name themselves; "
+                    f"try {name}_ or {what}_{name}. Reserved: {', '.join(sorted(RESERVED))}"
+                )
+            if name in seen:
+                raise SystemDefinitionError(
+                    f"{system!r}: the name {name!r} is given to a {seen[name]} and to a {what}; "
+                    f"all names of a system must be different"
+                )
+            seen[name] = what
+
+
+def unknown(name: object, what: str, of: str, known: Mapping[str, str] | Iterable[str]) -> str:
+    """Return the sentence for a name that is not known: nearest first, then all.
+
+    Parameters
+    ----------
+    name : object
+        The name that was given.
+    what : str
+        What it should have been, with its article: "a parameter".
+    of : str
+        The owner as it shall be printed: "'discontinuous support'".
+    known : mapping of name to unit, or iterable of names
+        What is allowed.
+    """
+    units = known if isinstance(known, Mapping) else dict.fromkeys(known, "")
+    ordered = sorted(units)
+    text = f"`{name}` is not {what} of {of}"
+    near = max(ordered, key=lambda candidate: _likeness(str(name), candidate), default=None)
+    if near is not None and _likeness(str(name), near) >= 0.5:
+        unit = units[near]
+        text += f"; nearest: {near}" + (f" [{unit}]" if unit else "")
+    return text + (f"; all: {', '.join(ordered)}" if ordered else f"; {of} has none")
+
+
+def _likeness(given: str, candidate: str) -> float:
+    """Similarity, 0 to about 1; the same beginning counts (``gap`` means g rather than omega)."""
+    begins = given[:1].lower() == candidate[:1].lower()
+    return difflib.SequenceMatcher(None, given.lower(), candidate.lower()).ratio() + 0.2 * begins

@@ -1,0 +1,147 @@
+"""A system for the eye: a short table, and LaTeX."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import sympy as sp
+
+from nonsmooth.system.expressions import write_expression
+from nonsmooth.system.parameter import latex_name
+
+if TYPE_CHECKING:
+    from nonsmooth.system.system import System
+    from nonsmooth.system.traced import Row, Traced, TracedTransition
+
+__all__ = ["latex", "table"]
+
+
+def _plain(traced: Traced) -> dict[sp.Symbol, str]:
+    names = {traced.t: "t"}
+    for symbols, known in (
+        (traced.u, traced.state_names), (traced.p, traced.parameter_names), (traced.m, traced.memory_names),
+    ):  # fmt: skip
+        names |= dict(zip(symbols, known, strict=True))
+    return names
+
+
+def _row(row: Row, traced: Traced) -> str:
+    relation = (">" if row.sign > 0 else "<") + ("" if row.strict else "=")
+    return f"{traced.indicator_names[row.indicator]} {relation} 0"
+
+
+def _jump(jump: TracedTransition, traced: Traced, names: dict[sp.Symbol, str]) -> str:
+    text = jump.label
+    if jump.at is not None:
+        text += f"  at phase {jump.at:g}"
+    else:
+        text += "  when " + " and ".join(_row(row, traced) for row in jump.rows)
+    if jump.reset is not None:
+        changed = [
+            f"{name} := {write_expression(e, names)}"
+            for name, e, symbol, gone in zip(
+                traced.state_names, jump.reset, traced.u, traced.lacking[jump.target], strict=True
+            )
+            if e != symbol and not gone
+        ]
+        text += ", reset " + ", ".join(changed)
+    if jump.writes:
+        written = (f"{traced.memory_names[i]} := {write_expression(e, names)}" for i, e in jump.writes)
+        text += ", write " + ", ".join(written)
+    return text
+
+
+def table(system: System) -> str:
+    """Return the table shown by ``repr``."""
+    traced = system.traced
+    names = _plain(traced)
+    lines: list[tuple[str, str]] = []
+
+    def unit(text: str) -> str:
+        return f" [{text}]" if text else ""
+
+    lines.append(("states", ", ".join(f"{name}{unit(u)}" for name, u in system.states.items())))
+    values = (f"{k} = {v.value:.12g}{' ' * bool(v.unit)}{v.unit}" for k, v in system.parameters.items())
+    lines.append(("parameters", ", ".join(values) or "none"))
+    if system.memory:
+        lines.append(("memory", ", ".join(f"{name}{unit(u)}" for name, u in system.memory.items())))
+    for mode, field, lacking in zip(traced.mode_names, traced.fields, traced.lacking, strict=True):
+        head = f"mode {mode}"
+        for name, e, gone in zip(traced.state_names, field, lacking, strict=True):
+            if not gone:
+                lines.append((head, f"{name}' = {write_expression(e, names)}"))
+                head = ""
+    n = len(system._description.traced.indicator_names)  # those derived for a band are named by their formula
+    for name, e in zip(traced.indicator_names[:n], traced.indicators, strict=False):
+        lines.append((f"indicator {name}", write_expression(e, names)))
+    for surface in system.surfaces:
+        text = f"{traced.mode_names[surface.below]} | {traced.mode_names[surface.above]}"
+        lines.append((f"surface {traced.indicator_names[surface.indicator]}", f"{text}, crossed or slid on"))
+    either_side = {frozenset((surface.below, surface.above)) for surface in system.surfaces}
+    head = "transitions"
+    for jump in traced.transitions:
+        if frozenset((jump.source, jump.target)) not in either_side:
+            lines.append((head, _jump(jump, traced, names)))
+            head = ""
+    if system.outputs:
+        lines.append(("outputs", ", ".join(f"{name}{unit(u)}" for name, u in system.outputs.items())))
+    lines.append(("period", _period(system, names)))
+    if system.is_smoothed:
+        lines.append(("smoothing", f"eta = {system.eta}"))
+    width = max(len(head) for head, _ in lines)
+    return "\n".join([f"System {system.name!r}", *(f"  {head:<{width}}  {text}".rstrip() for head, text in lines)])
+
+
+def _period(system: System, names: dict[sp.Symbol, str]) -> str:
+    period = system.traced.period
+    if period is not None:
+        return f"{write_expression(period, names)} = {system.period():.9g}"
+    return "none: depends on the time, not periodically" if system.explicit_time else "none (autonomous)"
+
+
+def latex(system: System) -> str:
+    """Return the equations as an ``align*`` environment: fields by mode, indicators, transitions."""
+    traced, parameters = system.traced, system.parameters
+    names = {traced.t: "t"}
+    names |= {s: latex_name(name) for s, name in zip(traced.u, traced.state_names, strict=True)}
+    names |= {s: parameters[name].symbol for s, name in zip(traced.p, traced.parameter_names, strict=True)}
+    names |= {s: latex_name(name) for s, name in zip(traced.m, traced.memory_names, strict=True)}
+
+    def write(expression: sp.Expr) -> str:
+        return str(sp.latex(expression, symbol_names=names))
+
+    def word(text: str) -> str:
+        return r"\text{" + text.replace("_", r"\_") + "}"
+
+    lines = []
+    for mode, field, lacking in zip(traced.mode_names, traced.fields, traced.lacking, strict=True):
+        label = rf"&& {word(mode)}"
+        for symbol, e, gone in zip(traced.u, field, lacking, strict=True):
+            if not gone:
+                lines.append(rf"\dot{{{names[symbol]}}} &= {write(e)} {label}".rstrip())
+                label = ""
+    lines += [
+        rf"h_{{{word(name)}}} &= {write(e)}" for name, e in zip(traced.indicator_names, traced.indicators, strict=True)
+    ]
+    for jump in traced.transitions:
+        arrow = rf"{word(traced.mode_names[jump.source])} &\to {word(traced.mode_names[jump.target])}"
+        if jump.at is not None:
+            condition = rf"t / T = {jump.at:g}"
+        else:
+            signs = (
+                (">" if r.sign > 0 else "<") if r.strict else (r"\ge" if r.sign > 0 else r"\le") for r in jump.rows
+            )
+            condition = r",\ ".join(
+                rf"h_{{{word(traced.indicator_names[row.indicator])}}} {sign} 0"
+                for row, sign in zip(jump.rows, signs, strict=True)
+            )
+        lines.append(rf"{arrow} && {condition}")
+        if jump.reset is not None:
+            moved = [
+                rf"{names[symbol]}^+ = {write(e)}"
+                for symbol, e in zip(traced.u, jump.reset, strict=True)
+                if e != symbol
+            ]
+            lines[-1] += r",\quad " + r",\ ".join(moved)
+    body = " \\\\\n".join(lines)
+    return f"\\begin{{align*}}\n{body}\n\\end{{align*}}"

@@ -1,0 +1,411 @@
+"""`System`: a piecewise-smooth dynamical system, complete and checked."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.system.description import Description, describe
+from nonsmooth.system.equations import TracedSurface
+from nonsmooth.system.mode import Band, Mode
+from nonsmooth.system.names import unknown
+from nonsmooth.system.parameter import Parameter, finite_number
+from nonsmooth.system.transition import Surface, Transition
+from nonsmooth.system.variant import ETA_PER_INDICATOR, ONE_ETA, SHARP, Variant, variant_of
+
+if TYPE_CHECKING:
+    from nonsmooth.system.derivatives import Derivatives
+    from nonsmooth.system.symmetry import Symmetry
+    from nonsmooth.system.traced import Traced, TracedTransition
+
+__all__ = ["System"]
+
+
+class System:
+    r"""A piecewise-smooth dynamical system: smooth in each of its modes, switching between them.
+
+    Parameters
+    ----------
+    states : mapping of str to str, or sequence of str
+        Names and units of the states, in order: ``{"x": "m", "v": "m/s"}``.
+    parameters : mapping
+        ``{"m": (0.838, "kg"), "k": 8.47}``; a third entry is a LaTeX symbol.
+    modes : mapping of str to callable or Mode
+        Vector fields ``f(t, u, p)``; a run starts in the first. They are called once, with symbols: ``x, v = u``,
+        ``u.x``, ``p.k``, NumPy functions. No ``if`` on a state: that is two modes.
+    indicators : mapping of str to callable, optional
+        Functions ``h(t, u, p)`` whose zeros bound the modes.
+    transitions : sequence of Transition or Surface, optional
+    memory : mapping, optional
+        What transitions write and modes read: ``{"v_a": "m/s"}`` or ``{"v_a": (0.0, "m/s")}``; read as ``p.v_a``.
+    outputs : mapping, optional
+        ``{"contact_force": (f, "N")}``, f a function or a mapping mode -> function.
+    symmetry : tuple, optional
+        ``(map, shift)`` or ``(map, shift, {mode: mode})``: ``map(u)`` of a solution, ``shift`` periods later, is one.
+    scale : mapping of str to float, optional
+        Typical sizes of the states (1 where missing): used by every norm and tolerance.
+    period : float or callable, optional
+        Forcing period, a number or a function of ``p``; read off sin and cos of ``w * t`` where not given.
+    bands : mapping of str to Band, optional
+        Fields prescribed inside the bands of the smoothed system, by indicator.
+    name : str
+
+    Raises
+    ------
+    SystemDefinitionError
+        Whatever does not fit together; the message says where and what to do.
+
+    Notes
+    -----
+    Systems do not change. `with_parameters` and `smoothed` return new ones that share the equations.
+    """
+
+    __slots__ = ("__weakref__", "_description", "_values", "_variant")
+    _description: Description
+    _values: dict[str, float]
+    _variant: Variant
+
+    def __init__(
+        self,
+        *,
+        states: Mapping[str, str] | Sequence[str],
+        parameters: Mapping[str, Any],
+        modes: Mapping[str, Callable[..., Any] | Mode],
+        indicators: Mapping[str, Callable[..., Any]] | None = None,
+        transitions: Sequence[Transition | Surface] = (),
+        memory: Mapping[str, Any] | None = None,
+        outputs: Mapping[str, Any] | None = None,
+        symmetry: Any = None,
+        scale: Mapping[str, float] | None = None,
+        period: Any = None,
+        bands: Mapping[str, Band] | None = None,
+        name: str = "system",
+    ) -> None:
+        if not isinstance(name, str) or not name:
+            raise SystemDefinitionError(f"`name` must be a string, not {name!r}")
+        description = describe(
+            name=name, states=states, parameters=parameters, modes=modes, indicators=indicators,
+            transitions=transitions, memory=memory, outputs=outputs, symmetry=symmetry, scale=scale,
+            period=period, bands=bands,
+        )  # fmt: skip
+        values = {key: parameter.value for key, parameter in description.parameters.items()}
+        self._set(description, values, variant_of(description, SHARP))
+        self._variant.domain.check(values)
+
+    def _set(self, description: Description, values: dict[str, float], variant: Variant) -> None:
+        put = object.__setattr__
+        put(self, "_description", description)
+        put(self, "_values", values)
+        put(self, "_variant", variant)
+
+    @classmethod
+    def _make(cls, description: Description, values: dict[str, float], variant: Variant) -> System:
+        new = object.__new__(cls)
+        new._set(description, values, variant)
+        return new
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        raise AttributeError(f"a System does not change: use with_parameters(...) (tried to set {name!r})")
+
+    def __delattr__(self, name: str) -> None:
+        raise AttributeError("a System does not change")
+
+    # What it is
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        return self._description.name
+
+    @property
+    def states(self) -> Mapping[str, str]:
+        """Names and units of the states."""
+        return MappingProxyType(dict(self._description.states))
+
+    @property
+    def parameters(self) -> Mapping[str, Parameter]:
+        """Parameters with present value, unit and symbol; a smoothed system has ``eta`` at the end."""
+        known = self._description.parameters
+        table = {key: Parameter(self._values[key], known[key].unit, known[key].symbol) for key in known}
+        for key, indicator in self._variant.etas:
+            symbol = r"\eta" if indicator is None else rf"\eta_{{\mathrm{{{indicator}}}}}"
+            table[key] = Parameter(self._values[key], "", symbol)
+        return MappingProxyType(table)
+
+    @property
+    def values(self) -> Mapping[str, float]:
+        """Present values of the parameters."""
+        return MappingProxyType(self._values)
+
+    @property
+    def modes(self) -> tuple[str, ...]:
+        """Names of the modes, the bands of a smoothed system included."""
+        return self.traced.mode_names
+
+    @property
+    def indicators(self) -> tuple[str, ...]:
+        """Names of the indicators, those derived for a smoothed system at the end."""
+        return self.traced.indicator_names
+
+    @property
+    def transitions(self) -> tuple[TracedTransition, ...]:
+        """The allowed jumps, in declared order."""
+        return self.traced.transitions
+
+    @property
+    def surfaces(self) -> tuple[TracedSurface, ...]:
+        """Surfaces on which motion may slide; empty for a smoothed system."""
+        return () if self.is_smoothed else self._description.surfaces
+
+    @property
+    def memory(self) -> Mapping[str, str]:
+        """Names and units of the memory."""
+        return MappingProxyType({key: unit for key, (_, unit) in self._variant.memory.items()})
+
+    @property
+    def outputs(self) -> Mapping[str, str]:
+        """Names and units of the outputs."""
+        return MappingProxyType(dict(self._description.outputs))
+
+    @property
+    def scale(self) -> Mapping[str, float]:
+        """Typical size of each state."""
+        return MappingProxyType(dict(self._description.scale))
+
+    @property
+    def symmetry(self) -> Symmetry | None:
+        """The declared symmetry, as expressions."""
+        return self._description.symmetry
+
+    @property
+    def traced(self) -> Traced:
+        """The equations as expressions; those of the smoothed system where it is smoothed."""
+        return self._variant.traced
+
+    @property
+    def derivatives(self) -> Derivatives:
+        """Exact derivatives of the equations, shared by all copies."""
+        return self._variant.derivatives
+
+    @property
+    def is_smoothed(self) -> bool:
+        """Whether the switches are smoothed."""
+        return self._variant.kind != SHARP
+
+    @property
+    def eta(self) -> float | dict[str, float] | None:
+        """Half width of the bands: None, a number, or a number for each indicator."""
+        if not self.is_smoothed:
+            return None
+        if self._variant.kind == ONE_ETA:
+            return self._values["eta"]
+        return {str(indicator): self._values[key] for key, indicator in self._variant.etas}
+
+    @property
+    def depends_on_time(self) -> bool:
+        """Whether the time occurs in the equations, or transitions happen at phases of a period."""
+        return self.traced.period is not None or self._description.explicit_time
+
+    @property
+    def explicit_time(self) -> bool:
+        """Whether the equations depend on time without a known period: only runs over a ``duration`` are possible."""
+        return self._description.explicit_time
+
+    # Numbers
+
+    def parameter_vector(self) -> np.ndarray:
+        """Return the present values, float64, in declared order (``eta`` last)."""
+        return np.array(list(self._values.values()), dtype=np.float64)
+
+    def memory_vector(self) -> np.ndarray:
+        """Return the memory at a start, float64."""
+        return np.array([initial for initial, _ in self._variant.memory.values()], dtype=np.float64)
+
+    def scale_vector(self) -> np.ndarray:
+        """Return the typical sizes of the states, float64."""
+        return np.array(list(self._description.scale.values()), dtype=np.float64)
+
+    def period(self) -> float | None:
+        """Return the forcing period at the present values of the parameters; None where there is none."""
+        return self.period_at(self._values)
+
+    def period_at(self, values: Mapping[str, float] | Sequence[float] | np.ndarray) -> float | None:
+        """Return the forcing period at other values: a mapping (others stay), or a vector in declared order."""
+        period = self._variant.period
+        if period is None:
+            return None
+        if isinstance(values, Mapping):
+            arguments = [float(values.get(key, now)) for key, now in self._values.items()]
+        else:
+            arguments = [float(value) for value in values]
+        return float(period(*arguments))
+
+    def parameter_points(self, columns: Mapping[str, Any]) -> np.ndarray:
+        """Return checked rows of parameter values, (P, n_parameters), for columns of equal length P.
+
+        Raises
+        ------
+        ValueError, SystemDefinitionError
+            An unknown name, a value that is not finite, or one the equations do not allow.
+        """
+        lists = {key: np.atleast_1d(np.asarray(column, dtype=np.float64)) for key, column in columns.items()}
+        sizes = {column.shape for column in lists.values()}
+        if len(sizes) > 1 or any(len(size) != 1 for size in sizes):
+            raise ValueError(f"columns of parameters must be one-dimensional and of equal length, not {sizes}")
+        points = np.tile(self.parameter_vector(), (next(iter(sizes))[0] if sizes else 1, 1))
+        order = list(self._values)
+        for key, column in lists.items():
+            if key not in self._values:
+                raise ValueError(self._unknown_parameter(key))
+            if not np.isfinite(column).all():
+                raise ValueError(f"parameter {key!r} must be finite, not {column[~np.isfinite(column)][0]}")
+            points[:, order.index(key)] = column
+        if len(points):
+            self._variant.domain.check_points(points)
+        return points
+
+    # Copies
+
+    def with_parameters(self, given: Any = None, /, **values: float) -> System:
+        """Return the same system at other values of its parameters.
+
+        Parameters
+        ----------
+        given : mapping, or object with a mapping ``values``, optional
+            ``{"g": 0.0018}``, another system, or a set of identified parameters.
+        **values : float
+            ``g=0.0018``; these win over ``given``.
+
+        Raises
+        ------
+        ValueError
+            An unknown parameter or a value that is not finite (TypeError: not a number).
+        SystemDefinitionError
+            A value the equations do not allow, such as a mass of zero.
+        """
+        if given is not None:
+            mapping = given if isinstance(given, Mapping) else getattr(given, "values", None)
+            if not isinstance(mapping, Mapping):
+                raise TypeError(f"with_parameters takes a mapping or an object with a mapping `values`, not {given!r}")
+            values = {**mapping, **values}
+        new = self._values.copy()
+        for key, value in values.items():
+            if key not in new:
+                raise ValueError(self._unknown_parameter(key))
+            if type(value) is not float or value - value != 0:
+                value = finite_number(value, f"parameter {key!r}")
+            new[key] = value
+        for key, _ in self._variant.etas:
+            if key in values:
+                _positive(new[key], key)
+        self._variant.domain.check(new, values)
+        return self._make(self._description, new, self._variant)
+
+    def _unknown_parameter(self, key: object) -> str:
+        text = unknown(key, "a parameter", repr(self.name), self._variant.units)
+        if str(key).startswith("eta") and not self.is_smoothed:
+            text += "; eta is set by smoothed(eta)"
+        return text
+
+    def smoothed(self, eta: float | Mapping[str, float] | None) -> System:
+        """Return the system with its switches smoothed over bands (Savi et al. 2007, Eqs. 6-10).
+
+        Parameters
+        ----------
+        eta : float, mapping of indicator to float, or None
+            Half width of the bands, in the indicators' units; None takes the smoothing away.
+
+        Raises
+        ------
+        SystemDefinitionError
+            Transitions with a reset or at a time, hysteresis, or bands that overlap: the pair is named.
+        """
+        plain = {key: self._values[key] for key in self._description.parameters}
+        if eta is None:
+            return self._make(self._description, plain, variant_of(self._description, SHARP))
+        if isinstance(eta, Mapping):
+            variant = variant_of(self._description, ETA_PER_INDICATOR)
+            wanted = [str(indicator) for _, indicator in variant.etas]
+            for key in eta:
+                if key not in wanted:
+                    raise ValueError(f"eta: {unknown(key, 'a smoothed indicator', repr(self.name), wanted)}")
+            if missing := [key for key in wanted if key not in eta]:
+                raise ValueError(f"eta: no width for {', '.join(missing)}; give {{{', '.join(wanted)}}} or one number")
+            widths = {key: eta[str(indicator)] for key, indicator in variant.etas}
+        else:
+            variant = variant_of(self._description, ONE_ETA)
+            widths = {"eta": eta}
+        new = plain | {key: _positive(finite_number(width, key), key) for key, width in widths.items()}
+        variant.domain.check(new)
+        return self._make(self._description, new, variant)
+
+    # Text
+
+    def to_text(self) -> str:
+        """Return the whole system as text (JSON): equations, units and values; data only."""
+        from nonsmooth.system.text import write_system
+
+        return write_system(self)
+
+    @classmethod
+    def from_text(cls, text: str) -> System:
+        """Read `to_text` back. Nothing in the text is executed.
+
+        Raises
+        ------
+        SystemDefinitionError
+            What was expected, and what was found.
+        """
+        from nonsmooth.system.text import read_system
+
+        return read_system(text)
+
+    def content_hash(self, *, values: bool = False) -> str:
+        """Return a hash of the equations (64 hex digits); with ``values`` also of the parameters' present values."""
+        from nonsmooth.system.text import write_system
+
+        return hashlib.sha256(write_system(self, values=values).encode()).hexdigest()
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, System):
+            return NotImplemented
+        if self._description is other._description:
+            return self._variant is other._variant and self._values == other._values
+        return self.to_text() == other.to_text()
+
+    def __hash__(self) -> int:
+        return hash((self.name, tuple(self._values.items())))
+
+    def __copy__(self) -> System:
+        return self
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> System:
+        return self
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return System.from_text, (self.to_text(),)
+
+    def __repr__(self) -> str:
+        from nonsmooth.system.show import table
+
+        return table(self)
+
+    def to_latex(self) -> str:
+        """Return the equations as LaTeX (an ``align*`` environment)."""
+        from nonsmooth.system.show import latex
+
+        return latex(self)
+
+    def _repr_latex_(self) -> str:
+        return self.to_latex()
+
+
+def _positive(width: float, key: str) -> float:
+    if width <= 0:
+        raise ValueError(f"{key} is the half width of a band and must be positive, not {width}")
+    return width

@@ -1,0 +1,208 @@
+"""A system as text and back: JSON with the equations as strings.
+
+Data only. Expressions are read with a white list (`expressions`), and what was read goes through the same
+checks as what a user writes, because it is handed to them as functions that return expressions.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import sympy as sp
+
+from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.system.condition import condition_text
+from nonsmooth.system.description import Description
+from nonsmooth.system.expressions import read_expression, write_expression
+from nonsmooth.system.mode import Band, Mode
+from nonsmooth.system.scalar import Scalar
+from nonsmooth.system.traced import Row
+from nonsmooth.system.tracing import Symbols
+from nonsmooth.system.transition import Surface, Transition
+
+if TYPE_CHECKING:
+    from nonsmooth.system.system import System
+
+__all__ = ["read_system", "write_system"]
+
+_FORMAT = "nonsmooth system"
+_VERSION = 1
+
+
+def write_system(system: System, values: bool = True) -> str:
+    """Return the system as text; without ``values`` only what copies share (for the hash of the equations)."""
+    content = _content(system._description)
+    if values:
+        now = system.values
+        content["parameters"] = {key: {"value": now[key], **rest} for key, rest in content["parameters"].items()}
+    eta = system.eta
+    if eta is not None:
+        kind = sorted(eta) if isinstance(eta, Mapping) else "all"
+        content["smoothing"] = {"eta": eta} if values else {"bands": kind}
+    return json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False)
+
+
+def _content(d: Description) -> dict[str, Any]:
+    t, names = d.traced, d.symbol_names
+
+    def text(expression: sp.Expr) -> str:
+        return write_expression(expression, names)
+
+    upward = {(s.below, s.above, (Row(s.indicator, 1),)) for s in d.surfaces}
+    downward = {(s.above, s.below, (Row(s.indicator, -1),)) for s in d.surfaces}
+    transitions: list[dict[str, Any]] = []
+    for jump in t.transitions:
+        crossing = (jump.source, jump.target, jump.rows)
+        if crossing in downward:  # the second half of a surface
+            continue
+        if crossing in upward:
+            below, above = t.mode_names[jump.source], t.mode_names[jump.target]
+            surface = t.indicator_names[jump.rows[0].indicator]
+            transitions.append({"surface": surface, "below": below, "above": above})
+            continue
+        entry: dict[str, Any] = {"source": t.mode_names[jump.source], "target": t.mode_names[jump.target]}
+        if jump.at is None:
+            entry["when"] = condition_text([(t.indicator_names[row.indicator], row.sign) for row in jump.rows])
+        else:
+            entry["at"] = float(jump.at)
+        if jump.reset is not None:
+            own = t.lacking[jump.target]
+            entry["reset"] = {s: text(e) for s, e, gone in zip(t.state_names, jump.reset, own, strict=True) if not gone}
+        if jump.writes:
+            entry["write"] = {t.memory_names[i]: text(value) for i, value in jump.writes}
+        transitions.append(entry)
+    modes = {}
+    for mode, field, lacking in zip(t.mode_names, t.fields, t.lacking, strict=True):
+        modes[mode] = {s: text(e) for s, e, gone in zip(t.state_names, field, lacking, strict=True) if not gone}
+    content: dict[str, Any] = {
+        "format": _FORMAT,
+        "version": _VERSION,
+        "name": d.name,
+        "states": dict(d.states),
+        "scale": dict(d.scale),
+        "parameters": {k: {"unit": v.unit, "symbol": v.symbol} for k, v in d.parameters.items()},
+        "memory": {k: {"value": value, "unit": unit} for k, (value, unit) in d.memory.items()},
+        "modes": modes,
+        "indicators": {k: text(e) for k, e in zip(t.indicator_names, t.indicators, strict=True)},
+        "transitions": transitions,
+        "outputs": {
+            k: {"unit": d.outputs[k], "modes": {m: text(e) for m, e in zip(t.mode_names, row, strict=True)}}
+            for k, row in zip(t.output_names, t.outputs, strict=True)
+        },
+    }
+    if t.period is not None:
+        content["period"] = text(t.period)
+    if d.symmetry is not None:
+        content["symmetry"] = {
+            "map": {s: text(e) for s, e in zip(t.state_names, d.symmetry.map, strict=True)},
+            "shift": d.symmetry.shift,
+            "modes": {t.mode_names[i]: t.mode_names[j] for i, j in enumerate(d.symmetry.modes)},
+        }
+    if d.bands:
+        content["bands"] = {t.indicator_names[band.indicator]: _band_content(band, d) for band in d.bands}
+    return content
+
+
+def _band_content(band: Any, d: Description) -> dict[str, Any]:
+    names = d.symbol_names | {band.eta: "p.eta"} | {symbol: f"p.{name}" for name, _, symbol, _ in band.memory}
+    t = d.traced
+    return {
+        "field": {s: write_expression(e, names) for s, e in zip(t.state_names, band.field, strict=True)},
+        "write": {n: {"unit": unit, "value": write_expression(e, names)} for n, unit, _, e in band.memory},
+        "outputs": {t.output_names[i]: write_expression(e, names) for i, e in band.outputs.items()},
+    }
+
+
+def read_system(text: str) -> System:
+    """Return the system written by `write_system`; see `System.from_text`."""
+    from nonsmooth.system.system import System
+
+    try:
+        content = json.loads(text, parse_constant=_no_constant)
+    except (ValueError, TypeError, RecursionError) as error:
+        raise SystemDefinitionError(f"this is not the text of a system (JSON expected): {error}") from None
+    if not isinstance(content, dict) or content.get("format") != _FORMAT:
+        raise SystemDefinitionError(f'this is not the text of a system: "format": "{_FORMAT}" is missing')
+    if content.get("version") != _VERSION:
+        raise SystemDefinitionError(
+            f"the text of the system has version {content.get('version')!r}; this version of nonsmooth reads {_VERSION}"
+        )
+    try:
+        system = System(**_Reader(content).arguments())
+        smoothing = content.get("smoothing")
+        return system if smoothing is None else system.smoothed(smoothing["eta"])
+    except SystemDefinitionError:
+        raise
+    except (KeyError, TypeError, AttributeError, ValueError) as error:
+        what = f"{error} is missing" if isinstance(error, KeyError) else str(error)
+        raise SystemDefinitionError(f"the text of the system {content.get('name')!r} is damaged: {what}") from error
+
+
+def _no_constant(name: str) -> float:
+    raise ValueError(f"{name} is not a finite number")
+
+
+class _Reader:
+    """Turns the content into the arguments of `System`."""
+
+    def __init__(self, content: Mapping[str, Any]) -> None:
+        self.content = content
+        self.bands = content.get("bands", {})
+        memory = {key: entry["unit"] for key, entry in content.get("memory", {}).items()}
+        parameters = {key: entry["unit"] for key, entry in content["parameters"].items()}
+        symbols = Symbols(content["name"], content["states"], parameters, memory)
+        self.symbols = {"t": symbols.t} | {f"u.{key}": s for key, s in symbols.u.items()}
+        self.symbols |= {f"p.{key}": s for key, s in (symbols.p | symbols.m).items()}
+
+    def function(self, text: str, extra: Mapping[str, sp.Symbol] | None = None) -> Callable[..., Any]:
+        expression = Scalar(read_expression(text, self.symbols | dict(extra or {})))
+        return lambda *_: expression
+
+    def vector(self, texts: Mapping[str, str], extra: Mapping[str, sp.Symbol] | None = None) -> Callable[..., Any]:
+        parts = [self.function(text, extra)() for text in texts.values()]
+        return lambda *_: parts
+
+    def arguments(self) -> dict[str, Any]:
+        c = self.content
+        memory = c.get("memory", {})
+        symmetry = c.get("symmetry")
+        return {
+            "name": c["name"],
+            "states": c["states"],
+            "scale": c["scale"],
+            "parameters": {k: (e["value"], e["unit"], e["symbol"]) for k, e in c["parameters"].items()},
+            "memory": {k: (e["value"], e["unit"]) for k, e in memory.items()},
+            "modes": {k: Mode(self.vector(e), states=list(e)) for k, e in c["modes"].items()},
+            "indicators": {k: self.function(e) for k, e in c["indicators"].items()},
+            "transitions": [self.transition(e) for e in c["transitions"]],
+            "outputs": {
+                k: ({mode: self.function(text) for mode, text in e["modes"].items()}, e["unit"])
+                for k, e in c.get("outputs", {}).items()
+            },
+            "period": self.function(c["period"]) if "period" in c else None,
+            "symmetry": symmetry and (self.vector(symmetry["map"]), symmetry["shift"], symmetry["modes"]),
+            "bands": {k: self.band(e) for k, e in self.bands.items()},
+        }
+
+    def transition(self, entry: Mapping[str, Any]) -> Transition | Surface:
+        if "surface" in entry:
+            return Surface(entry["surface"], below=entry["below"], above=entry["above"])
+        return Transition(
+            entry["source"],
+            entry["target"],
+            when=entry.get("when"),
+            at=entry.get("at"),
+            reset=self.vector(entry["reset"]) if "reset" in entry else None,
+            write={k: self.function(e) for k, e in entry["write"].items()} if "write" in entry else None,
+        )
+
+    def band(self, entry: Mapping[str, Any]) -> Band:
+        extra = {"p.eta": sp.Symbol("p_eta", real=True)}
+        extra |= {f"p.{name}": sp.Symbol(f"m_{name}", real=True) for name in entry["write"]}
+        return Band(
+            self.vector(entry["field"], extra),
+            write={k: (self.function(e["value"], extra), e["unit"]) for k, e in entry["write"].items()},
+            outputs={k: self.function(e, extra) for k, e in entry["outputs"].items()},
+        )

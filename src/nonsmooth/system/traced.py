@@ -1,0 +1,76 @@
+"""What remains of a user's system once its functions have been called with symbols.
+
+Everything below the system room reads this record and nothing else: the linearity test, the
+derivatives, the code generator, the smoothed switch and the text form.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from sympy import Expr, Symbol
+
+__all__ = ["Row", "Traced", "TracedTransition"]
+
+
+@dataclass(frozen=True)
+class Row:
+    """One sign condition: ``sign * indicator > 0`` (``>= 0`` where not strict).
+
+    A non-strict row only occurs in derived systems (the smoothed switch), where it settles a tie:
+    the region of an indicator that vanishes identically.
+    """
+
+    indicator: int
+    sign: int
+    strict: bool = True
+
+
+@dataclass(frozen=True)
+class TracedTransition:
+    """An allowed jump from mode ``source`` to mode ``target``.
+
+    It fires at the instant all ``rows`` hold (``rows``), or at the forcing phase ``at`` (in periods,
+    0..1); one of the two is empty. ``reset`` has one expression per state, or is None (identity).
+    ``writes`` are (memory index, expression) pairs, evaluated with the state just before the jump.
+    ``contact`` marks the transitions counted as contacts: those with a reset, and those that leave the
+    first mode.
+    """
+
+    source: int
+    target: int
+    rows: tuple[Row, ...]
+    at: float | None = None
+    reset: tuple[Expr, ...] | None = None
+    writes: tuple[tuple[int, Expr], ...] = ()
+    contact: bool = False
+    label: str = ""
+
+
+@dataclass(frozen=True)
+class Traced:
+    """The expressions of a system in its symbols ``t``, ``u``, ``p`` (parameters) and ``m`` (memory).
+
+    ``fields[mode][state]`` is du/dt (0 where ``lacking[mode][state]``: the mode does not have that state),
+    ``indicators[i]``, ``outputs[i][mode]``. ``period`` is the forcing period in ``p`` (None: autonomous).
+    """
+
+    name: str
+    t: Symbol
+    u: tuple[Symbol, ...]
+    p: tuple[Symbol, ...]
+    m: tuple[Symbol, ...]
+    state_names: tuple[str, ...]
+    parameter_names: tuple[str, ...]
+    memory_names: tuple[str, ...]
+    mode_names: tuple[str, ...]
+    indicator_names: tuple[str, ...]
+    output_names: tuple[str, ...]
+    fields: tuple[tuple[Expr, ...], ...]
+    lacking: tuple[tuple[bool, ...], ...]
+    indicators: tuple[Expr, ...]
+    transitions: tuple[TracedTransition, ...]
+    outputs: tuple[tuple[Expr, ...], ...]
+    period: Expr | None

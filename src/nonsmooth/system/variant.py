@@ -1,0 +1,61 @@
+"""One traced form of a description, sharp or smoothed, with what is derived from it and kept."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import cached_property
+from typing import Any
+
+from nonsmooth.system.derivatives import Derivatives
+from nonsmooth.system.description import Description
+from nonsmooth.system.domain import Domain
+from nonsmooth.system.traced import Traced
+
+__all__ = ["ETA_PER_INDICATOR", "ONE_ETA", "SHARP", "Variant", "variant_of"]
+
+SHARP, ONE_ETA, ETA_PER_INDICATOR = "sharp", "one eta", "eta per indicator"
+
+
+class Variant:
+    """A traced system, its derivatives, and what its parameters must fulfil; shared by all copies."""
+
+    def __init__(self, description: Description, kind: str) -> None:
+        self.kind = kind
+        self.etas: tuple[tuple[str, str | None], ...] = ()
+        self.memory: dict[str, tuple[float, str]] = dict(description.memory)
+        extra: tuple[Any, ...] = ()
+        if kind == SHARP:
+            self.traced: Traced = description.traced
+        else:
+            from nonsmooth.system.smoothing import smooth
+
+            smoothed = smooth(description, single=kind == ONE_ETA)
+            self.traced, self.etas, extra = smoothed.traced, smoothed.etas, smoothed.apart
+            self.memory |= {name: (0.0, unit) for name, unit in smoothed.memory}
+        self.units: Mapping[str, str] = {
+            **{name: parameter.unit for name, parameter in description.parameters.items()},
+            **{name: "" for name, _ in self.etas},
+        }
+        self.domain = Domain(self.traced, extra)
+
+    @cached_property
+    def period(self) -> Callable[..., float] | None:
+        """The forcing period as a function of all parameters in order."""
+        if self.traced.period is None:
+            return None
+        import sympy as sp
+
+        return sp.lambdify(self.traced.p, self.traced.period, modules="math")
+
+    @cached_property
+    def derivatives(self) -> Derivatives:
+        """Exact derivatives, built on demand."""
+        return Derivatives(self.traced)
+
+
+def variant_of(description: Description, kind: str = SHARP) -> Variant:
+    """Return the variant, made once for each description."""
+    found = description.variants.get(kind)
+    if found is None:
+        found = description.variants[kind] = Variant(description, kind)
+    return found

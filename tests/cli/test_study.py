@@ -1,0 +1,113 @@
+"""Study files: read strictly, computed as the same call in Python, written where they say."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import nonsmooth as ns
+from nonsmooth.cli import main as cli
+from nonsmooth.cli.study import read_study
+from nonsmooth.results.provenance import read_provenance
+
+SYSTEM = """
+[system]
+model = "discontinuous_support"
+parameters = { omega = 3.69, g = -0.0045 }
+"""
+SWEEP = """
+[sweep]
+parameter = "rho"
+values = { from = 0.42, to = 0.46, n = 5 }
+transient = 60
+keep = 8
+"""
+
+
+@pytest.fixture
+def write(tmp_path: Path):  # type: ignore[no-untyped-def]
+    def _write(text: str) -> Path:
+        path = tmp_path / "study.toml"
+        path.write_text(text)
+        return path
+
+    return _write
+
+
+def test_a_file_computes_what_the_call_computes(write, tmp_path: Path, capsys) -> None:  # type: ignore[no-untyped-def]
+    path = write(SYSTEM + SWEEP + '[output]\ndata = "out/a.nc"\nfigure = "out/a.pdf"\ny = "v"\n')
+    assert cli.main(["run", str(path)]) == 0
+    assert "sweep of" in capsys.readouterr().out
+    system = ns.models.discontinuous_support().with_parameters(omega=3.69, g=-0.0045)
+    expected = ns.sweep(system, "rho", np.linspace(0.42, 0.46, 5), transient=60, keep=8, progress=False)
+    found = ns.load(tmp_path / "out" / "a.nc")
+    xr.testing.assert_equal(found, expected)
+    assert ns.System.from_text(read_provenance(found)["system"]["text"]) == system
+    assert (tmp_path / "out" / "a.pdf").read_bytes().startswith(b"%PDF")
+
+
+@pytest.mark.parametrize(
+    ("verb", "figure_of"),
+    [
+        ("[simulate]\nperiods = 3\n", "u"),
+        ("[poincare]\nn = 5\ntransient = 10\nsection = { phase = 0.25 }\n", "section"),
+        ("[frequency_response]\nvalues = [3.0, 3.1, 3.2]\ntransient = 20\nkeep = 4\n", "amplitude"),
+    ],
+)
+def test_every_verb_is_a_table(verb: str, figure_of: str, write, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+    path = write(SYSTEM + verb + '[output]\ndata = "r.zarr"\nfigure = "r.svg"\n')
+    assert cli.main(["run", str(path), "--quiet"]) == 0
+    assert figure_of in ns.load(tmp_path / "r.zarr")
+    assert (tmp_path / "r.svg").exists()
+
+
+def test_a_model_may_come_from_a_file_and_be_smoothed(write, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+    (tmp_path / "mine.py").write_text(
+        "from nonsmooth import models\n"
+        "oscillator = models.discontinuous_support(g=0.5)\n"
+        "def build():\n    return models.impact_oscillator()\n"
+        "number = 3\n"
+    )
+    study = read_study(write('[system]\nmodel = "mine.py:oscillator"\nsmoothed = 1e-5\n' + SWEEP))
+    assert study.system.eta == 1e-5
+    assert study.system.values["g"] == 0.5
+    built = read_study(write('[system]\nmodel = "mine.py:build"\n[simulate]\nperiods = 1\n'))
+    assert built.system == ns.models.impact_oscillator()
+    for name, message in (("number", "is a int, not a System"), ("oscilator", "nearest: oscillator")):
+        with pytest.raises(ValueError, match=message):
+            read_study(write(f'[system]\nmodel = "mine.py:{name}"\n[simulate]\nperiods = 1\n'))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (SYSTEM + SWEEP + "kepe = 5\n", r"study\.toml, table \[sweep\]: `kepe` is not a key .*nearest: keep; all: .*transient"),
+        (SYSTEM + SWEEP + "[outptu]\n", r"study\.toml: `outptu` is not a table .*nearest: output"),
+        (SYSTEM.replace("model", "modell") + SWEEP, r"table \[system\]: `modell` is not a key .*nearest: model"),
+        (SYSTEM.replace("omega", "omegaa") + SWEEP, r"`omegaa` is not a parameter of 'discontinuous support'; nearest: omega"),
+        (SYSTEM + SWEEP + '[output]\ncsv = "a"\n', r"table \[output\]: `csv` is not a key .*all: data, figure, x, y"),
+        (SYSTEM, "exactly one verb, this one has none"),
+        (SYSTEM + SWEEP + "[simulate]\nperiods = 3\n", r"exactly one verb, this one has \['sweep', 'simulate'\]"),
+        (SWEEP, r"needs a table \[system\]"),
+        (SYSTEM + '[sweep]\nparameter = "rho"\n', r"table \[sweep\]: needs values"),
+        (SYSTEM + '[sweep]\nparameter = "rho"\nvalues = { from = 0.1, to = 1 }\n', "values is .* give a list or"),
+        (SYSTEM + '[sweep]\nparameter = "rho"\nvalues = { from = 0.1, till = 1 }\n', r"values: `till` is not a key"),
+        (SYSTEM + "[poincare]\nsection = 0.5\n", "section is 0.5; give"),
+        ("sweep = 3\n" + SYSTEM, r"`sweep` must be a table: write \[sweep\]"),
+        ("[system\n", "is not a TOML file: .*line 1"),
+    ],
+)
+def test_what_is_wrong_is_named(text: str, message: str, write, capsys) -> None:  # type: ignore[no-untyped-def]
+    path = write(text)
+    with pytest.raises(ValueError, match=message):
+        read_study(path)
+    assert cli.main(["run", str(path)]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"none\.toml: no such study file"):
+        read_study(tmp_path / "none.toml")

@@ -1,0 +1,112 @@
+"""Synthetic results, built through the schema, whose every number is known in closed form."""
+
+from __future__ import annotations
+
+import os
+
+os.environ.setdefault("MPLBACKEND", "Agg")
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from nonsmooth.results import schema
+from nonsmooth.results.labels import Labels, Quantity
+from nonsmooth.results.provenance import provenance
+from nonsmooth.results.statuses import by_name
+
+GAP = 0.5
+JUMP_UP, JUMP_DOWN = 5.9, 5.2
+
+
+@pytest.fixture(scope="session")
+def labels() -> Labels:
+    return Labels(
+        name="oscillator",
+        states={"x": Quantity("m"), "v": Quantity("m/s", r"\dot x")},
+        parameters={"rho": Quantity("N", r"\rho", 0.3), "omega": Quantity("rad/s", r"\omega", 1.0),
+                    "g": Quantity("m", "g", GAP)},
+        modes=("free", "contact"),
+        transitions=((0, 1), (1, 0)),
+        indicators=("penetration", "separation"),
+        outputs={"contact_force": Quantity("N")},
+        text="the system as text",
+    )  # fmt: skip
+
+
+@pytest.fixture
+def trajectory(labels: Labels) -> xr.Dataset:
+    """x = cos t, v = -sin t over two turns, "contact" where x > GAP; each crossing stands twice."""
+    first = np.arccos(GAP)
+    turns = 2 * np.pi * np.arange(3)
+    crossing = np.sort(np.concatenate([turns + first, turns - first]))
+    crossing = crossing[(crossing > 0) & (crossing < 4 * np.pi)]
+    time = np.sort(np.concatenate([np.linspace(0, 4 * np.pi, 401), crossing, crossing]))
+    segment = np.searchsorted(crossing, time, side="left")
+    for k, instant in enumerate(crossing):
+        segment[np.flatnonzero(time == instant)[-1]] = k + 1
+    mode = 1 - segment % 2  # the run begins inside contact
+    state = np.stack([np.cos(time), -np.sin(time)], axis=1)
+    at = np.stack([np.cos(crossing), -np.sin(crossing)], axis=1)
+    return schema.trajectory(
+        labels, provenance(labels, "simulate", {"periods": 2}, method="exact"),
+        time=time, u=state, mode=mode, segment=segment, crossing_time=crossing,
+        crossing_transition=1 - np.arange(len(crossing)) % 2, u_before=at, u_after=at,
+        touch_time=np.empty(0), touch_indicator=np.empty(0), touch_u=np.empty((0, 2)), touch_clearance=np.empty(0),
+        outputs=np.maximum(state[:, :1] - GAP, 0),
+    )  # fmt: skip
+
+
+def sweep_arrays(directions: int, starts: int, points: int, keep: int = 4) -> dict[str, np.ndarray]:
+    """Every entry holds its own indices, so that a transposed dim shows: 1000 d + 100 s + point + iterate / 10."""
+    lead = (directions, starts, points)
+    d, s, p = np.meshgrid(*(np.arange(k) for k in lead), indexing="ij")
+    base = 1000.0 * d + 100.0 * s + p
+    iterate = np.arange(keep) / 10
+    section = np.stack([base[..., None] + iterate, -(base[..., None] + iterate)], axis=-1)
+    status = np.full(lead, by_name("ok").code)
+    status[..., -1] = by_name("diverged").code
+    section[..., -1, :, :] = np.nan
+    return {
+        "section": section, "maximum": section.max(axis=-2), "minimum": section.min(axis=-2),
+        "period_number": np.ones(lead, dtype=int), "residual": np.zeros(lead),
+        "crossings_per_period": 2 * np.ones(lead), "contacts_per_period": np.ones(lead),
+        "clearance": np.stack([base, -base], axis=-1), "status": status,
+        "output_maximum": base[..., None] + 0.5, "output_minimum": base[..., None] - 0.5,
+    }  # fmt: skip
+
+
+@pytest.fixture
+def swept(labels: Labels) -> xr.Dataset:
+    """A sweep of rho both ways over five values, from one start; the last point diverged."""
+    return schema.sweep(
+        labels, provenance(labels, "sweep", {"parameter": "rho", "direction": "both"}, method="exact"),
+        "rho", np.linspace(0.2, 0.4, 5), sweep_arrays(2, 1, 5),
+        directions=("up", "down"), starts=np.zeros((1, 2)), squeeze=("start",),
+    )  # fmt: skip
+
+
+@pytest.fixture
+def responded(labels: Labels) -> xr.Dataset:
+    """A triangular resonance that drops at JUMP_UP going up and at JUMP_DOWN coming down."""
+    omega = np.linspace(3, 7, 81)
+    low, high = np.full_like(omega, 0.01), 0.01 * omega
+    amplitude = np.stack([np.where(omega <= JUMP_UP, high, low), np.where(omega < JUMP_DOWN, high, low)])
+    arrays = sweep_arrays(2, 1, 81)
+    x = amplitude[:, None, :, None] * np.array([1.0, 2.0])
+    base = schema.sweep(
+        labels, provenance(labels, "frequency_response", {}, method="exact"), "omega", omega,
+        arrays | {"maximum": x, "minimum": -x}, directions=("up", "down"), starts=np.zeros((1, 2)), squeeze=("start",),
+    )  # fmt: skip
+    return schema.response(base, amplitude=x, jumps={"value": [JUMP_UP, JUMP_DOWN], "direction": ["up", "down"]})
+
+
+@pytest.fixture
+def points(labels: Labels) -> xr.Dataset:
+    """Ten points of a section on the unit circle, from two starts."""
+    angle = np.linspace(0, 1, 20).reshape(2, 10)
+    return schema.section_points(
+        labels, provenance(labels, "poincare", {"n": 10}, method="exact"),
+        section=np.stack([np.cos(angle), np.sin(angle)], axis=-1), time=angle, mode=np.zeros((2, 10)),
+        status=np.zeros(2), starts=np.zeros((2, 2)),
+    )  # fmt: skip

@@ -1,0 +1,197 @@
+"""The compile cache: a second process compiles nothing, an edit anywhere it matters compiles again."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+KERNELS = '''
+from numba import types
+from nonsmooth.kernels.cache import device, kernel
+
+STEP = types.FunctionType(types.void(types.int64, types.float64, types.float64[::1]))
+
+
+@device
+def add(a, b):
+    return a + b
+
+
+@kernel(types.float64(types.float64))
+def twice(a):
+    return add(a, a)
+
+
+@kernel(types.float64(STEP, STEP, types.float64[::1], types.int64))
+def drive(f, g, u, n):
+    for i in range(n):
+        f(i, 0.5, u)
+        g(i, 0.5, u)
+    return twice(u[0])
+'''
+
+MODEL = '''
+from nonsmooth.kernels.cache import kernel
+
+
+@kernel("void(int64, float64, float64[::1])")
+def f(mode, t, u):
+    u[0] += {0!r} + mode * t
+
+
+@kernel("void(int64, float64, float64[::1])")
+def g(mode, t, u):
+    u[0] *= {0!r}
+'''
+
+SCRIPT = '''
+import json, sys
+import numpy as np
+from nonsmooth.kernels import cache
+import driver
+
+model = cache.load_module(sys.stdin.read(), "model")
+value = driver.drive(model.f, model.g, np.ones(1), 2)
+drive = driver.drive
+print(json.dumps({
+    "value": value,
+    "driver": list(cache.cache_statistics(driver)),
+    "model": list(cache.cache_statistics(model)),
+    "overloads": len(getattr(drive, "signatures", [])),
+    "file": model.__file__,
+}))
+'''
+
+
+def expected(factor):
+    u = 1.0
+    for mode in range(2):
+        u = (u + factor + mode * 0.5) * factor
+    return 2 * u
+
+
+def run(folder, factor, script=SCRIPT, **environment):
+    (folder / "driver.py").exists() or (folder / "driver.py").write_text(KERNELS)
+    path = os.pathsep.join([str(folder), *[p for p in sys.path if p]])
+    environment = {**os.environ, "NONSMOOTH_CACHE_DIR": str(folder / "cache"), "PYTHONPATH": path, **environment}
+    done = subprocess.run(
+        [sys.executable, "-c", script], input=MODEL.format(factor), env=environment, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def test_second_process_compiles_nothing_and_a_new_model_only_itself(tmp_path):
+    first = run(tmp_path, 2.0)
+    assert first["value"] == expected(2.0)
+    assert ["drive", 0, 1] in first["driver"]
+
+    again = run(tmp_path, 2.0)
+    assert again["value"] == expected(2.0)
+    assert all(misses == 0 for _, _, misses in again["driver"] + again["model"])
+
+    other = run(tmp_path, 3.0)
+    assert other["value"] == expected(3.0)
+    assert all(misses == 0 for _, _, misses in other["driver"])
+    assert all((hits, misses) == (0, 1) for _, hits, misses in other["model"])
+    # The functions came in as first-class function types: no second version of the driver was made for them.
+    assert other["overloads"] == 1
+
+
+def test_damaged_entries_are_compiled_anew(tmp_path):
+    run(tmp_path, 2.0)
+    for entry in (tmp_path / "cache" / "compiled").iterdir():
+        entry.write_bytes(entry.read_bytes()[:100])
+    for source in (tmp_path / "cache" / "generated").glob("*.py"):
+        source.write_text("damaged")
+    damaged = run(tmp_path, 2.0)
+    assert damaged["value"] == expected(2.0)
+    assert ["drive", 0, 1] in damaged["driver"]
+    assert ["drive", 1, 0] in run(tmp_path, 2.0)["driver"]
+
+
+def test_without_jit(tmp_path):
+    plain = run(tmp_path, 2.0, NUMBA_DISABLE_JIT="1")
+    assert plain["value"] == expected(2.0)
+    assert plain["model"] == [] and plain["driver"] == []
+    assert not (tmp_path / "cache" / "compiled").exists()
+
+
+def test_stamp_follows_imports_through_kernel_files(monkeypatch):
+    from nonsmooth.kernels import cache
+
+    sources = {"low": "x = 1", "mid": "from .low import x", "top": "from .mid import x", "apart": "y = 2"}
+
+    def stamp(text):
+        monkeypatch.setattr(cache, "_kernel_sources", lambda: dict(sources))
+        cache._source_stamp.cache_clear()
+        return cache._source_stamp(text)
+
+    before = {name: stamp(text) for name, text in sources.items()}
+    sources["low"] = "x = 3"
+    after = {name: stamp(text) for name, text in sources.items()}
+    assert before["apart"] == after["apart"]
+    assert all(before[name] != after[name] for name in ("low", "mid", "top"))
+    cache._source_stamp.cache_clear()
+
+
+def test_old_entries_are_pruned(tmp_path):
+    from nonsmooth.kernels import cache
+
+    for name, age_days in (("old", 200), ("new", 1)):
+        (tmp_path / name).write_text("")
+        stat = (tmp_path / name).stat()
+        os.utime(tmp_path / name, (stat.st_atime, stat.st_mtime - 86400 * age_days))
+    cache._prune(tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["new"]
+
+
+def test_cache_folder(tmp_path, monkeypatch):
+    from nonsmooth.kernels.cache import cache_folder
+
+    monkeypatch.setenv("NONSMOOTH_CACHE_DIR", str(tmp_path / "a" / "b"))
+    assert cache_folder() == tmp_path / "a" / "b"
+    assert cache_folder().is_dir()
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("NONSMOOTH_CACHE_DIR", str(tmp_path / "file"))
+    with pytest.raises(PermissionError, match="choose another folder"):
+        cache_folder()
+
+
+@pytest.mark.skipif(sys.platform in ("win32", "darwin"), reason="XDG folders")
+def test_unwritable_user_folder_falls_back_to_a_private_one(tmp_path, monkeypatch):
+    from nonsmooth.kernels import cache
+
+    (tmp_path / "file").write_text("")
+    monkeypatch.delenv("NONSMOOTH_CACHE_DIR", raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    cache._usable_folder.cache_clear()
+    folder = cache.cache_folder()
+    assert folder.parent == tmp_path
+    assert Path(folder).stat().st_mode & 0o077 == 0
+    cache._usable_folder.cache_clear()
+
+
+def test_one_signature_only(tmp_path, monkeypatch):
+    from nonsmooth.kernels import cache
+
+    monkeypatch.setenv("NONSMOOTH_CACHE_DIR", str(tmp_path))
+    module = cache.load_module(MODEL.format(7.0), "single")
+    assert module is cache.load_module(MODEL.format(7.0), "single")
+    if hasattr(module.f, "signatures"):
+        with pytest.raises(TypeError, match="No matching definition"):
+            module.f(0, 0.5, [1.0, "text"])
+        assert len(module.f.signatures) == 1
+
+
+def test_failed_module_is_not_kept(tmp_path, monkeypatch):
+    from nonsmooth.kernels import cache
+
+    monkeypatch.setenv("NONSMOOTH_CACHE_DIR", str(tmp_path))
+    for _ in range(2):
+        with pytest.raises(ZeroDivisionError):
+            cache.load_module("1 / 0", "broken")

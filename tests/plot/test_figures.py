@@ -1,0 +1,156 @@
+"""Every figure draws what its result holds, on the axes it was given, and saves as a vector file."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import matplotlib as mpl
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+import xarray as xr
+
+from nonsmooth import plot
+from nonsmooth.plot.labels import column, label
+from nonsmooth.plot.segments import with_gaps
+
+CASES = [
+    ("time_history", "trajectory"), ("phase_portrait", "trajectory"), ("bifurcation", "swept"),
+    ("frequency_response", "responded"), ("section", "points"),
+]  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def _close() -> Iterator[None]:
+    yield
+    plt.close("all")
+
+
+@pytest.mark.parametrize(("figure", "name"), CASES)
+def test_a_figure_of_its_own_has_a_column_width_and_saves_the_same_twice(
+    figure: str, name: str, tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
+    ax = getattr(plot, figure)(request.getfixturevalue(name))
+    assert ax.figure.get_figwidth() * 25.4 == pytest.approx(84)
+    once = plot.save_figure(ax, tmp_path / "a.pdf").read_bytes()
+    assert once.startswith(b"%PDF")
+    assert plot.save_figure(ax.figure, tmp_path / "b.pdf").read_bytes() == once
+    assert ax.get_xlabel()
+    assert ax.get_ylabel()
+
+
+@pytest.mark.parametrize(("figure", "name"), CASES)
+def test_given_axes_are_used_and_the_callers_style_kept(
+    figure: str, name: str, request: pytest.FixtureRequest
+) -> None:
+    _, mine = plt.subplots()
+    before = dict(mpl.rcParams)
+    assert getattr(plot, figure)(request.getfixturevalue(name), mine) is mine
+    assert dict(mpl.rcParams) == before
+    assert len(plt.get_fignums()) == 1
+
+
+@pytest.mark.parametrize(("figure", "name"), CASES)
+def test_a_result_of_another_verb_is_refused(figure: str, name: str) -> None:
+    with pytest.raises(ValueError, match="it is not the result of"):
+        getattr(plot, figure)(xr.Dataset({"u2": 1.0}))
+
+
+def test_a_diagram_shows_every_finite_point_up_and_down(swept: xr.Dataset) -> None:
+    ax = plot.bifurcation(swept, y="v")
+    up, down = ax.lines
+    assert (up.get_label(), down.get_label()) == ("up", "down")
+    for line, direction in ((up, "up"), (down, "down")):
+        drawn = np.array(line.get_data()).T
+        drawn = drawn[np.isfinite(drawn[:, 1])]
+        held = swept["section"].sel(direction=direction, state="v").transpose("iterate", "rho")
+        expected = {(float(r), float(v)) for row in held for r, v in zip(swept["rho"], row, strict=True) if np.isfinite(v)}
+        assert set(map(tuple, drawn)) == expected
+        assert line.get_rasterized()
+    assert ax.get_xlabel() == r"$\rho$ (N)"
+    assert ax.get_ylabel() == r"$\dot x$ (m/s)"
+
+
+def test_many_starts_are_all_drawn(swept: xr.Dataset) -> None:
+    many = swept.isel(direction=0).drop_vars("start").expand_dims(start=3)
+    (cloud,) = plot.bifurcation(many).lines
+    assert len(cloud.get_xdata()) == many["section"].isel(state=0).size
+
+
+def test_jumps_are_gaps_with_their_values(responded: xr.Dataset) -> None:
+    ax = plot.frequency_response(responded)
+    texts = [text.get_text() for text in ax.texts if text.get_text()]
+    assert texts == ["5.9", "5.2"]
+    up, down = ax.lines
+    assert (up.get_label(), down.get_label()) == ("increasing", "decreasing")
+    for line, value in ((up, 5.9), (down, 5.2)):
+        x, y = line.get_data()
+        (gap,) = np.flatnonzero(np.isnan(x))
+        assert x[gap - 1] <= value + 1e-9 <= x[gap + 1] + 1e-9
+        assert max(y[gap - 1], y[gap + 1]) > 4 * min(y[gap - 1], y[gap + 1])
+    assert up.get_linestyle() != down.get_linestyle()
+    plain = plot.frequency_response(responded, plt.figure().add_subplot(), jumps=False, quantity="maximum")
+    assert not plain.texts
+
+
+def test_an_axis_in_falling_order_breaks_at_the_same_places(responded: xr.Dataset) -> None:
+    rising = plot.frequency_response(responded).lines[0].get_data()
+    falling = plot.frequency_response(responded.isel(omega=slice(None, None, -1)), plt.figure().add_subplot())
+    np.testing.assert_array_equal(np.array(falling.lines[0].get_data())[:, ::-1], rising)
+
+
+def test_a_portrait_tells_the_modes_apart(trajectory: xr.Dataset) -> None:
+    ax = plot.phase_portrait(trajectory, zone="g")
+    free, contact = (line for line in ax.lines if line.get_label() in ("free", "contact"))
+    inside = contact.get_xdata()[np.isfinite(contact.get_xdata())]
+    outside = free.get_xdata()[np.isfinite(free.get_xdata())]
+    assert inside.min() >= 0.5 - 1e-12
+    assert outside.max() <= 0.5 + 1e-12
+    zone = ax.patches[0]
+    assert zone.get_extents().transformed(ax.transData.inverted()).x0 == pytest.approx(0.5)
+
+
+def test_a_portrait_carries_section_points(trajectory: xr.Dataset, points: xr.Dataset) -> None:
+    ax = plot.phase_portrait(trajectory, section=points)
+    (drawn,) = (line for line in ax.lines if line.get_label() == "section")
+    np.testing.assert_array_equal(drawn.get_xdata(), points["section"].sel(state="x").values.ravel())
+
+
+def test_an_impact_is_a_gap_not_a_line(trajectory: xr.Dataset) -> None:
+    (plain,) = with_gaps(trajectory, trajectory["time"].values)
+    assert np.isfinite(plain).all()
+    impact = trajectory.copy(deep=True)
+    impact["u"].values[trajectory["segment"].values == 1] *= -0.8
+    (cut,) = with_gaps(impact, impact["time"].values)
+    assert np.isnan(cut).sum() == 2  # into segment 1 and out of it
+
+
+def test_contact_is_shaded_over_time(trajectory: xr.Dataset) -> None:
+    ax = plot.time_history(trajectory, y="contact_force")
+    (shade,) = ax.collections
+    spans = [(path.vertices[:, 0].min(), path.vertices[:, 0].max()) for path in shade.get_paths()]
+    crossing = trajectory["crossing_time"].values
+    np.testing.assert_allclose(spans[1], crossing[1:3], atol=0.05)
+    assert not plot.time_history(trajectory, plt.figure().add_subplot(), shade=False).collections
+
+
+def test_labels_have_symbols_units_or_words(trajectory: xr.Dataset, swept: xr.Dataset) -> None:
+    assert label(trajectory, "time") == "$t$ (s)"
+    assert label(trajectory, "x") == "$x$ (m)"
+    assert label(trajectory, "contact_force") == "contact force (N)"
+    assert label(swept, "omega") == r"$\omega$ (rad/s)"
+
+
+def test_an_unknown_state_is_answered_with_all_states(swept: xr.Dataset) -> None:
+    with pytest.raises(ValueError, match=r"'w' is neither a state nor an output .*\['x', 'v'\]"):
+        column(swept, "section", "w")
+    with pytest.raises(ValueError, match="quantity is 'height'"):
+        plot.frequency_response(xr.Dataset({"amplitude": 1.0}), quantity="height")
+
+
+def test_point_clouds_are_pixels_and_text_stays_text(swept: xr.Dataset, tmp_path: Path) -> None:
+    text = plot.save_figure(plot.bifurcation(swept), tmp_path / "a.svg").read_text()
+    assert "data:image/png;base64" in text
+    assert re.search(r"<text[^>]*>", text)
