@@ -22,9 +22,9 @@ def processor() -> str:
 
 def facts() -> list[str]:
     packages = ("nonsmooth", "numpy", "numba", "scipy", "heyoka", "xarray", "sympy")
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     return [
-        f"processor: {processor()}; {len(os.sched_getaffinity(0)) if hasattr(os, 'sched_getaffinity') else os.cpu_count()}"
-        " cores visible",
+        f"processor: {processor()}; {cores} cores visible",
         f"system: {platform.system()}, Python {platform.python_version()}",
         "versions: " + ", ".join(f"{name} {version(name)}" for name in packages),
         f"load of the machine when the run began: {os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else "",

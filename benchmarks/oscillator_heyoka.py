@@ -92,9 +92,8 @@ class Oscillator:
         depth, tau = x - p["g"], p["c_s"] / p["k_s"]
         inside = depth > 0 and depth + tau * v > 0
         self.period = 2 * np.pi / p["omega"]
-        self.ta.pars[:] = [
-            2 * p["k"] / m, p["c"] / m, p["rho"] / m, p["omega"], p["g"], p["k_s"] / m, p["c_s"] / m, tau, float(inside),
-        ]  # fmt: skip
+        coefficients = (2 * p["k"] / m, p["c"] / m, p["rho"] / m, p["omega"], p["g"], p["k_s"] / m, p["c_s"] / m, tau)
+        self.ta.pars[:] = [*coefficients, float(inside)]
         self.ta.time = 0.0
         self.ta.state[:] = u
         self.ta.reset_cooldowns()

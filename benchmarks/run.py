@@ -35,7 +35,9 @@ def main() -> int:
         text += lines
         verdicts += part_verdicts
     summary = ["## Against the figures to be met", "", "| what | to be met | measured | met |", "|---|---|---|---|"]
-    summary += [f"| {what} | {target} | {found} | {'yes' if met else '**no**'} |" for what, target, found, met in verdicts]
+    summary += [
+        f"| {what} | {target} | {found} | {'yes' if met else '**no**'} |" for what, target, found, met in verdicts
+    ]
     print("\n".join(summary))
     options.out.write_text("\n".join([*text, *summary, ""]), encoding="utf-8")
     return 0

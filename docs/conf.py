@@ -6,7 +6,7 @@ from nonsmooth.results.statuses import STATUSES
 
 project = "nonsmooth"
 author = "the nonsmooth authors"
-copyright = "2026, the nonsmooth authors"  # noqa: A001
+copyright = "2026, the nonsmooth authors"
 release = metadata.version("nonsmooth")
 version = release
 

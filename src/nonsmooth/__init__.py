@@ -1,1 +1,74 @@
-"""Non-smooth (piecewise-smooth) dynamical systems, from the equations to the measured twin."""
+"""Non-smooth (piecewise-smooth) dynamical systems, from the equations to the measured twin.
+
+The verbs are the front door; each answers one question. Names are loaded when they are first used, so that
+``import nonsmooth`` costs nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from nonsmooth import models as models
+    from nonsmooth import plot as plot
+    from nonsmooth.analysis.response import frequency_response as frequency_response
+    from nonsmooth.analysis.sweep import sweep as sweep
+    from nonsmooth.errors import DataFileError as DataFileError
+    from nonsmooth.errors import SolveError as SolveError
+    from nonsmooth.errors import SystemDefinitionError as SystemDefinitionError
+    from nonsmooth.flow.poincare import poincare as poincare
+    from nonsmooth.flow.sections import Poincare as Poincare
+    from nonsmooth.flow.sections import Stroboscopic as Stroboscopic
+    from nonsmooth.flow.simulate import simulate as simulate
+    from nonsmooth.flow.starts import random_starts as random_starts
+    from nonsmooth.results.store import load as load
+    from nonsmooth.results.store import save as save
+    from nonsmooth.system.mode import Band as Band
+    from nonsmooth.system.mode import Mode as Mode
+    from nonsmooth.system.scalar import where as where
+    from nonsmooth.system.system import System as System
+    from nonsmooth.system.transition import Surface as Surface
+    from nonsmooth.system.transition import Transition as Transition
+
+_WHERE = {
+    "System": "system.system",
+    "Transition": "system.transition",
+    "Surface": "system.transition",
+    "Mode": "system.mode",
+    "Band": "system.mode",
+    "where": "system.scalar",
+    "simulate": "flow.simulate",
+    "poincare": "flow.poincare",
+    "Stroboscopic": "flow.sections",
+    "Poincare": "flow.sections",
+    "random_starts": "flow.starts",
+    "sweep": "analysis.sweep",
+    "frequency_response": "analysis.response",
+    "save": "results.store",
+    "load": "results.store",
+    "SystemDefinitionError": "errors",
+    "SolveError": "errors",
+    "DataFileError": "errors",
+}
+_ROOMS = ("models", "plot")
+
+__all__ = sorted([*_WHERE, *_ROOMS, "__version__"])
+
+
+def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        from nonsmooth.results.provenance import package_version
+
+        return package_version()
+    if name in _ROOMS:
+        return import_module(f"nonsmooth.{name}")
+    if name in _WHERE:
+        value = getattr(import_module(f"nonsmooth.{_WHERE[name]}"), name)
+        globals()[name] = value
+        return value
+    raise AttributeError(f"module 'nonsmooth' has no attribute {name!r}; it has: {', '.join(__all__)}")
+
+
+def __dir__() -> list[str]:
+    return __all__

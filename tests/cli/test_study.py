@@ -76,7 +76,7 @@ def test_a_model_may_come_from_a_file_and_be_smoothed(write, tmp_path: Path) -> 
     assert study.system.values["g"] == 0.5
     built = read_study(write('[system]\nmodel = "mine.py:build"\n[simulate]\nperiods = 1\n'))
     assert built.system == ns.models.impact_oscillator()
-    for name, message in (("number", "is a int, not a System"), ("oscilator", "nearest: oscillator")):
+    for name, message in (("number", "is of type int"), ("oscillators", "nearest: oscillator")):
         with pytest.raises(ValueError, match=message):
             read_study(write(f'[system]\nmodel = "mine.py:{name}"\n[simulate]\nperiods = 1\n'))
 
@@ -84,10 +84,10 @@ def test_a_model_may_come_from_a_file_and_be_smoothed(write, tmp_path: Path) -> 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (SYSTEM + SWEEP + "kepe = 5\n", r"study\.toml, table \[sweep\]: `kepe` is not a key .*nearest: keep; all: .*transient"),
-        (SYSTEM + SWEEP + "[outptu]\n", r"study\.toml: `outptu` is not a table .*nearest: output"),
-        (SYSTEM.replace("model", "modell") + SWEEP, r"table \[system\]: `modell` is not a key .*nearest: model"),
-        (SYSTEM.replace("omega", "omegaa") + SWEEP, r"`omegaa` is not a parameter of 'discontinuous support'; nearest: omega"),
+        (SYSTEM + SWEEP + "keeps = 5\n", r"study\.toml, table \[sweep\]: `keeps` is not a key .*nearest: keep; all: "),
+        (SYSTEM + SWEEP + "[outputs]\n", r"study\.toml: `outputs` is not a table .*nearest: output"),
+        (SYSTEM.replace("model", "models") + SWEEP, r"table \[system\]: `models` is not a key .*nearest: model"),
+        (SYSTEM.replace("omega", "omegaa") + SWEEP, r"`omegaa` is not a parameter of 'discontinuous .*nearest: omega"),
         (SYSTEM + SWEEP + '[output]\ncsv = "a"\n', r"table \[output\]: `csv` is not a key .*all: data, figure, x, y"),
         (SYSTEM, "exactly one verb, this one has none"),
         (SYSTEM + SWEEP + "[simulate]\nperiods = 3\n", r"exactly one verb, this one has \['sweep', 'simulate'\]"),

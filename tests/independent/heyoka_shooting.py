@@ -1,12 +1,13 @@
-"""Periodic orbits of the paper's oscillator by shooting on heyoka's return map; folds and flips by Newton.
+"""Periodic orbits of the paper's oscillator by shooting on heyoka's return map; their folds and flips.
 
 The Jacobian is a central difference of the map itself: no variational equation and no saltation matrix enters,
-so the numbers found here can judge ours. `reference_values` holds what this module found, `python
-heyoka_shooting.py` recomputes it.
+so the numbers found here can judge ours. `reference_values` holds what this module found;
+`test_heyoka_references.py` recomputes it.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 
 import heyoka_support as hs
@@ -52,7 +53,14 @@ def settle(p: Mapping[str, float], n_periods: int, start: tuple[float, float] = 
 
 
 def flip(
-    p: Mapping[str, float], name: str, n: int, u: NDArray[np.float64], to: float, *, n_steps: int = 20, step: float = 1e-5
+    p: Mapping[str, float],
+    name: str,
+    n: int,
+    u: NDArray[np.float64],
+    to: float,
+    *,
+    n_steps: int = 20,
+    step: float = 1e-5,
 ) -> float:
     """Value of parameter `name` between ``p[name]`` and `to` where det(DP^n + I) of the n-periodic orbit through
     `u` changes sign: followed in `n_steps` steps, then bracketed (Brent)."""
@@ -65,7 +73,7 @@ def flip(
 
     values = np.linspace(p[name], to, n_steps + 1)
     last = determinant(values[0])
-    for before, value in zip(values, values[1:], strict=False):
+    for before, value in itertools.pairwise(values):
         u_before = orbit["u"]
         current = determinant(value)
         if last * current <= 0:
@@ -76,7 +84,14 @@ def flip(
 
 
 def fold(
-    p: Mapping[str, float], name: str, n: int, u: NDArray[np.float64], *, state: int = 0, arc: float = 1e-3, step: float = 1e-5
+    p: Mapping[str, float],
+    name: str,
+    n: int,
+    u: NDArray[np.float64],
+    *,
+    state: int = 0,
+    arc: float = 1e-3,
+    step: float = 1e-5,
 ) -> float:
     """Extreme value of parameter `name` along the branch of n-periodic orbits that passes near `u` (multiplier +1).
 

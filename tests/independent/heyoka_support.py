@@ -115,9 +115,7 @@ class _Compiled:
 def compiled(tolerance: float = 1e-14) -> _Compiled:
     x, v = hy.make_vars("x", "v")
     m, k, k_s, c, c_s, g, rho, omega, on = (hy.par[i] for i in range(9))
-    acceleration = (
-        rho * hy.cos(omega * hy.time) - 2.0 * k * x - c * v - on * (k_s * (x - g) + c_s * v)
-    ) / m
+    acceleration = (rho * hy.cos(omega * hy.time) - 2.0 * k * x - c * v - on * (k_s * (x - g) + c_s * v)) / m
     stops, maxima, turns = (_Stop(), _Stop()), _Note(), _Note()
     integrator = hy.taylor_adaptive(
         [(x, v), (v, acceleration)],

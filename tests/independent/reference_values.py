@@ -1,7 +1,7 @@
 """Numbers found once by codes that share nothing with `nonsmooth`; each says where it comes from.
 
 [exact] closed form; [heyoka] shooting on heyoka 7.13 at tolerance 1e-14 with central differences (recomputed by
-`heyoka_shooting`, see `test_heyoka_references.py`); two step sizes of the differences agreed to the digits printed here.
+`heyoka_shooting`, see `test_heyoka_references.py`); two step sizes of the differences agreed to the printed digits.
 """
 
 from __future__ import annotations

@@ -67,6 +67,9 @@ def run_valve(
     impacts: list[float] = []
     maxima: list[float] = []
 
+    def field(_t: float, u: NDArray[np.float64]) -> list[float]:
+        return [u[1], -p["k"] * u[1] - u[0] - p["delta"] + u[2], p["beta"] * (p["q"] - u[0] * np.sqrt(u[2]))]
+
     def seat(_t: float, u: NDArray[np.float64]) -> float:
         return u[0]
 
@@ -76,9 +79,8 @@ def run_valve(
     seat.terminal, seat.direction, top.direction = True, -1, -1  # type: ignore[attr-defined]
     while t < duration:
         s = solve_ivp(
-            lambda _t, u: [u[1], -p["k"] * u[1] - u[0] - p["delta"] + u[2], p["beta"] * (p["q"] - u[0] * np.sqrt(u[2]))],
-            (t, duration), u, method="DOP853", rtol=1e-12, atol=1e-14, events=[seat, top], max_step=0.02,
-        )  # fmt: skip
+            field, (t, duration), u, method="DOP853", rtol=1e-12, atol=1e-14, events=[seat, top], max_step=0.02
+        )
         maxima += list(s.t_events[1])
         t, u = s.t[-1], s.y[:, -1]
         if len(s.t_events[0]):

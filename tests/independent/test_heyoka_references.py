@@ -41,7 +41,8 @@ def test_contact_can_begin_through_the_second_indicator_beyond_the_gap() -> None
     start = (p["g"] + 1e-4, -0.01)  # h_b = 4e-4 > 0: free, moving back, accelerated forward by 1 m/s^2
     run = hs.run(p, 1, start)
     states, crossings = scipy_support.run_oscillator(p, 1, start)
-    assert run.modes[0] == 0 and run.crossings[0].kind == "enter_b"
+    assert run.modes[0] == 0
+    assert run.crossings[0].kind == "enter_b"
     assert [c.kind for c in run.crossings] == [kind for _, kind in crossings]
     assert np.max(np.abs(run.states - states)) < 1e-11
 
@@ -63,7 +64,9 @@ def test_the_steady_motion_without_contact_is_a_fixed_point() -> None:
     assert np.max(np.abs(hs.run(p, 10, u).states - u)) < 1e-15
 
 
-@pytest.mark.parametrize(("n", "start", "to"), [(1, 0.41, 0.395), (2, 0.28, 0.268), (4, 0.25, 0.243), (8, 0.2415, 0.2397)])
+@pytest.mark.parametrize(
+    ("n", "start", "to"), [(1, 0.41, 0.395), (2, 0.28, 0.268), (4, 0.25, 0.243), (8, 0.2415, 0.2397)]
+)
 def test_flips_of_figure_11(n: int, start: float, to: float) -> None:
     p = dict(known.TABLE_1, rho=start, g=-0.0045, omega=3.69)
     found = shooting.flip(p, "rho", n, shooting.settle(p, 3000), to, n_steps=8)
@@ -89,7 +92,9 @@ def test_folds_beside_the_grazing_points(name: str, rho: float, g: float, which:
     assert 2e-5 < abs(found - graze) < 3.4e-4
 
 
-@pytest.mark.parametrize(("name", "rho", "g", "omega"), [("figure 9 rising", 0.14, 0.02, 5.7), ("figure 10 rising", 0.16, 0.0145, 6.4)])
+@pytest.mark.parametrize(
+    ("name", "rho", "g", "omega"), [("figure 9 rising", 0.14, 0.02, 5.7), ("figure 10 rising", 0.16, 0.0145, 6.4)]
+)
 def test_folds_where_the_orbit_with_contact_ends(name: str, rho: float, g: float, omega: float) -> None:
     p = dict(known.TABLE_1, rho=rho, g=g, omega=4.5)
     u = shooting.solve_orbit(p, 1, shooting.settle(p, 300))
@@ -141,7 +146,8 @@ def test_valve_with_impacts_agrees_with_scipy(q: float) -> None:
     start = np.array([1.0, 0.0, 11.0])
     run = hv.run({"q": q}, start, 15.0, tolerance=1e-14)
     end, impacts, maxima = scipy_support.run_valve({"q": q}, start, 15.0)
-    assert len(impacts) >= 4 and len(run.impact_time) == len(impacts)
+    assert len(impacts) >= 4
+    assert len(run.impact_time) == len(impacts)
     assert np.max(np.abs(np.array(run.impact_time) - impacts)) < 1e-9
     # The run starts at a maximum or minimum (y2 = 0): only tops after the start are compared.
     tops = [t for t in maxima if t > 1e-9]

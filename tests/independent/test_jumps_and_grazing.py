@@ -38,7 +38,7 @@ def test_jump_lies_at_the_grazing_frequency(name: str, method: str) -> None:
     assert values[at] - STEP <= graze <= values[at + 1] + STEP
     # And as the result reports it.
     reported = np.atleast_1d(response["jump_value"].values)
-    print(f"\n{name}: grazing {graze:.5f}, largest step between {values[at]:.4f} and {values[at + 1]:.4f}, reported {reported}")
+    print(f"\n{name}: grazing {graze:.5f}, step from {values[at]:.4f} to {values[at + 1]:.4f}, reported {reported}")
     assert np.min(np.abs(reported - graze)) <= STEP
 
 

@@ -29,7 +29,8 @@ def sweep(values: np.ndarray, **options: object) -> tuple[np.ndarray, np.ndarray
 def cascade(rho: np.ndarray) -> np.ndarray:
     """Period number from heyoka's flips; -1 where it does not follow from them.
 
-    Below the fourth flip (period 16 and beyond), and between 0.3 and 0.34, where two period-2 orbits coexist, nothing is claimed.
+    Nothing is claimed below the fourth flip (period 16 and beyond), nor between 0.3 and 0.34, where two period-2
+    orbits coexist.
     """
     flips = known.FLIPS_FIGURE_11
     period = np.select([rho > flips[1], rho > flips[2], rho > flips[4], rho > flips[8]], [1, 2, 4, 8], -1)
@@ -52,9 +53,11 @@ def test_never_a_wrong_period_number(n: int) -> None:
         far &= np.abs(rho / other - 1) > 0.01
     share = float(np.mean(slow[far])) if far.any() else 0.0
     print(
-        f"\nflip of period {n} at {flip:.6f}: {slow.sum()} of {N_POINTS} slow ({slow_long.sum()} after the long transient),"
-        f" {wrong.sum()} differ from the long transient, {false.sum()} from the cascade; slow farther than 1 %: {share:.1%}"
+        f"\nflip of period {n} at {flip:.6f}: {slow.sum()} of {N_POINTS} slow ({slow_long.sum()} after the long"
+        f" transient), {wrong.sum()} differ from it, {false.sum()} from the cascade; slow farther than 1 %: {share:.1%}"
     )
-    assert not wrong.any(), f"differs from a transient 50 times longer at rho = {rho[wrong]}: {found[wrong]}, {long[wrong]}"
+    assert not wrong.any(), (
+        f"differs from a transient 50 times longer at rho = {rho[wrong]}: {found[wrong]}, {long[wrong]}"
+    )
     assert not false.any(), f"differs from the cascade at rho = {rho[false]}: {found[false]}, {truth[false]}"
     assert share <= 0.05

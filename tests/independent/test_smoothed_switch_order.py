@@ -62,8 +62,10 @@ def test_bands_are_crossed_in_the_same_order_as_in_the_second_code() -> None:
         dict(known.TABLE_1, rho=0.29, g=-0.0045, omega=3.69),
         dict(known.TABLE_1, rho=0.14, g=known.amplitude(dict(known.TABLE_1, rho=0.14, omega=5.3)) - 3e-6, omega=5.3),
     ):
-        _, crossings = smoothed_reference.march(p, eta, (0.0, 0.0), 3) if p["g"] < 0 else smoothed_reference.march(
-            p, eta, known.steady_state(p), 3
+        _, crossings = (
+            smoothed_reference.march(p, eta, (0.0, 0.0), 3)
+            if p["g"] < 0
+            else smoothed_reference.march(p, eta, known.steady_state(p), 3)
         )
         start = (0.0, 0.0) if p["g"] < 0 else known.steady_state(p)
         system = ns.models.discontinuous_support().with_parameters(p).smoothed(eta=eta)
@@ -99,5 +101,7 @@ def test_smoothed_grazing_is_that_of_a_gap_reduced_by_eta(eta: float, method: st
         low, high = (middle, high) if enters(middle) else (low, middle)
     found = (low + high) / 2
     unsmoothed = known.grazing_frequencies(rho, g)[1]
-    print(f"\n{method}, eta {eta:g}: grazes at {found:.9f}, closed form of g - eta {expected:.9f}, of g {unsmoothed:.9f}")
+    print(
+        f"\n{method}, eta {eta:g}: grazes at {found:.9f}, closed form of g - eta {expected:.9f}, of g {unsmoothed:.9f}"
+    )
     assert found == pytest.approx(expected, abs=1e-8)

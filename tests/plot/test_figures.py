@@ -66,7 +66,8 @@ def test_a_diagram_shows_every_finite_point_up_and_down(swept: xr.Dataset) -> No
         drawn = np.array(line.get_data()).T
         drawn = drawn[np.isfinite(drawn[:, 1])]
         held = swept["section"].sel(direction=direction, state="v").transpose("iterate", "rho")
-        expected = {(float(r), float(v)) for row in held for r, v in zip(swept["rho"], row, strict=True) if np.isfinite(v)}
+        pairs = {(float(r), float(v)) for row in held for r, v in zip(swept["rho"], row, strict=True)}
+        expected = {pair for pair in pairs if np.isfinite(pair[1])}
         assert set(map(tuple, drawn)) == expected
         assert line.get_rasterized()
     assert ax.get_xlabel() == r"$\rho$ (N)"

@@ -139,10 +139,10 @@ def test_nonlinear_fields_against_lie_derivatives(fields):
     u = (X, Y, Z)
     start, t = (1.5, -0.4, 9.0), 0.2
     indicator = X * Z - Y**2
-    got = series(make(fields, indicators=[indicator]), start, t, order=6)
+    got = series(make(fields, indicators=[indicator]), start, t, order=4)
     values = {X: start[0], Y: start[1], Z: start[2], T: t, **PARAMETERS}
     for row, g in enumerate([*u, indicator]):
-        for k in range(7):
+        for k in range(5):  # the derivatives' length grows very fast
             exact = sp.sympify(g).evalf(40, subs=values) / math.factorial(k)
             np.testing.assert_allclose(got[row, k], float(exact), rtol=2e-13, atol=1e-13)
             g = sp.diff(g, T) + sum(sp.diff(g, v) * f for v, f in zip(u, fields, strict=True))

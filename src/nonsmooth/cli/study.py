@@ -25,8 +25,8 @@ __all__ = ["Study", "load_model", "named_model", "read_study"]
 VERBS = ("simulate", "sweep", "frequency_response", "poincare")
 _SYSTEM_KEYS = ("model", "parameters", "smoothed")
 _OUTPUT_KEYS = ("data", "figure", "x", "y")
-#: Arguments of verbs that a file cannot hold (functions) or that belong to the command line.
-_NOT_IN_FILES = ("progress", "ramps", "client", "store")
+#: Arguments of verbs that belong to the command line, or that a file cannot hold.
+_NOT_IN_FILES = ("progress", "client", "store")
 _FIGURES = {
     "simulate": "phase_portrait", "sweep": "bifurcation", "frequency_response": "frequency_response",
     "poincare": "section",
@@ -94,7 +94,8 @@ def read_study(path: Path) -> Study:
     verbs = [name for name in document if name in VERBS]
     if len(verbs) != 1:
         raise ValueError(
-            f"{where}: a study runs exactly one verb, this one has {verbs or 'none'}; add one table of: {', '.join(VERBS)}"
+            f"{where}: a study runs exactly one verb, this one has {verbs or 'none'}; "
+            f"keep one table of: {', '.join(VERBS)}"
         )
     if "system" not in document:
         raise ValueError(f'{where}: needs a table [system] with at least model = "..."')
@@ -137,7 +138,8 @@ def load_model(text: str, folder: Path) -> Any:
     found = getattr(module, name)
     system = found() if callable(found) and not isinstance(found, System) else found
     if not isinstance(system, System):
-        raise ValueError(f"{source}: {name!r} is a {type(system).__name__}, not a System nor a function that returns one")
+        what = type(system).__name__
+        raise ValueError(f"{source}: {name!r} is of type {what}; it must be a System or a function that returns one")
     return system
 
 
@@ -159,13 +161,14 @@ def _options(verb: str, table: Mapping[str, Any], where: str) -> dict[str, Any]:
     import nonsmooth
 
     signature = inspect.signature(getattr(nonsmooth, verb)).parameters
-    allowed = [name for name in list(signature)[1:] if name not in _NOT_IN_FILES]
+    named = [name for name, item in signature.items() if item.kind is not inspect.Parameter.VAR_KEYWORD][1:]
+    allowed = [name for name in named if name not in _NOT_IN_FILES]
     place = f"{where}, table [{verb}]"
     _check_keys(table, allowed, place, "a key")
     missing = [name for name in allowed if signature[name].default is inspect.Parameter.empty and name not in table]
     if missing:
         raise ValueError(f"{place}: needs {', '.join(missing)}; all keys: {', '.join(allowed)}")
-    readers = {"values": _values, "section": _section, "start": _start}
+    readers = {"values": _values, "section": _section, "start": _start, "direction": _direction}
     return {name: readers[name](value, place) if name in readers else value for name, value in table.items()}
 
 
@@ -198,6 +201,11 @@ def _start(value: Any, place: str) -> Any:
         _check_keys(value, ("n", "low", "high", "seed"), f"{place}, start", "a key")
         return nonsmooth.random_starts(**value)
     return value
+
+
+def _direction(value: Any, place: str) -> Any:
+    """TOML has no None: every point from its start is written ``"none"``, as results store it."""
+    return None if value == "none" else value
 
 
 def _check_keys(table: Mapping[str, Any], allowed: Iterable[str], where: str, what: str) -> None:

@@ -15,10 +15,10 @@ from .codes import DIVERGED, LOG_FULL, NO_CONVERGENCE, NOT_GUARANTEED, OK
 from .crossing import NOISE, earliest, holds, section_crossing, sides_at
 from .polynomial import NONE
 from .rkf45 import first_step, hermite, quiet, stages, transit
-from .series_node import begin, count_pass, leap, look, meets_section, next_is_edge, open_window
+from .series_node import begin, clear, count_pass, leap, look, meets_section, next_is_edge, open_window
 from .series_places import (
-    AFTER, BEGUN, CORNERS, CROSSINGS, DOUBTFUL, EXACT, HALVINGS, JUMPS, LOCATE, METHOD, MOST_STEPS, N_INDICATORS,
-    N_OUTPUTS, N_PARAMETERS, ORDER, PERIOD, PHASE, RECORD, RISING, RKF45, RTOL, SAMPLES, SECTION, SECTION_MODE,
+    AFTER, BEGUN, CORNERS, CROSSINGS, DOUBTFUL, HALVINGS, JUMPS, LOCATE, METHOD, MOST_STEPS, N_INDICATORS,
+    N_OUTPUTS, N_PARAMETERS, ORDER, PERIOD, PHASE, READY, RECORD, RISING, RKF45, RTOL, SAMPLES, SECTION, SECTION_MODE,
     SEGMENT, SETTLED, SINCE_CROSSING, SINCE_RETURN, SMOOTH_INDICATORS, STEP, STEPS, STEPS_IN_RETURN, T_MAX, TAYLOR,
     TOUCHES, TRANSIENT, UNTIL, WINDOW,
 )  # fmt: skip
@@ -96,6 +96,19 @@ def polished(values, mode, t, q, C, m, n, row, h, tau, u_dense, vals):
 
 
 @device
+def judged_at_end(mode, X, n, n_indicators, net, side, side_before):
+    """Without location: the transition whose rows hold at the end of the step and did not at its beginning, or -1."""
+    first, outgoing = net[0], net[1]
+    for i in range(n_indicators):
+        side_before[i] = side[i]
+        side[i] = 1 if X[n + i, 0] > 0.0 else -1
+    for j in range(first[mode], first[mode + 1]):
+        if holds(outgoing[j], net, side) and not holds(outgoing[j], net, side_before):
+            return outgoing[j]
+    return -1
+
+
+@device
 def at_end(C, m, row, h):
     """Value and slope of a row at the end of a part of the step."""
     v, slope = C[row, m], 0.0
@@ -127,8 +140,8 @@ def march(
         tally[BEGUN] = 1
         for i in range(n_indicators):
             scale[i], measured[i], side[i] = 0.0, 0.0, 0
-        rise[:] = 0
-        usual[:] = 0.0
+        clear(rise)
+        clear(usual)
         mode, status = begin(
             jet, jump, mode, t, u, q, tally[SETTLED], choice, norms, log_rtol, rtol, fixed, exact_steps, net, work
         )
@@ -268,7 +281,8 @@ def march(
                     break
                 dense_states(C, degree, n, tau, u_dense)
                 count_pass(choice, tally, memo, clock, t + tau, period, mode, u_dense, sections, extremes)
-                memo[SINCE_RETURN] = -tau
+                if memo[SINCE_RETURN] == 0.0:
+                    memo[SINCE_RETURN] = -tau
                 cursor, before = x, 0
 
         # --- what is observed on the step, then its end
@@ -316,8 +330,9 @@ def march(
         ready = False
         arrived = landing and record and stop == until - base
         if not cut:
-            for i in range(n_indicators):
-                side[i] = side_next[i]
+            if choice[LOCATE] == 1:
+                for i in range(n_indicators):
+                    side[i] = side_next[i]
             if rkf:
                 for i in range(rows):
                     J0[i, 0], J0[i, 1], J0[i, 2] = J1[i, 0], J1[i, 1], J1[i, 2]
@@ -328,7 +343,7 @@ def march(
                 if not ready:
                     look(jet, mode, t, u, q, False, choice, norms, log_rtol, rtol, fixed, exact_steps, work)
                     ready = True
-                pending = judged_at_end(mode, J0 if rkf else C, n, n_indicators, net, work[13], side_next, visited=work[17])
+                pending = judged_at_end(mode, J0 if rkf else C, n, n_indicators, net, side, side_next)
         for i in range(n):
             u_before[i] = u[i]
         if landing and stop == period:
@@ -346,7 +361,7 @@ def march(
             )  # fmt: skip
             if hit >= 0 and usual[mode] <= 0.0:
                 usual[mode] = planned
-            rise[:] = 0
+            clear(rise)
             ready = True
             if record and not forced:
                 tally[JUMPS] = 0

@@ -3,19 +3,32 @@
 from math import fabs, inf
 
 from .cache import device
-from .codes import BEYOND_STOP, CHATTER, NO_CONVERGENCE, OK, TOO_MANY_CROSSINGS
-from .crossing import NOISE, holding, holds, snap
+from .codes import BEYOND_STOP, CHATTER, OK, TOO_MANY_CROSSINGS
+from .crossing import holding, holds, snap
 from .rkf45 import first_step
 from .series_places import (
-    AFTER, CROSSINGS, ELAPSED, EVERY, EXACT, KEEP, KEPT_CONTACTS, KEPT_CROSSINGS, JUMPS, LONGEST, METHOD, MOST_JUMPS,
-    MOST_RAPID, N_INDICATORS, N_OUTPUTS, N_PARAMETERS, ORDER, PASSES, PERIOD, RAPID, RECORD, RETURNS, RISING, RKF45,
-    RTOL, SECTION, SECTION_MODE, SEGMENT, SINCE_CROSSING, SINCE_RETURN, STEP, STEPS_IN_RETURN, TRANSIENT, WINDOW,
-    WINDOW_FRACTION, WINDOW_PERIODS,
+    CROSSINGS, ELAPSED, EVERY, EXACT, JUMPS, KEEP, KEPT_CONTACTS, KEPT_CROSSINGS, LONGEST, METHOD, MOST_JUMPS,
+    MOST_RAPID, N_INDICATORS, N_OUTPUTS, N_PARAMETERS, ORDER, PASSES, RAPID, RECORD, RETURNS, RISING, RKF45, SEGMENT,
+    SINCE_CROSSING, SINCE_RETURN, STEPS_IN_RETURN, TRANSIENT, WINDOW, WINDOW_FRACTION, WINDOW_PERIODS,
 )  # fmt: skip
 from .taylor import step_length
 from .watch import extend_at_node, forget
 
-__all__ = ["begin", "count_pass", "leap", "look"]
+__all__ = ["begin", "clear", "copy", "count_pass", "leap", "look", "meets_section", "next_is_edge", "open_window"]
+
+
+@device
+def copy(source, target):
+    """Element by element: kernels allocate nothing, and a slice assignment might."""
+    for i in range(target.shape[0]):
+        target[i] = source[i]
+
+
+@device
+def clear(target):
+    """All elements zero."""
+    for i in range(target.shape[0]):
+        target[i] = 0
 
 
 @device
@@ -74,8 +87,8 @@ def begin(jet, jump, mode, t, u, q, settled, choice, norms, log_rtol, rtol, fixe
         if k < 0:
             break
         jump(k, t, u, q, u_new, q_new)
-        u[:] = u_new
-        q[:] = q_new
+        copy(u_new, u)
+        copy(q_new, q)
         mode = transitions[k, 1]
         visited[mode] = 1
         look(jet, mode, t, u, q, True, choice, norms, log_rtol, rtol, fixed, exact_steps, work)
@@ -113,8 +126,8 @@ def leap(
             for i in range(q.shape[0] - n_parameters):
                 crossings[row, 2 + 2 * n + i] = q_new[n_parameters + i]
             tally[CROSSINGS] += 1
-        u[:] = u_new
-        q[:] = q_new
+        copy(u_new, u)
+        copy(q_new, q)
         mode = transitions[pending, 1]
         tally[SEGMENT] += 1
         tally[JUMPS] += 1

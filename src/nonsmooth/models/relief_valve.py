@@ -55,7 +55,9 @@ def relief_valve(**parameters: float) -> System:
     -------
     System
         One mode ``open``; indicators ``seat`` (y1) and ``lift_velocity`` (y2; falling through 0 at the maxima of
-        the lift: the section of the published scans).
+        the lift: the section of the published scans). Give a start with a pressure, such as
+        ``{"y1": 0.2, "y2": 0.0, "y3": 10.0}``: at the default one, all zero, the valve is on its seat and the root
+        of the pressure has no derivative.
 
     References
     ----------

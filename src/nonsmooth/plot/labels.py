@@ -52,9 +52,8 @@ def column(result: xr.Dataset, variable: str, name: str) -> xr.DataArray:
 def variable_along(result: xr.Dataset, variable: str, verb: str) -> None:
     """Check that ``result`` is of the kind a plot needs; ValueError naming the verb that makes such results."""
     if variable not in result:
-        raise ValueError(
-            f"this result has no {variable!r}: it is not the result of {verb}; it holds {sorted(map(str, result.data_vars))}"
-        )
+        held = sorted(map(str, result.data_vars))
+        raise ValueError(f"this result has no {variable!r}: it is not the result of {verb}; it holds {held}")
 
 
 def first_states(result: xr.Dataset, *names: str | None) -> list[str]:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 __all__ = ["regions"]
 
-_FILLS = {"G_-": "#FFFFFF", "G_+": "#D6E6F2", "S": ("#F7D9B8", "#CDE8DC", "#EED3E2")}
+_OUTSIDE, _INSIDE, _BANDS = "#FFFFFF", "#D6E6F2", ("#F7D9B8", "#CDE8DC", "#EED3E2")
 _LINES = ("second", "third", "fourth")
 _GRID = 401
 
@@ -108,25 +108,25 @@ def _margins(system: System, names: list[str], first: Any, second: Any, t: float
 
 def _draw_bands(ax: Axes, x: Any, y: Any, margins: NDArray[np.float64]) -> None:
     least = margins.min(axis=0)
-    _fill(ax, x, y, least + 1, _FILLS["G_-"], "$G_-$")
-    _fill(ax, x, y, 1 - least, _FILLS["G_+"], "$G_+$")
+    _fill(ax, x, y, least + 1, _OUTSIDE, "$G_-$")
+    _fill(ax, x, y, 1 - least, _INSIDE, "$G_+$")
     for r, others in _others(margins):
         inside = np.maximum(np.abs(margins[r]) - 1, margins[r] - others)
-        _fill(ax, x, y, inside, _FILLS["S"][r % 3], _surface_name(r, len(margins)))
+        _fill(ax, x, y, inside, _BANDS[r % 3], _surface_name(r, len(margins)))
         ax.contour(x, y, inside, levels=[0], colors=style.COLORS[_LINES[r % 3]], linewidths=0.8)
 
 
 def _draw_surfaces(ax: Axes, x: Any, y: Any, margins: NDArray[np.float64]) -> None:
     least = margins.min(axis=0)
-    _fill(ax, x, y, least, _FILLS["G_-"], r"$\tilde G_-$")
-    _fill(ax, x, y, -least, _FILLS["G_+"], r"$\tilde G_+$")
+    _fill(ax, x, y, least, _OUTSIDE, r"$\tilde G_-$")
+    _fill(ax, x, y, -least, _INSIDE, r"$\tilde G_+$")
     for r, others in _others(margins):
         here = np.where(margins[r] <= others, margins[r], np.nan)
         color = style.COLORS[_LINES[r % 3]]
         drawn = ax.contour(x, y, here, levels=[0], colors=color, linewidths=1.4)
-        lines = [path.vertices for path in drawn.get_paths() if len(path.vertices)]
-        if lines:
-            longest = max(lines, key=len)
+        lines = [np.asarray(path.vertices) for path in drawn.get_paths()]
+        longest = max(lines, key=len)
+        if len(longest):
             name = _surface_name(r, len(margins)).replace("S", r"\tilde S")
             ax.annotate(name, longest[len(longest) // 2], (5, 2), textcoords="offset points", color=color)
 

@@ -33,7 +33,7 @@ COLORS = {
     "muted": "#7F7F7F",
 }
 
-_RC: dict[str, Any] = {
+_RC: Any = {
     "figure.figsize": (COLUMN, COLUMN * 0.72),
     "figure.dpi": 150,
     "figure.constrained_layout.use": True,
@@ -93,7 +93,7 @@ def save_figure(figure: Figure | Axes, path: str | os.PathLike[str]) -> Path:
     so equal input gives equal files.
     """
     target = Path(path)
-    owner = getattr(figure, "figure", figure)
+    owner: Any = getattr(figure, "figure", figure)
     metadata: dict[str, Any] | None = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}.get(target.suffix)
     with journal():
         owner.savefig(target, metadata=metadata)

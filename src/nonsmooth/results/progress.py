@@ -10,14 +10,14 @@ __all__ = ["progress"]
 
 
 @contextmanager
-def progress(total: int, label: str, enabled: bool = True) -> Iterator[Callable[[int], None]]:
-    """A bar of ``total`` steps on stderr; yields ``advance(n)``, which any thread may call.
+def progress(total: int, label: str, enabled: bool = True) -> Iterator[Callable[..., None]]:
+    """A bar of ``total`` steps on stderr; yields ``advance(n=1)``, which any thread may call.
 
     No bar is drawn, and nothing is imported, when ``enabled`` is False, when there is nothing to do or when
     stderr is not a terminal. The bar is wiped when the block ends, by an exception too.
     """
     if not enabled or total <= 0 or not sys.stderr.isatty():
-        yield lambda n=1: None
+        yield _count_nothing
         return
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
@@ -25,4 +25,12 @@ def progress(total: int, label: str, enabled: bool = True) -> Iterator[Callable[
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(label, total=total)
-        yield lambda n=1: bar.advance(task, n)
+
+        def advance(n: int = 1) -> None:
+            bar.advance(task, n)
+
+        yield advance
+
+
+def _count_nothing(n: int = 1) -> None:
+    pass

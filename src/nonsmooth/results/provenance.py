@@ -16,12 +16,14 @@ import math
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from importlib import metadata
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from nonsmooth.results.labels import Labels
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["ATTRIBUTE", "options_as_data", "package_version", "provenance", "read_provenance"]
 
@@ -66,7 +68,9 @@ def read_provenance(result: xr.Dataset) -> dict[str, Any]:
     """The record written by :func:`provenance`; ValueError if the Dataset carries none."""
     text = result.attrs.get(ATTRIBUTE)
     if not isinstance(text, str):
-        raise ValueError(f"this Dataset has no attribute {ATTRIBUTE!r}: it was not made by nonsmooth, or lost it on the way")
+        raise ValueError(
+            f"this Dataset has no attribute {ATTRIBUTE!r}: it was not made by nonsmooth, or lost it on the way"
+        )
     record: dict[str, Any] = json.loads(text)
     return record
 

@@ -8,7 +8,6 @@ Files are written beside their place and moved there when whole, so an interrupt
 from __future__ import annotations
 
 import os
-import shutil
 import tempfile
 from collections.abc import Hashable
 from pathlib import Path
@@ -85,13 +84,16 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
     except Exception as error:
         raise DataFileError(f"{source}: cannot be read, it is damaged or cut short ({error}); {_EXPECTED}") from error
     if ATTRIBUTE not in raw.attrs:
-        raise DataFileError(f"{source}: has no attribute {ATTRIBUTE!r}, so it is not a result of this package; {_EXPECTED}")
+        raise DataFileError(
+            f"{source}: has no attribute {ATTRIBUTE!r}, so it is not a result of this package; {_EXPECTED}"
+        )
     return _decode(raw)
 
 
 def _suffix(path: Path) -> str:
     if path.suffix not in (".nc", ".zarr"):
-        raise ValueError(f"{path}: the name must end in .nc (NetCDF) or .zarr (Zarr), got {path.suffix or 'no ending'!r}")
+        given = path.suffix or "no ending"
+        raise ValueError(f"{path}: the name must end in .nc (NetCDF) or .zarr (Zarr), got {given!r}")
     return path.suffix
 
 
@@ -159,7 +161,7 @@ def _decode(raw: xr.Dataset) -> xr.Dataset:
     result = raw.drop_encoding()
     for name in list(result.variables):
         array = result[name]
-        if array.dtype.kind in "OT":
+        if array.dtype.kind in ("O", "T"):
             result[name] = (array.dims, np.array(array.values.tolist(), dtype=str).reshape(array.shape), array.attrs)
         elif "part" in array.dims and name != "part":
             result[name] = _join(array)

@@ -83,6 +83,9 @@ def describe(
     remembered = {key: _memory(key, given) for key, given in _units(memory or {}, "memory", name, raw=True).items()}
     shown = {key: _output(key, given) for key, given in (outputs or {}).items()}
     bands = dict(bands or {})
+    for key, band in bands.items():
+        if not isinstance(band, Band):
+            raise SystemDefinitionError(f"{name!r}: the band of {key!r} must be an ns.Band, not {band!r}")
     inside = {key for band in bands.values() for key in (band.write or {})}
     check_names(
         {

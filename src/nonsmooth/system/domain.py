@@ -119,16 +119,22 @@ class Domain:
         """
         for name in values if changed is None else changed:
             if name in self._zero and values[name] == 0:
-                raise SystemDefinitionError(f"{name} = 0 makes {self._zero[name]} divide by zero")
+                raise SystemDefinitionError(self._by_zero(name))
         for rule in self._rules:
             if changed is None or not rule.used.isdisjoint(changed):
                 rule.check(values)
 
+    def _by_zero(self, name: str) -> str:
+        return (
+            f"{name} = 0 makes {self._zero[name]} divide by zero: give {name} another value, or write it without "
+            f"that division"
+        )
+
     def check_points(self, points: np.ndarray) -> None:
         """Check rows of parameter values (P, n_parameters), all points of a sweep or a chart, in one go."""
-        for name, owner in self._zero.items():
+        for name in self._zero:
             if (points[:, self._names.index(name)] == 0).any():
-                raise SystemDefinitionError(f"{name} = 0 makes {owner} divide by zero")
+                raise SystemDefinitionError(self._by_zero(name))
         for rule in self._rules:
             refused = rule.first_refused(points)
             if refused is not None:

@@ -201,8 +201,6 @@ def trace_band(
     what = f"the band of {key!r}"
     if key not in traced.indicator_names:
         raise SystemDefinitionError(f"bands: {unknown(key, 'an indicator', 'this system', traced.indicator_names)}")
-    if not isinstance(band, Band):
-        raise SystemDefinitionError(f"{what} must be an ns.Band, not {band!r}")
     if "eta" in parameters:
         raise SystemDefinitionError(f"{what}: `eta` is the width of the band; the parameter `eta` must be renamed")
     eta = sp.Symbol("p_eta", real=True)

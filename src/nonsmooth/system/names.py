@@ -17,8 +17,8 @@ __all__ = ["RESERVED", "check_names", "unknown"]
 RESERVED = frozenset(
     [
         # dims of results
-        "time", "state", "iterate", "point", "crossing", "touch", "direction", "start", "mode", "status", "method", "jump",
-        "special", "multiplier", "exponent", "attractor", "segment", "indicator", "part", "memory", "sample",
+        "time", "state", "iterate", "point", "crossing", "touch", "direction", "start", "mode", "status", "method",
+        "jump", "special", "multiplier", "exponent", "attractor", "segment", "indicator", "part", "memory", "sample",
         # variables of results
         "section", "maximum", "minimum", "amplitude", "residual", "period", "period_number", "crossings_per_period",
         "contacts_per_period", "clearance", "signature", "stable", "label", "kind", "transition",

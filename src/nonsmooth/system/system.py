@@ -264,6 +264,8 @@ class System:
                 raise ValueError(self._unknown_parameter(key))
             if not np.isfinite(column).all():
                 raise ValueError(f"parameter {key!r} must be finite, not {column[~np.isfinite(column)][0]}")
+            if key in dict(self._variant.etas):
+                _positive(float(column.min()), key)
             points[:, order.index(key)] = column
         if len(points):
             self._variant.domain.check_points(points)

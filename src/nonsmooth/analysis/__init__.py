@@ -1,0 +1,1 @@
+"""Brute-force questions to a flow, one per file."""

@@ -1,0 +1,84 @@
+"""Period numbers that are known, not assumed.
+
+Section points s_0, s_1, ... after a transient look periodic long before they are, most of all near a flip, where
+they approach like |mu|^k with mu close to -1. Here period p is granted only with a certificate: the return after
+p sections is small, r_p = |s_{k+p} - s_k| <= tolerance; the multipliers of the p-th return map, by finite
+differences at the last point, lie inside |mu| < 1 - MARGIN; and the orbit, which is then at most r_p / (1 - |mu|)
+away, is farther from each shorter period than that. What does not qualify but is nearly periodic is slow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from nonsmooth.flow.engine import FloatArray
+from nonsmooth.kernels import codes
+
+__all__ = ["TOLERANCE", "Verdict", "judge", "residuals"]
+
+TOLERANCE = 1e-9  # of the return, in units of the motion's size
+NEARLY = 1e-3  # a smallest return below this is a motion that may still settle
+MARGIN = 2e-3  # multipliers nearer to the unit circle than this settle nothing within a transient
+APART = 10.0  # how much farther a shorter period must be than the orbit is uncertain
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Period number (0: none), the scaled return it rests on, status, and whether the orbit is certainly unstable."""
+
+    period_number: int
+    residual: float
+    status: int
+    unstable: bool = False
+
+
+def residuals(points: FloatArray, size: FloatArray, max_period: int) -> FloatArray:
+    """Largest scaled return r_p over the last p points, p = 1 ... max_period (those that fit), in the max norm."""
+    scaled = points / size
+    longest = min(max_period, len(points) - 1)
+    result = np.full(longest, np.inf)
+    for p in range(1, longest + 1):
+        last = scaled[-p:] if 2 * p <= len(points) else scaled[p:]
+        result[p - 1] = np.abs(last - scaled[-p - len(last) : len(points) - p]).max()
+    return result
+
+
+def judge(
+    points: FloatArray,
+    size: FloatArray,
+    max_period: int,
+    multiplier: Callable[[int], float],
+    tolerance: float = TOLERANCE,
+) -> Verdict:
+    """Judge the kept section points of one parameter value.
+
+    Parameters
+    ----------
+    points : array (keep, n)
+    size : array (n,)
+        Size of the motion in each state.
+    multiplier : callable
+        ``multiplier(p)``: modulus of the largest multiplier of the p-th return map at the last point (NaN: unknown).
+    tolerance : float
+        What counts as a return.
+    """
+    returns = residuals(points, size, max_period)
+    if not len(returns) or not np.isfinite(returns).all():
+        return Verdict(0, np.nan, codes.SLOW)
+    close = np.flatnonzero(returns <= tolerance)
+    if not len(close):
+        least = float(returns.min())
+        return Verdict(0, least, codes.SLOW if least < NEARLY else codes.NOT_PERIODIC)
+    p = int(close[0]) + 1
+    residual = float(returns[p - 1])
+    mu = multiplier(p)
+    if not mu < 1.0 - MARGIN:
+        return Verdict(0, residual, codes.SLOW, unstable=bool(mu > 1.0 + MARGIN))
+    away = residual / (1.0 - mu)
+    shorter = [returns[d - 1] for d in range(1, p) if p % d == 0]
+    if any(one <= APART * away for one in shorter):
+        return Verdict(0, residual, codes.SLOW)
+    return Verdict(p, residual, codes.OK)

@@ -1,0 +1,133 @@
+"""Bring a trajectory to its attractor at one parameter value, and say what was reached.
+
+The state is run through the transient, its section points are judged (``classify``), and a point that is still
+settling is run on, or pushed off an unstable orbit on which a carried state may sit for ever.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from nonsmooth.analysis.classify import Verdict, judge
+from nonsmooth.flow.engine import Chain, Engine, FloatArray, SectionPlan, State
+from nonsmooth.flow.poincare import result_status
+from nonsmooth.kernels import codes
+
+__all__ = ["Attractors"]
+
+LONGER = (1, 2, 4)  # further transients for a point that is still settling, in units of the first
+KICK = 1e-3  # what pushes a state off an unstable orbit, in units of the motion's size
+NUDGE = 1e-6  # finite differences of the return map, in units of the motion's size
+FAILED = (codes.DIVERGED, codes.CHATTER, codes.TOO_MANY_CROSSINGS, codes.NO_CONVERGENCE, codes.BEYOND_STOP)
+
+
+@dataclass(frozen=True)
+class Attractors:
+    """An engine with its tables for all points, the section, and how long to wait."""
+
+    engine: Engine
+    tables: Any
+    plan: SectionPlan
+    transient: int
+    keep: int
+    max_period: int
+    tolerance: float
+    scale: FloatArray
+
+    def settle(self, i: int, state: State, out: Chain, fresh: Callable[[], State]) -> Verdict:
+        """Run point i on from ``state`` (left where the run ends) and judge it; ``fresh`` makes a state at the start."""
+        self._chain(i, state, self.transient, self.keep, out)
+        if out.status[i] == codes.BEYOND_STOP:  # a carried state that a moved stop has overtaken
+            other = fresh()
+            _replace(state, other)
+            self._chain(i, state, self.transient, self.keep, out)
+        if out.status[i] in FAILED:
+            return Verdict(0, np.nan, result_status(out.status[i]))
+        verdict = self._judge(i, state, out)
+        for factor in LONGER:
+            if verdict.status != codes.SLOW:
+                break
+            if verdict.unstable:
+                kicked = state.copy()
+                kicked.u += KICK * self._size(i, out)
+                kicked.settled = False
+                _replace(state, kicked)
+            self._chain(i, state, factor * max(self.transient, 1), self.keep, out)
+            if out.status[i] in FAILED:
+                return Verdict(0, np.nan, result_status(out.status[i]))
+            verdict = self._judge(i, state, out)
+        if out.status[i] == codes.NOT_GUARANTEED and verdict.status == codes.OK:
+            return Verdict(verdict.period_number, verdict.residual, codes.NOT_GUARANTEED)
+        return verdict
+
+    def _chain(self, i: int, state: State, transient: int, keep: int, out: Chain) -> None:
+        self.engine.chain(self.tables, i, i + 1, state, None, self.plan, transient, keep, out)
+
+    def _size(self, i: int, out: Chain) -> FloatArray:
+        """Half the range of each state; its scale where it does not move."""
+        size = 0.5 * (out.maximum[i] - out.minimum[i])
+        return np.where(size > 1e-9 * self.scale, size, self.scale)
+
+    def _judge(self, i: int, state: State, out: Chain) -> Verdict:
+        size = self._size(i, out)
+        measure = self._multiplier if self.plan.indicator < 0 else self._contraction
+        return judge(
+            out.section[i], size, self.max_period, lambda p: measure(i, p, state, size, out), self.tolerance
+        )
+
+    def _multiplier(self, i: int, p: int, state: State, size: FloatArray, out: Chain) -> float:
+        """Largest |multiplier| of the p-th return map of a stroboscopic section, by differences at the last point."""
+        n = len(size)
+        nudge = max(NUDGE, 1e2 * self.tolerance) * size
+        probe = _rows_of(out, i, 1)
+        images = []
+        for j in range(-1, n):
+            moved = state.copy()
+            if j >= 0:
+                moved.u[j] += nudge[j]
+                moved.settled = False
+            self._chain(i, moved, p - 1, 1, probe)
+            if probe.status[i] in FAILED:
+                return np.nan
+            images.append(probe.section[i, 0].copy())
+        matrix = np.array([(images[j + 1] - images[0]) / nudge[j] for j in range(n)]).T
+        scaled = matrix * size[None, :] / size[:, None]
+        return float(np.abs(np.linalg.eigvals(scaled)).max())
+
+    def _contraction(self, i: int, p: int, state: State, size: FloatArray, out: Chain) -> float:
+        """The factor by which a nudged state nears the cycle on a Poincare section per p returns.
+
+        A nudge moves the state off the surface, which may shift the count of returns by one; so the distance to the
+        whole cycle is measured, over several rounds."""
+        rounds = 8
+        keep = rounds * p + 2
+        cycle = out.section[i, -p:] / size
+        moved = state.copy()
+        moved.u += max(NUDGE, 1e2 * self.tolerance) * size
+        moved.settled = False
+        probe = _rows_of(out, i, keep)
+        self._chain(i, moved, 0, keep, probe)
+        if probe.status[i] in FAILED:
+            return np.nan
+        points = probe.section[i] / size
+        gap = np.abs(points[:, None, :] - cycle[None, :, :]).max(axis=2).min(axis=1)
+        first, last = gap[1 : p + 1].max(), gap[-p:].max()
+        if last <= self.tolerance:
+            return 0.5
+        return float((last / first) ** (1.0 / (rounds - 1)))
+
+
+def _rows_of(out: Chain, i: int, keep: int) -> Chain:
+    """Buffers in which row i can be written."""
+    n, n_indicators, n_outputs = out.maximum.shape[1], out.indicator_max.shape[1], out.output_max.shape[1]
+    return Chain.empty(i + 1, keep, n, n_indicators, n_outputs)
+
+
+def _replace(state: State, other: State) -> None:
+    """Make ``state`` a copy of ``other``, in place."""
+    state.u[:], state.memory[:], state.clock[:], state.counters[:] = other.u, other.memory, other.clock, other.counters
+    state.settled = other.settled

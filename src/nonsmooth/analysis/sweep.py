@@ -1,0 +1,284 @@
+"""``sweep``: brute force over a parameter, as a rig would do it; its picture is the bifurcation diagram."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.analysis.classify import TOLERANCE
+from nonsmooth.analysis.settle import Attractors
+from nonsmooth.flow.engine import Chain, FloatArray, State
+from nonsmooth.flow.methods import RTOL, engine_for
+from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
+from nonsmooth.flow.starts import is_one_start, start_states
+from nonsmooth.kernels import codes
+from nonsmooth.results.progress import progress as progress_bar
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from nonsmooth.system.system import System
+
+__all__ = ["sweep"]
+
+DIRECTIONS: dict[str | None, tuple[str, ...]] = {"up": ("up",), "down": ("down",), "both": ("up", "down"), None: ("none",)}
+PIECE = 16  # points of one piece of independent work
+
+
+def sweep(
+    system: System,
+    parameter: str,
+    values: Any,
+    *,
+    direction: str | None = "up",
+    start: Any = None,
+    section: Stroboscopic | Poincare | None = None,
+    transient: int = 500,
+    keep: int = 100,
+    max_period: int = 16,
+    method: str = "auto",
+    rtol: float | None = None,
+    atol: Any = None,
+    threads: int | None = None,
+    progress: bool = True,
+    **expert: Any,
+) -> xr.Dataset:
+    """Long-time behaviour over a parameter: section points, extremes, period numbers.
+
+    Parameters
+    ----------
+    system : System
+    parameter : str
+        The parameter that is varied.
+    values : array (P,)
+        Its values, in any order; the result keeps it.
+    direction : {"up", "down", "both", None}
+        Carry the state along with rising or falling values (at equal phase of the forcing), both, or begin every point
+        at ``start``.
+    start : state or list of states, optional
+        First state; zeros where not given. Several starts show attractors that coexist.
+    section : Stroboscopic or Poincare, optional
+        ``Stroboscopic(0)`` where the system has a period.
+    transient, keep : int
+        Section returns passed over, then recorded, at each value. A point that is still settling gets up to eight
+        transients; what is not settled then has the status ``slow``.
+    max_period : int
+        Longest period number looked for.
+    method, rtol, atol
+        See :func:`nonsmooth.flow.methods.engine_for`.
+    threads : int, optional
+        Threads for independent work; the result does not depend on it. Default: one per core.
+    progress : bool
+        A bar on a terminal.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over the parameter (and ``direction``, ``start``): ``section(..., iterate, state)``, true extremes ``maximum``,
+        ``minimum``, ``period_number`` (0: none found), ``residual``, ``crossings_per_period``,
+        ``contacts_per_period``, ``clearance``, extremes of the outputs, ``status``.
+
+    Raises
+    ------
+    ValueError, TypeError
+        Arguments that do not fit. A point that fails keeps its status; the others are whole.
+
+    Notes
+    -----
+    A period number p is granted only where the p-th return is below 1e-9 of the motion's size and contracts:
+    see :mod:`nonsmooth.analysis.classify`.
+    """
+    numbers = _values(system, parameter, values)
+    directions = _directions(direction)
+    for name, number, least in (("transient", transient, 0), ("keep", keep, 2), ("max_period", max_period, 1)):
+        if int(number) != number or number < least:
+            raise ValueError(f"{name} = {number!r} must be a whole number, at least {least}")
+    if threads is not None and threads < 1:
+        raise ValueError(f"threads = {threads} must be at least 1")
+    section, plan = section_plan(system, section)
+    engine = engine_for(system, method, rtol, atol, **expert)
+    starts = start_states(system, start)
+    points = system.parameter_points({parameter: numbers})
+    noise = TOLERANCE if engine.name == "exact" else max(TOLERANCE, 10.0 * (RTOL if rtol is None else rtol))
+    attractors = Attractors(engine, engine.prepare(points), plan, int(transient), int(keep), int(max_period), noise,
+                            system.scale_vector())  # fmt: skip
+    traced = system.traced
+    sizes = len(traced.u), len(traced.indicators), len(traced.outputs)
+    slots = {
+        (d, k): Slot(Chain.empty(len(numbers), int(keep), *sizes), len(numbers))
+        for d in range(len(directions)) for k in range(len(starts))
+    }  # fmt: skip
+    memory = system.memory_vector()
+
+    def march(slot: tuple[int, int], order: Sequence[int], report: Report) -> None:
+        d, k = slot
+        state: State | None = None
+        for i in order:
+            if report.stop.is_set():
+                return
+            if state is None or directions[d] == "none":
+                state = State(starts[k].copy(), memory.copy())
+            verdict = attractors.settle(i, state, slots[slot].chain, lambda: State(starts[k].copy(), memory.copy()))
+            slots[slot].period_number[i] = verdict.period_number
+            slots[slot].residual[i] = verdict.residual
+            slots[slot].status[i] = verdict.status
+            report.advance(1)
+
+    _run(march, _pieces(directions, len(starts), numbers), threads, progress, parameter)
+    return _dataset(
+        system, engine.name, parameter, numbers, directions, starts, slots,
+        {
+            "parameter": parameter, "values": values, "direction": direction, "start": start, "section": section,
+            "transient": transient, "keep": keep, "max_period": max_period, "method": method, "rtol": rtol,
+            "atol": atol, **expert,
+        },
+        (() if direction == "both" else ("direction",)) + (("start",) if is_one_start(start) else ()),
+    )  # fmt: skip
+
+
+class Slot:
+    """One direction and start: the kernel's buffers over all points, and the verdicts."""
+
+    def __init__(self, chain: Chain, n_points: int) -> None:
+        self.chain = chain
+        self.period_number = np.zeros(n_points, dtype=np.int64)
+        self.residual = np.full(n_points, np.nan)
+        self.status = np.full(n_points, codes.INTERRUPTED, dtype=np.int8)
+
+
+class Report:
+    """What the pieces of work tell the thread that waits for them, and it them."""
+
+    def __init__(self, advance: Callable[..., None]) -> None:
+        self.advance = advance
+        self.stop = threading.Event()
+
+
+def _values(system: System, parameter: str, values: Any) -> FloatArray:
+    if parameter not in system.values:
+        system.with_parameters({parameter: 0.0})  # raises with the names there are
+    numbers = np.array(values, dtype=float)
+    if numbers.ndim != 1 or not len(numbers):
+        raise ValueError(f"values of {parameter!r} must be a list of numbers, not of shape {numbers.shape}")
+    if not np.isfinite(numbers).all():
+        raise ValueError(f"values of {parameter!r} must be finite; number {int(np.argmin(np.isfinite(numbers)))} is not")
+    if len(np.unique(numbers)) < len(numbers):
+        raise ValueError(f"values of {parameter!r} must differ from each other")
+    return numbers
+
+
+def _directions(direction: Any) -> tuple[str, ...]:
+    if direction not in DIRECTIONS:
+        raise ValueError(f"direction = {direction!r}; allowed: {', '.join(map(repr, DIRECTIONS))}")
+    return DIRECTIONS[direction]
+
+
+def _pieces(
+    directions: Sequence[str], n_starts: int, numbers: FloatArray
+) -> list[tuple[tuple[int, int], list[int]]]:
+    """Independent pieces of work: a whole chain where the state is carried along, else a few points."""
+    rising = np.argsort(numbers, kind="stable")
+    pieces = []
+    for d, direction in enumerate(directions):
+        order = [int(i) for i in (rising[::-1] if direction == "down" else rising)]
+        size = PIECE if direction == "none" else len(order)
+        for k in range(n_starts):
+            pieces += [((d, k), order[i : i + size]) for i in range(0, len(order), size)]
+    return pieces
+
+
+def _run(
+    march: Callable[..., None],
+    pieces: Sequence[tuple[tuple[int, int], list[int]]],
+    threads: int | None,
+    progress: bool,
+    label: str,
+) -> None:
+    """All pieces on a pool of threads (the kernels release the lock); Ctrl-C stops them after their present point."""
+    workers = min(threads or len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1,
+                  len(pieces))  # fmt: skip
+    total = sum(len(order) for _, order in pieces)
+    with progress_bar(total, f"sweep over {label}", progress) as advance:
+        report = Report(advance)
+        if workers == 1:
+            for slot, order in pieces:
+                march(slot, order, report)
+            return
+        with ThreadPoolExecutor(workers) as pool:
+            futures = [pool.submit(march, slot, order, report) for slot, order in pieces]
+            try:
+                for future in as_completed(futures):
+                    future.result()
+            except BaseException:
+                report.stop.set()
+                for future in futures:
+                    future.cancel()
+                raise
+
+
+def _dataset(
+    system: System,
+    method: str,
+    parameter: str,
+    numbers: FloatArray,
+    directions: Sequence[str],
+    starts: FloatArray,
+    slots: Mapping[tuple[int, int], Slot],
+    options: Mapping[str, Any],
+    squeeze: Iterable[str],
+) -> xr.Dataset:
+    from nonsmooth.results.labels import labels_of
+    from nonsmooth.results.provenance import provenance
+    from nonsmooth.results.schema import sweep as build
+
+    def gather(read: Callable[[Slot], Any]) -> np.ndarray:
+        return np.stack(
+            [np.stack([read(slots[d, k]) for k in range(len(starts))]) for d in range(len(directions))]
+        )
+
+    failed = gather(lambda slot: np.isnan(slot.chain.section).any(axis=(1, 2)) & ~_usable(slot))
+    sides = armed_signs(system)
+
+    def whole(values: np.ndarray) -> np.ndarray:
+        """NaN where the point failed: the kernel's buffers hold what it had by then."""
+        return np.where(failed.reshape(failed.shape + (1,) * (values.ndim - 3)), np.nan, values)
+
+    returns = gather(lambda slot: np.full(slot.chain.section.shape[0], slot.chain.section.shape[1], dtype=float))
+    arrays = {
+        "section": whole(gather(lambda s: s.chain.section)),
+        "maximum": whole(gather(lambda s: s.chain.maximum)),
+        "minimum": whole(gather(lambda s: s.chain.minimum)),
+        "period_number": gather(lambda s: s.period_number),
+        "residual": gather(lambda s: s.residual),
+        "crossings_per_period": whole(gather(lambda s: s.chain.crossings) / returns),
+        "contacts_per_period": whole(gather(lambda s: s.chain.contacts) / returns),
+        "clearance": whole(gather(lambda s: np.where(sides > 0, -s.chain.indicator_max, s.chain.indicator_min))),
+        "output_maximum": whole(gather(lambda s: s.chain.output_max)),
+        "output_minimum": whole(gather(lambda s: s.chain.output_min)),
+        "status": gather(lambda s: s.status),
+    }
+    if not system.outputs or arrays["output_maximum"].shape[-1] != len(system.outputs):
+        del arrays["output_maximum"], arrays["output_minimum"]
+    labels = labels_of(system)
+    return build(
+        labels, provenance(labels, "sweep", options, method=method), parameter, numbers, arrays,
+        directions=directions, starts=starts, squeeze=tuple(squeeze),
+    )  # fmt: skip
+
+
+def _usable(slot: Slot) -> np.ndarray:
+    return np.isin(slot.status, (codes.OK, codes.SLOW, codes.NOT_PERIODIC, codes.NOT_GUARANTEED))
+
+
+def armed_signs(system: System) -> np.ndarray:
+    """+1 or -1 for each indicator: the sign with which it first stands in a transition (+1 where in none)."""
+    signs = np.ones(len(system.indicators), dtype=np.int64)
+    for jump in reversed(system.transitions):
+        for row in reversed(jump.rows):
+            signs[row.indicator] = row.sign
+    return signs

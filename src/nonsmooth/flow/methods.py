@@ -1,0 +1,108 @@
+"""Which engine runs a system: the meaning of ``method=``, ``rtol=``, ``atol=`` and ``step=`` everywhere."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.flow.engine import Engine, FloatArray
+
+if TYPE_CHECKING:
+    from nonsmooth.system.system import System
+    from nonsmooth.system.traced import Traced
+
+__all__ = ["METHODS", "RTOL", "engine_for"]
+
+METHODS = ("auto", "exact", "taylor", "rkf45")
+RTOL = 1e-9
+
+
+def engine_for(
+    system: System,
+    method: str = "auto",
+    rtol: float | None = None,
+    atol: Any = None,
+    step: float | None = None,
+    *,
+    traced: Traced | None = None,
+    **expert: Any,
+) -> Engine:
+    """The engine for a system, a method and tolerances.
+
+    Parameters
+    ----------
+    system : System
+    method : str
+        ``"auto"``: ``"exact"`` where every mode is linear with harmonic forcing, else ``"taylor"``.
+    rtol, atol : float; float, mapping of state to float, or array (n,)
+        Tolerances per step; rtol 1e-9 and atol = rtol * scale where not given.
+    step : float, optional
+        A fixed step (``"taylor"`` and ``"rkf45"``).
+    traced : Traced, optional
+        Equations in place of the system's own (parameters that are functions of time).
+
+    Raises
+    ------
+    ValueError
+        A method that does not exist or does not fit, or tolerances for a method that has none.
+    SystemDefinitionError
+        A system with sliding surfaces.
+    """
+    if method not in METHODS:
+        raise ValueError(f"method = {method!r} does not exist; allowed: {', '.join(map(repr, METHODS))}")
+    if getattr(system, "surfaces", ()):
+        names = ", ".join(repr(surface.indicator) for surface in system.surfaces)
+        raise SystemDefinitionError(
+            f"{system.name!r} has sliding surfaces ({names}); motion along a Surface cannot be simulated yet. "
+            "Write the stick or slide mode and its transitions out, or use .smoothed(eta)"
+        )
+    equations = system.traced if traced is None else traced
+    form = None
+    if method in ("auto", "exact") and traced is None:
+        from nonsmooth.system.linear import linear_form
+
+        form = linear_form(equations)
+    if method == "exact":
+        if form is None:
+            raise ValueError(
+                f"{system.name!r} has no exact flow: some mode is not linear with constant coefficients and harmonic "
+                'forcing (or reads memory); use method="taylor" or "rkf45"'
+            )
+        if rtol is not None or atol is not None or step is not None:
+            raise ValueError('method="exact" has no tolerance and no step; leave rtol, atol and step out')
+    # A smoothed system is run by its series, also where its bands happen to be linear: design section 2.
+    if form is not None and not system.is_smoothed and step is None:
+        from nonsmooth.flow.planar import PlanarEngine, is_planar
+
+        if is_planar(equations, form) and not expert:
+            return PlanarEngine(equations, form, system.scale_vector())
+        name = "exact"
+    elif method == "exact":
+        name = "exact"
+    else:
+        name = "taylor" if method == "auto" else method
+    from nonsmooth.flow.series import SeriesEngine
+
+    tolerance = RTOL if rtol is None else float(rtol)
+    return SeriesEngine(
+        equations, system.scale_vector(), name, tolerance, _absolute(system, atol), step=step, **expert
+    )
+
+
+def _absolute(system: System, atol: Any) -> FloatArray | None:
+    """Absolute tolerances per state."""
+    if atol is None:
+        return None
+    names = list(system.states)
+    if isinstance(atol, Mapping):
+        missing = set(names) ^ set(atol)
+        if missing:
+            raise ValueError(f"atol must name each state of {names} once; wrong: {sorted(missing)}")
+        atol = [atol[name] for name in names]
+    values = np.broadcast_to(np.asarray(atol, dtype=float), (len(names),)).copy()
+    if not (np.isfinite(values).all() and (values > 0).all()):
+        raise ValueError(f"atol = {atol} must be positive and finite")
+    return values

@@ -1,0 +1,96 @@
+"""``poincare``: the points in which trajectories meet a section."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.errors import SolveError
+from nonsmooth.flow.engine import Chain, State
+from nonsmooth.flow.methods import engine_for
+from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
+from nonsmooth.flow.starts import is_one_start, start_states
+from nonsmooth.kernels import codes
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from nonsmooth.system.system import System
+
+__all__ = ["poincare", "result_status"]
+
+
+def result_status(code: int) -> int:
+    """The status of a result for a kernel's code: a start beyond a stop is a point that did not converge."""
+    return codes.NO_CONVERGENCE if code < 0 else int(code)
+
+
+def poincare(
+    system: System,
+    *,
+    section: Stroboscopic | Poincare | None = None,
+    n: int = 1000,
+    transient: int = 0,
+    start: Any = None,
+    method: str = "auto",
+    rtol: float | None = None,
+    atol: Any = None,
+    **expert: Any,
+) -> xr.Dataset:
+    """Section points of a trajectory, or of several.
+
+    Parameters
+    ----------
+    system : System
+    section : Stroboscopic or Poincare, optional
+        ``Stroboscopic(0)`` where the system has a period.
+    n : int
+        Number of returns to record.
+    transient : int
+        Returns to pass over first.
+    start : state or list of states, optional
+        Zeros where not given.
+    method, rtol, atol
+        See :func:`nonsmooth.flow.methods.engine_for`.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``section(iterate, state)``, ``time``, ``mode``, ``status``; with the dim ``start`` for several starts.
+
+    Raises
+    ------
+    SolveError
+        A single run that could not be completed.
+    """
+    if n < 1 or transient < 0:
+        raise ValueError(f"n = {n} must be at least 1 and transient = {transient} not negative")
+    section, plan = section_plan(system, section)
+    engine = engine_for(system, method, rtol, atol, **expert)
+    starts = start_states(system, start)
+    traced = system.traced
+    out = Chain.empty(len(starts), n, len(traced.u), len(traced.indicators), len(traced.outputs))
+    tables = engine.prepare(np.tile(system.parameter_vector(), (len(starts), 1)))
+    state = State(starts[0].copy(), system.memory_vector())
+    engine.chain(tables, 0, len(starts), state, starts, plan, int(transient), int(n), out)
+    if is_one_start(start) and out.status[0] not in (codes.OK, codes.NOT_GUARANTEED):
+        from nonsmooth.results.statuses import by_code
+
+        status = by_code(result_status(out.status[0]))
+        raise SolveError(status.sentence, status=status.name)
+    from nonsmooth.results.labels import labels_of
+    from nonsmooth.results.provenance import provenance
+    from nonsmooth.results.schema import section_points
+
+    options = {
+        "section": section, "n": n, "transient": transient, "start": start, "method": method, "rtol": rtol,
+        "atol": atol, **expert,
+    }  # fmt: skip
+    labels = labels_of(system)
+    return section_points(
+        labels, provenance(labels, "poincare", options, method=engine.name),
+        section=out.section, time=out.section_time, mode=out.section_mode,
+        status=[result_status(code) for code in out.status], starts=starts,
+        squeeze=("start",) if is_one_start(start) else (),
+    )  # fmt: skip

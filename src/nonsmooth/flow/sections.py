@@ -1,0 +1,117 @@
+"""Sections: where a trajectory is looked at once per return."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.flow.engine import SectionPlan
+
+if TYPE_CHECKING:
+    from nonsmooth.system.system import System
+
+__all__ = ["Poincare", "Stroboscopic", "section_plan"]
+
+
+@dataclass(frozen=True)
+class Stroboscopic:
+    """The state at one phase of every forcing period.
+
+    Parameters
+    ----------
+    phase : float
+        In forcing periods, 0 <= phase < 1.
+
+    Raises
+    ------
+    ValueError
+        A phase outside 0..1.
+    """
+
+    phase: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.phase < 1.0:
+            raise ValueError(f"phase = {self.phase}: the phase is given in forcing periods, 0 <= phase < 1")
+
+
+@dataclass(frozen=True)
+class Poincare:
+    """The state each time an indicator goes through zero.
+
+    Parameters
+    ----------
+    indicator : str
+        Name of the indicator.
+    rising : bool or None
+        Through zero upwards, downwards, or (None) both.
+    mode : str, optional
+        Count it in this mode only.
+    side : str
+        ``"after"`` or ``"before"``: which limit is taken where the section lies on a switching surface.
+    every : int
+        Take each ``every``-th return.
+    t_max : float, optional
+        The longest wait for one return, in time; beyond it the status is ``no_convergence``. Default: 1000 forcing
+        periods, or 1e6 units of time.
+    """
+
+    indicator: str
+    rising: bool | None = True
+    mode: str | None = None
+    side: str = "after"
+    every: int = 1
+    t_max: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.side not in ("before", "after"):
+            raise ValueError(f'side = {self.side!r}; allowed: "before", "after"')
+        if self.every < 1:
+            raise ValueError(f"every = {self.every}; it counts returns and is at least 1")
+        if self.t_max is not None and not self.t_max > 0:
+            raise ValueError(f"t_max = {self.t_max} must be positive")
+
+
+def section_plan(system: System, section: Any) -> tuple[Stroboscopic | Poincare, SectionPlan]:
+    """The section meant (``Stroboscopic(0)`` where None and the system has a period), and its integers.
+
+    Raises
+    ------
+    ValueError, TypeError
+        No section for an autonomous system, an unknown indicator or mode.
+    """
+    period = system.period()
+    if section is None:
+        if period is None:
+            raise ValueError(
+                f"{system.name!r} has no forcing period, so there is no stroboscopic section; "
+                f'pass section=ns.Poincare("indicator"), one of: {", ".join(system.indicators) or "(it has none)"}'
+            )
+        section = Stroboscopic()
+    if isinstance(section, Stroboscopic):
+        if period is None:
+            raise ValueError(f"{system.name!r} has no forcing period: use ns.Poincare(...) in place of {section}")
+        return section, SectionPlan(phase=section.phase)
+    if not isinstance(section, Poincare):
+        raise TypeError(f"section must be ns.Stroboscopic(...) or ns.Poincare(...), not {section!r}")
+    from nonsmooth.system.names import unknown
+
+    indicators, modes = list(system.indicators), list(system.modes)
+    if section.indicator not in indicators:
+        raise ValueError(unknown(section.indicator, "an indicator", repr(system.name), indicators))
+    if section.mode is not None and section.mode not in modes:
+        raise ValueError(unknown(section.mode, "a mode", repr(system.name), modes))
+    t_max = section.t_max
+    if t_max is None:
+        t_max = 1e6 if period is None else 1e3 * period
+    return section, SectionPlan(
+        phase=-1.0,
+        indicator=indicators.index(section.indicator),
+        rising={True: 1, False: -1, None: 0}[section.rising],
+        mode=-1 if section.mode is None else modes.index(section.mode),
+        after=int(section.side == "after"),
+        every=section.every,
+        t_max=float(np.float64(t_max)),
+    )

@@ -1,0 +1,202 @@
+"""``simulate``: one trajectory, with every crossing and touch."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.errors import SolveError
+from nonsmooth.flow.engine import FloatArray, Log, State
+from nonsmooth.flow.methods import engine_for
+from nonsmooth.flow.starts import is_one_start, start_states
+from nonsmooth.kernels import codes
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from nonsmooth.system.system import System
+
+__all__ = ["simulate"]
+
+SAMPLES_PER_PERIOD = 256
+SAMPLES = 4096
+
+
+def simulate(
+    system: System,
+    *,
+    periods: float | None = None,
+    duration: float | None = None,
+    start: Any = None,
+    mode: str | None = None,
+    transient: float = 0,
+    samples: Any = None,
+    step: float | None = None,
+    ramps: Mapping[str, Any] | None = None,
+    method: str = "auto",
+    rtol: float | None = None,
+    atol: Any = None,
+    **expert: Any,
+) -> xr.Dataset:
+    """March one trajectory and return it as segments between crossings.
+
+    Parameters
+    ----------
+    system : System
+    periods, duration : float
+        Length of the run in forcing periods, or in time: one of the two.
+    start : mapping, sequence of n floats, or a result of ``simulate``, optional
+        State at t = 0; zeros where not given.
+    mode : str, optional
+        Mode at the start; the first where not given. Transitions that already hold are taken first.
+    transient : float
+        Run this long before recording, in the unit of the length. Time goes on: the record begins at t = transient.
+    samples : int or array, optional
+        Number of equidistant instants, or the instants themselves. Default: 256 per period, or 4096 in all.
+    step : float, optional
+        Fixed step of ``"taylor"`` and ``"rkf45"``.
+    ramps : mapping of parameter to (first, last) or callable, optional
+        Parameters as functions of time in this run: linear over the recorded time, or ``f(t)``.
+    method, rtol, atol
+        See :func:`nonsmooth.flow.methods.engine_for`; rtol is 1e-9 where not given.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``u(time, state)``, ``mode``, ``segment`` (each crossing stands twice in ``time``: the limits before and
+        after), ``crossing_time``, ``crossing_transition``, ``u_before``, ``u_after``, the touches (``touch_time``,
+        ``touch_indicator``, ``touch_u``, ``touch_clearance``: maxima of an armed indicator that do not reach zero),
+        the outputs, and ``status``.
+
+    Raises
+    ------
+    ValueError, TypeError
+        Arguments that do not fit.
+    SolveError
+        The run could not be completed; it says where and why.
+    """
+    period = system.period()
+    unit, length = _length(system, periods, duration, period, transient)
+    if not is_one_start(start):
+        raise ValueError("simulate marches one trajectory: give one start; sweep and poincare take several")
+    t_begin, t_end = transient * unit, transient * unit + length
+    traced = system.traced
+    if ramps:
+        from nonsmooth.flow.ramps import with_ramps
+
+        if method == "exact":
+            raise ValueError('method="exact" needs constant parameters; with ramps use "taylor" or "rkf45"')
+        traced = with_ramps(system, ramps, t_begin, t_end)
+    engine = engine_for(system, method, rtol, atol, step, traced=traced if ramps else None, **expert)
+    instants = _instants(samples, t_begin, t_end, None if ramps and period is None else period)
+    state = State(start_states(system, start)[0].copy(), system.memory_vector())
+    if mode is not None:
+        if mode not in system.modes:
+            from nonsmooth.system.names import unknown
+
+            raise ValueError(unknown(mode, "a mode", repr(system.name), list(system.modes)))
+        state.counters[0] = list(system.modes).index(mode)
+    tables = engine.prepare(system.parameter_vector()[None, :])
+    if t_begin > 0:
+        _complete(engine.record(tables, state, t_begin, np.empty(0)), system, state, period)
+    log = engine.record(tables, state, t_end, instants)
+    _complete(log, system, state, period)
+    options = {
+        "periods": periods, "duration": duration, "start": _plain_start(start, system), "mode": mode,
+        "transient": transient, "samples": samples, "step": step,
+        "ramps": None if not ramps else {k: v if not callable(v) else str(v) for k, v in ramps.items()},
+        "method": method, "rtol": rtol, "atol": atol, **expert,
+    }  # fmt: skip
+    return _dataset(system, traced, engine.name, options, log, instants, period)
+
+
+def _length(
+    system: System, periods: float | None, duration: float | None, period: float | None, transient: float
+) -> tuple[float, float]:
+    """The unit of the length (the period, or 1) and the length in time."""
+    if (periods is None) == (duration is None):
+        raise ValueError("give the length of the run once: periods=... or duration=...")
+    if periods is not None and period is None:
+        raise ValueError(f"{system.name!r} has no forcing period: give duration=... in place of periods")
+    value = periods if periods is not None else duration
+    if value is None or not np.isfinite(value) or value <= 0:
+        raise ValueError(f"the length of a run must be positive and finite, not {value!r}")
+    if not np.isfinite(transient) or transient < 0:
+        raise ValueError(f"transient = {transient!r} must be zero or more")
+    unit = 1.0 if periods is None or period is None else period
+    return unit, float(value) * unit
+
+
+def _instants(samples: Any, t_begin: float, t_end: float, period: float | None) -> FloatArray:
+    if samples is None:
+        samples = SAMPLES + 1 if period is None else int(np.ceil((t_end - t_begin) / period * SAMPLES_PER_PERIOD)) + 1
+    if np.ndim(samples) == 0:
+        if int(samples) != samples or samples < 2:
+            raise ValueError(f"samples = {samples!r}: a number of instants is a whole number, at least 2")
+        return np.linspace(t_begin, t_end, int(samples))
+    instants = np.array(samples, dtype=float)
+    if instants.ndim != 1 or not np.isfinite(instants).all() or (np.diff(instants) <= 0).any():
+        raise ValueError("samples must be a number, or increasing finite instants")
+    if len(instants) and (instants[0] < t_begin or instants[-1] > t_end * (1 + 1e-15)):
+        raise ValueError(f"samples lie outside the recorded time {t_begin:.6g} ... {t_end:.6g}")
+    return np.minimum(instants, t_end)
+
+
+def _complete(log: Log, system: System, state: State, period: float | None) -> None:
+    """Raise for a run that stopped early, with the place where it did."""
+    if log.status in (codes.OK, codes.NOT_GUARANTEED):
+        return
+    from nonsmooth.results.statuses import by_code
+
+    if log.status == codes.BEYOND_STOP:
+        message = (
+            "the start lies beyond a stop: a transition with a reset holds there already; "
+            "start on the admissible side of its indicator"
+        )
+        name = "beyond_stop"
+    else:
+        status = by_code(log.status)
+        message, name = status.sentence, status.name
+    time = state.clock[0] + (state.clock[1] * period if period is not None else 0.0)
+    where = dict(zip(system.states, map(float, state.u), strict=True))
+    raise SolveError(message, time=float(time), state=where, mode=system.modes[int(state.counters[0])], status=name)
+
+
+def _plain_start(start: Any, system: System) -> Any:
+    return start_states(system, start)[0].tolist() if hasattr(start, "data_vars") else start
+
+
+def _dataset(
+    system: System, traced: Any, method: str, options: Mapping[str, Any], log: Log, instants: FloatArray,
+    period: float | None,
+) -> xr.Dataset:  # fmt: skip
+    from nonsmooth.flow.outputs import output_values
+    from nonsmooth.results.labels import labels_of
+    from nonsmooth.results.provenance import provenance
+    from nonsmooth.results.schema import trajectory
+    from nonsmooth.results.segments import with_crossings
+
+    labels = labels_of(system)
+    source = np.array([jump.source for jump in traced.transitions], dtype=np.int64)
+    target = np.array([jump.target for jump in traced.transitions], dtype=np.int64)
+    merged = with_crossings(
+        instants, log.sample_u, log.sample_mode, log.sample_segment, log.crossing_time, log.u_before, log.u_after,
+        source[log.crossing_transition], target[log.crossing_transition],
+    )  # fmt: skip
+    memory = None
+    if traced.memory_names:  # constant within a segment
+        first = system.memory_vector()[None, :] if not len(log.sample_memory) else log.sample_memory[:1]
+        memory = np.concatenate([first, log.memory_after])[merged.segment]
+    outputs = None
+    if traced.output_names:
+        kept = np.zeros((len(merged.time), 0)) if memory is None else memory
+        outputs = output_values(traced, system.parameter_vector(), merged.time, merged.u, kept, merged.mode)
+    return trajectory(
+        labels, provenance(labels, "simulate", options, method=method),
+        time=merged.time, u=merged.u, mode=merged.mode, segment=merged.segment,
+        crossing_time=log.crossing_time, crossing_transition=log.crossing_transition,
+        u_before=log.u_before, u_after=log.u_after, touch_time=log.touch_time, touch_indicator=log.touch_indicator,
+        touch_u=log.touch_u, touch_clearance=log.touch_clearance, outputs=outputs, memory=memory, status=log.status,
+    )  # fmt: skip

@@ -1,0 +1,77 @@
+"""The ready models against what was published for them."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from nonsmooth import models
+
+
+def numbers(system, expressions, u, t=0.0):
+    traced = system.traced
+    return np.array(
+        sp.lambdify([traced.t, traced.u, traced.p], expressions, modules="numpy")(t, u, system.parameter_vector()),
+        float,
+    )
+
+
+def test_every_model_is_listed_documented_and_takes_parameters():
+    assert models.names() == ("discontinuous_support", "impact_oscillator", "relief_valve")
+    for name in models.names():
+        make = getattr(models, name)
+        assert "References" in make.__doc__
+        system = make()
+        first = next(iter(system.values))
+        assert make(**{first: 2.0}).values[first] == 2.0
+        with pytest.raises(ValueError, match="`nonsense` is not a parameter"):
+            make(nonsense=1.0)
+
+
+def test_the_paper_s_table_1_and_natural_frequency():
+    values = models.discontinuous_support().values
+    table = {"k": 8.47, "k_s": 1210, "c": 0.87, "c_s": 0.60, "m": 0.838}
+    assert {key: values[key] for key in table} == table
+    assert np.sqrt(2 * values["k"] / values["m"]) == pytest.approx(4.50, abs=0.005)  # printed in Sec. 3.1
+    damping_ratio = values["c"] / (2 * values["m"] * np.sqrt(2 * values["k"] / values["m"]))
+    assert damping_ratio == pytest.approx(0.115, abs=0.001)  # Fig. 6
+
+
+def test_the_support_pushes_only_in_contact():
+    system = models.discontinuous_support()
+    free, contact = (numbers(system, [row[mode] for row in system.traced.outputs], (-0.004, 0.1))[0] for mode in (0, 1))
+    assert free == 0
+    assert contact == pytest.approx(-(1210 * 0.0005 + 0.60 * 0.1), rel=1e-12)
+
+
+def test_the_impact_oscillator_grazes_at_the_published_amplitude():
+    system = models.impact_oscillator()
+    p = dict(system.values)
+    amplitude = p["d"] * np.hypot(p["k"] - p["omega"] ** 2, p["c"] * p["omega"])
+    assert amplitude == pytest.approx(0.1)
+    # x = d sin(omega t) solves the equation there (resonance) and just reaches the stop
+    grazing = system.with_parameters(A=amplitude)
+    for t in (0.0, 0.4, 2.0):
+        x, v = np.sin(t), np.cos(t)
+        assert numbers(grazing, grazing.traced.fields[0], (x, v), t) == pytest.approx([v, -x])
+
+
+def test_the_relief_valve_has_the_published_hopf_point():
+    system = models.relief_valve(q=8.4911176352)
+    # equilibrium: y2 = 0, y3 = y1 + delta, y1 sqrt(y3) = q
+    lift = next(r.real for r in np.roots([1, 10, 0, -(8.4911176352**2)]) if r.real > 0)
+    rest = (lift, 0.0, lift + 10)
+    assert numbers(system, system.traced.fields[0], rest) == pytest.approx([0, 0, 0], abs=1e-12)
+    jacobian = numbers(system, [e for row in system.derivatives.field(0) for e in row], rest).reshape(3, 3)
+    leading = max(np.linalg.eigvals(jacobian), key=lambda z: z.real)
+    assert leading.real == pytest.approx(0, abs=1e-9)
+    assert abs(leading.imag) > 0.1
+
+
+def test_listing_models_loads_no_heavy_package():
+    code = "import sys; from nonsmooth import models; models.names(); "
+    code += "print({'sympy', 'numba', 'xarray'} & set(sys.modules))"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == "set()"

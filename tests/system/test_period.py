@@ -1,0 +1,90 @@
+"""The forcing period: closed forms for what is read off, checks for what is given."""
+
+import numpy as np
+import pytest
+
+from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.system.system import System
+from nonsmooth.system.transition import Transition
+
+
+def forced(force, period=None, **parameters):
+    return System(
+        states=["x"],
+        parameters={"w": 3.0, "b": 0.7} | parameters,
+        modes={"only": lambda t, u, p: -u.x + force(t, u, p)},
+        period=period,
+    )
+
+
+@pytest.mark.parametrize(
+    ("force", "period"),
+    [
+        (lambda t, u, p: np.cos(p.w * t), 2 * np.pi / 3),
+        (lambda t, u, p: np.cos(2 * p.w * t) + np.sin(3 * p.w * t), 2 * np.pi / 3),
+        (lambda t, u, p: np.cos(2 * p.w * t) * u.x, np.pi / 3),
+        (lambda t, u, p: np.cos(p.w * t) * np.sin(1.5 * p.w * t), 4 * np.pi / 3),
+        (lambda t, u, p: np.cos(p.w * t + u.x) + np.sin(p.w * (t - p.b)), 2 * np.pi / 3),
+        (lambda t, u, p: np.cos(1.1 * t) + np.cos(3.3 * t), 2 * np.pi / 1.1),
+        (lambda t, u, p: np.cos(p.w * t / 3) ** 3 + np.exp(np.sin(p.w * t / 2)), 12 * np.pi / 3),
+        (lambda t, u, p: np.cos(np.pi * t), 2.0),
+        (lambda t, u, p: np.cos((p.w + p.b) * t) + np.cos(2 * (p.b + p.w) * t), 2 * np.pi / 3.7),
+    ],
+)
+def test_the_period_is_read_off(force, period):
+    system = forced(force)
+    assert system.period() == pytest.approx(period, rel=1e-14)
+    assert system.depends_on_time
+    assert not system.explicit_time
+
+
+def test_autonomous_and_not_periodic():
+    assert forced(lambda t, u, p: p.w).period() is None
+    assert not forced(lambda t, u, p: p.w).depends_on_time
+    for force in (
+        lambda t, u, p: np.cos(p.w * t) + np.cos(p.b * t),
+        lambda t, u, p: p.w * t,
+        lambda t, u, p: np.cos(p.w * t**2),
+        lambda t, u, p: np.cos(u.x * t),
+    ):
+        system = forced(force)
+        assert system.period() is None
+        assert system.explicit_time
+        assert system.depends_on_time
+        assert "not periodically" in repr(system)
+
+
+def test_a_given_period_is_checked():
+    two = forced(lambda t, u, p: np.cos(p.w * t) + np.cos(p.b * t), period=lambda p: 20 * np.pi, w=0.3, b=0.7)
+    assert two.period() == pytest.approx(20 * np.pi)
+    assert forced(lambda t, u, p: np.cos(p.w * t), period=lambda p: 4 * np.pi / p.w).period() == pytest.approx(
+        4 * np.pi / 3
+    )
+    assert forced(lambda t, u, p: 0, period=2.5).period() == 2.5
+    with pytest.raises(SystemDefinitionError, match="does not repeat after the period"):
+        forced(lambda t, u, p: np.cos(p.w * t), period=lambda p: 3 * np.pi / p.w)
+    with pytest.raises(SystemDefinitionError, match="failed when it was called"):
+        forced(lambda t, u, p: np.cos(p.w * t), period=lambda t, u, p: t)
+
+
+def test_switching_at_a_phase_needs_a_period():
+    def bang_bang(**more):
+        return System(
+            states=["x", "v"],
+            parameters={"A": 26.0, "omega": 1.0},
+            modes={
+                "minus": lambda t, u, p: (u.v, -p.A - 0.2 * u.v - u.x - u.x**3),
+                "plus": lambda t, u, p: (u.v, p.A - 0.2 * u.v - u.x - u.x**3),
+            },
+            transitions=[Transition("minus", "plus", at=0.5), Transition("plus", "minus", at=0.0)],
+            **more,
+        )
+
+    with pytest.raises(SystemDefinitionError, match=r"minus -> plus: `at` is a phase.*give period="):
+        bang_bang()
+    system = bang_bang(
+        period=lambda p: 2 * np.pi / p.omega, symmetry=(lambda u: (-u.x, -u.v), 0.5, {"plus": "minus", "minus": "plus"})
+    )
+    assert system.period() == pytest.approx(2 * np.pi)
+    assert [jump.at for jump in system.transitions] == [0.5, 0.0]
+    assert system.depends_on_time

@@ -1,0 +1,163 @@
+"""Text and back: nothing lost, nothing executed, the same in every process."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from nonsmooth import models
+from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.system.expressions import read_expression, write_expression
+from nonsmooth.system.mode import Mode
+from nonsmooth.system.scalar import where
+from nonsmooth.system.system import System
+from nonsmooth.system.transition import Surface, Transition
+
+
+def everything():
+    """A system that uses every part of a description at once."""
+    return System(
+        name="everything (µ)",
+        states={"x": "m", "v": "m/s", "w": ""},
+        parameters={"a": (0.1, "N"), "b": 1 / 3, "omega": (2.0, "rad/s", r"\Omega")},
+        memory={"kept": (0.25, "m")},
+        modes={
+            "one": lambda t, u, p: (u.v, -u.x / (2 * p.b) + p.a * np.cos(p.omega * t) ** 2, -u.w * np.exp(-u.x)),
+            "two": lambda t, u, p: (u.v, -2 * (u.x + u.v) / p.b + p.kept, where(p.a > 0.05, p.a, -p.a) * u.w),
+            "held": Mode(lambda t, u, p: (1e-17 * u.v + 0.1, np.arctan2(u.x, 2 + u.v**2)), states=["x", "v"]),
+        },
+        indicators={"level": lambda t, u, p: u.x - 0.3 * np.sqrt(1 + u.v**2), "speed": lambda t, u, p: u.v - p.b},
+        transitions=[
+            Surface("speed", below="one", above="two"),
+            Transition("one", "held", when="level > 0 and speed < 0"),
+            Transition(
+                "held", "two", at=0.25, reset=lambda t, u, p: (u.x, -p.b * u.v, p.kept),
+                write={"kept": lambda t, u, p: u.x},
+            ),
+        ],
+        outputs={
+            "power": (lambda t, u, p: abs(u.v) * np.maximum(u.x, p.a), "W"),
+            "side": {"one": lambda t, u, p: u.w, "two": lambda t, u, p: -u.w, "held": lambda t, u, p: 0},
+        },
+        scale={"x": 1e-3},
+        period=lambda p: 4 * np.pi / p.omega,
+    )  # fmt: skip
+
+
+SYSTEMS = {name: getattr(models, name) for name in models.names()} | {
+    "smoothed": lambda: models.discontinuous_support(c_s=0.1 + 0.2).smoothed(1e-5),
+    "two widths": lambda: models.discontinuous_support().smoothed({"penetration": 1e-5, "separation": 3e-6}),
+    "everything": everything,
+}
+
+
+@pytest.mark.parametrize("make", SYSTEMS.values(), ids=SYSTEMS.keys())
+def test_text_and_back_is_the_same_system(make):
+    system = make()
+    again = System.from_text(system.to_text())
+    assert again.to_text() == system.to_text()
+    assert again.traced == system.traced
+    assert again.values == system.values
+    assert again.surfaces == system.surfaces
+    assert again == system
+
+
+def test_the_hash_of_the_equations_does_not_see_values():
+    system = models.discontinuous_support()
+    other = system.with_parameters(g=np.nextafter(system.values["g"], 1))
+    assert system.content_hash() == other.content_hash()
+    assert system.content_hash(values=True) != other.content_hash(values=True)
+    assert system.smoothed(1e-5).content_hash() == system.smoothed(2e-5).content_hash() != system.content_hash()
+
+
+def test_the_text_is_the_same_in_another_process():
+    code = (
+        "from nonsmooth import models; print(models.discontinuous_support().smoothed(1e-5).content_hash(values=True))"
+    )
+    hashes = {
+        subprocess.run(
+            [sys.executable, "-c", code],
+            env={"PYTHONHASHSEED": seed, "PYTHONPATH": ":".join(sys.path)},
+            capture_output=True, text=True, check=True,
+        ).stdout.strip()
+        for seed in ("1", "2")
+    }  # fmt: skip
+    assert hashes == {models.discontinuous_support().smoothed(1e-5).content_hash(values=True)}
+
+
+def random_expression(random, symbols, depth):
+    if depth == 0:
+        choice = random.integers(4)
+        number = sp.Rational(int(random.integers(-6, 7)), int(random.integers(1, 4)))
+        return (*random.permutation(np.array(symbols, dtype=object)), number, sp.Float(random.normal()))[choice + 1]
+    a, b = (random_expression(random, symbols, depth - 1) for _ in range(2))
+    kind = random.integers(8)
+    if kind < 5:
+        return [a + b, a - b, a * b, a / (2 + b**2), -(a**3) * b][kind]
+    return [sp.sin(a), sp.sqrt(1 + a**2) + b, sp.exp(-(a**2)) / (1 + b**2) ** sp.Rational(3, 2)][kind - 5]
+
+
+def test_random_expressions_survive():
+    symbols = sp.symbols("u_x u_v p_k t_", real=True)
+    names = dict(zip(symbols, ("u.x", "u.v", "p.k", "t"), strict=True))
+    table = {name: symbol for symbol, name in names.items()}
+    random = np.random.default_rng(8)
+    for _ in range(150):
+        expression = random_expression(random, symbols, 3)
+        text = write_expression(expression, names)
+        again = read_expression(text, table)
+        assert write_expression(again, names) == text
+        assert again == expression, text
+
+
+def test_floats_survive_to_the_last_bit():
+    for value in np.random.default_rng(9).uniform(-1, 1, 300) * 10.0 ** np.random.default_rng(9).integers(
+        -300, 300, 300
+    ):
+        assert float(read_expression(write_expression(sp.Float(value), {}), {})) == value
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "__import__('os').system('true')", "().__class__", "u.x.real", "[1]", "lambda: 1", "print(1)", "p.unknown", "x",
+        "'a'", "1 if u.x else 2", "(1, 2)", "sin(*[1])", "9**9**9**9", "10.0**1e9", "sin()", "1e999", "u.x +",
+        "f'{1}'", "1j",
+        "u[0]", "", "(" * 500 + "1" + ")" * 500, "where(1, 2)", "nan",
+    ],
+)  # fmt: skip
+def test_only_the_white_list_is_read(text):
+    with pytest.raises(ValueError, match=r"expression"):
+        read_expression(text, {"u.x": sp.Symbol("u_x", real=True)})
+
+
+def damaged(change):
+    content = json.loads(models.discontinuous_support().to_text())
+    change(content)
+    return json.dumps(content)
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("", "JSON expected"),
+        ("[]", '"format"'),
+        ("{}", '"format"'),
+        (damaged(lambda d: d.update(version=99)), "version 99"),
+        (damaged(lambda d: d.pop("modes")), "'modes' is missing"),
+        (damaged(lambda d: d["indicators"].update(penetration="__import__('os')")), "not allowed"),
+        (damaged(lambda d: d["transitions"][0].update(target="nowhere")), "`nowhere` is not a mode"),
+        (damaged(lambda d: d["parameters"]["m"].update(value=0)), "m = 0"),
+        (damaged(lambda d: d["parameters"]["m"].update(value="0.1")), "must be a real number"),
+        (damaged(lambda d: d.update(modes=3)), "damaged"),
+        (damaged(lambda d: d["modes"]["free"].update(v="abs(u.x)")), "`abs` of the state"),
+        (damaged(lambda d: d.update(smoothing={"eta": -1})), "positive"),
+        (models.discontinuous_support().to_text().replace("0.838", "NaN"), "not a finite number"),
+    ],
+)
+def test_damaged_text_is_refused(text, sentence):
+    with pytest.raises(SystemDefinitionError, match=sentence):
+        System.from_text(text)
