@@ -7,7 +7,7 @@ and ``h_b = -(x - g) - (c_s / k_s) v``: it begins when the second of the two con
 at ``x > g``, where it must not begin again.
 
 heyoka isolates the crossings on the Taylor polynomial of each step. Both indicators are terminal events in
-either direction; what a stop means is decided here, in Python, from the state a nanosecond later. The support is
+either direction; what a stop means is decided here, in Python, from the state just after it. The support is
 switched by a runtime parameter, so one compiled integrator serves every parameter set.
 """
 
@@ -29,8 +29,8 @@ TABLE_1 = {"m": 0.838, "k": 8.47, "k_s": 1210.0, "c": 0.87, "c_s": 0.60}  # the 
 #: (a t^2 / 8 < 1e-19 m); without it heyoka may find the same root again, 1e-17 s later.
 COOLDOWN = 1e-10
 
-#: A condition that is zero within rounding at a stop is judged this much later, in seconds.
-AFTER = 1e-9
+#: An indicator smaller than this at a stop is zero within rounding, and is judged by its rate (metres).
+ZERO = 1e-17
 
 
 @dataclass
@@ -146,9 +146,15 @@ def region(p: Mapping[str, float], x: float, v: float) -> int:
 
 
 def _decide(p: Mapping[str, float], t: float, x: float, v: float, mode: int) -> int:
-    """The mode just after a stop, with both indicators judged `AFTER` seconds later."""
-    a = acceleration(p, t, x, v, mode)
-    return region(p, x + AFTER * v + AFTER**2 * a / 2, v + AFTER * a)
+    """The mode just after a stop: an indicator that is zero is judged by where it is going."""
+    tau, a = p["c_s"] / p["k_s"], acceleration(p, t, x, v, mode)
+    rounding = ZERO + 2e-16 * (abs(x) + abs(p["g"]))
+
+    def sign(value: float, rate: float) -> float:
+        return rate if abs(value) <= rounding else value
+
+    h_a, h_b = x - p["g"], -(x - p["g"]) - tau * v
+    return int(sign(h_a, v) > 0 and sign(h_b, -v - tau * a) < 0)
 
 
 def run(

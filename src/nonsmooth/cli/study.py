@@ -27,6 +27,8 @@ _SYSTEM_KEYS = ("model", "parameters", "smoothed")
 _OUTPUT_KEYS = ("data", "figure", "x", "y")
 #: Arguments of verbs that belong to the command line, or that a file cannot hold.
 _NOT_IN_FILES = ("progress", "client", "store")
+#: A verb that hands its further options on to another takes that one's keys too.
+_HANDS_ON_TO = {"frequency_response": "sweep"}
 _FIGURES = {
     "simulate": "phase_portrait", "sweep": "bifurcation", "frequency_response": "frequency_response",
     "poincare": "section",
@@ -160,9 +162,14 @@ def _options(verb: str, table: Mapping[str, Any], where: str) -> dict[str, Any]:
     """The verb's own parameters are the allowed keys, so that a new option needs no change here."""
     import nonsmooth
 
-    signature = inspect.signature(getattr(nonsmooth, verb)).parameters
-    named = [name for name, item in signature.items() if item.kind is not inspect.Parameter.VAR_KEYWORD][1:]
-    allowed = [name for name in named if name not in _NOT_IN_FILES]
+    signature: dict[str, inspect.Parameter] = {}
+    for owner in (_HANDS_ON_TO.get(verb), verb):  # the verb's own defaults win
+        if owner is not None:
+            signature |= inspect.signature(getattr(nonsmooth, owner)).parameters
+    allowed = [
+        name for name, item in signature.items()
+        if name not in (*_NOT_IN_FILES, "system") and item.kind is not inspect.Parameter.VAR_KEYWORD
+    ]  # fmt: skip
     place = f"{where}, table [{verb}]"
     _check_keys(table, allowed, place, "a key")
     missing = [name for name in allowed if signature[name].default is inspect.Parameter.empty and name not in table]
