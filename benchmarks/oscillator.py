@@ -17,7 +17,7 @@ Verdict = tuple[str, str, str, bool]
 
 def measure(case: Case, effort: float) -> dict[str, float]:
     """Microseconds per forcing period of every peer, from the same settled state."""
-    complete, minimal = oscillator_heyoka.oscillator(), oscillator_heyoka.oscillator(complete=False)
+    complete, minimal = oscillator_heyoka.oscillator("complete"), oscillator_heyoka.oscillator("minimal")
     p = case.parameters
     complete.start(p)
     u = complete.march(500)

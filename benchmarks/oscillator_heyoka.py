@@ -2,7 +2,7 @@
 
 What was tried, in microseconds per forcing period at the parameters of Fig. 11 / Fig. 13 on one machine:
 
-- both indicators as terminal events in either direction, decided in the callback (the plain way): 22-25 / 8-11;
+- both indicators as terminal events in either direction, decided in the callback (the plain way): 20-26 / 7-11;
 - one directed event ``on h_b + (1 - on) h_a`` for entry and release, a second one for entry through h_b: 17-20 / 7-9;
 - the same with coefficients divided by the mass beforehand and callbacks that write through memory views:
   14-16 / 5.5-7 (`complete`: the one that counts);
@@ -65,22 +65,25 @@ class _Second:
 
 
 class Oscillator:
-    """A compiled integrator; `start` sets parameters and state, the rest marches on from there."""
+    """A compiled integrator; `start` sets parameters and state, the rest marches on from there.
 
-    def __init__(self, *, complete: bool = True, tolerance: float = 1e-14) -> None:
+    `events` is "complete" (the fastest complete logic) or "minimal" (blind to contact that begins beyond the gap).
+    """
+
+    def __init__(self, events: str = "complete", tolerance: float = 1e-14) -> None:
         x, v = hy.make_vars("x", "v")
         stiffness, damping, force, omega, gap, support, dashpot, tau, on = (hy.par[i] for i in range(9))
         depth = x - gap
         free = force * hy.cos(omega * hy.time) - stiffness * x - damping * v
         rising = hy.event_direction.positive
         self._toggle, self._second = _Toggle(), _Second()
-        events = [hy.t_event((1.0 - on) * depth - on * (depth + tau * v), callback=self._toggle, direction=rising)]
-        if complete:
+        watched = [hy.t_event((1.0 - on) * depth - on * (depth + tau * v), callback=self._toggle, direction=rising)]
+        if events == "complete":
             # Minus h_b while free, the constant -1 in contact: h_b falling is this rising.
-            events.append(hy.t_event((1.0 - on) * (depth + tau * v) - on, callback=self._second, direction=rising))
+            watched.append(hy.t_event((1.0 - on) * (depth + tau * v) - on, callback=self._second, direction=rising))
         self.ta = hy.taylor_adaptive(
             [(x, v), (v, free - on * (support * depth + dashpot * v))],
-            [0.0, 0.0], pars=[0.0] * 9, tol=tolerance, t_events=events,
+            [0.0, 0.0], pars=[0.0] * 9, tol=tolerance, t_events=watched,
         )  # fmt: skip
         for callback in (self._toggle, self._second):
             callback.pars = memoryview(self.ta.pars)
@@ -121,5 +124,5 @@ class Oscillator:
 
 
 @cache
-def oscillator(*, complete: bool = True) -> Oscillator:
-    return Oscillator(complete=complete)
+def oscillator(events: str = "complete") -> Oscillator:
+    return Oscillator(events)

@@ -46,7 +46,7 @@ def march(system: ns.System, u: NDArray[np.float64], n_periods: int, **method: A
     """State after `n_periods`: the transient of a sweep with one point, as a bifurcation diagram runs it."""
     rho = system.values["rho"]
     result = ns.sweep(
-        system, "rho", [rho], start=start_of(u), transient=n_periods - 1, keep=1, max_period=1, progress=False, **method
+        system, "rho", [rho], start=start_of(u), transient=n_periods - 2, keep=2, max_period=1, progress=False, **method
     )
     return result["section"].transpose("rho", "iterate", "state").values[0, -1]
 

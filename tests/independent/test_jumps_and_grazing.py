@@ -16,20 +16,20 @@ STEP = 0.005
 
 #: rho, g, window of omega, direction of the sweep, grazing frequency's index (0 lower, 1 upper).
 JUMPS = {
-    "figure 9, falling": (0.14, 0.02, (5.06, 5.26), "down", 1),
-    "figure 10, falling": (0.16, 0.0145, (5.55, 5.75), "down", 1),
+    # Begun above the fold at which the orbit in contact ends (5.8104 and 6.5312): only one orbit is there.
+    "figure 9, falling": (0.14, 0.02, (5.0, 6.0), "down", 1),
+    "figure 10, falling": (0.16, 0.0145, (5.5, 6.7), "down", 1),
     "figure 10, small jump, rising": (0.16, 0.0145, (2.66, 2.76), "up", 0),
 }
 
 
-@pytest.mark.parametrize("method", ["exact"])
 @pytest.mark.parametrize("name", JUMPS)
-def test_jump_lies_at_the_grazing_frequency(name: str, method: str) -> None:
+def test_jump_lies_at_the_grazing_frequency(name: str) -> None:
     rho, g, (low, high), direction, which = JUMPS[name]
     graze = known.grazing_frequencies(rho, g)[which]
     system = ns.models.discontinuous_support().with_parameters(rho=rho, g=g)
     values = np.arange(low, high + STEP / 2, STEP)
-    response = ns.frequency_response(system, values, direction=direction, method=method, progress=False)
+    response = ns.frequency_response(system, values, direction=direction, progress=False)
     # From the amplitudes alone: the largest step between neighbours of the displacement's amplitude.
     amplitude = response["amplitude"].sel(state="x").squeeze().values
     steps = np.abs(np.diff(amplitude))

@@ -1,6 +1,6 @@
 """The engine of the series methods: generated Taylor series, Runge-Kutta-Fehlberg 4(5), and the exact flow for any n.
 
-It packs a system into the arrays of ``kernels.series_run`` and unpacks what comes back; no numerics of its own.
+It packs a system into the arrays of ``kernels.series`` and unpacks what comes back; no numerics of its own.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def order_for(rtol: float) -> int:
 
 @dataclass
 class SeriesEngine:
-    """``Engine`` over ``kernels.series_run`` for one system, method and tolerance.
+    """``Engine`` over ``kernels.series`` for one system, method and tolerance.
 
     Parameters
     ----------
@@ -81,6 +81,20 @@ class SeriesEngine:
         self.net = pack_net(self.traced)
 
     @cached_property
+    def lacking(self) -> Any:
+        return np.array(self.traced.lacking, dtype=np.int64).reshape(len(self.traced.mode_names), -1)
+
+    @cached_property
+    def smooth(self) -> Any:
+        return np.array(self.model.smooth_outputs, dtype=np.int64)
+
+    @cached_property
+    def norms(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Per state: atol / rtol, atol, and the size beyond which it has diverged."""
+        absolute = self.rtol * self.scale if self.atol is None else np.array(self.atol, dtype=float)
+        return absolute / self.rtol, absolute, DIVERGENCE * self.scale
+
+    @cached_property
     def model(self) -> CompiledModel:
         """The generated functions of the system."""
         from nonsmooth.system.generate import compile_model
@@ -102,28 +116,46 @@ class SeriesEngine:
     ) -> None:  # fmt: skip
         """See :class:`nonsmooth.flow.engine.Engine`."""
         traced = self.traced
-        n, rows = len(traced.u), len(traced.u) + len(traced.indicators) + len(traced.outputs)
+        n, n_p, n_i = len(traced.u), len(traced.p), len(traced.indicators)
         choice = self._choice(tables)
         choice[[at.TRANSIENT, at.KEEP, at.SECTION, at.RISING]] = transient, keep, plan.indicator, plan.rising
         choice[[at.SECTION_MODE, at.AFTER, at.EVERY]] = plan.mode, plan.after, plan.every
-        control = self._control(plan.phase, plan.t_max, -1.0)
+        control = self._control(-1.0, plan.t_max, -1.0)
         tally, memo = np.zeros(at.N_TALLY, dtype=np.int64), np.zeros(at.N_MEMO)
-        tally[at.SETTLED] = state.settled
-        begin = np.zeros((0, n)) if starts is None else np.ascontiguousarray(starts, dtype=float)
-        carried = state if starts is None else state.copy()
+        sections, extremes = np.zeros((keep, n + 2)), np.zeros((2, n + n_i + len(traced.outputs)))
+        scratch, log = self._scratch(), _no_log()
+        carried = state if starts is None else State(np.zeros(n), np.zeros(len(traced.m)))
+        good = carried.copy()
         q = np.concatenate([tables.points[first], carried.memory])
-        self._run(
-            tables, choice, control, begin, first, last, carried, q, self._scratch(),
-            (np.zeros((keep, n + 2)), np.zeros((2, rows)), tally, memo),
-            (
-                out.section, out.maximum, out.minimum, out.indicator_max, out.indicator_min, out.output_max,
-                out.output_min, out.crossings, out.contacts, out.elapsed, out.section_time, out.section_mode,
-                out.status,
-            ),
-            (np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 0))),
-        )  # fmt: skip
+        settled = state.settled and starts is None
+        for i in range(first, last):
+            if starts is not None:
+                carried.counters[:2], carried.clock[:] = (0, -1), 0.0
+                carried.u[:], q[n_p:] = starts[i], 0.0
+            q[:n_p] = tables.points[i]
+            control[at.PERIOD] = tables.periods[i]
+            if plan.indicator < 0:
+                control[at.PHASE] = plan.phase * tables.periods[i]
+            tally[:], memo[:] = 0, 0.0
+            tally[at.SETTLED] = settled and i == first
+            status = self._march(tables, i, choice, control, carried, q, scratch, sections, extremes, tally, memo, log)
+            out.status[i] = status
+            if status in (codes.OK, codes.NOT_GUARANTEED):
+                out.section[i], out.section_time[i], out.section_mode[i] = sections[:, :n], *sections[:, n:].T
+                for high, low, part in (
+                    (out.maximum, out.minimum, slice(0, n)),
+                    (out.indicator_max, out.indicator_min, slice(n, n + n_i)),
+                    (out.output_max, out.output_min, slice(n + n_i, None)),
+                ):
+                    high[i], low[i] = extremes[0, part], extremes[1, part]
+                out.crossings[i], out.contacts[i] = tally[at.KEPT_CROSSINGS], tally[at.KEPT_CONTACTS]
+                out.elapsed[i] = memo[at.ELAPSED]
+                carried.memory[:] = q[n_p:]
+                good = carried.copy()
+            elif starts is None:
+                carried.u[:], carried.memory[:], q[n_p:] = good.u, good.memory, good.memory
+                carried.clock[:], carried.counters[:] = good.clock, good.counters
         if starts is None:
-            state.memory[:] = q[len(traced.p) :]
             state.settled = True
 
     def record(self, tables: Tables, state: State, until: float, samples: FloatArray) -> Log:
@@ -134,16 +166,16 @@ class SeriesEngine:
         samples = np.ascontiguousarray(samples, dtype=float)
         choice, control = self._choice(tables), self._control(-1.0, np.inf, until)
         choice[at.RECORD], choice[at.SECTION] = 1, -1
-        control[at.PHASE] = -1.0
+        control[at.PERIOD] = tables.periods[0]
         tally, memo = np.zeros(at.N_TALLY, dtype=np.int64), np.zeros(at.N_MEMO)
         tally[at.SETTLED] = state.settled
         q = np.concatenate([tables.points[0], state.memory])
         sampled = np.full((len(samples), n + n_memory + 2), np.nan)
         crossings, touched = np.zeros((256, 2 + 2 * n + n_memory)), np.zeros((1024, 3 + n))
-        scratch, seen, result = self._scratch(), (np.zeros((0, n + 2)), np.zeros((2, rows)), tally, memo), _nothing()
+        scratch, sections, extremes = self._scratch(), np.zeros((0, n + 2)), np.zeros((2, rows))
         while True:
-            status = self._run(
-                tables, choice, control, np.zeros((0, n)), 0, 1, state, q, scratch, seen, result,
+            status = self._march(
+                tables, 0, choice, control, state, q, scratch, sections, extremes, tally, memo,
                 (samples, sampled, crossings, touched),
             )  # fmt: skip
             if status != codes.LOG_FULL:
@@ -205,30 +237,20 @@ class SeriesEngine:
         sizes = (len(traced.u), len(traced.indicators), rows, len(traced.mode_names), len(self.net[3]))
         return Scratch.of(*sizes, len(traced.p) + len(traced.m), self._order(), self.model.n_scratch)
 
-    def _run(
-        self, tables: Tables, choice: Any, control: Any, starts: Any, first: int, last: int, state: State, q: Any,
-        scratch: Scratch, seen: Any, result: Any, log: Any,
+    def _march(
+        self, tables: Tables, i: int, choice: Any, control: Any, state: State, q: Any, scratch: Scratch,
+        sections: Any, extremes: Any, tally: Any, memo: Any, log: Any,
     ) -> int:  # fmt: skip
-        from nonsmooth.kernels.series_run import run
+        from nonsmooth.kernels.series import march
 
         model = self.model
-        absolute = self.rtol * self.scale if self.atol is None else np.array(self.atol, dtype=float)
-        norms = (absolute / self.rtol, absolute, DIVERGENCE * self.scale)
-        lacking = np.array(self.traced.lacking, dtype=np.int64).reshape(len(self.traced.mode_names), -1)
-        smooth = np.array(model.smooth_outputs, dtype=np.int64)
-        status: int = run(
-            model.field, model.jet, model.values, model.jump, self.net, lacking, smooth, choice, control, norms,
-            tables.points, tables.periods, tables.steps, starts, first, last,
-            state.u, q, state.clock, state.counters, scratch.arrays, *seen, result, log,
-            (state.u.copy(), q.copy(), state.clock.copy(), state.counters.copy()),
+        status: int = march(
+            model.field, model.jet, model.values, model.jump, self.net, self.lacking, self.smooth, choice, control,
+            self.norms, tables.steps[i], state.u, q, state.clock, state.counters, scratch.arrays, sections, extremes,
+            tally, memo, log,
         )  # fmt: skip
         return status
 
 
-def _nothing() -> tuple[Any, ...]:
-    """Empty arrays in the places of a chain's results."""
-    empty, integers = np.zeros((0, 0)), np.zeros(0, dtype=np.int64)
-    return (
-        np.zeros((0, 0, 0)), empty, empty, empty, empty, empty, empty, integers, integers, np.zeros(0), empty,
-        np.zeros((0, 0), dtype=np.int64), integers,
-    )  # fmt: skip
+def _no_log() -> tuple[FloatArray, ...]:
+    return np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 0))

@@ -11,7 +11,7 @@ step (``side``: -1, 1, or 0 where nothing was established), so that no change fa
 from math import fabs, sqrt
 
 from .cache import device
-from .polynomial import NONE, bounds, dense, first_crossing, load, shift, strip
+from .polynomial import NONE, UP, bounds, dense, first_crossing, load, shift, strip
 
 __all__ = ["NOISE", "earliest", "holding", "holds", "section_crossing", "sides_at", "snap"]
 
@@ -70,7 +70,7 @@ def _error(a, m, tail, slack, scale):
 def _others_hold(r0, lo, hi, x, C, m, n, powers, rows, scale, a, d):
     """Whether the other rows hold where row r0 crosses; one that vanishes there is judged by what it does next."""
     i0 = rows[r0, 0]
-    m0 = load(C, n + i0, rows[r0, 1], m, powers, a)
+    m0 = load(C, n + i0, float(rows[r0, 1]), m, powers, a)
     shift(a, m0, x, 1.0, d)
     noise = NOISE * scale[i0]
     doubt = 1e-15 + noise / (fabs(d[1]) + sqrt(noise * (fabs(d[2]) + noise)))  # of x itself
@@ -78,7 +78,7 @@ def _others_hold(r0, lo, hi, x, C, m, n, powers, rows, scale, a, d):
         if r == r0:
             continue
         i = rows[r, 0]
-        mr = load(C, n + i, rows[r, 1], m, powers, a)
+        mr = load(C, n + i, float(rows[r, 1]), m, powers, a)
         v = dense(a, mr, x)
         noise = NOISE * scale[i]
         if v > 1.0e3 * noise + doubt * scale[i]:
@@ -103,10 +103,10 @@ def _fires(lo, hi, C, m, n, powers, rows, side, side_next, scale, tail, slack, a
     """Where the conjunction of rows lo..hi-1 first becomes true on the step, and the row that makes it so."""
     cursor, begun = 0.0, False
     for _ in range(64):
-        best, best_row = NONE, -1
+        best, best_row = NONE, lo
         for r in range(lo, hi):
             i, sign = rows[r, 0], rows[r, 1]
-            mr = load(C, n + i, sign, m, powers, a)
+            mr = load(C, n + i, float(sign), m, powers, a)
             error = _error(a, mr, tail, slack, scale[i])
             before = 0 if begun else sign * side[i]
             if begun:
@@ -116,7 +116,7 @@ def _fires(lo, hi, C, m, n, powers, rows, side, side_next, scale, tail, slack, a
             mr = strip(a, mr)
             if mr < 0:
                 continue
-            x = first_crossing(a, mr, 1, before, error, stack, found)
+            x = first_crossing(a, mr, UP, before, error, stack, found)
             side_next[i] = sign * found[1]
             if x != NONE and cursor + x * (1.0 - cursor) < best:
                 best, best_row = cursor + x * (1.0 - cursor), r
@@ -146,7 +146,7 @@ def earliest(mode, C, m, n, powers, net, side, side_next, scale, tail, slack, a,
         dead, opened = False, False
         for r in range(lo, hi):
             i, sign = rows[r, 0], rows[r, 1]
-            mr = load(C, n + i, sign, m, powers, a)
+            mr = load(C, n + i, float(sign), m, powers, a)
             error = _error(a, mr, tail, slack, scale[i])
             mr = strip(a, mr)
             if mr < 0:
@@ -174,7 +174,7 @@ def earliest(mode, C, m, n, powers, net, side, side_next, scale, tail, slack, a,
 @device
 def section_crossing(C, row, m, way, before, cursor, powers, scale, a, stack, found):
     """The next x > cursor (fraction of the step) where a row changes sign in the direction ``way``, or NONE."""
-    mr = load(C, row, 1, m, powers, a)
+    mr = load(C, row, 1.0, m, powers, a)
     if cursor > 0.0:
         shift(a, mr, cursor, 1.0 - cursor, a)
         if fabs(a[0]) <= NOISE * scale:
@@ -196,7 +196,7 @@ def section_crossing(C, row, m, way, before, cursor, powers, scale, a, stack, fo
 def sides_at(C, m, n, n_indicators, x, powers, scale, a, side):
     """Signs of the indicators just before x: where a step is cut although no transition fires there."""
     for i in range(n_indicators):
-        mr = load(C, n + i, 1, m, powers, a)
+        mr = load(C, n + i, 1.0, m, powers, a)
         v, slope = a[mr], 0.0
         for k in range(mr - 1, -1, -1):
             slope = slope * x + v

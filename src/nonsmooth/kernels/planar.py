@@ -11,9 +11,9 @@ from .cache import device, inline, kernel
 from .codes import CHATTER, DIVERGED, LOG_FULL, NO_CONVERGENCE, OK, TOO_MANY_CROSSINGS
 from .planar_march import bounded, jump, leg, next_holding, set_phase, settle, trigger
 from .planar_search import (
-    ROW, WIDTH, bracketed, compose, curvature_at, dense, horner, place, raise_maximum, slope_of, to_node, value_of,
+    WIDTH, bracketed, compose, curvature_at, dense, horner, raise_maximum, slope_of, to_node, value_of,
 )  # fmt: skip
-from .planar_tables import HARMONICS, NODES, TERMS, M, build
+from .planar_tables import DEGREE, HARMONICS, NODES, TERMS, M, build
 
 MOST_CROSSINGS = 1000  # within one section return
 BURST = 50  # crossings in a row at intervals below SHORT of the mode's step end a run as chatter
@@ -27,17 +27,17 @@ _LINEAR = (
     + (_BLOCK + _TABLE + _BLOCK * 2) * 2  # oa, ob, oc, os, ra, rb, rc, rs
 )  # fmt: skip
 _NET = "int64[:,::1], int64[:,::1], " + _INTEGERS * 3 + _VECTOR  # transitions, rows, row and mode starts, list, at
-_SCRATCH = _BLOCK + _TABLE * 3 + _MATRIX * 4 + _VECTOR * 2 + "int64[::1]"
+_SCRATCH = _BLOCK + _TABLE * 2 + _BLOCK + _TABLE + _MATRIX * 4 + _VECTOR * 2 + "int64[::1]"
 
 
 def scratch(n_modes, n_indicators, n_outputs, n_rows):
-    """Work arrays for one thread: prop, rot, fun, field, info, row, vectors, scr, points, rates, integers."""
+    """Work arrays for one thread: prop, rot, fun, tay, field, info, row, vectors, scr, points, rates, integers."""
     n_f = n_indicators + 2 + n_outputs
     return (
         np.zeros((n_modes, NODES + 1, 2, M)), np.zeros((n_modes, NODES + 1, 2 * HARMONICS + 1)),
-        np.zeros((n_modes, n_f, 2 * M + 6)), np.zeros((n_modes, 2, M)),
-        np.zeros((n_modes, 4)), np.zeros((TERMS + 1, M)), np.zeros((6, M)), np.zeros((ROW + n_rows + 1, WIDTH)),
-        np.zeros(4), np.zeros(HARMONICS), np.zeros(n_indicators + 2, dtype=np.int64),
+        np.zeros((n_modes, n_f, 2 * M + 6)), np.zeros((n_modes, n_f, M, DEGREE + 1)), np.zeros((n_modes, 2, M)),
+        np.zeros((n_modes, 4)), np.zeros((TERMS + 1, M)), np.zeros((6, M)), np.zeros((n_rows + 2, WIDTH)),
+        np.zeros(4), np.zeros(HARMONICS), np.zeros(n_indicators + 1, dtype=np.int64),
     )  # fmt: skip
 
 
@@ -53,8 +53,8 @@ def extreme_slot(f, n_i, maximum, minimum, i_max, i_min, o_max, o_min):
 
 @device
 def widen(
-    i, a, b, prop, rot, fun, field, info, mode, rates, w, w1, n_i, maximum, minimum, i_max, i_min, o_max, o_min,
-    wn, wp, wq, scr, mark, points,
+    i, a, b, prop, rot, fun, tay, info, mode, w, w1, n_i, maximum, minimum, i_max, i_min, o_max, o_min,
+    wn, wq, scr, points,
 ):  # fmt: skip
     """Extend the extremes of point i by the piece [a, b] of a leg that starts at w."""
     for f in range(fun.shape[1]):
@@ -62,9 +62,7 @@ def widen(
         for side in range(2):
             sign = 1.0 - 2.0 * side
             best = hi[i, k] if side == 0 else -lo[i, k]
-            best = raise_maximum(
-                prop, rot, fun, field, info, mode, rates, w, w1, f, sign, a, b, best, wn, wp, wq, scr, mark, points
-            )
+            best = raise_maximum(prop, rot, fun, tay, info, mode, w, w1, f, sign, a, b, best, wn, wq, scr, points)
             if side == 0:
                 hi[i, k] = best
             else:
@@ -104,7 +102,7 @@ def chain(
     phase, plan, t_max, transient, keep, limit,
     section, maximum, minimum, i_max, i_min, o_max, o_min,
     crossings, contacts, elapsed, section_time, section_mode, status,
-    prop, rot, fun, field, info, row, vectors, scr, points, rates, integers,
+    prop, rot, fun, tay, field, info, row, vectors, scr, points, rates, integers,
 ):  # fmt: skip
     """Run points first <= i < last: ``transient`` section returns, then ``keep`` more, stored.
 
@@ -114,15 +112,14 @@ def chain(
     n_i = ia.shape[1]
     w, w1, wn, wp, wq, end = vectors[0], vectors[1], vectors[2], vectors[3], vectors[4], vectors[5]
     zero = integers[0:n_i]
-    mark = integers[n_i : n_i + 1]
-    found = integers[n_i + 1 : n_i + 2]
+    found = integers[n_i : n_i + 1]
     surface, direction, surface_mode, after, every = plan[0], plan[1], plan[2], plan[3], plan[4]
     w[2] = 1.0
     for i in range(first, last):
         for h in range(HARMONICS):
             rates[h] = multiples[h] * omega[i]
         T = period[i]
-        build(i, A, b, c, s_, rates, T, ia, ib, ic, is_, oa, ob, oc, os_, prop, rot, fun, field, info, row)
+        build(i, A, b, c, s_, rates, T, ia, ib, ic, is_, oa, ob, oc, os_, prop, rot, fun, tay, field, info, row)
         target = phase * T
         s = 0.0
         whole = 0.0
@@ -147,10 +144,7 @@ def chain(
             o_max[i, k] = -1e300
             o_min[i, k] = 1e300
         set_phase(w, s, rates)
-        mode, code = settle(
-            prop, rot, fun, field, mode, rates, w, transitions, rows, row_start, mode_start, mode_list, zero, wn, scr,
-            mark,
-        )  # fmt: skip
+        mode, code = settle(fun, tay, mode, w, transitions, rows, row_start, mode_start, mode_list, zero)
         crossings[i] = 0
         contacts[i] = 0
         elapsed[i] = 0.0
@@ -162,9 +156,9 @@ def chain(
         closed = False
         while code == OK and returns < transient + keep:
             wait, timed = trigger(mode, s, T, mode_start, mode_list, at)
-            step, t, crossed = leg(
-                prop, rot, fun, field, info, mode, rates, w, wait, rows, row_start, mode_start, mode_list,
-                surface, direction, surface_mode, zero, w1, wn, wp, wq, scr, mark, points, end, found,
+            step, t, full, crossed = leg(
+                prop, rot, fun, tay, info, mode, n_i, rates, w, wait, rows, row_start, mode_start, mode_list,
+                surface, direction, surface_mode, zero, w1, wn, wp, wq, scr, points, end, found,
             )  # fmt: skip
             if t < 0 and crossed == 0 and timed >= 0 and step >= wait:
                 t = timed
@@ -181,7 +175,7 @@ def chain(
                     n_here = 0
                     if is_open:
                         k = returns - transient - 1
-                        dense(prop, rot, field, info, mode, rates, w, r, wn, scr, mark, wp)
+                        dense(prop, rot, tay, info, mode, n_i, rates, w, r, wn, scr, wp)
                         section[i, k, 0] = wp[0]
                         section[i, k, 1] = wp[1]
                         section_mode[i, k] = mode
@@ -196,8 +190,8 @@ def chain(
                         a = r
             if is_open:
                 widen(
-                    i, a, b_, prop, rot, fun, field, info, mode, rates, w, w1, n_i, maximum, minimum, i_max, i_min,
-                    o_max, o_min, wn, wp, wq, scr, mark, points,
+                    i, a, b_, prop, rot, fun, tay, info, mode, w, w1, n_i, maximum, minimum, i_max, i_min,
+                    o_max, o_min, wn, wq, scr, points,
                 )  # fmt: skip
                 elapsed[i] += b_ - a
             if closed:
@@ -208,7 +202,7 @@ def chain(
             waited += step
             short = step < SHORT * info[mode, 0]
             for j in range(M):
-                w[j] = end[j]
+                w[j] = w1[j] if full else end[j]
             s = s1
             if s >= T:
                 s -= T
@@ -242,10 +236,7 @@ def chain(
                             crossings[i] += 1
                             contacts[i] += transitions[nxt, 2]
                             include(i, fun, mode, w, n_i, maximum, minimum, i_max, i_min, o_max, o_min)
-                        nxt = next_holding(
-                            prop, rot, fun, field, mode, rates, w, rows, row_start, mode_start, mode_list, zero, wn,
-                            scr, mark,
-                        )  # fmt: skip
+                        nxt = next_holding(fun, tay, mode, w, rows, row_start, mode_start, mode_list, zero)
                     n_here += jumps
                     burst = burst + 1 if short else 0
                     if burst > BURST:
@@ -284,7 +275,7 @@ def chain(
 
 @device
 def log_touches(
-    b, base, prop, rot, fun, field, info, mode, rates, w, rows, row_start, mode_start, mode_list, wn, wp, wq, scr, mark,
+    b, base, prop, rot, fun, tay, info, mode, n_i, w, rows, row_start, mode_start, mode_list, wn, wq, scr,
     touch_time, touch_indicator, touch_u, touch_gap, n,
 ):  # fmt: skip
     """Append the local maxima of the mode's armed rows that stay <= 0 within (0, b) of a leg. Returns the new count."""
@@ -298,23 +289,23 @@ def log_touches(
             for node in range(0, NODES, size):
                 if node * spacing >= b or n >= touch_time.shape[0]:
                     break
-                to_node(prop, rot, mode, node, w, wp)
+                to_node(prop, rot, mode, node, w, wn)
                 to_node(prop, rot, mode, node + size, w, wq)
-                if sign * value_of(fun, mode, f, wp) > 0.0:
+                if sign * value_of(fun, mode, f, wn) > 0.0:
                     continue
-                if sign * slope_of(fun, mode, f, wp) <= 0.0 or sign * slope_of(fun, mode, f, wq) > 0.0:
+                if sign * slope_of(fun, mode, f, wn) <= 0.0 or sign * slope_of(fun, mode, f, wq) > 0.0:
                     continue
-                place(prop, rot, field, mode, rates, w, node, wn, scr, mark)
-                compose(fun, mode, f, scr, ROW)
-                local = bracketed(scr, ROW, 1, 0.0, size * spacing)
-                value = sign * horner(scr, ROW, local)
+                compose(tay, mode, f, wn, scr, 0)
+                local = bracketed(scr, 0, 1, 0.0, size * spacing)
+                value = sign * horner(scr, 0, local)
                 tau = node * spacing + local
-                if tau >= b or value > 0.0 or sign * curvature_at(scr, ROW, local) > 0.0:
+                if tau >= b or value > 0.0 or sign * curvature_at(scr, 0, local) > 0.0:
                     continue
                 touch_time[n] = base + tau
                 touch_indicator[n] = f
-                touch_u[n, 0] = horner(scr, 0, local)
-                touch_u[n, 1] = horner(scr, 1, local)
+                for k in range(2):
+                    compose(tay, mode, n_i + k, wn, scr, 0)
+                    touch_u[n, k] = horner(scr, 0, local)
                 touch_gap[n] = -value
                 n += 1
     return n
@@ -333,7 +324,7 @@ def record(
     sample_u, sample_mode, sample_segment,
     crossing_time, crossing_transition, u_before, u_after,
     touch_time, touch_indicator, touch_u, touch_gap,
-    prop, rot, fun, field, info, row, vectors, scr, points, rates, integers,
+    prop, rot, fun, tay, field, info, row, vectors, scr, points, rates, integers,
 ):  # fmt: skip
     """March to the time ``until``; log samples, crossings, touches. LOG_FULL asks to be called again.
 
@@ -343,12 +334,11 @@ def record(
     n_i = ia.shape[1]
     w, w1, wn, wp, wq, end = vectors[0], vectors[1], vectors[2], vectors[3], vectors[4], vectors[5]
     zero = integers[0:n_i]
-    mark = integers[n_i : n_i + 1]
-    found = integers[n_i + 1 : n_i + 2]
+    found = integers[n_i : n_i + 1]
     T = period[0]
     for h in range(HARMONICS):
         rates[h] = multiples[h] * omega[0]
-    build(0, A, b, c, s_, rates, T, ia, ib, ic, is_, oa, ob, oc, os_, prop, rot, fun, field, info, row)
+    build(0, A, b, c, s_, rates, T, ia, ib, ic, is_, oa, ob, oc, os_, prop, rot, fun, tay, field, info, row)
     s = clock[0]
     whole = clock[1]
     mode = counters[0]
@@ -358,10 +348,7 @@ def record(
     set_phase(w, s, rates)
     code = OK
     if counters[1] == 0:
-        mode, code = settle(
-            prop, rot, fun, field, mode, rates, w, transitions, rows, row_start, mode_start, mode_list, zero, wn, scr,
-            mark,
-        )  # fmt: skip
+        mode, code = settle(fun, tay, mode, w, transitions, rows, row_start, mode_start, mode_list, zero)
         counters[1] = 1
     n_s = progress[0]
     n_c = progress[1]
@@ -373,27 +360,27 @@ def record(
             break
         wait, timed = trigger(mode, s, T, mode_start, mode_list, at)
         rest = until - base
-        step, t, _ = leg(
-            prop, rot, fun, field, info, mode, rates, w, min(wait, rest), rows, row_start, mode_start, mode_list,
-            -1, 0, -1, zero, w1, wn, wp, wq, scr, mark, points, end, found,
+        step, t, full, _ = leg(
+            prop, rot, fun, tay, info, mode, n_i, rates, w, min(wait, rest), rows, row_start, mode_start, mode_list,
+            -1, 0, -1, zero, w1, wn, wp, wq, scr, points, end, found,
         )  # fmt: skip
         if t < 0 and timed >= 0 and step >= wait:
             t = timed
             found[0] = -1
         while n_s < samples.shape[0] and samples[n_s] - base < step:
-            dense(prop, rot, field, info, mode, rates, w, max(samples[n_s] - base, 0.0), wn, scr, mark, wp)
+            dense(prop, rot, tay, info, mode, n_i, rates, w, max(samples[n_s] - base, 0.0), wn, scr, wp)
             sample_u[n_s, 0] = wp[0]
             sample_u[n_s, 1] = wp[1]
             sample_mode[n_s] = mode
             sample_segment[n_s] = n_c
             n_s += 1
         n_t = log_touches(
-            step, base, prop, rot, fun, field, info, mode, rates, w, rows, row_start, mode_start, mode_list,
-            wn, wp, wq, scr, mark, touch_time, touch_indicator, touch_u, touch_gap, n_t,
+            step, base, prop, rot, fun, tay, info, mode, n_i, w, rows, row_start, mode_start, mode_list,
+            wn, wq, scr, touch_time, touch_indicator, touch_u, touch_gap, n_t,
         )  # fmt: skip
         short = step < SHORT * info[mode, 0]
         for j in range(M):
-            w[j] = end[j]
+            w[j] = w1[j] if full else end[j]
         s += step
         if s >= T:
             s -= T
@@ -421,9 +408,7 @@ def record(
                 u_after[n_c, 1] = w[1]
                 n_c += 1
                 jumps += 1
-                t = next_holding(
-                    prop, rot, fun, field, mode, rates, w, rows, row_start, mode_start, mode_list, zero, wn, scr, mark
-                )
+                t = next_holding(fun, tay, mode, w, rows, row_start, mode_start, mode_list, zero)
             progress[3] += jumps
             progress[4] = progress[4] + 1 if short else 0
             if progress[4] > BURST:

@@ -11,7 +11,7 @@ from math import cos, fabs, isfinite, sin
 
 from .cache import device, inline
 from .codes import BEYOND_STOP, OK
-from .planar_search import dense, place, search, slope_of, to_node, value_of
+from .planar_search import dense, search, slope_of, to_node, value_of
 from .planar_tables import HARMONICS, NODES, M
 
 EPS = 2.3e-16
@@ -42,34 +42,33 @@ def mark_zeros(fun, mode, w, zero):
 
 
 @device
-def sign_of_derivatives(prop, rot, fun, field, mode, rates, w, f, wn, scr, mark):
+def sign_of_derivatives(tay, mode, f, w):
     """Sign of the first derivative of functional f, from the second to the fourth, that is not zero."""
-    place(prop, rot, field, mode, rates, w, 0, wn, scr, mark)
-    mark[0] = -1
     for k in range(2, 5):
-        total = fun[mode, f, 0] * scr[0, k] + fun[mode, f, 1] * scr[1, k]
-        size = fabs(fun[mode, f, 0] * scr[0, k]) + fabs(fun[mode, f, 1] * scr[1, k])
-        for j in range(3, M):
-            total += fun[mode, f, j] * scr[j - 1, k]
-            size += fabs(fun[mode, f, j] * scr[j - 1, k])
+        total = tay[mode, f, 2, k]
+        size = fabs(total)
+        for j in range(M):
+            if j != 2:
+                total += tay[mode, f, j, k] * w[j]
+                size += fabs(tay[mode, f, j, k] * w[j])
         if fabs(total) > 64.0 * EPS * size:
             return 1 if total > 0.0 else -1
     return 0
 
 
 @inline
-def sign_after(prop, rot, fun, field, mode, rates, w, f, zero, wn, scr, mark):
+def sign_after(fun, tay, mode, w, f, zero):
     """Sign (-1, 0, 1) of functional f just after w along the mode: its value's, or its first non-zero derivative's."""
     if f >= zero.shape[0] or zero[f] == 0:
         return 1 if value_of(fun, mode, f, w) > 0.0 else -1
     slope = slope_of(fun, mode, f, w)
     if fabs(slope) > rounding(fun, mode, f, M, w):
         return 1 if slope > 0.0 else -1
-    return sign_of_derivatives(prop, rot, fun, field, mode, rates, w, f, wn, scr, mark)
+    return sign_of_derivatives(tay, mode, f, w)
 
 
 @inline
-def next_holding(prop, rot, fun, field, mode, rates, w, rows, row_start, mode_start, mode_list, zero, wn, scr, mark):
+def next_holding(fun, tay, mode, w, rows, row_start, mode_start, mode_list, zero):
     """The first outgoing transition (in declared order) whose rows all hold just after w, or -1."""
     for k in range(mode_start[mode], mode_start[mode + 1]):
         t = mode_list[k]
@@ -77,7 +76,7 @@ def next_holding(prop, rot, fun, field, mode, rates, w, rows, row_start, mode_st
         hi = row_start[t + 1]
         holds = lo < hi
         for r in range(lo, hi):
-            sign = sign_after(prop, rot, fun, field, mode, rates, w, rows[r, 0], zero, wn, scr, mark) * rows[r, 1]
+            sign = sign_after(fun, tay, mode, w, rows[r, 0], zero) * rows[r, 1]
             if sign < 0 or (sign == 0 and rows[r, 2] != 0):
                 holds = False
                 break
@@ -87,18 +86,14 @@ def next_holding(prop, rot, fun, field, mode, rates, w, rows, row_start, mode_st
 
 
 @device
-def settle(
-    prop, rot, fun, field, mode, rates, w, transitions, rows, row_start, mode_start, mode_list, zero, wn, scr, mark
-):
+def settle(fun, tay, mode, w, transitions, rows, row_start, mode_start, mode_list, zero):
     """Start rule: transitions without a reset that already hold are taken, each mode at most once.
 
     Returns (mode, status): BEYOND_STOP where one with a reset holds."""
     visited = 1 << mode
     for _ in range(64):
         mark_zeros(fun, mode, w, zero)
-        t = next_holding(
-            prop, rot, fun, field, mode, rates, w, rows, row_start, mode_start, mode_list, zero, wn, scr, mark
-        )
+        t = next_holding(fun, tay, mode, w, rows, row_start, mode_start, mode_list, zero)
         if t < 0:
             return mode, OK
         if transitions[t, 1] != 0:
@@ -147,15 +142,15 @@ def trigger(mode, s, period, mode_start, mode_list, at):
 
 @inline
 def leg(
-    prop, rot, fun, field, info, mode, rates, w, r_max, rows, row_start, mode_start, mode_list,
-    surface, direction, surface_mode, zero, w1, wn, wp, wq, scr, mark, points, end, found,
+    prop, rot, fun, tay, info, mode, n_i, rates, w, r_max, rows, row_start, mode_start, mode_list,
+    surface, direction, surface_mode, zero, w1, wn, wp, wq, scr, points, end, found,
 ):  # fmt: skip
     """March one step of the mode, or less: to r_max, or to the first crossing or section return.
 
-    ``end`` receives w at the leg's end, w1 stands at the end of the whole step. Returns (time marched, transition or
-    -1, section direction or 0); ``found[0]`` is the functional that crossed.
+    w1 stands at the end of the whole step, ``end`` at the leg's end where that is shorter (the third number returned
+    tells). Returns (time marched, transition or -1, whole step or not, section direction or 0); ``found[0]`` is the
+    functional that crossed.
     """
-    mark[0] = -1
     to_node(prop, rot, mode, NODES, w, w1)
     step = info[mode, 0]
     best = min(step, r_max)
@@ -179,23 +174,17 @@ def leg(
             hi = lo + 1
         if lo == hi or direction * sense < 0:
             continue
-        tau = search(
-            prop, rot, fun, field, info, mode, rates, w, w1, rows, lo, hi, zero, best, wn, wp, wq, scr, mark, points,
-            found,
-        )  # fmt: skip
+        tau = search(prop, rot, fun, tay, info, mode, w, w1, rows, lo, hi, zero, best, wn, wp, wq, scr, points, found)
         if tau >= 0.0 and (tau < best or (fired < 0 and crossed == 0 and tau <= best)):
             best = tau
             fired = t
             crossed = sense
             functional = found[0]
     found[0] = functional
-    if fired < 0 and crossed == 0 and r_max >= step:
-        for j in range(M):
-            end[j] = w1[j]
-        best = step
-    else:
-        dense(prop, rot, field, info, mode, rates, w, best, wn, scr, mark, end)
-    return best, fired, crossed
+    whole = fired < 0 and crossed == 0 and r_max >= step
+    if not whole:
+        dense(prop, rot, tay, info, mode, n_i, rates, w, best, wn, scr, end)
+    return best, fired, whole, crossed
 
 
 @inline

@@ -8,20 +8,17 @@ Hermite interpolant, raised to Bernstein degree 4 and widened by the bound K on 
 halved, and at one node spacing the polynomial's own extrema decide. This finds double roots (grazing) and several
 crossings in one step, and stays sharp when the step starts on the surface.
 
-``scr`` holds Taylor coefficients in rows: x, v, then the harmonics, then one row per condition under search.
+``scr`` holds Taylor polynomials in rows, one per condition under search (two for x and v in ``dense``).
 """
 
 from math import fabs
 
 from .cache import device, inline
-from .planar_tables import HARMONICS, NODES, M
+from .planar_tables import DEGREE, HARMONICS, NODES, M
 
-DEGREE = 9
 WIDTH = DEGREE + 1
-ROW = 2 + 2 * HARMONICS  # first row of scr for a condition
 NEVER, ALWAYS, ONCE, OPEN = -1, 1, 2, 0
 THIRD = 1.0 / 3.0
-INVERSE = (1.0, 1.0 / 2, 1.0 / 3, 1.0 / 4, 1.0 / 5, 1.0 / 6, 1.0 / 7, 1.0 / 8, 1.0 / 9)
 
 
 @inline
@@ -68,51 +65,14 @@ def to_node(prop, rot, mode, node, w, out):
     out[2] = 1.0
 
 
-@device
-def place(prop, rot, field, mode, rates, w, node, wn, scr, mark):
-    """Taylor coefficients of x, v and the harmonics at a node of the step, into the first rows of scr."""
-    to_node(prop, rot, mode, node, w, wn)
-    for j in range(3, M):
-        scr[j - 1, 0] = wn[j]
-    for k in range(DEGREE):
-        inverse = INVERSE[k]
-        for h in range(HARMONICS):
-            rate = rates[h] * inverse
-            scr[2 + 2 * h, k + 1] = -rate * scr[3 + 2 * h, k]
-            scr[3 + 2 * h, k + 1] = rate * scr[2 + 2 * h, k]
-    a00 = field[mode, 0, 0]
-    a01 = field[mode, 0, 1]
-    a10 = field[mode, 1, 0]
-    a11 = field[mode, 1, 1]
-    x = wn[0]
-    v = wn[1]
-    scr[0, 0] = x
-    scr[1, 0] = v
-    for k in range(DEGREE):
-        dx = a00 * x + a01 * v
-        dv = a10 * x + a11 * v
-        if k == 0:
-            dx += field[mode, 0, 2]
-            dv += field[mode, 1, 2]
-        for j in range(3, M):
-            dx += field[mode, 0, j] * scr[j - 1, k]
-            dv += field[mode, 1, j] * scr[j - 1, k]
-        x = dx * INVERSE[k]
-        v = dv * INVERSE[k]
-        scr[0, k + 1] = x
-        scr[1, k + 1] = v
-    mark[0] = node
-
-
 @inline
-def compose(fun, mode, f, scr, row):
-    """Taylor coefficients of functional f from those of w, into a row of scr."""
+def compose(tay, mode, f, wn, scr, row):
+    """Taylor coefficients of functional f at a node where w is ``wn``, into a row of scr."""
     for k in range(WIDTH):
-        total = fun[mode, f, 0] * scr[0, k] + fun[mode, f, 1] * scr[1, k]
+        total = tay[mode, f, 0, k] * wn[0] + tay[mode, f, 1, k] * wn[1] + tay[mode, f, 2, k]
         for j in range(3, M):
-            total += fun[mode, f, j] * scr[j - 1, k]
+            total += tay[mode, f, j, k] * wn[j]
         scr[row, k] = total
-    scr[row, 0] += fun[mode, f, 2]
 
 
 @inline
@@ -246,74 +206,76 @@ def cubic_root(g0, s0, g1, s1, h):
     c1 = h * s0
     c2 = 3.0 * rise - h * (2.0 * s0 + s1)
     c3 = h * (s0 + s1) - 2.0 * rise
-    lo = 0.0
-    hi = 1.0
-    x = g0 / (g0 - g1) if g0 < 0.0 else 0.5
-    for _ in range(5):
-        # with g0 = 0 the root at the start is divided out
-        if g0 < 0.0:
-            value = g0 + x * (c1 + x * (c2 + x * c3))
-            slope = c1 + x * (2.0 * c2 + 3.0 * x * c3)
-        else:
-            value = c1 + x * (c2 + x * c3)
-            slope = c2 + 2.0 * x * c3
-        if value > 0.0:
-            hi = x
-        else:
-            lo = x
-        nxt = x - value / slope if slope > 0.0 else 0.5 * (lo + hi)
-        if not (lo <= nxt <= hi):
-            nxt = 0.5 * (lo + hi)
-        change = fabs(nxt - x)
-        x = nxt
-        if change < 1e-2:
+    # with g0 = 0 the root at the start is divided out
+    q0 = g0
+    q1 = c1
+    q2 = c2
+    q3 = c3
+    x = 0.5
+    if g0 < 0.0:
+        x = g0 / (g0 - g1)
+    else:
+        q0, q1, q2, q3 = c1, c2, c3, 0.0
+    for _ in range(4):
+        value = q0 + x * (q1 + x * (q2 + x * q3))
+        slope = q1 + x * (2.0 * q2 + 3.0 * x * q3)
+        if slope <= 0.0:
+            break
+        change = value / slope
+        x = min(max(x - change, 0.0), 1.0)
+        if fabs(change) < 1e-2:
             break
     return x
 
 
 @inline
-def refine(prop, rot, fun, field, info, mode, rates, w, f, sign, zero, guess, wn, scr, mark):
-    """Newton on the polynomial of a functional from a good guess; -1 where it does not end on an upward root."""
+def refine(prop, rot, tay, info, mode, w, f, sign, zero, guess, wn, scr):
+    """The upward root of a functional near a good guess, on its polynomial beside the nearest node; -1: not found.
+
+    One step of Halley's method (third order), then Newton's."""
     spacing = info[mode, 1]
     tau = guess
+    result = -1.0
     for _ in range(4):
         node = min(max(int(tau / spacing), 0), NODES - 1)
-        if mark[0] != node:
-            place(prop, rot, field, mode, rates, w, node, wn, scr, mark)
-        compose(fun, mode, f, scr, ROW)
+        to_node(prop, rot, mode, node, w, wn)
+        compose(tay, mode, f, wn, scr, 0)
         if node == 0 and zero != 0:
-            scr[ROW, 0] = 0.0
+            scr[0, 0] = 0.0
         local = tau - node * spacing
-        inside = True
-        for _k in range(12):
-            value = horner(scr, ROW, local)
-            slope = slope_at(scr, ROW, local)
-            if slope * sign <= 0.0:
-                return -1.0
+        value = horner(scr, 0, local)
+        slope = slope_at(scr, 0, local)
+        half = 0.5 * curvature_at(scr, 0, local)
+        local -= value * slope / (slope * slope - value * half)
+        good = True
+        for _k in range(10):
+            good = -0.5 * spacing <= local <= 1.5 * spacing
+            if not good:
+                break
+            value = horner(scr, 0, local)
+            slope = slope_at(scr, 0, local)
             change = value / slope
             local -= change
-            if local < -0.5 * spacing or local > 1.5 * spacing:
-                inside = False
-                break
-            if fabs(change) <= 1e-9 * spacing:
+            if fabs(change) <= 1e-8 * spacing and fabs(change * half) <= 1e-8 * fabs(slope):
                 break
         tau = node * spacing + local
-        if tau < 0.0:
-            return -1.0
-        if inside:
-            return tau
-    return -1.0
+        if good:
+            if slope * sign > 0.0 and tau >= 0.0:
+                result = tau
+            break
+        if not (0.0 <= tau <= NODES * spacing):
+            break
+    return result
 
 
 @device
-def finest(prop, rot, fun, field, info, mode, rates, w, rows, lo, hi, zero, node, wn, scr, mark, points, found):
+def finest(prop, rot, tay, info, mode, w, rows, lo, hi, zero, node, wn, scr, points, found):
     """First instant within one node spacing at which all rows lo..hi are positive, on their polynomials; -1: none."""
     spacing = info[mode, 1]
-    if mark[0] != node:
-        place(prop, rot, field, mode, rates, w, node, wn, scr, mark)
+    to_node(prop, rot, mode, node, w, wn)
     for r in range(lo, hi):
-        row = ROW + r - lo
-        compose(fun, mode, rows[r, 0], scr, row)
+        row = r - lo
+        compose(tay, mode, rows[r, 0], wn, scr, row)
         if rows[r, 1] < 0:
             for k in range(WIDTH):
                 scr[row, k] = -scr[row, k]
@@ -324,7 +286,7 @@ def finest(prop, rot, fun, field, info, mode, rates, w, rows, lo, hi, zero, node
     for _ in range(8 * (hi - lo) + 8):
         moved = False
         for r in range(lo, hi):
-            row = ROW + r - lo
+            row = r - lo
             if r == current or horner(scr, row, tau) > 0.0:
                 continue
             tau = next_upward(scr, row, tau, spacing, points)
@@ -340,7 +302,7 @@ def finest(prop, rot, fun, field, info, mode, rates, w, rows, lo, hi, zero, node
 
 
 @inline
-def search(prop, rot, fun, field, info, mode, rates, w, w1, rows, lo, hi, zero, r_max, wn, wp, wq, scr, mark, points, found):
+def search(prop, rot, fun, tay, info, mode, w, w1, rows, lo, hi, zero, r_max, wn, wp, wq, scr, points, found):
     """First instant in [0, r_max] of the step at which all the rows lo..hi are positive; -1: none.
 
     ``w`` and ``w1`` stand at the ends of the whole step; ``found[0]`` is the functional that crossed last.
@@ -357,7 +319,7 @@ def search(prop, rot, fun, field, info, mode, rates, w, w1, rows, lo, hi, zero, 
         n_open = 0
         n_once = 0
         once = lo
-        guess = 0.0
+        a0 = a1 = r0 = r1 = 0.0
         never = False
         for r in range(lo, hi):
             f = rows[r, 0]
@@ -380,29 +342,44 @@ def search(prop, rot, fun, field, info, mode, rates, w, w1, rows, lo, hi, zero, 
                 break
             if kind == ONCE:
                 n_once += 1
-                once = r
-                guess = node * spacing + h * cubic_root(g0, s0, g1, s1, h)
+                if n_once == 1:
+                    once = r
+                    a0, r0, a1, r1 = g0, s0, g1, s1
             elif kind == OPEN:
                 n_open += 1
         if not never:
             if n_open == 0 and n_once == 0:
                 found[0] = rows[lo, 0]
                 return node * spacing
-            if n_open == 0 and n_once == 1:
-                f = rows[once, 0]
-                flag = zero[f] if f < zero.shape[0] else 0
-                tau = refine(
-                    prop, rot, fun, field, info, mode, rates, w, f, float(rows[once, 1]), flag, guess, wn, scr, mark
-                )
-                if tau >= 0.0:
+            if n_open == 0:
+                # every row crosses at most once: all are positive from the last of these crossings on
+                tau = node * spacing + h * cubic_root(a0, r0, a1, r1, h)
+                row = once
+                for _ in range(n_once):
+                    f = rows[row, 0]
+                    flag = zero[f] if f < zero.shape[0] else 0
+                    tau = refine(prop, rot, tay, info, mode, w, f, float(rows[row, 1]), flag, tau, wn, scr)
+                    if tau < 0.0:
+                        break
                     found[0] = f
+                    behind = -1
+                    if n_once > 1:
+                        left = min(int(tau / spacing), NODES - 1)
+                        to_node(prop, rot, mode, left, w, wn)
+                        for r in range(lo, hi):
+                            if r != row and behind < 0:
+                                compose(tay, mode, rows[r, 0], wn, scr, 1)
+                                if rows[r, 1] * horner(scr, 1, tau - left * spacing) <= 0.0:
+                                    behind = r
+                    if behind < 0:
+                        break
+                    row = behind
+                if tau >= 0.0:
                     return tau
             if size > 1:
                 size //= 2
                 continue
-            tau = finest(
-                prop, rot, fun, field, info, mode, rates, w, rows, lo, hi, zero, node, wn, scr, mark, points, found
-            )
+            tau = finest(prop, rot, tay, info, mode, w, rows, lo, hi, zero, node, wn, scr, points, found)
             if tau >= 0.0:
                 return node * spacing + tau
         node = end
@@ -412,24 +389,33 @@ def search(prop, rot, fun, field, info, mode, rates, w, w1, rows, lo, hi, zero, 
 
 
 @inline
-def dense(prop, rot, field, info, mode, rates, w, tau, wn, scr, mark, out):
-    """w at any instant of the step."""
+def turn(angle, c, s):
+    """Cosine and sine of a phase whose cosine and sine are c and s, after a small angle (below 0.1)."""
+    a2 = angle * angle
+    ca = 1.0 - a2 * (0.5 - a2 * (1.0 / 24 - a2 * (1.0 / 720 - a2 * (1.0 / 40320))))
+    sa = angle * (1.0 - a2 * (1.0 / 6 - a2 * (1.0 / 120 - a2 * (1.0 / 5040 - a2 * (1.0 / 362880)))))
+    return c * ca - s * sa, s * ca + c * sa
+
+
+@inline
+def dense(prop, rot, tay, info, mode, n_i, rates, w, tau, wn, scr, out):
+    """w at any instant of the step; the states are the functionals n_i and n_i + 1."""
     spacing = info[mode, 1]
     node = min(max(int(tau / spacing), 0), NODES - 1)
-    if mark[0] >= 0 and -0.5 * spacing <= tau - mark[0] * spacing <= 1.5 * spacing:
-        node = mark[0]
-    else:
-        place(prop, rot, field, mode, rates, w, node, wn, scr, mark)
+    to_node(prop, rot, mode, node, w, wn)
     local = tau - node * spacing
-    out[0] = horner(scr, 0, local)
-    out[1] = horner(scr, 1, local)
+    for r in range(2):
+        compose(tay, mode, n_i + r, wn, scr, r)
+        out[r] = horner(scr, r, local)
     out[2] = 1.0
-    for j in range(3, M):
-        out[j] = horner(scr, j - 1, local)
+    for h in range(HARMONICS):
+        c, s = turn(rates[h] * local, wn[3 + 2 * h], wn[4 + 2 * h])
+        out[3 + 2 * h] = c
+        out[4 + 2 * h] = s
 
 
 @device
-def locate_maximum(prop, rot, fun, field, info, mode, rates, w, f, sign, a, b, best, wn, wp, wq, scr, mark, points):
+def locate_maximum(prop, rot, fun, tay, info, mode, w, f, sign, a, b, best, wn, wq, scr, points):
     """The larger of ``best`` and the maximum of sign * functional over [a, b] of the step, piece by piece."""
     spacing = info[mode, 1]
     size = NODES // 8
@@ -439,26 +425,24 @@ def locate_maximum(prop, rot, fun, field, info, mode, rates, w, f, sign, a, b, b
         hi = min(b - node * spacing, size * spacing)
         if lo > hi:
             continue
-        to_node(prop, rot, mode, node, w, wp)
+        to_node(prop, rot, mode, node, w, wn)
         to_node(prop, rot, mode, node + size, w, wq)
-        g0 = sign * value_of(fun, mode, f, wp) - best
+        g0 = sign * value_of(fun, mode, f, wn) - best
         g1 = sign * value_of(fun, mode, f, wq) - best
-        s0 = sign * slope_of(fun, mode, f, wp)
+        s0 = sign * slope_of(fun, mode, f, wn)
         s1 = sign * slope_of(fun, mode, f, wq)
         if classify(g0, s0, g1, s1, size * spacing, bound) == NEVER:
             continue
-        if mark[0] != node:
-            place(prop, rot, field, mode, rates, w, node, wn, scr, mark)
-        compose(fun, mode, f, scr, ROW)
-        n = critical_points(scr, ROW, lo, hi, points)
-        best = max(best, sign * horner(scr, ROW, lo), sign * horner(scr, ROW, hi))
+        compose(tay, mode, f, wn, scr, 0)
+        n = critical_points(scr, 0, lo, hi, points)
+        best = max(best, sign * horner(scr, 0, lo), sign * horner(scr, 0, hi))
         for k in range(n):
-            best = max(best, sign * horner(scr, ROW, points[k]))
+            best = max(best, sign * horner(scr, 0, points[k]))
     return best
 
 
 @inline
-def raise_maximum(prop, rot, fun, field, info, mode, rates, w, w1, f, sign, a, b, best, wn, wp, wq, scr, mark, points):
+def raise_maximum(prop, rot, fun, tay, info, mode, w, w1, f, sign, a, b, best, wn, wq, scr, points):
     """The larger of ``best`` and the maximum of sign * functional over [a, b] of the step; cheap where it is not raised."""
     g0 = sign * value_of(fun, mode, f, w) - best
     g1 = sign * value_of(fun, mode, f, w1) - best
@@ -466,6 +450,4 @@ def raise_maximum(prop, rot, fun, field, info, mode, rates, w, w1, f, sign, a, b
     s1 = sign * slope_of(fun, mode, f, w1)
     if classify(g0, s0, g1, s1, info[mode, 0], bound_at(fun, info, mode, f, w)) == NEVER:
         return best
-    return locate_maximum(
-        prop, rot, fun, field, info, mode, rates, w, f, sign, a, b, best, wn, wp, wq, scr, mark, points
-    )
+    return locate_maximum(prop, rot, fun, tay, info, mode, w, f, sign, a, b, best, wn, wq, scr, points)

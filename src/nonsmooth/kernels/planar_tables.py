@@ -11,6 +11,8 @@ every inner loop has constant bounds. Arrays (M columns of w, functionals = indi
     rot[mode, node, 2 H + 1]       cos and sin of k_h w tau
     fun[mode, functional, 2 M + 6] row of the value, row of the slope, then k0, k1, k2: on a step that starts at
                                    (x, v) the fourth derivative stays below k0 |x - x_eq| + k1 |v - v_eq| + k2 (and three numbers of scratch)
+    tay[mode, functional, M, 10]   columns of the normalised Taylor coefficients of the functional: coefficient k
+                                   at w is the sum over j of tay[mode, f, j, k] w[j]
     field[mode, 2, M]              rows of x' and v'
     info[mode, 4]                  step, node spacing, x_eq, v_eq
 """
@@ -23,6 +25,7 @@ HARMONICS = 1
 M = 3 + 2 * HARMONICS
 NODES = 32
 TERMS = 26
+DEGREE = 9  # of the Taylor polynomial beside a node: remainder below 1e-18 of the amplitude
 STEP_ANGLE = 1.2566370614359172  # 2 pi / 5
 FREE_STEP = 1.0  # a mode without a time scale of its own moves on polynomials: any step is exact
 
@@ -132,12 +135,16 @@ def bound_of(row, k, mode, prop, rot, x_eq, v_eq, out, at):
 
 
 @device
-def fill_functional(mode, f, field, rates, info, prop, rot, fun, row):
-    """Slope row and fourth-derivative bound of the functional whose value row stands in fun[mode, f]."""
+def fill_functional(mode, f, field, rates, info, prop, rot, fun, tay, row):
+    """Taylor rows, slope row and fourth-derivative bound of the functional whose value row stands in fun[mode, f]."""
     for j in range(M):
         row[0, j] = fun[mode, f, j]
-    for k in range(5):
+    scale = 1.0
+    for k in range(DEGREE + 1):
+        for j in range(M):
+            tay[mode, f, j, k] = scale * row[k, j]
         times_generator(row, k, field, mode, rates, 1.0)
+        scale /= k + 1
     for j in range(M):
         fun[mode, f, M + j] = row[1, j]
     at = 2 * M
@@ -148,7 +155,7 @@ def fill_functional(mode, f, field, rates, info, prop, rot, fun, row):
 
 
 @device
-def build(i, A, b, c, s, rates, period, ia, ib, ic, is_, oa, ob, oc, os_, prop, rot, fun, field, info, row):
+def build(i, A, b, c, s, rates, period, ia, ib, ic, is_, oa, ob, oc, os_, prop, rot, fun, tay, field, info, row):
     """Fill the tables for parameter point ``i``."""
     n_i = ia.shape[1]
     for mode in range(A.shape[1]):
@@ -174,4 +181,4 @@ def build(i, A, b, c, s, rates, period, ia, ib, ic, is_, oa, ob, oc, os_, prop, 
                 for h in range(HARMONICS):
                     fun[mode, f, 3 + 2 * h] = oc[i, o, mode, h]
                     fun[mode, f, 4 + 2 * h] = os_[i, o, mode, h]
-            fill_functional(mode, f, field, rates, info, prop, rot, fun, row)
+            fill_functional(mode, f, field, rates, info, prop, rot, fun, tay, row)

@@ -17,9 +17,10 @@ import numpy as np
 from .cache import device
 
 __all__ = [
-    "NONE", "bernstein", "bounds", "dense", "first_crossing", "largest", "load", "shift", "stack_size", "strip",
+    "DOWN", "NONE", "UP", "bernstein", "bounds", "dense", "first_crossing", "largest", "load", "shift", "stack_size", "strip",
 ]  # fmt: skip
 
+UP, DOWN = np.int64(1), np.int64(-1)  # of this type, so that Numba compiles one version, not one per number
 NONE = 2.0  # "no crossing on [0, 1]"
 DEPTH = 44  # halvings; below, neighbouring doubles cannot be told apart any more
 WIDEST = 40  # highest degree + 1
@@ -229,7 +230,7 @@ def first_crossing(a, m, way, before, error, stack, found):
         if changes == 1:
             if way == 0 or last == way:
                 found[1] = last
-                return _zero(a, m, lo, lo + width, last)
+                return _zero(a, m, lo, lo + width, float(last))
             before = last
             top -= 1
             continue
@@ -238,16 +239,16 @@ def first_crossing(a, m, way, before, error, stack, found):
             continue
         turns, slope = _turns(stack, base, m)
         if turns == 1 and changes == 2:
-            x = _extremum(a, m, lo, lo + width, slope)
+            x = _extremum(a, m, lo, lo + width, float(slope))
             v = dense(a, m, x)
             if fabs(v) <= error:
                 found[0] = 1
             if v * first < 0.0:
                 if way == 0 or way == -first:
                     found[1] = -first
-                    return _zero(a, m, lo, x, -first)
+                    return _zero(a, m, lo, x, float(-first))
                 found[1] = first
-                return _zero(a, m, x, lo + width, first)
+                return _zero(a, m, x, lo + width, float(first))
             top -= 1
         elif top + 1 >= DEPTH:
             if first != last and (way == 0 or last == way):
@@ -291,7 +292,7 @@ def largest(a, m, current, stack):
         turns, slope = _turns(stack, base, m)
         if turns <= 1:
             if turns == 1 and slope > 0:
-                current = max(current, dense(a, m, _extremum(a, m, lo, lo + width, 1)))
+                current = max(current, dense(a, m, _extremum(a, m, lo, lo + width, 1.0)))
             top -= 1
         else:
             left = base + stride

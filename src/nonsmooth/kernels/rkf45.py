@@ -89,7 +89,7 @@ def quiet(mode, J0, J1, n, h, net, side, side_next, scale, slack, section, secti
         dead, opened = False, False
         for r in range(transitions[k, 2], transitions[k, 3]):
             i, sign = rows[r, 0], rows[r, 1]
-            certain = _certain(J0, J1, n + i, sign, h, slack * scale[i])
+            certain = _certain(J0, J1, n + i, float(sign), h, slack * scale[i])
             if certain < 0:
                 side_next[i] = -sign
                 dead = True
@@ -101,7 +101,7 @@ def quiet(mode, J0, J1, n, h, net, side, side_next, scale, slack, section, secti
         if opened and not dead:
             return False
     if section >= 0 and (section_mode < 0 or section_mode == mode):
-        low = _certain(J0, J1, n + section, 1, h, 0.0)
+        low = _certain(J0, J1, n + section, 1.0, h, 0.0)
         if low == 0 or low * side[section] < 0:
             return False
         side_next[section] = low

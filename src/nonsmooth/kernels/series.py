@@ -8,14 +8,17 @@ The places in ``choice``, ``control``, ``tally`` and ``memo`` have names in ``se
 ``crossing``, ``work`` (scratch) in ``flow.series_tables``.
 """
 
-from math import fabs, inf, log
+from math import fabs, inf
+from math import log as ln
 
-from .cache import device
+from numba import types
+
+from .cache import device, kernel
 from .codes import DIVERGED, LOG_FULL, NO_CONVERGENCE, NOT_GUARANTEED, OK
 from .crossing import NOISE, earliest, holds, section_crossing, sides_at
 from .polynomial import NONE
 from .rkf45 import first_step, hermite, quiet, stages, transit
-from .series_node import begin, clear, count_pass, leap, look, meets_section, next_is_edge, open_window
+from .series_node import SAME, begin, clear, count_pass, leap, look, meets_section, next_is_edge, open_window
 from .series_places import (
     AFTER, BEGUN, CORNERS, CROSSINGS, DOUBTFUL, HALVINGS, JUMPS, LOCATE, METHOD, MOST_STEPS, N_INDICATORS,
     N_OUTPUTS, N_PARAMETERS, ORDER, PERIOD, PHASE, READY, RECORD, RISING, RKF45, RTOL, SAMPLES, SECTION, SECTION_MODE,
@@ -118,12 +121,37 @@ def at_end(C, m, row, h):
     return v, slope
 
 
-@device
+_i, _f = types.int64, types.float64
+_f1, _f2, _f3, _i1, _i2 = _f[::1], _f[:, ::1], _f[:, :, ::1], _i[::1], _i[:, ::1]
+
+FIELD = types.FunctionType(types.void(_i, _f, _f1, _f1, _f1))
+JET = types.FunctionType(types.void(_i, _i, _f, _f1, _f1, _f2, _f2))
+VALUES = types.FunctionType(types.void(_i, _f, _f1, _f1, _f1))
+JUMP = types.FunctionType(types.void(_i, _f, _f1, _f1, _f1, _f1))
+
+NET = types.Tuple((_i1, _i1, _i2, _i2, _f1))
+WORK = types.Tuple((
+    _f2, _f2, _f2, _f2, types.UniTuple(_f1, 8), _f1, _f1, _f1, _f1, _f1, _f1,
+    _f1, _f1, _i1, _i1, _i1, _f1, _i1, _f1, _i1, _f1, _f1,
+))  # fmt: skip
+NORMS = types.UniTuple(_f1, 3)
+LOG = types.Tuple((_f1, _f2, _f2, _f2))
+
+_SIGNATURE = types.int64(
+    FIELD, JET, VALUES, JUMP, NET, _i2, _i1, _i1, _f1, NORMS, _f1, _f1, _f1, _f1, _i1, WORK,
+    _f2, _f2, _i1, _f1, LOG,
+)  # fmt: skip
+
+
+@kernel(_SIGNATURE)
 def march(
     field, jet, values, jump, net, lacking, smooth, choice, control, norms, exact_steps, u, q, clock, counters, work,
-    sections, extremes, tally, memo, times, samples, crossings, touch_log,
+    sections, extremes, tally, memo, log,
 ):  # fmt: skip
-    """Run one trajectory until its section returns are counted or its time is reached. Returns a status."""
+    """Run one trajectory until its section returns are counted, or its time is reached. Returns a status.
+
+    LOG_FULL asks for larger logs and to be called again with the same arrays."""
+    times, samples, crossings, touch_log = log
     C, W, J0, J1, K, powers, a, d, vals, u_new, q_new = work[:11]
     scale, measured, side, side_next, rise, usual, _, stack, found, u_dense, u_before = work[11:]
     n, n_indicators, order, method = u.shape[0], choice[N_INDICATORS], choice[ORDER], choice[METHOD]
@@ -133,7 +161,7 @@ def march(
     rtol, fixed, period, phase, until, t_max = (
         control[RTOL], control[STEP], control[PERIOD], control[PHASE], control[UNTIL], control[T_MAX],
     )  # fmt: skip
-    log_rtol, tail, forced = log(rtol), (1.0 if method == TAYLOR else 0.0), period < inf
+    log_rtol, tail, forced = ln(rtol), (1.0 if method == TAYLOR else 0.0), period < inf
     mode, t, status, zero_row, take = counters[0], clock[0], OK, -1, False
 
     if tally[BEGUN] == 0:
@@ -164,7 +192,7 @@ def march(
             status = LOG_FULL
             break
         if not ready:
-            look(jet, mode, t, u, q, False, choice, norms, log_rtol, rtol, fixed, exact_steps, work)
+            look(jet, mode, t, u, q, SAME, choice, norms, log_rtol, rtol, fixed, exact_steps, work)
             if zero_row >= 0:
                 (J0 if rkf else C)[n + zero_row, 0] = 0.0
                 side[zero_row] = 0
@@ -341,7 +369,7 @@ def march(
                 ready = True
             if choice[LOCATE] == 0:
                 if not ready:
-                    look(jet, mode, t, u, q, False, choice, norms, log_rtol, rtol, fixed, exact_steps, work)
+                    look(jet, mode, t, u, q, SAME, choice, norms, log_rtol, rtol, fixed, exact_steps, work)
                     ready = True
                 pending = judged_at_end(mode, J0 if rkf else C, n, n_indicators, net, side, side_next)
         for i in range(n):

@@ -2,6 +2,8 @@
 
 from math import fabs, inf
 
+import numpy as np
+
 from .cache import device
 from .codes import BEYOND_STOP, CHATTER, OK, TOO_MANY_CROSSINGS
 from .crossing import holding, holds, snap
@@ -14,7 +16,9 @@ from .series_places import (
 from .taylor import step_length
 from .watch import extend_at_node, forget
 
-__all__ = ["begin", "clear", "copy", "count_pass", "leap", "look", "meets_section", "next_is_edge", "open_window"]
+__all__ = ["FRESH", "SAME", "begin", "clear", "copy", "count_pass", "leap", "look", "meets_section", "next_is_edge", "open_window"]
+
+FRESH, SAME = np.int64(1), np.int64(0)  # a node at a start or after a jump, or one between two steps of a mode
 
 
 @device
@@ -37,14 +41,14 @@ def look(jet, mode, t, u, q, fresh, choice, norms, log_rtol, rtol, fixed, exact_
     C, W, J0, scale, measured, side, usual = work[0], work[1], work[2], work[11], work[12], work[13], work[16]
     n, n_indicators = u.shape[0], choice[N_INDICATORS]
     if choice[METHOD] == RKF45:
-        m = 4 if fresh else 2
+        m = 4 if fresh == FRESH else 2
         jet(mode, m, t, u, q, J0, W)
         X = J0
     else:
         m = choice[ORDER]
         jet(mode, m, t, u, q, C, W)
         X = C
-    if fresh:
+    if fresh == FRESH:
         h = usual[mode]
         if fixed > 0.0:
             h = fixed
@@ -73,7 +77,7 @@ def begin(jet, jump, mode, t, u, q, settled, choice, norms, log_rtol, rtol, fixe
     for i in range(visited.shape[0]):
         visited[i] = 0
     visited[mode] = 1
-    look(jet, mode, t, u, q, True, choice, norms, log_rtol, rtol, fixed, exact_steps, work)
+    look(jet, mode, t, u, q, FRESH, choice, norms, log_rtol, rtol, fixed, exact_steps, work)
     while settled == 0:
         k = -1
         for j in range(first[mode], first[mode + 1]):
@@ -91,7 +95,7 @@ def begin(jet, jump, mode, t, u, q, settled, choice, norms, log_rtol, rtol, fixe
         copy(q_new, q)
         mode = transitions[k, 1]
         visited[mode] = 1
-        look(jet, mode, t, u, q, True, choice, norms, log_rtol, rtol, fixed, exact_steps, work)
+        look(jet, mode, t, u, q, FRESH, choice, norms, log_rtol, rtol, fixed, exact_steps, work)
     return mode, OK
 
 
@@ -134,7 +138,7 @@ def leap(
         if tally[WINDOW] == 1:
             tally[KEPT_CROSSINGS] += 1
             tally[KEPT_CONTACTS] += transitions[pending, 4]
-        look(jet, mode, t, u, q, True, choice, norms, log_rtol, rtol, fixed, exact_steps, work)
+        look(jet, mode, t, u, q, FRESH, choice, norms, log_rtol, rtol, fixed, exact_steps, work)
         if tally[WINDOW] == 1:
             all_rows = n + choice[N_INDICATORS] + choice[N_OUTPUTS]
             extend_at_node(J0 if choice[METHOD] == RKF45 else C, all_rows, lacking, mode, n, extremes)

@@ -4,7 +4,7 @@ from math import inf
 
 from .cache import device
 from .crossing import NOISE
-from .polynomial import NONE, dense, first_crossing, largest, load, shift, strip
+from .polynomial import DOWN, NONE, dense, first_crossing, largest, load, shift, strip
 from .taylor import dense_states
 
 __all__ = ["extend", "extend_at_node", "extend_corners", "forget", "sample", "touches", "write_sample"]
@@ -74,7 +74,7 @@ def touches(mode, t, h, C, m, n, powers, net, scale, rise, a, d, stack, found, u
                     known = known or (rows[rr, 0] == i and rows[rr, 1] == sign)
             if known:
                 continue
-            mr = load(C, n + i, sign, m, powers, a)
+            mr = load(C, n + i, float(sign), m, powers, a)
             cursor, before, begun = 0.0, rise[r], False
             for _ in range(mr):
                 for k in range(mr):
@@ -91,7 +91,7 @@ def touches(mode, t, h, C, m, n, powers, net, scale, rise, a, d, stack, found, u
                 if md < 0:
                     rise[r] = 0
                     break
-                x = first_crossing(d, md, -1, before, 0.0, stack, found)
+                x = first_crossing(d, md, DOWN, before, 0.0, stack, found)
                 rise[r] = found[1]
                 if x == NONE:
                     break

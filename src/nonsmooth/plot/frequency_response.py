@@ -59,13 +59,12 @@ def frequency_response(
         for i, direction in enumerate(np.atleast_1d(result["direction"].values).astype(str)):
             one = heights.isel(direction=i) if "direction" in heights.dims else heights
             curves = one.transpose(parameter, ...).values.reshape(len(values), -1)
-            places = _jumps(result, direction)
             for k, curve in enumerate(curves.T):
-                found = _intervals(values, curve, places)
+                found = _intervals(values, curve, _jumps(result, direction, k))
                 at = [i for _, i in found]
                 broken = np.insert(values, at, np.nan), np.insert(curve, at, np.nan)
                 drawn.plot(*broken, label=_WORDS[direction] if k == 0 else None, **_LOOKS[direction])
-                if jumps and k == 0:
+                if jumps:
                     for place, i in found:
                         _mark(drawn, curve, i, values[0] <= values[-1], place, direction, digits)
         drawn.legend(loc="best")
@@ -74,10 +73,14 @@ def frequency_response(
     return drawn
 
 
-def _jumps(result: xr.Dataset, direction: str) -> list[float]:
+def _jumps(result: xr.Dataset, direction: str, start: int) -> list[float]:
+    """The jumps of one curve: those of its direction and, where there are several starts, of its start."""
     if "jump_value" not in result:
         return []
-    return [float(v) for v in result["jump_value"].values[result["jump_direction"].values == direction]]
+    mine = result["jump_direction"].values == direction
+    if "jump_start" in result:
+        mine = mine & (result["jump_start"].values == start)
+    return [float(value) for value in result["jump_value"].values[mine]]
 
 
 def _intervals(
@@ -108,9 +111,11 @@ def _mark(
     arrow = {"arrowstyle": "->", "color": color, "linestyle": ":", "linewidth": 0.8, "shrinkA": 0, "shrinkB": 0}
     ax.annotate("", (place, after), (place, before), arrowprops=arrow)
     side = 2 if direction == "up" else -2
+    small = abs(after - before) < 0.2 * np.ptp(curve[np.isfinite(curve)])  # no room beside the arrow: below it
+    where, offset = (min(before, after), (side, -3)) if small else ((before + after) / 2, (side, 0))
     ax.annotate(
-        f"{place:.{digits}g}", (place, (before + after) / 2), (side, 0), textcoords="offset points", color=color,
-        fontsize="small", rotation=90, va="center", ha="left" if side > 0 else "right",
+        f"{place:.{digits}g}", (place, where), offset, textcoords="offset points", color=color, fontsize="small",
+        rotation=90, va="top" if small else "center", ha="left" if side > 0 else "right",
     )  # fmt: skip
 
 

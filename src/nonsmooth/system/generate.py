@@ -82,7 +82,10 @@ def compile_model(traced: Traced) -> CompiledModel:
     source = model_source(traced)
     module = load_module(source, "model")
     return CompiledModel(
-        *(getattr(module, name) for name in SIGNATURES),
+        field=module.field,
+        jet=module.jet,
+        values=module.values,
+        jump=module.jump,
         n_scratch=module.N_SCRATCH,
         smooth_outputs=module.SMOOTH_OUTPUTS,
         content_hash=hashlib.sha256(source.encode()).hexdigest(),

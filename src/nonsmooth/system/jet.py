@@ -13,7 +13,8 @@ from dataclasses import dataclass
 from sympy import Basic, Expr, Symbol
 
 from nonsmooth.system.printing import Printer
-from nonsmooth.system.recurrences import CornerError, Linear, Series, Sum
+from nonsmooth.system.recurrences import Sum
+from nonsmooth.system.series import CornerError, Linear, Series
 
 __all__ = ["JetCode", "jet_code"]
 

@@ -128,8 +128,8 @@ class Printer:
             a, b = (self._atom(x) for x in e.args)
             return f"({a} % {b})", True
         raise SystemDefinitionError(
-            f"no code can be written for {e} ({type(e).__name__}); allowed are + - * / **, abs, sign, maximum, minimum, "
-            f"where, heaviside and {', '.join(names[1] for names in FUNCTIONS.values())}"
+            f"no code can be written for {e} ({type(e).__name__}); allowed are + - * / **, abs, sign, maximum, "
+            f"minimum, where, heaviside and {', '.join(names[1] for names in FUNCTIONS.values())}"
         )
 
     def _sum(self, e: sympy.Add) -> str:
@@ -206,7 +206,7 @@ class Printer:
 
 def _number(e: Basic) -> str:
     try:
-        value = float(e)  # type: ignore[arg-type]
+        value = float(e)
     except TypeError:
         raise SystemDefinitionError(f"the number {e} in an expression of the model is not a real number") from None
     if math.isfinite(value):
