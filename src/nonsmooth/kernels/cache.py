@@ -6,7 +6,7 @@ run stale code, and it cannot write beside a read-only install. Here one file pe
 ever stale, entries never change, and several processes need no lock.
 
 Everything that leans on private parts of Numba (a dispatcher's ``_cache``, ``CompileResult._reduce``) stands
-in this file; ``tests/kernels/test_cache.py`` covers it. Checked with Numba 0.60 to 0.68.
+in this file; ``tests/kernels/test_cache.py`` covers it. Checked with Numba 0.62 and 0.68.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from numba.core.compiler import CompileResult
 __all__ = ["cache_folder", "cache_statistics", "device", "inline", "kernel", "load_module"]
 
 # Kernels allocate nothing (scratch is an argument), so they need no reference counts: "_nrt" off saves a third.
-_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": False, "_nrt": False}
+_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}, "_nrt": False}
 _UNUSED_DAYS = 90.0
 _lock = threading.Lock()
 

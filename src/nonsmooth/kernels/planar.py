@@ -36,8 +36,8 @@ def scratch(n_modes, n_indicators, n_outputs, n_rows):
     return (
         np.zeros((n_modes, NODES + 1, 2, M)), np.zeros((n_modes, NODES + 1, 2 * HARMONICS + 1)),
         np.zeros((n_modes, n_f, 2 * M + 6)), np.zeros((n_modes, n_f, M, DEGREE + 1)), np.zeros((n_modes, 2, M)),
-        np.zeros((n_modes, 4)), np.zeros((TERMS + 1, M)), np.zeros((6, M)), np.zeros((n_rows + 2, WIDTH)),
-        np.zeros(4), np.zeros(HARMONICS), np.zeros(n_indicators + 1, dtype=np.int64),
+        np.zeros((n_modes, 4)), np.zeros((TERMS + 1, M)), np.zeros((7, M)), np.zeros((n_rows + 3, WIDTH)),
+        np.zeros(4), np.zeros(HARMONICS), np.zeros(n_indicators + 2, dtype=np.int64),
     )  # fmt: skip
 
 
@@ -110,11 +110,17 @@ def chain(
     the last transient return (or the start) to the last kept one; its end is where a carried state goes on.
     """
     n_i = ia.shape[1]
-    w, w1, wn, wp, wq, end = vectors[0], vectors[1], vectors[2], vectors[3], vectors[4], vectors[5]
+    w, w1, wn, wp, wq, end, there = (
+        vectors[0], vectors[1], vectors[2], vectors[3], vectors[4], vectors[5], vectors[6],
+    )  # fmt: skip
     zero = integers[0:n_i]
-    found = integers[n_i : n_i + 1]
+    found = integers[n_i : n_i + 2]
     surface, direction, surface_mode, after, every = plan[0], plan[1], plan[2], plan[3], plan[4]
     w[2] = 1.0
+    # whole steps at a stride: only where nothing but a crossing can end a step
+    strides = surface < 0 and period[first] < 1e300
+    for k in range(at.shape[0]):
+        strides = strides and at[k] < 0.0
     for i in range(first, last):
         for h in range(HARMONICS):
             rates[h] = multiples[h] * omega[i]
@@ -154,11 +160,21 @@ def chain(
         burst = 0
         waited = 0.0
         closed = False
+        fresh = True  # just after a jump an indicator may be zero: no stride
         while code == OK and returns < transient + keep:
+            if strides and returns < transient and not fresh:
+                border = target if s < target else T
+                n = stride(
+                    prop, rot, fun, info, mode, w, w1, rows, row_start, mode_start, mode_list,
+                    int((border - s) / info[mode, 0] - 1e-9),
+                )  # fmt: skip
+                s += n * info[mode, 0]
+                waited += n * info[mode, 0]
+            fresh = False
             wait, timed = trigger(mode, s, T, mode_start, mode_list, at)
             step, t, full, crossed = leg(
                 prop, rot, fun, tay, info, mode, n_i, rates, w, wait, rows, row_start, mode_start, mode_list,
-                surface, direction, surface_mode, zero, w1, wn, wp, wq, scr, points, end, found,
+                surface, direction, surface_mode, zero, w1, wn, wp, wq, scr, points, end, there, found,
             )  # fmt: skip
             if t < 0 and crossed == 0 and timed >= 0 and step >= wait:
                 t = timed
@@ -175,7 +191,7 @@ def chain(
                     n_here = 0
                     if is_open:
                         k = returns - transient - 1
-                        dense(prop, rot, tay, info, mode, n_i, rates, w, r, wn, scr, wp)
+                        dense(prop, rot, tay, info, mode, n_i, rates, w, r, wn, scr, found, wp)
                         section[i, k, 0] = wp[0]
                         section[i, k, 1] = wp[1]
                         section_mode[i, k] = mode
@@ -213,6 +229,7 @@ def chain(
             for f in range(n_i):
                 zero[f] = 0
             if t >= 0 or crossed != 0:
+                fresh = True
                 fired = found[0]
                 before0 = w[0]
                 before1 = w[1]
@@ -332,9 +349,11 @@ def record(
     crossings in a burst. The zero flags in ``integers`` are part of what a second call goes on from.
     """
     n_i = ia.shape[1]
-    w, w1, wn, wp, wq, end = vectors[0], vectors[1], vectors[2], vectors[3], vectors[4], vectors[5]
+    w, w1, wn, wp, wq, end, there = (
+        vectors[0], vectors[1], vectors[2], vectors[3], vectors[4], vectors[5], vectors[6],
+    )  # fmt: skip
     zero = integers[0:n_i]
-    found = integers[n_i : n_i + 1]
+    found = integers[n_i : n_i + 2]
     T = period[0]
     for h in range(HARMONICS):
         rates[h] = multiples[h] * omega[0]
@@ -362,13 +381,13 @@ def record(
         rest = until - base
         step, t, full, _ = leg(
             prop, rot, fun, tay, info, mode, n_i, rates, w, min(wait, rest), rows, row_start, mode_start, mode_list,
-            -1, 0, -1, zero, w1, wn, wp, wq, scr, points, end, found,
+            -1, 0, -1, zero, w1, wn, wp, wq, scr, points, end, there, found,
         )  # fmt: skip
         if t < 0 and timed >= 0 and step >= wait:
             t = timed
             found[0] = -1
         while n_s < samples.shape[0] and samples[n_s] - base < step:
-            dense(prop, rot, tay, info, mode, n_i, rates, w, max(samples[n_s] - base, 0.0), wn, scr, wp)
+            dense(prop, rot, tay, info, mode, n_i, rates, w, max(samples[n_s] - base, 0.0), wn, scr, found, wp)
             sample_u[n_s, 0] = wp[0]
             sample_u[n_s, 1] = wp[1]
             sample_mode[n_s] = mode

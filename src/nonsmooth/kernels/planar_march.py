@@ -11,7 +11,7 @@ from math import cos, fabs, isfinite, sin
 
 from .cache import device, inline
 from .codes import BEYOND_STOP, OK
-from .planar_search import dense, search, slope_of, to_node, value_of
+from .planar_search import NEVER, bound_at, classify, dense, search, slope_of, to_node, value_of
 from .planar_tables import HARMONICS, NODES, M
 
 EPS = 2.3e-16
@@ -141,9 +141,38 @@ def trigger(mode, s, period, mode_start, mode_list, at):
 
 
 @inline
+def stride(prop, rot, fun, info, mode, w, w1, rows, row_start, mode_start, mode_list, n):
+    """Up to n whole steps on which the first row of every outgoing transition is certainly <= 0; how many were made."""
+    step = info[mode, 0]
+    start = mode_start[mode]
+    stop = mode_start[mode + 1]
+    count = 0
+    while count < n:
+        to_node(prop, rot, mode, NODES, w, w1)
+        clear = True
+        for k in range(start, stop):
+            r = row_start[mode_list[k]]
+            f = rows[r, 0]
+            sign = float(rows[r, 1])
+            g0 = sign * value_of(fun, mode, f, w)
+            g1 = sign * value_of(fun, mode, f, w1)
+            s0 = sign * slope_of(fun, mode, f, w)
+            s1 = sign * slope_of(fun, mode, f, w1)
+            if classify(g0, s0, g1, s1, step, bound_at(fun, info, mode, f, w)) != NEVER:
+                clear = False
+                break
+        if not clear:
+            break
+        for j in range(M):
+            w[j] = w1[j]
+        count += 1
+    return count
+
+
+@inline
 def leg(
     prop, rot, fun, tay, info, mode, n_i, rates, w, r_max, rows, row_start, mode_start, mode_list,
-    surface, direction, surface_mode, zero, w1, wn, wp, wq, scr, points, end, found,
+    surface, direction, surface_mode, zero, w1, wn, wp, wq, scr, points, end, there, found,
 ):  # fmt: skip
     """March one step of the mode, or less: to r_max, or to the first crossing or section return.
 
@@ -152,6 +181,7 @@ def leg(
     functional that crossed.
     """
     to_node(prop, rot, mode, NODES, w, w1)
+    found[1] = -1
     step = info[mode, 0]
     best = min(step, r_max)
     fired = -1
@@ -174,16 +204,21 @@ def leg(
             hi = lo + 1
         if lo == hi or direction * sense < 0:
             continue
-        tau = search(prop, rot, fun, tay, info, mode, w, w1, rows, lo, hi, zero, best, wn, wp, wq, scr, points, found)
+        tau = search(
+            prop, rot, fun, tay, info, mode, n_i, rates, w, w1, rows, lo, hi, zero, best, wn, wp, wq, scr, points, found,
+            there,
+        )  # fmt: skip
         if tau >= 0.0 and (tau < best or (fired < 0 and crossed == 0 and tau <= best)):
             best = tau
             fired = t
             crossed = sense
             functional = found[0]
+            for j in range(M):
+                end[j] = there[j]
     found[0] = functional
     whole = fired < 0 and crossed == 0 and r_max >= step
-    if not whole:
-        dense(prop, rot, tay, info, mode, n_i, rates, w, best, wn, scr, end)
+    if not whole and functional < 0:
+        dense(prop, rot, tay, info, mode, n_i, rates, w, best, wn, scr, found, end)
     return best, fired, whole, crossed
 
 

@@ -76,6 +76,32 @@ def compose(tay, mode, f, wn, scr, row):
 
 
 @inline
+def place(prop, rot, tay, mode, n_i, w, node, wn, scr, found):
+    """w at a node of the step, and there the Taylor coefficients of x and v (rows 0 and 1 of scr).
+
+    ``found[1]`` is the node for which they stand there already."""
+    if found[1] != node:
+        to_node(prop, rot, mode, node, w, wn)
+        compose(tay, mode, n_i, wn, scr, 0)
+        compose(tay, mode, n_i + 1, wn, scr, 1)
+        found[1] = node
+
+
+@inline
+def combine(fun, tay, mode, f, n_i, wn, scr, row):
+    """Like ``compose``, after ``place``: a functional without harmonics of its own is a sum of the states."""
+    plain = f < n_i
+    for j in range(3, M):
+        plain = plain and fun[mode, f, j] == 0.0
+    if plain:
+        for k in range(WIDTH):
+            scr[row, k] = fun[mode, f, 0] * scr[0, k] + fun[mode, f, 1] * scr[1, k]
+        scr[row, 0] += fun[mode, f, 2]
+    else:
+        compose(tay, mode, f, wn, scr, row)
+
+
+@inline
 def horner(scr, row, tau):
     total = scr[row, DEGREE]
     for k in range(DEGREE - 1, -1, -1):
@@ -229,7 +255,34 @@ def cubic_root(g0, s0, g1, s1, h):
 
 
 @inline
-def refine(prop, rot, tay, info, mode, w, f, sign, zero, guess, wn, scr):
+def turn(angle, c, s):
+    """Cosine and sine of a phase whose cosine and sine are c and s, after a small angle (below 0.1)."""
+    a2 = angle * angle
+    ca = 1.0 - a2 * (0.5 - a2 * (1.0 / 24 - a2 * (1.0 / 720 - a2 * (1.0 / 40320))))
+    sa = angle * (1.0 - a2 * (1.0 / 6 - a2 * (1.0 / 120 - a2 * (1.0 / 5040 - a2 * (1.0 / 362880)))))
+    return c * ca - s * sa, s * ca + c * sa
+
+
+@inline
+def dense(prop, rot, tay, info, mode, n_i, rates, w, tau, wn, scr, found, out):
+    """w at any instant of the step."""
+    spacing = info[mode, 1]
+    node = min(max(int(tau / spacing), 0), NODES - 1)
+    if found[1] >= 0 and -0.5 * spacing <= tau - found[1] * spacing <= 1.5 * spacing:
+        node = found[1]
+    place(prop, rot, tay, mode, n_i, w, node, wn, scr, found)
+    local = tau - node * spacing
+    out[0] = horner(scr, 0, local)
+    out[1] = horner(scr, 1, local)
+    out[2] = 1.0
+    for h in range(HARMONICS):
+        c, s = turn(rates[h] * local, wn[3 + 2 * h], wn[4 + 2 * h])
+        out[3 + 2 * h] = c
+        out[4 + 2 * h] = s
+
+
+@inline
+def refine(prop, rot, fun, tay, info, mode, n_i, w, f, sign, zero, guess, wn, scr, found):
     """The upward root of a functional near a good guess, on its polynomial beside the nearest node; -1: not found.
 
     One step of Halley's method (third order), then Newton's."""
@@ -238,22 +291,22 @@ def refine(prop, rot, tay, info, mode, w, f, sign, zero, guess, wn, scr):
     result = -1.0
     for _ in range(4):
         node = min(max(int(tau / spacing), 0), NODES - 1)
-        to_node(prop, rot, mode, node, w, wn)
-        compose(tay, mode, f, wn, scr, 0)
+        place(prop, rot, tay, mode, n_i, w, node, wn, scr, found)
+        combine(fun, tay, mode, f, n_i, wn, scr, 2)
         if node == 0 and zero != 0:
-            scr[0, 0] = 0.0
+            scr[2, 0] = 0.0
         local = tau - node * spacing
-        value = horner(scr, 0, local)
-        slope = slope_at(scr, 0, local)
-        half = 0.5 * curvature_at(scr, 0, local)
+        value = horner(scr, 2, local)
+        slope = slope_at(scr, 2, local)
+        half = 0.5 * curvature_at(scr, 2, local)
         local -= value * slope / (slope * slope - value * half)
         good = True
         for _k in range(10):
             good = -0.5 * spacing <= local <= 1.5 * spacing
             if not good:
                 break
-            value = horner(scr, 0, local)
-            slope = slope_at(scr, 0, local)
+            value = horner(scr, 2, local)
+            slope = slope_at(scr, 2, local)
             change = value / slope
             local -= change
             if fabs(change) <= 1e-8 * spacing and fabs(change * half) <= 1e-8 * fabs(slope):
@@ -273,6 +326,7 @@ def finest(prop, rot, tay, info, mode, w, rows, lo, hi, zero, node, wn, scr, poi
     """First instant within one node spacing at which all rows lo..hi are positive, on their polynomials; -1: none."""
     spacing = info[mode, 1]
     to_node(prop, rot, mode, node, w, wn)
+    found[1] = -1
     for r in range(lo, hi):
         row = r - lo
         compose(tay, mode, rows[r, 0], wn, scr, row)
@@ -302,20 +356,23 @@ def finest(prop, rot, tay, info, mode, w, rows, lo, hi, zero, node, wn, scr, poi
 
 
 @inline
-def search(prop, rot, fun, tay, info, mode, w, w1, rows, lo, hi, zero, r_max, wn, wp, wq, scr, points, found):
+def search(
+    prop, rot, fun, tay, info, mode, n_i, rates, w, w1, rows, lo, hi, zero, r_max, wn, wp, wq, scr, points, found, end
+):
     """First instant in [0, r_max] of the step at which all the rows lo..hi are positive; -1: none.
 
-    ``w`` and ``w1`` stand at the ends of the whole step; ``found[0]`` is the functional that crossed last.
+    ``w`` and ``w1`` stand at the ends of the whole step; ``found[0]`` is the functional that crossed last. ``end``
+    receives w at the crossing.
     """
     spacing = info[mode, 1]
     size = NODES
     node = 0
     while node < NODES and node * spacing <= r_max:
-        end = node + size
+        last = node + size
         h = size * spacing
         if size < NODES:
             to_node(prop, rot, mode, node, w, wp)
-            to_node(prop, rot, mode, end, w, wq)
+            to_node(prop, rot, mode, last, w, wq)
         n_open = 0
         n_once = 0
         once = lo
@@ -350,6 +407,7 @@ def search(prop, rot, fun, tay, info, mode, w, w1, rows, lo, hi, zero, r_max, wn
         if not never:
             if n_open == 0 and n_once == 0:
                 found[0] = rows[lo, 0]
+                dense(prop, rot, tay, info, mode, n_i, rates, w, node * spacing, wn, scr, found, end)
                 return node * spacing
             if n_open == 0:
                 # every row crosses at most once: all are positive from the last of these crossings on
@@ -358,19 +416,17 @@ def search(prop, rot, fun, tay, info, mode, w, w1, rows, lo, hi, zero, r_max, wn
                 for _ in range(n_once):
                     f = rows[row, 0]
                     flag = zero[f] if f < zero.shape[0] else 0
-                    tau = refine(prop, rot, tay, info, mode, w, f, float(rows[row, 1]), flag, tau, wn, scr)
+                    tau = refine(
+                        prop, rot, fun, tay, info, mode, n_i, w, f, float(rows[row, 1]), flag, tau, wn, scr, found
+                    )
                     if tau < 0.0:
                         break
                     found[0] = f
+                    dense(prop, rot, tay, info, mode, n_i, rates, w, tau, wn, scr, found, end)
                     behind = -1
-                    if n_once > 1:
-                        left = min(int(tau / spacing), NODES - 1)
-                        to_node(prop, rot, mode, left, w, wn)
-                        for r in range(lo, hi):
-                            if r != row and behind < 0:
-                                compose(tay, mode, rows[r, 0], wn, scr, 1)
-                                if rows[r, 1] * horner(scr, 1, tau - left * spacing) <= 0.0:
-                                    behind = r
+                    for r in range(lo, hi):
+                        if r != row and rows[r, 1] * value_of(fun, mode, rows[r, 0], end) <= 0.0:
+                            behind = r
                     if behind < 0:
                         break
                     row = behind
@@ -381,37 +437,13 @@ def search(prop, rot, fun, tay, info, mode, w, w1, rows, lo, hi, zero, r_max, wn
                 continue
             tau = finest(prop, rot, tay, info, mode, w, rows, lo, hi, zero, node, wn, scr, points, found)
             if tau >= 0.0:
-                return node * spacing + tau
-        node = end
+                tau += node * spacing
+                dense(prop, rot, tay, info, mode, n_i, rates, w, tau, wn, scr, found, end)
+                return tau
+        node = last
         while size < NODES // 2 and node % (2 * size) == 0:
             size *= 2
     return -1.0
-
-
-@inline
-def turn(angle, c, s):
-    """Cosine and sine of a phase whose cosine and sine are c and s, after a small angle (below 0.1)."""
-    a2 = angle * angle
-    ca = 1.0 - a2 * (0.5 - a2 * (1.0 / 24 - a2 * (1.0 / 720 - a2 * (1.0 / 40320))))
-    sa = angle * (1.0 - a2 * (1.0 / 6 - a2 * (1.0 / 120 - a2 * (1.0 / 5040 - a2 * (1.0 / 362880)))))
-    return c * ca - s * sa, s * ca + c * sa
-
-
-@inline
-def dense(prop, rot, tay, info, mode, n_i, rates, w, tau, wn, scr, out):
-    """w at any instant of the step; the states are the functionals n_i and n_i + 1."""
-    spacing = info[mode, 1]
-    node = min(max(int(tau / spacing), 0), NODES - 1)
-    to_node(prop, rot, mode, node, w, wn)
-    local = tau - node * spacing
-    for r in range(2):
-        compose(tay, mode, n_i + r, wn, scr, r)
-        out[r] = horner(scr, r, local)
-    out[2] = 1.0
-    for h in range(HARMONICS):
-        c, s = turn(rates[h] * local, wn[3 + 2 * h], wn[4 + 2 * h])
-        out[3 + 2 * h] = c
-        out[4 + 2 * h] = s
 
 
 @device

@@ -1,0 +1,1 @@
+"""Reproductions of published papers: each is a package with ``reproduce(out, figures, quick, progress)``."""

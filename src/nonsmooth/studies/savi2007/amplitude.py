@@ -1,0 +1,62 @@
+"""Figures 11 and 12: the forcing amplitude is varied at a support that is pressed at rest (g = -0.0045 m)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from nonsmooth import plot
+from nonsmooth.studies.savi2007.diagrams import diagrams, draw_diagram, how
+from nonsmooth.studies.savi2007.figure import Figure, sheet
+from nonsmooth.studies.savi2007.flows import FLOWS, Settings
+from nonsmooth.studies.savi2007.portraits import describe, draw_portraits, portraits
+from nonsmooth.studies.savi2007.printed import FIGURE_11, FIGURE_12, NUMBERS
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure as Canvas
+
+__all__ = ["FIGURES"]
+
+_PRINTED = [NUMBERS[f"period {n} from"].value for n in (4, 2, 1)]
+
+
+def _compute_11(settings: Settings) -> dict[str, xr.Dataset]:
+    return diagrams(settings, FIGURE_11, "rho", 0.2, 0.5, (600, 300))
+
+
+def _draw_11(data: Mapping[str, xr.Dataset]) -> Canvas:
+    with plot.journal():
+        canvas = sheet(plot.PAGE, 0.44 * plot.PAGE)
+        for ax, flow, letter in zip(canvas.subplots(1, 2, sharey=True), FLOWS, "ab", strict=True):
+            draw_diagram(ax, data, flow.key, "v", values=_PRINTED, loc="upper right")
+            ax.set_title(f"({letter}) {flow.title}")
+        ax.set_ylabel("")
+    return canvas
+
+
+def _caption_11(data: Mapping[str, xr.Dataset]) -> str:
+    return (
+        "Bifurcation diagram over the forcing amplitude, omega = 3.69 rad/s, g = -0.0045 m: velocity at the section. "
+        "Dotted: the paper's printed ends of chaos, period 4 and period 2 (0.26, 0.28 and 0.406 N). " + how(data)
+    )
+
+
+def _compute_12(settings: Settings) -> dict[str, xr.Dataset]:
+    return portraits(settings, FIGURE_11, "rho", FIGURE_12)
+
+
+def _caption_12(data: Mapping[str, xr.Dataset]) -> str:
+    return (
+        "Phase portraits with section points (black) at four amplitudes of Fig. 11; contact zone x > g shaded, orbit in "
+        "contact in vermilion. " + describe(data, FIGURE_12)
+    )
+
+
+FIGURES = (
+    Figure("fig11", 11, "Bifurcation diagram over the forcing amplitude", _compute_11, _draw_11, _caption_11),
+    Figure(
+        "fig12", 12, "Phase portraits over the forcing amplitude", _compute_12,
+        draw_portraits("rho", "N", r"\rho", FIGURE_12), _caption_12,
+    ),
+)  # fmt: skip

@@ -1,0 +1,71 @@
+"""Bifurcation diagrams beside each other: the exact flow and the smoothed switch, several starts behind the sweeps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nonsmooth import plot
+from nonsmooth.analysis.sweep import sweep
+from nonsmooth.studies.savi2007.flows import FLOWS, Settings, starts
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+
+__all__ = ["diagrams", "draw_diagram", "how"]
+
+
+def diagrams(
+    settings: Settings, parameters: Mapping[str, float], parameter: str, low: float, high: float, steps: tuple[int, int]
+) -> dict[str, xr.Dataset]:
+    """Sweeps up and down (``exact``, ``smoothed``) and from several starts (``exact_starts``, ``smoothed_starts``).
+
+    ``steps``: of the exact and of the smoothed sweep; the starts are tried at half and a quarter as many values.
+    """
+    data = {}
+    for flow in FLOWS:
+        system = flow.system(**parameters)
+        n = settings.of(flow, exact=steps[0], smoothed=steps[1], quick=70)
+        data[flow.key] = sweep(
+            system, parameter, np.linspace(low, high, n + 1), direction="both", progress=settings.progress,
+            transient=settings.of(flow, exact=600, smoothed=200, quick=100),
+            keep=settings.of(flow, exact=200, smoothed=64, quick=40), **flow.options,
+        )  # fmt: skip
+        n = settings.of(flow, exact=steps[0] // 2, smoothed=steps[1] // 4, quick=10)
+        data[f"{flow.key}_starts"] = sweep(
+            system, parameter, np.linspace(low, high, n + 1), direction=None,
+            start=starts(settings.of(flow, exact=12, smoothed=8, quick=4)), progress=settings.progress,
+            transient=settings.of(flow, exact=600, smoothed=150, quick=80), keep=32, **flow.options,
+        )  # fmt: skip
+    return data
+
+
+def draw_diagram(
+    ax: Axes, data: Mapping[str, xr.Dataset], key: str, y: str, *, values: Sequence[float] = (), loc: str = "best"
+) -> None:
+    """One diagram: starts in grey behind, down over up; the paper's parameter values as dotted lines."""
+    plot.bifurcation(data[f"{key}_starts"], ax, y=y, color="#A8A8A8", size=1.6)
+    behind = len(ax.get_lines())
+    plot.bifurcation(data[key], ax, y=y, size=0.7)
+    for i, line in enumerate(ax.get_lines()):
+        line.set_zorder(1 + (i >= behind))
+    ax.get_lines()[0].set_label("several starts")
+    for value in values:
+        ax.axvline(value, color="black", linewidth=0.6, linestyle=":", zorder=0)
+    ax.legend(loc=loc, markerscale=5, handletextpad=0.2)
+
+
+def how(data: Mapping[str, xr.Dataset]) -> str:
+    """How the sweeps were made, for a caption."""
+    words = []
+    for flow in FLOWS:
+        swept, many = data[flow.key], data[f"{flow.key}_starts"]
+        parameter = str(swept["maximum"].dims[0])
+        words.append(
+            f"{flow.key}: {swept.sizes[parameter]} values up and down, {swept.sizes['iterate']} section points each; "
+            f"{many.sizes['start']} starts at {many.sizes[parameter]} values"
+        )
+    return "Section at phase 0. " + "; ".join(words) + "."

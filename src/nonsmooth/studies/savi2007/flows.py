@@ -1,0 +1,56 @@
+"""The two ways in which every figure is computed, and how finely."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+from nonsmooth.flow.starts import random_starts
+from nonsmooth.models import discontinuous_support
+from nonsmooth.system.system import System
+
+__all__ = ["ETA", "EXACT", "FLOWS", "SMOOTHED", "Flow", "Settings", "starts"]
+
+ETA = 1e-5  # Section 4: "it is assumed that eta = 1e-5 for all simulations"
+
+_Choice = TypeVar("_Choice")
+
+
+@dataclass(frozen=True)
+class Flow:
+    """A model with the method that integrates it: ``key`` in file names, ``title`` in figures."""
+
+    key: str
+    title: str
+    eta: float | None
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+    def system(self, **parameters: float) -> System:
+        """The paper's oscillator with Table 1 and these parameters."""
+        system = discontinuous_support(**parameters)
+        return system if self.eta is None else system.smoothed(self.eta)
+
+
+EXACT = Flow("exact", "exact flow", None, {"method": "exact"})
+SMOOTHED = Flow("smoothed", "smoothed switch, RKF45", ETA, {"method": "rkf45", "rtol": 1e-6})
+FLOWS = (EXACT, SMOOTHED)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How much work: ``quick`` for a first look."""
+
+    quick: bool = False
+    progress: bool = True
+
+    def of(self, flow: Flow, *, exact: _Choice, smoothed: _Choice, quick: _Choice) -> _Choice:
+        """A number for this flow; ``quick`` takes the place of both in a quick run."""
+        if self.quick:
+            return quick
+        return exact if flow is EXACT else smoothed
+
+
+def starts(count: int, seed: int = 2007) -> list[Any]:
+    """First states drawn from a box a little larger than the motions of Figs. 11-18, so that coexisting motions show."""
+    return random_starts(count, {"x": -0.010, "v": -0.10}, {"x": 0.004, "v": 0.10}, seed=seed)

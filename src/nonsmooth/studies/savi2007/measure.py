@@ -1,0 +1,107 @@
+"""Numbers read off the datasets: regimes, the intervals in which they change, jumps, rates of separation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.results.statuses import by_name
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = [
+    "APERIODIC", "UNSETTLED", "Interval", "change", "jumps", "last_with", "periods_reached", "regimes", "separation_rate",
+]  # fmt: skip
+
+APERIODIC = 0  # no period found up to the longest looked for
+UNSETTLED = -1  # the transient did not decide it
+
+
+@dataclass(frozen=True)
+class Interval:
+    """Something that lies between two neighbouring points of a sweep."""
+
+    low: float
+    high: float
+
+    @property
+    def middle(self) -> float:
+        """The best single number."""
+        return 0.5 * (self.low + self.high)
+
+    @property
+    def uncertainty(self) -> float:
+        """Half the width."""
+        return 0.5 * (self.high - self.low)
+
+    def __str__(self) -> str:
+        digits = max(0, 1 - int(np.floor(np.log10(self.uncertainty)))) if self.uncertainty > 0 else 6
+        return f"{self.middle:.{digits}f} ± {self.uncertainty:.{digits}f}"
+
+
+def regimes(swept: xr.Dataset, direction: str | None = None) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Parameter values, rising, and the regime at each: the period number, APERIODIC or UNSETTLED."""
+    one = swept if direction is None or "direction" not in swept.dims else swept.sel(direction=direction)
+    values = one[str(one["maximum"].dims[0])].values
+    order = np.argsort(values)
+    status = one["status"].values[order]
+    number = one["period_number"].values[order].astype(np.int64)
+    settled = np.isin(status, [by_name(word).code for word in ("ok", "not_periodic", "not_guaranteed")])
+    return values[order], np.where(settled, number, UNSETTLED)
+
+
+def change(swept: xr.Dataset, first: int, second: int, direction: str | None = None) -> Interval | None:
+    """Where regime ``first`` borders on ``second`` (in either order), with nothing but unsettled points between.
+
+    The narrowest such interval; None where they are no neighbours.
+    """
+    values, regime = regimes(swept, direction)
+    at = np.flatnonzero(regime != UNSETTLED)
+    found = [
+        Interval(float(values[i]), float(values[j]))
+        for i, j in zip(at[:-1], at[1:], strict=True)
+        if {int(regime[i]), int(regime[j])} == {first, second} and first != second
+    ]
+    return min(found, key=lambda interval: interval.uncertainty, default=None)
+
+
+def last_with(swept: xr.Dataset, regime_wanted: int, direction: str | None = None) -> tuple[float, float] | None:
+    """Smallest and largest parameter value with a regime."""
+    values, regime = regimes(swept, direction)
+    at = np.flatnonzero(regime == regime_wanted)
+    return (float(values[at[0]]), float(values[at[-1]])) if len(at) else None
+
+
+def jumps(response: xr.Dataset, direction: str) -> list[Interval]:
+    """The steps in which the amplitude jumps in one direction, at rising values."""
+    here = response["jump_direction"].values.astype(str) == direction
+    value, step = response["jump_value"].values[here], response["jump_step"].values[here]
+    return sorted(
+        (Interval(float(a - 0.5 * b), float(a + 0.5 * b)) for a, b in zip(value, step, strict=True)),
+        key=lambda interval: interval.low,
+    )
+
+
+def periods_reached(survey: xr.Dataset, value: float) -> dict[int, int]:
+    """How many starts of a ``survey`` (a sweep from several starts) end in each regime at one parameter value."""
+    one = survey.sel({str(survey["maximum"].dims[0]): value}, method="nearest")
+    ok = [by_name(word).code for word in ("ok", "not_periodic", "not_guaranteed")]
+    regime = np.where(np.isin(one["status"].values, ok), one["period_number"].values, UNSETTLED)
+    return {int(r): int((regime == r).sum()) for r in np.unique(regime)}
+
+
+def separation_rate(twins: xr.Dataset, scale: tuple[float, float] = (1e-3, 1e-2)) -> tuple[float, float]:
+    """Mean growth of ln(distance) per period between each start and its twin, with its standard error.
+
+    The first half of the starts and the second are pairs. A mean over a finite stretch, not a Lyapunov exponent: it
+    leaves out the first return, in which the distance turns into the growing direction.
+    """
+    points = twins["section"].transpose("start", "iterate", "state").values / np.asarray(scale)
+    half = len(points) // 2
+    distance = np.linalg.norm(points[half:] - points[:half], axis=-1)
+    rates = np.log(distance[:, -1] / distance[:, 0]) / (distance.shape[1] - 1)
+    return float(rates.mean()), float(rates.std(ddof=1) / np.sqrt(half))

@@ -1,0 +1,105 @@
+"""Sheets of phase portraits: one orbit per parameter value, exact above smoothed, with its section points."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nonsmooth import plot
+from nonsmooth.analysis.sweep import sweep
+from nonsmooth.flow.simulate import simulate
+from nonsmooth.studies.savi2007.figure import sheet
+from nonsmooth.studies.savi2007.flows import FLOWS, Settings, starts
+from nonsmooth.studies.savi2007.measure import APERIODIC, periods_reached
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure as Canvas
+
+__all__ = ["chosen_start", "describe", "draw_portraits", "portraits"]
+
+CHAOTIC_PERIODS = 40  # drawn of an orbit without a period
+
+
+def portraits(
+    settings: Settings, parameters: Mapping[str, float], parameter: str, shown: Mapping[float, int], others: tuple = ()
+) -> dict[str, xr.Dataset]:
+    """Survey each value from several starts, then record one orbit of the regime in ``shown`` (value -> period).
+
+    ``<flow>`` holds the survey (a ``sweep`` from the starts, ``others`` surveyed too), ``<flow>_<value>`` the orbit.
+    """
+    data: dict[str, xr.Dataset] = {}
+    for flow in FLOWS:
+        transient = settings.of(flow, exact=1000, smoothed=300, quick=150)
+        first = starts(settings.of(flow, exact=16, smoothed=16, quick=8))
+        system = flow.system(**parameters)
+        survey = sweep(
+            system, parameter, sorted({*shown, *others}), direction=None, start=first, transient=transient, keep=64,
+            progress=settings.progress, **flow.options,
+        )  # fmt: skip
+        data[flow.key] = survey
+        for value, wanted in shown.items():
+            periods = 2 * wanted if wanted != APERIODIC else settings.of(flow, exact=40, smoothed=40, quick=20)
+            data[f"{flow.key}_{value:g}"] = simulate(
+                system.with_parameters({parameter: value}), start=first[chosen_start(survey, value, wanted)],
+                transient=transient, periods=periods, **flow.options,
+            )  # fmt: skip
+    return data
+
+
+def chosen_start(survey: xr.Dataset, value: float, wanted: int) -> int:
+    """The first start that ends in the wanted regime; the first of all where none does."""
+    one = survey.sel({_parameter(survey): value}, method="nearest")
+    at = np.flatnonzero(one["period_number"].values == wanted)
+    return int(at[0]) if len(at) else 0
+
+
+def draw_portraits(
+    parameter: str, unit: str, symbol: str, shown: Mapping[float, int]
+) -> Callable[[Mapping[str, xr.Dataset]], Canvas]:
+    """The sheet: columns are values, rows are flows."""
+
+    def draw(data: Mapping[str, xr.Dataset]) -> Canvas:
+        with plot.journal():
+            canvas = sheet(plot.PAGE, 0.62 * plot.PAGE * 2 / max(len(shown) - 1, 2) + 0.3)
+            grid = canvas.subplots(2, len(shown), sharex="col", sharey="col", squeeze=False)
+            for row, flow in zip(grid, FLOWS, strict=True):
+                for i, (ax, (value, wanted)) in enumerate(zip(row, shown.items(), strict=True)):
+                    orbit, survey = data[f"{flow.key}_{value:g}"], data[flow.key]
+                    points = survey.sel({parameter: value}, method="nearest").isel(
+                        start=chosen_start(survey, value, wanted)
+                    )
+                    plot.phase_portrait(orbit, ax, section=points if wanted != APERIODIC else None, zone="g")
+                    if wanted == APERIODIC:
+                        for line in ax.get_lines():
+                            line.set(linewidth=0.35)
+                        plot.section(points, ax, size=3.0)
+                        ax.get_lines()[-1].set_zorder(4)
+                    ax.set_xlabel(ax.get_xlabel() if flow is FLOWS[-1] else "")
+                    ax.set_ylabel(f"{flow.title}\n{ax.get_ylabel()}" if i == 0 else "")
+                    if flow is FLOWS[0]:
+                        ax.set_title(f"({'abcd'[i]}) ${symbol} = {value:g}$ {unit}")
+        return canvas
+
+    return draw
+
+
+def describe(data: Mapping[str, xr.Dataset], shown: Mapping[float, int]) -> str:
+    """What the starts reached at each value, by the exact flow."""
+    survey = data["exact"]
+    words = [
+        f"{_parameter(survey)} = {value:g}: {words_of(periods_reached(survey, value))}" for value in shown
+    ]
+    return f"Reached by {survey.sizes['start']} starts (exact): " + "; ".join(words) + "."
+
+
+def words_of(reached: Mapping[int, int]) -> str:
+    """``period 3 (8 starts), period 4 (8 starts)``."""
+    names = {APERIODIC: "no period", -1: "unsettled"}
+    return ", ".join(f"{names.get(p, f'period {p}')} ({n})" for p, n in reached.items())
+
+
+def _parameter(survey: xr.Dataset) -> str:
+    return str(survey["maximum"].dims[0])

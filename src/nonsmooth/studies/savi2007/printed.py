@@ -1,0 +1,55 @@
+"""The numbers printed in the paper, as text, each with its place: data, never used to tune anything."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+__all__ = [
+    "FIGURE_9", "FIGURE_10", "FIGURE_11", "FIGURE_12", "FIGURE_13", "FIGURE_14", "FIGURE_14_TEXT", "FIGURE_17", "FIGURE_18",
+    "NUMBERS", "Printed",
+]  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Printed:
+    """A number as printed: ``text`` keeps its digits, ``place`` says where it stands."""
+
+    text: str
+    unit: str
+    place: str
+
+    @property
+    def value(self) -> float:
+        """The number."""
+        return float(self.text)
+
+    @property
+    def rounding(self) -> float:
+        """Half a unit of the last printed digit."""
+        digits = len(self.text.partition(".")[2])
+        return 0.5 * 10.0**-digits
+
+    def __str__(self) -> str:
+        return f"{self.text} {self.unit}"
+
+
+# Parameters of the figures (captions and Section 4), with Table 1 for the rest.
+FIGURE_9 = {"rho": 0.14, "g": 0.02}
+FIGURE_10 = {"rho": 0.16, "g": 0.0145}
+FIGURE_11 = {"omega": 3.69, "g": -0.0045}
+FIGURE_12 = {0.29: 2, 0.39: 2, 0.42: 1, 0.46: 1}  # rho -> period number, by the ranges printed for Fig. 11
+FIGURE_13 = {"omega": 11.15, "rho": 0.33}
+FIGURE_14 = {-0.0012: 1, 0.0009: 2, 0.0014: 3, 0.0018: 0}  # g of the caption -> period number (0: chaotic)
+FIGURE_14_TEXT = {-0.0012: 1, 0.005: 2, 0.0012: 3, 0.0014: 0}  # g as the text of Section 4 prints them
+FIGURE_17 = {"rho": 0.23, "g": 0.0036}
+FIGURE_18 = {8.64: 1, 9.55: 0, 9.88: 1}  # omega -> period number (0: chaotic)
+
+_9, _11 = "Section 4, on Fig. 9", "Section 4, on Fig. 11"
+NUMBERS = {
+    "period 2 near": Printed("3.63", "rad/s", _9),
+    "jump rising": Printed("5.88", "rad/s", _9),
+    "jump falling": Printed("5.29", "rad/s", _9),
+    "period 1 from": Printed("0.406", "N", _11),
+    "period 2 from": Printed("0.28", "N", _11),
+    "period 4 from": Printed("0.26", "N", _11),
+}

@@ -1,0 +1,111 @@
+"""Figures 9 and 10: amplitude over the forcing frequency, up and down, with the jumps and the grazing frequencies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nonsmooth import plot
+from nonsmooth.analysis.response import frequency_response
+from nonsmooth.studies.savi2007.figure import Figure, sheet
+from nonsmooth.studies.savi2007.flows import FLOWS, Settings
+from nonsmooth.studies.savi2007.grazing import grazing_frequencies
+from nonsmooth.studies.savi2007.printed import FIGURE_9, FIGURE_10, NUMBERS
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure as Canvas
+
+__all__ = ["FIGURES", "grazing_of"]
+
+
+def grazing_of(response: xr.Dataset) -> list[float]:
+    """Closed-form grazing frequencies at the parameters of a response (rad/s)."""
+    return grazing_frequencies({name: float(response[name]) for name in ("m", "k", "c", "rho", "g")})
+
+
+def _compute(parameters: Mapping[str, float], low: float, high: float) -> Callable[[Settings], dict[str, xr.Dataset]]:
+    def compute(settings: Settings) -> dict[str, xr.Dataset]:
+        data = {}
+        for flow in FLOWS:
+            step = settings.of(flow, exact=0.0025, smoothed=0.005, quick=0.02)
+            values = np.linspace(low, high, round((high - low) / step) + 1)
+            data[flow.key] = frequency_response(
+                flow.system(**parameters), values, transient=settings.of(flow, exact=300, smoothed=100, quick=60),
+                keep=16, max_period=4, progress=settings.progress, **flow.options,
+            )  # fmt: skip
+        return data
+
+    return compute
+
+
+def _draw(printed: Mapping[str, float]) -> Callable[[Mapping[str, xr.Dataset]], Canvas]:
+    def draw(data: Mapping[str, xr.Dataset]) -> Canvas:
+        with plot.journal():
+            canvas = sheet(plot.PAGE, 0.46 * plot.PAGE)
+            for ax, flow, letter in zip(canvas.subplots(1, 2, sharey=True), FLOWS, "ab", strict=True):
+                response = data[flow.key]
+                plot.frequency_response(response, ax)
+                _mark(ax, response, printed)
+                ax.set_title(f"({letter}) {flow.title}")
+                ax.legend(loc="upper left")
+            ax.set_ylabel("")
+        return canvas
+
+    return draw
+
+
+def _mark(ax: Axes, response: xr.Dataset, printed: Mapping[str, float]) -> None:
+    """Grazing frequencies, the range of period 2, and the paper's numbers at the upper edge."""
+    for i, omega in enumerate(grazing_of(response)):
+        ax.axvline(
+            omega, color=plot.COLORS["third"], linewidth=0.8, zorder=0, label="grazing, closed form" if i == 0 else None
+        )
+    omega = response["omega"].values
+    doubled = (response["period_number"] == 2).any("direction").values
+    if doubled.any():
+        ax.fill_between(
+            omega, 0, 1, where=doubled, transform=ax.get_xaxis_transform(), color=plot.COLORS["zone"], alpha=0.25,
+            linewidth=0, zorder=0, label="period 2",
+        )  # fmt: skip
+    for i, value in enumerate(printed.values()):
+        ax.plot(
+            value, 1.0, "v", transform=ax.get_xaxis_transform(), color="black", markersize=4, clip_on=False,
+            label="printed in the paper" if i == 0 else None, linestyle="none",
+        )  # fmt: skip
+    ax.margins(y=0.12)
+
+
+def _caption(name: str) -> Callable[[Mapping[str, xr.Dataset]], str]:
+    def caption(data: Mapping[str, xr.Dataset]) -> str:
+        exact, smoothed = data["exact"], data["smoothed"]
+        grazing = " and ".join(f"{omega:.5f}" for omega in grazing_of(exact))
+        return (
+            f"Frequency response for rho = {float(exact['rho']):g} N and g = {float(exact['g']):g} m: half the peak-to-peak "
+            f"displacement with rising and falling frequency, jumps marked. Closed-form grazing at {grazing} rad/s (green). "
+            f"Steps of {_step(exact):.4f} rad/s (exact) and {_step(smoothed):.4f} rad/s (smoothed; a shorter transient)."
+            f"{name}"
+        )
+
+    return caption
+
+
+def _step(response: xr.Dataset) -> float:
+    return float(np.diff(response["omega"].values).max())
+
+
+_PRINTED_9 = {key: NUMBERS[key].value for key in ("period 2 near", "jump rising", "jump falling")}
+
+FIGURES = (
+    Figure(
+        "fig09", 9, "Frequency response with a period-2 range", _compute(FIGURE_9, 3.0, 7.0), _draw(_PRINTED_9),
+        _caption(" Triangles: the paper's 3.63, 5.29 and 5.88 rad/s. The unstable branch between the jumps is not drawn."),
+    ),
+    Figure(
+        "fig10", 10, "Frequency response with a small jump", _compute(FIGURE_10, 2.4, 7.4), _draw({}),
+        _caption(" The paper prints no numbers for this figure."),
+    ),
+)  # fmt: skip
