@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from functools import partial
+from statistics import median
 
 import numpy as np
 
 import nonsmooth as ns
 import oscillator_heyoka
 import oscillator_scipy
-from timing import geometric_mean, interleaved, medians
+from timing import Times, geometric_mean, interleaved, per_unit, ratio
 from work import CASES, Case, march, section
 
 Verdict = tuple[str, str, str, bool]
 
 
-def measure(case: Case, effort: float) -> dict[str, float]:
+def measure(case: Case, effort: float) -> Times:
     """Microseconds per forcing period of every peer, from the same settled state."""
     complete, minimal = oscillator_heyoka.oscillator("complete"), oscillator_heyoka.oscillator("minimal")
     p = case.parameters
@@ -33,21 +34,17 @@ def measure(case: Case, effort: float) -> dict[str, float]:
         complete.start(p, u)
         complete.section(n_heyoka)
 
-    rkf45 = {"method": "rkf45", "rtol": 1e-6}
-    times = interleaved(
-        {
-            "exact": partial(march, system, u, n, method="exact"),
-            "heyoka": partial(heyoka_march, complete),
-            "heyoka, h_a only": partial(heyoka_march, minimal),
-            "exact, section points": partial(section, system, u, n, method="exact"),
-            "heyoka, section points": heyoka_section,
-            "smoothed RKF45": partial(march, smooth, u, n_smooth, **rkf45),
-        }
-    )
-    counts = {"exact": n, "exact, section points": n, "smoothed RKF45": n_smooth}
-    found = {name: 1e6 * t / counts.get(name, n_heyoka) for name, t in medians(times).items()}
-    scipy = medians(interleaved({"SciPy": partial(oscillator_scipy.march, p, u, n_scipy)}))["SciPy"]
-    return found | {"SciPy": 1e6 * scipy / n_scipy}
+    peers = {
+        "exact": (partial(march, system, u, n, method="exact"), n),
+        "heyoka": (partial(heyoka_march, complete), n_heyoka),
+        "heyoka, h_a only": (partial(heyoka_march, minimal), n_heyoka),
+        "exact, section points": (partial(section, system, u, n, method="exact"), n),
+        "heyoka, section points": (heyoka_section, n_heyoka),
+        "smoothed RKF45": (partial(march, smooth, u, n_smooth, method="rkf45", rtol=1e-6), n_smooth),
+        "SciPy": (partial(oscillator_scipy.march, p, u, n_scipy), n_scipy),
+    }
+    times = interleaved({name: call for name, (call, _) in peers.items()})
+    return per_unit(times, {name: count for name, (_, count) in peers.items()})
 
 
 def same_answers(case: Case) -> float:
@@ -83,18 +80,18 @@ def run(effort: float) -> tuple[list[str], list[Verdict]]:
         + " | heyoka / exact | with sections | SciPy / exact | smoothed / heyoka | difference |",
         "|---|" + "---|" * (len(columns) + 5),
     ]
-    ratios: dict[str, list[float]] = {"heyoka": [], "section": [], "SciPy": [], "smoothed": [], "h_a only": []}
-    for case, t, difference in rows:
-        ratios["heyoka"].append(t["heyoka"] / t["exact"])
-        ratios["h_a only"].append(t["heyoka, h_a only"] / t["exact"])
-        ratios["section"].append(t["heyoka, section points"] / t["exact, section points"])
-        ratios["SciPy"].append(t["SciPy"] / t["exact"])
-        ratios["smoothed"].append(t["smoothed RKF45"] / t["heyoka"])
-        last = [ratios[key][-1] for key in ("heyoka", "section", "SciPy", "smoothed")]
-        lines.append(
-            f"| {case.name} | " + " | ".join(f"{t[c]:.3g}" for c in columns)
-            + f" | {last[0]:.1f} | {last[1]:.1f} | {last[2]:.0f} | {last[3]:.2f} | {difference:.1e} |"
-        )  # fmt: skip
+    pairs = {
+        "heyoka": ("heyoka", "exact"),
+        "section": ("heyoka, section points", "exact, section points"),
+        "SciPy": ("SciPy", "exact"),
+        "smoothed": ("smoothed RKF45", "heyoka"),
+        "h_a only": ("heyoka, h_a only", "exact"),
+    }
+    ratios = {key: [ratio(times, a, b) for _, times, _ in rows] for key, (a, b) in pairs.items()}
+    for i, (case, times, difference) in enumerate(rows):
+        cells = [f"{median(times[name]):.3g}" for name in columns]
+        cells += [f"{ratios[key][i]:.{digits}f}" for key, digits in zip(list(pairs)[:4], (1, 1, 0, 2), strict=True)]
+        lines.append(f"| {case.name} | " + " | ".join(cells) + f" | {difference:.1e} |")
     peer = oscillator_heyoka.oscillator()
     peer.start(CASES[0].parameters)
     before = peer.n_callbacks

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import heyoka_support as hs
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 import nonsmooth as ns
@@ -42,7 +43,9 @@ class Agreement:
     nearest_graze: float  # metres
     same_modes: bool  # up to the first touch or crossing nearer to grazing than 1e-9 m
     crossing_time: float  # largest difference of a crossing's time while growth < 1e3, seconds
-    n_touches: int  # touches both codes saw, or -1 where they differ
+    n_touches: int  # touches of the gap both codes saw, or -1 where the numbers differ
+    clearance: float  # largest difference of a touch's clearance, metres
+    allowance: float  # the largest allowance on the stretch
 
 
 def parameter_sets() -> list[tuple[int, dict[str, float]]]:
@@ -86,7 +89,8 @@ def compare(figure: int, p: dict[str, float], model: ns.System) -> Agreement:
     return Agreement(
         figure, p, theirs.n_contacts, float(hs.growth(p, theirs, scale=SCALE).max()), float(difference.max()),
         float(np.max(difference / allowance[1:])), worst, theirs.nearest_graze(), same, max(times, default=0.0),
-        same_touches(run, theirs, until),
+        *touches(run, theirs, until),
+        float(allowance.max()),
     )  # fmt: skip
 
 
@@ -94,23 +98,29 @@ def run_period(p: dict[str, float]) -> float:
     return 2 * np.pi / p["omega"]
 
 
-def entries_and_releases(run: object, until: float) -> list[tuple[float, bool]]:
+def entries_and_releases(run: xr.Dataset, until: float) -> list[tuple[float, bool]]:
     """(time, is release) of every crossing of our run before `until`.
 
     ``crossing_transition`` counts the transitions as declared: contact first, then its loss.
     """
-    times, transitions = run["crossing_time"].values, run["crossing_transition"].values  # type: ignore[index]
+    times, transitions = run["crossing_time"].values, run["crossing_transition"].values
     return [(float(t), int(k) == 1) for t, k in zip(times, transitions, strict=True) if t < until]
 
 
-def same_touches(run: object, theirs: hs.Run, until: float) -> int:
-    """Number of touches of the gap (local maxima of x below it) that both saw, -1 if the counts differ."""
-    names = [str(name) for name in np.atleast_1d(run["touch_indicator"].values)]  # type: ignore[index]
-    ours = sum(t < until for t in np.atleast_1d(run["touch_time"].values))  # type: ignore[index]
-    expected = sum(
-        e.time < until and e.mode == 0 and e.value <= 0 and e.indicator == "penetration" for e in theirs.extrema
-    )
-    return expected if ours == expected or not names else -1
+def touches(run: xr.Dataset, theirs: hs.Run, until: float) -> tuple[int, float]:
+    """Touches of the gap (maxima of x below it while free) both saw, -1 where the counts differ; and the largest
+    difference of a clearance (metres)."""
+    gap = run["touch_indicator"].values == 0  # penetration, the first indicator declared
+    times, clearances = run["touch_time"].values[gap], run["touch_clearance"].values[gap]
+    ours = clearances[times < until]
+    expected = [
+        -e.value
+        for e in theirs.extrema
+        if e.time < until and e.mode == 0 and e.value <= 0 and e.indicator == "penetration"
+    ]
+    if len(ours) != len(expected):
+        return -1, np.inf
+    return len(ours), float(np.max(np.abs(ours - expected), initial=0.0))
 
 
 def compare_all() -> list[Agreement]:
@@ -130,6 +140,8 @@ def report(results: list[Agreement]) -> str:
         f"{sum(r.nearest_graze >= 1e-9 for r in results)} have no touch or crossing nearer to grazing than 1e-9 m",
         f"worst difference over its allowance: {max(r.excess for r in results):.1e}",
         f"worst difference after one period from the same state (scaled): {max(r.per_period for r in results):.1e}",
+        f"touches of the gap seen by both: {sum(r.n_touches for r in results)}, worst clearance over its allowance:"
+        f" {max(r.clearance / r.allowance for r in results):.1e}",
         f"worst crossing time while neighbours stay together: {max(r.crossing_time for r in results):.1e} s",
     ]
     return "\n".join(lines)

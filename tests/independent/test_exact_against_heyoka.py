@@ -34,3 +34,10 @@ def test_modes_follow_in_the_same_order(results: list[Agreement]) -> None:
 
 def test_crossing_times_agree(results: list[Agreement]) -> None:
     assert max(r.crossing_time for r in results) <= 1e-10
+
+
+def test_touches_agree(results: list[Agreement]) -> None:
+    """Every maximum below the gap is recorded, with its clearance."""
+    assert all(r.n_touches >= 0 for r in results)
+    assert sum(r.n_touches for r in results) > 100
+    assert max(r.clearance / r.allowance for r in results) <= 1.0

@@ -9,7 +9,7 @@ import numpy as np
 
 from .cache import device, inline, kernel
 from .codes import CHATTER, DIVERGED, LOG_FULL, NO_CONVERGENCE, OK, TOO_MANY_CROSSINGS
-from .planar_march import bounded, jump, leg, next_holding, set_phase, settle, trigger
+from .planar_march import bounded, jump, leg, next_holding, set_phase, settle, stride, trigger, wrap_phase
 from .planar_search import (
     WIDTH, bracketed, compose, curvature_at, dense, horner, raise_maximum, slope_of, to_node, value_of,
 )  # fmt: skip
@@ -223,7 +223,7 @@ def chain(
             if s >= T:
                 s -= T
                 whole += 1.0
-                set_phase(w, s, rates)
+                wrap_phase(w, s, mode, info, rot, rates)
                 if not bounded(w, limit):
                     code = DIVERGED
             for f in range(n_i):
@@ -239,9 +239,10 @@ def chain(
                 if t < 0:
                     zero[surface] = 1
                 else:
-                    for k in range(row_start[t], row_start[t + 1]):
-                        if rows[k, 0] == fired:
-                            sense = rows[k, 1]
+                    if surface >= 0:
+                        for k in range(row_start[t], row_start[t + 1]):
+                            if rows[k, 0] == fired:
+                                sense = rows[k, 1]
                     nxt = t
                     while nxt >= 0:  # and those that hold just after it, at the same instant
                         if jumps > mode_start.shape[0]:
@@ -297,23 +298,23 @@ def log_touches(
 ):  # fmt: skip
     """Append the local maxima of the mode's armed rows that stay <= 0 within (0, b) of a leg. Returns the new count."""
     spacing = info[mode, 1]
-    size = NODES // 8
     for j in range(mode_start[mode], mode_start[mode + 1]):
         t = mode_list[j]
         for r in range(row_start[t], row_start[t + 1]):
             f = rows[r, 0]
             sign = float(rows[r, 1])
-            for node in range(0, NODES, size):
-                if node * spacing >= b or n >= touch_time.shape[0]:
+            for node in range(1, NODES, 2):  # pieces of two spacings, with their polynomial in the middle
+                if (node - 1) * spacing >= b or n >= touch_time.shape[0]:
                     break
-                to_node(prop, rot, mode, node, w, wn)
-                to_node(prop, rot, mode, node + size, w, wq)
+                to_node(prop, rot, mode, node - 1, w, wn)
+                to_node(prop, rot, mode, node + 1, w, wq)
                 if sign * value_of(fun, mode, f, wn) > 0.0:
                     continue
                 if sign * slope_of(fun, mode, f, wn) <= 0.0 or sign * slope_of(fun, mode, f, wq) > 0.0:
                     continue
+                to_node(prop, rot, mode, node, w, wn)
                 compose(tay, mode, f, wn, scr, 0)
-                local = bracketed(scr, 0, 1, 0.0, size * spacing)
+                local = bracketed(scr, 0, 1, -spacing, spacing)
                 value = sign * horner(scr, 0, local)
                 tau = node * spacing + local
                 if tau >= b or value > 0.0 or sign * curvature_at(scr, 0, local) > 0.0:
@@ -404,7 +405,7 @@ def record(
         if s >= T:
             s -= T
             whole += 1.0
-            set_phase(w, s, rates)
+            wrap_phase(w, s, mode, info, rot, rates)
             progress[3] = 0
         elif T > 1e300 and t < 0:
             progress[3] = 0

@@ -11,7 +11,7 @@ from math import cos, fabs, isfinite, sin
 
 from .cache import device, inline
 from .codes import BEYOND_STOP, OK
-from .planar_search import NEVER, bound_at, classify, dense, search, slope_of, to_node, value_of
+from .planar_search import NEVER, bound_at, classify, dense, search, slope_of, to_node, turn, value_of
 from .planar_tables import HARMONICS, NODES, M
 
 EPS = 2.3e-16
@@ -23,6 +23,18 @@ def set_phase(w, s, rates):
     for h in range(HARMONICS):
         w[3 + 2 * h] = cos(rates[h] * s)
         w[4 + 2 * h] = sin(rates[h] * s)
+
+
+@inline
+def wrap_phase(w, s, mode, info, rot, rates):
+    """Harmonics of the forcing at a time s shorter than a step of the mode, from its table: no drift over periods."""
+    spacing = info[mode, 1]
+    node = min(int(s / spacing + 0.5), NODES)
+    local = s - node * spacing
+    for h in range(HARMONICS):
+        c, s_ = turn(rates[h] * local, rot[mode, node, 2 * h], rot[mode, node, 2 * h + 1])
+        w[3 + 2 * h] = c
+        w[4 + 2 * h] = s_
 
 
 @inline

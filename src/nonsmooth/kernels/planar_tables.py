@@ -11,7 +11,7 @@ every inner loop has constant bounds. Arrays (M columns of w, functionals = indi
     rot[mode, node, 2 H + 1]       cos and sin of k_h w tau
     fun[mode, functional, 2 M + 6] row of the value, row of the slope, then k0, k1, k2: on a step that starts at
                                    (x, v) the fourth derivative stays below k0 |x - x_eq| + k1 |v - v_eq| + k2 (and three numbers of scratch)
-    tay[mode, functional, M, 10]   columns of the normalised Taylor coefficients of the functional: coefficient k
+    tay[mode, functional, M, 8]    columns of the normalised Taylor coefficients of the functional: coefficient k
                                    at w is the sum over j of tay[mode, f, j, k] w[j]
     field[mode, 2, M]              rows of x' and v'
     info[mode, 4]                  step, node spacing, x_eq, v_eq
@@ -25,7 +25,7 @@ HARMONICS = 1
 M = 3 + 2 * HARMONICS
 NODES = 32
 TERMS = 26
-DEGREE = 9  # of the Taylor polynomial beside a node: remainder below 1e-18 of the amplitude
+DEGREE = 7  # of the Taylor polynomials: within a node spacing the remainder is below 2e-16 of the amplitude
 STEP_ANGLE = 1.2566370614359172  # 2 pi / 5
 FREE_STEP = 1.0  # a mode without a time scale of its own moves on polynomials: any step is exact
 

@@ -47,14 +47,15 @@ def draw_diagram(
     ax: Axes, data: Mapping[str, xr.Dataset], key: str, y: str, *, values: Sequence[float] = (), loc: str = "best"
 ) -> None:
     """One diagram: starts in grey behind, down over up; the paper's parameter values as dotted lines."""
-    plot.bifurcation(data[f"{key}_starts"], ax, y=y, color="#A8A8A8", size=1.6)
+    plot.bifurcation(data[f"{key}_starts"], ax, y=y, color="#B4B4B4", size=1.8)
     behind = len(ax.get_lines())
-    plot.bifurcation(data[key], ax, y=y, size=0.7)
+    plot.bifurcation(data[key], ax, y=y, size=0.9 if data[key].sizes["iterate"] > 100 else 1.3)
     for i, line in enumerate(ax.get_lines()):
         line.set_zorder(1 + (i >= behind))
     ax.get_lines()[0].set_label("several starts")
-    for value in values:
-        ax.axvline(value, color="black", linewidth=0.6, linestyle=":", zorder=0)
+    for i, value in enumerate(values):
+        label = "printed in the paper" if i == 0 else None
+        ax.axvline(value, color="black", linewidth=0.6, linestyle=":", zorder=0, label=label)
     ax.legend(loc=loc, markerscale=5, handletextpad=0.2)
 
 

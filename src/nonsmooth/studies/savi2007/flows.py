@@ -19,10 +19,11 @@ _Choice = TypeVar("_Choice")
 
 @dataclass(frozen=True)
 class Flow:
-    """A model with the method that integrates it: ``key`` in file names, ``title`` in figures."""
+    """A model with the method that integrates it: ``key`` in file names, ``title`` and ``short`` in figures."""
 
     key: str
     title: str
+    short: str
     eta: float | None
     options: Mapping[str, Any] = field(default_factory=dict)
 
@@ -32,8 +33,8 @@ class Flow:
         return system if self.eta is None else system.smoothed(self.eta)
 
 
-EXACT = Flow("exact", "exact flow", None, {"method": "exact"})
-SMOOTHED = Flow("smoothed", "smoothed switch, RKF45", ETA, {"method": "rkf45", "rtol": 1e-6})
+EXACT = Flow("exact", "exact flow", "exact", None, {"method": "exact"})
+SMOOTHED = Flow("smoothed", "smoothed switch, RKF45", "smoothed", ETA, {"method": "rkf45", "rtol": 1e-6})
 FLOWS = (EXACT, SMOOTHED)
 
 

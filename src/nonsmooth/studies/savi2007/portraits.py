@@ -41,7 +41,7 @@ def portraits(
         )  # fmt: skip
         data[flow.key] = survey
         for value, wanted in shown.items():
-            periods = 2 * wanted if wanted != APERIODIC else settings.of(flow, exact=40, smoothed=40, quick=20)
+            periods = 2 * wanted if wanted != APERIODIC else CHAOTIC_PERIODS
             data[f"{flow.key}_{value:g}"] = simulate(
                 system.with_parameters({parameter: value}), start=first[chosen_start(survey, value, wanted)],
                 transient=transient, periods=periods, **flow.options,
@@ -78,7 +78,7 @@ def draw_portraits(
                         plot.section(points, ax, size=3.0)
                         ax.get_lines()[-1].set_zorder(4)
                     ax.set_xlabel(ax.get_xlabel() if flow is FLOWS[-1] else "")
-                    ax.set_ylabel(f"{flow.title}\n{ax.get_ylabel()}" if i == 0 else "")
+                    ax.set_ylabel(f"{flow.short}\n{ax.get_ylabel()}" if i == 0 else "")
                     if flow is FLOWS[0]:
                         ax.set_title(f"({'abcd'[i]}) ${symbol} = {value:g}$ {unit}")
         return canvas

@@ -51,7 +51,7 @@ def _draw(printed: Mapping[str, float]) -> Callable[[Mapping[str, xr.Dataset]], 
                 plot.frequency_response(response, ax)
                 _mark(ax, response, printed)
                 ax.set_title(f"({letter}) {flow.title}")
-                ax.legend(loc="upper left")
+                ax.legend(loc="lower left")
             ax.set_ylabel("")
         return canvas
 

@@ -104,11 +104,12 @@ def _chosen(numbers: Sequence[int] | None) -> tuple[Figure, ...]:
 
 
 def _write(figure: Figure, data: dict[str, xr.Dataset], folder: Path) -> None:
-    from nonsmooth.plot import save_figure
+    from nonsmooth.plot import journal, save_figure
     from nonsmooth.results.store import save
 
     for key, dataset in data.items():
         save(dataset, folder / f"{figure.name}_{key}.nc")
     canvas = figure.draw(data)
     save_figure(canvas, folder / f"{figure.name}.pdf")
-    canvas.savefig(folder / f"{figure.name}.png", dpi=PICTURE_DPI, metadata={"Software": None})
+    with journal():
+        canvas.savefig(folder / f"{figure.name}.png", dpi=PICTURE_DPI, metadata={"Software": None})

@@ -1,0 +1,84 @@
+"""Figures 17 and 18: the forcing frequency is varied across a range of chaos that ends in grazing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from nonsmooth import plot
+from nonsmooth.flow.poincare import poincare
+from nonsmooth.studies.savi2007.diagrams import diagrams, draw_diagram, how
+from nonsmooth.studies.savi2007.figure import Figure, sheet
+from nonsmooth.studies.savi2007.flows import FLOWS, Settings, starts
+from nonsmooth.studies.savi2007.portraits import chosen_start, describe, draw_portraits, portraits
+from nonsmooth.studies.savi2007.printed import FIGURE_17, FIGURE_18
+from nonsmooth.studies.savi2007.resonance import grazing_of
+from nonsmooth.studies.savi2007.twins import twins
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure as Canvas
+
+__all__ = ["FIGURES"]
+
+_CHAOTIC = 9.55
+
+
+def _compute_17(settings: Settings) -> dict[str, xr.Dataset]:
+    return diagrams(settings, FIGURE_17, "omega", 8.4, 10.4, (800, 300))
+
+
+def _draw_17(data: Mapping[str, xr.Dataset]) -> Canvas:
+    with plot.journal():
+        canvas = sheet(plot.PAGE, 0.72 * plot.PAGE)
+        grid = canvas.subplots(2, 2, sharex=True, sharey="row")
+        for j, flow in enumerate(FLOWS):
+            for i, state in enumerate("xv"):
+                ax = grid[i, j]
+                draw_diagram(ax, data, flow.key, state, values=tuple(FIGURE_18), loc="lower left")
+                for omega in grazing_of(data[flow.key]):
+                    if data[flow.key]["omega"].min() < omega < data[flow.key]["omega"].max():
+                        ax.axvline(omega, color=plot.COLORS["third"], linewidth=0.8, zorder=0, label="grazing")
+                ax.set_xlabel(ax.get_xlabel() if i else "")
+                ax.set_ylabel(ax.get_ylabel() if j == 0 else "")
+                if (i, j) == (0, 0):
+                    ax.legend(loc="upper right", markerscale=5, handletextpad=0.2)
+                else:
+                    ax.get_legend().remove()
+            grid[0, j].set_title(f"({'ab'[j]}) {flow.title}")
+    return canvas
+
+
+def _caption_17(data: Mapping[str, xr.Dataset]) -> str:
+    grazing = ", ".join(f"{omega:.5f}" for omega in grazing_of(data["exact"]))
+    return (
+        "Bifurcation diagram over the forcing frequency, rho = 0.23 N, g = 0.0036 m: displacement (above) and velocity at the "
+        f"section. Dotted: the three frequencies of Fig. 18; green: closed-form grazing of the motion without contact "
+        f"(all: {grazing} rad/s). Grey shows motions that coexist with what the sweeps follow. " + how(data)
+    )
+
+
+def _compute_18(settings: Settings) -> dict[str, xr.Dataset]:
+    data = portraits(settings, FIGURE_17, "omega", FIGURE_18)
+    for flow in FLOWS:
+        begin = starts(data[flow.key].sizes["start"])[chosen_start(data[flow.key], _CHAOTIC, FIGURE_18[_CHAOTIC])]
+        system = flow.system(omega=_CHAOTIC, **FIGURE_17)
+        attractor = poincare(system, start=begin, transient=300, n=200, **flow.options)
+        data[f"{flow.key}_twins"] = twins(flow, system, attractor)
+    return data
+
+
+def _caption_18(data: Mapping[str, xr.Dataset]) -> str:
+    return (
+        "Phase portraits at three frequencies of Fig. 17; section points black, contact zone shaded. Where motions coexist, "
+        "the first start that ends in the paper's is drawn. " + describe(data, FIGURE_18)
+    )
+
+
+FIGURES = (
+    Figure("fig17", 17, "Bifurcation diagrams over the forcing frequency", _compute_17, _draw_17, _caption_17),
+    Figure(
+        "fig18", 18, "Phase portraits over the forcing frequency", _compute_18,
+        draw_portraits("omega", "rad/s", r"\omega", FIGURE_18), _caption_18,
+    ),
+)  # fmt: skip
