@@ -10,7 +10,7 @@ step (``side``: -1, 1, or 0 where nothing was established), so that no change fa
 
 from math import fabs, sqrt
 
-from .cache import device
+from .cache import device, inline
 from .polynomial import NONE, UP, bounds, dense, first_crossing, load, shift, strip
 
 __all__ = ["NOISE", "earliest", "holding", "holds", "section_crossing", "sides_at", "snap"]
@@ -131,7 +131,7 @@ def _fires(lo, hi, C, m, n, powers, rows, side, side_next, scale, tail, slack, a
     return NONE, -1
 
 
-@device
+@inline
 def earliest(mode, C, m, n, powers, net, side, side_next, scale, tail, slack, a, d, stack, found):
     """(x, transition, row): the first transition out of ``mode`` on the step, at the fraction x of it; x = NONE: none.
 
@@ -171,7 +171,7 @@ def earliest(mode, C, m, n, powers, net, side, side_next, scale, tail, slack, a,
     return best, which, hit
 
 
-@device
+@inline
 def section_crossing(C, row, m, way, before, cursor, powers, scale, a, stack, found):
     """The next x > cursor (fraction of the step) where a row changes sign in the direction ``way``, or NONE."""
     mr = load(C, row, 1.0, m, powers, a)

@@ -11,7 +11,7 @@ from .cache import device, inline, kernel
 from .codes import CHATTER, DIVERGED, LOG_FULL, NO_CONVERGENCE, OK, TOO_MANY_CROSSINGS
 from .planar_march import bounded, jump, leg, next_holding, set_phase, settle, stride, trigger, wrap_phase
 from .planar_search import (
-    WIDTH, bracketed, compose, curvature_at, dense, horner, raise_maximum, slope_of, to_node, value_of,
+    WIDTH, bracketed, compose, curvature_at, dense, exceeds, horner, locate_maximum, slope_of, to_node, value_of,
 )  # fmt: skip
 from .planar_tables import DEGREE, HARMONICS, NODES, TERMS, M, build
 
@@ -37,7 +37,7 @@ def scratch(n_modes, n_indicators, n_outputs, n_rows):
         np.zeros((n_modes, NODES + 1, 2, M)), np.zeros((n_modes, NODES + 1, 2 * HARMONICS + 1)),
         np.zeros((n_modes, n_f, 2 * M + 6)), np.zeros((n_modes, n_f, M, DEGREE + 1)), np.zeros((n_modes, 2, M)),
         np.zeros((n_modes, 4)), np.zeros((TERMS + 1, M)), np.zeros((7, M)), np.zeros((n_rows + 3, WIDTH)),
-        np.zeros(4), np.zeros(HARMONICS), np.zeros(n_indicators + 2, dtype=np.int64),
+        np.zeros(4), np.zeros(HARMONICS), np.zeros(2 * n_indicators + 2, dtype=np.int64),
     )  # fmt: skip
 
 
@@ -51,22 +51,47 @@ def extreme_slot(f, n_i, maximum, minimum, i_max, i_min, o_max, o_min):
     return o_max, o_min, f - n_i - 2
 
 
-@device
+@inline
 def widen(
-    i, a, b, prop, rot, fun, tay, info, mode, w, w1, n_i, maximum, minimum, i_max, i_min, o_max, o_min,
+    i, a, b, prop, rot, fun, tay, info, mode, w, w1, n_i, twin, maximum, minimum, i_max, i_min, o_max, o_min,
     wn, wq, scr, points,
 ):  # fmt: skip
     """Extend the extremes of point i by the piece [a, b] of a leg that starts at w."""
     for f in range(fun.shape[1]):
+        if f < n_i and twin[f] >= 0:
+            continue  # a state but for a constant: see ``finish``
         hi, lo, k = extreme_slot(f, n_i, maximum, minimum, i_max, i_min, o_max, o_min)
-        for side in range(2):
-            sign = 1.0 - 2.0 * side
-            best = hi[i, k] if side == 0 else -lo[i, k]
-            best = raise_maximum(prop, rot, fun, tay, info, mode, w, w1, f, sign, a, b, best, wn, wq, scr, points)
-            if side == 0:
-                hi[i, k] = best
-            else:
-                lo[i, k] = -best
+        below, above = exceeds(fun, info, mode, f, w, w1, lo[i, k], hi[i, k])
+        if above:
+            hi[i, k] = locate_maximum(
+                prop, rot, fun, tay, info, mode, w, f, 1.0, a, b, hi[i, k], wn, wq, scr, points
+            )
+        if below:
+            lo[i, k] = -locate_maximum(
+                prop, rot, fun, tay, info, mode, w, f, -1.0, a, b, -lo[i, k], wn, wq, scr, points
+            )
+
+
+@inline
+def find_twins(fun, n_i, twin):
+    """Indicators that are a state but for a constant, and which: their extremes follow from the state's."""
+    for f in range(n_i):
+        twin[f] = -1
+        for k in range(2):
+            same = fun[0, f, k] == 1.0 and fun[0, f, 1 - k] == 0.0
+            for j in range(3, M):
+                same = same and fun[0, f, j] == 0.0
+            if same:
+                twin[f] = k
+
+
+@inline
+def finish(i, fun, n_i, twin, maximum, minimum, i_max, i_min):
+    """Extremes of the indicators that are a state but for a constant."""
+    for f in range(n_i):
+        if twin[f] >= 0:
+            i_max[i, f] = maximum[i, twin[f]] + fun[0, f, 2]
+            i_min[i, f] = minimum[i, twin[f]] + fun[0, f, 2]
 
 
 @device
@@ -115,6 +140,7 @@ def chain(
     )  # fmt: skip
     zero = integers[0:n_i]
     found = integers[n_i : n_i + 2]
+    twin = integers[n_i + 2 : 2 * n_i + 2]
     surface, direction, surface_mode, after, every = plan[0], plan[1], plan[2], plan[3], plan[4]
     w[2] = 1.0
     # whole steps at a stride: only where nothing but a crossing can end a step
@@ -126,6 +152,7 @@ def chain(
             rates[h] = multiples[h] * omega[i]
         T = period[i]
         build(i, A, b, c, s_, rates, T, ia, ib, ic, is_, oa, ob, oc, os_, prop, rot, fun, tay, field, info, row)
+        find_twins(fun, n_i, twin)
         target = phase * T
         s = 0.0
         whole = 0.0
@@ -206,7 +233,7 @@ def chain(
                         a = r
             if is_open:
                 widen(
-                    i, a, b_, prop, rot, fun, tay, info, mode, w, w1, n_i, maximum, minimum, i_max, i_min,
+                    i, a, b_, prop, rot, fun, tay, info, mode, w, w1, n_i, twin, maximum, minimum, i_max, i_min,
                     o_max, o_min, wn, wq, scr, points,
                 )  # fmt: skip
                 elapsed[i] += b_ - a
@@ -281,6 +308,7 @@ def chain(
                             section_time[i, k] = (whole * T if T < 1e300 else 0.0) + s
             if surface >= 0 and waited > t_max and code == OK:
                 code = NO_CONVERGENCE
+        finish(i, fun, n_i, twin, maximum, minimum, i_max, i_min)
         status[i] = code
         if code == OK:
             u[0] = w[0]

@@ -480,12 +480,18 @@ def locate_maximum(prop, rot, fun, tay, info, mode, w, f, sign, a, b, best, wn, 
 
 
 @inline
-def raise_maximum(prop, rot, fun, tay, info, mode, w, w1, f, sign, a, b, best, wn, wq, scr, points):
-    """The larger of ``best`` and the maximum of sign * functional over [a, b] of the step; cheap where it is not raised."""
-    g0 = sign * value_of(fun, mode, f, w) - best
-    g1 = sign * value_of(fun, mode, f, w1) - best
-    s0 = sign * slope_of(fun, mode, f, w)
-    s1 = sign * slope_of(fun, mode, f, w1)
-    if classify(g0, s0, g1, s1, info[mode, 0], bound_at(fun, info, mode, f, w)) == NEVER:
-        return best
-    return locate_maximum(prop, rot, fun, tay, info, mode, w, f, sign, a, b, best, wn, wq, scr, points)
+def exceeds(fun, info, mode, f, w, w1, lowest, highest):
+    """Whether functional f may leave [lowest, highest] on the step from w to w1: (below, above)."""
+    g0 = value_of(fun, mode, f, w)
+    g1 = value_of(fun, mode, f, w1)
+    h = info[mode, 0]
+    b1 = g0 + h * slope_of(fun, mode, f, w) * THIRD
+    b2 = g1 - h * slope_of(fun, mode, f, w1) * THIRD
+    c1 = 0.25 * (g0 + 3.0 * b1)
+    c2 = 0.5 * (b1 + b2)
+    c3 = 0.25 * (3.0 * b2 + g1)
+    h2 = h * h
+    wide = bound_at(fun, info, mode, f, w) * h2 * h2 * (1.0 / 144.0)
+    below = min(min(min(g0, g1), min(c1, c3)), c2 - wide) < lowest
+    above = max(max(max(g0, g1), max(c1, c3)), c2 + wide) > highest
+    return below, above

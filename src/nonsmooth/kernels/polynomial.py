@@ -14,7 +14,7 @@ from math import fabs
 
 import numpy as np
 
-from .cache import device
+from .cache import device, inline
 
 __all__ = [
     "DOWN", "NONE", "UP", "bernstein", "bounds", "dense", "first_crossing", "largest", "load", "shift", "stack_size", "strip",
@@ -39,7 +39,7 @@ def stack_size(m: int) -> int:
     return (DEPTH + 2) * (m + 4)
 
 
-@device
+@inline
 def load(C, row, sign, m, powers, a):
     """a_k = sign C[row, k] powers[k]: the row on the unit interval; at least degree 4, filled with zeros."""
     for k in range(m + 1):
@@ -49,7 +49,7 @@ def load(C, row, sign, m, powers, a):
     return m if m > 4 else 4
 
 
-@device
+@inline
 def strip(a, m):
     """Divide by the power of x that a polynomial with leading zeros contains: same signs for x > 0, sharper tests.
 
@@ -69,7 +69,7 @@ def strip(a, m):
     return m if m > 4 else 4
 
 
-@device
+@inline
 def bounds(a, m):
     """Certified (lower, upper) bound on [0, 1]: Bernstein coefficients of the first five terms, the rest by size."""
     low, high = 0.0, 0.0
@@ -85,7 +85,7 @@ def bounds(a, m):
     return low + min(a[0], b1, b2, b3, b4), high + max(a[0], b1, b2, b3, b4)
 
 
-@device
+@inline
 def dense(a, m, x):
     """a(x) by Horner's rule."""
     v = a[m]

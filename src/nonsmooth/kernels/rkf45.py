@@ -8,7 +8,7 @@ of degree 5 whose error h^6 / 46080 is below the step's own.
 
 from math import fabs, inf, sqrt
 
-from .cache import device
+from .cache import device, inline
 
 __all__ = ["first_step", "hermite", "quiet", "stages", "transit"]
 
@@ -65,7 +65,7 @@ def hermite(J0, J1, rows, h, C):
         C[i, 5] = (6.0 * e0 - 3.0 * e1 + e2) * g * g * g * g * g
 
 
-@device
+@inline
 def _certain(J0, J1, row, sign, h, error):
     """-1: sign * row certainly <= 0 on the step, 1: certainly > 0, 0: undecided (Bernstein form of the quintic)."""
     b0, b5 = sign * J0[row, 0], sign * J1[row, 0]

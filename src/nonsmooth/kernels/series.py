@@ -13,7 +13,7 @@ from math import log as ln
 
 from numba import types
 
-from .cache import device, kernel
+from .cache import device, inline, kernel
 from .codes import DIVERGED, LOG_FULL, NO_CONVERGENCE, NOT_GUARANTEED, OK
 from .crossing import NOISE, earliest, holds, section_crossing, sides_at
 from .polynomial import NONE
@@ -31,7 +31,7 @@ from .watch import extend, extend_at_node, extend_corners, sample, touches, writ
 __all__ = ["march"]
 
 
-@device
+@inline
 def next_stop(mode, t, base, period, phase, until, net):
     """The next time at which a step must end."""
     stop = period if until < 0.0 else min(period, until - base)
@@ -68,7 +68,7 @@ def no_doubt(C, m, n, n_indicators, h, scale):
     return h
 
 
-@device
+@inline
 def failed(u, n, largest):
     """Whether the state has left every bound."""
     for i in range(n):

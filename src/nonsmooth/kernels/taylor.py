@@ -6,12 +6,12 @@ The order follows from the tolerance, p = ceil(1 - ln(rtol) / 2), and the length
 
 from math import exp, fabs, inf, log
 
-from .cache import device
+from .cache import inline
 
 __all__ = ["dense_states", "fill_powers", "step_length"]
 
 
-@device
+@inline
 def step_length(C, order, n, n_indicators, u, weight, scale, log_rtol):
     """h such that the last two terms are rtol (|u_i| + weight_i), for an indicator rtol times its own scale.
 
@@ -37,7 +37,7 @@ def step_length(C, order, n, n_indicators, u, weight, scale, log_rtol):
     return inf if power > 300.0 else exp(power)
 
 
-@device
+@inline
 def fill_powers(h, m, powers):
     """powers[k] = h^k, k = 0..m."""
     power = 1.0
@@ -46,7 +46,7 @@ def fill_powers(h, m, powers):
         power *= h
 
 
-@device
+@inline
 def dense_states(C, m, n, tau, out):
     """States at the local time tau of the step."""
     for i in range(n):

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.lines import Line2D
 
 from nonsmooth import plot
 from nonsmooth.analysis.sweep import sweep
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = ["diagrams", "draw_diagram", "how"]
+__all__ = ["diagrams", "draw_diagram", "how", "key"]
 
 
 def diagrams(
@@ -56,7 +57,14 @@ def draw_diagram(
     for i, value in enumerate(values):
         label = "printed in the paper" if i == 0 else None
         ax.axvline(value, color="black", linewidth=0.6, linestyle=":", zorder=0, label=label)
-    ax.legend(loc=loc, markerscale=5, handletextpad=0.2)
+    key(ax, loc)
+
+
+def key(ax: Axes, loc: str) -> None:
+    """The legend of a diagram, its points large enough to be seen."""
+    for handle in ax.legend(loc=loc).legend_handles:
+        if isinstance(handle, Line2D):
+            handle.set_markersize(4)
 
 
 def how(data: Mapping[str, xr.Dataset]) -> str:

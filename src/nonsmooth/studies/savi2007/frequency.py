@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from nonsmooth import plot
 from nonsmooth.flow.poincare import poincare
-from nonsmooth.studies.savi2007.diagrams import diagrams, draw_diagram, how
+from nonsmooth.studies.savi2007.diagrams import diagrams, draw_diagram, how, key
 from nonsmooth.studies.savi2007.figure import Figure, sheet
 from nonsmooth.studies.savi2007.flows import FLOWS, Settings, starts
 from nonsmooth.studies.savi2007.portraits import chosen_start, describe, draw_portraits, portraits
@@ -42,7 +42,7 @@ def _draw_17(data: Mapping[str, xr.Dataset]) -> Canvas:
                 ax.set_xlabel(ax.get_xlabel() if i else "")
                 ax.set_ylabel(ax.get_ylabel() if j == 0 else "")
                 if (i, j) == (0, 0):
-                    ax.legend(loc="upper right", markerscale=5, handletextpad=0.2)
+                    key(ax, "lower right")
                 else:
                     ax.get_legend().remove()
             grid[0, j].set_title(f"({'ab'[j]}) {flow.title}")

@@ -62,7 +62,7 @@ def _compute_15(settings: Settings) -> dict[str, xr.Dataset]:
     data = {}
     for flow in FLOWS:
         system = flow.system(g=_CHAOTIC, **FIGURE_13)
-        n = settings.of(flow, exact=20_000, smoothed=6_000, quick=2_000)
+        n = settings.of(flow, exact=20_000, smoothed=20_000, quick=2_000)
         for key, phase in PHASES.items():
             data[f"{flow.key}_{key}"] = poincare(
                 system, section=Stroboscopic(phase), n=n, transient=300, **flow.options
@@ -81,7 +81,7 @@ def _draw_15(data: Mapping[str, xr.Dataset]) -> Canvas:
                 ax.set_xlabel(ax.get_xlabel() if flow is FLOWS[-1] else "")
                 ax.set_ylabel(f"{flow.short}\n{ax.get_ylabel()}" if i == 0 else "")
                 if flow is FLOWS[0]:
-                    ax.set_title(f"({'abcd'[i]}) phase ${_ANGLES[i]}$")
+                    ax.set_title(f"({'abcd'[i]}) phase ${_ANGLES[i]}$", y=1.0, pad=9)
     return canvas
 
 

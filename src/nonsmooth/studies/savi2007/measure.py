@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "APERIODIC", "UNSETTLED", "Interval", "change", "jumps", "last_with", "periods_reached", "regimes", "separation_rate",
+    "APERIODIC", "UNSETTLED", "Interval", "change", "jumps", "range_of", "periods_reached", "regimes", "separation_rate",
 ]  # fmt: skip
 
 APERIODIC = 0  # no period found up to the longest looked for
@@ -69,8 +69,8 @@ def change(swept: xr.Dataset, first: int, second: int, direction: str | None = N
     return min(found, key=lambda interval: interval.uncertainty, default=None)
 
 
-def last_with(swept: xr.Dataset, regime_wanted: int, direction: str | None = None) -> tuple[float, float] | None:
-    """Smallest and largest parameter value with a regime."""
+def range_of(swept: xr.Dataset, regime_wanted: int, direction: str | None = None) -> tuple[float, float] | None:
+    """Smallest and largest parameter value with a regime; None where it does not occur."""
     values, regime = regimes(swept, direction)
     at = np.flatnonzero(regime == regime_wanted)
     return (float(values[at[0]]), float(values[at[-1]])) if len(at) else None

@@ -80,7 +80,7 @@ def draw_portraits(
                     ax.set_xlabel(ax.get_xlabel() if flow is FLOWS[-1] else "")
                     ax.set_ylabel(f"{flow.short}\n{ax.get_ylabel()}" if i == 0 else "")
                     if flow is FLOWS[0]:
-                        ax.set_title(f"({'abcd'[i]}) ${symbol} = {value:g}$ {unit}")
+                        ax.set_title(f"({'abcd'[i]}) ${symbol} = {value:g}$ {unit}", y=1.0, pad=9)
         return canvas
 
     return draw

@@ -1,0 +1,84 @@
+"""A row of the report, and the rules by which a number is called in agreement."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeAlias
+
+from nonsmooth.studies.savi2007.measure import Interval
+from nonsmooth.studies.savi2007.printed import Printed
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["CLOSE", "Data", "Row", "against_closed_form", "against_printed", "compare"]
+
+#: Datasets by figure and key.
+Data: TypeAlias = "Mapping[str, Mapping[str, xr.Dataset]]"
+
+CLOSE = 2.0  # percent; the paper's own two natural frequencies, 4.50 and 4.60 rad/s, are 2.2 % apart
+
+
+@dataclass(frozen=True)
+class Row:
+    """One statement: what the paper says (``place``: where), what both flows give, and what follows."""
+
+    id: str
+    place: str
+    says: str
+    exact: str
+    smoothed: str
+    difference: str
+    verdict: str
+    why: str = ""
+
+
+def compare(printed: Printed, found: Interval | None) -> tuple[str, str]:
+    """Difference in percent, and the verdict.
+
+    A number agrees when the printed one, with its rounding, lies in the interval of the sweep; within N % up to 2 %.
+    """
+    if found is None:
+        return "not found", "differs"
+    percent = 100 * (found.middle / printed.value - 1)
+    if abs(found.middle - printed.value) <= found.uncertainty + printed.rounding:
+        verdict = "agrees"
+    elif abs(percent) <= CLOSE:
+        verdict = f"agrees within {math.ceil(10 * abs(percent)) / 10:.1f} %"
+    else:
+        verdict = f"differs by {abs(percent):.1f} %"
+    return f"{percent:+.1f} %", verdict
+
+
+def against_printed(
+    claim: str, says: str, printed: Printed, exact: Interval | None, smoothed: Interval | None, why: str = ""
+) -> Row:
+    """A printed number beside what both flows give; the verdict is on the exact one."""
+    difference, verdict = compare(printed, exact)
+    other, _ = compare(printed, smoothed)
+    return Row(
+        claim, printed.place, says, _with_unit(exact, printed.unit), _with_unit(smoothed, printed.unit),
+        f"exact {difference}, smoothed {other}", verdict, why,
+    )  # fmt: skip
+
+
+def against_closed_form(
+    claim: str, place: str, says: str, closed: float, exact: Interval | None, smoothed: Interval | None, why: str = ""
+) -> Row:
+    """A frequency known in closed form, in rad/s, beside the sweeps: they agree within one of their steps."""
+
+    def off(found: Interval | None) -> str:
+        return "not found" if found is None else f"{found.middle - closed:+.4f} rad/s"
+
+    met = [found is not None and abs(found.middle - closed) <= 2 * found.uncertainty for found in (exact, smoothed)]
+    verdict = "agrees" if all(met) else "agrees in part" if any(met) else "differs"
+    return Row(
+        claim, place, f"{says}: {closed:.5f} rad/s", _with_unit(exact, "rad/s"), _with_unit(smoothed, "rad/s"),
+        f"exact {off(exact)}, smoothed {off(smoothed)}", verdict, why,
+    )  # fmt: skip
+
+
+def _with_unit(found: Interval | None, unit: str) -> str:
+    return "not found" if found is None else f"{found} {unit}"
