@@ -54,6 +54,9 @@ def frequency_response(
     from nonsmooth.results.provenance import ATTRIBUTE, read_provenance
     from nonsmooth.results.schema import response
 
+    check_system(system, "frequency_response")
+    if parameter not in system.parameters:
+        system.with_parameters({parameter: 0.0})  # raises with the names there are
     swept = sweep(system, parameter, values, direction=direction, **options)
     full = [("direction", 1), ("start", 1), (parameter, swept.sizes[parameter]), ("state", swept.sizes["state"])]
     half = 0.5 * (swept["maximum"] - swept["minimum"])

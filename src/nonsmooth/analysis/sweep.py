@@ -12,6 +12,7 @@ import numpy as np
 
 from nonsmooth.analysis.classify import TOLERANCE
 from nonsmooth.analysis.settle import Attractors
+from nonsmooth.flow.arguments import check_options, check_system, float_array, whole_number
 from nonsmooth.flow.engine import Chain, FloatArray, State
 from nonsmooth.flow.methods import RTOL, engine_for
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
@@ -68,7 +69,7 @@ def sweep(
         Section returns passed over, then recorded, at each value. A point that is still settling gets up to eight
         transients; what is not settled then has the status ``slow``.
     max_period : int
-        Longest period number looked for.
+        Longest period number looked for (and no longer than ``keep`` - 1).
     method, rtol, atol
         See :func:`nonsmooth.flow.methods.engine_for`.
     threads : int, optional
@@ -93,24 +94,25 @@ def sweep(
     A period number p is granted only where the p-th return is below 1e-9 of the motion's size and contracts:
     see :mod:`nonsmooth.analysis.classify`.
     """
+    check_system(system, "sweep")
+    check_options(system, expert, sweep)
     numbers = _values(system, parameter, values)
     directions = _directions(direction)
-    for name, number, least in (("transient", transient, 0), ("keep", keep, 2), ("max_period", max_period, 1)):
-        if int(number) != number or number < least:
-            raise ValueError(f"{name} = {number!r} must be a whole number, at least {least}")
-    if threads is not None and threads < 1:
-        raise ValueError(f"threads = {threads} must be at least 1")
+    transient, keep = whole_number(transient, "transient", 0), whole_number(keep, "keep", 2)
+    max_period = whole_number(max_period, "max_period", 1)
+    if threads is not None:
+        threads = whole_number(threads, "threads", 1)
     section, plan = section_plan(system, section)
     engine = engine_for(system, method, rtol, atol, **expert)
     starts = start_states(system, start)
     points = system.parameter_points({parameter: numbers})
     noise = TOLERANCE if engine.name == "exact" else max(TOLERANCE, 10.0 * (RTOL if rtol is None else rtol))
-    attractors = Attractors(engine, engine.prepare(points), plan, int(transient), int(keep), int(max_period), noise,
+    attractors = Attractors(engine, engine.prepare(points), plan, transient, keep, max_period, noise,
                             system.scale_vector())  # fmt: skip
     traced = system.traced
     sizes = len(traced.u), len(traced.indicators), len(traced.outputs)
     slots = {
-        (d, k): Slot(Chain.empty(len(numbers), int(keep), *sizes), len(numbers))
+        (d, k): Slot(Chain.empty(len(numbers), keep, *sizes), len(numbers))
         for d in range(len(directions)) for k in range(len(starts))
     }  # fmt: skip
     memory = system.memory_vector()
@@ -162,18 +164,20 @@ class Report:
 def _values(system: System, parameter: str, values: Any) -> FloatArray:
     if parameter not in system.values:
         system.with_parameters({parameter: 0.0})  # raises with the names there are
-    numbers = np.array(values, dtype=float)
+    numbers = float_array(values, f"values of {parameter!r}")
     if numbers.ndim != 1 or not len(numbers):
-        raise ValueError(f"values of {parameter!r} must be a list of numbers, not of shape {numbers.shape}")
+        hint = "; for one value write [value]" if numbers.ndim == 0 else ""
+        raise ValueError(f"values of {parameter!r} must be a list of numbers, not of shape {numbers.shape}{hint}")
     if not np.isfinite(numbers).all():
         raise ValueError(f"values of {parameter!r} must be finite; number {int(np.argmin(np.isfinite(numbers)))} is not")
-    if len(np.unique(numbers)) < len(numbers):
-        raise ValueError(f"values of {parameter!r} must differ from each other")
+    distinct, count = np.unique(numbers, return_counts=True)
+    if (count > 1).any():
+        raise ValueError(f"values of {parameter!r} must differ from each other; {distinct[count > 1][0]} is there twice")
     return numbers
 
 
 def _directions(direction: Any) -> tuple[str, ...]:
-    if direction not in DIRECTIONS:
+    if not isinstance(direction, str | None) or direction not in DIRECTIONS:
         raise ValueError(f"direction = {direction!r}; allowed: {', '.join(map(repr, DIRECTIONS))}")
     return DIRECTIONS[direction]
 
@@ -241,7 +245,7 @@ def _dataset(
             [np.stack([read(slots[d, k]) for k in range(len(starts))]) for d in range(len(directions))]
         )
 
-    failed = gather(lambda slot: np.isnan(slot.chain.section).any(axis=(1, 2)) & ~_usable(slot))
+    failed = gather(lambda slot: ~_usable(slot))
     sides = armed_signs(system)
 
     def whole(values: np.ndarray) -> np.ndarray:

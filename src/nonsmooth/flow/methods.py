@@ -8,16 +8,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.flow.arguments import float_array, real_number, whole_number
 from nonsmooth.flow.engine import Engine, FloatArray
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
     from nonsmooth.system.traced import Traced
 
-__all__ = ["METHODS", "RTOL", "engine_for"]
+__all__ = ["EXPERT", "METHODS", "RTOL", "engine_for"]
 
 METHODS = ("auto", "exact", "taylor", "rkf45")
 RTOL = 1e-9
+EXPERT = ("order", "locate")  # options of the series engine, beyond those of the verbs
 
 
 def engine_for(
@@ -43,15 +45,17 @@ def engine_for(
         A fixed step (``"taylor"`` and ``"rkf45"``).
     traced : Traced, optional
         Equations in place of the system's own (parameters that are functions of time).
+    **expert
+        ``order`` of the Taylor series; ``locate=False`` judges transitions at the ends of steps only.
 
     Raises
     ------
-    ValueError
+    ValueError, TypeError
         A method that does not exist or does not fit, or tolerances for a method that has none.
     SystemDefinitionError
         A system with sliding surfaces.
     """
-    if method not in METHODS:
+    if not isinstance(method, str) or method not in METHODS:
         raise ValueError(f"method = {method!r} does not exist; allowed: {', '.join(map(repr, METHODS))}")
     if getattr(system, "surfaces", ()):
         names = ", ".join(repr(surface.indicator) for surface in system.surfaces)
@@ -59,6 +63,16 @@ def engine_for(
             f"{system.name!r} has sliding surfaces ({names}); motion along a Surface cannot be simulated yet. "
             "Write the stick or slide mode and its transitions out, or use .smoothed(eta)"
         )
+    tolerance = RTOL if rtol is None else real_number(rtol, "rtol")
+    if not 1e-15 <= tolerance <= 1e-2:
+        raise ValueError(f"rtol = {rtol!r} is outside 1e-15 ... 1e-2")
+    absolute = _absolute(system, atol)
+    if step is not None and not real_number(step, "step") > 0:
+        raise ValueError(f"step = {step!r}: a fixed step is a positive time")
+    if "order" in expert:
+        expert["order"] = whole_number(expert["order"], "order", 2)
+        if method in ("exact", "rkf45"):
+            raise ValueError(f'order is that of method="taylor"; method={method!r} has its own')
     equations = system.traced if traced is None else traced
     form = None
     if method in ("auto", "exact") and traced is None:
@@ -74,7 +88,8 @@ def engine_for(
         if rtol is not None or atol is not None or step is not None:
             raise ValueError('method="exact" has no tolerance and no step; leave rtol, atol and step out')
     # A smoothed system is run by its series, also where its bands happen to be linear: design section 2.
-    if form is not None and not system.is_smoothed and step is None:
+    # A step or an order asks for a method that has one.
+    if form is not None and not system.is_smoothed and step is None and "order" not in expert:
         from nonsmooth.flow.planar import PlanarEngine, is_planar
 
         if is_planar(equations, form) and not expert:
@@ -86,10 +101,7 @@ def engine_for(
         name = "taylor" if method == "auto" else method
     from nonsmooth.flow.series import SeriesEngine
 
-    tolerance = RTOL if rtol is None else float(rtol)
-    return SeriesEngine(
-        equations, system.scale_vector(), name, tolerance, _absolute(system, atol), step=step, **expert
-    )
+    return SeriesEngine(equations, system.scale_vector(), name, tolerance, absolute, step=step, **expert)
 
 
 def _absolute(system: System, atol: Any) -> FloatArray | None:
@@ -102,7 +114,10 @@ def _absolute(system: System, atol: Any) -> FloatArray | None:
         if missing:
             raise ValueError(f"atol must name each state of {names} once; wrong: {sorted(missing)}")
         atol = [atol[name] for name in names]
-    values = np.broadcast_to(np.asarray(atol, dtype=float), (len(names),)).copy()
+    values = float_array(atol, "atol")
+    if values.shape not in ((), (1,), (len(names),)):
+        raise ValueError(f"atol must be one number or one for each of {', '.join(names)}, not of shape {values.shape}")
+    values = np.broadcast_to(values, (len(names),)).copy()
     if not (np.isfinite(values).all() and (values > 0).all()):
         raise ValueError(f"atol = {atol} must be positive and finite")
     return values

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.errors import SolveError
+from nonsmooth.flow.arguments import check_options, check_system, whole_number
 from nonsmooth.flow.engine import Chain, State
 from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
@@ -64,8 +65,9 @@ def poincare(
     SolveError
         A single run that could not be completed.
     """
-    if n < 1 or transient < 0:
-        raise ValueError(f"n = {n} must be at least 1 and transient = {transient} not negative")
+    check_system(system, "poincare")
+    check_options(system, expert, poincare)
+    n, transient = whole_number(n, "n", 1), whole_number(transient, "transient", 0)
     section, plan = section_plan(system, section)
     engine = engine_for(system, method, rtol, atol, **expert)
     starts = start_states(system, start)
@@ -73,7 +75,7 @@ def poincare(
     out = Chain.empty(len(starts), n, len(traced.u), len(traced.indicators), len(traced.outputs))
     tables = engine.prepare(np.tile(system.parameter_vector(), (len(starts), 1)))
     state = State(starts[0].copy(), system.memory_vector())
-    engine.chain(tables, 0, len(starts), state, starts, plan, int(transient), int(n), out)
+    engine.chain(tables, 0, len(starts), state, starts, plan, transient, n, out)
     if is_one_start(start) and out.status[0] not in (codes.OK, codes.NOT_GUARANTEED):
         from nonsmooth.results.statuses import by_code
 

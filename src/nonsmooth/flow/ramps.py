@@ -6,11 +6,17 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from nonsmooth.flow.arguments import real_number
+
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
     from nonsmooth.system.traced import Traced
 
 __all__ = ["with_ramps"]
+
+WATCHED = 101  # values of a linear ramp that are checked to be allowed
 
 
 def with_ramps(system: System, ramps: Mapping[str, Any], t_begin: float, t_end: float) -> Traced:
@@ -20,34 +26,42 @@ def with_ramps(system: System, ramps: Mapping[str, Any], t_begin: float, t_end: 
     ----------
     ramps : mapping of parameter to (float, float) or callable
         ``(first, last)``: linear from ``t_begin`` to ``t_end``; a function of the time ``t``, called once with a
-        symbol, like the fields of a system.
+        symbol, like the fields of a system. The value is put in as it stands: in ``cos(omega * t)`` a ramp of
+        ``omega`` gives the phase omega(t) t, whose frequency is omega + t d omega/dt.
 
     Returns
     -------
     Traced
         Without a period: time is absolute.
+
+    Raises
+    ------
+    ValueError, TypeError, SystemDefinitionError
+        A parameter that does not exist, a ramp that is none of these, or has a corner, or passes through a value
+        that the equations do not allow.
     """
     from sympy import Float
 
     from nonsmooth.system.names import unknown
     from nonsmooth.system.scalar import Scalar
-    from nonsmooth.system.tracing import call_scalar
+    from nonsmooth.system.tracing import call_scalar, refuse_corners
 
     traced = system.traced
+    if not isinstance(ramps, Mapping):
+        raise TypeError(f'ramps must map parameters to ramps, {{"rho": (0.2, 0.5)}}, not {ramps!r}')
     changes: dict[Any, Any] = {}
     for name, ramp in ramps.items():
         if name not in traced.parameter_names:
             raise ValueError(unknown(name, "a parameter", repr(system.name), traced.parameter_names))
         symbol = traced.p[traced.parameter_names.index(name)]
         if isinstance(ramp, Callable):  # type: ignore[arg-type]
-            changes[symbol] = call_scalar(ramp, (Scalar(traced.t),), f"ramp of {name!r}")
+            changes[symbol] = call_scalar(ramp, (Scalar(traced.t),), f"the ramp of {name!r}")
+            refuse_corners(changes[symbol], {traced.t}, f"the ramp of {name!r}")
         else:
-            try:
-                first, last = (float(value) for value in ramp)
-            except (TypeError, ValueError):
-                raise TypeError(
-                    f"ramps[{name!r}] must be (first, last) or a function of time, not {ramp!r}"
-                ) from None
+            if np.shape(ramp) != (2,):
+                raise TypeError(f"ramps[{name!r}] must be (first, last) or a function of time, not {ramp!r}")
+            first, last = (real_number(value, f"ramps[{name!r}]") for value in ramp)
+            system.parameter_points({name: np.linspace(first, last, WATCHED)})
             slope = Float((last - first) / (t_end - t_begin))
             changes[symbol] = Float(first) + slope * (traced.t - Float(t_begin))
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
+from nonsmooth.flow.arguments import real_number, whole_number
 from nonsmooth.flow.engine import SectionPlan
 
 if TYPE_CHECKING:
@@ -33,7 +32,7 @@ class Stroboscopic:
     phase: float = 0.0
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.phase < 1.0:
+        if not 0.0 <= real_number(self.phase, "phase") < 1.0:
             raise ValueError(f"phase = {self.phase}: the phase is given in forcing periods, 0 <= phase < 1")
 
 
@@ -68,10 +67,11 @@ class Poincare:
     def __post_init__(self) -> None:
         if self.side not in ("before", "after"):
             raise ValueError(f'side = {self.side!r}; allowed: "before", "after"')
-        if self.every < 1:
-            raise ValueError(f"every = {self.every}; it counts returns and is at least 1")
-        if self.t_max is not None and not self.t_max > 0:
-            raise ValueError(f"t_max = {self.t_max} must be positive")
+        if self.rising not in (True, False, None):
+            raise ValueError(f"rising = {self.rising!r}; allowed: True (upwards), False (downwards), None (both)")
+        whole_number(self.every, "every", 1)
+        if self.t_max is not None and not real_number(self.t_max, "t_max") > 0:
+            raise ValueError(f"t_max = {self.t_max!r}: the longest wait for a return is a positive time")
 
 
 def section_plan(system: System, section: Any) -> tuple[Stroboscopic | Poincare, SectionPlan]:
@@ -109,9 +109,9 @@ def section_plan(system: System, section: Any) -> tuple[Stroboscopic | Poincare,
     return section, SectionPlan(
         phase=-1.0,
         indicator=indicators.index(section.indicator),
-        rising={True: 1, False: -1, None: 0}[section.rising],
+        rising=0 if section.rising is None else 2 * int(section.rising) - 1,
         mode=-1 if section.mode is None else modes.index(section.mode),
         after=int(section.side == "after"),
-        every=section.every,
-        t_max=float(np.float64(t_max)),
+        every=int(section.every),
+        t_max=float(t_max),
     )

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.errors import SolveError
+from nonsmooth.flow.arguments import check_options, check_system, float_array, real_number, whole_number
 from nonsmooth.flow.engine import FloatArray, Log, State
 from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.starts import is_one_start, start_states
@@ -77,6 +78,8 @@ def simulate(
     SolveError
         The run could not be completed; it says where and why.
     """
+    check_system(system, "simulate")
+    check_options(system, expert, simulate)
     period = system.period()
     unit, length = _length(system, periods, duration, period, transient)
     if not is_one_start(start):
@@ -120,27 +123,29 @@ def _length(
         raise ValueError("give the length of the run once: periods=... or duration=...")
     if periods is not None and period is None:
         raise ValueError(f"{system.name!r} has no forcing period: give duration=... in place of periods")
-    value = periods if periods is not None else duration
-    if value is None or not np.isfinite(value) or value <= 0:
-        raise ValueError(f"the length of a run must be positive and finite, not {value!r}")
-    if not np.isfinite(transient) or transient < 0:
+    name, value = ("periods", periods) if periods is not None else ("duration", duration)
+    number = real_number(value, name)
+    if number <= 0:
+        raise ValueError(f"{name} = {value!r}: the length of a run must be positive")
+    if real_number(transient, "transient") < 0:
         raise ValueError(f"transient = {transient!r} must be zero or more")
     unit = 1.0 if periods is None or period is None else period
-    return unit, float(value) * unit
+    return unit, number * unit
 
 
 def _instants(samples: Any, t_begin: float, t_end: float, period: float | None) -> FloatArray:
     if samples is None:
         samples = SAMPLES + 1 if period is None else int(np.ceil((t_end - t_begin) / period * SAMPLES_PER_PERIOD)) + 1
     if np.ndim(samples) == 0:
-        if int(samples) != samples or samples < 2:
-            raise ValueError(f"samples = {samples!r}: a number of instants is a whole number, at least 2")
-        return np.linspace(t_begin, t_end, int(samples))
-    instants = np.array(samples, dtype=float)
+        return np.linspace(t_begin, t_end, whole_number(samples, "samples", 2))
+    instants = float_array(samples, "samples")
     if instants.ndim != 1 or not np.isfinite(instants).all() or (np.diff(instants) <= 0).any():
         raise ValueError("samples must be a number, or increasing finite instants")
     if len(instants) and (instants[0] < t_begin or instants[-1] > t_end * (1 + 1e-15)):
-        raise ValueError(f"samples lie outside the recorded time {t_begin:.6g} ... {t_end:.6g}")
+        raise ValueError(
+            f"samples from {instants[0]:.6g} to {instants[-1]:.6g} lie outside the recorded time "
+            f"{t_begin:.6g} ... {t_end:.6g}; they are instants, in time and not in periods"
+        )
     return np.minimum(instants, t_end)
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nonsmooth.flow.arguments import float_array, real_number, whole_number
 from nonsmooth.flow.engine import FloatArray
 
 if TYPE_CHECKING:
@@ -42,25 +43,34 @@ def random_starts(n: int, low: Any, high: Any, seed: int) -> list[Any]:
     >>> random_starts(2, {"x": 0.0}, {"x": 0.01}, seed=1)  # doctest: +ELLIPSIS
     [{'x': 0.005...}, {'x': 0.009...}]
     """
-    if n < 1:
-        raise ValueError(f"n = {n}: ask for at least one start")
+    n = whole_number(n, "n (the number of starts)", 1)
     rng = np.random.default_rng(seed)
     if isinstance(low, Mapping) or isinstance(high, Mapping):
         if not (isinstance(low, Mapping) and isinstance(high, Mapping)) or set(low) != set(high):
             raise ValueError(f"low and high must name the same states, not {low!r} and {high!r}")
         names = list(low)
-        table = rng.uniform([low[k] for k in names], [high[k] for k in names], size=(n, len(names)))
+        a, b = (np.array([real_number(corner[k], k) for k in names]) for corner in (low, high))
+        _check_box(a, b, low, high)
+        table = rng.uniform(a, b, size=(n, len(names)))
         return [dict(zip(names, map(float, row), strict=True)) for row in table]
-    a, b = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
+    a, b = float_array(low, "low"), float_array(high, "high")
     if a.ndim != 1 or a.shape != b.shape:
         raise ValueError(f"low and high must be states of equal length, not of shapes {a.shape} and {b.shape}")
+    _check_box(a, b, low, high)
     return [list(map(float, row)) for row in rng.uniform(a, b, size=(n, len(a)))]
+
+
+def _check_box(a: FloatArray, b: FloatArray, low: Any, high: Any) -> None:
+    if not (np.isfinite(a).all() and np.isfinite(b).all() and (a <= b).all()):
+        raise ValueError(f"low must be finite and not above high, got low = {low!r} and high = {high!r}")
 
 
 def is_one_start(start: Any) -> bool:
     """Whether ``start`` is one state (None, a mapping, a flat sequence of numbers) rather than several."""
     if start is None or isinstance(start, Mapping) or hasattr(start, "data_vars"):
         return True
+    if isinstance(start, str) or np.ndim(start) == 0:
+        return True  # not a start at all: start_states says so
     return isinstance(start, np.ndarray | Sequence) and np.ndim(_first(start)) == 0 and not isinstance(
         _first(start), Mapping
     )
@@ -80,8 +90,6 @@ def start_states(system: System, start: Any) -> FloatArray:
     """
     if is_one_start(start):
         return _state(system, start)[None, :]
-    if not isinstance(start, np.ndarray | Sequence) or len(start) == 0:
-        raise TypeError(f"start must be a state or a list of states, not {start!r}")
     return np.stack([_state(system, one) for one in start])
 
 
@@ -99,14 +107,27 @@ def _state(system: System, start: Any) -> FloatArray:
                 from nonsmooth.system.names import unknown
 
                 raise ValueError(unknown(name, "a state", repr(system.name), dict(system.states)))
-        return _finite(np.array([float(start.get(name, 0.0)) for name in names]), names)
-    values = np.asarray(start, dtype=float)
+        return _finite(np.array([_number(start.get(name, 0.0), name) for name in names]), names)
+    if isinstance(start, str) or np.ndim(start) == 0:
+        raise TypeError(f"start must be a state ({_form(names)}), a result of simulate, or a list of states, not {start!r}")
+    values = float_array(start, "the numbers of a start")
     if values.shape != (len(names),):
         raise ValueError(
             f"a start of {system.name!r} has {len(names)} numbers ({', '.join(names)}), not shape {values.shape}; "
-            f"or name them: {{{', '.join(f'{name!r}: 0.0' for name in names)}}}"
+            f"or name them: {_form(names)}"
         )
     return _finite(values, names)
+
+
+def _form(names: Sequence[str]) -> str:
+    return f"{{{', '.join(f'{name!r}: 0.0' for name in names)}}}"
+
+
+def _number(value: Any, name: str) -> float:
+    """NaN and infinity are told apart later, with the whole state."""
+    if isinstance(value, float):
+        return value
+    return real_number(value, f"the start of state {name!r}")
 
 
 def _finite(values: FloatArray, names: Sequence[str]) -> FloatArray:

@@ -11,7 +11,7 @@ step (``side``: -1, 1, or 0 where nothing was established), so that no change fa
 from math import fabs, sqrt
 
 from .cache import device, inline
-from .polynomial import NONE, UP, bounds, dense, first_crossing, load, shift, strip
+from .polynomial import NONE, UP, bounds, dense, first_crossing, load, row_bounds, shift, strip
 
 __all__ = ["NOISE", "earliest", "holding", "holds", "section_crossing", "sides_at", "snap"]
 
@@ -59,10 +59,10 @@ def holding(mode, net, side):
     return -1
 
 
-@device
-def _error(a, m, tail, slack, scale):
+@inline
+def _error(C, row, m, powers, tail, slack, scale):
     """Bound for what the polynomial lacks: its last terms, or the step's own error estimate; 0 where it is rounding."""
-    error = tail * (fabs(a[m]) + 0.1 * fabs(a[m - 1])) + slack * scale
+    error = tail * (fabs(C[row, m]) * powers[m] + 0.1 * fabs(C[row, m - 1]) * powers[m - 1]) + slack * scale
     return error if error > NOISE * scale else 0.0
 
 
@@ -107,7 +107,7 @@ def _fires(lo, hi, C, m, n, powers, rows, side, side_next, scale, tail, slack, a
         for r in range(lo, hi):
             i, sign = rows[r, 0], rows[r, 1]
             mr = load(C, n + i, float(sign), m, powers, a)
-            error = _error(a, mr, tail, slack, scale[i])
+            error = _error(C, n + i, m, powers, tail, slack, scale[i])
             before = 0 if begun else sign * side[i]
             if begun:
                 shift(a, mr, cursor, 1.0 - cursor, a)
@@ -146,15 +146,16 @@ def earliest(mode, C, m, n, powers, net, side, side_next, scale, tail, slack, a,
         dead, opened = False, False
         for r in range(lo, hi):
             i, sign = rows[r, 0], rows[r, 1]
-            mr = load(C, n + i, float(sign), m, powers, a)
-            error = _error(a, mr, tail, slack, scale[i])
-            mr = strip(a, mr)
-            if mr < 0:
-                if rows[r, 2] == 1:
-                    dead = True
-                    break
-                continue
-            low, high = bounds(a, mr)
+            a0, low, high = row_bounds(C, n + i, float(sign), m, powers)
+            error = _error(C, n + i, m, powers, tail, slack, scale[i])
+            if a0 == 0.0:  # after a jump: decided by the coefficients that follow
+                mr = strip(a, load(C, n + i, float(sign), m, powers, a))
+                if mr < 0:
+                    if rows[r, 2] == 1:
+                        dead = True
+                        break
+                    continue
+                low, high = bounds(a, mr)
             if high + error <= 0.0:
                 side_next[i] = -sign
                 dead = True
@@ -174,6 +175,11 @@ def earliest(mode, C, m, n, powers, net, side, side_next, scale, tail, slack, a,
 @inline
 def section_crossing(C, row, m, way, before, cursor, powers, scale, a, stack, found):
     """The next x > cursor (fraction of the step) where a row changes sign in the direction ``way``, or NONE."""
+    if cursor == 0.0:
+        a0, low, high = row_bounds(C, row, 1.0, m, powers)
+        if (low > 0.0 and before >= 0) or (high < 0.0 and before <= 0):
+            found[1] = 1 if low > 0.0 else -1
+            return NONE
     mr = load(C, row, 1.0, m, powers, a)
     if cursor > 0.0:
         shift(a, mr, cursor, 1.0 - cursor, a)
@@ -183,10 +189,6 @@ def section_crossing(C, row, m, way, before, cursor, powers, scale, a, stack, fo
     mr = strip(a, mr)
     if mr < 0:
         found[1] = 0
-        return NONE
-    low, high = bounds(a, mr)
-    if (low > 0.0 and before >= 0) or (high < 0.0 and before <= 0):
-        found[1] = 1 if low > 0.0 else -1
         return NONE
     x = first_crossing(a, mr, way, before, 0.0, stack, found)
     return NONE if x == NONE else cursor + x * (1.0 - cursor)

@@ -11,7 +11,7 @@ from .cache import device, inline, kernel
 from .codes import CHATTER, DIVERGED, LOG_FULL, NO_CONVERGENCE, OK, TOO_MANY_CROSSINGS
 from .planar_march import bounded, jump, leg, next_holding, set_phase, settle, stride, trigger, wrap_phase
 from .planar_search import (
-    WIDTH, bracketed, compose, curvature_at, dense, exceeds, horner, locate_maximum, slope_of, to_node, value_of,
+    WIDTH, compose, critical_points, curvature_at, dense, exceeds, horner, locate_maximum, to_node, value_of,
 )  # fmt: skip
 from .planar_tables import DEGREE, HARMONICS, NODES, TERMS, M, build
 
@@ -187,21 +187,21 @@ def chain(
         burst = 0
         waited = 0.0
         closed = False
-        fresh = True  # just after a jump an indicator may be zero: no stride
         while code == OK and returns < transient + keep:
-            if strides and returns < transient and not fresh:
-                border = target if s < target else T
-                n = stride(
-                    prop, rot, fun, info, mode, w, w1, rows, row_start, mode_start, mode_list,
-                    int((border - s) / info[mode, 0] - 1e-9),
+            ready = strides and returns < transient
+            if ready:
+                counted = returns
+                s, whole, returns = stride(
+                    prop, rot, fun, info, mode, rates, w, w1, rows, row_start, mode_start, mode_list, zero,
+                    s, whole, target, T, returns, transient,
                 )  # fmt: skip
-                s += n * info[mode, 0]
-                waited += n * info[mode, 0]
-            fresh = False
-            wait, timed = trigger(mode, s, T, mode_start, mode_list, at)
+                if returns > counted:
+                    n_here = 0
+            wait, timed = (1e300, -1) if strides else trigger(mode, s, T, mode_start, mode_list, at)
             step, t, full, crossed = leg(
                 prop, rot, fun, tay, info, mode, n_i, rates, w, wait, rows, row_start, mode_start, mode_list,
                 surface, direction, surface_mode, zero, w1, wn, wp, wq, scr, points, end, there, found,
+                ready,
             )  # fmt: skip
             if t < 0 and crossed == 0 and timed >= 0 and step >= wait:
                 t = timed
@@ -256,7 +256,6 @@ def chain(
             for f in range(n_i):
                 zero[f] = 0
             if t >= 0 or crossed != 0:
-                fresh = True
                 fired = found[0]
                 before0 = w[0]
                 before1 = w[1]
@@ -321,7 +320,7 @@ def chain(
 
 @device
 def log_touches(
-    b, base, prop, rot, fun, tay, info, mode, n_i, w, rows, row_start, mode_start, mode_list, wn, wq, scr,
+    b, base, prop, rot, fun, tay, info, mode, n_i, w, rows, row_start, mode_start, mode_list, wn, points, scr,
     touch_time, touch_indicator, touch_u, touch_gap, n,
 ):  # fmt: skip
     """Append the local maxima of the mode's armed rows that stay <= 0 within (0, b) of a leg. Returns the new count."""
@@ -334,26 +333,22 @@ def log_touches(
             for node in range(1, NODES, 2):  # pieces of two spacings, with their polynomial in the middle
                 if (node - 1) * spacing >= b or n >= touch_time.shape[0]:
                     break
-                to_node(prop, rot, mode, node - 1, w, wn)
-                to_node(prop, rot, mode, node + 1, w, wq)
-                if sign * value_of(fun, mode, f, wn) > 0.0:
-                    continue
-                if sign * slope_of(fun, mode, f, wn) <= 0.0 or sign * slope_of(fun, mode, f, wq) > 0.0:
-                    continue
                 to_node(prop, rot, mode, node, w, wn)
                 compose(tay, mode, f, wn, scr, 0)
-                local = bracketed(scr, 0, 1, -spacing, spacing)
-                value = sign * horner(scr, 0, local)
-                tau = node * spacing + local
-                if tau >= b or value > 0.0 or sign * curvature_at(scr, 0, local) > 0.0:
-                    continue
-                touch_time[n] = base + tau
-                touch_indicator[n] = f
-                for k in range(2):
-                    compose(tay, mode, n_i + k, wn, scr, 0)
-                    touch_u[n, k] = horner(scr, 0, local)
-                touch_gap[n] = -value
-                n += 1
+                count = critical_points(scr, 0, -spacing, spacing, points)
+                for k in range(count):
+                    local = points[k]
+                    value = sign * horner(scr, 0, local)
+                    tau = node * spacing + local
+                    if tau <= 0.0 or tau >= b or value > 0.0 or sign * curvature_at(scr, 0, local) > 0.0:
+                        continue
+                    touch_time[n] = base + tau
+                    touch_indicator[n] = f
+                    touch_gap[n] = -value
+                    for r_ in range(2):
+                        compose(tay, mode, n_i + r_, wn, scr, 1)
+                        touch_u[n, r_] = horner(scr, 1, local)
+                    n += 1
     return n
 
 
@@ -410,7 +405,7 @@ def record(
         rest = until - base
         step, t, full, _ = leg(
             prop, rot, fun, tay, info, mode, n_i, rates, w, min(wait, rest), rows, row_start, mode_start, mode_list,
-            -1, 0, -1, zero, w1, wn, wp, wq, scr, points, end, there, found,
+            -1, 0, -1, zero, w1, wn, wp, wq, scr, points, end, there, found, False,
         )  # fmt: skip
         if t < 0 and timed >= 0 and step >= wait:
             t = timed
@@ -424,7 +419,7 @@ def record(
             n_s += 1
         n_t = log_touches(
             step, base, prop, rot, fun, tay, info, mode, n_i, w, rows, row_start, mode_start, mode_list,
-            wn, wq, scr, touch_time, touch_indicator, touch_u, touch_gap, n_t,
+            wn, points, scr, touch_time, touch_indicator, touch_u, touch_gap, n_t,
         )  # fmt: skip
         short = step < SHORT * info[mode, 0]
         for j in range(M):

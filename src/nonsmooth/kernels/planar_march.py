@@ -153,46 +153,75 @@ def trigger(mode, s, period, mode_start, mode_list, at):
 
 
 @inline
-def stride(prop, rot, fun, info, mode, w, w1, rows, row_start, mode_start, mode_list, n):
-    """Up to n whole steps on which the first row of every outgoing transition is certainly <= 0; how many were made."""
-    step = info[mode, 0]
-    start = mode_start[mode]
-    stop = mode_start[mode + 1]
-    count = 0
-    while count < n:
-        to_node(prop, rot, mode, NODES, w, w1)
-        clear = True
-        for k in range(start, stop):
-            r = row_start[mode_list[k]]
+def clear_step(fun, info, mode, w, w1, rows, row_start, mode_start, mode_list, zero):
+    """Whether no transition can fire on the whole step from w to w1: each has a row that certainly stays <= 0."""
+    clear = True
+    for k in range(mode_start[mode], mode_start[mode + 1]):
+        t = mode_list[k]
+        blocked = False
+        for r in range(row_start[t], row_start[t + 1]):
             f = rows[r, 0]
             sign = float(rows[r, 1])
             g0 = sign * value_of(fun, mode, f, w)
+            if zero[f] != 0:
+                g0 = 0.0
             g1 = sign * value_of(fun, mode, f, w1)
             s0 = sign * slope_of(fun, mode, f, w)
             s1 = sign * slope_of(fun, mode, f, w1)
-            if classify(g0, s0, g1, s1, step, bound_at(fun, info, mode, f, w)) != NEVER:
-                clear = False
+            if classify(g0, s0, g1, s1, info[mode, 0], bound_at(fun, info, mode, f, w)) == NEVER:
+                blocked = True
                 break
-        if not clear:
+        if not blocked:
+            clear = False
             break
+    return clear
+
+
+@inline
+def stride(
+    prop, rot, fun, info, mode, rates, w, w1, rows, row_start, mode_start, mode_list, zero, s, whole, target, period,
+    returns, most,
+):  # fmt: skip
+    """Whole steps without crossings, past section phases, as long as ``returns`` < ``most``.
+
+    Returns (s, whole, returns); w1 then stands at the end of the step that is not clear, or that would be one return
+    too many."""
+    step = info[mode, 0]
+    to_node(prop, rot, mode, NODES, w, w1)
+    while clear_step(fun, info, mode, w, w1, rows, row_start, mode_start, mode_list, zero):
+        after = s + step
+        if (s < target and target <= after) or (s < target + period and target + period <= after):
+            if returns + 1 >= most:
+                break
+            returns += 1
+        s = after
         for j in range(M):
             w[j] = w1[j]
-        count += 1
-    return count
+        if s >= period:
+            s -= period
+            whole += 1.0
+            wrap_phase(w, s, mode, info, rot, rates)
+            if not (fabs(w[0]) < 1e300 and fabs(w[1]) < 1e300):
+                break
+        for f in range(zero.shape[0]):
+            zero[f] = 0
+        to_node(prop, rot, mode, NODES, w, w1)
+    return s, whole, returns
 
 
 @inline
 def leg(
     prop, rot, fun, tay, info, mode, n_i, rates, w, r_max, rows, row_start, mode_start, mode_list,
-    surface, direction, surface_mode, zero, w1, wn, wp, wq, scr, points, end, there, found,
+    surface, direction, surface_mode, zero, w1, wn, wp, wq, scr, points, end, there, found, ready,
 ):  # fmt: skip
     """March one step of the mode, or less: to r_max, or to the first crossing or section return.
 
-    w1 stands at the end of the whole step, ``end`` at the leg's end where that is shorter (the third number returned
+    w1 stands at the end of the whole step (``ready``: it does so already), ``end`` at the leg's end where that is shorter (the third number returned
     tells). Returns (time marched, transition or -1, whole step or not, section direction or 0); ``found[0]`` is the
     functional that crossed.
     """
-    to_node(prop, rot, mode, NODES, w, w1)
+    if not ready:
+        to_node(prop, rot, mode, NODES, w, w1)
     found[1] = -1
     step = info[mode, 0]
     best = min(step, r_max)

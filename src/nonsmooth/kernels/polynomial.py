@@ -17,7 +17,7 @@ import numpy as np
 from .cache import device, inline
 
 __all__ = [
-    "DOWN", "NONE", "UP", "bernstein", "bounds", "dense", "first_crossing", "largest", "load", "shift", "stack_size", "strip",
+    "DOWN", "NONE", "UP", "bernstein", "bounds", "dense", "first_crossing", "largest", "load", "row_bounds", "shift", "stack_size", "strip",
 ]  # fmt: skip
 
 UP, DOWN = np.int64(1), np.int64(-1)  # of this type, so that Numba compiles one version, not one per number
@@ -83,6 +83,29 @@ def bounds(a, m):
     b3 = a[0] + 0.75 * a[1] + 0.5 * a[2] + 0.25 * a[3]
     b4 = a[0] + a[1] + a[2] + a[3] + a[4]
     return low + min(a[0], b1, b2, b3, b4), high + max(a[0], b1, b2, b3, b4)
+
+
+@inline
+def row_bounds(C, row, sign, m, powers):
+    """``load`` and ``bounds`` in one pass that stores nothing. Returns (a_0, lower, upper)."""
+    low, high = 0.0, 0.0
+    for k in range(5, m + 1):
+        a = sign * C[row, k] * powers[k]
+        low += min(a, 0.0)
+        high += max(a, 0.0)
+    a0 = sign * C[row, 0]
+    a1, a2, a3, a4 = sign * C[row, 1] * powers[1], 0.0, 0.0, 0.0
+    if m >= 4:
+        a2, a3, a4 = sign * C[row, 2] * powers[2], sign * C[row, 3] * powers[3], sign * C[row, 4] * powers[4]
+    else:
+        a2 = sign * C[row, 2] * powers[2]
+        if m == 3:
+            a3 = sign * C[row, 3] * powers[3]
+    b1 = a0 + 0.25 * a1
+    b2 = a0 + 0.5 * a1 + a2 / 6.0
+    b3 = a0 + 0.75 * a1 + 0.5 * a2 + 0.25 * a3
+    b4 = a0 + a1 + a2 + a3 + a4
+    return a0, low + min(a0, b1, b2, b3, b4), high + max(a0, b1, b2, b3, b4)
 
 
 @inline

@@ -18,14 +18,14 @@ from .codes import DIVERGED, LOG_FULL, NO_CONVERGENCE, NOT_GUARANTEED, OK
 from .crossing import NOISE, earliest, holds, section_crossing, sides_at
 from .polynomial import NONE
 from .rkf45 import first_step, hermite, quiet, stages, transit
-from .series_node import SAME, begin, clear, count_pass, leap, look, meets_section, next_is_edge, open_window
+from .series_node import begin, clear, count_pass, leap, meets_section, next_is_edge, open_window
 from .series_places import (
     AFTER, BEGUN, CORNERS, CROSSINGS, DOUBTFUL, HALVINGS, JUMPS, LOCATE, METHOD, MOST_STEPS, N_INDICATORS,
     N_OUTPUTS, N_PARAMETERS, ORDER, PERIOD, PHASE, READY, RECORD, RISING, RKF45, RTOL, SAMPLES, SECTION, SECTION_MODE,
     SEGMENT, SETTLED, SINCE_CROSSING, SINCE_RETURN, SMOOTH_INDICATORS, STEP, STEPS, STEPS_IN_RETURN, T_MAX, TAYLOR,
     TOUCHES, TRANSIENT, UNTIL, WINDOW,
 )  # fmt: skip
-from .taylor import dense_states, fill_powers, step_length
+from .taylor import dense_states, end_states, fill_powers, step_length
 from .watch import extend, extend_at_node, extend_corners, sample, touches, write_sample
 
 __all__ = ["march"]
@@ -158,6 +158,7 @@ def march(
     rows, n_modes = n + n_indicators + choice[N_OUTPUTS], lacking.shape[0]
     rkf, record, section = method == RKF45, choice[RECORD] == 1, choice[SECTION]
     degree = 5 if rkf else order
+    J = J0 if rkf else C  # the jets at the beginning of a step
     rtol, fixed, period, phase, until, t_max = (
         control[RTOL], control[STEP], control[PERIOD], control[PHASE], control[UNTIL], control[T_MAX],
     )  # fmt: skip
@@ -175,9 +176,8 @@ def march(
         )
         tally[READY] = 1
         if section >= 0:  # a start on the section is no return, nor is a carried state left there
-            X = J0 if rkf else C
-            if fabs(X[n + section, 0]) <= 1e-9 * scale[section]:
-                X[n + section, 0] = 0.0
+            if fabs(J[n + section, 0]) <= 1e-9 * scale[section]:
+                J[n + section, 0] = 0.0
                 side[section] = 0
         if not record and choice[TRANSIENT] == 0:
             open_window(tally, memo, clock, t, extremes)
@@ -192,14 +192,16 @@ def march(
             status = LOG_FULL
             break
         if not ready:
-            look(jet, mode, t, u, q, SAME, choice, norms, log_rtol, rtol, fixed, exact_steps, work)
+            jet(mode, 2 if rkf else order, t, u, q, J, W)
+            for i in range(n_indicators):
+                scale[i] = max(scale[i], fabs(J[n + i, 0]))
             if zero_row >= 0:
-                (J0 if rkf else C)[n + zero_row, 0] = 0.0
+                J[n + zero_row, 0] = 0.0
                 side[zero_row] = 0
                 zero_row = -1
             ready = True
         if take:
-            extend_at_node(J0 if rkf else C, rows, lacking, mode, n, extremes)
+            extend_at_node(J, rows, lacking, mode, n, extremes)
             take = False
         watched = record or tally[WINDOW] == 1
 
@@ -339,8 +341,10 @@ def march(
             new = K[7]
             for i in range(n):
                 u[i] = new[i]
-        else:
+        elif cut and not watched:
             dense_states(C, degree, n, part, u)
+        else:
+            end_states(C, degree, n, powers, u)
         if edge:
             sides_at(C, degree, n, n_indicators, part / h, powers, scale, a, side)
         landing = landing and not cut
@@ -369,9 +373,9 @@ def march(
                 ready = True
             if choice[LOCATE] == 0:
                 if not ready:
-                    look(jet, mode, t, u, q, SAME, choice, norms, log_rtol, rtol, fixed, exact_steps, work)
+                    jet(mode, order, t, u, q, C, W)
                     ready = True
-                pending = judged_at_end(mode, J0 if rkf else C, n, n_indicators, net, side, side_next)
+                pending = judged_at_end(mode, J, n, n_indicators, net, side, side_next)
         for i in range(n):
             u_before[i] = u[i]
         if landing and stop == period:
@@ -397,9 +401,8 @@ def march(
                 break
         passed = edge or (landing and t == phase)
         if pending >= 0 and section >= 0 and hit >= 0:
-            X = J0 if rkf else C
             meets = meets_section(
-                choice, value_before, slope_before, X[n + section, 0], X[n + section, 1], NOISE * scale[section]
+                choice, value_before, slope_before, J[n + section, 0], J[n + section, 1], NOISE * scale[section]
             )
             passed = meets and (
                 choice[SECTION_MODE] < 0 or choice[SECTION_MODE] == (mode if choice[AFTER] == 1 else mode_before)

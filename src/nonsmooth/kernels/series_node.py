@@ -2,8 +2,6 @@
 
 from math import fabs, inf
 
-import numpy as np
-
 from .cache import device
 from .codes import BEYOND_STOP, CHATTER, OK, TOO_MANY_CROSSINGS
 from .crossing import holding, holds, snap
@@ -16,10 +14,7 @@ from .series_places import (
 from .taylor import step_length
 from .watch import extend_at_node, forget
 
-__all__ = ["FRESH", "SAME", "begin", "clear", "copy", "count_pass", "leap", "look", "meets_section", "next_is_edge", "open_window"]
-
-FRESH, SAME = np.int64(1), np.int64(0)  # a node at a start or after a jump, or one between two steps of a mode
-
+__all__ = ["begin", "clear", "copy", "count_pass", "leap", "look", "meets_section", "next_is_edge", "open_window"]
 
 @device
 def copy(source, target):
@@ -36,35 +31,34 @@ def clear(target):
 
 
 @device
-def look(jet, mode, t, u, q, fresh, choice, norms, log_rtol, rtol, fixed, exact_steps, work):
-    """Jets at (t, u). At a fresh node (a start, or after a jump) also the after-limits."""
+def look(jet, mode, t, u, q, choice, norms, log_rtol, rtol, fixed, exact_steps, work):
+    """Jets and after-limits at a start or after a jump."""
     C, W, J0, scale, measured, side, usual = work[0], work[1], work[2], work[11], work[12], work[13], work[16]
     n, n_indicators = u.shape[0], choice[N_INDICATORS]
     if choice[METHOD] == RKF45:
-        m = 4 if fresh == FRESH else 2
+        m = 4
         jet(mode, m, t, u, q, J0, W)
         X = J0
     else:
         m = choice[ORDER]
         jet(mode, m, t, u, q, C, W)
         X = C
-    if fresh == FRESH:
-        h = usual[mode]
-        if fixed > 0.0:
-            h = fixed
-        elif choice[METHOD] == EXACT:
-            h = exact_steps[mode]
-        elif choice[METHOD] == RKF45:
-            if h <= 0.0:
-                h = first_step(X, u, n, norms[1], rtol)
-        else:
-            h = step_length(X, m, n, n_indicators, u, norms[0], scale, log_rtol)
-        if not (h < inf):
-            h = 1.0
-        for i in range(n_indicators):
-            if scale[i] == 0.0:
-                scale[i] = max(fabs(X[n + i, 0]), fabs(X[n + i, 1]) * h)
-        snap(X, m, n, n_indicators, h, scale, measured, side)
+    h = usual[mode]
+    if fixed > 0.0:
+        h = fixed
+    elif choice[METHOD] == EXACT:
+        h = exact_steps[mode]
+    elif choice[METHOD] == RKF45:
+        if h <= 0.0:
+            h = first_step(X, u, n, norms[1], rtol)
+    else:
+        h = step_length(X, m, n, n_indicators, u, norms[0], scale, log_rtol)
+    if not (h < inf):
+        h = 1.0
+    for i in range(n_indicators):
+        if scale[i] == 0.0:
+            scale[i] = max(fabs(X[n + i, 0]), fabs(X[n + i, 1]) * h)
+    snap(X, m, n, n_indicators, h, scale, measured, side)
     for i in range(n_indicators):
         scale[i] = max(scale[i], fabs(X[n + i, 0]))
 
@@ -77,7 +71,7 @@ def begin(jet, jump, mode, t, u, q, settled, choice, norms, log_rtol, rtol, fixe
     for i in range(visited.shape[0]):
         visited[i] = 0
     visited[mode] = 1
-    look(jet, mode, t, u, q, FRESH, choice, norms, log_rtol, rtol, fixed, exact_steps, work)
+    look(jet, mode, t, u, q, choice, norms, log_rtol, rtol, fixed, exact_steps, work)
     while settled == 0:
         k = -1
         for j in range(first[mode], first[mode + 1]):
@@ -95,7 +89,7 @@ def begin(jet, jump, mode, t, u, q, settled, choice, norms, log_rtol, rtol, fixe
         copy(q_new, q)
         mode = transitions[k, 1]
         visited[mode] = 1
-        look(jet, mode, t, u, q, FRESH, choice, norms, log_rtol, rtol, fixed, exact_steps, work)
+        look(jet, mode, t, u, q, choice, norms, log_rtol, rtol, fixed, exact_steps, work)
     return mode, OK
 
 
@@ -138,7 +132,7 @@ def leap(
         if tally[WINDOW] == 1:
             tally[KEPT_CROSSINGS] += 1
             tally[KEPT_CONTACTS] += transitions[pending, 4]
-        look(jet, mode, t, u, q, FRESH, choice, norms, log_rtol, rtol, fixed, exact_steps, work)
+        look(jet, mode, t, u, q, choice, norms, log_rtol, rtol, fixed, exact_steps, work)
         if tally[WINDOW] == 1:
             all_rows = n + choice[N_INDICATORS] + choice[N_OUTPUTS]
             extend_at_node(J0 if choice[METHOD] == RKF45 else C, all_rows, lacking, mode, n, extremes)

@@ -8,7 +8,7 @@ from math import exp, fabs, inf, log
 
 from .cache import inline
 
-__all__ = ["dense_states", "fill_powers", "step_length"]
+__all__ = ["dense_states", "end_states", "fill_powers", "step_length"]
 
 
 @inline
@@ -40,10 +40,34 @@ def step_length(C, order, n, n_indicators, u, weight, scale, log_rtol):
 @inline
 def fill_powers(h, m, powers):
     """powers[k] = h^k, k = 0..m."""
-    power = 1.0
-    for k in range(m + 1):
-        powers[k] = power
-        power *= h
+    p0, p1, p2, p3 = 1.0, h, h * h, h * h * h
+    h4 = p2 * p2
+    k = 0
+    while k + 3 <= m:  # four short chains of products instead of a long one
+        powers[k], powers[k + 1], powers[k + 2], powers[k + 3] = p0, p1, p2, p3
+        p0, p1, p2, p3 = p0 * h4, p1 * h4, p2 * h4, p3 * h4
+        k += 4
+    if k <= m:
+        powers[k] = p0
+    if k + 1 <= m:
+        powers[k + 1] = p1
+    if k + 2 <= m:
+        powers[k + 2] = p2
+
+
+@inline
+def end_states(C, m, n, powers, out):
+    """States at the end of the interval whose powers are given; the small terms are added first."""
+    for i in range(n):
+        even, odd = 0.0, 0.0
+        k = m - m % 2
+        if k < m:
+            odd = C[i, m] * powers[m]
+        while k >= 2:
+            even += C[i, k] * powers[k]
+            odd += C[i, k - 1] * powers[k - 1]
+            k -= 2
+        out[i] = C[i, 0] + (odd + even)
 
 
 @inline

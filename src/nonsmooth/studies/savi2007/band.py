@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 __all__ = ["FIGURES", "order_in_eta"]
 
 ORBITS = {
-    "Fig. 9, ω = 4.8 rad/s": {**FIGURE_9, "omega": 4.8},
-    "Fig. 11, ρ = 0.45 N": {**FIGURE_11, "rho": 0.45},
-    "Fig. 13, g = 0.0009 m": {**FIGURE_13, "g": 0.0009},
+    r"Fig. 9, $\omega = 4.8$ rad/s": {**FIGURE_9, "omega": 4.8},
+    r"Fig. 11, $\rho = 0.45$ N": {**FIGURE_11, "rho": 0.45},
+    "Fig. 13, $g = 0.0009$ m": {**FIGURE_13, "g": 0.0009},
 }
 PERIODS = 4
 ETAS = np.array([1e-4, 3e-5, 1e-5, 3e-6, 1e-6])
@@ -78,7 +78,7 @@ def _errors(settings: Settings) -> xr.Dataset:
 
 
 def _grazing(settings: Settings) -> xr.Dataset:
-    """Upper frequency of Fig. 9 at which the motion without contact first meets the band, by bisection; eta 0: exact."""
+    """Upper frequency of Fig. 9 at which the motion without contact first meets the band; at eta 0, the support."""
     etas = np.concatenate([[0.0], ETAS[2:3] if settings.quick else ETAS])
     found = np.array([_first_meeting(float(eta)) for eta in etas])
     sharp = EXACT.system(**FIGURE_9)
@@ -132,13 +132,15 @@ def _draw(data: Mapping[str, xr.Dataset]) -> Canvas:
             left.loglog(eta, one.sel(form="general"), ":", color=color)
         guide = 4 * float(errors["error"].sel(form="paper").max())
         left.loglog(eta, guide * (eta / eta.max()) ** 2, color=plot.COLORS["muted"], linewidth=0.8, label=r"$\eta^2$")
-        left.plot([], [], "s", color="black", markerfacecolor="none", markersize=6, label="rtol $10^{-6}$, as in the figures")
+        hollow = {"color": "black", "markerfacecolor": "none", "markersize": 6}
+        left.plot([], [], "s", label="rtol $10^{-6}$, as in the figures", **hollow)
         left.plot([], [], ":", color="black", label="general form")
         left.axvline(ETA, color="black", linewidth=0.6, linestyle="--", zorder=0)
         left.legend(loc="lower right")
         left.set(
-            xlabel=r"$\eta$ (m)", ylabel="error after 4 periods (1 mm, 1 cm/s)", title="(a) error of the smoothed switch"
-        )
+            xlabel=r"$\eta$ (m)", ylabel="error after 4 periods (1 mm, 1 cm/s)",
+            title="(a) error of the smoothed switch",
+        )  # fmt: skip
         at = grazing["eta"].values > 0
         base = float(grazing["closed_form"][0])
         fine = np.geomspace(grazing["eta"].values[at].min() / 2, grazing["eta"].values[at].max() * 2, 50)
@@ -163,11 +165,15 @@ def _caption(data: Mapping[str, xr.Dataset]) -> str:
     orders = ", ".join(f"{order:.3f}" for order in order_in_eta(errors, "paper"))
     speed = float(errors["slowest_contact"].min())
     return (
-        f"Effect of the band's half width eta. (a) Error of the smoothed switch against the exact flow after {PERIODS} periods "
-        f"on three orbits whose slowest transition has {speed:.3f} m/s: filled, RKF45 at rtol 1e-11 (fitted orders {orders}); "
-        "squares, rtol 1e-6 as in the figures (the paper names no tolerance); dotted, the fields interpolated in place of the paper's Eq. 8. (b) Grazing "
+        "Effect of the band's half width eta. (a) Error of the smoothed switch against the exact flow after "
+        f"{PERIODS} periods "
+        f"on three orbits whose slowest transition has {speed:.3f} m/s: filled, RKF45 at rtol 1e-11 (fitted orders "
+        f"{orders}); "
+        "squares, rtol 1e-6 as in the figures (the paper names no tolerance); dotted, the fields interpolated in "
+        "place of the paper's Eq. 8. (b) Grazing "
         f"frequency of the smoothed model: it is that of a gap g - eta. Exact flow, bisected: "
-        f"{float(data['grazing']['grazing'][0]):.6f} rad/s, closed form {float(data['grazing']['closed_form'][0]):.6f} rad/s."
+        f"{float(data['grazing']['grazing'][0]):.6f} rad/s, closed form "
+        f"{float(data['grazing']['closed_form'][0]):.6f} rad/s."
     )
 
 

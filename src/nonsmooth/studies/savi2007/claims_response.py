@@ -42,7 +42,7 @@ def _by_size(response: xr.Dataset, direction: str, largest: bool) -> Interval | 
 def f9a(data: Data) -> list[Row]:
     """Rising frequency: period 2, and a jump."""
     exact, smoothed = data["fig09"]["exact"], data["fig09"]["smoothed"]
-    printed = NUMBERS["period 2 near"]
+    printed, rising = NUMBERS["period 2 near"], NUMBERS["jump rising"]
     found = range_of(exact, 2, "up")
     inside = found is not None and found[0] <= printed.value <= found[1]
     why = "no period 2 found"
@@ -53,12 +53,12 @@ def f9a(data: Data) -> list[Row]:
         )
     return [
         Row(
-            "F9a", _9, "rising frequency: a small period-2 region near 3.63 rad/s", _range(exact, "up"),
-            _range(smoothed, "up"), "3.63 lies inside" if inside else "3.63 lies outside",
+            "F9a", _9, f"rising frequency: a small period-2 region near {printed}", _range(exact, "up"),
+            _range(smoothed, "up"), f"{printed.text} lies {'inside' if inside else 'outside'}",
             "agrees" if inside else "differs", why,
         ),
         against_printed(
-            "F9a", "rising frequency: dynamical jump near 5.88 rad/s", NUMBERS["jump rising"], main_jump(exact, "up"),
+            "F9a", f"rising frequency: dynamical jump near {rising}", rising, main_jump(exact, "up"),
             main_jump(smoothed, "up"),
             "The motion with contact ends in a fold there. Both flows agree; the printed value is the model's own "
             "neither with nor without smoothing.",
@@ -70,13 +70,16 @@ def f9b(data: Data) -> list[Row]:
     """Falling frequency: the jump at grazing, and period 2 again."""
     exact, smoothed = data["fig09"]["exact"], data["fig09"]["smoothed"]
     closed = grazing_of(exact)[-1]
+    falling = NUMBERS["jump falling"]
     found = range_of(exact, 2, "down")
     return [
         against_printed(
-            "F9b", "falling frequency: dynamical jump at 5.29 rad/s", NUMBERS["jump falling"], main_jump(exact, "down"),
+            "F9b", f"falling frequency: dynamical jump at {falling}", falling, main_jump(exact, "down"),
             main_jump(smoothed, "down"),
-            f"Falling, the motion without contact ends where it meets the support. With Table 1 that is {closed:.5f} rad/s, "
-            "in closed form and without any integration; both flows jump there. The printed value does not follow from the "
+            f"Falling, the motion without contact ends where it meets the support. With Table 1 that is {closed:.5f} "
+            "rad/s, "
+            "in closed form and without any integration; both flows jump there. The printed value does not follow "
+            "from the "
             "paper's own parameters.",
         ),
         against_closed_form(
@@ -112,7 +115,8 @@ def f9c(data: Data) -> list[Row]:
         Row(
             "F9c", _9, "an unstable region between the jumps with rising and falling frequency", texts[0], texts[1],
             "none in kind", "agrees in part" if two else "differs",
-            "Two stable motions coexist between the jumps, as they must on both sides of an unstable one. The unstable branch "
+            "Two stable motions coexist between the jumps, as they must on both sides of an unstable one. The "
+            "unstable branch "
             "itself is not drawn here: sweeps only see what is stable.",
         )
     ]  # fmt: skip
@@ -141,7 +145,8 @@ def f10(data: Data) -> list[Row]:
         Row(
             "F10", _10, "a small jump instead", _small(exact), _small(smoothed), "no number printed",
             "agrees" if small is not None else "differs",
-            "With rising frequency at the grazing of the motion without contact, with falling at a fold of the motion with "
+            "With rising frequency at the grazing of the motion without contact, with falling at a fold of the motion "
+            "with "
             "contact.",
         ),
         against_closed_form(
@@ -157,7 +162,8 @@ def grazing_behind_both(data: Data) -> list[Row]:
         against_closed_form(
             "F10", _10, "both (period 2 in Fig. 9, the small jump in Fig. 10) are probably related to grazing; closed form "
             "of Fig. 9's lower grazing", grazing_of(exact)[0], change(exact, 1, 2, "up"), change(smoothed, 1, 2, "up"),
-            "The period-2 range of Fig. 9 begins where the motion without contact grazes, as does the small jump of Fig. 10.",
+            "The period-2 range of Fig. 9 begins where the motion without contact grazes, as does the small jump of "
+            "Fig. 10.",
         )
     ]  # fmt: skip
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = ["diagrams", "draw_diagram", "how", "key"]
+__all__ = ["diagrams", "draw_diagram", "how", "legend"]
 
 
 def diagrams(
@@ -57,10 +57,10 @@ def draw_diagram(
     for i, value in enumerate(values):
         label = "printed in the paper" if i == 0 else None
         ax.axvline(value, color="black", linewidth=0.6, linestyle=":", zorder=0, label=label)
-    key(ax, loc)
+    legend(ax, loc)
 
 
-def key(ax: Axes, loc: str) -> None:
+def legend(ax: Axes, loc: str) -> None:
     """The legend of a diagram, its points large enough to be seen."""
     for handle in ax.legend(loc=loc).legend_handles:
         if isinstance(handle, Line2D):

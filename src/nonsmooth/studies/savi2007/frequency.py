@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from nonsmooth import plot
 from nonsmooth.flow.poincare import poincare
-from nonsmooth.studies.savi2007.diagrams import diagrams, draw_diagram, how, key
+from nonsmooth.studies.savi2007.diagrams import diagrams, draw_diagram, how, legend
 from nonsmooth.studies.savi2007.figure import Figure, sheet
 from nonsmooth.studies.savi2007.flows import FLOWS, Settings, starts
 from nonsmooth.studies.savi2007.portraits import chosen_start, describe, draw_portraits, portraits
@@ -42,7 +42,7 @@ def _draw_17(data: Mapping[str, xr.Dataset]) -> Canvas:
                 ax.set_xlabel(ax.get_xlabel() if i else "")
                 ax.set_ylabel(ax.get_ylabel() if j == 0 else "")
                 if (i, j) == (0, 0):
-                    key(ax, "lower right")
+                    legend(ax, "lower right")
                 else:
                     ax.get_legend().remove()
             grid[0, j].set_title(f"({'ab'[j]}) {flow.title}")
@@ -52,7 +52,8 @@ def _draw_17(data: Mapping[str, xr.Dataset]) -> Canvas:
 def _caption_17(data: Mapping[str, xr.Dataset]) -> str:
     grazing = ", ".join(f"{omega:.5f}" for omega in grazing_of(data["exact"]))
     return (
-        "Bifurcation diagram over the forcing frequency, rho = 0.23 N, g = 0.0036 m: displacement (above) and velocity at the "
+        "Bifurcation diagram over the forcing frequency, rho = 0.23 N, g = 0.0036 m: displacement (above) and "
+        "velocity at the "
         f"section. Dotted: the three frequencies of Fig. 18; green: closed-form grazing of the motion without contact "
         f"(all: {grazing} rad/s). Grey shows motions that coexist with what the sweeps follow. " + how(data)
     )
@@ -70,7 +71,8 @@ def _compute_18(settings: Settings) -> dict[str, xr.Dataset]:
 
 def _caption_18(data: Mapping[str, xr.Dataset]) -> str:
     return (
-        "Phase portraits at three frequencies of Fig. 17; section points black, contact zone shaded. Where motions coexist, "
+        "Phase portraits at three frequencies of Fig. 17; section points black, contact zone shaded. Where motions "
+        "coexist, "
         "the first start that ends in the paper's is drawn. " + describe(data, FIGURE_18)
     )
 

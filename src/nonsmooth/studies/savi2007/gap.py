@@ -42,7 +42,8 @@ def _draw_13(data: Mapping[str, xr.Dataset]) -> Canvas:
 
 def _caption_13(data: Mapping[str, xr.Dataset]) -> str:
     return (
-        "Bifurcation diagram over the gap, omega = 11.15 rad/s, rho = 0.33 N: velocity at the section. Dotted: the four gaps "
+        "Bifurcation diagram over the gap, omega = 11.15 rad/s, rho = 0.33 N: velocity at the section. Dotted: the "
+        "four gaps "
         "of Fig. 14. Grey shows motions that coexist with what the sweeps follow. " + how(data)
     )
 
@@ -88,7 +89,8 @@ def _draw_15(data: Mapping[str, xr.Dataset]) -> Canvas:
 def _caption_15(data: Mapping[str, xr.Dataset]) -> str:
     sizes = " and ".join(f"{data[f'{flow.key}_0'].sizes['iterate']} ({flow.key})" for flow in FLOWS)
     return (
-        f"Strange attractor at g = 0.0018 m, omega = 11.15 rad/s, rho = 0.33 N: sections at four phases of the forcing, "
+        "Strange attractor at g = 0.0018 m, omega = 11.15 rad/s, rho = 0.33 N: sections at four phases of the "
+        "forcing, "
         f"{sizes} points each, from rest. Both rows have the same axes."
     )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,7 +15,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "APERIODIC", "UNSETTLED", "Interval", "change", "jumps", "range_of", "periods_reached", "regimes", "separation_rate",
+    "APERIODIC", "UNSETTLED", "Interval", "change", "jumps", "periods_reached", "range_of", "regimes",
+    "separation_rate",
 ]  # fmt: skip
 
 APERIODIC = 0  # no period found up to the longest looked for
@@ -63,7 +65,7 @@ def change(swept: xr.Dataset, first: int, second: int, direction: str | None = N
     at = np.flatnonzero(regime != UNSETTLED)
     found = [
         Interval(float(values[i]), float(values[j]))
-        for i, j in zip(at[:-1], at[1:], strict=True)
+        for i, j in pairwise(at)
         if {int(regime[i]), int(regime[j])} == {first, second} and first != second
     ]
     return min(found, key=lambda interval: interval.uncertainty, default=None)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 __all__ = [
-    "FIGURE_9", "FIGURE_10", "FIGURE_11", "FIGURE_12", "FIGURE_13", "FIGURE_14", "FIGURE_14_TEXT", "FIGURE_17", "FIGURE_18",
-    "NUMBERS", "Printed",
+    "FIGURE_9", "FIGURE_10", "FIGURE_11", "FIGURE_12", "FIGURE_13", "FIGURE_14", "FIGURE_14_TEXT", "FIGURE_17",
+    "FIGURE_18", "NUMBERS", "Printed",
 ]  # fmt: skip
 
 

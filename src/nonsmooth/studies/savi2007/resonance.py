@@ -84,9 +84,12 @@ def _caption(name: str) -> Callable[[Mapping[str, xr.Dataset]], str]:
         exact, smoothed = data["exact"], data["smoothed"]
         grazing = " and ".join(f"{omega:.5f}" for omega in grazing_of(exact))
         return (
-            f"Frequency response for rho = {float(exact['rho']):g} N and g = {float(exact['g']):g} m: half the peak-to-peak "
-            f"displacement with rising and falling frequency, jumps marked. Closed-form grazing at {grazing} rad/s (green). "
-            f"Steps of {_step(exact):.4f} rad/s (exact) and {_step(smoothed):.4f} rad/s (smoothed; a shorter transient)."
+            f"Frequency response for rho = {float(exact['rho']):g} N and g = {float(exact['g']):g} m: half the "
+            "peak-to-peak "
+            f"displacement with rising and falling frequency, jumps marked. Closed-form grazing at {grazing} rad/s "
+            "(green). "
+            f"Steps of {_step(exact):.4f} rad/s (exact) and {_step(smoothed):.4f} rad/s (smoothed; a shorter "
+            "transient)."
             f"{name}"
         )
 

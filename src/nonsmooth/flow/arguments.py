@@ -1,0 +1,83 @@
+"""What a verb was given: each check names the argument, what it was, what is allowed and what to do."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.flow.engine import FloatArray
+
+if TYPE_CHECKING:
+    from nonsmooth.system.system import System
+
+__all__ = ["check_options", "check_system", "float_array", "real_number", "whole_number"]
+
+
+def check_system(system: Any, verb: str) -> None:
+    """TypeError where ``system`` is no System: a name, or a model's function that was not called."""
+    from nonsmooth.system.system import System
+
+    if isinstance(system, System):
+        return
+    name = getattr(system, "__name__", None)
+    hint = f"; call it: {name}()" if callable(system) and name else ""
+    if isinstance(system, str):
+        hint = f"; a ready model is called by its name: ns.models.{system}()"
+    raise TypeError(f"{verb} takes an ns.System, not {system!r}{hint}")
+
+
+def check_options(system: System, given: Mapping[str, Any], verb: Callable[..., Any]) -> None:
+    """TypeError for options that are neither the verb's nor an engine's.
+
+    Parameters
+    ----------
+    given : mapping
+        What the verb's own arguments left over.
+    verb : callable
+        Its signature names what is allowed.
+    """
+    from nonsmooth.flow.methods import EXPERT
+    from nonsmooth.system.names import unknown
+
+    for name in given:
+        if name in EXPERT:
+            continue
+        if name in system.parameters:
+            raise TypeError(
+                f"`{name}` is a parameter of {system.name!r}, not an option of {verb.__name__}: "
+                f"set it with system.with_parameters({name}=...)"
+            )
+        kinds = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
+        allowed = [key for key, item in inspect.signature(verb).parameters.items() if item.kind in kinds]
+        raise TypeError(unknown(name, "an option", verb.__name__, [*allowed[1:], *EXPERT]))
+
+
+def real_number(value: Any, name: str) -> float:
+    """``value`` as a finite float: TypeError for what is no real number, ValueError for NaN and infinity."""
+    from nonsmooth.system.parameter import finite_number
+
+    return finite_number(value, f"{name} = {value!r}:" if isinstance(value, str) else name)
+
+
+def whole_number(value: Any, name: str, least: int) -> int:
+    """``value`` as an integer of at least ``least``; 3.0 passes, 2.5, True, "3" and NaN do not."""
+    number = real_number(value, name)
+    if number != int(number) or number < least:
+        raise ValueError(f"{name} = {value!r} must be a whole number, at least {least}")
+    return int(number)
+
+
+def float_array(values: Any, name: str) -> FloatArray:
+    """``values`` as an array of real numbers of any shape; TypeError for words, complex numbers, ragged lists."""
+    try:
+        array = np.asarray(values)
+        if array.dtype.kind in "fiu":
+            return np.array(array, dtype=float)
+        if array.dtype.kind == "O":
+            return np.array([real_number(value, name) for value in array.ravel()]).reshape(array.shape)
+    except (TypeError, ValueError) as error:
+        raise TypeError(f"{name} must be real numbers, not {values!r} ({error})") from None
+    raise TypeError(f"{name} must be real numbers, not {values!r}")
