@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.analysis.sweep import sweep
+from nonsmooth.flow.arguments import check_system
 from nonsmooth.flow.engine import FloatArray
 
 if TYPE_CHECKING:
@@ -56,7 +57,10 @@ def frequency_response(
 
     check_system(system, "frequency_response")
     if parameter not in system.parameters:
-        system.with_parameters({parameter: 0.0})  # raises with the names there are
+        from nonsmooth.system.names import unknown
+
+        known = {name: item.unit for name, item in system.parameters.items()}
+        raise ValueError(unknown(parameter, "a parameter", repr(system.name), known) + "; choose one with parameter=")
     swept = sweep(system, parameter, values, direction=direction, **options)
     full = [("direction", 1), ("start", 1), (parameter, swept.sizes[parameter]), ("state", swept.sizes["state"])]
     half = 0.5 * (swept["maximum"] - swept["minimum"])

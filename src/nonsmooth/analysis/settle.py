@@ -40,6 +40,7 @@ class Attractors:
 
     def settle(self, i: int, state: State, out: Chain, fresh: Callable[[], State]) -> Verdict:
         """Run point i on from ``state`` (left where the run ends) and judge it; ``fresh`` makes a state at the start."""
+        state.settled = False  # a parameter has changed under it: what holds already is taken first
         self._chain(i, state, self.transient, self.keep, out)
         if out.status[i] == codes.BEYOND_STOP:  # a carried state that a moved stop has overtaken
             other = fresh()

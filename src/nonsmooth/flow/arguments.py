@@ -59,7 +59,7 @@ def real_number(value: Any, name: str) -> float:
     """``value`` as a finite float: TypeError for what is no real number, ValueError for NaN and infinity."""
     from nonsmooth.system.parameter import finite_number
 
-    return finite_number(value, f"{name} = {value!r}:" if isinstance(value, str) else name)
+    return finite_number(value, name)
 
 
 def whole_number(value: Any, name: str, least: int) -> int:

@@ -1,6 +1,6 @@
 """The engine of the exact flow for two states: affine indicators and resets, harmonic forcing.
 
-It only packs a system into the arrays of ``kernels.planar`` and unpacks what comes back.
+It only packs a system into the arrays of ``kernels.planar_module`` and unpacks what comes back.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class Tables:
 
 @dataclass
 class PlanarEngine:
-    """``Engine`` over ``kernels.planar`` for one system's traced form."""
+    """``Engine`` over ``kernels.planar_module`` for one system's traced form."""
 
     traced: Traced
     form: LinearForm
@@ -125,10 +125,12 @@ class PlanarEngine:
             logs = grown
         state.settled = True
         _, n_c, n_t = progress[:3]
-        memory = np.zeros((n, 0))
+        times, transitions, before, after = (log[:n_c] for log in logs[:4])
+        touch_times, indicators, touch_u, clearances = (log[:n_t] for log in logs[4:])
         return Log(
-            sample_u, memory, sample_mode, sample_segment,
-            *(log[:n_c] for log in logs[:4]), np.zeros((n_c, 0)), *(log[:n_t] for log in logs[4:]), int(code),
+            sample_u, np.zeros((n, 0)), sample_mode, sample_segment,
+            times, transitions, before, after, np.zeros((n_c, 0)),
+            touch_times, indicators, touch_u, clearances, int(code),
         )  # fmt: skip
 
     def _with_section(self, plan: SectionPlan) -> np.ndarray:

@@ -11,7 +11,7 @@ from nonsmooth.errors import SolveError
 from nonsmooth.flow.arguments import check_options, check_system, float_array, real_number, whole_number
 from nonsmooth.flow.engine import FloatArray, Log, State
 from nonsmooth.flow.methods import engine_for
-from nonsmooth.flow.starts import is_one_start, start_states
+from nonsmooth.flow.starts import first_state, is_one_start, start_states
 from nonsmooth.kernels import codes
 
 if TYPE_CHECKING:
@@ -49,9 +49,10 @@ def simulate(
     periods, duration : float
         Length of the run in forcing periods, or in time: one of the two.
     start : mapping, sequence of n floats, or a result of ``simulate``, optional
-        State at t = 0; zeros where not given.
+        State at t = 0; zeros where not given. A result gives its last state, mode and memory; the forcing begins anew,
+        so let it end after whole periods.
     mode : str, optional
-        Mode at the start; the first where not given. Transitions that already hold are taken first.
+        Mode at the start; that of the result, else the first, where not given. Transitions that already hold are taken first.
     transient : float
         Run this long before recording, in the unit of the length. Time goes on: the record begins at t = transient.
     samples : int or array, optional
@@ -94,13 +95,7 @@ def simulate(
         traced = with_ramps(system, ramps, t_begin, t_end)
     engine = engine_for(system, method, rtol, atol, step, traced=traced if ramps else None, **expert)
     instants = _instants(samples, t_begin, t_end, None if ramps and period is None else period)
-    state = State(start_states(system, start)[0].copy(), system.memory_vector())
-    if mode is not None:
-        if mode not in system.modes:
-            from nonsmooth.system.names import unknown
-
-            raise ValueError(unknown(mode, "a mode", repr(system.name), list(system.modes)))
-        state.counters[0] = list(system.modes).index(mode)
+    state = first_state(system, start, mode)
     tables = engine.prepare(system.parameter_vector()[None, :])
     if t_begin > 0:
         _complete(engine.record(tables, state, t_begin, np.empty(0)), system, state, period)

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.flow.arguments import float_array, real_number, whole_number
-from nonsmooth.flow.engine import FloatArray
+from nonsmooth.flow.engine import FloatArray, State
+from nonsmooth.system.names import unknown
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["is_one_start", "random_starts", "start_states"]
+__all__ = ["first_state", "is_one_start", "random_starts", "start_states"]
 
 
 def random_starts(n: int, low: Any, high: Any, seed: int) -> list[Any]:
@@ -93,19 +94,48 @@ def start_states(system: System, start: Any) -> FloatArray:
     return np.stack([_state(system, one) for one in start])
 
 
+def first_state(system: System, start: Any, mode: str | None = None) -> State:
+    """The one start of a single run: with the mode and the memory that a result of ``simulate`` ended with.
+
+    Parameters
+    ----------
+    mode : str, optional
+        Mode at the start; that of the result, else the first, where not given.
+
+    Raises
+    ------
+    ValueError
+        A mode that does not exist, and what :func:`start_states` raises.
+    """
+    modes = list(system.modes)
+    state = State(start_states(system, start)[0].copy(), system.memory_vector())
+    if hasattr(start, "data_vars"):
+        ended = start["mode"].attrs["flag_meanings"].split()[int(start["mode"].values[-1])]
+        state.counters[0] = modes.index(ended) if ended in modes else 0
+        for i, name in enumerate(system.memory):
+            if name in start:
+                state.memory[i] = float(start[name].values[-1])
+    if mode is not None:
+        if mode not in modes:
+            raise ValueError(unknown(mode, "a mode", repr(system.name), modes))
+        state.counters[0] = modes.index(mode)
+    return state
+
+
 def _state(system: System, start: Any) -> FloatArray:
     names = list(system.states)
     if start is None:
         return np.zeros(len(names))
     if hasattr(start, "data_vars"):
-        if "u" in start and start["u"].dims == ("time", "state"):
-            return _finite(np.array(start["u"].values[-1], dtype=float), names)
-        raise ValueError("a Dataset given as start must be a result of simulate (with u over time and state)")
+        if "u" in start and start["u"].dims == ("time", "state") and list(start["state"].values) == names:
+            # NaN where the last mode lacks a state; a run that went wrong has no result.
+            return np.nan_to_num(np.array(start["u"].values[-1], dtype=float), nan=0.0)
+        raise ValueError(
+            f"a Dataset given as start must be a result of simulate, with the states {', '.join(names)} of {system.name!r}"
+        )
     if isinstance(start, Mapping):
         for name in start:
             if name not in names:
-                from nonsmooth.system.names import unknown
-
                 raise ValueError(unknown(name, "a state", repr(system.name), dict(system.states)))
         return _finite(np.array([_number(start.get(name, 0.0), name) for name in names]), names)
     if isinstance(start, str) or np.ndim(start) == 0:

@@ -1,6 +1,6 @@
 """The planar kernels for a given number of harmonics.
 
-The four planar files are written once, with the number of harmonics a constant at the top; here their text is
+The planar files are written once, with the number of harmonics a constant at the top; here their text is
 joined into one module with that constant set, so that every inner loop has constant bounds (a factor of two).
 """
 
@@ -15,7 +15,10 @@ from nonsmooth.kernels.cache import load_module
 
 __all__ = ["planar_module"]
 
-PARTS = ("planar_tables", "planar_search", "planar_march", "planar")
+PARTS = (
+    "planar_tables", "planar_polynomial", "planar_search", "planar_march", "planar_extremes", "planar_layout",
+    "planar_chain", "planar_record",
+)  # fmt: skip
 
 
 @cache

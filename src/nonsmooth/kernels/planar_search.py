@@ -2,11 +2,11 @@
 
 On a step the flow is known in closed form, so a functional g (an indicator, a state, an output) is known with
 its slope at any of 33 nodes for a dozen multiplications, and as a Taylor polynomial of degree 7 beside a node
-(remainder below 2e-16 of the amplitude over a node spacing of 0.04 rad, 5e-19 over half of it). A crossing is *excluded* where the cubic
-Hermite interpolant, raised to Bernstein degree 4 and widened by the bound K on the fourth derivative
-(K h^4 / 144), keeps its sign; it is *found* where the coefficients change sign exactly once; else the piece is
-halved, and at one node spacing the polynomial's own extrema decide. This finds double roots (grazing) and several
-crossings in one step, and stays sharp when the step starts on the surface.
+(remainder below 2e-16 of the amplitude over a node spacing of 0.04 rad, 5e-19 over half of it). A crossing is
+*excluded* where the cubic Hermite interpolant, raised to Bernstein degree 4 and widened by the bound K on the
+fourth derivative (K h^4 / 144), keeps its sign; it is *found* where the coefficients change sign exactly once; else
+the piece is halved, and at one node spacing the polynomial's own extrema decide. This finds double roots (grazing)
+and several crossings in one step, and stays sharp when the step starts on the surface.
 
 ``scr`` holds Taylor polynomials in rows, one per condition under search (two for x and v in ``dense``).
 """
@@ -14,11 +14,20 @@ crossings in one step, and stays sharp when the step starts on the surface.
 from math import fabs
 
 from .cache import device, inline
+from .planar_polynomial import (
+    NEVER,
+    ONCE,
+    OPEN,
+    classify,
+    cubic_root,
+    curvature_at,
+    horner,
+    next_upward,
+    slope_at,
+)  # fmt: skip
 from .planar_tables import DEGREE, HARMONICS, NODES, M
 
 WIDTH = DEGREE + 1
-NEVER, ALWAYS, ONCE, OPEN = -1, 1, 2, 0
-THIRD = 1.0 / 3.0
 
 
 @inline
@@ -99,159 +108,6 @@ def combine(fun, tay, mode, f, n_i, wn, scr, row):
         scr[row, 0] += fun[mode, f, 2]
     else:
         compose(tay, mode, f, wn, scr, row)
-
-
-@inline
-def horner(scr, row, tau):
-    total = scr[row, DEGREE]
-    for k in range(DEGREE - 1, -1, -1):
-        total = total * tau + scr[row, k]
-    return total
-
-
-@inline
-def slope_at(scr, row, tau):
-    """Slope of a row's polynomial."""
-    total = DEGREE * scr[row, DEGREE]
-    for k in range(DEGREE - 1, 0, -1):
-        total = total * tau + k * scr[row, k]
-    return total
-
-
-@inline
-def curvature_at(scr, row, tau):
-    """Second derivative of a row's polynomial."""
-    total = DEGREE * (DEGREE - 1) * scr[row, DEGREE]
-    for k in range(DEGREE - 1, 1, -1):
-        total = total * tau + k * (k - 1) * scr[row, k]
-    return total
-
-
-@device
-def derivative(scr, row, order, tau):
-    """The polynomial of a row (order 0), its slope (1) or its second derivative (2)."""
-    if order == 0:
-        return horner(scr, row, tau)
-    if order == 1:
-        return slope_at(scr, row, tau)
-    return curvature_at(scr, row, tau)
-
-
-@device
-def bracketed(scr, row, order, lo, hi):
-    """Root of ``derivative(order)`` where it changes sign on [lo, hi]: Newton, kept inside the bracket."""
-    rising = derivative(scr, row, order, hi) > 0.0
-    tau = 0.5 * (lo + hi)
-    for _ in range(80):
-        value = derivative(scr, row, order, tau)
-        if value == 0.0:
-            return tau
-        if (value > 0.0) == rising:
-            hi = tau
-        else:
-            lo = tau
-        slope = derivative(scr, row, order + 1, tau) if order < 2 else 0.0
-        nxt = tau - value / slope if slope != 0.0 else lo
-        if not (lo < nxt < hi):
-            nxt = 0.5 * (lo + hi)
-        if nxt == tau or not (lo < nxt < hi):
-            return nxt
-        tau = nxt
-    return tau
-
-
-@device
-def critical_points(scr, row, lo, hi, out):
-    """Zeros of the polynomial's slope in (lo, hi), increasing; at most two per sign of its third derivative, which
-    is taken to keep its sign over such a short piece."""
-    d0 = curvature_at(scr, row, lo)
-    d1 = curvature_at(scr, row, hi)
-    pieces = 1
-    middle = hi
-    if (d0 < 0.0 and d1 > 0.0) or (d0 > 0.0 and d1 < 0.0):
-        middle = bracketed(scr, row, 2, lo, hi)
-        pieces = 2
-    n = 0
-    left = lo
-    for piece in range(pieces):
-        right = middle if piece == 0 else hi
-        s0 = slope_at(scr, row, left)
-        s1 = slope_at(scr, row, right)
-        if (s0 < 0.0 and s1 > 0.0) or (s0 > 0.0 and s1 < 0.0):
-            out[n] = bracketed(scr, row, 1, left, right)
-            n += 1
-        left = right
-    return n
-
-
-@device
-def next_upward(scr, row, lo, hi, points):
-    """First tau >= lo at which the polynomial goes from <= 0 to > 0, or -1."""
-    n = critical_points(scr, row, lo, hi, points)
-    left = lo
-    g_left = horner(scr, row, lo)
-    for piece in range(n + 1):
-        right = points[piece] if piece < n else hi
-        g_right = horner(scr, row, right)
-        if g_left <= 0.0 and g_right > 0.0:
-            return bracketed(scr, row, 0, left, right) if g_left < 0.0 else left
-        left = right
-        g_left = g_right
-    return -1.0
-
-
-@inline
-def classify(g0, s0, g1, s1, h, bound):
-    """What is certain about the sign of g on a piece of length h: NEVER > 0, ALWAYS > 0, upward ONCE, or OPEN."""
-    b1 = g0 + h * s0 * THIRD
-    b2 = g1 - h * s1 * THIRD
-    c1 = g0 + 3.0 * b1
-    c2 = 0.5 * (b1 + b2)
-    c3 = 3.0 * b2 + g1
-    h2 = h * h
-    wide = bound * h2 * h2 * (1.0 / 144.0)
-    kind = OPEN
-    if g0 <= 0.0:
-        if g1 <= 0.0:
-            if c1 <= 0.0 and c2 + wide <= 0.0 and c3 <= 0.0:
-                kind = NEVER
-        elif c1 > 0.0:
-            if c2 - wide > 0.0 and c3 > 0.0:
-                kind = ONCE if g0 < 0.0 else ALWAYS
-        elif c2 + wide <= 0.0 or c3 > 0.0:
-            kind = ONCE
-    elif c1 >= 0.0 and c2 - wide >= 0.0 and c3 >= 0.0 and g1 >= 0.0:
-        kind = ALWAYS
-    return kind
-
-
-@inline
-def cubic_root(g0, s0, g1, s1, h):
-    """The upward root of the Hermite cubic, as a fraction of the piece (a first guess)."""
-    rise = g1 - g0
-    c1 = h * s0
-    c2 = 3.0 * rise - h * (2.0 * s0 + s1)
-    c3 = h * (s0 + s1) - 2.0 * rise
-    # with g0 = 0 the root at the start is divided out
-    q0 = g0
-    q1 = c1
-    q2 = c2
-    q3 = c3
-    x = 0.5
-    if g0 < 0.0:
-        x = g0 / (g0 - g1)
-    else:
-        q0, q1, q2, q3 = c1, c2, c3, 0.0
-    for _ in range(4):
-        value = q0 + x * (q1 + x * (q2 + x * q3))
-        slope = q1 + x * (2.0 * q2 + 3.0 * x * q3)
-        if slope <= 0.0:
-            break
-        change = value / slope
-        x = min(max(x - change, 0.0), 1.0)
-        if fabs(change) < 1e-2:
-            break
-    return x
 
 
 @inline
@@ -444,54 +300,3 @@ def search(
         while size < NODES // 2 and node % (2 * size) == 0:
             size *= 2
     return -1.0
-
-
-@device
-def locate_maximum(prop, rot, fun, tay, info, mode, w, f, sign, a, b, best, wn, wq, scr, points):
-    """The larger of ``best`` and the maximum of sign * functional over [a, b] of the step, piece by piece."""
-    spacing = info[mode, 1]
-    bound = bound_at(fun, info, mode, f, w)
-    size = NODES // 4
-    node = min(int(a / spacing) // size * size, NODES - size)
-    while node < NODES and node * spacing <= b:
-        to_node(prop, rot, mode, node, w, wn)
-        to_node(prop, rot, mode, node + size, w, wq)
-        g0 = sign * value_of(fun, mode, f, wn) - best
-        g1 = sign * value_of(fun, mode, f, wq) - best
-        s0 = sign * slope_of(fun, mode, f, wn)
-        s1 = sign * slope_of(fun, mode, f, wq)
-        if classify(g0, s0, g1, s1, size * spacing, bound) != NEVER:
-            if size > 2:
-                size //= 2
-                continue
-            to_node(prop, rot, mode, node + 1, w, wn)
-            compose(tay, mode, f, wn, scr, 0)
-            lo = max(a - (node + 1) * spacing, -spacing)
-            hi = min(b - (node + 1) * spacing, spacing)
-            if lo <= hi:
-                n = critical_points(scr, 0, lo, hi, points)
-                best = max(best, sign * horner(scr, 0, lo), sign * horner(scr, 0, hi))
-                for k in range(n):
-                    best = max(best, sign * horner(scr, 0, points[k]))
-        node += size
-        while size < NODES // 4 and node % (2 * size) == 0:
-            size *= 2
-    return best
-
-
-@inline
-def exceeds(fun, info, mode, f, w, w1, lowest, highest):
-    """Whether functional f may leave [lowest, highest] on the step from w to w1: (below, above)."""
-    g0 = value_of(fun, mode, f, w)
-    g1 = value_of(fun, mode, f, w1)
-    h = info[mode, 0]
-    b1 = g0 + h * slope_of(fun, mode, f, w) * THIRD
-    b2 = g1 - h * slope_of(fun, mode, f, w1) * THIRD
-    c1 = 0.25 * (g0 + 3.0 * b1)
-    c2 = 0.5 * (b1 + b2)
-    c3 = 0.25 * (3.0 * b2 + g1)
-    h2 = h * h
-    wide = bound_at(fun, info, mode, f, w) * h2 * h2 * (1.0 / 144.0)
-    below = min(min(min(g0, g1), min(c1, c3)), c2 - wide) < lowest
-    above = max(max(max(g0, g1), max(c1, c3)), c2 + wide) > highest
-    return below, above

@@ -5,12 +5,12 @@ In a mode u' = A u + b + sum_h (c_h cos k_h w t + s_h sin k_h w t). With w = (x,
 no special case. ``build`` sums the Taylor series of the upper two rows of exp(M tau) at 33 equidistant nodes of
 a step that is a fifth of the mode's fastest period.
 
-The four planar files become one generated module for each number of harmonics (``planar_variant``), so that
+The planar files become one generated module for each number of harmonics (``planar_module``), so that
 every inner loop has constant bounds. Arrays (M columns of w, functionals = indicators, two states, affine outputs):
     prop[mode, node, 2, M]         rows of x and v at the node, to be applied to w at the step's start
     rot[mode, node, 2 H + 1]       cos and sin of k_h w tau
-    fun[mode, functional, 2 M + 6] row of the value, row of the slope, then k0, k1, k2: on a step that starts at
-                                   (x, v) the fourth derivative stays below k0 |x - x_eq| + k1 |v - v_eq| + k2 (and three numbers of scratch)
+    fun[mode, functional, 2 M + 6] row of the value, row of the slope, then k0, k1, k2 (and scratch): on a step that
+                                   starts at (x, v) the fourth derivative is below k0 |x - x_eq| + k1 |v - v_eq| + k2
     tay[mode, functional, M, 8]    columns of the normalised Taylor coefficients of the functional: coefficient k
                                    at w is the sum over j of tay[mode, f, j, k] w[j]
     field[mode, 2, M]              rows of x' and v'

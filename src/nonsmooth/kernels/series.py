@@ -20,10 +20,44 @@ from .polynomial import NONE
 from .rkf45 import first_step, hermite, quiet, stages, transit
 from .series_node import begin, clear, count_pass, leap, meets_section, next_is_edge, open_window
 from .series_places import (
-    AFTER, BEGUN, CORNERS, CROSSINGS, DOUBTFUL, HALVINGS, JUMPS, LOCATE, METHOD, MOST_STEPS, N_INDICATORS,
-    N_OUTPUTS, N_PARAMETERS, ORDER, PERIOD, PHASE, READY, RECORD, RISING, RKF45, RTOL, SAMPLES, SECTION, SECTION_MODE,
-    SEGMENT, SETTLED, SINCE_CROSSING, SINCE_RETURN, SMOOTH_INDICATORS, STEP, STEPS, STEPS_IN_RETURN, T_MAX, TAYLOR,
-    TOUCHES, TRANSIENT, UNTIL, WINDOW,
+    AFTER,
+    BEGUN,
+    CORNERS,
+    CROSSINGS,
+    DOUBTFUL,
+    HALVINGS,
+    JUMPS,
+    LOCATE,
+    METHOD,
+    MOST_STEPS,
+    N_INDICATORS,
+    N_OUTPUTS,
+    N_PARAMETERS,
+    ORDER,
+    PERIOD,
+    PHASE,
+    READY,
+    RECORD,
+    RISING,
+    RKF45,
+    RTOL,
+    SAMPLES,
+    SECTION,
+    SECTION_MODE,
+    SEGMENT,
+    SETTLED,
+    SINCE_CROSSING,
+    SINCE_RETURN,
+    SMOOTH_INDICATORS,
+    STEP,
+    STEPS,
+    STEPS_IN_RETURN,
+    T_MAX,
+    TAYLOR,
+    TOUCHES,
+    TRANSIENT,
+    UNTIL,
+    WINDOW,
 )  # fmt: skip
 from .taylor import dense_states, end_states, fill_powers, step_length
 from .watch import extend, extend_at_node, extend_corners, sample, touches, write_sample
@@ -162,7 +196,7 @@ def march(
     rtol, fixed, period, phase, until, t_max = (
         control[RTOL], control[STEP], control[PERIOD], control[PHASE], control[UNTIL], control[T_MAX],
     )  # fmt: skip
-    log_rtol, tail, forced = ln(rtol), (1.0 if method == TAYLOR else 0.0), period < inf
+    log_rtol, tail, forced = ln(max(0.1 * rtol, 1e-16)), (1.0 if method == TAYLOR else 0.0), period < inf
     mode, t, status, zero_row, take = counters[0], clock[0], OK, -1, False
 
     if tally[BEGUN] == 0:

@@ -1,7 +1,8 @@
 """Length of a Taylor step and evaluation of its polynomials.
 
 The order follows from the tolerance, p = ceil(1 - ln(rtol) / 2), and the length from the last two coefficients
-(Jorba and Zou, Exp. Math. 14 (2005) 99-117): a term c_p h^p may be rtol times the size of its row.
+(Jorba and Zou, Exp. Math. 14 (2005) 99-117): a term c_p h^p may be
+a tenth of rtol times the size of its row, so that the error of a whole run stays near rtol.
 """
 
 from math import exp, fabs, inf, log

@@ -133,10 +133,10 @@ def f13(data: Data) -> list[Row]:
         texts.append(", ".join(part for part in parts if part))
         others.append(_coexisting(data["fig13"][f"{flow}_starts"], data["fig13"][flow]))
     return [
-        Row("F13", "Section 4, on Fig. 13", "periodic and chaotic responses as the gap varies", *texts, "none in kind",
-            "agrees" if "no period" in texts[0] else "differs"),
-        Row("F13", "not in the paper", "coexisting motions (several starts)", *others, "none in kind", "adds to the paper",
-            "One sweep follows one motion; the paper shows one at each gap."),
+        Row("F13", "Section 4, on Fig. 13", "periodic and chaotic responses as the gap varies", texts[0], texts[1],
+            "none in kind", "agrees" if "no period" in texts[0] else "differs"),
+        Row("F13", "not in the paper", "coexisting motions (several starts)", others[0], others[1], "none in kind",
+            "adds to the paper", "One sweep follows one motion; the paper shows one at each gap."),
     ]  # fmt: skip
 
 
@@ -200,11 +200,12 @@ def f15(data: Data) -> list[Row]:
         size = exact.max(axis=0) - exact.min(axis=0)
         distance, _ = cKDTree(exact / size).query(smoothed / size)
         worst = max(worst, float(np.quantile(distance, 0.99)))
+    texts = [f"neighbours part by exp({rate:.3f} ± {error:.3f}) per period" for rate, error in rates]
     chaotic = all(rate > 5 * error for rate, error in rates)
     return [
         Row(
             "F15", "Fig. 15", "g = 0.0018 m: a strange attractor, sections at four phases",
-            *(f"neighbours part by exp({rate:.3f} ± {error:.3f}) per period" for rate, error in rates),
+            texts[0], texts[1],
             f"99 % of the smoothed points within {100 * worst:.2f} % of the attractor's size of an exact point",
             "agrees" if chaotic and worst < 0.05 else "differs",
             "A mean over the first returns of pairs of neighbours; not a Lyapunov exponent with its error.",
@@ -236,7 +237,7 @@ def f17(data: Data) -> list[Row]:
             + ("" if as_said else ' The text has "contact" and "no contact" swapped.')
         )
         rows.append(
-            Row("F17", "Section 4, on Fig. 17", f"omega = {omega:g} rad/s: {says}", *texts,
+            Row("F17", "Section 4, on Fig. 17", f"omega = {omega:g} rad/s: {says}", texts[0], texts[1],
                 "none" if as_said else "contact and no contact swapped", "agrees" if as_said else "differs",
                 "Rising sweep; other motions coexist (Fig. 18)." if chaos else why)
         )  # fmt: skip
@@ -260,8 +261,8 @@ def _abrupt(data: Data) -> Row:
             f"{up:.4f}, falling into it at {down:.4f} rad/s"
         )
     return Row(
-        "F17", "Section 4, on Fig. 17", "abrupt transitions from periodic to chaotic and from chaotic to periodic", *texts,
-        "one of two is abrupt", "agrees in part",
+        "F17", "Section 4, on Fig. 17", "abrupt transitions from periodic to chaotic and from chaotic to periodic",
+        texts[0], texts[1], "one of two is abrupt", "agrees in part",
         "The transition at the higher frequency is abrupt, with a little hysteresis; the other is a cascade of flips "
         "that looks "
         "abrupt on the scale of the figure.",

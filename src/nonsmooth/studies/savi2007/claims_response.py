@@ -87,8 +87,8 @@ def f9b(data: Data) -> list[Row]:
             main_jump(smoothed, "down"), "Within one step of the sweep; read from its amplitudes alone.",
         ),
         Row(
-            "F9b", _9, "falling frequency: period 2 appears again", _range(exact, "down"), _range(smoothed, "down"), "none",
-            "agrees" if found else "differs",
+            "F9b", _9, "falling frequency: period 2 appears again", _range(exact, "down"), _range(smoothed, "down"),
+            "none", "agrees" if found else "differs",
         ),
     ]  # fmt: skip
 
@@ -131,8 +131,8 @@ def f10(data: Data) -> list[Row]:
     small = small_jump(exact, "up")
     return [
         Row(
-            "F10", _10, "jumps as in Fig. 9, elsewhere with rising than with falling frequency", _both(exact), _both(smoothed),
-            "no number printed", "agrees" if main_jump(exact, "up") and main_jump(exact, "down") else "differs",
+            "F10", _10, "jumps as in Fig. 9, elsewhere with rising than with falling frequency", _both(exact),
+            _both(smoothed), "no number printed", "agrees" if main_jump(exact, "up") and main_jump(exact, "down") else "differs",
         ),
         against_closed_form(
             "F10", "closed form, not printed", "falling jump at grazing", high, main_jump(exact, "down"),
@@ -160,8 +160,8 @@ def grazing_behind_both(data: Data) -> list[Row]:
     exact, smoothed = data["fig09"]["exact"], data["fig09"]["smoothed"]
     return [
         against_closed_form(
-            "F10", _10, "both (period 2 in Fig. 9, the small jump in Fig. 10) are probably related to grazing; closed form "
-            "of Fig. 9's lower grazing", grazing_of(exact)[0], change(exact, 1, 2, "up"), change(smoothed, 1, 2, "up"),
+            "F10", _10, "both (period 2 in Fig. 9, the small jump in Fig. 10) are probably related to grazing; closed "
+            "form of Fig. 9's lower grazing", grazing_of(exact)[0], change(exact, 1, 2, "up"), change(smoothed, 1, 2, "up"),
             "The period-2 range of Fig. 9 begins where the motion without contact grazes, as does the small jump of "
             "Fig. 10.",
         )

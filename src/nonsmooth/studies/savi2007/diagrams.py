@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 from matplotlib.lines import Line2D
@@ -15,6 +15,8 @@ from nonsmooth.studies.savi2007.flows import FLOWS, Settings, starts
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
+
+Place: TypeAlias = Literal["best", "upper right", "lower left", "lower right"]
 
 __all__ = ["diagrams", "draw_diagram", "how", "legend"]
 
@@ -45,7 +47,7 @@ def diagrams(
 
 
 def draw_diagram(
-    ax: Axes, data: Mapping[str, xr.Dataset], key: str, y: str, *, values: Sequence[float] = (), loc: str = "best"
+    ax: Axes, data: Mapping[str, xr.Dataset], key: str, y: str, *, values: Sequence[float] = (), loc: Place = "best"
 ) -> None:
     """One diagram: starts in grey behind, down over up; the paper's parameter values as dotted lines."""
     plot.bifurcation(data[f"{key}_starts"], ax, y=y, color="#B4B4B4", size=1.8)
@@ -60,7 +62,7 @@ def draw_diagram(
     legend(ax, loc)
 
 
-def legend(ax: Axes, loc: str) -> None:
+def legend(ax: Axes, loc: Place) -> None:
     """The legend of a diagram, its points large enough to be seen."""
     for handle in ax.legend(loc=loc).legend_handles:
         if isinstance(handle, Line2D):

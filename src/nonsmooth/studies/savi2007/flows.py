@@ -53,5 +53,5 @@ class Settings:
 
 
 def starts(count: int, seed: int = 2007) -> list[Any]:
-    """First states drawn from a box a little larger than the motions of Figs. 11-18, so that coexisting motions show."""
+    """First states from a box a little larger than the motions of Figs. 11-18, so that coexisting motions show."""
     return random_starts(count, {"x": -0.010, "v": -0.10}, {"x": 0.004, "v": 0.10}, seed=seed)

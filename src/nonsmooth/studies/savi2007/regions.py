@@ -24,9 +24,8 @@ def _draw(data: Mapping[str, xr.Dataset]) -> Canvas:
     with plot.journal():
         canvas = sheet(plot.PAGE, 0.42 * plot.PAGE)
         left, right = canvas.subplots(1, 2)
-        window = {"xlim": (-5 * ETA, 5 * ETA), "ylim": (-0.12, 0.12)}
-        plot.regions(EXACT.system(g=0.0), left, **window)
-        plot.regions(SMOOTHED.system(g=0.0), right, **window)
+        for ax, flow in ((left, EXACT), (right, SMOOTHED)):
+            plot.regions(flow.system(g=0.0), ax, xlim=(-5 * ETA, 5 * ETA), ylim=(-0.12, 0.12))
         left.set_title("(a) non-smooth system, Eqs. 4-5")
         right.set_title(r"(b) smoothed system, $\eta = 10^{-5}$ m, Eqs. 9-10")
         for ax in (left, right):

@@ -60,9 +60,9 @@ def _draw(printed: Mapping[str, float]) -> Callable[[Mapping[str, xr.Dataset]], 
 
 def _mark(ax: Axes, response: xr.Dataset, printed: Mapping[str, float]) -> None:
     """Grazing frequencies, the range of period 2, and the paper's numbers at the upper edge."""
-    for i, omega in enumerate(grazing_of(response)):
+    for i, grazing in enumerate(grazing_of(response)):
         ax.axvline(
-            omega, color=plot.COLORS["third"], linewidth=0.8, zorder=0, label="grazing, closed form" if i == 0 else None
+            grazing, color=plot.COLORS["third"], linewidth=0.8, zorder=0, label="grazing, closed form" if i == 0 else None
         )
     omega = response["omega"].values
     doubled = (response["period_number"] == 2).any("direction").values
@@ -105,7 +105,7 @@ _PRINTED_9 = {key: NUMBERS[key].value for key in ("period 2 near", "jump rising"
 FIGURES = (
     Figure(
         "fig09", 9, "Frequency response with a period-2 range", _compute(FIGURE_9, 3.0, 7.0), _draw(_PRINTED_9),
-        _caption(" Triangles: the paper's 3.63, 5.29 and 5.88 rad/s. The unstable branch between the jumps is not drawn."),
+        _caption(" Triangles: printed in the paper. The unstable branch between the jumps is not drawn."),
     ),
     Figure(
         "fig10", 10, "Frequency response with a small jump", _compute(FIGURE_10, 2.4, 7.4), _draw({}),
