@@ -5,6 +5,7 @@ It only packs a system into the arrays of ``kernels.planar_module`` and unpacks 
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass, field
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -44,8 +45,13 @@ class Tables:
     module: ModuleType
     sizes: tuple[int, int, int, int]
 
+    local: threading.local = field(default_factory=threading.local)
+
     def scratch(self) -> tuple[Any, ...]:
-        work: tuple[Any, ...] = self.module.scratch(*self.sizes)
+        """The present thread's work arrays; the kernel keeps the tables of the last point in them."""
+        if not hasattr(self.local, "work"):
+            self.local.work = self.module.scratch(*self.sizes)
+        work: tuple[Any, ...] = self.local.work
         return work
 
 

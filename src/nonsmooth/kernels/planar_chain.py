@@ -56,7 +56,9 @@ def chain(
         for h in range(HARMONICS):
             rates[h] = multiples[h] * omega[i]
         T = period[i]
-        build(i, A, b, c, s_, rates, T, ia, ib, ic, is_, oa, ob, oc, os_, prop, rot, fun, tay, field, info, row)
+        if integers[2 * n_i + 2] != i + 1:
+            build(i, A, b, c, s_, rates, T, ia, ib, ic, is_, oa, ob, oc, os_, prop, rot, fun, tay, field, info, row)
+            integers[2 * n_i + 2] = i + 1
         find_twins(fun, n_i, twin)
         target = phase * T
         s = 0.0

@@ -21,11 +21,13 @@ _SCRATCH = _BLOCK + _TABLE * 2 + _BLOCK + _TABLE + _MATRIX * 4 + _VECTOR * 2 + "
 
 
 def scratch(n_modes, n_indicators, n_outputs, n_rows):
-    """Work arrays for one thread: prop, rot, fun, tay, field, info, row, vectors, scr, points, rates, integers."""
+    """Work arrays for one thread: prop, rot, fun, tay, field, info, row, vectors, scr, points, rates, integers.
+
+    The last integer is the point for which the tables stand there already, plus one."""
     n_f = n_indicators + 2 + n_outputs
     return (
         np.zeros((n_modes, NODES + 1, 2, M)), np.zeros((n_modes, NODES + 1, 2 * HARMONICS + 1)),
         np.zeros((n_modes, n_f, 2 * M + 6)), np.zeros((n_modes, n_f, M, DEGREE + 1)), np.zeros((n_modes, 2, M)),
         np.zeros((n_modes, 4)), np.zeros((TERMS + 1, M)), np.zeros((7, M)), np.zeros((n_rows + 3, WIDTH)),
-        np.zeros(4), np.zeros(HARMONICS), np.zeros(2 * n_indicators + 2, dtype=np.int64),
+        np.zeros(4), np.zeros(HARMONICS), np.zeros(2 * n_indicators + 3, dtype=np.int64),
     )  # fmt: skip

@@ -3,7 +3,7 @@
 from .cache import device, kernel
 from .codes import CHATTER, DIVERGED, LOG_FULL, OK, TOO_MANY_CROSSINGS
 from .planar_layout import _INTEGERS, _LINEAR, _MATRIX, _NET, _SCRATCH, _VECTOR, BURST, MOST_CROSSINGS, SHORT
-from .planar_march import bounded, jump, leg, next_holding, set_phase, settle, trigger, wrap_phase
+from .planar_march import bounded, jump, leg, mark_zeros, next_holding, set_phase, settle, trigger, wrap_phase
 from .planar_polynomial import critical_points, curvature_at, horner
 from .planar_search import compose, dense, to_node
 from .planar_tables import HARMONICS, NODES, M, build
@@ -61,7 +61,7 @@ def record(
     """March to the time ``until``; log samples, crossings, touches. LOG_FULL asks to be called again.
 
     ``counters`` = mode, settled. ``progress`` = samples, crossings and touches so far, crossings in this period,
-    crossings in a burst. The zero flags in ``integers`` are part of what a second call goes on from.
+    crossings in a burst.
     """
     n_i = ia.shape[1]
     w, w1, wn, wp, wq, end, there = (
@@ -72,7 +72,9 @@ def record(
     T = period[0]
     for h in range(HARMONICS):
         rates[h] = multiples[h] * omega[0]
-    build(0, A, b, c, s_, rates, T, ia, ib, ic, is_, oa, ob, oc, os_, prop, rot, fun, tay, field, info, row)
+    if integers[2 * n_i + 2] != 1:
+        build(0, A, b, c, s_, rates, T, ia, ib, ic, is_, oa, ob, oc, os_, prop, rot, fun, tay, field, info, row)
+        integers[2 * n_i + 2] = 1
     s = clock[0]
     whole = clock[1]
     mode = counters[0]
@@ -81,6 +83,7 @@ def record(
     w[2] = 1.0
     set_phase(w, s, rates)
     code = OK
+    mark_zeros(fun, mode, w, zero)
     if counters[1] == 0:
         mode, code = settle(fun, tay, mode, w, transitions, rows, row_start, mode_start, mode_list, zero)
         counters[1] = 1
