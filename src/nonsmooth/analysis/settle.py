@@ -7,7 +7,7 @@ settling is run on, or pushed off an unstable orbit on which a carried state may
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -39,7 +39,7 @@ class Attractors:
     scale: FloatArray
 
     def settle(self, i: int, state: State, out: Chain, fresh: Callable[[], State]) -> Verdict:
-        """Run point i on from ``state`` (left where the run ends) and judge it; ``fresh`` makes a state at the start."""
+        """Run point i on from ``state`` (left where the run ends) and judge it; ``fresh`` gives a state at the start."""
         state.settled = False  # a parameter has changed under it: what holds already is taken first
         self._chain(i, state, self.transient, self.keep, out)
         if out.status[i] == codes.BEYOND_STOP:  # a carried state that a moved stop has overtaken
@@ -68,6 +68,10 @@ class Attractors:
     def _chain(self, i: int, state: State, transient: int, keep: int, out: Chain) -> None:
         self.engine.chain(self.tables, i, i + 1, state, None, self.plan, transient, keep, out)
 
+    def _probe(self, i: int, state: State, transient: int, keep: int, out: Chain) -> None:
+        plan = replace(self.plan, extremes=False)
+        self.engine.chain(self.tables, i, i + 1, state, None, plan, transient, keep, out)
+
     def _size(self, i: int, out: Chain) -> FloatArray:
         """Half the range of each state; its scale where it does not move."""
         size = 0.5 * (out.maximum[i] - out.minimum[i])
@@ -91,7 +95,7 @@ class Attractors:
             if j >= 0:
                 moved.u[j] += nudge[j]
                 moved.settled = False
-            self._chain(i, moved, p - 1, 1, probe)
+            self._probe(i, moved, p - 1, 1, probe)
             if probe.status[i] in FAILED:
                 return np.nan
             images.append(probe.section[i, 0].copy())
@@ -111,7 +115,7 @@ class Attractors:
         moved.u += max(NUDGE, 1e2 * self.tolerance) * size
         moved.settled = False
         probe = _rows_of(out, i, keep)
-        self._chain(i, moved, 0, keep, probe)
+        self._probe(i, moved, 0, keep, probe)
         if probe.status[i] in FAILED:
             return np.nan
         points = probe.section[i] / size

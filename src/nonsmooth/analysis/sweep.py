@@ -27,7 +27,9 @@ if TYPE_CHECKING:
 
 __all__ = ["sweep"]
 
-DIRECTIONS: dict[str | None, tuple[str, ...]] = {"up": ("up",), "down": ("down",), "both": ("up", "down"), None: ("none",)}
+DIRECTIONS: dict[str | None, tuple[str, ...]] = {
+    "up": ("up",), "down": ("down",), "both": ("up", "down"), None: ("none",),
+}  # fmt: skip
 PIECE = 16  # points of one piece of independent work
 
 
@@ -169,10 +171,12 @@ def _values(system: System, parameter: str, values: Any) -> FloatArray:
         hint = "; for one value write [value]" if numbers.ndim == 0 else ""
         raise ValueError(f"values of {parameter!r} must be a list of numbers, not of shape {numbers.shape}{hint}")
     if not np.isfinite(numbers).all():
-        raise ValueError(f"values of {parameter!r} must be finite; number {int(np.argmin(np.isfinite(numbers)))} is not")
+        where = int(np.argmin(np.isfinite(numbers)))
+        raise ValueError(f"values of {parameter!r} must be finite; number {where} is {numbers[where]}")
     distinct, count = np.unique(numbers, return_counts=True)
     if (count > 1).any():
-        raise ValueError(f"values of {parameter!r} must differ from each other; {distinct[count > 1][0]} is there twice")
+        twice = distinct[count > 1][0]
+        raise ValueError(f"values of {parameter!r} must differ from each other; {twice} is there more than once")
     return numbers
 
 

@@ -22,10 +22,10 @@ IntArray = NDArray[np.int64]
 class State:
     """Where a trajectory is: everything needed to go on. Kernels read and write it in place.
 
-    ``clock[0]`` is the time since the start of the current forcing period (autonomous: the time),
-    ``clock[1]`` the number of whole periods before it, so that no digits are lost in long runs:
-    t = clock[1] * T + clock[0]. ``clock[2]`` is the period T in which clock[0] was measured (0: none yet), so that
-    a carried state keeps its phase when the forcing frequency changes. ``counters``: [mode, last indicator row that fired or -1, free, free].
+    ``clock[0]`` is the time since the start of the current forcing period (autonomous: the time), ``clock[1]``
+    the number of whole periods before it, so that no digits are lost in long runs: t = clock[1] * T + clock[0].
+    ``clock[2]`` is the period T in which clock[0] was measured (0: none yet), so that a carried state keeps its
+    phase when the forcing frequency changes. ``counters``: [mode, and three places that an engine may use].
     """
 
     u: FloatArray  # (n,)
@@ -51,6 +51,7 @@ class SectionPlan:
     after: int = 1
     every: int = 1
     t_max: float = np.inf
+    extremes: bool = True  # False: extremes are not wanted, an engine may leave them out
 
 
 @dataclass

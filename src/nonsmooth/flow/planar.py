@@ -94,12 +94,12 @@ class PlanarEngine:
     ) -> None:  # fmt: skip
         rows = self._with_section(plan)
         carry = starts is None
+        section = np.array([plan.indicator, plan.rising, plan.mode, plan.after, plan.every, plan.extremes], np.int64)
         tables.module.chain(
             first, last, int(carry), np.zeros((1, 2)) if starts is None else starts,
             state.u, state.clock, state.counters,
             *tables.linear, self.net[0], rows, *self.net[2:],
-            plan.phase, np.array([plan.indicator, plan.rising, plan.mode, plan.after, plan.every]), plan.t_max,
-            transient, keep, DIVERGENCE * self.scale,
+            plan.phase, section, plan.t_max, transient, keep, DIVERGENCE * self.scale,
             out.section, out.maximum, out.minimum, out.indicator_max, out.indicator_min, out.output_max, out.output_min,
             out.crossings, out.contacts, out.elapsed, out.section_time, out.section_mode, out.status,
             *tables.scratch(),

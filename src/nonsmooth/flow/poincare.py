@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -69,6 +70,7 @@ def poincare(
     check_options(system, expert, poincare)
     n, transient = whole_number(n, "n", 1), whole_number(transient, "transient", 0)
     section, plan = section_plan(system, section)
+    plan = replace(plan, extremes=False)
     engine = engine_for(system, method, rtol, atol, **expert)
     starts = start_states(system, start)
     traced = system.traced

@@ -52,7 +52,8 @@ def simulate(
         State at t = 0; zeros where not given. A result gives its last state, mode and memory; the forcing begins anew,
         so let it end after whole periods.
     mode : str, optional
-        Mode at the start; that of the result, else the first, where not given. Transitions that already hold are taken first.
+        Mode at the start; that of the result, else the first, where not given. Transitions that already hold are
+        taken first.
     transient : float
         Run this long before recording, in the unit of the length. Time goes on: the record begins at t = transient.
     samples : int or array, optional

@@ -131,7 +131,8 @@ def _state(system: System, start: Any) -> FloatArray:
             # NaN where the last mode lacks a state; a run that went wrong has no result.
             return np.nan_to_num(np.array(start["u"].values[-1], dtype=float), nan=0.0)
         raise ValueError(
-            f"a Dataset given as start must be a result of simulate, with the states {', '.join(names)} of {system.name!r}"
+            f"a Dataset given as start must be a result of simulate with the states {', '.join(names)} of "
+            f"{system.name!r}"
         )
     if isinstance(start, Mapping):
         for name in start:
@@ -139,7 +140,9 @@ def _state(system: System, start: Any) -> FloatArray:
                 raise ValueError(unknown(name, "a state", repr(system.name), dict(system.states)))
         return _finite(np.array([_number(start.get(name, 0.0), name) for name in names]), names)
     if isinstance(start, str) or np.ndim(start) == 0:
-        raise TypeError(f"start must be a state ({_form(names)}), a result of simulate, or a list of states, not {start!r}")
+        raise TypeError(
+            f"start must be a state ({_form(names)}), a result of simulate, or a list of states, not {start!r}"
+        )
     values = float_array(start, "the numbers of a start")
     if values.shape != (len(names),):
         raise ValueError(

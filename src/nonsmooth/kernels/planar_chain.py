@@ -36,8 +36,9 @@ def chain(
 ):  # fmt: skip
     """Run points first <= i < last: ``transient`` section returns, then ``keep`` more, stored.
 
-    ``plan`` = section functional (-1: stroboscopic), direction, mode, after, every. The kept window reaches from
-    the last transient return (or the start) to the last kept one; its end is where a carried state goes on.
+    ``plan`` = section functional (-1: stroboscopic), direction, mode, after, every, extremes wanted. The kept window
+    reaches from the last transient return (or the start) to the last kept one; its end is where a carried state goes
+    on.
     """
     n_i = ia.shape[1]
     w, w1, wn, wp, wq, end, there = (
@@ -46,7 +47,7 @@ def chain(
     zero = integers[0:n_i]
     found = integers[n_i : n_i + 2]
     twin = integers[n_i + 2 : 2 * n_i + 2]
-    surface, direction, surface_mode, after, every = plan[0], plan[1], plan[2], plan[3], plan[4]
+    surface, direction, surface_mode, after, every, extremes = plan[0], plan[1], plan[2], plan[3], plan[4], plan[5]
     w[2] = 1.0
     # whole steps at a stride: only where nothing but a crossing can end a step
     strides = surface < 0 and period[first] < 1e300
@@ -138,11 +139,12 @@ def chain(
                     elif returns == transient:
                         is_open = True
                         a = r
-            if is_open:
+            if is_open and extremes != 0:
                 widen(
                     i, a, b_, prop, rot, fun, tay, info, mode, w, w1, n_i, twin, maximum, minimum, i_max, i_min,
                     o_max, o_min, wn, wq, scr, points,
                 )  # fmt: skip
+            if is_open:
                 elapsed[i] += b_ - a
             if closed:
                 s = target

@@ -31,7 +31,7 @@ ORBITS = {
     "Fig. 13, $g = 0.0009$ m": {**FIGURE_13, "g": 0.0009},
 }
 PERIODS = 4
-ETAS = np.array([1e-4, 3e-5, 1e-5, 3e-6, 1e-6])
+ETAS = np.array([1e-6, 3e-6, 1e-5, 3e-5, 1e-4])
 FITTED = (9e-7, 3.1e-5)  # etas of the fitted order: between rounding of the method and bands as wide as the contact
 FINE = 1e-11  # rtol at which the error is that of the smoothing alone
 NARROW = 1e-7  # rad/s, to which a grazing frequency is bisected
@@ -112,7 +112,7 @@ def _first_meeting(eta: float) -> float:
 
 def order_in_eta(errors: xr.Dataset, form: str) -> np.ndarray:
     """Slope of log error over log eta, for each orbit."""
-    chosen = errors.sel(eta=slice(FITTED[1], FITTED[0]) if errors["eta"][0] > errors["eta"][-1] else slice(*FITTED))
+    chosen = errors.sel(eta=slice(*FITTED))
     return np.array(
         [np.polyfit(np.log(chosen["eta"]), np.log(row), 1)[0] for row in chosen["error"].sel(form=form).values]
     )

@@ -8,18 +8,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth.studies.savi2007.gap import PHASES
+from nonsmooth.studies.savi2007.grazing import free_amplitude
 from nonsmooth.studies.savi2007.measure import (
     APERIODIC,
     UNSETTLED,
     Interval,
-    change,
+    changes,
+    highest,
+    lowest,
     periods_reached,
     range_of,
     regimes,
     separation_rate,
 )  # fmt: skip
 from nonsmooth.studies.savi2007.portraits import chosen_start, words_of
-from nonsmooth.studies.savi2007.printed import FIGURE_12, FIGURE_14, FIGURE_14_TEXT, FIGURE_18, NUMBERS
+from nonsmooth.studies.savi2007.printed import FIGURE_12, FIGURE_14, FIGURE_14_TEXT, FIGURE_17_TEXT, FIGURE_18, NUMBERS
 from nonsmooth.studies.savi2007.resonance import grazing_of
 from nonsmooth.studies.savi2007.rows import Data, Row, against_closed_form, against_printed
 
@@ -34,16 +37,12 @@ FLOWS = ("exact", "smoothed")
 def f11(data: Data) -> list[Row]:
     """The ranges of period 1, 2, 4 and of chaos over the forcing amplitude (slowly rising)."""
     swept = [data["fig11"][flow] for flow in FLOWS]
-    why = {
-        1: "A flip of the model's own orbit; both flows agree.",
-        2: _hysteresis(swept[0]),
-        4: "Period 8 and longer follow below.",
-    }
+    why = {1: "", 2: _hysteresis(swept[0]), 4: "Longer periods follow below."}
     says = {1: "period 1 for rho of at least", 2: "period 2 down to", 4: "period 4 down to"}
     rows = []
     for n in (1, 2, 4):
         printed = NUMBERS[f"period {n} from"]
-        found = [change(one, n, 2 * n, "up") for one in swept]
+        found = [highest(changes(one, n, 2 * n, "up")) for one in swept]
         rows.append(against_printed("F11", f"{says[n]} {printed}", printed, found[0], found[1], why[n]))
     printed = NUMBERS["period 4 from"]
     edges = [_chaos_from(one) for one in swept]
@@ -79,7 +78,7 @@ def _hysteresis(swept: xr.Dataset) -> str:
     differ = periodic & (abs(top[0] - top[1]) > 1e-4)
     at = swept["rho"].values[differ.values & (up["period_number"] == 2).values]
     if not len(at):
-        return "A flip of the model's own orbit; both flows agree."
+        return ""
     return (
         f"Within the range, two motions of period 2 coexist from {at[0]:.4f} to {at[-1]:.4f} N (up and down sweeps "
         "differ), "
@@ -215,41 +214,45 @@ def f15(data: Data) -> list[Row]:
 
 def f17(data: Data) -> list[Row]:
     """Three responses over the frequency, contact or not, and the transitions between them."""
-    rows = []
-    words = {8.64: "periodic, no contact", 9.55: "chaotic", 9.88: "periodic, with contact"}
-    for omega, says in words.items():
-        texts, contacts, kinds = [], [], []
-        for flow in FLOWS:
-            one = data["fig17"][flow].sel(direction="up").sel(omega=omega, method="nearest")
-            contacts.append(float(one["contacts_per_period"]))
-            kinds.append(int(one["period_number"]))
-            texts.append(f"{_name(kinds[-1])}, {contacts[-1]:.2f} contacts per period")
-        chaos = omega == 9.55
-        as_said = kinds[0] == APERIODIC if chaos else (contacts[0] > 0) == ("with" in says)
-        p = {name: float(data["fig17"]["exact"][name]) for name in ("m", "k", "c", "rho")}
-        linear = p["rho"] / np.hypot(2 * p["k"] - p["m"] * omega**2, p["c"] * omega)
-        gap = float(data["fig17"]["exact"]["g"])
-        why = (
-            f"Without the support the amplitude would be {1e3 * linear:.2f} mm, {'more' if linear > gap else 'less'} "
-            "than the "
-            f"gap of {1e3 * gap:g} mm: "
-            + ("contact is certain." if linear > gap else "motion without contact exists.")
-            + ("" if as_said else ' The text has "contact" and "no contact" swapped.')
-        )
-        rows.append(
-            Row("F17", "Section 4, on Fig. 17", f"omega = {omega:g} rad/s: {says}", texts[0], texts[1],
-                "none" if as_said else "contact and no contact swapped", "agrees" if as_said else "differs",
-                "Rising sweep; other motions coexist (Fig. 18)." if chaos else why)
-        )  # fmt: skip
-    rows.append(_abrupt(data))
-    return rows
+    return [*(_response_at(data, omega, says) for omega, says in FIGURE_17_TEXT.items()), _abrupt(data)]
+
+
+def _response_at(data: Data, omega: float, says: str) -> Row:
+    texts, contacts, kinds = [], [], []
+    for flow in FLOWS:
+        one = data["fig17"][flow].sel(direction="up").sel(omega=omega, method="nearest")
+        contacts.append(float(one["contacts_per_period"]))
+        kinds.append(int(one["period_number"]))
+        texts.append(f"{_name(kinds[-1])}, {contacts[-1]:.2f} contacts per period")
+    chaos = "chaotic" in says
+    right_kind = (kinds[0] == APERIODIC) == chaos
+    swapped = not chaos and (contacts[0] > 0) != ("with contact" in says)
+    difference = "another motion" if not right_kind else "contact and no contact swapped" if swapped else "none"
+    return Row(
+        "F17", "Section 4, on Fig. 17", f"omega = {omega:g} rad/s: {says}", texts[0], texts[1], difference,
+        "agrees" if difference == "none" else "differs",
+        "Rising sweep; other motions coexist (Fig. 18)." if chaos else _without_support(data, omega, swapped),
+    )  # fmt: skip
+
+
+def _without_support(data: Data, omega: float, swapped: bool) -> str:
+    """The linear amplitude against the gap."""
+    swept = data["fig17"]["exact"]
+    parameters = {name: float(swept[name]) for name in ("m", "k", "c", "rho")}
+    linear, gap = free_amplitude({**parameters, "omega": omega}), float(swept["g"])
+    more = linear > gap
+    return (
+        f"Without the support the amplitude would be {1e3 * linear:.2f} mm, {'more' if more else 'less'} than the gap of "
+        f"{1e3 * gap:g} mm: {'contact is certain' if more else 'motion without contact exists'}."
+        + (' The text has "contact" and "no contact" swapped.' if swapped else "")
+    )
 
 
 def _abrupt(data: Data) -> Row:
     texts = []
     for flow in FLOWS:
         swept = data["fig17"][flow]
-        first = change(swept, 1, 2, "up")
+        first = lowest(changes(swept, 1, 2, "up"))
         chaos = [range_of(swept, APERIODIC, direction) for direction in ("up", "down")]
         if first is None or None in chaos:
             texts.append("not found")
@@ -275,7 +278,8 @@ def f17_grazing(data: Data) -> list[Row]:
     return [
         against_closed_form(
             "F17", "closed form, not printed", "the abrupt transition is grazing (falling)", grazing_of(exact)[-1],
-            change(exact, 1, APERIODIC, "down"), change(smoothed, 1, APERIODIC, "down"),
+
+            highest(changes(exact, 1, APERIODIC, "down")), highest(changes(smoothed, 1, APERIODIC, "down")),
         )
     ]  # fmt: skip
 

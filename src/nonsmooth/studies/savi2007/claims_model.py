@@ -11,7 +11,7 @@ from nonsmooth.studies.savi2007.band import FITTED, order_in_eta
 from nonsmooth.studies.savi2007.claims_response import main_jump, small_jump
 from nonsmooth.studies.savi2007.flows import ETA
 from nonsmooth.studies.savi2007.measure import jumps, regimes, separation_rate
-from nonsmooth.studies.savi2007.printed import FIGURE_12
+from nonsmooth.studies.savi2007.printed import FIGURE_12, NUMBERS
 from nonsmooth.studies.savi2007.resonance import grazing_of
 from nonsmooth.studies.savi2007.rows import Data, Row
 
@@ -39,10 +39,10 @@ def m1(data: Data) -> list[Row]:
     stated, printed_formula = (float(np.sqrt(n * p["k"] / p["m"])) for n in (2, 1))
     return [
         Row(
-            "M1", "Eqs. 1-2", "two modes; the support's force f_s < 0 in contact, and zero at release", texts[0], texts[1],
-            "none", "agrees" if max(pulls) < 1e-6 else "differs",
+            "M1", "Eqs. 1-2", "two modes; the support's force f_s < 0 in contact, and zero at release", texts[0],
+            texts[1], "none", "agrees" if max(pulls) < 1e-6 else "differs",
             f"Over the orbits of Fig. 12. By Eq. 2 the natural frequency is sqrt(2k/m) = {stated:.3f} rad/s, the "
-            "paper's 4.50; "
+            f"paper's {NUMBERS['natural frequency'].text}; "
             f"the formula printed in Section 3.1, sqrt(k/m), gives {printed_formula:.2f}.",
         )
     ]  # fmt: skip

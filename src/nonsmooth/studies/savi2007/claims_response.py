@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nonsmooth.studies.savi2007.measure import Interval, change, jumps, range_of
+from nonsmooth.studies.savi2007.measure import Interval, changes, jumps, lowest, range_of
 from nonsmooth.studies.savi2007.printed import NUMBERS
 from nonsmooth.studies.savi2007.resonance import grazing_of
 from nonsmooth.studies.savi2007.rows import Data, Row, against_closed_form, against_printed
@@ -49,7 +49,8 @@ def f9a(data: Data) -> list[Row]:
     if found is not None:
         why = (
             f"The range is {found[1] - found[0]:.2f} rad/s wide and begins at the lower grazing frequency, "
-            f"{grazing_of(exact)[0]:.5f} rad/s in closed form; {printed.text} lies near its lower end."
+            f"{grazing_of(exact)[0]:.5f} rad/s in closed form; {printed.text} lies at "
+            f"{100 * (printed.value - found[0]) / (found[1] - found[0]):.0f} % of it."
         )
     return [
         Row(
@@ -131,8 +132,9 @@ def f10(data: Data) -> list[Row]:
     small = small_jump(exact, "up")
     return [
         Row(
-            "F10", _10, "jumps as in Fig. 9, elsewhere with rising than with falling frequency", _both(exact),
-            _both(smoothed), "no number printed", "agrees" if main_jump(exact, "up") and main_jump(exact, "down") else "differs",
+            "F10", _10, "jumps as in Fig. 9, elsewhere with rising than with falling frequency",
+            _both(exact), _both(smoothed), "no number printed",
+            "agrees" if main_jump(exact, "up") and main_jump(exact, "down") else "differs",
         ),
         against_closed_form(
             "F10", "closed form, not printed", "falling jump at grazing", high, main_jump(exact, "down"),
@@ -161,7 +163,8 @@ def grazing_behind_both(data: Data) -> list[Row]:
     return [
         against_closed_form(
             "F10", _10, "both (period 2 in Fig. 9, the small jump in Fig. 10) are probably related to grazing; closed "
-            "form of Fig. 9's lower grazing", grazing_of(exact)[0], change(exact, 1, 2, "up"), change(smoothed, 1, 2, "up"),
+            "form of Fig. 9's lower grazing", grazing_of(exact)[0],
+            lowest(changes(exact, 1, 2, "up")), lowest(changes(smoothed, 1, 2, "up")),
             "The period-2 range of Fig. 9 begins where the motion without contact grazes, as does the small jump of "
             "Fig. 10.",
         )
@@ -179,4 +182,5 @@ def _both(response: xr.Dataset) -> str:
 
 
 def _small(response: xr.Dataset) -> str:
-    return f"rising {small_jump(response, 'up')}, falling {small_jump(response, 'down')} rad/s"
+    found = [small_jump(response, direction) or "none found" for direction in ("up", "down")]
+    return f"rising {found[0]}, falling {found[1]} rad/s"

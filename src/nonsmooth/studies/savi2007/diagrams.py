@@ -22,28 +22,39 @@ __all__ = ["diagrams", "draw_diagram", "how", "legend"]
 
 
 def diagrams(
-    settings: Settings, parameters: Mapping[str, float], parameter: str, low: float, high: float, steps: tuple[int, int]
+    settings: Settings,
+    parameters: Mapping[str, float],
+    parameter: str,
+    low: float,
+    high: float,
+    steps: tuple[int, int],
+    also: tuple[float, ...],
 ) -> dict[str, xr.Dataset]:
     """Sweeps up and down (``exact``, ``smoothed``) and from several starts (``exact_starts``, ``smoothed_starts``).
 
     ``steps``: of the exact and of the smoothed sweep; the starts are tried at half and a quarter as many values.
+    ``also``: values to be among those swept.
     """
     data = {}
     for flow in FLOWS:
         system = flow.system(**parameters)
         n = settings.of(flow, exact=steps[0], smoothed=steps[1], quick=70)
         data[flow.key] = sweep(
-            system, parameter, np.linspace(low, high, n + 1), direction="both", progress=settings.progress,
+            system, parameter, _grid(low, high, n, also), direction="both", progress=settings.progress,
             transient=settings.of(flow, exact=600, smoothed=200, quick=100),
             keep=settings.of(flow, exact=200, smoothed=64, quick=40), **flow.options,
         )  # fmt: skip
         n = settings.of(flow, exact=steps[0] // 2, smoothed=steps[1] // 4, quick=10)
         data[f"{flow.key}_starts"] = sweep(
-            system, parameter, np.linspace(low, high, n + 1), direction=None,
+            system, parameter, _grid(low, high, n, also), direction=None,
             start=starts(settings.of(flow, exact=12, smoothed=8, quick=4)), progress=settings.progress,
             transient=settings.of(flow, exact=600, smoothed=150, quick=80), keep=32, **flow.options,
         )  # fmt: skip
     return data
+
+
+def _grid(low: float, high: float, steps: int, also: tuple[float, ...]) -> np.ndarray:
+    return np.unique(np.round(np.concatenate([np.linspace(low, high, steps + 1), also]), 9))
 
 
 def draw_diagram(

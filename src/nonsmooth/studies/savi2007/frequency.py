@@ -25,7 +25,7 @@ _CHAOTIC = 9.55
 
 
 def _compute_17(settings: Settings) -> dict[str, xr.Dataset]:
-    return diagrams(settings, FIGURE_17, "omega", 8.4, 10.4, (800, 300))
+    return diagrams(settings, FIGURE_17, "omega", 8.4, 10.4, (800, 300), tuple(FIGURE_18))
 
 
 def _draw_17(data: Mapping[str, xr.Dataset]) -> Canvas:
@@ -64,7 +64,7 @@ def _compute_18(settings: Settings) -> dict[str, xr.Dataset]:
     for flow in FLOWS:
         begin = starts(data[flow.key].sizes["start"])[chosen_start(data[flow.key], _CHAOTIC, FIGURE_18[_CHAOTIC])]
         system = flow.system(omega=_CHAOTIC, **FIGURE_17)
-        attractor = poincare(system, start=begin, transient=300, n=200, **flow.options)
+        attractor = poincare(system, start=begin, transient=300, n=1000, **flow.options)
         data[f"{flow.key}_twins"] = twins(flow, system, attractor)
     return data
 

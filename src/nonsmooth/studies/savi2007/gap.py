@@ -27,7 +27,7 @@ _CHAOTIC = 0.0018
 
 
 def _compute_13(settings: Settings) -> dict[str, xr.Dataset]:
-    return diagrams(settings, FIGURE_13, "g", -0.0015, 0.002, (700, 280))
+    return diagrams(settings, FIGURE_13, "g", -0.0015, 0.002, (700, 280), tuple(FIGURE_14))
 
 
 def _draw_13(data: Mapping[str, xr.Dataset]) -> Canvas:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -15,8 +16,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "APERIODIC", "UNSETTLED", "Interval", "change", "jumps", "periods_reached", "range_of", "regimes",
-    "separation_rate",
+    "APERIODIC", "UNSETTLED", "Interval", "changes", "highest", "jumps", "lowest", "periods_reached", "range_of",
+    "regimes", "separation_rate",
 ]  # fmt: skip
 
 APERIODIC = 0  # no period found up to the longest looked for
@@ -56,19 +57,25 @@ def regimes(swept: xr.Dataset, direction: str | None = None) -> tuple[NDArray[np
     return values[order], np.where(settled, number, UNSETTLED)
 
 
-def change(swept: xr.Dataset, first: int, second: int, direction: str | None = None) -> Interval | None:
-    """Where regime ``first`` borders on ``second`` (in either order), with nothing but unsettled points between.
-
-    The narrowest such interval; None where they are no neighbours.
-    """
+def changes(swept: xr.Dataset, first: int, second: int, direction: str | None = None) -> list[Interval]:
+    """Where regime ``first`` borders on ``second`` (in either order), with nothing but unsettled points between."""
     values, regime = regimes(swept, direction)
     at = np.flatnonzero(regime != UNSETTLED)
-    found = [
+    return [
         Interval(float(values[i]), float(values[j]))
         for i, j in pairwise(at)
         if {int(regime[i]), int(regime[j])} == {first, second} and first != second
     ]
-    return min(found, key=lambda interval: interval.uncertainty, default=None)
+
+
+def highest(found: Sequence[Interval]) -> Interval | None:
+    """The last of intervals at rising values, if there is one."""
+    return found[-1] if found else None
+
+
+def lowest(found: Sequence[Interval]) -> Interval | None:
+    """The first of intervals at rising values, if there is one."""
+    return found[0] if found else None
 
 
 def range_of(swept: xr.Dataset, regime_wanted: int, direction: str | None = None) -> tuple[float, float] | None:

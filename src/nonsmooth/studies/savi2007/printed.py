@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 __all__ = [
     "FIGURE_9", "FIGURE_10", "FIGURE_11", "FIGURE_12", "FIGURE_13", "FIGURE_14", "FIGURE_14_TEXT", "FIGURE_17",
-    "FIGURE_18", "NUMBERS", "Printed",
+    "FIGURE_17_TEXT", "FIGURE_18", "NUMBERS", "Printed",
 ]  # fmt: skip
 
 
@@ -42,10 +42,13 @@ FIGURE_13 = {"omega": 11.15, "rho": 0.33}
 FIGURE_14 = {-0.0012: 1, 0.0009: 2, 0.0014: 3, 0.0018: 0}  # g of the caption -> period number (0: chaotic)
 FIGURE_14_TEXT = {-0.0012: 1, 0.005: 2, 0.0012: 3, 0.0014: 0}  # g as the text of Section 4 prints them
 FIGURE_17 = {"rho": 0.23, "g": 0.0036}
+FIGURE_17_TEXT = {8.64: "periodic, no contact", 9.55: "chaotic", 9.88: "periodic, with contact"}  # omega
 FIGURE_18 = {8.64: 1, 9.55: 0, 9.88: 1}  # omega -> period number (0: chaotic)
 
 _9, _11 = "Section 4, on Fig. 9", "Section 4, on Fig. 11"
 NUMBERS = {
+    "natural frequency": Printed("4.50", "rad/s", "Section 3.1"),
+    "natural frequency, measured": Printed("4.60", "rad/s", "Section 3.1, Table 1"),
     "period 2 near": Printed("3.63", "rad/s", _9),
     "jump rising": Printed("5.88", "rad/s", _9),
     "jump falling": Printed("5.29", "rad/s", _9),

@@ -20,6 +20,7 @@ from nonsmooth.studies.savi2007.pages import (
     to_html,
     to_markdown,
 )  # fmt: skip
+from nonsmooth.studies.savi2007.printed import NUMBERS
 from nonsmooth.studies.savi2007.rows import CLOSE, Data, Row
 
 __all__ = ["write_report"]
@@ -94,11 +95,12 @@ def _summary(rows: Sequence[Row]) -> str:
 
 
 def _rules() -> str:
+    one, other = (NUMBERS[key] for key in ("natural frequency", "natural frequency, measured"))
     return (
         "a ± b is the middle and half the width of the step of a sweep in which the change lies. A printed number "
         "agrees "
         "when it lies there within its own rounding; it agrees within N % up to "
-        f"{CLOSE:g} %, which is about how far the paper's own two natural frequencies (4.50 and 4.60 rad/s) lie "
+        f"{CLOSE:g} %, which is about how far the paper's own two natural frequencies ({one} and {other}) lie "
         "apart; beyond "
         "that it differs. Differences are (found - printed) / printed."
     )

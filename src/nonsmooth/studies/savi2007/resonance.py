@@ -61,9 +61,8 @@ def _draw(printed: Mapping[str, float]) -> Callable[[Mapping[str, xr.Dataset]], 
 def _mark(ax: Axes, response: xr.Dataset, printed: Mapping[str, float]) -> None:
     """Grazing frequencies, the range of period 2, and the paper's numbers at the upper edge."""
     for i, grazing in enumerate(grazing_of(response)):
-        ax.axvline(
-            grazing, color=plot.COLORS["third"], linewidth=0.8, zorder=0, label="grazing, closed form" if i == 0 else None
-        )
+        label = "grazing, closed form" if i == 0 else None
+        ax.axvline(grazing, color=plot.COLORS["third"], linewidth=0.8, zorder=0, label=label)
     omega = response["omega"].values
     doubled = (response["period_number"] == 2).any("direction").values
     if doubled.any():

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
 __all__ = ["twins"]
 
-PAIRS = 64
-RETURNS = 10
+PAIRS = 400
+RETURNS = 12
 APART = {"exact": 1e-9, "smoothed": 1e-6}  # m; above what rounding (exact) or rtol 1e-6 (smoothed) does by itself
 
 
