@@ -79,7 +79,9 @@ def frequency_response(
     columns = list(zip(*found, strict=True)) if found else [()] * 6
     keys = ("value", "step", "direction", "start", "before", "after")
     kinds = (float, float, str, int, float, float)
-    jumps: dict[str, np.ndarray] = {key: np.array(column, dtype=kind) for key, column, kind in zip(keys, columns, kinds, strict=True)}
+    jumps: dict[str, np.ndarray] = {
+        key: np.array(column, dtype=kind) for key, column, kind in zip(keys, columns, kinds, strict=True)
+    }
     result = response(swept, amplitude=amplitude, jumps=jumps)
     record = read_provenance(swept) | {"verb": "frequency_response"}
     import json

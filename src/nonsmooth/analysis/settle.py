@@ -39,7 +39,7 @@ class Attractors:
     scale: FloatArray
 
     def settle(self, i: int, state: State, out: Chain, fresh: Callable[[], State]) -> Verdict:
-        """Run point i on from ``state`` (left where the run ends) and judge it; ``fresh`` gives a state at the start."""
+        """Run point i on from ``state`` (left where the run ends) and judge it; ``fresh`` makes a start."""
         state.settled = False  # a parameter has changed under it: what holds already is taken first
         self._chain(i, state, self.transient, self.keep, out)
         if out.status[i] == codes.BEYOND_STOP:  # a carried state that a moved stop has overtaken

@@ -16,7 +16,7 @@ from nonsmooth.flow.arguments import check_options, check_system, float_array, w
 from nonsmooth.flow.engine import Chain, FloatArray, State
 from nonsmooth.flow.methods import RTOL, engine_for
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
-from nonsmooth.flow.starts import is_one_start, start_states
+from nonsmooth.flow.starts import is_one_start, plain_start, start_states
 from nonsmooth.kernels import codes
 from nonsmooth.results.progress import progress as progress_bar
 
@@ -137,7 +137,8 @@ def sweep(
     return _dataset(
         system, engine.name, parameter, numbers, directions, starts, slots,
         {
-            "parameter": parameter, "values": values, "direction": direction, "start": start, "section": section,
+            "parameter": parameter, "values": values, "direction": direction, "start": plain_start(system, start),
+            "section": section,
             "transient": transient, "keep": keep, "max_period": max_period, "method": method, "rtol": rtol,
             "atol": atol, **expert,
         },

@@ -12,7 +12,7 @@ from nonsmooth.flow.arguments import check_options, check_system, whole_number
 from nonsmooth.flow.engine import Chain, State
 from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
-from nonsmooth.flow.starts import is_one_start, start_states
+from nonsmooth.flow.starts import is_one_start, plain_start, start_states
 from nonsmooth.kernels import codes
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ def poincare(
     from nonsmooth.results.schema import section_points
 
     options = {
-        "section": section, "n": n, "transient": transient, "start": start, "method": method, "rtol": rtol,
+        "section": section, "n": n, "transient": transient, "start": plain_start(system, start), "method": method, "rtol": rtol,
         "atol": atol, **expert,
     }  # fmt: skip
     labels = labels_of(system)

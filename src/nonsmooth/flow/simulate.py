@@ -11,7 +11,7 @@ from nonsmooth.errors import SolveError
 from nonsmooth.flow.arguments import check_options, check_system, float_array, real_number, whole_number
 from nonsmooth.flow.engine import FloatArray, Log, State
 from nonsmooth.flow.methods import engine_for
-from nonsmooth.flow.starts import first_state, is_one_start, start_states
+from nonsmooth.flow.starts import first_state, is_one_start, plain_start
 from nonsmooth.kernels import codes
 
 if TYPE_CHECKING:
@@ -103,7 +103,7 @@ def simulate(
     log = engine.record(tables, state, t_end, instants)
     _complete(log, system, state, period)
     options = {
-        "periods": periods, "duration": duration, "start": _plain_start(start, system), "mode": mode,
+        "periods": periods, "duration": duration, "start": plain_start(system, start), "mode": mode,
         "transient": transient, "samples": samples, "step": step,
         "ramps": None if not ramps else {k: v if not callable(v) else str(v) for k, v in ramps.items()},
         "method": method, "rtol": rtol, "atol": atol, **expert,
@@ -163,10 +163,6 @@ def _complete(log: Log, system: System, state: State, period: float | None) -> N
     time = state.clock[0] + (state.clock[1] * period if period is not None else 0.0)
     where = dict(zip(system.states, map(float, state.u), strict=True))
     raise SolveError(message, time=float(time), state=where, mode=system.modes[int(state.counters[0])], status=name)
-
-
-def _plain_start(start: Any, system: System) -> Any:
-    return start_states(system, start)[0].tolist() if hasattr(start, "data_vars") else start
 
 
 def _dataset(

@@ -14,7 +14,7 @@ from nonsmooth.system.names import unknown
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["first_state", "is_one_start", "random_starts", "start_states"]
+__all__ = ["first_state", "is_one_start", "plain_start", "random_starts", "start_states"]
 
 
 def random_starts(n: int, low: Any, high: Any, seed: int) -> list[Any]:
@@ -68,17 +68,25 @@ def _check_box(a: FloatArray, b: FloatArray, low: Any, high: Any) -> None:
 
 def is_one_start(start: Any) -> bool:
     """Whether ``start`` is one state (None, a mapping, a flat sequence of numbers) rather than several."""
-    if start is None or isinstance(start, Mapping) or hasattr(start, "data_vars"):
-        return True
-    if isinstance(start, str) or np.ndim(start) == 0:
-        return True  # not a start at all: start_states says so
-    return isinstance(start, np.ndarray | Sequence) and np.ndim(_first(start)) == 0 and not isinstance(
-        _first(start), Mapping
-    )
+    if not _is_list(start):
+        return True  # None, a mapping, a result; or no start at all: start_states says so
+    first = start[0] if len(start) else 0.0
+    return not (isinstance(first, Mapping) or hasattr(first, "data_vars") or np.ndim(first) > 0)
 
 
-def _first(start: Any) -> Any:
-    return start[0] if len(start) else 0.0
+def _is_list(start: Any) -> bool:
+    """Whether ``start`` has entries: a sequence or an array (NumPy's, xarray's, a row of a table)."""
+    if isinstance(start, str) or hasattr(start, "data_vars") or getattr(start, "ndim", 1) == 0:
+        return False
+    return isinstance(start, Sequence) or hasattr(start, "__array__")
+
+
+def plain_start(system: System, start: Any) -> Any:
+    """``start`` as data that a result can record: arrays and results as lists of numbers."""
+    if start is None or isinstance(start, Mapping):
+        return start
+    states = start_states(system, start)
+    return states[0].tolist() if is_one_start(start) else states.tolist()
 
 
 def start_states(system: System, start: Any) -> FloatArray:
@@ -139,7 +147,7 @@ def _state(system: System, start: Any) -> FloatArray:
             if name not in names:
                 raise ValueError(unknown(name, "a state", repr(system.name), dict(system.states)))
         return _finite(np.array([_number(start.get(name, 0.0), name) for name in names]), names)
-    if isinstance(start, str) or np.ndim(start) == 0:
+    if not _is_list(start):
         raise TypeError(
             f"start must be a state ({_form(names)}), a result of simulate, or a list of states, not {start!r}"
         )

@@ -13,7 +13,7 @@ from .cache import device, inline
 __all__ = ["first_step", "hermite", "quiet", "stages", "transit"]
 
 
-@device
+@inline
 def stages(field, mode, t, u, q, h, n, K, fifth, absolute, rtol):
     """One step from u; K = (k1..k6, scratch, result) with k1 given. Returns the error over the tolerance."""
     k1, k2, k3, k4, k5, k6, v, new = K
@@ -80,7 +80,7 @@ def _certain(J0, J1, row, sign, h, error):
     return 0
 
 
-@device
+@inline
 def quiet(mode, J0, J1, n, h, net, side, side_next, scale, slack, section, section_mode):
     """Whether nothing can happen on the step, seen from the jets at its two ends alone (most steps)."""
     first, outgoing, transitions, rows, _ = net
@@ -125,7 +125,7 @@ def first_step(J, u, n, absolute, rtol):
     return h
 
 
-@device
+@inline
 def transit(mode, J, n, net):
     """Estimated time to the next transition, from the parabolas of its rows (inf: none in sight).
 

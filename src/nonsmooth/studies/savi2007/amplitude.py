@@ -49,8 +49,7 @@ def _compute_12(settings: Settings) -> dict[str, xr.Dataset]:
 def _caption_12(data: Mapping[str, xr.Dataset]) -> str:
     return (
         "Phase portraits with section points (black) at four amplitudes of Fig. 11; contact zone x > g shaded, orbit "
-        "in "
-        "contact in vermilion. " + describe(data, FIGURE_12)
+        "in contact in vermilion. " + describe(data, FIGURE_12)
     )
 
 

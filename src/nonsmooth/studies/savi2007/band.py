@@ -166,13 +166,10 @@ def _caption(data: Mapping[str, xr.Dataset]) -> str:
     speed = float(errors["slowest_contact"].min())
     return (
         "Effect of the band's half width eta. (a) Error of the smoothed switch against the exact flow after "
-        f"{PERIODS} periods "
-        f"on three orbits whose slowest transition has {speed:.3f} m/s: filled, RKF45 at rtol 1e-11 (fitted orders "
-        f"{orders}); "
-        "squares, rtol 1e-6 as in the figures (the paper names no tolerance); dotted, the fields interpolated in "
-        "place of the paper's Eq. 8. (b) Grazing "
-        f"frequency of the smoothed model: it is that of a gap g - eta. Exact flow, bisected: "
-        f"{float(data['grazing']['grazing'][0]):.6f} rad/s, closed form "
+        f"{PERIODS} periods on three orbits whose slowest transition has {speed:.3f} m/s: filled, RKF45 at rtol 1e-11 "
+        f"(fitted orders {orders}); squares, rtol 1e-6 as in the figures (the paper names no tolerance); dotted, the "
+        "fields interpolated in place of the paper's Eq. 8. (b) Grazing frequency of the smoothed model: it is that "
+        f"of a gap g - eta. Exact flow, bisected: {float(data['grazing']['grazing'][0]):.6f} rad/s, closed form "
         f"{float(data['grazing']['closed_form'][0]):.6f} rad/s."
     )
 

@@ -66,8 +66,7 @@ def m2(data: Data) -> list[Row]:
     return [
         Row(
             "M2", "Eqs. 3-5, Fig. 2a", "in contact exactly where h_a > 0 and h_b < 0",
-            f"mode = region at {right} of {total} "
-            "samples", "see M3", "none", "agrees" if right == total else "differs",
+            f"mode = region at {right} of {total} samples", "see M3", "none", "agrees" if right == total else "differs",
             "The mode is stored and changed by transitions, not computed from the state: this is a check.",
         )
     ]  # fmt: skip
@@ -94,8 +93,7 @@ def m3(data: Data) -> list[Row]:
             f"mode = region of Eqs. 9-10 at {right} of {total} "
             "samples", "none", "agrees" if right == total else "differs",
             "S_a holds the velocity at its entry (Eq. 8a) as memory. Eq. 8a interpolates the forces at the band's "
-            "ends; it is "
-            "not the (1 - q) f- + q f+ of the text above it.",
+            "ends; it is not the (1 - q) f- + q f+ of the text above it.",
         )
     ]  # fmt: skip
 
@@ -128,7 +126,7 @@ def m4(data: Data) -> list[Row]:
         Row(
             "M4", "closed form, not printed", f"near grazing contact begins at g - eta: Fig. 9's falling jump moves by "
             f"{closed:+.2e} rad/s at eta = "
-            f"1e-5", f"{narrow:+.1e} rad/s off the closed form of g", f"moves by {shift:+.2e} rad/s",
+            "1e-5", f"{narrow:+.1e} rad/s off the closed form of g", f"moves by {shift:+.2e} rad/s",
             f"{shift - closed:+.1e} rad/s", "agrees" if abs(shift - closed) < 1e-6 else "differs",
             "Near grazing the effect is proportional to eta itself. Bisected on both models to 1e-7 rad/s.",
         ),
@@ -159,8 +157,7 @@ def c1(data: Data) -> list[Row]:
             "C1", "Section 5", "grazing causes abrupt changes (falling jumps of Figs. 9 and 10, small rising one)",
             counted[0], counted[1], "none", "agrees" if min(at_grazing) == 3 else "agrees in part",
             "The support is soft: grazing as such is passed continuously, and the jump is a fold that follows closer "
-            "than "
-            "the steps of these sweeps.",
+            "than the steps of these sweeps.",
         ),
     ]  # fmt: skip
 
@@ -172,8 +169,7 @@ def c1_other_systems(data: Data) -> list[Row]:
         Row(
             "C1", "Section 5", "the procedure may be useful for other non-smooth systems", "not a number",
             f"the general form, (1 - q) f- + q f+, converges with order {order.min():.2f} ... {order.max():.2f} on "
-            "this "
-            "oscillator", "none", "agrees in part",
+            "this oscillator", "none", "agrees in part",
             "Shown here on the paper's oscillator only, with the general form in place of Eq. 8.",
         )
     ]  # fmt: skip

@@ -10,13 +10,14 @@ from matplotlib.lines import Line2D
 
 from nonsmooth import plot
 from nonsmooth.analysis.sweep import sweep
+from nonsmooth.results.provenance import read_provenance
 from nonsmooth.studies.savi2007.flows import FLOWS, Settings, starts
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-Place: TypeAlias = Literal["best", "upper right", "lower left", "lower right"]
+Place: TypeAlias = Literal["best", "upper left", "upper right", "lower left"]
 
 __all__ = ["diagrams", "draw_diagram", "how", "legend"]
 
@@ -29,11 +30,12 @@ def diagrams(
     high: float,
     steps: tuple[int, int],
     also: tuple[float, ...],
+    patience: int = 600,
 ) -> dict[str, xr.Dataset]:
     """Sweeps up and down (``exact``, ``smoothed``) and from several starts (``exact_starts``, ``smoothed_starts``).
 
-    ``steps``: of the exact and of the smoothed sweep; the starts are tried at half and a quarter as many values.
-    ``also``: values to be among those swept.
+    ``steps``: of the exact and of the smoothed sweep; the starts are tried at a half or a quarter of them.
+    ``also``: values to be among those swept. ``patience``: transient of the exact flow from the starts.
     """
     data = {}
     for flow in FLOWS:
@@ -44,11 +46,12 @@ def diagrams(
             transient=settings.of(flow, exact=600, smoothed=200, quick=100),
             keep=settings.of(flow, exact=200, smoothed=64, quick=40), **flow.options,
         )  # fmt: skip
-        n = settings.of(flow, exact=steps[0] // 2, smoothed=steps[1] // 4, quick=10)
+        fewer = 2 if patience <= 600 else 4
+        n = settings.of(flow, exact=steps[0] // fewer, smoothed=steps[1] // 4, quick=10)
         data[f"{flow.key}_starts"] = sweep(
             system, parameter, _grid(low, high, n, also), direction=None,
             start=starts(settings.of(flow, exact=12, smoothed=8, quick=4)), progress=settings.progress,
-            transient=settings.of(flow, exact=600, smoothed=150, quick=80), keep=32, **flow.options,
+            transient=settings.of(flow, exact=patience, smoothed=150, quick=80), keep=32, **flow.options,
         )  # fmt: skip
     return data
 
@@ -75,7 +78,8 @@ def draw_diagram(
 
 def legend(ax: Axes, loc: Place) -> None:
     """The legend of a diagram, its points large enough to be seen."""
-    for handle in ax.legend(loc=loc).legend_handles:
+    frame = {"frameon": True, "facecolor": "white", "edgecolor": "none", "framealpha": 0.85}
+    for handle in ax.legend(loc=loc, **frame).legend_handles:
         if isinstance(handle, Line2D):
             handle.set_markersize(4)
 
@@ -87,7 +91,12 @@ def how(data: Mapping[str, xr.Dataset]) -> str:
         swept, many = data[flow.key], data[f"{flow.key}_starts"]
         parameter = str(swept["maximum"].dims[0])
         words.append(
-            f"{flow.key}: {swept.sizes[parameter]} values up and down, {swept.sizes['iterate']} section points each; "
-            f"{many.sizes['start']} starts at {many.sizes[parameter]} values"
+            f"{flow.key}: {swept.sizes[parameter]} values up and down, {swept.sizes['iterate']} section points each "
+            f"after {_transient(swept)} periods; {many.sizes['start']} starts at {many.sizes[parameter]} values, after "
+            f"{_transient(many)} periods"
         )
     return "Section at phase 0. " + "; ".join(words) + "."
+
+
+def _transient(swept: xr.Dataset) -> int:
+    return int(read_provenance(swept)["options"]["transient"])

@@ -43,8 +43,7 @@ def _draw_13(data: Mapping[str, xr.Dataset]) -> Canvas:
 def _caption_13(data: Mapping[str, xr.Dataset]) -> str:
     return (
         "Bifurcation diagram over the gap, omega = 11.15 rad/s, rho = 0.33 N: velocity at the section. Dotted: the "
-        "four gaps "
-        "of Fig. 14. Grey shows motions that coexist with what the sweeps follow. " + how(data)
+        "four gaps of Fig. 14. Grey shows motions that coexist with what the sweeps follow. " + how(data)
     )
 
 
@@ -90,8 +89,7 @@ def _caption_15(data: Mapping[str, xr.Dataset]) -> str:
     sizes = " and ".join(f"{data[f'{flow.key}_0'].sizes['iterate']} ({flow.key})" for flow in FLOWS)
     return (
         "Strange attractor at g = 0.0018 m, omega = 11.15 rad/s, rho = 0.33 N: sections at four phases of the "
-        "forcing, "
-        f"{sizes} points each, from rest. Both rows have the same axes."
+        f"forcing, {sizes} points each, from rest. Both rows have the same axes."
     )
 
 

@@ -32,7 +32,7 @@ def portraits(
     """
     data: dict[str, xr.Dataset] = {}
     for flow in FLOWS:
-        transient = settings.of(flow, exact=1000, smoothed=300, quick=150)
+        transient = settings.of(flow, exact=1000, smoothed=1000, quick=150)
         first = starts(settings.of(flow, exact=16, smoothed=16, quick=8))
         system = flow.system(**parameters)
         survey = sweep(
@@ -77,6 +77,7 @@ def draw_portraits(
                             line.set(linewidth=0.35)
                         plot.section(points, ax, size=3.0)
                         ax.get_lines()[-1].set_zorder(4)
+                    ax.ticklabel_format(axis="y", style="plain")
                     ax.set_xlabel(ax.get_xlabel() if flow is FLOWS[-1] else "")
                     ax.set_ylabel(f"{flow.short}\n{ax.get_ylabel()}" if i == 0 else "")
                     if flow is FLOWS[0]:

@@ -36,10 +36,8 @@ def _draw(data: Mapping[str, xr.Dataset]) -> Canvas:
 def _caption(data: Mapping[str, xr.Dataset]) -> str:
     return (
         "Regions of the state plane with Table 1's support, near x = g: (a) without contact (white) and in contact "
-        "(blue), "
-        "parted by the surfaces S_a (x = g) and S_b (the support's force vanishes); (b) the bands of half width eta "
-        "of the "
-        "smoothed system in their place. Drawn from the system's own conditions."
+        "(blue), parted by the surfaces S_a (x = g) and S_b (the support's force vanishes); (b) the bands of half "
+        "width eta of the smoothed system in their place. Drawn from the system's own conditions."
     )
 
 

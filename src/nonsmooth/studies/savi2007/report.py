@@ -47,13 +47,12 @@ def _blocks(
         Heading(TITLE, 1),
         Paragraph(
             "M.A. Savi, S. Divenyi, L.F.P. Franca, H.I. Weber, Numerical and experimental investigations of the "
-            "nonlinear "
-            "dynamics and chaos in non-smooth systems, J. Sound Vib. 301 (2007) 59-73, doi:10.1016/j.jsv.2006.09.014. "
-            "Every statement that needs no rig is measured here on the paper's own model with the parameters of its "
-            "Table 1, "
-            "none of them tuned: by the exact flow, and by the paper's smoothed switch with "
-            f"eta = {ETA:g} m, integrated by Runge-Kutta-Fehlberg at rtol = {SMOOTHED.options['rtol']:g}. "
-            f"Written by nonsmooth {package_version()}; all numbers are read off the datasets beside this file."
+            "nonlinear dynamics and chaos in non-smooth systems, J. Sound Vib. 301 (2007) 59-73, "
+            "doi:10.1016/j.jsv.2006.09.014. Every statement that needs no rig is measured here on the paper's own "
+            "model with the parameters of its Table 1, none of them tuned: by the exact flow, and by the paper's "
+            f"smoothed switch with eta = {ETA:g} m, integrated by Runge-Kutta-Fehlberg at rtol = "
+            f"{SMOOTHED.options['rtol']:g}. Written by nonsmooth {package_version()}; all numbers are read off the "
+            "datasets beside this file."
         ),
     ]
     if settings.quick:
@@ -63,7 +62,8 @@ def _blocks(
     if not complete:
         names = ", ".join(figure.name for figure in figures)
         blocks.append(Paragraph(f"A partial run ({names}): only the statements these figures decide are listed."))
-    blocks += [Heading("Statements"), Paragraph(_summary(rows)), Paragraph(_rules()), _table(rows)]
+    if rows:
+        blocks += [Heading("Statements"), Paragraph(_summary(rows)), Paragraph(_rules()), _table(rows)]
     blocks += [Heading("What the paper leaves open"), Bullets(_OPEN), Heading("Figures")]
     for figure in figures:
         title = figure.title if figure.number is None else f"Fig. {figure.number}: {figure.title}"
@@ -98,11 +98,9 @@ def _rules() -> str:
     one, other = (NUMBERS[key] for key in ("natural frequency", "natural frequency, measured"))
     return (
         "a ± b is the middle and half the width of the step of a sweep in which the change lies. A printed number "
-        "agrees "
-        "when it lies there within its own rounding; it agrees within N % up to "
-        f"{CLOSE:g} %, which is about how far the paper's own two natural frequencies ({one} and {other}) lie "
-        "apart; beyond "
-        "that it differs. Differences are (found - printed) / printed."
+        f"agrees when it lies there within its own rounding; it agrees within N % up to {CLOSE:g} %, which is about "
+        f"how far the paper's own two natural frequencies ({one} and {other}) lie apart; beyond that it differs. "
+        "Differences are (found - printed) / printed."
     )
 
 

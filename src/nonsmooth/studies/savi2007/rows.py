@@ -65,18 +65,25 @@ def against_printed(
 
 
 def against_closed_form(
-    claim: str, place: str, says: str, closed: float, exact: Interval | None, smoothed: Interval | None, why: str = ""
+    claim: str,
+    place: str,
+    says: str,
+    closed: tuple[float, float],
+    exact: Interval | None,
+    smoothed: Interval | None,
+    why: str = "",
 ) -> Row:
-    """A frequency known in closed form, in rad/s, beside the sweeps: they agree within one of their steps."""
+    """A frequency known in closed form, in rad/s, beside the sweeps: they agree within one of their steps.
 
-    def off(found: Interval | None) -> str:
-        return "not found" if found is None else f"{found.middle - closed:+.4f} rad/s"
-
-    met = [found is not None and abs(found.middle - closed) <= 2 * found.uncertainty for found in (exact, smoothed)]
+    ``closed`` holds it for the gap g and, to compare the smoothed switch with, for g - eta.
+    """
+    pairs = list(zip((exact, smoothed), closed, strict=True))
+    off = ["not found" if found is None else f"{found.middle - truth:+.4f} rad/s" for found, truth in pairs]
+    met = [found is not None and abs(found.middle - truth) <= 2 * found.uncertainty for found, truth in pairs]
     verdict = "agrees" if all(met) else "agrees in part" if any(met) else "differs"
     return Row(
-        claim, place, f"{says}: {closed:.5f} rad/s", _with_unit(exact, "rad/s"), _with_unit(smoothed, "rad/s"),
-        f"exact {off(exact)}, smoothed {off(smoothed)}", verdict, why,
+        claim, place, f"{says}: {closed[0]:.5f} rad/s (gap g - eta: {closed[1]:.5f})", _with_unit(exact, "rad/s"),
+        _with_unit(smoothed, "rad/s"), f"exact {off[0]}, smoothed {off[1]}", verdict, why,
     )  # fmt: skip
 
 

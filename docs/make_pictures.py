@@ -1,0 +1,56 @@
+"""Draw the pictures of the documentation: one per example, and that of the first page from that page's own code.
+
+Run it from anywhere: ``python docs/make_pictures.py``. It takes some ten seconds (longer the first time) and writes ``docs/pictures/*.png``,
+which are kept with the source so that the pages can be built without computing anything.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import runpy
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+
+from nonsmooth import plot
+
+DOCS = Path(__file__).resolve().parent
+PICTURES = DOCS / "pictures"
+DPI = 170
+
+
+def keep(drawn: Any, name: str) -> None:
+    """Save a figure (or the figure of some axes) as docs/pictures/NAME.png, without date or program in it."""
+    figure = getattr(drawn, "figure", drawn)
+    with plot.journal():
+        figure.savefig(PICTURES / f"{name}.png", dpi=DPI, metadata={"Software": None})
+    print(f"{name}.png: {(PICTURES / f'{name}.png').stat().st_size // 1024} kB")
+
+
+def first_code(page: Path) -> str:
+    """The first block of Python of a page."""
+    found = re.search(r"^```python\n(.*?)^```", page.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+    assert found is not None, f"{page} has no block of Python"
+    return found[1]
+
+
+def main() -> None:
+    """All pictures."""
+    mpl.use("Agg")
+    PICTURES.mkdir(exist_ok=True)
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+        names: dict[str, Any] = {}
+        exec(first_code(DOCS / "start.md"), names)
+        keep(names["ax"], "start")
+    for path in sorted((DOCS.parent / "examples").glob("*.py")):
+        keep(runpy.run_path(str(path))["main"](), path.stem)
+    total = sum(os.path.getsize(file) for file in PICTURES.glob("*.png"))
+    print(f"together {total // 1024} kB")
+
+
+if __name__ == "__main__":
+    main()

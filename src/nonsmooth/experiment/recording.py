@@ -1,0 +1,240 @@
+"""A recording: the runs of an experiment, each with its sensors, each sensor with its own clock.
+
+The tree is ``/run/sensor``; a sensor is a Dataset whose channels share one axis, mostly ``time`` in seconds. Channels
+of one run that were sampled at the same instants form one sensor, named after the first of them.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.results.provenance import ATTRIBUTE
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Recording", "RecordingWarning"]
+
+
+class RecordingWarning(UserWarning):
+    """Something in a recording that its user should know: it names the run and the channel."""
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """What was recorded, by run and sensor, with units, rates and where each channel came from.
+
+    Read one with :func:`nonsmooth.load_recording`, or build one with :meth:`from_runs`.
+
+    Attributes
+    ----------
+    tree : xarray.DataTree
+        ``/run/sensor``: ``tree["Run #1/Angle"]`` holds the channels sampled together with ``Angle``, over their own
+        ``time``. Names hold no ``/``; the name as it stands in the file is the attribute ``long_name``.
+    source : mapping
+        ``file``, ``format``, ``bytes``, ``sha256``, ``options`` and ``header`` (what the file says of itself).
+    warnings : tuple of str
+        All that was noticed while reading, one sentence each.
+    synthetic : bool
+        True if the file says that it was computed, not measured. False if it says nothing.
+    """
+
+    tree: xr.DataTree
+    source: Mapping[str, Any]
+    warnings: tuple[str, ...] = ()
+    synthetic: bool = False
+
+    @classmethod
+    def from_runs(
+        cls,
+        runs: Mapping[str, Mapping[str, xr.Dataset]],
+        *,
+        synthetic: bool,
+        source: Mapping[str, Any] | None = None,
+        warnings: tuple[str, ...] = (),
+        run_attrs: Mapping[str, Mapping[str, str]] | None = None,
+    ) -> Recording:
+        """Build a recording from Datasets, ``{run: {sensor: dataset}}``; each Dataset has one dim, its axis.
+
+        Raises
+        ------
+        ValueError
+            If a Dataset has not exactly one dim with a coordinate, or a name is empty, twice there, or holds ``/``.
+        """
+        import xarray as xr
+
+        nodes: dict[str, xr.Dataset] = {"/": xr.Dataset()}
+        for run, sensors in runs.items():
+            _check_name("run", run)
+            nodes[f"/{run}"] = xr.Dataset(attrs=dict((run_attrs or {}).get(run, {})))
+            for sensor, dataset in sensors.items():
+                _check_name("sensor", sensor)
+                if len(dataset.dims) != 1 or set(dataset.dims) - set(dataset.coords):
+                    raise ValueError(
+                        f"sensor {sensor!r} of run {run!r} must have one dim with its coordinate (time), "
+                        f"got dims {tuple(dataset.dims)} and coordinates {tuple(dataset.coords)}"
+                    )
+                nodes[f"/{run}/{sensor}"] = dataset
+        tree = xr.DataTree.from_dict(nodes)
+        record = dict(source or {"file": "", "format": "built in memory"})
+        tree.attrs = {ATTRIBUTE: _as_json(record, warnings, synthetic), "synthetic": "yes" if synthetic else "no"}
+        return cls(tree, record, tuple(warnings), synthetic)
+
+    @property
+    def runs(self) -> tuple[str, ...]:
+        """The names of the runs, in the file's order."""
+        return tuple(str(name) for name in self.tree.children)
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The names of the channels over all runs, each once, in the order in which they appear."""
+        return tuple(dict.fromkeys(name for _, _, name, _ in self._all()))
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The unit of each channel ("" where unknown).
+
+        Where runs differ in it the entry begins with ``mixed`` and says which: take each from its own array then.
+        """
+        found: dict[str, dict[str, str]] = {}
+        for run, _, name, array in self._all():
+            found.setdefault(name, {}).setdefault(str(array.attrs["units"]), run)
+        return {name: next(iter(u)) if len(u) == 1 else mixed_units(u) for name, u in found.items()}
+
+    @property
+    def rates(self) -> dict[str, float]:
+        """The mean sample rate of each sensor in Hz, by ``run/sensor``; NaN where there is none."""
+        return {f"{run}/{sensor}": float(ds.attrs.get("rate", np.nan)) for run, sensor, ds in self._sensors()}
+
+    def channel(self, name: str, run: str | None = None) -> xr.DataArray:
+        """One channel of one run, over its own axis.
+
+        Parameters
+        ----------
+        name : str
+            The channel's name, as in :attr:`channels` or as it stands in the file, or the measured quantity where
+            only one channel of the run measures it (``"Temperature"`` for ``"Temperature, Ch P3"``).
+        run : str, optional
+            Needed where the recording has several runs.
+
+        Raises
+        ------
+        ValueError
+            If there is no such run or channel, or the name fits several; the message lists what there is.
+        """
+        if run is None:
+            if len(self.runs) != 1:
+                raise ValueError(f"this recording has {len(self.runs)} runs, say which: {', '.join(self.runs)}")
+            run = self.runs[0]
+        if run not in self.runs:
+            raise ValueError(f"no run {run!r}; there are: {', '.join(self.runs)}")
+        here = [(channel, array) for r, _, channel, array in self._all() if r == run]
+        for attribute in (None, "long_name", "measurement"):
+            fits = [a for c, a in here if name == (c if attribute is None else a.attrs.get(attribute))]
+            if len(fits) == 1:
+                return fits[0]
+            if fits:
+                raise ValueError(f"{name!r} fits {len(fits)} channels of run {run!r}: {', '.join(c for c, _ in here)}")
+        raise ValueError(f"run {run!r} has no channel {name!r}; it has: {', '.join(c for c, _ in here)}")
+
+    def to_dataset(self) -> xr.Dataset:
+        """The whole recording as one flat Dataset that ``nonsmooth.save`` takes; :meth:`from_dataset` takes it back.
+
+        Sensor ``i`` has the dim ``sample_i``; its axis is ``axis_i``, its channels are ``channel_i_k``, and their
+        names, runs and sensors stand in their attributes.
+        """
+        import xarray as xr
+
+        variables: dict[str, Any] = {}
+        coords: dict[str, Any] = {}
+        for i, (run, sensor, ds) in enumerate(self._sensors(), 1):
+            dim = f"sample_{i}"
+            (axis,) = ds.dims
+            here = {"run": run, "sensor": sensor}
+            sensor_attrs = {f"sensor_{key}": value for key, value in ds.attrs.items()}
+            coords[f"axis_{i}"] = (dim, ds[axis].values, {**ds[axis].attrs, **here, **sensor_attrs, "axis": str(axis)})
+            for k, (name, array) in enumerate(ds.data_vars.items(), 1):
+                variables[f"channel_{i}_{k}"] = (dim, array.values, {**array.attrs, **here, "channel": str(name)})
+        runs = {run: dict(self.tree[run].attrs) for run in self.runs}
+        attrs = {**self.tree.attrs, "run_attributes": json.dumps(runs, ensure_ascii=False)}
+        return xr.Dataset(variables, coords, attrs)
+
+    @classmethod
+    def from_dataset(cls, dataset: xr.Dataset) -> Recording:
+        """The recording that :meth:`to_dataset` made the Dataset from; ValueError for any other Dataset."""
+        import xarray as xr
+
+        if "run_attributes" not in dataset.attrs or ATTRIBUTE not in dataset.attrs:
+            raise ValueError("this Dataset was not made by Recording.to_dataset")
+        run_attrs = json.loads(dataset.attrs["run_attributes"])
+        runs: dict[str, dict[str, xr.Dataset]] = {run: {} for run in run_attrs}
+        for axis_name, axis in dataset.coords.items():
+            own = dict(axis.attrs)
+            run, sensor, dim = own.pop("run"), own.pop("sensor"), own.pop("axis")
+            attrs = {key.removeprefix("sensor_"): own.pop(key) for key in list(own) if key.startswith("sensor_")}
+            prefix = f"channel_{str(axis_name).removeprefix('axis_')}_"
+            data = {}
+            for name, array in dataset.data_vars.items():
+                if str(name).startswith(prefix):
+                    kept = {key: value for key, value in array.attrs.items() if key not in ("run", "sensor", "channel")}
+                    data[array.attrs["channel"]] = (dim, array.values, kept)
+            runs[run][sensor] = xr.Dataset(data, {dim: (dim, axis.values, own)}, attrs)
+        record = json.loads(dataset.attrs[ATTRIBUTE])
+        return cls.from_runs(
+            runs, synthetic=record["synthetic"], source=record["source"], warnings=tuple(record["warnings"]),
+            run_attrs=run_attrs,
+        )  # fmt: skip
+
+    def __repr__(self) -> str:
+        name = self.source.get("file") or "in memory"
+        lines = [f"Recording of {name} ({self.source.get('format')}{', synthetic' if self.synthetic else ''})"]
+        rows = list(self._sensors())
+        for run, _, ds in rows[:20]:
+            (axis,) = ds.dims
+            rate = float(ds.attrs.get("rate", np.nan))
+            clock = f" at {rate:.6g} Hz" if np.isfinite(rate) else ""
+            shown = ", ".join(f"{c} [{a.attrs['units'] or '?'}]" for c, a in ds.data_vars.items())
+            lines.append(f"  {run}: {ds.sizes[axis]} samples{clock}: {shown}")
+        if len(rows) > 20:
+            lines.append(f"  and {len(rows) - 20} more sensors")
+        if self.warnings:
+            lines.append(f"  {len(self.warnings)} warnings: see .warnings")
+        return "\n".join(lines)
+
+    def _sensors(self) -> Iterator[tuple[str, str, xr.Dataset]]:
+        for run, node in self.tree.children.items():
+            for sensor, leaf in node.children.items():
+                yield str(run), str(sensor), leaf.to_dataset()
+
+    def _all(self) -> Iterator[tuple[str, str, str, xr.DataArray]]:
+        for run, sensor, dataset in self._sensors():
+            for name, array in dataset.data_vars.items():
+                yield run, sensor, str(name), array
+
+
+def mixed_units(runs_by_unit: Mapping[str, str]) -> str:
+    """Units that differ between runs, each with the first run that has it."""
+    return "mixed: " + ", ".join(f"{unit or 'none'} ({run})" for unit, run in runs_by_unit.items())
+
+
+def _check_name(kind: str, name: str) -> None:
+    if not name.strip() or "/" in name or name in (".", ".."):
+        raise ValueError(f"{name!r} cannot be the name of a {kind}: it must not be empty, '.' or '..', nor hold '/'")
+
+
+def _as_json(source: Mapping[str, Any], warnings: tuple[str, ...], synthetic: bool) -> str:
+    from nonsmooth.results.provenance import options_as_data, package_version
+
+    record = {
+        "version": package_version(),
+        "verb": "load_recording",
+        "source": options_as_data(source),
+        "warnings": list(warnings),
+        "synthetic": synthetic,
+    }
+    return json.dumps(record, ensure_ascii=False, allow_nan=False)

@@ -1,0 +1,23 @@
+"""Every example runs and ends in the number it asserts; its figure is one that can be saved."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.py"))
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_example(path: Path) -> None:
+    import matplotlib.pyplot as plt
+
+    spec = importlib.util.spec_from_file_location(f"example_{path.stem}", path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    drawn = module.main()
+    assert hasattr(drawn, "savefig") or hasattr(drawn, "plot")
+    plt.close("all")

@@ -1,0 +1,26 @@
+"""The code in the README and in the pages of the documentation runs, and prints what the page says it prints."""
+
+from __future__ import annotations
+
+import doctest
+from pathlib import Path
+
+import pytest
+from page_code import run_page
+
+ROOT = Path(__file__).parents[2]
+PAGES = [ROOT / "README.md", ROOT / "docs" / "start.md", *sorted((ROOT / "docs" / "guides").glob("*.md"))]
+FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_code_of_page(page: Path, tmp_path: Path) -> None:
+    import matplotlib.pyplot as plt
+
+    checker = doctest.OutputChecker()
+    for printed, expected, line in run_page(page, tmp_path):
+        if expected is not None:
+            assert checker.check_output(expected, printed, FLAGS), (
+                f"{page.name}, block at line {line}, prints\n{printed}\nand not\n{expected}"
+            )
+    plt.close("all")

@@ -1,0 +1,149 @@
+"""Sections against motions whose passages are known in closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from linear_flow import LinearFlow
+
+import nonsmooth as ns
+
+METHODS = {"exact": {}, "taylor": {"rtol": 1e-13}, "rkf45": {"rtol": 1e-13}}
+
+
+def harmonic() -> ns.System:
+    """x = cos t: x'' = -x in two modes, left and right of x = 0.5."""
+
+    def motion(t, u, p):
+        return u.v, -p.k * u.x
+
+    return ns.System(
+        states=["x", "v"],
+        parameters={"k": 1.0},
+        modes={"left": motion, "right": motion},
+        indicators={"side": lambda t, u, p: u.x - 0.5, "speed": lambda t, u, p: u.v, "level": lambda t, u, p: u.x + 0.2},
+        transitions=[ns.Transition("left", "right", when="side > 0"), ns.Transition("right", "left", when="side < 0")],
+    )
+
+
+LEVEL = np.arccos(-0.2)  # x = -0.2 falling at LEVEL, rising at 2 pi - LEVEL
+
+
+@pytest.fixture(scope="module")
+def swing() -> ns.System:
+    return harmonic()
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(
+    ("section", "first", "spacing"),
+    [
+        (ns.Poincare("level"), [2 * np.pi - LEVEL], 2 * np.pi),
+        (ns.Poincare("level", rising=False), [LEVEL], 2 * np.pi),
+        (ns.Poincare("level", rising=None), [LEVEL, 2 * np.pi - LEVEL], 2 * np.pi),
+        (ns.Poincare("level", every=3), [6 * np.pi - LEVEL], 6 * np.pi),
+        (ns.Poincare("level", rising=None, every=2), [2 * np.pi - LEVEL], 2 * np.pi),
+        (ns.Poincare("speed"), [np.pi], 2 * np.pi),
+        (ns.Poincare("speed", rising=None, mode="left"), [np.pi], 2 * np.pi),
+        (ns.Poincare("speed", rising=None, mode="right"), [2 * np.pi], 2 * np.pi),
+        (ns.Poincare("speed", rising=False), [2 * np.pi], 2 * np.pi),
+        (ns.Poincare("side"), [2 * np.pi - np.pi / 3], 2 * np.pi),
+        (ns.Poincare("side", rising=None), [np.pi / 3, 5 * np.pi / 3], 2 * np.pi),
+        (ns.Poincare("side", rising=None, mode="right"), [5 * np.pi / 3], 2 * np.pi),
+        (ns.Poincare("side", rising=None, mode="right", side="before"), [np.pi / 3], 2 * np.pi),
+        (ns.Poincare("side", rising=True, mode="left"), None, None),
+    ],
+    ids=str,
+)
+def test_passages_of_a_harmonic_motion(section, first, spacing, method: str, swing: ns.System) -> None:  # type: ignore[no-untyped-def]
+    """x = cos t from t = 0: the start, where the speed is zero, is no passage."""
+    options = {"section": section, "start": {"x": 1.0}, "method": method, **METHODS[method]}
+    if first is None:
+        options["section"] = ns.Poincare(section.indicator, section.rising, section.mode, t_max=100.0)
+        with pytest.raises(ns.SolveError, match="did not return to the section"):
+            ns.poincare(swing, n=3, **options)
+        return
+    points = ns.poincare(swing, n=3 * len(first), **options)
+    times = np.concatenate([np.array(first) + k * spacing for k in range(3)])
+    assert np.max(np.abs(points["time"] - times)) < 1e-9
+    assert np.max(np.abs(points["section"].values - np.stack([np.cos(times), -np.sin(times)], axis=1))) < 1e-9
+    later = ns.poincare(swing, n=len(first), transient=len(first), **options)
+    assert np.max(np.abs(later["time"] - times[len(first) : 2 * len(first)])) < 1e-9
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("side", ["before", "after"])
+def test_both_limits_on_a_surface_with_a_reset(method: str, side: str) -> None:
+    """A ball that bounces with e = 1 on a floor at x = 0: before -v, after v, v = sqrt(2 g h), all periods equal."""
+    ball = ns.System(
+        states=["x", "v"],
+        parameters={"g": 2.0},
+        modes={"flight": lambda t, u, p: (u.v, -p.g)},
+        indicators={"floor": lambda t, u, p: u.x},
+        transitions=[ns.Transition("flight", "flight", when="floor < 0", reset=lambda t, u, p: (u.x, -u.v))],
+    )
+    section = ns.Poincare("floor", rising=None, side=side)
+    points = ns.poincare(ball, section=section, n=5, start={"x": 4.0}, method=method, **METHODS[method])
+    assert np.allclose(points["time"], 2.0 * (1 + 2 * np.arange(5)), rtol=1e-12)
+    assert np.allclose(points["section"].sel(state="v"), 4.0 if side == "after" else -4.0, rtol=1e-12)
+    assert np.max(np.abs(points["section"].sel(state="x"))) < 1e-12
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("phase", [0.0, 0.3, 0.5, 0.999])
+def test_stroboscopic_at_any_phase(method: str, phase: float) -> None:
+    """The forced linear motion by closed form; a start at phase 0 is no return."""
+    p = {"k": 1.0, "c": 0.1, "omega": 1.3, "A": 0.7, "d": 1e3}
+    system = ns.models.impact_oscillator(**p)
+    truth = LinearFlow([[0, 1], [-1.0, -0.1]], [0, 0], {1: ([0, 0.7], [0, 0])}, 1.3)
+    points = ns.poincare(
+        system, section=ns.Stroboscopic(phase), n=4, transient=2, start=[0.4, -0.2], method=method, **METHODS[method]
+    )
+    times = (phase + np.arange(3, 7) - (1 if phase else 0)) * 2 * np.pi / 1.3
+    assert np.allclose(points["time"], times, rtol=1e-14)
+    states = np.array([truth.exactly(0.0, (0.4, -0.2), t) for t in times])
+    assert np.max(np.abs(points["section"].values - states)) < 1e-11
+    assert points["mode"].values.tolist() == [0] * 4
+
+
+def test_the_default_section_is_stroboscopic_at_phase_zero() -> None:
+    system = ns.models.discontinuous_support()
+    run = ns.simulate(system, periods=6, samples=7)
+    points = ns.poincare(system, n=6)
+    times = run["time"].values
+    at = [np.flatnonzero(np.isclose(times, k * system.period(), rtol=1e-14))[0] for k in range(1, 7)]
+    assert np.max(np.abs(points["section"].values - run["u"].values[at])) < 1e-14
+
+
+def test_several_starts_are_a_dim() -> None:
+    system = ns.models.impact_oscillator(d=1e3, omega=1.3)
+    starts = [{"x": 0.1}, {"x": -0.2, "v": 0.3}]
+    several = ns.poincare(system, n=3, start=starts)
+    assert several["section"].dims == ("start", "iterate", "state")
+    assert several["start_state"].values.tolist() == [[0.1, 0.0], [-0.2, 0.3]]
+    for k, start in enumerate(starts):
+        alone = ns.poincare(system, n=3, start=start)
+        assert alone["section"].dims == ("iterate", "state")
+        assert np.array_equal(alone["section"].values, several["section"].values[k])
+
+
+def test_one_start_of_several_may_fail() -> None:
+    system = ns.models.impact_oscillator()
+    points = ns.poincare(system, n=3, start=[{"x": 0.0}, {"x": 5.0}])
+    meanings = points["status"].attrs["flag_meanings"].split()
+    assert meanings[int(points["status"][0])] == "ok"
+    assert meanings[int(points["status"][1])] == "no_convergence"
+    assert np.isfinite(points["section"].values[0]).all()
+    with pytest.raises(ns.SolveError):
+        ns.poincare(system, n=3, start={"x": 5.0})
+
+
+def test_maxima_of_the_relief_valve_repeat_the_published_cycle() -> None:
+    """q = 8: the cycle spans 0.668282564 <= y1 <= 6.009885866 with period 2.392389442 (Hos & Champneys 2012)."""
+    valve = ns.models.relief_valve(q=8.0)
+    start = {"y1": 3.0, "y2": 0.0, "y3": 13.0}
+    top = ns.poincare(valve, section=ns.Poincare("lift_velocity", rising=False), n=3, transient=300, start=start)
+    low = ns.poincare(valve, section=ns.Poincare("lift_velocity", rising=True), n=3, transient=300, start=start)
+    assert np.allclose(top["section"].sel(state="y1"), 6.009885866, atol=2e-7)
+    assert np.allclose(low["section"].sel(state="y1"), 0.668282564, atol=2e-7)
+    assert np.allclose(np.diff(top["time"]), 2.392389442, atol=2e-7)

@@ -1,0 +1,16 @@
+"""One quick reproduction of the frequency responses and of Fig. 11, shared by the tests."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from nonsmooth.studies.savi2007 import Reproduction, reproduce
+
+
+@pytest.fixture(scope="session")
+def quick(tmp_path_factory: pytest.TempPathFactory) -> Reproduction:
+    """The quick run of Figs. 9, 10 and 11."""
+    folder: Path = tmp_path_factory.mktemp("savi2007")
+    return reproduce(folder, figures=[9, 10, 11], quick=True, progress=False)
