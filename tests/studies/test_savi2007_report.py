@@ -65,3 +65,20 @@ def test_the_report_is_self_contained(quick: Reproduction) -> None:
 def test_a_figure_of_the_rig_is_refused(tmp_path) -> None:
     with pytest.raises(ValueError, match=r"figure 16 is not among .* 2, 9, 10"):
         reproduce(tmp_path, figures=[16], progress=False)
+
+
+@pytest.mark.slow
+def test_the_whole_study_runs_quickly(tmp_path) -> None:
+    """All figures at coarse settings: every claim has its rows, and both flows say the same of each."""
+    whole = reproduce(tmp_path, quick=True, progress=False)
+    assert {row.id for row in whole.rows} == CLAIM_IDS
+    assert not any("nan" in " ".join(vars(row).values()) for row in whole.rows)
+    assert {figure.number for figure in whole.figures} == NUMBERS | {None}
+    text = (tmp_path / "report.md").read_text(encoding="utf-8")
+    assert "A quick run" in text
+    assert "A partial run" not in text
+    # Facts of the model, whatever the grid: contact at 8.64 rad/s, none at 9.88; order 2 in eta.
+    says = {row.says: row for row in whole.rows}
+    assert "swapped" in says["omega = 8.64 rad/s: periodic, no contact"].why
+    assert says["the choice of eta is important"].verdict == "agrees"
+    assert says["g = 0.0018 m: a strange attractor, sections at four phases"].verdict == "agrees"

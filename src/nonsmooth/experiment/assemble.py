@@ -103,8 +103,6 @@ def _sensor(group: list[Trace], source: Source, axis: str, remarks: list[str]) -
         name = _fit(trace.name or "channel", [*variables, axis])
         if name != trace.name and name != _clean(trace.name):
             remarks.append(f"{own}: the name stands there twice, or is the axis; this one is called {name!r}")
-        if not trace.unit:
-            remarks.append(f"{own}: the file gives no unit; say it with units={{{trace.name!r}: ...}}")
         variables[name] = (
             axis, trace.values,
             {"long_name": trace.name, "units": trace.unit, "origin": trace.origin, **trace.attrs},
@@ -148,9 +146,14 @@ def _clock(trace: Trace, where: str, source: Source, remarks: list[str]) -> dict
 
 def _compare_units(traces: list[Trace], remarks: list[str]) -> None:
     units: dict[str, dict[str, str]] = {}
+    runs: dict[str, set[str]] = {}
     for trace in traces:
+        runs.setdefault(trace.name, set()).add(trace.run)
         units.setdefault(trace.name, {}).setdefault(trace.unit, trace.run)
     for name, found in units.items():
+        if set(found) == {""}:
+            where = f"channel {name!r} (run {found['']!r}" + (" and others)" if len(runs[name]) > 1 else ")")
+            remarks.append(f"{where}: the file gives no unit; say it with units={{{name!r}: ...}}")
         if len(found) > 1:
             remarks.append(
                 f"channel {name!r} has {mixed_units(found)}; nothing was converted: "

@@ -88,8 +88,8 @@ def poincare(
     from nonsmooth.results.schema import section_points
 
     options = {
-        "section": section, "n": n, "transient": transient, "start": plain_start(system, start), "method": method, "rtol": rtol,
-        "atol": atol, **expert,
+        "section": section, "n": n, "transient": transient, "start": plain_start(system, start),
+        "method": method, "rtol": rtol, "atol": atol, **expert,
     }  # fmt: skip
     labels = labels_of(system)
     return section_points(

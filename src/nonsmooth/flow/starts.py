@@ -83,8 +83,8 @@ def _is_list(start: Any) -> bool:
 
 def plain_start(system: System, start: Any) -> Any:
     """``start`` as data that a result can record: arrays and results as lists of numbers."""
-    if start is None or isinstance(start, Mapping):
-        return start
+    if start is None or (isinstance(start, Mapping) and not hasattr(start, "data_vars")):
+        return start  # as it was named
     states = start_states(system, start)
     return states[0].tolist() if is_one_start(start) else states.tolist()
 

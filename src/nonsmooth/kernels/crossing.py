@@ -73,7 +73,7 @@ def _others_hold(r0, lo, hi, x, C, m, n, powers, rows, scale, a, d):
     m0 = load(C, n + i0, float(rows[r0, 1]), m, powers, a)
     shift(a, m0, x, 1.0, d)
     noise = NOISE * scale[i0]
-    doubt = 1e-15 + noise / (fabs(d[1]) + sqrt(noise * (fabs(d[2]) + noise)))  # of x itself
+    doubt = 1e-15 + noise / (fabs(d[1]) + sqrt(noise * (fabs(d[2]) + noise)) + 1e-300)  # of x itself
     for r in range(lo, hi):
         if r == r0:
             continue

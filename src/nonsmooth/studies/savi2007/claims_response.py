@@ -61,8 +61,8 @@ def f9a(data: Data) -> list[Row]:
         against_printed(
             "F9a", f"rising frequency: dynamical jump near {rising}", rising, main_jump(exact, "up"),
             main_jump(smoothed, "up"),
-            "The motion with contact ends in a fold there. Both flows agree; the printed value is the model's own "
-            "neither with nor without smoothing.",
+            "The motion with contact ends in a fold there. Both flows jump at the same place; the printed value "
+            "comes out of neither.",
         ),
     ]  # fmt: skip
 

@@ -121,9 +121,7 @@ def _html(block: Block) -> str:
 
 def _row(row: tuple[str, ...], marked: int | None) -> str:
     kind = "" if marked is None else f' class="{_kind(row[marked])}"'
-    cells = "".join(
-        f'<td{" class=mark" if i == marked else ""}>{escape(cell)}</td>' for i, cell in enumerate(row)
-    )
+    cells = "".join(f"<td{' class=mark' if i == marked else ''}>{escape(cell)}</td>" for i, cell in enumerate(row))
     return f"<tr{kind}>{cells}</tr>"
 
 

@@ -90,9 +90,7 @@ def draw_portraits(
 def describe(data: Mapping[str, xr.Dataset], shown: Mapping[float, int]) -> str:
     """What the starts reached at each value, by the exact flow."""
     survey = data["exact"]
-    words = [
-        f"{_parameter(survey)} = {value:g}: {words_of(periods_reached(survey, value))}" for value in shown
-    ]
+    words = [f"{_parameter(survey)} = {value:g}: {words_of(periods_reached(survey, value))}" for value in shown]
     return f"Reached by {survey.sizes['start']} starts (exact): " + "; ".join(words) + "."
 
 

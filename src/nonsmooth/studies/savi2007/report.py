@@ -105,8 +105,7 @@ def _rules() -> str:
 
 
 _OPEN = (
-    "The tolerance of the Runge-Kutta-Fehlberg integration, the steps of the sweeps and the lengths of the "
-    "transients.",
+    "The tolerance of the Runge-Kutta-Fehlberg integration, the steps of the sweeps and the lengths of the transients.",
     "The phase of the Poincare section in Figs. 11 to 14, 17 and 18; phase 0 of rho cos(omega t) here.",
     "The first states: where motions coexist, they decide what a figure shows.",
     "The memory of S_a (the velocity at its entry) when a run starts inside the band; here it is the velocity at the "
