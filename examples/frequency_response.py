@@ -27,7 +27,7 @@ def main() -> Axes:
 
     p = oscillator.values
     squares = np.roots([p["m"] ** 2, p["c"] ** 2 - 4 * p["k"] * p["m"], 4 * p["k"] ** 2 - (p["rho"] / p["g"]) ** 2])
-    grazing = np.sqrt(squares.max())  # 5.159862 rad/s
+    grazing = np.sqrt(squares.max())  # 5.159861 rad/s
     falling = response.jump_value.values[response.jump_direction.values == "down"]
     assert abs(falling - grazing).min() <= STEP
     return ax

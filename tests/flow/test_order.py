@@ -29,7 +29,7 @@ def spirals() -> System:
 
 
 def tangent() -> System:
-    """x' = 1 + x^2 up to x = 1 (x = tan t, at t = pi/4), then x' = -2 x^2 down to 1/2 (at t = pi/4 + 1/2), then x' = x."""
+    """x = tan t up to 1 (at pi/4), then x' = -2 x^2 down to 1/2 (at pi/4 + 1/2), then x' = x."""
     return System(
         states=("x",), parameters={"top": 1.0, "low": 0.5},
         modes={

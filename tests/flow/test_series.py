@@ -209,7 +209,9 @@ def test_logs_grow() -> None:
     turns = 600
     log, _ = record(system, [0.0, 1.0], 2 * np.pi * turns)
     first = np.arcsin(0.5)
-    expected = np.sort(np.concatenate([first + 2 * np.pi * np.arange(turns), np.pi - first + 2 * np.pi * np.arange(turns)]))
+    expected = np.sort(
+        np.concatenate([first + 2 * np.pi * np.arange(turns), np.pi - first + 2 * np.pi * np.arange(turns)])
+    )
     np.testing.assert_allclose(log.crossing_time, expected, atol=1e-9)
     far = log.touch_indicator == 1
     np.testing.assert_allclose(log.touch_time[far], np.pi / 2 + 2 * np.pi * np.arange(turns), atol=1e-7)
@@ -327,7 +329,9 @@ def test_points_do_not_depend_on_how_they_are_chunked() -> None:
     whole, parts = Chain.empty(6, 2, 1, 1, 0), Chain.empty(6, 2, 1, 1, 0)
     e.chain(e.prepare(points), 0, 6, State(np.zeros(1), np.zeros(0)), starts, SectionPlan(), 3, 2, whole)
     for first in range(0, 6, 2):
-        e.chain(e.prepare(points), first, first + 2, State(np.zeros(1), np.zeros(0)), starts, SectionPlan(), 3, 2, parts)
+        e.chain(
+            e.prepare(points), first, first + 2, State(np.zeros(1), np.zeros(0)), starts, SectionPlan(), 3, 2, parts
+        )
     np.testing.assert_array_equal(whole.section, parts.section)
     np.testing.assert_array_equal(whole.maximum, parts.maximum)
 

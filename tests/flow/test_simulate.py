@@ -249,6 +249,20 @@ def test_a_solution_that_ends_says_where(method: str) -> None:
     assert caught.value.mode == "only"
 
 
+@pytest.mark.parametrize("method", ["taylor", "rkf45"])
+@pytest.mark.parametrize("power", [2, 3, 4])
+@pytest.mark.parametrize("rtol", [1e-6, 1e-8, 1e-10, 1e-12, 1e-13])
+def test_a_series_with_gaps_does_not_hide_its_end(method: str, power: int, rtol: float) -> None:
+    """x' = cos(t^n): at t = 0 most coefficients of the series are zero, the last ones too; the truth by quadrature."""
+    system = ns.System(
+        states=["x"], parameters={"w": 1.0}, modes={"only": lambda t, u, p: np.cos(p.w * t**power) + 0 * u.x}
+    )
+    nodes, weights = np.polynomial.legendre.leggauss(200)
+    truth = np.sum(weights * np.cos((1 + nodes) ** power))  # over 0 ... 2
+    run = ns.simulate(system, duration=2.0, method=method, rtol=rtol, samples=2)
+    assert abs(run["u"].values[-1, 0] - truth) < 100 * rtol
+
+
 def test_unstable_linear_motion_ends_as_diverged() -> None:
     """x'' = k x from x = 1, v = sqrt(k): exp(sqrt(k) t) passes 1e9 at ln(1e9) / sqrt(k)."""
     system = ns.System(

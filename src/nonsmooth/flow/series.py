@@ -222,7 +222,7 @@ class SeriesEngine:
             len(traced.p), len(traced.indicators), len(traced.outputs),
         )  # fmt: skip
         choice[at.CORNERS] = not all(model.smooth_outputs)
-        choice[at.SMOOTH_INDICATORS] = tables.nonlinear_rows
+        choice[at.NONLINEAR_ROWS] = tables.nonlinear_rows
         return choice
 
     def _order(self) -> int:

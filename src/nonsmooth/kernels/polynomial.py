@@ -17,7 +17,8 @@ import numpy as np
 from .cache import device, inline
 
 __all__ = [
-    "DOWN", "NONE", "UP", "bernstein", "bounds", "dense", "first_crossing", "largest", "load", "row_bounds", "shift", "stack_size", "strip",
+    "DOWN", "NONE", "UP", "bernstein", "bounds", "dense", "first_crossing", "largest", "load", "row_bounds", "shift",
+    "stack_size", "strip",
 ]  # fmt: skip
 
 UP, DOWN = np.int64(1), np.int64(-1)  # of this type, so that Numba compiles one version, not one per number

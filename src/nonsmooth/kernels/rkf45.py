@@ -39,9 +39,7 @@ def stages(field, mode, t, u, q, h, n, K, fifth, absolute, rtol):
         error = h * (
             1.0 / 360.0 * k1[i] - 128.0 / 4275.0 * k3[i] - 2197.0 / 75240.0 * k4[i] + 0.02 * k5[i] + 2.0 / 55.0 * k6[i]
         )
-        fourth = u[i] + h * (
-            25.0 / 216.0 * k1[i] + 1408.0 / 2565.0 * k3[i] + 2197.0 / 4104.0 * k4[i] - 0.2 * k5[i]
-        )
+        fourth = u[i] + h * (25.0 / 216.0 * k1[i] + 1408.0 / 2565.0 * k3[i] + 2197.0 / 4104.0 * k4[i] - 0.2 * k5[i])
         new[i] = fourth + error if fifth else fourth
         ratio = fabs(error) / (absolute[i] + rtol * max(fabs(u[i]), fabs(new[i])))
         if not (ratio <= worst):  # also where it is NaN

@@ -13,147 +13,23 @@ from math import log as ln
 
 from numba import types
 
-from .cache import device, inline, kernel
+from .cache import kernel
 from .codes import DIVERGED, LOG_FULL, NO_CONVERGENCE, NOT_GUARANTEED, OK
-from .crossing import NOISE, earliest, holds, section_crossing, sides_at
+from .crossing import NOISE, earliest, section_crossing, sides_at
 from .polynomial import NONE
-from .rkf45 import first_step, hermite, quiet, stages, transit
+from .rkf45 import hermite, quiet, stages, transit
 from .series_node import begin, clear, count_pass, leap, meets_section, next_is_edge, open_window
 from .series_places import (
-    AFTER,
-    BEGUN,
-    CORNERS,
-    CROSSINGS,
-    DOUBTFUL,
-    HALVINGS,
-    JUMPS,
-    LOCATE,
-    METHOD,
-    MOST_STEPS,
-    N_INDICATORS,
-    N_OUTPUTS,
-    N_PARAMETERS,
-    ORDER,
-    PERIOD,
-    PHASE,
-    READY,
-    RECORD,
-    RISING,
-    RKF45,
-    RTOL,
-    SAMPLES,
-    SECTION,
-    SECTION_MODE,
-    SEGMENT,
-    SETTLED,
-    SINCE_CROSSING,
-    SINCE_RETURN,
-    SMOOTH_INDICATORS,
-    STEP,
-    STEPS,
-    STEPS_IN_RETURN,
-    T_MAX,
-    TAYLOR,
-    TOUCHES,
-    TRANSIENT,
-    UNTIL,
-    WINDOW,
+    AFTER, BEGUN, CORNERS, CROSSINGS, DOUBTFUL, HALVINGS, JUMPS, LOCATE, METHOD, MOST_STEPS, N_INDICATORS,
+    N_OUTPUTS, N_PARAMETERS, NONLINEAR_ROWS, ORDER, PERIOD, PHASE, READY, RECORD, RISING, RKF45, RTOL, SAMPLES,
+    SECTION, SECTION_MODE, SEGMENT, SETTLED, SINCE_CROSSING, SINCE_RETURN, STEP, STEPS, STEPS_IN_RETURN, T_MAX, TAYLOR,
+    TOUCHES, TRANSIENT, UNTIL, WINDOW,
 )  # fmt: skip
-from .taylor import dense_states, end_states, fill_powers, step_length
+from .series_step import at_end, failed, judged_at_end, next_stop, planned_length, polished, triggered
+from .taylor import dense_states, end_states, fill_powers
 from .watch import extend, extend_at_node, extend_corners, sample, touches, write_sample
 
 __all__ = ["march"]
-
-
-@inline
-def next_stop(mode, t, base, period, phase, until, net):
-    """The next time at which a step must end."""
-    stop = period if until < 0.0 else min(period, until - base)
-    if t < phase < stop:
-        stop = phase
-    transitions, at = net[2], net[4]
-    for k in range(at.shape[0]):
-        if at[k] >= 0.0 and transitions[k, 0] == mode and t < at[k] * period < stop:
-            stop = at[k] * period
-    return stop
-
-
-@device
-def triggered(mode, t, period, net):
-    """The time-triggered transition out of ``mode`` at the time t of the period, or -1."""
-    transitions, at = net[2], net[4]
-    for k in range(at.shape[0]):
-        if at[k] >= 0.0 and transitions[k, 0] == mode and at[k] * period == t:
-            return k
-    return -1
-
-
-@device
-def no_doubt(C, m, n, n_indicators, h, scale):
-    """Shorten an exact step until the series of nonlinear indicators has converged as well."""
-    for _ in range(60):
-        worst, power = 0.0, h ** (m - 1)
-        for i in range(n_indicators):
-            if scale[i] > 0.0:
-                worst = max(worst, (fabs(C[n + i, m - 1]) * power + fabs(C[n + i, m]) * power * h) / scale[i])
-        if not (worst > 1e-16):
-            break
-        h *= 0.8
-    return h
-
-
-@inline
-def failed(u, n, largest):
-    """Whether the state has left every bound."""
-    for i in range(n):
-        if not (fabs(u[i]) <= largest[i]):
-            return True
-    return False
-
-
-@device
-def polished(values, mode, t, q, C, m, n, row, h, tau, u_dense, vals):
-    """A zero of the interpolated row ``row`` (an indicator's), moved to the zero of the indicator of the dense state."""
-    at = tau
-    for _ in range(4):
-        dense_states(C, m, n, at, u_dense)
-        values(mode, t + at, u_dense, q, vals)
-        slope = 0.0
-        for k in range(m, 0, -1):
-            slope = slope * at + k * C[n + row, k]
-        if slope == 0.0:
-            break
-        move = vals[row] / slope
-        if not (fabs(at - move - tau) <= 1e-3 * h and 0.0 <= at - move <= h):
-            break
-        at -= move
-        if fabs(move) <= 4e-16 * h:
-            break
-    return at
-
-
-@device
-def judged_at_end(mode, X, n, n_indicators, net, side, side_before):
-    """Without location: the transition whose rows hold at the end of the step and did not at its beginning, or -1."""
-    first, outgoing = net[0], net[1]
-    for i in range(n_indicators):
-        side_before[i] = side[i]
-        side[i] = 1 if X[n + i, 0] > 0.0 else -1
-    for j in range(first[mode], first[mode + 1]):
-        if holds(outgoing[j], net, side) and not holds(outgoing[j], net, side_before):
-            return outgoing[j]
-    return -1
-
-
-@device
-def at_end(C, m, row, h):
-    """Value and slope of a row at the end of a part of the step."""
-    v, slope = C[row, m], 0.0
-    for k in range(m - 1, -1, -1):
-        slope = slope * h + v
-        v = v * h + C[row, k]
-    return v, slope
-
 
 _i, _f = types.int64, types.float64
 _f1, _f2, _f3, _i1, _i2 = _f[::1], _f[:, ::1], _f[:, :, ::1], _i[::1], _i[:, ::1]
@@ -243,16 +119,10 @@ def march(
         base = clock[1] * period if forced else 0.0
         stop = next_stop(mode, t, base, period, phase, until, net)
         remaining = stop - t
-        if fixed > 0.0:
-            h = fixed
-        elif rkf:
-            h = usual[mode] if usual[mode] > 0.0 else first_step(J0, u, n, norms[1], rtol)
-        elif method == TAYLOR:
-            h = step_length(C, order, n, n_indicators, u, norms[0], scale, log_rtol)
-        else:
-            h = exact_steps[mode]
-            if choice[SMOOTH_INDICATORS] == 1:
-                h = no_doubt(C, order, n, n_indicators, h, scale)
+        h = planned_length(
+            mode, method, J, u, n, n_indicators, order, fixed, usual, exact_steps, choice[NONLINEAR_ROWS], norms,
+            scale, log_rtol, rtol,
+        )  # fmt: skip
         if not (h > 1e-16 * t):
             status = DIVERGED
             break

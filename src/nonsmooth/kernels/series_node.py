@@ -43,6 +43,7 @@ from .watch import extend_at_node, forget
 
 __all__ = ["begin", "clear", "copy", "count_pass", "leap", "look", "meets_section", "next_is_edge", "open_window"]
 
+
 @device
 def copy(source, target):
     """Element by element: kernels allocate nothing, and a slice assignment might."""

@@ -1,0 +1,72 @@
+"""`frequency_response`: amplitudes by formula, jumps where they were put."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+from nonsmooth.analysis.response import jumps_in
+
+
+def test_the_amplitude_of_the_linear_oscillator() -> None:
+    """a = rho / |2 k - m w^2 + i c w|, half the true range, up and down alike; no jump."""
+    system = ns.models.discontinuous_support(g=1.0, rho=0.2)
+    omega = np.linspace(3.5, 5.5, 21)
+    response = ns.frequency_response(system, omega, transient=150, keep=4, progress=False)
+    p = system.values
+    a = p["rho"] / np.hypot(2 * p["k"] - p["m"] * omega**2, p["c"] * omega)
+    assert response["amplitude"].dims == ("omega", "direction", "state")
+    assert response["direction"].values.tolist() == ["up", "down"]
+    assert np.allclose(response["amplitude"].sel(state="x"), a[:, None], rtol=1e-9)
+    assert np.allclose(response["amplitude"].sel(state="v"), (a * omega)[:, None], rtol=1e-9)
+    assert response.sizes["jump"] == 0
+
+
+def test_jumps_of_a_bistable_motion() -> None:
+    """x' = x - x^3 + a (1 + cos(w t) / 100): going up it leaves the lower branch at the fold, 2 / (3 sqrt 3) shifted
+    by less than one percent; going down it is the mirror image. Half the range of x jumps there."""
+    system = ns.System(
+        states=["x"],
+        parameters={"a": 0.0, "w": 20.0},
+        modes={"only": lambda t, u, p: u.x - u.x**3 + p.a + 0.01 * np.cos(p.w * t)},
+    )
+    a = np.linspace(-0.6, 0.6, 61)
+    response = ns.frequency_response(
+        system, a, parameter="a", start={"x": -1.2}, transient=200, keep=4, rtol=1e-10, progress=False
+    )
+    assert response["jump_direction"].values.tolist() == ["up", "down"]
+    fold = 2 / (3 * np.sqrt(3))
+    width = a[1] - a[0]
+    assert np.allclose(response["jump_step"], width)
+    assert abs(response["jump_value"].values[0] - fold) <= 0.5 * width + 0.01 * fold
+    assert abs(response["jump_value"].values[1] + fold) <= 0.5 * width + 0.01 * fold
+    assert (response["jump_before"].values > response["jump_after"].values).all()
+
+
+@pytest.mark.parametrize(
+    ("amplitude", "found"),
+    [
+        (np.linspace(1.0, 2.0, 20), []),
+        (np.r_[np.linspace(1.0, 2.0, 10), np.linspace(0.5, 0.4, 10)], [9]),
+        (np.r_[np.linspace(1.0, 2.0, 10), 2.0 + 4e-3 + np.zeros(10)], []),
+        (np.r_[1.0, 1.0, 5.0, 5.0, 1.0, 1.0], [1, 3]),
+        (np.array([1.0]), []),
+        (np.array([1.0, 2.0]), []),
+        (np.r_[1.0, 1.01, np.nan, 1.03, 1.04, 3.0, 3.01], [4]),
+    ],
+)
+def test_jumps_stand_out_from_their_neighbours(amplitude: np.ndarray, found: list[int]) -> None:
+    assert jumps_in(amplitude) == found
+
+
+def test_directions_and_starts_of_a_response() -> None:
+    system = ns.models.discontinuous_support(g=1.0, rho=0.2)
+    one = ns.frequency_response(system, [3.0, 3.5], direction="up", transient=50, keep=4, progress=False)
+    assert one["amplitude"].dims == ("omega", "state")
+    starts = [{"x": 0.0}, {"x": 0.01}]
+    many = ns.frequency_response(system, [3.0, 3.5], start=starts, transient=150, keep=4, progress=False)
+    assert many["amplitude"].dims == ("omega", "direction", "start", "state")
+    p = system.values
+    a = p["rho"] / np.hypot(2 * p["k"] - p["m"] * 9.0, p["c"] * 3.0)
+    assert np.allclose(many["amplitude"].sel(omega=3.0, state="x"), a, rtol=1e-8)

@@ -1,0 +1,348 @@
+"""`sweep` against closed forms: the logistic map, linear amplitudes, dense sampling."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import nonsmooth as ns
+from nonsmooth.results.provenance import read_provenance
+
+QUIET = {"progress": False}
+METHODS = {"exact": {}, "taylor": {"rtol": 1e-12}, "rkf45": {"rtol": 1e-11}}
+
+
+def words(data: xr.DataArray) -> list[str]:
+    names = dict(zip(data.attrs["flag_values"], data.attrs["flag_meanings"].split(), strict=True))
+    return [names[int(value)] for value in data.values.ravel()]
+
+
+@pytest.fixture(scope="module")
+def logistic() -> ns.System:
+    """x stands still but for a kick at phase 0.5 of every period: x -> r x (1 - x). Its section is the logistic map."""
+    return ns.System(
+        states=["x"],
+        parameters={"r": 2.5},
+        modes={"rest": lambda t, u, p: 0 * u.x},
+        transitions=[ns.Transition("rest", "rest", at=0.5, reset=lambda t, u, p: p.r * u.x * (1 - u.x))],
+        period=1.0,
+    )
+
+
+@pytest.fixture(scope="module")
+def linear() -> ns.System:
+    """The paper's oscillator with its support out of reach."""
+    return ns.models.discontinuous_support(g=1.0, rho=0.2, c=0.87)
+
+
+def amplitude(p: dict[str, float], omega: np.ndarray) -> np.ndarray:
+    return p["rho"] / np.hypot(2 * p["k"] - p["m"] * omega**2, p["c"] * omega)
+
+
+def test_period_numbers_of_the_logistic_map(logistic: ns.System) -> None:
+    """Flips at 3, 1 + sqrt(6), 3.5440903, 3.5644073; period three from 1 + sqrt(8) to 3.8414990."""
+    known = {
+        1.5: 1, 2.9: 1, 3.05: 2, 3.44: 2, 3.46: 4, 3.54: 4, 3.5445: 8, 3.564: 8, 3.566: 16, 3.83: 3, 3.8285: 3,
+        3.845: 6, 3.6275: 6, 3.7: 0, 3.9: 0, 4.0: 0,
+    }  # fmt: skip
+    diagram = ns.sweep(logistic, "r", list(known), start={"x": 0.3}, direction=None, **QUIET)
+    found = dict(zip(known, diagram["period_number"].values.tolist(), strict=True))
+    assert found == known
+    for status, expected in zip(words(diagram["status"]), known.values(), strict=True):
+        assert status == ("ok" if expected else "not_periodic")
+
+
+def test_section_points_and_extremes_of_the_logistic_map(logistic: ns.System) -> None:
+    """The fixed point 1 - 1/r, and the 2-cycle (r + 1 +- sqrt((r - 3)(r + 1))) / (2 r)."""
+    r = np.array([2.2, 2.8, 3.1, 3.3])
+    diagram = ns.sweep(logistic, "r", r, start={"x": 0.3}, **QUIET)
+    root = np.sqrt(np.maximum((r - 3) * (r + 1), 0))
+    high = np.where(r < 3, 1 - 1 / r, (r + 1 + root) / (2 * r))
+    low = np.where(r < 3, 1 - 1 / r, (r + 1 - root) / (2 * r))
+    assert np.allclose(diagram["maximum"].sel(state="x"), high, atol=1e-9)
+    assert np.allclose(diagram["minimum"].sel(state="x"), low, atol=1e-9)
+    points = diagram["section"].sel(state="x").values
+    assert np.allclose(np.sort(points[:, -2:], axis=1), np.stack([low, high], axis=1), atol=1e-9)
+    assert np.allclose(diagram["crossings_per_period"], 1.0)
+
+
+def test_near_a_flip_a_period_is_right_or_slow(logistic: ns.System) -> None:
+    """Both sides of r = 3, from 1e-1 down to 1e-7 away: never a wrong number."""
+    r = np.sort(np.concatenate([3 - np.logspace(-7, -1, 13), 3 + np.logspace(-7, -1, 13)]))
+    diagram = ns.sweep(logistic, "r", r, start={"x": 0.3}, direction=None, **QUIET)
+    truth = np.where(r < 3, 1, 2)
+    numbers, status = diagram["period_number"].values, np.array(words(diagram["status"]))
+    assert (numbers[status == "ok"] == truth[status == "ok"]).all()
+    assert set(status[numbers == 0]) <= {"slow"}
+    assert (status[np.abs(r - 3) > 0.02] == "ok").all()
+
+
+def test_a_diverging_point_keeps_its_status_and_the_rest_is_whole(logistic: ns.System) -> None:
+    """Beyond r = 4 the map leaves every bound. Carried on, the next point starts from the last good one."""
+    r = np.array([2.5, 4.5, 3.2, 5.0])
+    for direction in ("up", "down", None):
+        diagram = ns.sweep(logistic, "r", r, start={"x": 0.3}, direction=direction, transient=200, **QUIET)
+        assert words(diagram["status"]) == ["ok", "diverged", "ok", "diverged"]
+        assert diagram["period_number"].values.tolist() == [1, 0, 2, 0]
+        bad = diagram["status"].values == 3
+        for name in ("section", "maximum", "minimum", "crossings_per_period"):
+            assert np.isnan(diagram[name].values[bad]).all()
+            assert np.isfinite(diagram[name].values[~bad]).all()
+        assert np.allclose(diagram["maximum"].values[0, 0], 0.6)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_negative_damping_for_a_part_of_the_values(method: str, linear: ns.System) -> None:
+    values = np.array([0.5, -0.5, 1.0, -2.0])
+    swept = ns.sweep(
+        linear.with_parameters(g=1e12), "c", values, direction=None, transient=200, keep=4, method=method,
+        **METHODS[method], **QUIET,
+    )  # fmt: skip
+    assert words(swept["status"]) == ["ok", "diverged", "ok", "diverged"]
+    p = dict(linear.values)
+    for i in (0, 2):
+        assert swept["maximum"].values[i, 0] == pytest.approx(amplitude(p | {"c": values[i]}, p["omega"]), rel=1e-9)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("phase", [0.0, 0.37])
+def test_extremes_of_a_linear_motion(method: str, phase: float, linear: ns.System) -> None:
+    """x = a cos(w t - d): true extremes, section points at the phase, clearance of both indicators."""
+    omega = np.linspace(3.0, 6.0, 7)
+    swept = ns.sweep(
+        linear, "omega", omega, section=ns.Stroboscopic(phase), transient=150, keep=20, method=method,
+        **METHODS[method], **QUIET,
+    )  # fmt: skip
+    p = dict(linear.values)
+    a = amplitude(p, omega)
+    assert (swept["period_number"] == 1).all()
+    assert words(swept["status"]) == ["ok"] * 7
+    for state, size in (("x", a), ("v", a * omega)):
+        assert np.allclose(swept["maximum"].sel(state=state), size, rtol=1e-8)
+        assert np.allclose(swept["minimum"].sel(state=state), -size, rtol=1e-8)
+    response = p["rho"] / (2 * p["k"] - p["m"] * omega**2 + 1j * p["c"] * omega)
+    expected = (response * np.exp(2j * np.pi * phase)).real
+    assert np.max(np.abs(swept["section"].sel(state="x").values - expected[:, None])) < 1e-9
+    assert np.allclose(swept["clearance"].sel(indicator="penetration"), 1.0 - a, rtol=1e-9)
+    assert (swept["crossings_per_period"] == 0).all()
+
+
+def test_an_undamped_motion_is_never_called_settled(linear: ns.System) -> None:
+    """With c = 0 the free oscillation never dies: not periodic, or slow."""
+    swept = ns.sweep(linear, "c", [0.0], start={"x": 0.01}, transient=50, keep=60, **QUIET)
+    assert words(swept["status"])[0] in ("not_periodic", "slow")
+    assert swept["period_number"].values[0] == 0
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_extremes_in_contact_are_those_of_a_dense_run(method: str) -> None:
+    """True extremes bound 20000 samples per period and are met by them within the parabola between two."""
+    system = ns.models.discontinuous_support(rho=0.29)
+    swept = ns.sweep(system, "rho", [0.29], transient=200, keep=4, method=method, **METHODS[method], **QUIET)
+    start = swept["section"].values[0, -1]
+    run = ns.simulate(system, periods=4, start=start, samples=80001, method=method, **METHODS[method])
+    u = run["u"].values
+    step = system.period() / 20000
+    for high, low, i in ((u.max(axis=0), u.min(axis=0), 0), (u.max(axis=0), u.min(axis=0), 1)):
+        curvature = np.abs(np.diff(u[:, i], 2)).max() + 40.0 * step**2
+        assert -1e-9 < swept["maximum"].values[0, i] - high[i] < curvature
+        assert -1e-9 < low[i] - swept["minimum"].values[0, i] < curvature
+    force = run["contact_force"].values
+    assert swept["contact_force_minimum"].values[0] == pytest.approx(force.min(), rel=1e-4)
+    assert swept["contact_force_maximum"].values[0] == pytest.approx(force.max(), abs=1e-3)
+    assert swept["crossings_per_period"].values[0] == run["crossing_time"].size / 4
+    assert swept["contacts_per_period"].values[0] == (run["crossing_transition"].values == 0).sum() / 4
+    clearance = (u[:, 0] - system.values["g"]).max()
+    assert swept["clearance"].sel(indicator="penetration").values[0] == pytest.approx(-clearance, rel=1e-5)
+
+
+def test_the_three_methods_agree_point_by_point() -> None:
+    """Periodic regimes of Fig. 11, with a section at an odd phase, carried along."""
+    system = ns.models.discontinuous_support()
+    results = {
+        method: ns.sweep(
+            system, "rho", [0.22, 0.26, 0.3], section=ns.Stroboscopic(0.13), transient=150, keep=8, method=method,
+            **settings, **QUIET,
+        )
+        for method, settings in METHODS.items()
+    }  # fmt: skip
+    for method in ("taylor", "rkf45"):
+        assert np.array_equal(results[method]["period_number"], results["exact"]["period_number"])
+        for name in ("section", "maximum", "minimum", "clearance"):
+            assert np.max(np.abs(results[method][name].values - results["exact"][name].values)) < 1e-8, (method, name)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_carried_state_keeps_the_phase_of_the_forcing(method: str, linear: ns.System) -> None:
+    """Without transient: at the next frequency the motion goes on from the same state and phase."""
+    phase, omega = 0.3, np.array([3.0, 4.0])
+    swept = ns.sweep(
+        linear, "omega", omega, section=ns.Stroboscopic(phase), transient=0, keep=3, method=method,
+        **METHODS[method], **QUIET,
+    )  # fmt: skip
+    # settling may take more than the first pass: the state that is carried is the last section point
+    last = swept["section"].values[0, -1]
+    shifted = linear_with_phase(omega[1], phase, linear)
+    run = ns.simulate(shifted, periods=3, start=last, samples=4)
+    found = swept["section"].values[1]
+    if words(swept["status"])[1] == "not_periodic":
+        assert np.max(np.abs(found - run["u"].values[1:])) < 1e-10
+
+
+def linear_with_phase(omega: float, phase: float, linear: ns.System) -> ns.System:
+    """The same motion with the forcing's clock set so that t = 0 is at ``phase``."""
+    p = linear.values
+
+    def shifted(t, u, q):  # type: ignore[no-untyped-def]
+        force = p["rho"] * np.cos(q.omega * t + 2 * np.pi * phase)
+        return u.v, (force - 2 * p["k"] * u.x - p["c"] * u.v) / p["m"]
+
+    return ns.System(states=["x", "v"], parameters={"omega": omega}, modes={"only": shifted})
+
+
+def test_directions_carry_the_state_along() -> None:
+    """A bistable switch: x falls to -1 or +1 of x' = x - x^3 + a, which folds at a = -+ 2 / (3 sqrt 3) = 0.3849."""
+    system = ns.System(
+        states=["x"],
+        parameters={"a": 0.0, "w": 2.0},
+        modes={"only": lambda t, u, p: u.x - u.x**3 + p.a + 1e-6 * np.cos(p.w * t)},
+    )
+    a = np.array([0.2, -0.2, 0.6, -0.6, 0.0])  # any order is kept
+    both = ns.sweep(system, "a", a, direction="both", start={"x": -1.0}, transient=60, keep=4, **QUIET)
+    assert both["section"].dims == ("a", "direction", "iterate", "state")
+    assert both["a"].values.tolist() == a.tolist()
+    x = both["section"].isel(iterate=-1).sel(state="x")
+    signs = {d: np.sign(x.sel(direction=d).values).tolist() for d in ("up", "down")}
+    assert signs["up"] == [-1, -1, 1, -1, -1]
+    assert signs["down"] == [1, 1, 1, -1, 1]
+    for i, value in enumerate(a):
+        roots = np.roots([-1, 0, 1, value])
+        real = roots[np.abs(roots.imag) < 1e-9].real
+        for d in ("up", "down"):
+            assert np.min(np.abs(real - float(x.sel(direction=d)[i]))) < 1e-5
+    for d in ("up", "down"):
+        alone = ns.sweep(system, "a", a, direction=d, start={"x": -1.0}, transient=60, keep=4, **QUIET)
+        assert str(alone["direction"].values) == d
+        assert np.array_equal(alone["section"].values, both["section"].sel(direction=d).values)
+    fresh = ns.sweep(system, "a", a, direction=None, start={"x": -1.0}, transient=60, keep=4, **QUIET)
+    assert str(fresh["direction"].values) == "none"
+    assert np.sign(fresh["section"].values[:, -1, 0]).tolist() == [-1, -1, 1, -1, -1]
+
+
+def test_several_starts_show_what_coexists() -> None:
+    """x' = x - x^3 (and a small forcing): starts left and right of 0 go to -1 and +1."""
+    system = ns.System(
+        states=["x"],
+        parameters={"a": 0.0, "w": 2.0},
+        modes={"only": lambda t, u, p: u.x - u.x**3 + p.a + 1e-6 * np.cos(p.w * t)},
+    )
+    starts = ns.random_starts(6, {"x": -2.0}, {"x": 2.0}, seed=8)
+    swept = ns.sweep(system, "a", [0.0, 0.1], direction=None, start=starts, transient=60, keep=4, **QUIET)
+    assert swept["section"].dims == ("a", "start", "iterate", "state")
+    expected = np.sign([start["x"] for start in starts])
+    assert len(set(expected)) == 2
+    assert np.array_equal(np.sign(swept["section"].values[0, :, -1, 0]), expected)
+    assert swept["start_state"].values[:, 0].tolist() == [start["x"] for start in starts]
+
+
+@pytest.mark.parametrize("direction", [None, "both"])
+def test_results_do_not_depend_on_the_number_of_threads(direction: str | None) -> None:
+    system = ns.models.discontinuous_support()
+    starts = ns.random_starts(3, {"x": -0.01}, {"x": 0.01}, seed=1)
+    values = np.linspace(0.2, 0.5, 40)
+    one, two, five = (
+        ns.sweep(system, "rho", values, direction=direction, start=starts, transient=30, keep=18, threads=n, **QUIET)
+        for n in (1, 2, 5)
+    )
+    xr.testing.assert_identical(one, two)
+    xr.testing.assert_identical(one, five)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_stop_that_moves_past_a_carried_state_begins_anew(method: str) -> None:
+    """Falling d: the state left at the phase of the largest x lies beyond the next stop, so the point starts at rest."""
+    system = ns.models.impact_oscillator(A=0.5, omega=0.7, c=0.3)
+    size = amplitude({"rho": 0.5, "k": 0.5, "m": 1.0, "c": 0.3}, np.array(0.7))
+    lag = np.angle(1 - 0.49 + 1j * 0.3 * 0.7)
+    section = ns.Stroboscopic(lag / (2 * np.pi))
+    options = {"section": section, "transient": 120, "keep": 6, "method": method, **METHODS[method], **QUIET}
+    carried = ns.sweep(system, "d", [2.0, 0.3 * size], direction="down", **options)
+    fresh = ns.sweep(system, "d", [2.0, 0.3 * size], direction=None, **options)
+    assert carried["section"].values[0, -1, 0] == pytest.approx(float(size), rel=1e-9)
+    assert "no_convergence" not in words(carried["status"])
+    assert np.array_equal(carried["section"].values[1], fresh["section"].values[1])
+    assert carried["maximum"].values[1, 0] == pytest.approx(0.3 * size, rel=1e-12)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_start_beyond_the_stop_is_a_status_in_a_sweep(method: str) -> None:
+    system = ns.models.impact_oscillator()
+    swept = ns.sweep(
+        system, "d", [0.5, 2.0], direction=None, start={"x": 1.0}, transient=20, keep=4, method=method, **QUIET
+    )
+    assert words(swept["status"])[0] == "no_convergence"
+    assert words(swept["status"])[1] in ("ok", "slow", "not_periodic")
+    assert np.isfinite(swept["section"].values[1]).all()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_support_that_moves_away_lets_go(method: str) -> None:
+    """A carried state in contact, its support gone: it must go on in the free mode, as a fresh run there does."""
+    system = ns.models.discontinuous_support(rho=0.1)
+    swept = ns.sweep(
+        system, "g", [-0.05, 0.5], transient=0, keep=2, max_period=1, method=method, **METHODS[method], **QUIET
+    )
+    assert swept["crossings_per_period"].values[1] == 0
+    assert swept["clearance"].sel(indicator="penetration").values[1] > 0.4
+
+
+def test_the_relief_valve_on_its_section() -> None:
+    """An autonomous system: q = 8 is the published cycle (period one, y1 from 0.668282564 to 6.009885866); no impacts;
+    at q = 9 the equilibrium is stable, so maxima of the lift come ever nearer to it."""
+    swept = ns.sweep(
+        ns.models.relief_valve(), "q", [8.0], section=ns.Poincare("lift_velocity", rising=False),
+        start={"y1": 3.0, "y2": 0.0, "y3": 13.0}, transient=200, keep=20, rtol=1e-11, **QUIET,
+    )  # fmt: skip
+    assert words(swept["status"]) == ["ok"]
+    assert swept["period_number"].values.tolist() == [1]
+    assert swept["maximum"].sel(state="y1").values[0] == pytest.approx(6.009885866, abs=1e-8)
+    assert swept["minimum"].sel(state="y1").values[0] == pytest.approx(0.668282564, abs=1e-8)
+    assert swept["crossings_per_period"].values[0] == 0
+    assert swept["clearance"].sel(indicator="seat").values[0] == pytest.approx(0.668282564, abs=1e-8)
+
+
+def test_a_section_that_is_never_met_is_a_status() -> None:
+    swept = ns.sweep(
+        ns.models.discontinuous_support(rho=0.05), "g", [-0.001, 0.5], direction=None,
+        section=ns.Poincare("penetration", t_max=30.0), transient=20, keep=4, method="taylor", **QUIET,
+    )  # fmt: skip
+    assert words(swept["status"])[1] == "no_convergence"
+    assert np.isnan(swept["section"].values[1]).all()
+    assert np.isfinite(swept["section"].values[0]).all()
+
+
+def test_memory_goes_along_in_a_smoothed_sweep() -> None:
+    """Sharp and smoothed agree to order eta on a transversal orbit, in both directions."""
+    system = ns.models.discontinuous_support()
+    options = {"direction": "both", "transient": 100, "keep": 4, **QUIET}
+    sharp = ns.sweep(system, "rho", [0.22, 0.24], **options)
+    smooth = ns.sweep(system.smoothed(1e-6), "rho", [0.22, 0.24], method="rkf45", rtol=1e-9, **options)
+    assert np.max(np.abs(sharp["section"].values - smooth["section"].values)) < 1e-6
+    assert np.array_equal(sharp["period_number"], smooth["period_number"])
+
+
+@pytest.mark.parametrize("suffix", [".nc", ".zarr"])
+def test_a_sweep_is_saved_and_loaded_whole(suffix: str, tmp_path: Path, logistic: ns.System) -> None:
+    starts = [{"x": 0.3}, {"x": 0.6}]
+    swept = ns.sweep(logistic, "r", [2.5, 4.5, 3.2], direction="both", start=starts, transient=50, keep=4, **QUIET)
+    again = ns.load(ns.save(swept, tmp_path / f"sweep{suffix}"))
+    xr.testing.assert_identical(swept, again)
+    record = read_provenance(again)
+    assert record["options"]["values"] == [2.5, 4.5, 3.2]
+    assert record["options"]["start"] == [[0.3], [0.6]]
+    system = ns.System.from_text(record["system"]["text"])
+    recomputed = ns.sweep(system, **{**record["options"], **QUIET})
+    assert np.array_equal(recomputed["section"].values, swept["section"].values, equal_nan=True)
