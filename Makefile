@@ -9,7 +9,7 @@ OUT    ?= out/savi2007
 PYTEST_ARGS ?= -n auto --dist loadfile
 
 .DEFAULT_GOAL := help
-.PHONY: help reproduce test check bench docs clean distclean
+.PHONY: help reproduce test fuzz check bench docs clean distclean
 
 help:  ## list the targets
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 18
@@ -19,6 +19,9 @@ reproduce: $(VENV)/.installed-run  ## reproduce Savi et al. (2007): figures, dat
 
 test: $(VENV)/.installed-test  ## run the tests
 	$(BIN)/python -m pytest $(PYTEST_ARGS)
+
+fuzz: $(VENV)/.installed-test  ## read 100 000 damaged recordings (half an hour)
+	$(BIN)/python -m pytest -m slow tests/experiment/test_fuzz.py -s
 
 check: $(VENV)/.installed-dev  ## ruff, mypy, import-linter, codespell
 	$(BIN)/ruff check .

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from nonsmooth.errors import DataFileError as DataFileError
     from nonsmooth.errors import SolveError as SolveError
     from nonsmooth.errors import SystemDefinitionError as SystemDefinitionError
+    from nonsmooth.experiment.load import load_recording as load_recording
+    from nonsmooth.experiment.recording import Recording as Recording
     from nonsmooth.flow.poincare import poincare as poincare
     from nonsmooth.flow.sections import Poincare as Poincare
     from nonsmooth.flow.sections import Stroboscopic as Stroboscopic
@@ -45,6 +47,8 @@ _WHERE = {
     "random_starts": "flow.starts",
     "sweep": "analysis.sweep",
     "frequency_response": "analysis.response",
+    "load_recording": "experiment.load",
+    "Recording": "experiment.recording",
     "save": "results.store",
     "load": "results.store",
     "SystemDefinitionError": "errors",

@@ -1,7 +1,7 @@
 """Runs the code of a page of the documentation and yields what each block printed beside what the page says.
 
 A page is run from top to bottom in one folder, with one set of names. Blocks of ``python`` are executed; a block of
-``toml`` whose first line is ``# NAME.toml`` is written to that file; lines of ``sh`` that begin with ``nonsmooth`` are run
+``toml`` whose first line is ``# NAME.toml``, and a ``{code-block}`` with a caption, is written to the file of that name; lines of ``sh`` that begin with ``nonsmooth`` are run
 (``reproduce`` excepted, which has tests of its own). A block of ``text`` directly below is what they must print, or the
 error they must raise, wrapped at will; ``...`` stands for anything.
 """
@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 _BLOCK = re.compile(r"^```(python|toml|sh|text)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+_FILE = re.compile(r"^```\{code-block\} \w+\n:caption: (\S+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 
 
 def blocks(text: str) -> list[tuple[str, str, str | None, int]]:
@@ -36,15 +37,18 @@ def blocks(text: str) -> list[tuple[str, str, str | None, int]]:
 def run_page(page: Path, folder: Path) -> Iterator[tuple[str, str | None, int]]:
     """Run every block of a page in ``folder``; yields (what it printed or raised, what is expected, line)."""
     names: dict[str, Any] = {"__name__": "page"}
+    text = page.read_text(encoding="utf-8")
     with contextlib.chdir(folder):
-        for language, code, expected, line in blocks(page.read_text(encoding="utf-8")):
+        for name, content in _FILE.findall(text):
+            Path(name).write_text(content, encoding="utf-8")
+        for language, code, expected, line in blocks(text):
             if language == "python":
                 place = compile("\n" * line + code, str(page), "exec")
                 yield _python(place, names, may_raise=expected is not None), expected, line
             elif language == "toml":
-                name = re.match(r"# (\S+\.toml)\n", code)
-                if name is not None:
-                    Path(name[1]).write_text(code, encoding="utf-8")
+                named = re.match(r"# (\S+\.toml)\n", code)
+                if named is not None:
+                    Path(named[1]).write_text(code, encoding="utf-8")
             else:
                 yield _shell(code), expected, line
 

@@ -141,7 +141,8 @@ def test_an_endless_chain_is_chatter() -> None:
     """Two modes that hand a moving point to one another at the same instant."""
     field = lambda t, u, p: (1.0,)  # noqa: E731
     system = System(
-        states=("x",), parameters={"g": 1.0}, modes={"a": field, "b": field}, indicators={"h": lambda t, u, p: u.x - p.g},
+        states=("x",), parameters={"g": 1.0}, modes={"a": field, "b": field},
+        indicators={"h": lambda t, u, p: u.x - p.g},
         transitions=[Transition("a", "b", when="h > 0"), Transition("b", "a", when="h > 0")],
     )  # fmt: skip
     assert record(system, [0.0], 2.0)[0].status == codes.CHATTER
@@ -200,10 +201,13 @@ def test_a_mode_may_lack_a_state() -> None:
 def test_logs_grow() -> None:
     """More than a thousand crossings and touches in one record; every one at its place."""
     system = System(
-        states=("x", "v"), parameters={"g": 0.5}, modes={"a": lambda t, u, p: (u.v, -u.x), "b": lambda t, u, p: (u.v, -u.x)},
+        states=("x", "v"), parameters={"g": 0.5},
+        modes={"a": lambda t, u, p: (u.v, -u.x), "b": lambda t, u, p: (u.v, -u.x)},
         indicators={"h": lambda t, u, p: u.x - p.g, "far": lambda t, u, p: u.x - 1.5 - 0 * p.g},
         transitions=[
-            Transition("a", "b", when="h > 0"), Transition("b", "a", when="h < 0"), Transition("b", "a", when="far > 0"),
+            Transition("a", "b", when="h > 0"),
+            Transition("b", "a", when="h < 0"),
+            Transition("b", "a", when="far > 0"),
         ],
     )  # fmt: skip
     turns = 600
@@ -268,7 +272,7 @@ def test_a_section_may_be_bound_to_a_mode() -> None:
         indicators={"up": lambda t, u, p: u.y, "clock": lambda t, u, p: u.s - p.g},
         transitions=[Transition("a", "b", when="clock > 0")],
     )  # fmt: skip
-    plan = SectionPlan(indicator=0, rising=0, mode=1, t_max=100.0)
+    plan = SectionPlan(indicator=0, rising=0, mode=1)
     out = chain(system, [1.0, 0.0, 0.0], plan, keep=2)
     np.testing.assert_allclose(out.section_time[0], [2 * np.pi, 3 * np.pi], rtol=1e-12)
     np.testing.assert_array_equal(out.section_mode, [[1, 1]])
@@ -344,7 +348,8 @@ def test_exact_flow_of_four_states_against_the_matrix_exponential() -> None:
 
     A = np.array([[0.1, 2.0, 0.0, 0.3], [-30.0, -0.2, 1.0, 0.0], [0.0, 0.5, -0.4, 5.0], [1.0, 0.0, -5.0, 0.0]])
     system = System(
-        states=("a", "b", "c", "d"), parameters={"g": 1.0}, modes={"only": lambda t, u, p: tuple(A @ np.array(u) * p.g)},
+        states=("a", "b", "c", "d"), parameters={"g": 1.0},
+        modes={"only": lambda t, u, p: tuple(A @ np.array(u) * p.g)},
     )  # fmt: skip
     start = [1.0, -1.0, 0.5, 2.0]
     _, state = record(system, start, 3.0, method="exact")

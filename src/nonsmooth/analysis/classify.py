@@ -20,7 +20,8 @@ from nonsmooth.kernels import codes
 __all__ = ["TOLERANCE", "Verdict", "judge", "residuals"]
 
 TOLERANCE = 1e-9  # of the return, in units of the motion's size
-NEARLY = 1e-3  # a smallest return below this is a motion that may still settle
+NEARLY = 1e-2  # a return below this, over a long stretch, is a motion that may still settle
+STRETCH = 32  # returns of that stretch: chaos comes near a cycle, but does not stay
 MARGIN = 2e-3  # multipliers nearer to the unit circle than this settle nothing within a transient
 APART = 10.0  # how much farther a shorter period must be than the orbit is uncertain
 
@@ -35,13 +36,16 @@ class Verdict:
     unstable: bool = False
 
 
-def residuals(points: FloatArray, size: FloatArray, max_period: int) -> FloatArray:
-    """Largest scaled return r_p over the last p points, p = 1 ... max_period (those that fit), in the max norm."""
+def residuals(points: FloatArray, size: FloatArray, max_period: int, stretch: int = 1) -> FloatArray:
+    """Largest scaled return r_p over the last p points, p = 1 ... max_period (those that fit), in the max norm.
+
+    With ``stretch`` over at least so many points."""
     scaled = points / size
     longest = min(max_period, len(points) - 1)
     result = np.full(longest, np.inf)
     for p in range(1, longest + 1):
-        last = scaled[-p:] if 2 * p <= len(points) else scaled[p:]
+        count = max(p, stretch)
+        last = scaled[-count:] if count + p <= len(points) else scaled[p:]
         result[p - 1] = np.abs(last - scaled[-p - len(last) : len(points) - p]).max()
     return result
 
@@ -71,7 +75,8 @@ def judge(
     close = np.flatnonzero(returns <= tolerance)
     if not len(close):
         least = float(returns.min())
-        return Verdict(0, least, codes.SLOW if least < NEARLY else codes.NOT_PERIODIC)
+        nearly = residuals(points, size, max_period, STRETCH).min()
+        return Verdict(0, least, codes.SLOW if nearly < NEARLY else codes.NOT_PERIODIC)
     p = int(close[0]) + 1
     residual = float(returns[p - 1])
     mu = multiplier(p)

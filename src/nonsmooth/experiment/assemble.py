@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from nonsmooth.experiment.limits import MAX_COLUMNS
 from nonsmooth.experiment.reading import Reading, Source, Trace
 from nonsmooth.experiment.recording import Recording, mixed_units
+from nonsmooth.experiment.remarks import Remarks
 from nonsmooth.experiment.sampling import examine, missing_runs
 
 if TYPE_CHECKING:
@@ -23,11 +24,11 @@ SHORT = 32
 
 def assemble(reading: Reading, source: Source, options: Mapping[str, Any], axis: str = "time") -> Recording:
     """Check the traces, group them by run and clock, and label them."""
-    remarks = list(reading.remarks)
+    remarks = reading.remarks
     traces = []
     for trace in reading.traces:
         if len(trace.values) == 0:
-            remarks.append(f"run {trace.run!r}, channel {trace.name!r}: holds no value; left out")
+            remarks.of(trace.run, trace.name, "holds no value; left out")
         else:
             traces.append(trace)
     if not traces:
@@ -54,7 +55,7 @@ def assemble(reading: Reading, source: Source, options: Mapping[str, Any], axis:
         "options": dict(options), "header": reading.header,
     }  # fmt: skip
     return Recording.from_runs(
-        runs, synthetic=reading.synthetic, source=record, warnings=tuple(remarks), run_attrs=run_attrs
+        runs, synthetic=reading.synthetic, source=record, warnings=remarks.sentences(), run_attrs=run_attrs
     )
 
 
@@ -77,7 +78,7 @@ def _by_clock(traces: list[Trace]) -> list[list[Trace]]:
     return ordered
 
 
-def _sensor(group: list[Trace], source: Source, axis: str, remarks: list[str]) -> xr.Dataset:
+def _sensor(group: list[Trace], source: Source, axis: str, remarks: Remarks) -> xr.Dataset:
     import xarray as xr
 
     first = group[0]
@@ -87,22 +88,28 @@ def _sensor(group: list[Trace], source: Source, axis: str, remarks: list[str]) -
     bad = np.flatnonzero(~np.isfinite(first.axis))
     if len(bad):
         raise source.error(first.place(int(bad[0])), f"{where}: the {axis} is not a finite number")
-    attrs: dict[str, Any] = _clock(first, where, source, remarks) if axis == "time" else {}
+
+    def note(sentence: str) -> None:
+        for trace in group:
+            remarks.of(trace.run, trace.name, sentence)
+
+    attrs: dict[str, Any] = _clock(first, where, source, note) if axis == "time" else {}
     if len(first.values) < SHORT:
-        remarks.append(f"{where}: only {len(first.values)} samples; too short to identify anything from")
+        note(f"only {len(first.values)} samples; too short to identify anything from")
     variables: dict[str, Any] = {}
     for trace in group:
-        own = f"run {trace.run!r}, channel {trace.name!r}"
         total, start, longest = missing_runs(trace.values)
         if total:
             at = f"{axis} = {trace.axis[start]:.9g} {trace.axis_unit}".rstrip()
-            remarks.append(
-                f"{own}: {total} of {len(trace.values)} values are not finite numbers, "
-                f"the longest run of them {longest} from {at} on; they are kept as they are"
-            )
+            remarks.of(
+                trace.run, trace.name,
+                f"{total} of {len(trace.values)} values are not finite numbers, "
+                f"the longest run of them {longest} from {at} on; they are kept as they are",
+            )  # fmt: skip
         name = _fit(trace.name or "channel", [*variables, axis])
         if name != trace.name and name != _clean(trace.name):
-            remarks.append(f"{own}: the name stands there twice, or is the axis; this one is called {name!r}")
+            sentence = f"the name stands there twice, or is the axis; this one is called {name!r}"
+            remarks.of(trace.run, trace.name, sentence)
         variables[name] = (
             axis, trace.values,
             {"long_name": trace.name, "units": trace.unit, "origin": trace.origin, **trace.attrs},
@@ -111,7 +118,7 @@ def _sensor(group: list[Trace], source: Source, axis: str, remarks: list[str]) -
     return xr.Dataset(variables, {axis: coordinate}, attrs)
 
 
-def _clock(trace: Trace, where: str, source: Source, remarks: list[str]) -> dict[str, Any]:
+def _clock(trace: Trace, where: str, source: Source, note: Callable[[str], None]) -> dict[str, Any]:
     """Attributes of a sensor's clock; remarks on gaps, changes and rounded times."""
     time = trace.axis
     back = np.flatnonzero(np.diff(time) < 0)
@@ -124,27 +131,27 @@ def _clock(trace: Trace, where: str, source: Source, remarks: list[str]) -> dict
         )
     clock = examine(time)
     if clock.repeated:
-        remarks.append(
-            f"{where}: {clock.repeated} of {len(time) - 1} time steps are zero; the times were written with too few "
+        note(
+            f"{clock.repeated} of {len(time) - 1} time steps are zero; the times were written with too few "
             "digits (export more of them) or samples stand twice"
         )
     if clock.change is not None:
         i, before, after = clock.change
-        remarks.append(
-            f"{where}: the sample rate changes from {before:.6g} Hz to {after:.6g} Hz near t = {time[i]:.9g} s "
+        note(
+            f"the sample rate changes from {before:.6g} Hz to {after:.6g} Hz near t = {time[i]:.9g} s "
             f"({trace.place(i)}); split the recording there before using methods that need one rate"
         )
     for i, count in clock.gaps[:3]:
-        remarks.append(
-            f"{where}: gap of {count} samples after t = {time[i]:.9g} s ({trace.place(i)}); nothing was filled in"
+        note(
+            f"gap of {count} samples after t = {time[i]:.9g} s ({trace.place(i)}); nothing was filled in"
         )
     if len(clock.gaps) > 3:
-        remarks.append(f"{where}: {len(clock.gaps) - 3} more gaps")
+        note(f"{len(clock.gaps) - 3} more gaps")
     kind = "regular" if clock.regular else "irregular"
     return {"rate": clock.rate, "sampling": kind}
 
 
-def _compare_units(traces: list[Trace], remarks: list[str]) -> None:
+def _compare_units(traces: list[Trace], remarks: Remarks) -> None:
     units: dict[str, dict[str, str]] = {}
     runs: dict[str, set[str]] = {}
     for trace in traces:
@@ -152,13 +159,14 @@ def _compare_units(traces: list[Trace], remarks: list[str]) -> None:
         units.setdefault(trace.name, {}).setdefault(trace.unit, trace.run)
     for name, found in units.items():
         if set(found) == {""}:
-            where = f"channel {name!r} (run {found['']!r}" + (" and others)" if len(runs[name]) > 1 else ")")
-            remarks.append(f"{where}: the file gives no unit; say it with units={{{name!r}: ...}}")
+            (run,) = runs[name] if len(runs[name]) == 1 else ("",)
+            remarks.of(run, name, "the file gives no unit; say it with units={channel: unit}")
         if len(found) > 1:
-            remarks.append(
-                f"channel {name!r} has {mixed_units(found)}; nothing was converted: "
-                "take each run's own unit, or read the runs one by one"
-            )
+            remarks.of(
+                "", name,
+                f"has units {mixed_units(found)}; nothing was converted: take each run's own unit, or read the runs "
+                "one by one",
+            )  # fmt: skip
 
 
 def _clean(name: str) -> str:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from nonsmooth.experiment.archive import Archive
 from nonsmooth.experiment.capstone_xml import Experiment, Segment, parse
 from nonsmooth.experiment.reading import Options, Reading, Source, Trace
+from nonsmooth.experiment.remarks import Remarks
 
 __all__ = ["RECORD", "SYNTHETIC", "read"]
 
@@ -40,7 +41,8 @@ def read(data: bytes, source: Source, options: Options) -> Reading:
     reading = Reading()
     reading.header = {**experiment.header, "sensors": experiment.sensors}
     reading.synthetic = experiment.header.get("Origin", "").startswith(SYNTHETIC)
-    reading.remarks += [f"{where}: has no stored values (it may be calculated); left out" for where in experiment.empty]
+    for run, name in experiment.empty:
+        reading.remarks.of(f"Run #{run}", name, "has no stored values (it may be calculated); left out")
     comma = experiment.header.get("DecimalSeparator", ".") == ","
     traces = []
     for group in _groups(experiment, reading):
@@ -58,9 +60,7 @@ def _groups(experiment: Experiment, reading: Reading) -> Iterator[list[Segment]]
     groups: dict[int, list[Segment]] = {}
     for segment in experiment.segments:
         if segment.deleted:
-            reading.remarks.append(
-                f"run {_run(segment)!r}, channel {segment.measurement!r}: deleted by the user in Capstone; left out"
-            )
+            reading.remarks.of(_run(segment), segment.measurement, "deleted by the user in Capstone; left out")
             continue
         groups.setdefault(segment.data_set, []).append(segment)
     return iter(groups.values())
@@ -70,20 +70,20 @@ def _run(segment: Segment) -> str:
     return f"Run #{segment.run}"
 
 
-def _trace(group: list[Segment], archive: Archive, comma: bool, remarks: list[str], source: Source) -> Trace | None:
+def _trace(group: list[Segment], archive: Archive, comma: bool, remarks: Remarks, source: Source) -> Trace | None:
     first = group[0]
     place = f"main.xml, line {first.line}"
     if not (first.run.isascii() and first.run.isdigit() and len(first.run) < 10):
         raise source.error(place, f"DataGroupNumber is {first.run[:40]!r}, expected the number of a run")
-    where = f"run {_run(first)!r}, channel {first.measurement!r}"
+    run, name = _run(first), first.measurement
     times, values = [], []
     for segment in group:
         stretch = _stretch(segment, archive, comma, source)
         if stretch is None:
-            remarks.append(f"{where}: {segment.values} holds text that a user typed, no measurement; left out")
+            remarks.of(run, name, f"{segment.values} holds text that a user typed, no measurement; left out")
             continue
         if stretch.blank:
-            remarks.append(f"{where}: {stretch.blank} records between valid ones are marked invalid; they are NaN")
+            remarks.of(run, name, f"{stretch.blank} records between valid ones are marked invalid; they are NaN")
         times.append(stretch.times)
         values.append(stretch.values)
     if not values:
@@ -94,7 +94,7 @@ def _trace(group: list[Segment], archive: Archive, comma: bool, remarks: list[st
     attrs = {"measurement": first.measurement} | ({"port": port} if port else {})
     origin = ", ".join(segment.values for segment in group[:4]) + (", ..." if len(group) > 4 else "")
     axis, column = (np.concatenate(times), np.concatenate(values)) if len(values) > 1 else (times[0], values[0])
-    return Trace(_run(first), name, first.unit, axis, column, origin, attrs=attrs)
+    return Trace(run, name, first.unit, axis, column, origin, attrs=attrs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +128,7 @@ def _stretch(segment: Segment, archive: Archive, comma: bool, source: Source) ->
             f"the clock of {segment.values} is IntervalCacheStartValue = {segment.start[:40]!r}, "
             f"IntervalCacheInterval = {segment.interval[:40]!r}; expected a time and a step > 0",
         )
-    return _Stretch(start + interval * np.arange(len(values)), values, blank)
+    return _Stretch(start + interval * np.arange(len(values), dtype=np.float64), values, blank)
 
 
 def _records(member: str, size: int, archive: Archive, source: Source) -> NDArray[np.float64] | None:

@@ -14,6 +14,7 @@ import numpy as np
 
 from nonsmooth.errors import DataFileError
 from nonsmooth.experiment.reading import TIME_WORDS, Options, Reading, Source, Trace, names_of, scaled_time
+from nonsmooth.experiment.remarks import Remarks
 from nonsmooth.experiment.text_table import Cells, decoded, read_cells, rows, split_unit
 
 __all__ = ["SYNTHETIC", "looks_like_capstone", "read"]
@@ -38,7 +39,7 @@ def looks_like_capstone(data: bytes, options: Options) -> bool:
         begin, end = begin[: len(begin) // 2 * 2], len(begin) // 2 * 2
     try:
         delimiter = options.delimiter or _delimiter(begin[:end], source)
-        header = next(rows(decoded(begin[:end], source, []), delimiter, source), (1, []))[1]
+        header = next(rows(decoded(begin[:end], source, Remarks()), delimiter, source), (1, []))[1]
     except DataFileError:
         return False
     runs = [match["run"] for match in map(_TIME.fullmatch, header) if match and match["run"]]
@@ -64,7 +65,7 @@ def read(data: bytes, source: Source, options: Options) -> Reading:
     used = {_time_of(times, run, column) for column, (run, _) in channels.items()}
     for column, (run, _) in times.items():
         if column not in used:
-            reading.remarks.append(f"run {run!r}: column {column + 1} ({header[column]!r}) is the time of no channel")
+            reading.remarks.of(run, header[column], "is the time of no channel")
     runs = {run for run, _ in times.values()}
     reading.synthetic = any(run.endswith(SYNTHETIC) for run in runs)
     if reading.synthetic:
@@ -112,7 +113,7 @@ def _time_of(times: dict[int, tuple[str, str]], run: str, column: int) -> int:
 
 
 def _trace(
-    column: int, run: str, label: str, time: int, time_unit: str, cells: Cells, source: Source, remarks: list[str]
+    column: int, run: str, label: str, time: int, time_unit: str, cells: Cells, source: Source, remarks: Remarks
 ) -> Trace:
     name, unit = split_unit(label)
     where = f"run {run!r}, channel {name!r}"
@@ -127,18 +128,19 @@ def _trace(
     if seconds is None:
         raise source.error("line 1", f"{where}: its time is in {time_unit!r}, which is no unit of time")
     if not time_unit:
-        remarks.append(f"{where}: the time has no unit; taken as seconds")
+        remarks.of(run, name, "the time has no unit; taken as seconds")
     if len(held):
         _, between = cells.blanks(column)
         last_time = cells.rows[time][-1] if len(cells.rows[time]) else -1
         trailing = int(np.count_nonzero(cells.rows[time] > held[-1]))
         if trailing:
-            remarks.append(
-                f"{where}: {trailing} trailing blanks dropped: it ends at line {cells.lines[held[-1]]}, "
-                f"the time of its run at line {cells.lines[last_time]}"
-            )
+            remarks.of(
+                run, name,
+                f"{trailing} trailing blanks dropped: it ends at line {cells.lines[held[-1]]}, "
+                f"the time of its run at line {cells.lines[last_time]}",
+            )  # fmt: skip
         if between:
-            remarks.append(f"{where}: {between} blank fields before its last value dropped; it has its own clock")
+            remarks.of(run, name, f"{between} blank fields before its last value dropped; it has its own clock")
     match = _PORT.fullmatch(name)
     attrs = {"measurement": match["measurement"], "port": match["port"]} if match else {"measurement": name}
     return Trace(

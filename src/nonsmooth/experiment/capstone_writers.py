@@ -88,14 +88,14 @@ def write_capstone_csv(
                     column[row[text]] = _print(value, digits) if np.isfinite(value) else ""
                 columns.append(column)
     longest = max(map(len, columns), default=0)
-    text = io.StringIO(newline="")
-    writer = csv.writer(text, delimiter=";" if decimal == "," else ",", lineterminator="\r\n")
+    table = io.StringIO(newline="")
+    writer = csv.writer(table, delimiter=";" if decimal == "," else ",", lineterminator="\r\n")
     writer.writerow(headers)
     for k in range(longest):
         fields = (column[k] if k < len(column) else "" for column in columns)
         writer.writerow([f.replace(".", decimal) for f in fields])
     mark = b"\xef\xbb\xbf" if byte_order_mark else b""
-    return _put(Path(path), mark + text.getvalue().encode("utf-8"))
+    return _put(Path(path), mark + table.getvalue().encode("utf-8"))
 
 
 def write_cap(
@@ -175,7 +175,7 @@ def _sensors(recording: Recording, run: str) -> Iterator[xr.Dataset]:
     for sensor, leaf in recording.tree[run].children.items():
         dataset = leaf.to_dataset()
         if tuple(dataset.dims) != ("time",):
-            raise ValueError(f"run {run!r}, sensor {sensor!r} is over {tuple(dataset.dims)}; this format knows time only")
+            raise ValueError(f"run {run!r}, sensor {sensor!r} is over {tuple(dataset.dims)}; only time can be written")
         yield dataset
 
 

@@ -44,7 +44,7 @@ class Experiment:
     header: dict[str, str] = field(default_factory=dict)
     sensors: list[dict[str, str]] = field(default_factory=list)
     segments: list[Segment] = field(default_factory=list)
-    empty: list[str] = field(default_factory=list)
+    empty: list[tuple[str, str]] = field(default_factory=list)
 
 
 def parse(pieces: Iterable[bytes], source: Source) -> Experiment:
@@ -131,7 +131,7 @@ class _Handler:
             if self._segment.values:
                 self.found.segments.append(self._segment)
             elif len(self.found.empty) < MAX_COLUMNS:
-                self.found.empty.append(f"run {self._segment.run!r}, channel {self._segment.measurement!r}")
+                self.found.empty.append((self._segment.run, self._segment.measurement))
             self._segment = None
         elif name == "DataSet":
             self._data_set = None

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.experiment.reading import Options, Reading, Source, Trace, is_axis_name, names_of, scaled_time
-from nonsmooth.experiment.text_table import Cells, decoded, number, read_cells, rows, split_unit
+from nonsmooth.experiment.remarks import Remarks
+from nonsmooth.experiment.text_table import Cells, Row, decoded, number, read_cells, rows, split_unit
 
 __all__ = ["read"]
 
@@ -35,7 +36,7 @@ def read(data: bytes, source: Source, options: Options) -> Reading:
     delimiter = options.delimiter or _delimiter(first)
     decimal = options.decimal or ("." if delimiter == "," else None)
     # The first line was taken to find the delimiter; put it back before the rest.
-    table = rows(_Again(first, stream), delimiter, source, first_line)
+    table = rows(itertools.chain([first], stream), delimiter, source, first_line)
     _, top = next(table)
     header, body = _header(top, table, first_line, decimal, source, options)
     chosen = _choose(header, source, options)
@@ -47,34 +48,21 @@ def read(data: bytes, source: Source, options: Options) -> Reading:
     picked = {name: (place[column], unit) for name, (column, unit) in chosen.items()}
     left = [text for k, text in enumerate(header) if k not in wanted and text.strip()]
     if left:
-        reading.remarks.append(f"columns not asked for are left out: {names_of(left)}")
+        reading.remarks.say(f"columns not asked for are left out: {names_of(left)}")
     origins = {name: f"column {column + 1} ({header[column]})" for name, (column, _) in chosen.items()}
     reading.traces = list(_traces(picked, origins, cells, source, options, reading.remarks))
     reading.header = {"delimiter": delimiter, "columns": len(header), "rows": len(cells.lines), "comments": comments}
     return reading
 
 
-class _Again:
-    """An iterator of lines that begins with one already taken."""
-
-    def __init__(self, first: str, rest: Iterator[str]) -> None:
-        self._lines = itertools.chain([first], rest)
-
-    def __iter__(self) -> _Again:
-        return self
-
-    def __next__(self) -> str:
-        return next(self._lines)
-
-
 def _header(
     top: list[str],
-    table: Iterator[tuple[int, list[str]]],
+    table: Iterator[Row],
     line: int,
     decimal: str | None,
     source: Source,
     options: Options,
-) -> tuple[list[str], Iterator[tuple[int, list[str]]]]:
+) -> tuple[list[str], Iterator[Row]]:
     """The header's fields and the rows below; a first row of numbers only is data, its columns have places."""
     if not all(f.strip() == "" or any(number(f, d) is not None for d in (decimal or ".,")) for f in top):
         return top, table
@@ -140,7 +128,7 @@ def _traces(
     cells: Cells,
     source: Source,
     options: Options,
-    remarks: list[str],
+    remarks: Remarks,
 ) -> Iterator[Trace]:
     axis = options.axis
     n = len(cells.lines)
@@ -153,7 +141,7 @@ def _traces(
             if seconds is None:
                 raise source.error("", f"the time column is in {unit!r}, which is no unit of time")
             if not unit:
-                remarks.append("the time column has no unit; taken as seconds")
+                remarks.say("the time column has no unit; taken as seconds")
             along, unit = seconds, "s"
     else:
         held, along, unit = np.arange(n), np.empty(0), "s"
@@ -173,7 +161,7 @@ def _traces(
             taken = along[place] if axis in chosen else (at - int(np.flatnonzero(inside)[0])) / float(options.rate or 1)
             blank = int(np.count_nonzero(inside)) - len(at)
             if blank and len(at):
-                remarks.append(f"{where}: {blank} blank fields dropped")
+                remarks.of(run, name, f"{blank} blank fields dropped")
             yield Trace(
                 run, name, own, np.asarray(taken, np.float64), values, origins[name], unit, lines=cells.lines[at]
             )

@@ -2,8 +2,9 @@
 
 Each segment is a run. ``Samples`` counts the first write only, so rows are read on to the next header or the end.
 Channels may have unequal numbers of samples; the k-th value of a channel is its k-th sample, whatever row it is
-printed in. The ``X_Value`` column is the clock of the first channel. A channel with the same step follows it, shifted by
-the difference of their ``X0`` (the column does not add up the rounding of ``Delta_X``); any other has X0 + k Delta_X.
+printed in. The ``X_Value`` column is the clock of the first channel. A channel with the same step follows it, shifted
+by the difference of their ``X0`` (the column does not add up the rounding of ``Delta_X``); any other has
+X0 + k Delta_X.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 
 from nonsmooth.experiment.limits import MAX_COLUMNS
 from nonsmooth.experiment.reading import Options, Reading, Source, Trace
+from nonsmooth.experiment.remarks import Remarks
 from nonsmooth.experiment.text_table import decoded, number
 
 __all__ = ["read"]
@@ -70,7 +72,7 @@ def read(data: bytes, source: Source, options: Options) -> Reading:
     return reading
 
 
-def _lines(data: bytes, source: Source, remarks: list[str]) -> tuple[str, Lines]:
+def _lines(data: bytes, source: Source, remarks: Remarks) -> tuple[str, Lines]:
     """The separator, and the lines split by it, with their numbers."""
     stream = decoded(data, source, remarks)
     top: list[str] = []
@@ -205,7 +207,7 @@ def _value(text: str, name: str, line: int, decimal: str, source: Source) -> flo
 
 
 def _traces(
-    run: str, segment: _Segment, clocks: str, decimal: str, source: Source, options: Options, remarks: list[str]
+    run: str, segment: _Segment, clocks: str, decimal: str, source: Source, options: Options, remarks: Remarks
 ) -> Iterator[Trace]:
     at = f"line {segment.line}"
     n = len(segment.names)
@@ -234,13 +236,13 @@ def _traces(
             axis = start[k] + np.arange(len(values)) * (step[k] if step[k] > 0 else 1.0)
         blanks = len(lines) - len(values)
         if blanks and len(values):
-            remarks.append(f"{where}: {blanks} blank fields dropped; {len(values)} values in {len(lines)} rows")
+            remarks.of(run, name, f"{blanks} blank fields dropped; {len(values)} values in {len(lines)} rows")
         if said[k] < len(values):
-            remarks.append(f"{where}: Samples says {said[k]:g} (its first write), {len(values)} were read")
+            remarks.of(run, name, f"Samples says {said[k]:g} (its first write), {len(values)} were read")
         elif said[k] > len(values):
-            remarks.append(f"{where}: Samples says {said[k]:g}, only {len(values)} follow; the file may be cut short")
+            remarks.of(run, name, f"Samples says {said[k]:g}, only {len(values)} follow; the file may be cut short")
         if k and start[k] != start[0]:
-            remarks.append(f"{where}: its clock begins at X0 = {start[k]:g}, that of the first channel at {start[0]:g}")
+            remarks.of(run, name, f"its clock begins at X0 = {start[k]:g}, that of the first channel at {start[0]:g}")
         begun = f"{dates[k]} {times[k]}".strip()
         yield Trace(
             run, name, units[k], axis, values, f"column {k + 2} from line {segment.line} on", unit,

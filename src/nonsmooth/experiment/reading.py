@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.errors import DataFileError
+from nonsmooth.experiment.remarks import Remarks
 
 __all__ = [
     "TIME_SCALES", "TIME_WORDS", "Column", "Options", "Reading", "Source", "Trace", "is_axis_name", "names_of",
@@ -90,7 +91,7 @@ class Reading:
     """All that a reader found."""
 
     traces: list[Trace] = field(default_factory=list)
-    remarks: list[str] = field(default_factory=list)
+    remarks: Remarks = field(default_factory=Remarks)
     header: dict[str, Any] = field(default_factory=dict)
     run_attrs: dict[str, dict[str, str]] = field(default_factory=dict)
     synthetic: bool = False

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from nonsmooth.experiment.limits import MAX_COLUMNS
 from nonsmooth.experiment.needed import needed
 from nonsmooth.experiment.reading import Options, Reading, Source, Trace, is_axis_name, scaled_time
+from nonsmooth.experiment.remarks import Remarks
 from nonsmooth.experiment.tdms_layout import check_layout
 
 __all__ = ["read"]
@@ -66,21 +67,20 @@ def _traces(
     channels: list[tuple[str, dict[str, str], Any]],
     source: Source,
     options: Options,
-    remarks: list[str],
+    remarks: Remarks,
 ) -> Iterator[Trace]:
     numeric: list[tuple[str, dict[str, str], NDArray[np.float64]]] = []
     clock: tuple[str, NDArray[np.float64]] | None = None
     for name, properties, raw in channels:
-        where = f"run {run!r}, channel {name!r}"
         values = np.asarray(raw)
         if values.dtype.kind == "M":
             seconds = (values - values[:1]).astype("timedelta64[ns]").astype(np.int64) * 1e-9
             if clock is None and is_axis_name(name, "time"):
                 clock = (name, np.asarray(seconds, np.float64))
                 continue
-            remarks.append(f"{where}: holds dates; left out")
+            remarks.of(run, name, "holds dates; left out")
         elif values.dtype.kind not in "fiub" or values.ndim != 1:
-            remarks.append(f"{where}: holds {values.dtype.name} values, no real numbers; left out")
+            remarks.of(run, name, f"holds {values.dtype.name} values, no real numbers; left out")
         elif clock is None and "wf_increment" not in properties and is_axis_name(name, "time"):
             scaled = scaled_time(values.astype(np.float64), properties.get("unit_string", ""))
             if scaled is None:
@@ -103,8 +103,9 @@ def _trace(
 ) -> Trace:
     origin = f"/{run}/{name}"
     step = _number(properties.get("wf_increment"))
+    axis: NDArray[np.float64]
     if step is not None and step > 0:
-        axis = (_number(properties.get("wf_start_offset")) or 0.0) + step * np.arange(len(values))
+        axis = (_number(properties.get("wf_start_offset")) or 0.0) + step * np.arange(len(values), dtype=np.float64)
     elif clock is not None:
         if len(clock[1]) != len(values):
             raise source.error(origin, f"holds {len(values)} values, its time channel {clock[0]!r} {len(clock[1])}")

@@ -8,7 +8,7 @@ from __future__ import annotations
 import csv
 import io
 from array import array
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,14 +16,18 @@ from numpy.typing import NDArray
 
 from nonsmooth.experiment.limits import MAX_COLUMNS
 from nonsmooth.experiment.reading import Source
+from nonsmooth.experiment.remarks import Remarks
 
-__all__ = ["Cells", "decoded", "number", "read_cells", "rows", "split_unit"]
+__all__ = ["Cells", "Row", "decoded", "number", "read_cells", "rows", "split_unit"]
+
+#: Line number and fields.
+Row = tuple[int, list[str]]
 
 _LONGEST_NUMBER = 64  # characters; a double has at most 24 that matter
 _SNIFFED = 20  # rows looked at to tell the decimal mark
 
 
-def decoded(data: bytes, source: Source, remarks: list[str]) -> io.TextIOWrapper:
+def decoded(data: bytes, source: Source, remarks: Remarks) -> io.TextIOWrapper:
     """The text of a file: UTF-8 or UTF-16 with or without mark, else Windows-1252 (with a remark)."""
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         encoding = "utf-16"
@@ -37,25 +41,25 @@ def decoded(data: bytes, source: Source, remarks: list[str]) -> io.TextIOWrapper
     except UnicodeDecodeError as error:
         where = f"line {_line_of(data, error.start)}"
         if encoding == "utf-16":
-            raise source.error(where, "is not valid UTF-16, as its first bytes say; the file may be cut short") from None
+            raise source.error(where, "is not valid UTF-16, as its mark says; the file may be cut short") from None
         encoding = "cp1252"
         try:
             data.decode(encoding)
         except UnicodeDecodeError:
             raise source.error(where, "is neither UTF-8 nor Windows-1252 text") from None
-        remarks.append(f"{where}: the text is not UTF-8; read as Windows-1252, so check names and units")
+        remarks.say(f"{where}: the text is not UTF-8; read as Windows-1252, so check names and units")
     return io.TextIOWrapper(io.BytesIO(data), encoding=encoding, newline="")
 
 
-def rows(stream: io.TextIOBase, delimiter: str, source: Source, first_line: int = 1) -> Iterator[tuple[int, list[str]]]:
+def rows(lines: Iterable[str], delimiter: str, source: Source, first_line: int = 1) -> Iterator[Row]:
     """Line number and fields of each row that is not empty. A delimiter of " " stands for any white space."""
     if delimiter == " ":
-        for line, text in enumerate(stream, first_line):
+        for line, text in enumerate(lines, first_line):
             fields = text.split()
             if fields:
                 yield line, fields
         return
-    reader = csv.reader(stream, delimiter=delimiter, strict=True)
+    reader = csv.reader(lines, delimiter=delimiter, strict=True)
     while True:
         begin = first_line + reader.line_num
         try:
@@ -102,12 +106,12 @@ class Cells:
 
 
 def read_cells(
-    table: Iterator[tuple[int, list[str]]],
+    table: Iterator[Row],
     labels: Sequence[str],
     wanted: Sequence[int],
     decimal: str | None,
     source: Source,
-    remarks: list[str],
+    remarks: Remarks,
     *,
     ends_with_newline: bool,
 ) -> Cells:
@@ -150,7 +154,7 @@ def read_cells(
     if last_short and not ends_with_newline:
         raise source.error(f"line {lines[-1]}", f"ends after fewer than {n} fields: the file is cut short")
     if short:
-        remarks.append(f"{short} rows have fewer fields than the header, first line {first_short}; taken as blank")
+        remarks.say(f"{short} rows have fewer fields than the header, first line {first_short}; taken as blank")
     return Cells(
         [np.frombuffer(v, dtype=np.float64) if v else np.empty(0) for v in values],
         [np.frombuffer(h, dtype=np.int64) if h else np.empty(0, np.int64) for h in held],
@@ -161,7 +165,7 @@ def read_cells(
 def split_unit(text: str, brackets: str = "()") -> tuple[str, str]:
     """``"Force (push) (N/(m/s))"`` -> ``("Force (push)", "N/(m/s)")``: the last balanced bracket is the unit."""
     stripped = text.strip()
-    opening, closing = brackets
+    opening, closing = brackets[0], brackets[1]
     if not stripped.endswith(closing):
         return stripped, ""
     depth = 0
@@ -173,7 +177,7 @@ def split_unit(text: str, brackets: str = "()") -> tuple[str, str]:
     return stripped, ""
 
 
-def _decimal_of(head: list[tuple[int, list[str]]], wanted: Sequence[int]) -> str:
+def _decimal_of(head: list[Row], wanted: Sequence[int]) -> str:
     """A comma, if there are fields that are numbers with one and none that are numbers with a point."""
     fields = [row[k] for _, row in head for k in wanted if k < len(row)]
     commas = any("," in f and number(f, ",") is not None for f in fields)
@@ -181,7 +185,7 @@ def _decimal_of(head: list[tuple[int, list[str]]], wanted: Sequence[int]) -> str
     return "," if commas and not points else "."
 
 
-def _chain(head: list[tuple[int, list[str]]], rest: Iterator[tuple[int, list[str]]]) -> Iterator[tuple[int, list[str]]]:
+def _chain(head: list[Row], rest: Iterator[Row]) -> Iterator[Row]:
     yield from head
     yield from rest
 

@@ -34,6 +34,20 @@ class State:
     counters: IntArray = field(default_factory=lambda: np.array([0, -1, 0, 0], dtype=np.int64))
     settled: bool = False  # False: the start rules (transitions that already hold) are still to be applied
 
+    def keep_phase(self, period: float, phase: float) -> None:
+        """Go on under a forcing of another period at equal phase of it.
+
+        ``phase`` is that of the section (negative: none): a state left there stays exactly there, else rounding could
+        count the same point as a return once more."""
+        if not period < np.inf:
+            self.clock[2] = 0.0
+            return
+        if self.clock[2] > 0.0:
+            self.clock[0] *= period / self.clock[2]
+        if phase >= 0.0 and abs(self.clock[0] - phase * period) <= 1e-12 * period:
+            self.clock[0] = phase * period
+        self.clock[2] = period
+
     def copy(self) -> State:
         return State(self.u.copy(), self.memory.copy(), self.clock.copy(), self.counters.copy(), self.settled)
 

@@ -95,6 +95,10 @@ class PlanarEngine:
         rows = self._with_section(plan)
         carry = starts is None
         section = np.array([plan.indicator, plan.rising, plan.mode, plan.after, plan.every, plan.extremes], np.int64)
+        clock = state.clock.copy()
+        if carry:
+            state.keep_phase(float(tables.period[first]), plan.phase if plan.indicator < 0 else -1.0)
+            state.clock[2] = 0.0  # for the kernel: done, take the time as it stands
         tables.module.chain(
             first, last, int(carry), np.zeros((1, 2)) if starts is None else starts,
             state.u, state.clock, state.counters,
@@ -106,6 +110,8 @@ class PlanarEngine:
         )  # fmt: skip
         if carry:
             state.settled = True
+            if state.clock[2] == 0.0 and tables.period[first] < np.inf:
+                state.clock[:] = clock  # failed at the first point: nothing was written
 
     def record(self, tables: Tables, state: State, until: float, samples: FloatArray) -> Log:
         n = len(samples)

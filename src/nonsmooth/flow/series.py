@@ -138,7 +138,7 @@ class SeriesEngine:
                 carried.u[:], q[n_p:] = starts[i], 0.0
             q[:n_p] = tables.points[i]
             control[at.PERIOD] = tables.periods[i]
-            _keep_phase(carried.clock, float(tables.periods[i]))
+            carried.keep_phase(float(tables.periods[i]), plan.phase if plan.indicator < 0 else -1.0)
             if plan.indicator < 0:
                 control[at.PHASE] = plan.phase * tables.periods[i]
             tally[:], memo[:] = 0, 0.0
@@ -255,13 +255,6 @@ class SeriesEngine:
             tally, memo, log,
         )  # fmt: skip
         return status
-
-
-def _keep_phase(clock: FloatArray, period: float) -> None:
-    """A carried state keeps the phase of the forcing, not the time, where the period changes."""
-    if clock[2] > 0.0 and period < np.inf:
-        clock[0] *= period / clock[2]
-    clock[2] = period if period < np.inf else 0.0
 
 
 def _no_log() -> tuple[FloatArray, ...]:

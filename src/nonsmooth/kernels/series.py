@@ -13,18 +13,13 @@ from math import log as ln
 
 from numba import types
 
+from . import series_places as place
 from .cache import kernel
 from .codes import DIVERGED, LOG_FULL, NO_CONVERGENCE, NOT_GUARANTEED, OK
 from .crossing import NOISE, earliest, section_crossing, sides_at
 from .polynomial import NONE
 from .rkf45 import hermite, quiet, stages, transit
 from .series_node import begin, clear, count_pass, leap, meets_section, next_is_edge, open_window
-from .series_places import (
-    AFTER, BEGUN, CORNERS, CROSSINGS, DOUBTFUL, HALVINGS, JUMPS, LOCATE, METHOD, MOST_STEPS, N_INDICATORS,
-    N_OUTPUTS, N_PARAMETERS, NONLINEAR_ROWS, ORDER, PERIOD, PHASE, READY, RECORD, RISING, RKF45, RTOL, SAMPLES,
-    SECTION, SECTION_MODE, SEGMENT, SETTLED, SINCE_CROSSING, SINCE_RETURN, STEP, STEPS, STEPS_IN_RETURN, T_MAX, TAYLOR,
-    TOUCHES, TRANSIENT, UNTIL, WINDOW,
-)  # fmt: skip
 from .series_step import at_end, failed, judged_at_end, next_stop, planned_length, polished, triggered
 from .taylor import dense_states, end_states, fill_powers
 from .watch import extend, extend_at_node, extend_corners, sample, touches, write_sample
@@ -64,40 +59,39 @@ def march(
     times, samples, crossings, touch_log = log
     C, W, J0, J1, K, powers, a, d, vals, u_new, q_new = work[:11]
     scale, measured, side, side_next, rise, usual, _, stack, found, u_dense, u_before = work[11:]
-    n, n_indicators, order, method = u.shape[0], choice[N_INDICATORS], choice[ORDER], choice[METHOD]
-    rows, n_modes = n + n_indicators + choice[N_OUTPUTS], lacking.shape[0]
-    rkf, record, section = method == RKF45, choice[RECORD] == 1, choice[SECTION]
+    n, n_indicators, order, method = u.shape[0], choice[place.N_INDICATORS], choice[place.ORDER], choice[place.METHOD]
+    rows, n_modes = n + n_indicators + choice[place.N_OUTPUTS], lacking.shape[0]
+    rkf, record, section = method == place.RKF45, choice[place.RECORD] == 1, choice[place.SECTION]
     degree = 5 if rkf else order
     J = J0 if rkf else C  # the jets at the beginning of a step
-    rtol, fixed, period, phase, until, t_max = (
-        control[RTOL], control[STEP], control[PERIOD], control[PHASE], control[UNTIL], control[T_MAX],
-    )  # fmt: skip
-    log_rtol, tail, forced = ln(max(0.1 * rtol, 1e-16)), (1.0 if method == TAYLOR else 0.0), period < inf
+    rtol, fixed, period = control[place.RTOL], control[place.STEP], control[place.PERIOD]
+    phase, until, t_max = control[place.PHASE], control[place.UNTIL], control[place.T_MAX]
+    log_rtol, tail, forced = ln(max(0.1 * rtol, 1e-16)), (1.0 if method == place.TAYLOR else 0.0), period < inf
     mode, t, status, zero_row, take = counters[0], clock[0], OK, -1, False
 
-    if tally[BEGUN] == 0:
-        tally[BEGUN] = 1
+    if tally[place.BEGUN] == 0:
+        tally[place.BEGUN] = 1
         for i in range(n_indicators):
             scale[i], measured[i], side[i] = 0.0, 0.0, 0
         clear(rise)
         clear(usual)
         mode, status = begin(
-            jet, jump, mode, t, u, q, tally[SETTLED], choice, norms, log_rtol, rtol, fixed, exact_steps, net, work
+            jet, jump, mode, t, u, q, tally[place.SETTLED], choice, norms, log_rtol, rtol, fixed, exact_steps, net, work
         )
-        tally[READY] = 1
+        tally[place.READY] = 1
         if section >= 0:  # a start on the section is no return, nor is a carried state left there
             if fabs(J[n + section, 0]) <= 1e-9 * scale[section]:
                 J[n + section, 0] = 0.0
                 side[section] = 0
-        if not record and choice[TRANSIENT] == 0:
+        if not record and choice[place.TRANSIENT] == 0:
             open_window(tally, memo, clock, t, extremes)
             take = True
-    ready = tally[READY] == 1
+    ready = tally[place.READY] == 1
 
     while status == OK:
         if record and (
-            crossings.shape[0] - tally[CROSSINGS] < n_modes + 4
-            or touch_log.shape[0] - tally[TOUCHES] < (net[3].shape[0] + 1) * (degree + 1)
+            crossings.shape[0] - tally[place.CROSSINGS] < n_modes + 4
+            or touch_log.shape[0] - tally[place.TOUCHES] < (net[3].shape[0] + 1) * (degree + 1)
         ):
             status = LOG_FULL
             break
@@ -113,27 +107,30 @@ def march(
         if take:
             extend_at_node(J, rows, lacking, mode, n, extremes)
             take = False
-        watched = record or tally[WINDOW] == 1
+        watched = record or tally[place.WINDOW] == 1
 
         # --- the length of the step
         base = clock[1] * period if forced else 0.0
         stop = next_stop(mode, t, base, period, phase, until, net)
         remaining = stop - t
         h = planned_length(
-            mode, method, J, u, n, n_indicators, order, fixed, usual, exact_steps, choice[NONLINEAR_ROWS], norms,
+            mode, method, J, u, n, n_indicators, order, fixed, usual, exact_steps, choice[place.NONLINEAR_ROWS], norms,
             scale, log_rtol, rtol,
         )  # fmt: skip
         if not (h > 1e-16 * t):
             status = DIVERGED
             break
+        if not record and tally[place.STEPS_IN_RETURN] > place.MOST_STEPS:
+            status = NO_CONVERGENCE
+            break
         if section >= 0:
-            wait = t_max - memo[SINCE_RETURN]
-            if wait <= 1e-12 * t_max or tally[STEPS_IN_RETURN] > MOST_STEPS or memo[SINCE_RETURN] > 1e100:
+            waited = memo[place.SINCE_RETURN]
+            if waited >= t_max * (1.0 - 1e-12) or waited > 1e100:
                 status = NO_CONVERGENCE
                 break
-            h = min(h, wait)
+            h = min(h, t_max - waited)
         if h == inf and remaining == inf:  # a polynomial solution: any length is right
-            h = max(1.0, memo[SINCE_RETURN])
+            h = max(1.0, memo[place.SINCE_RETURN])
         planned = h
         if rkf and fixed <= 0.0:
             h = min(h, 1.1 * transit(mode, J0, n, net))
@@ -163,14 +160,14 @@ def march(
                 side_next[i] = 0
             slack = rtol * error if rkf and fixed <= 0.0 else 0.0
             if rkf:
-                calm = choice[LOCATE] == 0 or quiet(
-                    mode, J0, J1, n, h, net, side, side_next, scale, slack, section, choice[SECTION_MODE]
+                calm = choice[place.LOCATE] == 0 or quiet(
+                    mode, J0, J1, n, h, net, side, side_next, scale, slack, section, choice[place.SECTION_MODE]
                 )
                 if calm and not watched:
                     break
                 hermite(J0, J1, rows, h, C)
             fill_powers(h, degree, powers)
-            if calm or choice[LOCATE] == 0:
+            if calm or choice[place.LOCATE] == 0:
                 break
             found[0] = 0
             for i in range(n_indicators):
@@ -178,9 +175,9 @@ def march(
             x, pending, hit = earliest(
                 mode, C, degree, n, powers, net, side, side_next, scale, tail, slack, a, d, stack, found
             )
-            if found[0] == 0 or fixed > 0.0 or halvings == HALVINGS:
+            if found[0] == 0 or fixed > 0.0 or halvings == place.HALVINGS:
                 if found[0] == 1:
-                    tally[DOUBTFUL] = 1
+                    tally[place.DOUBTFUL] = 1
                 break
             h *= 0.5  # a graze nearer than the polynomial is sure of
             landing = False
@@ -198,12 +195,13 @@ def march(
 
         # --- passes of a Poincare section before that
         edge = False
-        if section >= 0 and not calm and (choice[SECTION_MODE] < 0 or choice[SECTION_MODE] == mode):
+        if section >= 0 and not calm and (choice[place.SECTION_MODE] < 0 or choice[place.SECTION_MODE] == mode):
             cursor, limit, before = 0.0, part / h, side[section]
             while cursor < 1.0:
                 x = section_crossing(
-                    C, n + section, degree, choice[RISING], before, cursor, powers, scale[section], a, stack, found
-                )
+                    C, n + section, degree, choice[place.RISING], before, cursor, powers, scale[section], a, stack,
+                    found,
+                )  # fmt: skip
                 side_next[section] = found[1]
                 if x == NONE or (pending >= 0 and x >= limit * (1.0 - 1e-10)):
                     break
@@ -215,8 +213,8 @@ def march(
                     break
                 dense_states(C, degree, n, tau, u_dense)
                 count_pass(choice, tally, memo, clock, t + tau, period, mode, u_dense, sections, extremes)
-                if memo[SINCE_RETURN] == 0.0:
-                    memo[SINCE_RETURN] = -tau
+                if memo[place.SINCE_RETURN] == 0.0:
+                    memo[place.SINCE_RETURN] = -tau
                 cursor, before = x, 0
 
         # --- what is observed on the step, then its end
@@ -224,17 +222,17 @@ def march(
         if watched:
             fill_powers(part, degree, powers)
             if record:
-                tally[SAMPLES] = sample(
-                    times, tally[SAMPLES], base, t, part, C, degree, n, q, choice[N_PARAMETERS], mode, tally[SEGMENT],
-                    u_dense, samples,
+                tally[place.SAMPLES] = sample(
+                    times, tally[place.SAMPLES], base, t, part, C, degree, n, q, choice[place.N_PARAMETERS], mode,
+                    tally[place.SEGMENT], u_dense, samples,
                 )  # fmt: skip
-                tally[TOUCHES] = touches(
+                tally[place.TOUCHES] = touches(
                     mode, t + base, part, C, degree, n, powers, net, scale, rise, a, d, stack, found, u_dense,
-                    touch_log, tally[TOUCHES],
+                    touch_log, tally[place.TOUCHES],
                 )  # fmt: skip
             else:
                 extend(C, degree, rows, powers, lacking, mode, n, smooth, extremes, a, stack)
-                if choice[CORNERS] == 1:
+                if choice[place.CORNERS] == 1:
                     extend_corners(
                         values, mode, t, part, C, degree, n, n_indicators, q, smooth, extremes, u_dense, vals
                     )
@@ -250,13 +248,13 @@ def march(
         else:
             end_states(C, degree, n, powers, u)
         if edge:
-            sides_at(C, degree, n, n_indicators, part / h, powers, scale, a, side)
+            sides_at(C, degree, n, n_indicators, 1.0 if watched else part / h, powers, scale, a, side)
         landing = landing and not cut
         t = stop if landing else t + part
-        memo[SINCE_RETURN] += part
-        memo[SINCE_CROSSING] += part
-        tally[STEPS] += 1
-        tally[STEPS_IN_RETURN] += 1
+        memo[place.SINCE_RETURN] += part
+        memo[place.SINCE_CROSSING] += part
+        tally[place.STEPS] += 1
+        tally[place.STEPS_IN_RETURN] += 1
         if failed(u, n, norms[2]):
             status = DIVERGED
             break
@@ -266,7 +264,7 @@ def march(
         ready = False
         arrived = landing and record and stop == until - base
         if not cut:
-            if choice[LOCATE] == 1:
+            if choice[place.LOCATE] == 1:
                 for i in range(n_indicators):
                     side[i] = side_next[i]
             if rkf:
@@ -275,7 +273,7 @@ def march(
                 for i in range(n_indicators):
                     scale[i] = max(scale[i], fabs(J0[n + i, 0]))
                 ready = True
-            if choice[LOCATE] == 0:
+            if choice[place.LOCATE] == 0:
                 if not ready:
                     jet(mode, order, t, u, q, C, W)
                     ready = True
@@ -286,7 +284,7 @@ def march(
             clock[1] += 1.0
             t = 0.0
             if record:
-                tally[JUMPS] = 0
+                tally[place.JUMPS] = 0
         if landing and pending < 0:
             pending = triggered(mode, t, period, net)
         if pending >= 0:
@@ -300,7 +298,7 @@ def march(
             clear(rise)
             ready = True
             if record and not forced:
-                tally[JUMPS] = 0
+                tally[place.JUMPS] = 0
             if status != OK:
                 break
         passed = edge or (landing and t == phase)
@@ -309,10 +307,11 @@ def march(
                 choice, value_before, slope_before, J[n + section, 0], J[n + section, 1], NOISE * scale[section]
             )
             passed = meets and (
-                choice[SECTION_MODE] < 0 or choice[SECTION_MODE] == (mode if choice[AFTER] == 1 else mode_before)
+                choice[place.SECTION_MODE] < 0
+                or choice[place.SECTION_MODE] == (mode if choice[place.AFTER] == 1 else mode_before)
             )
         if passed:
-            after = choice[AFTER] == 1 or pending < 0
+            after = choice[place.AFTER] == 1 or pending < 0
             seen = count_pass(
                 choice, tally, memo, clock, t, period, mode if after else mode_before, u if after else u_before,
                 sections, extremes,
@@ -323,13 +322,15 @@ def march(
                 break
             take = seen == 1
         if arrived:
-            while tally[SAMPLES] < times.shape[0] and times[tally[SAMPLES]] <= until:
-                write_sample(samples, tally[SAMPLES], u, n, q, choice[N_PARAMETERS], mode, tally[SEGMENT])
-                tally[SAMPLES] += 1
+            while tally[place.SAMPLES] < times.shape[0] and times[tally[place.SAMPLES]] <= until:
+                write_sample(
+                    samples, tally[place.SAMPLES], u, n, q, choice[place.N_PARAMETERS], mode, tally[place.SEGMENT]
+                )
+                tally[place.SAMPLES] += 1
             break
 
     counters[0], clock[0] = mode, t
-    tally[READY] = 1 if ready else 0
-    if status == OK and tally[DOUBTFUL] == 1:
+    tally[place.READY] = 1 if ready else 0
+    if status == OK and tally[place.DOUBTFUL] == 1:
         status = NOT_GUARANTEED
     return status

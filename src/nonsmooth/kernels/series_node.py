@@ -2,42 +2,11 @@
 
 from math import fabs, inf
 
+from . import series_places as place
 from .cache import device
 from .codes import BEYOND_STOP, CHATTER, OK, TOO_MANY_CROSSINGS
 from .crossing import holding, holds, snap
 from .rkf45 import first_step
-from .series_places import (
-    CROSSINGS,
-    ELAPSED,
-    EVERY,
-    EXACT,
-    JUMPS,
-    KEEP,
-    KEPT_CONTACTS,
-    KEPT_CROSSINGS,
-    LONGEST,
-    METHOD,
-    MOST_JUMPS,
-    MOST_RAPID,
-    N_INDICATORS,
-    N_OUTPUTS,
-    N_PARAMETERS,
-    ORDER,
-    PASSES,
-    RAPID,
-    RECORD,
-    RETURNS,
-    RISING,
-    RKF45,
-    SEGMENT,
-    SINCE_CROSSING,
-    SINCE_RETURN,
-    STEPS_IN_RETURN,
-    TRANSIENT,
-    WINDOW,
-    WINDOW_FRACTION,
-    WINDOW_PERIODS,
-)  # fmt: skip
 from .taylor import step_length
 from .watch import extend_at_node, forget
 
@@ -62,21 +31,21 @@ def clear(target):
 def look(jet, mode, t, u, q, choice, norms, log_rtol, rtol, fixed, exact_steps, work):
     """Jets and after-limits at a start or after a jump."""
     C, W, J0, scale, measured, side, usual = work[0], work[1], work[2], work[11], work[12], work[13], work[16]
-    n, n_indicators = u.shape[0], choice[N_INDICATORS]
-    if choice[METHOD] == RKF45:
+    n, n_indicators = u.shape[0], choice[place.N_INDICATORS]
+    if choice[place.METHOD] == place.RKF45:
         m = 4
         jet(mode, m, t, u, q, J0, W)
         X = J0
     else:
-        m = choice[ORDER]
+        m = choice[place.ORDER]
         jet(mode, m, t, u, q, C, W)
         X = C
     h = usual[mode]
     if fixed > 0.0:
         h = fixed
-    elif choice[METHOD] == EXACT:
+    elif choice[place.METHOD] == place.EXACT:
         h = exact_steps[mode]
-    elif choice[METHOD] == RKF45:
+    elif choice[place.METHOD] == place.RKF45:
         if h <= 0.0:
             h = first_step(X, u, n, norms[1], rtol)
     else:
@@ -130,20 +99,20 @@ def leap(
     transitions, rows = net[2], net[3]
     C, J0, vals, measured, side = work[0], work[2], work[8], work[12], work[13]
     u_new, q_new = work[9], work[10]
-    n, n_parameters = u.shape[0], choice[N_PARAMETERS]
-    scale_of_time = max(memo[LONGEST], memo[SINCE_CROSSING])
-    memo[LONGEST] = scale_of_time
+    n, n_parameters = u.shape[0], choice[place.N_PARAMETERS]
+    scale_of_time = max(memo[place.LONGEST], memo[place.SINCE_CROSSING])
+    memo[place.LONGEST] = scale_of_time
     if period < inf:
         scale_of_time = period
-    tally[RAPID] = tally[RAPID] + 1 if memo[SINCE_CROSSING] < 1e-12 * scale_of_time else 0
-    memo[SINCE_CROSSING] = 0.0
+    tally[place.RAPID] = tally[place.RAPID] + 1 if memo[place.SINCE_CROSSING] < 1e-12 * scale_of_time else 0
+    memo[place.SINCE_CROSSING] = 0.0
     if hit >= 0:
         values(mode, t, u, q, vals)
         measured[rows[hit, 0]] = fabs(vals[rows[hit, 0]])
     for turn in range(lacking.shape[0] + 3):
         jump(pending, t, u, q, u_new, q_new)
-        if choice[RECORD] == 1:
-            row = tally[CROSSINGS]
+        if choice[place.RECORD] == 1:
+            row = tally[place.CROSSINGS]
             crossings[row, 0] = t + (clock[1] * period if period < inf else 0.0)
             crossings[row, 1] = pending
             for i in range(n):
@@ -151,58 +120,58 @@ def leap(
                 crossings[row, 2 + n + i] = u_new[i]
             for i in range(q.shape[0] - n_parameters):
                 crossings[row, 2 + 2 * n + i] = q_new[n_parameters + i]
-            tally[CROSSINGS] += 1
+            tally[place.CROSSINGS] += 1
         copy(u_new, u)
         copy(q_new, q)
         mode = transitions[pending, 1]
-        tally[SEGMENT] += 1
-        tally[JUMPS] += 1
-        if tally[WINDOW] == 1:
-            tally[KEPT_CROSSINGS] += 1
-            tally[KEPT_CONTACTS] += transitions[pending, 4]
+        tally[place.SEGMENT] += 1
+        tally[place.JUMPS] += 1
+        if tally[place.WINDOW] == 1:
+            tally[place.KEPT_CROSSINGS] += 1
+            tally[place.KEPT_CONTACTS] += transitions[pending, 4]
         look(jet, mode, t, u, q, choice, norms, log_rtol, rtol, fixed, exact_steps, work)
-        if tally[WINDOW] == 1:
-            all_rows = n + choice[N_INDICATORS] + choice[N_OUTPUTS]
-            extend_at_node(J0 if choice[METHOD] == RKF45 else C, all_rows, lacking, mode, n, extremes)
+        if tally[place.WINDOW] == 1:
+            all_rows = n + choice[place.N_INDICATORS] + choice[place.N_OUTPUTS]
+            extend_at_node(J0 if choice[place.METHOD] == place.RKF45 else C, all_rows, lacking, mode, n, extremes)
         if hit >= 0 and turn == 0:
             measured[rows[hit, 0]] = 0.0
-        if tally[JUMPS] > MOST_JUMPS:
+        if tally[place.JUMPS] > place.MOST_JUMPS:
             return mode, TOO_MANY_CROSSINGS
         pending = holding(mode, net, side)
         if pending < 0:
-            return mode, CHATTER if tally[RAPID] > MOST_RAPID else OK
+            return mode, CHATTER if tally[place.RAPID] > place.MOST_RAPID else OK
     return mode, CHATTER
 
 
 @device
 def next_is_edge(choice, tally):
     """Whether the next pass of the section opens or closes the kept window."""
-    if (tally[PASSES] + 1) % choice[EVERY] != 0:
+    if (tally[place.PASSES] + 1) % choice[place.EVERY] != 0:
         return False
-    r = tally[RETURNS] + 1
-    return r in (choice[TRANSIENT], choice[TRANSIENT] + choice[KEEP])
+    r = tally[place.RETURNS] + 1
+    return r in (choice[place.TRANSIENT], choice[place.TRANSIENT] + choice[place.KEEP])
 
 
 @device
 def count_pass(choice, tally, memo, clock, t, period, mode, u, sections, extremes):
     """Count a pass of the section at the time t of the period. Returns 1 where the window opens, 2 where it closes."""
-    tally[PASSES] += 1
-    if tally[PASSES] % choice[EVERY] != 0:
+    tally[place.PASSES] += 1
+    if tally[place.PASSES] % choice[place.EVERY] != 0:
         return 0
-    memo[SINCE_RETURN] = 0.0
-    tally[JUMPS] = 0
-    tally[STEPS_IN_RETURN] = 0
-    tally[RETURNS] += 1
-    row = tally[RETURNS] - choice[TRANSIENT] - 1
+    memo[place.SINCE_RETURN] = 0.0
+    tally[place.JUMPS] = 0
+    tally[place.STEPS_IN_RETURN] = 0
+    tally[place.RETURNS] += 1
+    row = tally[place.RETURNS] - choice[place.TRANSIENT] - 1
     if row >= 0:
         n = u.shape[0]
         for i in range(n):
             sections[row, i] = u[i]
         sections[row, n] = t + (clock[1] * period if period < inf else 0.0)
         sections[row, n + 1] = mode
-    if row + 1 == choice[KEEP]:
-        span = (clock[1] - memo[WINDOW_PERIODS]) * period if period < inf else 0.0
-        memo[ELAPSED] = span + (t - memo[WINDOW_FRACTION])
+    if row + 1 == choice[place.KEEP]:
+        span = (clock[1] - memo[place.WINDOW_PERIODS]) * period if period < inf else 0.0
+        memo[place.ELAPSED] = span + (t - memo[place.WINDOW_FRACTION])
         return 2
     if row == -1:
         open_window(tally, memo, clock, t, extremes)
@@ -213,11 +182,11 @@ def count_pass(choice, tally, memo, clock, t, period, mode, u, sections, extreme
 @device
 def open_window(tally, memo, clock, t, extremes):
     """From here on extremes and crossings are kept."""
-    tally[WINDOW] = 1
-    tally[KEPT_CROSSINGS] = 0
-    tally[KEPT_CONTACTS] = 0
-    memo[WINDOW_PERIODS] = clock[1]
-    memo[WINDOW_FRACTION] = t
+    tally[place.WINDOW] = 1
+    tally[place.KEPT_CROSSINGS] = 0
+    tally[place.KEPT_CONTACTS] = 0
+    memo[place.WINDOW_PERIODS] = clock[1]
+    memo[place.WINDOW_FRACTION] = t
     forget(extremes)
 
 
@@ -229,7 +198,7 @@ def meets_section(choice, before, slope_before, after, slope_after, noise):
     both)."""
     if fabs(before) > noise:
         return False
-    way = choice[RISING]
+    way = choice[place.RISING]
     if way == 0 or slope_before * way > 0.0:
         return True
     return fabs(after) <= noise and slope_after * way > 0.0

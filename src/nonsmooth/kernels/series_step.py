@@ -2,10 +2,10 @@
 
 from math import fabs
 
+from . import series_places as place
 from .cache import device, inline
 from .crossing import holds
 from .rkf45 import first_step
-from .series_places import RKF45, TAYLOR
 from .taylor import dense_states, step_length
 
 __all__ = ["at_end", "failed", "judged_at_end", "next_stop", "planned_length", "polished", "triggered"]
@@ -107,9 +107,9 @@ def planned_length(mode, method, J, u, n, n_indicators, order, fixed, usual, exa
     """The length of the next step, before stops and crossings in sight shorten it."""
     if fixed > 0.0:
         return fixed
-    if method == RKF45:
+    if method == place.RKF45:
         return usual[mode] if usual[mode] > 0.0 else first_step(J, u, n, norms[1], rtol)
-    if method == TAYLOR:
+    if method == place.TAYLOR:
         return step_length(J, order, n, n_indicators, u, norms[0], scale, log_rtol)
     if watch_rows == 1:
         return converged(J, order, n, n_indicators, exact_steps[mode], scale)
