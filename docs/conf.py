@@ -30,3 +30,5 @@ napoleon_use_rtype = False
 html_theme = "furo"
 html_title = "nonsmooth"
 html_copy_source = False
+html_static_path = ["_static"]
+html_css_files = ["pages.css"]

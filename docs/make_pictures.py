@@ -1,7 +1,7 @@
 """Draw the pictures of the documentation: one per example, and that of the first page from that page's own code.
 
-Run it from anywhere: ``python docs/make_pictures.py``. It takes some ten seconds (longer the first time) and writes ``docs/pictures/*.png``,
-which are kept with the source so that the pages can be built without computing anything.
+Run it from anywhere: ``python docs/make_pictures.py``. It takes some ten seconds (longer the first time) and writes
+``docs/pictures/*.png``, which are kept with the source so that the pages can be built without computing anything.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 """A block on a moving belt, held by a spring: stick and slip, with one state fewer while it sticks.
 
 The force of friction is at most f_s while the block sticks and f_d while it slips. From k x = f_s on it slips along
-an arc of the circle about x = f_d / k, of radius R = sqrt(((f_s - f_d) / k)^2 + (v_b / w)^2), w = sqrt(k / m), until its
-speed is that of the belt again. Its largest extension is f_d / k + R, and one slip lasts (pi + 2 atan(...)) / w.
+an arc of the circle about x = f_d / k, of radius R = sqrt(D^2 + (v_b / w)^2) with D = (f_s - f_d) / k and
+w = sqrt(k / m), until its speed is that of the belt again. Its largest extension is f_d / k + R, and one slip lasts
+(pi + 2 atan(v_b / (D w))) / w.
 """
 
 from __future__ import annotations

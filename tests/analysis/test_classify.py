@@ -48,6 +48,17 @@ def test_what_has_not_settled_is_slow() -> None:
     assert judge(cycle(2, 100), SIZE, 16, lambda _: 1.5).unstable
 
 
+@pytest.mark.parametrize("p", [1, 2, 4])
+def test_returns_that_all_shrink_are_slow(p: int) -> None:
+    """Near a flip the error falls like 1 / sqrt(n): by less than one percent per return, but at every one."""
+    k = np.arange(600, 700)
+    points = cycle(p, 100)
+    points[:, 0] += (-1.0) ** (k // p) / np.sqrt(k)
+    assert judge(points, SIZE, 16, lambda _: 0.99).status == codes.SLOW
+    points[:, 0] = np.sin(k**2) / 50  # as small, without a direction
+    assert judge(points, SIZE / 50, 16, lambda _: 0.99).status == codes.NOT_PERIODIC
+
+
 def test_a_shorter_period_that_is_not_told_apart_is_slow() -> None:
     """A 2-cycle of width 1e-11 with a return of 1e-10 could be a fixed point."""
     k = np.arange(100)

@@ -137,6 +137,13 @@ def test_an_undamped_motion_is_never_called_settled(linear: ns.System) -> None:
     assert swept["period_number"].values[0] == 0
 
 
+def test_a_motion_that_dies_out_has_period_one(linear: ns.System) -> None:
+    """Without forcing x decays like exp(-c t / 2 m); its section points shrink by the same factor at every return."""
+    swept = ns.sweep(linear, "rho", [0.0], start={"x": 0.01}, transient=100, keep=20, **QUIET)
+    assert (words(swept["status"]), swept["period_number"].values.tolist()) == (["ok"], [1])
+    assert np.abs(swept["section"].values).max() < 1e-12
+
+
 @pytest.mark.parametrize("method", METHODS)
 def test_extremes_in_contact_are_those_of_a_dense_run(method: str) -> None:
     """True extremes bound 20000 samples per period and are met by them within the parabola between two."""
@@ -266,7 +273,7 @@ def test_results_do_not_depend_on_the_number_of_threads(direction: str | None) -
 
 @pytest.mark.parametrize("method", METHODS)
 def test_a_stop_that_moves_past_a_carried_state_begins_anew(method: str) -> None:
-    """Falling d: the state left at the phase of the largest x lies beyond the next stop, so the point starts at rest."""
+    """Falling d: the state left where x is largest lies beyond the next stop, so that point starts at rest."""
     system = ns.models.impact_oscillator(A=0.5, omega=0.7, c=0.3)
     size = amplitude({"rho": 0.5, "k": 0.5, "m": 1.0, "c": 0.3}, np.array(0.7))
     lag = np.angle(1 - 0.49 + 1j * 0.3 * 0.7)

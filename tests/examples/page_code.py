@@ -1,9 +1,10 @@
 """Runs the code of a page of the documentation and yields what each block printed beside what the page says.
 
 A page is run from top to bottom in one folder, with one set of names. Blocks of ``python`` are executed; a block of
-``toml`` whose first line is ``# NAME.toml``, and a ``{code-block}`` with a caption, is written to the file of that name; lines of ``sh`` that begin with ``nonsmooth`` are run
-(``reproduce`` excepted, which has tests of its own). A block of ``text`` directly below is what they must print, or the
-error they must raise, wrapped at will; ``...`` stands for anything.
+``toml`` whose first line is ``# NAME.toml``, or a ``{code-block}`` with a caption, is written to a file of that name;
+lines of ``sh`` that begin with ``nonsmooth`` are run (``reproduce`` excepted, which has tests of its own). A block of
+``text`` directly below is what they must print, or the error they must raise, wrapped at will; ``...`` stands for
+anything.
 """
 
 from __future__ import annotations
@@ -26,11 +27,13 @@ def blocks(text: str) -> list[tuple[str, str, str | None, int]]:
     """(language, code, text expected or None, line) of each block that can be run."""
     found = list(_BLOCK.finditer(text))
     result = []
-    for this, after in zip(found, [*found[1:], None], strict=True):
+    for i, this in enumerate(found):
+        after = found[i + 1] if i + 1 < len(found) else None
         if this[1] == "text":
             continue
         follows = after is not None and after[1] == "text" and not text[this.end() : after.start()].strip()
-        result.append((this[1], this[2], after[2] if follows and after else None, text.count("\n", 0, this.start()) + 1))
+        expected = after[2] if after is not None and follows else None
+        result.append((this[1], this[2], expected, text.count("\n", 0, this.start()) + 1))
     return result
 
 

@@ -6,10 +6,11 @@ import doctest
 from pathlib import Path
 
 import pytest
-from page_code import run_page
+from page_code import blocks, run_page
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", ROOT / "docs" / "start.md", *sorted((ROOT / "docs" / "guides").glob("*.md"))]
+PAGES = [page for page in PAGES if blocks(page.read_text(encoding="utf-8"))]
 FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 
 

@@ -117,9 +117,7 @@ def test_a_bouncing_ball_until_its_bounces_accumulate(method: str, e: float) -> 
     n = int(np.log(1e-6) / np.log(e))
     exact = t0 * (1 + 2 * np.cumsum([0.0] + [e**k for k in range(1, n)]))
     zeno = t0 * (1 + e) / (1 - e)
-    run = ns.simulate(
-        system, duration=0.5 * (exact[-1] + exact[-2]), start={"x": h}, method=method, **METHODS[method]
-    )
+    run = ns.simulate(system, duration=0.5 * (exact[-1] + exact[-2]), start={"x": h}, method=method, **METHODS[method])
     times = run["crossing_time"].values
     assert len(times) == n - 1
     assert np.max(np.abs(times - exact[:-1])) < 1e-12 * zeno
@@ -136,9 +134,7 @@ def test_a_bouncing_ball_until_its_bounces_accumulate(method: str, e: float) -> 
 def test_impacts_of_a_forced_oscillator(method: str) -> None:
     """Between impacts the closed form from the state after the last one; at each, x = d and v+ = -e v- to the bit."""
     p = {"k": 1.0, "c": 0.1, "omega": 0.8, "d": 0.4, "e": 0.7, "A": 1.0}
-    run = ns.simulate(
-        ns.models.impact_oscillator(**p), periods=12, start={"x": 0.1}, method=method, **METHODS[method]
-    )
+    run = ns.simulate(ns.models.impact_oscillator(**p), periods=12, start={"x": 0.1}, method=method, **METHODS[method])
     times = run["crossing_time"].values
     before, after = run["u_before"].values, run["u_after"].values
     assert len(times) > 20
@@ -184,7 +180,9 @@ def two_harmonics() -> ns.System:
     """A motion x = a1 cos(w t + s) + a3 cos(3 (w t + s)) through a gate at g that changes nothing but the mode."""
 
     def motion(t, u, p):
-        force = p.c1 * np.cos(p.w * t) + p.s1 * np.sin(p.w * t) + p.c3 * np.cos(3 * p.w * t) + p.s3 * np.sin(3 * p.w * t)
+        force = (
+            p.c1 * np.cos(p.w * t) + p.s1 * np.sin(p.w * t) + p.c3 * np.cos(3 * p.w * t) + p.s3 * np.sin(3 * p.w * t)
+        )
         return u.v, force - p.k * u.x
 
     return ns.System(

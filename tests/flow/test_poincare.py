@@ -21,7 +21,11 @@ def harmonic() -> ns.System:
         states=["x", "v"],
         parameters={"k": 1.0},
         modes={"left": motion, "right": motion},
-        indicators={"side": lambda t, u, p: u.x - 0.5, "speed": lambda t, u, p: u.v, "level": lambda t, u, p: u.x + 0.2},
+        indicators={
+            "side": lambda t, u, p: u.x - 0.5,
+            "speed": lambda t, u, p: u.v,
+            "level": lambda t, u, p: u.x + 0.2,
+        },
         transitions=[ns.Transition("left", "right", when="side > 0"), ns.Transition("right", "left", when="side < 0")],
     )
 

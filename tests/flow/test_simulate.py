@@ -97,7 +97,7 @@ def test_entry_by_separation_beyond_the_gap() -> None:
     first = int(np.argmax(force > 0))
     entry = times[first - 1] - force[first - 1] * (times[1] - times[0]) / (force[first] - force[first - 1])
     assert states[first, 0] > -0.05
-    assert states[: first, 0].min() > -0.05
+    assert states[:first, 0].min() > -0.05
     for method, settings in METHODS.items():
         run = ns.simulate(system, duration=0.05, start=start, method=method, **settings)
         assert run["mode"].values[0] == 0
@@ -191,9 +191,7 @@ def test_the_smoothed_switch_remembers_the_velocity_at_its_entry(method: str) ->
     system = ns.models.discontinuous_support().smoothed(1e-5)
     run = ns.simulate(system, periods=4, method=method, rtol=1e-10)
     names = system.modes
-    entries = [
-        k for k, t in enumerate(run["crossing_transition"].values) if system.transitions[t].writes
-    ]
+    entries = [k for k, t in enumerate(run["crossing_transition"].values) if system.transitions[t].writes]
     assert len(entries) >= 4
     seen = 0
     for k in entries:
@@ -242,7 +240,9 @@ def test_a_solution_that_ends_says_where(method: str) -> None:
     system = ns.System(states=["x"], parameters={"a": 1.0}, modes={"only": lambda t, u, p: p.a * u.x**2})
     run = ns.simulate(system, duration=0.999, start=[1.0], method=method, rtol=1e-12)
     assert run["u"].values[-1, 0] == pytest.approx(1000.0, rel=1e-7)
-    with pytest.raises(ns.SolveError, match=r"grew beyond 1e9 times its scale.*at t = 0\.99.*x = .*mode 'only'") as caught:
+    with pytest.raises(
+        ns.SolveError, match=r"grew beyond 1e9 times its scale.*at t = 0\.99.*x = .*mode 'only'"
+    ) as caught:
         ns.simulate(system, duration=2.0, start=[1.0], method=method)
     assert caught.value.status == "diverged"
     assert caught.value.time == pytest.approx(1.0, abs=1e-6)
@@ -265,9 +265,7 @@ def test_a_series_with_gaps_does_not_hide_its_end(method: str, power: int, rtol:
 
 def test_unstable_linear_motion_ends_as_diverged() -> None:
     """x'' = k x from x = 1, v = sqrt(k): exp(sqrt(k) t) passes 1e9 at ln(1e9) / sqrt(k)."""
-    system = ns.System(
-        states=["x", "v"], parameters={"k": 4.0}, modes={"only": lambda t, u, p: (u.v, p.k * u.x)}
-    )
+    system = ns.System(states=["x", "v"], parameters={"k": 4.0}, modes={"only": lambda t, u, p: (u.v, p.k * u.x)})
     with pytest.raises(ns.SolveError) as caught:
         ns.simulate(system, duration=30.0, start=[1.0, 2.0])
     assert caught.value.status == "diverged"
@@ -308,7 +306,10 @@ def test_more_than_two_states_have_an_exact_flow() -> None:
         parameters={"F": 1.0, "w": 1.2, "g": 0.1},
         modes={"free": motion, "contact": stopped},
         indicators={"gap": lambda t, u, p: u.x3 - p.g},
-        transitions=[ns.Transition("free", "contact", when="gap > 0"), ns.Transition("contact", "free", when="gap < 0")],
+        transitions=[
+            ns.Transition("free", "contact", when="gap > 0"),
+            ns.Transition("contact", "free", when="gap < 0"),
+        ],
     )
     A = np.block([[np.zeros((3, 3)), np.eye(3)], [-K, -0.1 * np.eye(3)]])
     B = A.copy()

@@ -20,8 +20,9 @@ from nonsmooth.kernels import codes
 __all__ = ["TOLERANCE", "Verdict", "judge", "residuals"]
 
 TOLERANCE = 1e-9  # of the return, in units of the motion's size
-NEARLY = 1e-2  # a return below this, over a long stretch, is a motion that may still settle
-STRETCH = 32  # returns of that stretch: chaos comes near a cycle, but does not stay
+NEARLY = 1e-3  # a smallest return below this is a motion that may still settle
+SHRINKING = 3e-2  # and so is one below this whose returns all shrink: near a flip they do so ever more slowly
+STRETCH = 32  # returns looked at for that: chaos comes near a cycle, but not steadily
 MARGIN = 2e-3  # multipliers nearer to the unit circle than this settle nothing within a transient
 APART = 10.0  # how much farther a shorter period must be than the orbit is uncertain
 
@@ -36,18 +37,25 @@ class Verdict:
     unstable: bool = False
 
 
-def residuals(points: FloatArray, size: FloatArray, max_period: int, stretch: int = 1) -> FloatArray:
-    """Largest scaled return r_p over the last p points, p = 1 ... max_period (those that fit), in the max norm.
-
-    With ``stretch`` over at least so many points."""
+def residuals(points: FloatArray, size: FloatArray, max_period: int) -> FloatArray:
+    """Largest scaled return r_p over the last p points, p = 1 ... max_period (those that fit), in the max norm."""
     scaled = points / size
     longest = min(max_period, len(points) - 1)
     result = np.full(longest, np.inf)
     for p in range(1, longest + 1):
-        count = max(p, stretch)
-        last = scaled[-count:] if count + p <= len(points) else scaled[p:]
+        last = scaled[-p:] if 2 * p <= len(points) else scaled[p:]
         result[p - 1] = np.abs(last - scaled[-p - len(last) : len(points) - p]).max()
     return result
+
+
+def shrinks(points: FloatArray, size: FloatArray, max_period: int) -> bool:
+    """Whether for some p every one of the last scaled returns |s_{k+p} - s_k| is small and less than that p before."""
+    scaled = points / size
+    for p in range(1, max_period + 1):
+        returns = np.abs(scaled[p:] - scaled[:-p]).max(axis=1)[-STRETCH - p :]
+        if len(returns) >= 2 * p + 8 and returns.max() < SHRINKING and (returns[p:] < returns[:-p]).all():
+            return True
+    return False
 
 
 def judge(
@@ -75,8 +83,8 @@ def judge(
     close = np.flatnonzero(returns <= tolerance)
     if not len(close):
         least = float(returns.min())
-        nearly = residuals(points, size, max_period, STRETCH).min()
-        return Verdict(0, least, codes.SLOW if nearly < NEARLY else codes.NOT_PERIODIC)
+        settling = least < NEARLY or shrinks(points, size, max_period)
+        return Verdict(0, least, codes.SLOW if settling else codes.NOT_PERIODIC)
     p = int(close[0]) + 1
     residual = float(returns[p - 1])
     mu = multiplier(p)

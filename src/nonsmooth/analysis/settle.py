@@ -22,6 +22,7 @@ __all__ = ["Attractors"]
 LONGER = (1, 2, 4)  # further transients for a point that is still settling, in units of the first
 KICK = 1e-3  # what pushes a state off an unstable orbit, in units of the motion's size
 NUDGE = 1e-6  # finite differences of the return map, in units of the motion's size
+LEAST = 1e-3  # the least size of a motion, in units of the states' scales
 FAILED = (codes.DIVERGED, codes.CHATTER, codes.TOO_MANY_CROSSINGS, codes.NO_CONVERGENCE, codes.BEYOND_STOP)
 
 
@@ -73,9 +74,8 @@ class Attractors:
         self.engine.chain(self.tables, i, i + 1, state, None, plan, transient, keep, out)
 
     def _size(self, i: int, out: Chain) -> FloatArray:
-        """Half the range of each state; its scale where it does not move."""
-        size = 0.5 * (out.maximum[i] - out.minimum[i])
-        return np.where(size > 1e-9 * self.scale, size, self.scale)
+        """Half the range of each state, and no less than a part of its scale: a motion that dies out comes to rest."""
+        return np.maximum(0.5 * (out.maximum[i] - out.minimum[i]), LEAST * self.scale)
 
     def _judge(self, i: int, state: State, out: Chain) -> Verdict:
         size = self._size(i, out)

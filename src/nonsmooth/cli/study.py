@@ -182,12 +182,15 @@ def _options(verb: str, table: Mapping[str, Any], where: str) -> dict[str, Any]:
 def _values(value: Any, place: str) -> Any:
     import numpy as np
 
+    from nonsmooth.flow.arguments import float_array, real_number, whole_number
+
     if isinstance(value, dict):
         _check_keys(value, ("from", "to", "n"), f"{place}, values", "a key")
         if set(value) == {"from", "to", "n"}:
-            return np.linspace(value["from"], value["to"], value["n"])
+            low, high = (real_number(value[key], f"{place}, values: {key}") for key in ("from", "to"))
+            return np.linspace(low, high, whole_number(value["n"], f"{place}, values: n", 1))
     elif isinstance(value, list):
-        return np.array(value, dtype=float)
+        return float_array(value, f"{place}: values")
     raise ValueError(f"{place}: values is {value!r}; give a list or {{ from = ..., to = ..., n = ... }}")
 
 

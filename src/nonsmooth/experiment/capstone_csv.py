@@ -15,7 +15,7 @@ import numpy as np
 from nonsmooth.errors import DataFileError
 from nonsmooth.experiment.reading import TIME_WORDS, Options, Reading, Source, Trace, names_of, scaled_time
 from nonsmooth.experiment.remarks import Remarks
-from nonsmooth.experiment.text_table import Cells, decoded, read_cells, rows, split_unit
+from nonsmooth.experiment.text_table import Cells, checked_header, decoded, read_cells, rows, split_unit
 
 __all__ = ["SYNTHETIC", "looks_like_capstone", "read"]
 
@@ -54,7 +54,8 @@ def read(data: bytes, source: Source, options: Options) -> Reading:
     delimiter = options.delimiter or _delimiter(data, source)
     decimal = options.decimal or ("." if delimiter == "," else None)
     table = rows(decoded(data, source, reading.remarks), delimiter, source)
-    _, header = next(table, (1, []))
+    line, fields = next(table, (1, []))
+    header = checked_header(fields, line, source)
     times, channels = _layout(header, source)
     cells = read_cells(
         table, header, range(len(header)), decimal, source, reading.remarks, ends_with_newline=data.endswith(b"\n")

@@ -11,9 +11,10 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.experiment.limits import MAX_COLUMNS
 from nonsmooth.experiment.reading import Options, Reading, Source, Trace, is_axis_name, names_of, scaled_time
 from nonsmooth.experiment.remarks import Remarks
-from nonsmooth.experiment.text_table import Cells, Row, decoded, number, read_cells, rows, split_unit
+from nonsmooth.experiment.text_table import Cells, Row, checked_header, decoded, number, read_cells, rows, split_unit
 
 __all__ = ["read"]
 
@@ -37,7 +38,8 @@ def read(data: bytes, source: Source, options: Options) -> Reading:
     decimal = options.decimal or ("." if delimiter == "," else None)
     # The first line was taken to find the delimiter; put it back before the rest.
     table = rows(itertools.chain([first], stream), delimiter, source, first_line)
-    _, top = next(table)
+    _, fields = next(table)
+    top = checked_header(fields, first_line, source)
     header, body = _header(top, table, first_line, decimal, source, options)
     chosen = _choose(header, source, options)
     wanted = list(dict.fromkeys(column for column, _ in chosen.values()))
@@ -89,9 +91,7 @@ def _choose(header: list[str], source: Source, options: Options) -> dict[str, tu
             if not header[column].strip():
                 continue
             ours = options.axis if is_axis_name(name, options.axis) and options.axis not in chosen else name
-            while ours in chosen:
-                ours += "'"
-            chosen[ours] = (column, unit)
+            chosen[ours if ours not in chosen else f"{ours} (column {column + 1})"] = (column, unit)
     if options.axis not in chosen and options.rate is None:
         hint = "or give its sample rate in Hz, rate=..." if options.axis == "time" else "or another axis="
         raise source.error(
@@ -133,6 +133,8 @@ def _traces(
     axis = options.axis
     n = len(cells.lines)
     runs = _run_of_rows(chosen, cells, source)
+    if len(runs) * len(chosen) > MAX_COLUMNS:
+        raise source.error("", f"holds {len(chosen)} columns in {len(runs)} runs; at most {MAX_COLUMNS} are read")
     if axis in chosen:
         column, unit = chosen[axis]
         held, along = cells.rows[column], cells.values[column]
@@ -183,8 +185,8 @@ def _run_of_rows(
         bad = int(np.flatnonzero(~np.isfinite(values))[0])
         raise source.error(f"line {cells.lines[bad]}", f"the number of the run is {values[bad]}")
     numbers, first = np.unique(values, return_index=True)
-    if len(numbers) > 1024:
-        raise source.error("", f"the column that numbers the runs holds {len(numbers)} numbers; at most 1024 are read")
+    if len(numbers) > MAX_COLUMNS:
+        raise source.error("", f"holds {len(numbers)} runs; at most {MAX_COLUMNS} are read")
     return [(f"Run #{value:.12g}", values == value) for value in numbers[np.argsort(first)]]
 
 

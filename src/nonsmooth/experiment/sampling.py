@@ -81,5 +81,8 @@ def _change_of_rate(steps: NDArray[np.float64]) -> tuple[int, float, float] | No
         if len(rest) >= 2 and bool(rest[:2].all()):
             after = float(np.median(positive[i + 1 : i + 5]))
             if abs(after / reference - 1) > threshold:
-                return int(i) * block, 1.0 / reference, 1.0 / after
+                # The block only says about where; the first of its steps that is nearer to the new one says it.
+                near = steps[int(i) * block : (int(i) + 2) * block]
+                offset = int(np.argmax(np.abs(near - after) < np.abs(near - reference)))
+                return int(i) * block + offset, 1.0 / reference, 1.0 / after
     return None

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import logging
 import math
 from collections.abc import Iterator
 from typing import Any
@@ -14,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.errors import DataFileError
 from nonsmooth.experiment.limits import MAX_COLUMNS
 from nonsmooth.experiment.needed import needed
 from nonsmooth.experiment.reading import Options, Reading, Source, Trace, is_axis_name, scaled_time
@@ -31,23 +33,40 @@ def read(data: bytes, source: Source, options: Options) -> Reading:
     check_layout(data, source)
     reading = Reading()
     try:
-        with nptdms.TdmsFile.open(io.BytesIO(data)) as opened, np.errstate(all="ignore"):
+        with _heard(reading.remarks), np.errstate(all="ignore"), nptdms.TdmsFile.open(io.BytesIO(data)) as opened:
             groups = opened.groups()
             reading.header = {"properties": _plain(opened.properties)}
             if sum(len(group.channels()) for group in groups) > MAX_COLUMNS:
                 raise source.error("", f"holds more than {MAX_COLUMNS} channels")
             found = [(group.name, _plain(group.properties), list(_channels(group, data, source))) for group in groups]
+    except DataFileError:
+        raise
+    # Damaged metadata surfaces as almost any exception of the library.
     except Exception as error:
-        # Damaged metadata surfaces as almost any exception of the library.
-        from nonsmooth.errors import DataFileError
-
-        if isinstance(error, DataFileError):
-            raise
         raise source.error("", f"cannot be read as TDMS, it is damaged or cut short ({_short(error)})") from error
     for name, properties, channels in found:
         reading.run_attrs[name] = {f"property_{key}": value for key, value in properties.items()}
         reading.traces += _traces(name, channels, source, options, reading.remarks)
     return reading
+
+
+@contextlib.contextmanager
+def _heard(remarks: Remarks) -> Iterator[None]:
+    """Make remarks of what the library would print."""
+
+    def note(record: logging.LogRecord) -> bool:
+        remarks.say(f"npTDMS: {record.getMessage()[:200]}")
+        return False
+
+    names = [name for name in logging.root.manager.loggerDict if name.split(".")[0] == "nptdms"]
+    loggers = [logging.getLogger(name) for name in names]
+    for logger in loggers:
+        logger.addFilter(note)
+    try:
+        yield
+    finally:
+        for logger in loggers:
+            logger.removeFilter(note)
 
 
 def _channels(group: Any, data: bytes, source: Source) -> Iterator[tuple[str, dict[str, str], Any]]:

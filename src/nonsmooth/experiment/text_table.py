@@ -18,7 +18,7 @@ from nonsmooth.experiment.limits import MAX_COLUMNS
 from nonsmooth.experiment.reading import Source
 from nonsmooth.experiment.remarks import Remarks
 
-__all__ = ["Cells", "Row", "decoded", "number", "read_cells", "rows", "split_unit"]
+__all__ = ["Cells", "Row", "checked_header", "decoded", "number", "read_cells", "rows", "split_unit"]
 
 #: Line number and fields.
 Row = tuple[int, list[str]]
@@ -73,6 +73,13 @@ def rows(lines: Iterable[str], delimiter: str, source: Source, first_line: int =
             yield begin, fields
 
 
+def checked_header(fields: list[str], line: int, source: Source) -> list[str]:
+    """The names of the columns, stripped; DataFileError if there are absurdly many."""
+    if len(fields) > MAX_COLUMNS:
+        raise source.error(f"line {line}", f"has {len(fields)} columns; at most {MAX_COLUMNS} are read")
+    return [field.strip() for field in fields]
+
+
 def number(field: str, decimal: str) -> float | None:
     """The number in a field, strictly; None if it is none. Underscores and foreign digits are none."""
     text = field.strip()
@@ -121,8 +128,6 @@ def read_cells(
     line end means that the file is cut short.
     """
     n = len(labels)
-    if n > MAX_COLUMNS:
-        raise source.error("", f"has {n} columns; at most {MAX_COLUMNS} are read")
     if decimal is None:
         head = [row for _, row in zip(range(_SNIFFED), table, strict=False)]
         decimal = _decimal_of(head, wanted)

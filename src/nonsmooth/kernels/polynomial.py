@@ -40,7 +40,7 @@ def stack_size(m: int) -> int:
     return (DEPTH + 2) * (m + 4)
 
 
-@inline
+@device
 def load(C, row, sign, m, powers, a):
     """a_k = sign C[row, k] powers[k]: the row on the unit interval; at least degree 4, filled with zeros."""
     for k in range(m + 1):
@@ -50,7 +50,7 @@ def load(C, row, sign, m, powers, a):
     return m if m > 4 else 4
 
 
-@inline
+@device
 def strip(a, m):
     """Divide by the power of x that a polynomial with leading zeros contains: same signs for x > 0, sharper tests.
 
@@ -70,7 +70,7 @@ def strip(a, m):
     return m if m > 4 else 4
 
 
-@inline
+@device
 def bounds(a, m):
     """Certified (lower, upper) bound on [0, 1]: Bernstein coefficients of the first five terms, the rest by size."""
     low, high = 0.0, 0.0
@@ -109,7 +109,7 @@ def row_bounds(C, row, sign, m, powers):
     return a0, low + min(a0, b1, b2, b3, b4), high + max(a0, b1, b2, b3, b4)
 
 
-@inline
+@device
 def dense(a, m, x):
     """a(x) by Horner's rule."""
     v = a[m]

@@ -58,7 +58,8 @@ def march(
     LOG_FULL asks for larger logs and to be called again with the same arrays."""
     times, samples, crossings, touch_log = log
     C, W, J0, J1, K, powers, a, d, vals, u_new, q_new = work[:11]
-    scale, measured, side, side_next, rise, usual, _, stack, found, u_dense, u_before = work[11:]
+    scale, measured, side, side_next, rise, usual, visited, stack, found, u_dense, u_before = work[11:]
+    parts = (C, W, J0, scale, measured, side, usual, vals, u_new, q_new, visited)  # what happens at an instant needs
     n, n_indicators, order, method = u.shape[0], choice[place.N_INDICATORS], choice[place.ORDER], choice[place.METHOD]
     rows, n_modes = n + n_indicators + choice[place.N_OUTPUTS], lacking.shape[0]
     rkf, record, section = method == place.RKF45, choice[place.RECORD] == 1, choice[place.SECTION]
@@ -76,7 +77,7 @@ def march(
         clear(rise)
         clear(usual)
         mode, status = begin(
-            jet, jump, mode, t, u, q, tally[place.SETTLED], choice, norms, log_rtol, rtol, fixed, exact_steps, net, work
+            jet, jump, mode, t, u, q, tally[place.SETTLED], choice, norms, log_rtol, rtol, fixed, exact_steps, net, parts
         )
         tally[place.READY] = 1
         if section >= 0:  # a start on the section is no return, nor is a carried state left there
@@ -291,7 +292,7 @@ def march(
             counters[1] = hit
             mode, status = leap(
                 jet, values, jump, pending, hit, mode, t, clock, u, q, choice, norms, log_rtol, rtol, fixed, period,
-                exact_steps, lacking, net, work, extremes, tally, memo, crossings,
+                exact_steps, lacking, net, parts, extremes, tally, memo, crossings,
             )  # fmt: skip
             if hit >= 0 and usual[mode] <= 0.0:
                 usual[mode] = planned

@@ -28,9 +28,9 @@ def clear(target):
 
 
 @device
-def look(jet, mode, t, u, q, choice, norms, log_rtol, rtol, fixed, exact_steps, work):
+def look(jet, mode, t, u, q, choice, norms, log_rtol, rtol, fixed, exact_steps, parts):
     """Jets and after-limits at a start or after a jump."""
-    C, W, J0, scale, measured, side, usual = work[0], work[1], work[2], work[11], work[12], work[13], work[16]
+    C, W, J0, scale, measured, side, usual = parts[:7]
     n, n_indicators = u.shape[0], choice[place.N_INDICATORS]
     if choice[place.METHOD] == place.RKF45:
         m = 4
@@ -61,14 +61,14 @@ def look(jet, mode, t, u, q, choice, norms, log_rtol, rtol, fixed, exact_steps, 
 
 
 @device
-def begin(jet, jump, mode, t, u, q, settled, choice, norms, log_rtol, rtol, fixed, exact_steps, net, work):
+def begin(jet, jump, mode, t, u, q, settled, choice, norms, log_rtol, rtol, fixed, exact_steps, net, parts):
     """The start rule: (mode, status). Transitions without reset that hold already are taken, each mode at most once."""
     first, outgoing, transitions = net[0], net[1], net[2]
-    side, visited, u_new, q_new = work[13], work[17], work[9], work[10]
+    side, u_new, q_new, visited = parts[5], parts[8], parts[9], parts[10]
     for i in range(visited.shape[0]):
         visited[i] = 0
     visited[mode] = 1
-    look(jet, mode, t, u, q, choice, norms, log_rtol, rtol, fixed, exact_steps, work)
+    look(jet, mode, t, u, q, choice, norms, log_rtol, rtol, fixed, exact_steps, parts)
     while settled == 0:
         k = -1
         for j in range(first[mode], first[mode + 1]):
@@ -86,19 +86,18 @@ def begin(jet, jump, mode, t, u, q, settled, choice, norms, log_rtol, rtol, fixe
         copy(q_new, q)
         mode = transitions[k, 1]
         visited[mode] = 1
-        look(jet, mode, t, u, q, choice, norms, log_rtol, rtol, fixed, exact_steps, work)
+        look(jet, mode, t, u, q, choice, norms, log_rtol, rtol, fixed, exact_steps, parts)
     return mode, OK
 
 
 @device
 def leap(
     jet, values, jump, pending, hit, mode, t, clock, u, q, choice, norms, log_rtol, rtol, fixed, period, exact_steps,
-    lacking, net, work, extremes, tally, memo, crossings,
+    lacking, net, parts, extremes, tally, memo, crossings,
 ):  # fmt: skip
     """Take the transition ``pending`` (its row ``hit`` crossed; -1: none) and those that then hold: (mode, status)."""
     transitions, rows = net[2], net[3]
-    C, J0, vals, measured, side = work[0], work[2], work[8], work[12], work[13]
-    u_new, q_new = work[9], work[10]
+    C, J0, measured, side, vals, u_new, q_new = parts[0], parts[2], parts[4], parts[5], parts[7], parts[8], parts[9]
     n, n_parameters = u.shape[0], choice[place.N_PARAMETERS]
     scale_of_time = max(memo[place.LONGEST], memo[place.SINCE_CROSSING])
     memo[place.LONGEST] = scale_of_time
@@ -129,7 +128,7 @@ def leap(
         if tally[place.WINDOW] == 1:
             tally[place.KEPT_CROSSINGS] += 1
             tally[place.KEPT_CONTACTS] += transitions[pending, 4]
-        look(jet, mode, t, u, q, choice, norms, log_rtol, rtol, fixed, exact_steps, work)
+        look(jet, mode, t, u, q, choice, norms, log_rtol, rtol, fixed, exact_steps, parts)
         if tally[place.WINDOW] == 1:
             all_rows = n + choice[place.N_INDICATORS] + choice[place.N_OUTPUTS]
             extend_at_node(J0 if choice[place.METHOD] == place.RKF45 else C, all_rows, lacking, mode, n, extremes)

@@ -7,7 +7,7 @@ a tenth of rtol times the size of its row, so that the error of a whole run stay
 
 from math import exp, fabs, inf, log
 
-from .cache import inline
+from .cache import device, inline
 
 __all__ = ["dense_states", "end_states", "fill_powers", "step_length"]
 
@@ -71,7 +71,7 @@ def end_states(C, m, n, powers, out):
         out[i] = C[i, 0] + (odd + even)
 
 
-@inline
+@device
 def dense_states(C, m, n, tau, out):
     """States at the local time tau of the step."""
     for i in range(n):

@@ -1,0 +1,89 @@
+"""First use: what an import loads, and how long the first result of a new system takes."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+import uuid
+
+import pytest
+
+HEAVY = ("sympy", "numba", "xarray", "scipy.integrate", "matplotlib")
+
+NEW_SYSTEM = """
+import numpy as np
+import nonsmooth as ns
+
+def field(t, u, p):
+    x, v = u
+    return v, p.F * np.cos(p.w * t) - p.k * np.sin(x) - p.c * v + {number!r} * x**3
+
+system = ns.System(
+    states=["x", "v"],
+    parameters={{"F": 0.4, "w": 1.1, "k": 1.0, "c": 0.2, "d": 0.3, "e": 0.8}},
+    modes={{"swing": field}},
+    indicators={{"wall": lambda t, u, p: u.x - p.d}},
+    transitions=[ns.Transition("swing", "swing", when="wall > 0", reset=lambda t, u, p: (u.x, -p.e * u.v))],
+)
+run = ns.simulate(system, periods=50, samples=501)
+assert run["crossing_time"].size > 10
+"""
+
+COUNT = """
+import sys
+from nonsmooth.kernels.cache import cache_statistics
+modules = [m for name, m in sys.modules.items() if name.startswith("nonsmooth.kernels.")]
+counts = [one for module in modules for one in cache_statistics(module)]
+generated = [one for name, m in sys.modules.items() if name.startswith("nonsmooth_generated_")
+             for one in cache_statistics(m)]
+print(sum(loads for _, loads, _ in counts), sum(compiles for *_, compiles in counts), len(generated))
+"""
+
+
+def run(code: str) -> str:
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip()
+
+
+def best_of_three(code: str) -> float:
+    """The least wall time of three fresh processes that run ``code``, which may hold {number} for a new model each."""
+    times = []
+    for _ in range(3):
+        text = code.format(number=1e-3 * (uuid.uuid4().int % 10**9) / 1e9) if "{number" in code else code
+        began = time.perf_counter()
+        run(text)
+        times.append(time.perf_counter() - began)
+    return min(times)
+
+
+def test_an_import_loads_nothing_heavy() -> None:
+    code = f"import sys, nonsmooth; print([name for name in {HEAVY!r} if name in sys.modules])"
+    assert run(code) == "[]"
+
+
+def test_an_import_costs_less_than_half_a_second_beyond_numpy() -> None:
+    assert best_of_three("import numpy, nonsmooth") - best_of_three("import numpy") < 0.5
+
+
+def test_every_name_of_the_front_door_is_there() -> None:
+    code = "import nonsmooth as ns; print(len([getattr(ns, name) for name in dir(ns)]) == len(ns.__all__))"
+    assert run(code) == "True"
+    with pytest.raises(AssertionError, match="has no attribute 'simulte'; it has: .*simulate"):
+        run("import nonsmooth as ns; ns.simulte")
+
+
+def test_a_new_nonlinear_system_in_a_cold_process_takes_less_than_three_seconds() -> None:
+    run(NEW_SYSTEM.format(number=1e-4))  # the package's own kernels are compiled by now
+    assert best_of_three(NEW_SYSTEM) < 3.0
+
+
+def test_a_second_process_with_a_new_model_compiles_no_kernel() -> None:
+    run(NEW_SYSTEM.format(number=1e-4))
+    loads, compiles, generated = map(
+        int, run(NEW_SYSTEM.format(number=uuid.uuid4().int % 10**9 / 1e12) + COUNT).split()
+    )
+    assert compiles == 0
+    assert loads >= 1
+    assert generated >= 1
