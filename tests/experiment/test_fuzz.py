@@ -27,6 +27,8 @@ from nonsmooth.experiment import Recording
 from nonsmooth.experiment.load import parse_recording
 from nonsmooth.experiment.reading import Options
 
+pytestmark = pytest.mark.filterwarnings("error::RuntimeWarning")
+
 TOTAL = 100_000
 LONGEST = 5.0  # seconds for one file of a few kilobytes
 PEAK = 64 << 20  # bytes allocated while one is read
@@ -136,11 +138,10 @@ SEEDS: dict[str, Callable[[], Seed]] = {
 }
 
 PIECES = [
-    b"", b"\0", b"\0" * 4, b"\xff" * 4, b"\xff" * 8, b"\xff\xff\xff\x7f", b"\0\0\0\x40", b"\x80",
-    b"\xef\xbb\xbf", b"\xff\xfe", b"\n", b"\r", b"\t", b",", b";", b'"', b"'", b" ", b".", b"-", b"/", b"\\", b"(", b")", b"<", b">", b"&a;",
-    b"<!DOCTYPE a>", b"nan", b"inf", b"1e999",
-    b"99999999999", b"0", b"1", b"-1", b"Run #1", b"Time (s) ", b"***End_of_Header***", b"X_Value",
-    b"Samples", b"Channels", b"DataSet", b"TDSm", b"PK\x03\x04",
+    b"", b"\0", b"\0" * 4, b"\xff" * 4, b"\xff" * 8, b"\xff\xff\xff\x7f", b"\0\0\0\x40", b"\x80", b"\xef\xbb\xbf",
+    b"\xff\xfe", b"\n", b"\r", b"\t", b",", b";", b'"', b"'", b" ", b".", b"-", b"/", b"\\", b"(", b")", b"<", b">",
+    b"&a;", b"<!DOCTYPE a>", b"nan", b"inf", b"1e999", b"99999999999", b"0", b"1", b"-1", b"Run #1", b"Time (s) ",
+    b"***End_of_Header***", b"X_Value", b"Samples", b"Channels", b"DataSet", b"TDSm", b"PK\x03\x04",
 ]  # fmt: skip
 MUTATION = st.tuples(
     st.sampled_from(["set", "set", "put", "cut", "double", "end", "swap"]),
@@ -209,7 +210,7 @@ def fuzz(name: str, examples: int, *, deep: bool) -> dict[str, Any]:
         traced = sum(found.values()) % 50 == 0
         if traced:
             tracemalloc.start()
-        begin = time.perf_counter()
+        begin, cpu = time.perf_counter(), time.process_time()
         try:
             result = outcome(data, seed)
             found[result] += 1
@@ -218,7 +219,7 @@ def fuzz(name: str, examples: int, *, deep: bool) -> dict[str, Any]:
             if traced:
                 peak = max(peak, tracemalloc.get_traced_memory()[1])
                 tracemalloc.stop()
-        worst = max(worst, took)
+        worst = max(worst, time.process_time() - cpu)
         assert result in ("read", "refused")
         assert took < LONGEST, f"took {took:.1f} s"
         assert peak < PEAK, f"took {peak / 1e6:.0f} MB"
@@ -242,7 +243,7 @@ def test_very_many_damaged_files(name: str) -> None:
     grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
     print(
         f"\n{name}: {figures.get('read', 0)} read, {figures.get('refused', 0)} refused, slowest "
-        f"{1e3 * figures['worst']:.0f} ms, peak {figures['peak'] / 1e6:.1f} MB, process +{grown:.0f} MB, "
+        f"{1e3 * figures['worst']:.0f} ms of CPU, peak {figures['peak'] / 1e6:.1f} MB, process +{grown:.0f} MB, "
         f"{time.perf_counter() - begin:.0f} s",
         file=sys.stderr,
     )

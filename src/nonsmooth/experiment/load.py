@@ -12,6 +12,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from nonsmooth.errors import DataFileError
 from nonsmooth.experiment.assemble import assemble
 from nonsmooth.experiment.limits import MAX_FILE_BYTES
@@ -108,9 +110,11 @@ def parse_recording(
     kind = format if format is not None else _detect(data, unread, options)
     source = Source(name, len(data), hashlib.sha256(data).hexdigest(), kind)
     read: Callable[[bytes, Source, Options], Reading] = import_module(f"nonsmooth.experiment.{FORMATS[kind]}").read
-    reading = read(data, source, options)
-    _replace_units(reading, source, options)
-    return assemble(reading, source, _given(options), options.axis)
+    # Numbers from elsewhere may lie at both ends of the range of doubles; what is not finite is judged by assemble.
+    with np.errstate(all="ignore"):
+        reading = read(data, source, options)
+        _replace_units(reading, source, options)
+        return assemble(reading, source, _given(options), options.axis)
 
 
 def _checked(

@@ -33,7 +33,7 @@ def read(data: bytes, source: Source, options: Options) -> Reading:
     check_layout(data, source)
     reading = Reading()
     try:
-        with _heard(reading.remarks), np.errstate(all="ignore"), nptdms.TdmsFile.open(io.BytesIO(data)) as opened:
+        with _heard(reading.remarks), nptdms.TdmsFile.open(io.BytesIO(data)) as opened:
             groups = opened.groups()
             reading.header = {"properties": _plain(opened.properties)}
             if sum(len(group.channels()) for group in groups) > MAX_COLUMNS:

@@ -143,7 +143,7 @@ def earliest(mode, C, m, n, powers, net, side, side_next, scale, tail, slack, a,
     for j in range(first[mode], first[mode + 1]):
         k = outgoing[j]
         lo, hi = transitions[k, 2], transitions[k, 3]
-        dead, opened = False, False
+        dead, opened, row = False, 0, lo
         for r in range(lo, hi):
             i, sign = rows[r, 0], rows[r, 1]
             a0, low, high = row_bounds(C, n + i, float(sign), m, powers)
@@ -163,9 +163,11 @@ def earliest(mode, C, m, n, powers, net, side, side_next, scale, tail, slack, a,
             if low - error > 0.0 and sign * side[i] >= 0:
                 side_next[i] = sign
             else:
-                opened = True
-        if dead or not opened:
+                opened, row = opened + 1, r
+        if dead or opened == 0:
             continue
+        if opened == 1:  # the others hold throughout: it fires at the first rise of this one
+            lo, hi = row, row + 1
         x, r = _fires(lo, hi, C, m, n, powers, rows, side, side_next, scale, tail, slack, a, d, stack, found)
         if x < best * (1.0 - 1e-14):
             best, which, hit = x, k, r

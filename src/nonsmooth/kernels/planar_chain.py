@@ -4,8 +4,8 @@ from .cache import inline, kernel
 from .codes import CHATTER, DIVERGED, NO_CONVERGENCE, OK, TOO_MANY_CROSSINGS
 from .planar_extremes import find_twins, finish, include, widen
 from .planar_layout import _INTEGERS, _LINEAR, _MATRIX, _NET, _SCRATCH, _TABLE, _VECTOR, BURST, MOST_CROSSINGS, SHORT
-from .planar_march import bounded, jump, leg, next_holding, set_phase, settle, stride, trigger, wrap_phase
-from .planar_search import dense
+from .planar_march import bounded, jump, leg, next_holding, set_phase, settle, sign_after, stride, trigger, wrap_phase
+from .planar_search import dense, value_of
 from .planar_tables import HARMONICS, M, build
 
 
@@ -45,8 +45,8 @@ def chain(
         vectors[0], vectors[1], vectors[2], vectors[3], vectors[4], vectors[5], vectors[6],
     )  # fmt: skip
     zero = integers[0:n_i]
-    found = integers[n_i : n_i + 2]
-    twin = integers[n_i + 2 : 2 * n_i + 2]
+    found = integers[n_i : n_i + 4]
+    twin = integers[n_i + 4 : 2 * n_i + 4]
     surface, direction, surface_mode, after, every, extremes = plan[0], plan[1], plan[2], plan[3], plan[4], plan[5]
     w[2] = 1.0
     # whole steps at a stride: only where nothing but a crossing can end a step
@@ -57,9 +57,9 @@ def chain(
         for h in range(HARMONICS):
             rates[h] = multiples[h] * omega[i]
         T = period[i]
-        if integers[2 * n_i + 2] != i + 1:
+        if integers[2 * n_i + 4] != i + 1:
             build(i, A, b, c, s_, rates, T, ia, ib, ic, is_, oa, ob, oc, os_, prop, rot, fun, tay, field, info, row)
-            integers[2 * n_i + 2] = i + 1
+            integers[2 * n_i + 4] = i + 1
         find_twins(fun, n_i, twin)
         target = phase * T
         s = 0.0
@@ -86,6 +86,8 @@ def chain(
             o_min[i, k] = 1e300
         set_phase(w, s, rates)
         mode, code = settle(fun, tay, mode, w, transitions, rows, row_start, mode_start, mode_list, zero)
+        if surface >= 0:  # a start on the section is no return
+            found[3] = sign_after(fun, tay, mode, w, surface, zero)
         crossings[i] = 0
         contacts[i] = 0
         elapsed[i] = 0.0
@@ -214,6 +216,15 @@ def chain(
                             section[i, k, 1] = w[1] if after != 0 else before1
                             section_mode[i, k] = mode if after != 0 else before_mode
                             section_time[i, k] = (whole * T if T < 1e300 else 0.0) + s
+            if surface >= 0:
+                if t >= 0:
+                    found[3] = sign_after(fun, tay, mode, w, surface, zero)
+                elif crossed != 0:
+                    found[3] = crossed
+                else:
+                    value = value_of(fun, mode, surface, w)
+                    if value != 0.0:
+                        found[3] = 1 if value > 0.0 else -1
             if surface >= 0 and waited > t_max and code == OK:
                 code = NO_CONVERGENCE
         finish(i, fun, n_i, twin, maximum, minimum, i_max, i_min)

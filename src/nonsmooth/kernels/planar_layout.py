@@ -29,5 +29,5 @@ def scratch(n_modes, n_indicators, n_outputs, n_rows):
         np.zeros((n_modes, NODES + 1, 2, M)), np.zeros((n_modes, NODES + 1, 2 * HARMONICS + 1)),
         np.zeros((n_modes, n_f, 2 * M + 6)), np.zeros((n_modes, n_f, M, DEGREE + 1)), np.zeros((n_modes, 2, M)),
         np.zeros((n_modes, 4)), np.zeros((TERMS + 1, M)), np.zeros((7, M)), np.zeros((n_rows + 3, WIDTH)),
-        np.zeros(4), np.zeros(HARMONICS), np.zeros(2 * n_indicators + 3, dtype=np.int64),
+        np.zeros(4), np.zeros(HARMONICS), np.zeros(2 * n_indicators + 5, dtype=np.int64),
     )  # fmt: skip

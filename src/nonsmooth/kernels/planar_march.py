@@ -218,7 +218,8 @@ def leg(
 
     w1 stands at the end of the whole step (``ready``: it does so already), ``end`` at the leg's end where that is
     shorter (the third number returned tells). Returns (time marched, transition or -1, whole step or not, section
-    direction or 0); ``found[0]`` is the functional that crossed.
+    direction or 0). ``found[0]`` is the functional that crossed, ``found[3]`` the sign of the section's functional
+    when the leg begins.
     """
     if not ready:
         to_node(prop, rot, mode, NODES, w, w1)
@@ -246,8 +247,8 @@ def leg(
         if lo == hi or direction * sense < 0:
             continue
         tau = search(
-            prop, rot, fun, tay, info, mode, n_i, rates, w, w1, rows, lo, hi, zero, best, wn, wp, wq, scr, points,
-            found, there,
+            prop, rot, fun, tay, info, mode, n_i, rates, w, w1, rows, lo, hi, zero, sense * found[3] > 0, best, wn, wp, wq, scr,
+            points, found, there,
         )  # fmt: skip
         if tau >= 0.0 and (tau < best or (fired < 0 and crossed == 0 and tau <= best)):
             best = tau

@@ -68,13 +68,13 @@ def record(
         vectors[0], vectors[1], vectors[2], vectors[3], vectors[4], vectors[5], vectors[6],
     )  # fmt: skip
     zero = integers[0:n_i]
-    found = integers[n_i : n_i + 2]
+    found = integers[n_i : n_i + 4]
     T = period[0]
     for h in range(HARMONICS):
         rates[h] = multiples[h] * omega[0]
-    if integers[2 * n_i + 2] != 1:
+    if integers[2 * n_i + 4] != 1:
         build(0, A, b, c, s_, rates, T, ia, ib, ic, is_, oa, ob, oc, os_, prop, rot, fun, tay, field, info, row)
-        integers[2 * n_i + 2] = 1
+        integers[2 * n_i + 4] = 1
     s = clock[0]
     whole = clock[1]
     mode = counters[0]

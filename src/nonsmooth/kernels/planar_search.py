@@ -178,8 +178,11 @@ def refine(prop, rot, fun, tay, info, mode, n_i, w, f, sign, zero, guess, wn, sc
 
 
 @device
-def finest(prop, rot, tay, info, mode, w, rows, lo, hi, zero, node, wn, scr, points, found):
-    """First instant within one node spacing at which all rows lo..hi are positive, on their polynomials; -1: none."""
+def finest(prop, rot, tay, info, mode, w, rows, lo, hi, zero, node, up, wn, scr, points, found):
+    """First instant within one node spacing at which all rows lo..hi become positive, on their polynomials; -1: none.
+
+    ``up``: they are positive at its start already, so one has to fall first. ``found[2]``: whether all are positive at
+    its end, where none is found."""
     spacing = info[mode, 1]
     to_node(prop, rot, mode, node, w, wn)
     found[1] = -1
@@ -193,12 +196,29 @@ def finest(prop, rot, tay, info, mode, w, rows, lo, hi, zero, node, wn, scr, poi
             scr[row, 0] = 0.0
     tau = 0.0
     current = -1
+    if up:
+        fall = 2.0 * spacing
+        for r in range(lo, hi):
+            row = r - lo
+            for k in range(WIDTH):
+                scr[row, k] = -scr[row, k]
+            first = next_upward(scr, row, 0.0, spacing, points)
+            for k in range(WIDTH):
+                scr[row, k] = -scr[row, k]
+            if first >= 0.0 and first < fall:
+                fall = first
+                current = -2 - r
+        found[2] = 1
+        if current == -1:
+            return -1.0
+        tau = fall
     for _ in range(8 * (hi - lo) + 8):
         moved = False
         for r in range(lo, hi):
             row = r - lo
-            if r == current or horner(scr, row, tau) > 0.0:
+            if current != -2 - r and (r == current or horner(scr, row, tau) > 0.0):
                 continue
+            found[2] = 0
             tau = next_upward(scr, row, tau, spacing, points)
             if tau < 0.0:
                 return -1.0
@@ -213,16 +233,19 @@ def finest(prop, rot, tay, info, mode, w, rows, lo, hi, zero, node, wn, scr, poi
 
 @inline
 def search(
-    prop, rot, fun, tay, info, mode, n_i, rates, w, w1, rows, lo, hi, zero, r_max, wn, wp, wq, scr, points, found, end
+    prop, rot, fun, tay, info, mode, n_i, rates, w, w1, rows, lo, hi, zero, held, r_max, wn, wp, wq, scr, points, found, end
 ):
-    """First instant in [0, r_max] of the step at which all the rows lo..hi are positive; -1: none.
+    """First instant in [0, r_max] of the step at which all the rows lo..hi become positive; -1: none.
 
+    ``held``: they were positive when the step began, so one has to fall first. Not so for transitions: the
+    after-limits saw a condition that did not hold, and one that holds now has become true at the start.
     ``w`` and ``w1`` stand at the ends of the whole step; ``found[0]`` is the functional that crossed last. ``end``
     receives w at the crossing.
     """
     spacing = info[mode, 1]
     size = NODES
     node = 0
+    up = held
     while node < NODES and node * spacing <= r_max:
         last = node + size
         h = size * spacing
@@ -262,9 +285,14 @@ def search(
                 n_open += 1
         if not never:
             if n_open == 0 and n_once == 0:
-                found[0] = rows[lo, 0]
-                dense(prop, rot, tay, info, mode, n_i, rates, w, node * spacing, wn, scr, found, end)
-                return node * spacing
+                if not up:
+                    found[0] = rows[lo, 0]
+                    dense(prop, rot, tay, info, mode, n_i, rates, w, node * spacing, wn, scr, found, end)
+                    return node * spacing
+                node = last
+                while size < NODES // 2 and node % (2 * size) == 0:
+                    size *= 2
+                continue
             if n_open == 0:
                 # every row crosses at most once: all are positive from the last of these crossings on
                 tau = node * spacing + h * cubic_root(a0, r0, a1, r1, h)
@@ -291,11 +319,14 @@ def search(
             if size > 1:
                 size //= 2
                 continue
-            tau = finest(prop, rot, tay, info, mode, w, rows, lo, hi, zero, node, wn, scr, points, found)
+            tau = finest(prop, rot, tay, info, mode, w, rows, lo, hi, zero, node, up, wn, scr, points, found)
             if tau >= 0.0:
                 tau += node * spacing
                 dense(prop, rot, tay, info, mode, n_i, rates, w, tau, wn, scr, found, end)
                 return tau
+            up = found[2] != 0
+        else:
+            up = False
         node = last
         while size < NODES // 2 and node % (2 * size) == 0:
             size *= 2

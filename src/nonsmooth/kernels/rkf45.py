@@ -15,35 +15,63 @@ __all__ = ["first_step", "hermite", "quiet", "stages", "transit"]
 
 @inline
 def stages(field, mode, t, u, q, h, n, K, fifth, absolute, rtol):
-    """One step from u; K = (k1..k6, scratch, result) with k1 given. Returns the error over the tolerance."""
+    """One step from u; K = (k1..k6, scratch, result) with k1 given. Returns the error over the tolerance.
+
+    The loops over the few states are written so that the compiler does not prepare them for many.
+    """
     k1, k2, k3, k4, k5, k6, v, new = K
-    for i in range(n):
-        v[i] = u[i] + h * 0.25 * k1[i]
+    i = 0
+    while True:
+        v[i] = u[i] + h * (0.25 * k1[i])
+        i += 1
+        if i >= n:
+            break
     field(mode, t + 0.25 * h, v, q, k2)
-    for i in range(n):
+    i = 0
+    while True:
         v[i] = u[i] + h * (3.0 / 32.0 * k1[i] + 9.0 / 32.0 * k2[i])
+        i += 1
+        if i >= n:
+            break
     field(mode, t + 0.375 * h, v, q, k3)
-    for i in range(n):
+    i = 0
+    while True:
         v[i] = u[i] + h * (1932.0 / 2197.0 * k1[i] - 7200.0 / 2197.0 * k2[i] + 7296.0 / 2197.0 * k3[i])
+        i += 1
+        if i >= n:
+            break
     field(mode, t + 12.0 / 13.0 * h, v, q, k4)
-    for i in range(n):
+    i = 0
+    while True:
         v[i] = u[i] + h * (439.0 / 216.0 * k1[i] - 8.0 * k2[i] + 3680.0 / 513.0 * k3[i] - 845.0 / 4104.0 * k4[i])
+        i += 1
+        if i >= n:
+            break
     field(mode, t + h, v, q, k5)
-    for i in range(n):
+    i = 0
+    while True:
         v[i] = u[i] + h * (
             -8.0 / 27.0 * k1[i] + 2.0 * k2[i] - 3544.0 / 2565.0 * k3[i] + 1859.0 / 4104.0 * k4[i] - 0.275 * k5[i]
         )
+        i += 1
+        if i >= n:
+            break
     field(mode, t + 0.5 * h, v, q, k6)
-    worst = 0.0
-    for i in range(n):
+    worst, i = 0.0, 0
+    while True:
         error = h * (
             1.0 / 360.0 * k1[i] - 128.0 / 4275.0 * k3[i] - 2197.0 / 75240.0 * k4[i] + 0.02 * k5[i] + 2.0 / 55.0 * k6[i]
         )
-        fourth = u[i] + h * (25.0 / 216.0 * k1[i] + 1408.0 / 2565.0 * k3[i] + 2197.0 / 4104.0 * k4[i] - 0.2 * k5[i])
-        new[i] = fourth + error if fifth else fourth
-        ratio = fabs(error) / (absolute[i] + rtol * max(fabs(u[i]), fabs(new[i])))
+        end = u[i] + h * (25.0 / 216.0 * k1[i] + 1408.0 / 2565.0 * k3[i] + 2197.0 / 4104.0 * k4[i] - 0.2 * k5[i])
+        if fifth:
+            end += error
+        new[i] = end
+        ratio = fabs(error) / (absolute[i] + rtol * max(fabs(u[i]), fabs(end)))
         if not (ratio <= worst):  # also where it is NaN
             worst = ratio
+        i += 1
+        if i >= n:
+            break
     return worst
 
 
@@ -124,8 +152,8 @@ def first_step(J, u, n, absolute, rtol):
 
 
 @inline
-def transit(mode, J, n, net):
-    """Estimated time to the next transition, from the parabolas of its rows (inf: none in sight).
+def transit(mode, J, n, net, h):
+    """Estimated time to the next transition, from the parabolas of its rows (inf: none within h).
 
     A step is not planned far beyond it: the bands of a smoothed system are crossed in one step each."""
     first, outgoing, transitions, rows, _ = net
@@ -138,6 +166,9 @@ def transit(mode, J, n, net):
             g, s, c = sign * J[row, 0], sign * J[row, 1], sign * J[row, 2]
             if g > 0.0:
                 continue
+            if g + h * (max(s, 0.0) + h * max(c, 0.0)) <= 0.0:
+                last = inf
+                break
             at = inf
             if g == 0.0:
                 if s < 0.0 < c:

@@ -12,6 +12,7 @@ from math import fabs, inf
 from math import log as ln
 
 from numba import types
+from numpy import float32
 
 from . import series_places as place
 from .cache import kernel
@@ -134,7 +135,7 @@ def march(
             h = max(1.0, memo[place.SINCE_RETURN])
         planned = h
         if rkf and fixed <= 0.0:
-            h = min(h, 1.1 * transit(mode, J0, n, net))
+            h = min(h, 1.1 * transit(mode, J0, n, net, h))
         landing = h >= remaining * (1.0 - 1e-13)
         if landing:
             h = remaining
@@ -186,7 +187,7 @@ def march(
         if status != OK:
             break
         if rkf:
-            growth = min(5.0, 0.9 * error**-0.2) if error > 0.0 else 5.0
+            growth = min(5.0, 0.9 * float32(error) ** float32(-0.2)) if error > 1e-30 else 5.0
             usual[mode] = growth * h if growth < 1.0 else max(planned, growth * h)
         part = h
         if pending >= 0:
