@@ -13,6 +13,7 @@ import re
 import numpy as np
 
 from nonsmooth.errors import DataFileError
+from nonsmooth.experiment.limits import MAX_COLUMNS
 from nonsmooth.experiment.reading import TIME_WORDS, Options, Reading, Source, Trace, names_of, scaled_time
 from nonsmooth.experiment.remarks import Remarks
 from nonsmooth.experiment.text_table import Cells, checked_header, decoded, read_cells, rows, split_unit
@@ -42,8 +43,10 @@ def looks_like_capstone(data: bytes, options: Options) -> bool:
         header = next(rows(decoded(begin[:end], source, Remarks()), delimiter, source), (1, []))[1]
     except DataFileError:
         return False
-    runs = [match["run"] for match in map(_TIME.fullmatch, header) if match and match["run"]]
-    return any(h.rstrip().endswith(" " + run) and not _TIME.fullmatch(h) for run in runs for h in header)
+    # Stripped first: on much white space at the end the expression would try every way to share it out.
+    names = [text.strip() for text in header[: MAX_COLUMNS + 1]]
+    runs = [match["run"] for match in map(_TIME.fullmatch, names) if match and match["run"]]
+    return any(name.endswith(" " + run) and not _TIME.fullmatch(name) for run in runs for name in names)
 
 
 def read(data: bytes, source: Source, options: Options) -> Reading:

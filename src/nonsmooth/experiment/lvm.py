@@ -185,9 +185,11 @@ def _row(segment: _Segment, line: int, fields: list[str], clocks: str, decimal: 
         segment.more_comments += 1
     if clocks == "One":
         segment.x[0].append(_value(fields[0], "X_Value", line, decimal, source))
-    for k, name in enumerate(segment.names):
+    # A short row costs what it weighs, however many channels the header announces.
+    present = len(fields) // 2 if clocks == "Multi" else len(fields) - 1
+    for k, name in enumerate(segment.names[:present]):
         place = 2 * k + 1 if clocks == "Multi" else k + 1
-        text = fields[place] if place < len(fields) else ""
+        text = fields[place]
         if text and not text.isspace():
             segment.values[k].append(_value(text, name, line, decimal, source))
             segment.rows[k].append(row)

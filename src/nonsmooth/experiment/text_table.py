@@ -135,6 +135,7 @@ def read_cells(
     values = [array("d") for _ in wanted]
     held = [array("q") for _ in wanted]
     lines = array("q")
+    pairs = sorted(enumerate(wanted), key=lambda pair: pair[1])
     short, first_short, last_short = 0, 0, False
     for row, (line, fields) in enumerate(table):
         if len(fields) > n and any(field.strip() for field in fields[n:]):
@@ -143,8 +144,11 @@ def read_cells(
         if last_short:
             short, first_short = short + 1, first_short or line
         lines.append(line)
-        for k, column in enumerate(wanted):
-            field = fields[column] if column < len(fields) else ""
+        for k, column in pairs:
+            # A short row costs what it weighs, however many columns the header announces.
+            if column >= len(fields):
+                break
+            field = fields[column]
             if field and not field.isspace():
                 value = number(field, decimal)
                 if value is None:

@@ -247,7 +247,8 @@ def leg(
         if lo == hi or direction * sense < 0:
             continue
         tau = search(
-            prop, rot, fun, tay, info, mode, n_i, rates, w, w1, rows, lo, hi, zero, sense * found[3] > 0, best, wn, wp, wq, scr,
+            prop, rot, fun, tay, info, mode, n_i, rates, w, w1, rows, lo, hi, zero, sense * found[3] > 0, best,
+            wn, wp, wq, scr,
             points, found, there,
         )  # fmt: skip
         if tau >= 0.0 and (tau < best or (fired < 0 and crossed == 0 and tau <= best)):

@@ -233,8 +233,9 @@ def finest(prop, rot, tay, info, mode, w, rows, lo, hi, zero, node, up, wn, scr,
 
 @inline
 def search(
-    prop, rot, fun, tay, info, mode, n_i, rates, w, w1, rows, lo, hi, zero, held, r_max, wn, wp, wq, scr, points, found, end
-):
+    prop, rot, fun, tay, info, mode, n_i, rates, w, w1, rows, lo, hi, zero, held, r_max, wn, wp, wq, scr, points, found,
+    end,
+):  # fmt: skip
     """First instant in [0, r_max] of the step at which all the rows lo..hi become positive; -1: none.
 
     ``held``: they were positive when the step began, so one has to fall first. Not so for transitions: the

@@ -38,7 +38,7 @@ JUMP = types.FunctionType(types.void(_i, _f, _f1, _f1, _f1, _f1))
 NET = types.Tuple((_i1, _i1, _i2, _i2, _f1))
 WORK = types.Tuple((
     _f2, _f2, _f2, _f2, types.UniTuple(_f1, 8), _f1, _f1, _f1, _f1, _f1, _f1,
-    _f1, _f1, _i1, _i1, _i1, _f1, _i1, _f1, _i1, _f1, _f1,
+    _f1, _f1, _i1, _i1, _i1, _f1, _i1, _f1, _i1, _f1, _f1, _f1,
 ))  # fmt: skip
 NORMS = types.UniTuple(_f1, 3)
 LOG = types.Tuple((_f1, _f2, _f2, _f2))
@@ -59,7 +59,7 @@ def march(
     LOG_FULL asks for larger logs and to be called again with the same arrays."""
     times, samples, crossings, touch_log = log
     C, W, J0, J1, K, powers, a, d, vals, u_new, q_new = work[:11]
-    scale, measured, side, side_next, rise, usual, visited, stack, found, u_dense, u_before = work[11:]
+    scale, measured, side, side_next, rise, usual, visited, stack, found, u_dense, u_before, dwell = work[11:]
     parts = (C, W, J0, scale, measured, side, usual, vals, u_new, q_new, visited)  # what happens at an instant needs
     n, n_indicators, order, method = u.shape[0], choice[place.N_INDICATORS], choice[place.ORDER], choice[place.METHOD]
     rows, n_modes = n + n_indicators + choice[place.N_OUTPUTS], lacking.shape[0]
@@ -77,6 +77,7 @@ def march(
             scale[i], measured[i], side[i] = 0.0, 0.0, 0
         clear(rise)
         clear(usual)
+        clear(dwell)
         mode, status = begin(
             jet, jump, mode, t, u, q, tally[place.SETTLED], choice, norms, log_rtol, rtol, fixed, exact_steps, net, parts
         )
@@ -134,7 +135,7 @@ def march(
         if h == inf and remaining == inf:  # a polynomial solution: any length is right
             h = max(1.0, memo[place.SINCE_RETURN])
         planned = h
-        if rkf and fixed <= 0.0:
+        if rkf and fixed <= 0.0 and dwell[mode] < 2.0 * h:  # a mode that was left soon the last time
             h = min(h, 1.1 * transit(mode, J0, n, net, h))
         landing = h >= remaining * (1.0 - 1e-13)
         if landing:
@@ -187,7 +188,7 @@ def march(
         if status != OK:
             break
         if rkf:
-            growth = min(5.0, 0.9 * float32(error) ** float32(-0.2)) if error > 1e-30 else 5.0
+            growth = min(5.0, 0.85 * float32(error) ** float32(-0.2)) if error > 1e-30 else 5.0
             usual[mode] = growth * h if growth < 1.0 else max(planned, growth * h)
         part = h
         if pending >= 0:
@@ -291,6 +292,7 @@ def march(
             pending = triggered(mode, t, period, net)
         if pending >= 0:
             counters[1] = hit
+            dwell[mode] = memo[place.SINCE_CROSSING]
             mode, status = leap(
                 jet, values, jump, pending, hit, mode, t, clock, u, q, choice, norms, log_rtol, rtol, fixed, period,
                 exact_steps, lacking, net, parts, extremes, tally, memo, crossings,

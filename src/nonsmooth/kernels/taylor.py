@@ -16,7 +16,8 @@ __all__ = ["dense_states", "end_states", "fill_powers", "step_length"]
 def step_length(C, order, n, n_indicators, u, weight, scale, log_rtol):
     """h such that the last two terms are rtol (|u_i| + weight_i), for an indicator rtol times its own scale.
 
-    ``inf`` where the last coefficients vanish (a polynomial solution), NaN where they are not finite.
+    Where both vanish (cos(t^2) has gaps), all coefficients are asked: h = rtol^(1/p) / max_k |c_k|^(1/k); ``inf`` where
+    none is left (a constant), NaN where they are not finite.
     """
     last, before = 0.0, 0.0
     for i in range(n):
@@ -30,12 +31,31 @@ def step_length(C, order, n, n_indicators, u, weight, scale, log_rtol):
             w = 1.0 / scale[i]
             last = max(last, fabs(C[n + i, order]) * w)
             before = max(before, fabs(C[n + i, order - 1]) * w)
+    if last == 0.0 and before == 0.0:
+        return step_over_gaps(C, order, n, n_indicators, u, weight, scale, log_rtol)
     power = inf
     if last > 0.0:
         power = (log_rtol - log(last)) / order
     if before > 0.0 and order > 1:
         power = min(power, (log_rtol - log(before)) / (order - 1))
     return inf if power > 300.0 else exp(power)
+
+
+@device
+def step_over_gaps(C, order, n, n_indicators, u, weight, scale, log_rtol):
+    """A step from the growth of all coefficients: for series whose last terms vanish."""
+    growth = 0.0
+    for i in range(n + n_indicators):
+        w = 0.0
+        if i < n:
+            w = 1.0 / (fabs(u[i]) + weight[i])
+        elif scale[i - n] > 0.0:
+            w = 1.0 / scale[i - n]
+        for k in range(1, order - 1):
+            size = w * fabs(C[i, k])
+            if size > 0.0:
+                growth = max(growth, exp(log(size) / k))
+    return exp(log_rtol / order) / growth if growth > 0.0 else inf
 
 
 @inline
