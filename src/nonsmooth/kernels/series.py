@@ -188,7 +188,7 @@ def march(
         if status != OK:
             break
         if rkf:
-            growth = min(5.0, 0.85 * float32(error) ** float32(-0.2)) if error > 1e-30 else 5.0
+            growth = min(5.0, 0.9 * float32(error) ** float32(-0.2)) if error > 1e-30 else 5.0
             usual[mode] = growth * h if growth < 1.0 else max(planned, growth * h)
         part = h
         if pending >= 0:
