@@ -22,7 +22,13 @@ LEAST = 5e-3  # and this fraction of the amplitude
 
 
 def frequency_response(
-    system: System, values: Any, *, parameter: str = "omega", direction: str | None = "both", **options: Any
+    system: System,
+    values: Any,
+    *,
+    parameter: str = "omega",
+    direction: str | None = "both",
+    progress: bool = True,
+    **options: Any,
 ) -> xr.Dataset:
     r"""Amplitude over the forcing frequency (or another parameter), carried along up and down.
 
@@ -37,6 +43,8 @@ def frequency_response(
         ``"omega"`` where not given.
     direction : {"up", "down", "both", None}
         See :func:`nonsmooth.sweep`.
+    progress : bool
+        A bar on a terminal.
     **options
         All other options of :func:`nonsmooth.sweep`.
 
@@ -61,7 +69,7 @@ def frequency_response(
 
         known = {name: item.unit for name, item in system.parameters.items()}
         raise ValueError(unknown(parameter, "a parameter", repr(system.name), known) + "; choose one with parameter=")
-    swept = sweep(system, parameter, values, direction=direction, **options)
+    swept = sweep(system, parameter, values, direction=direction, progress=progress, **options)
     full = [("direction", 1), ("start", 1), (parameter, swept.sizes[parameter]), ("state", swept.sizes["state"])]
     half = 0.5 * (swept["maximum"] - swept["minimum"])
     expanded = half.expand_dims([dim for dim, _ in full if dim not in half.dims]).transpose(*[dim for dim, _ in full])

@@ -31,7 +31,7 @@ def _run(options: argparse.Namespace) -> int:
     result = load(options.file)
     print(summary(result))
     if options.text:
-        print(read_provenance(result)["system"]["text"])
+        print(read_provenance(result).get("system", {}).get("text", "(not made from a system)"))
     return 0
 
 
@@ -40,13 +40,16 @@ def summary(result: xr.Dataset) -> str:
     from nonsmooth.results.provenance import read_provenance
 
     record = read_provenance(result)
-    system = record["system"]
-    lines = [
-        f"{record['verb']} of {system['name']!r} (nonsmooth {record['version']}, method {record['method']})",
-        "parameters  " + ", ".join(f"{name} = {_number(value)}" for name, value in system["parameters"].items()),
-        "options     " + ", ".join(f"{name} = {_short(value)}" for name, value in record["options"].items()),
-        "dims        " + ", ".join(f"{name} {size}" for name, size in result.sizes.items()),
-    ]
+    if "system" in record:
+        system = record["system"]
+        lines = [
+            f"{record['verb']} of {system['name']!r} (nonsmooth {record['version']}, method {record['method']})",
+            "parameters  " + ", ".join(f"{name} = {_number(value)}" for name, value in system["parameters"].items()),
+            "options     " + ", ".join(f"{name} = {_short(value)}" for name, value in record["options"].items()),
+        ]
+    else:  # a recording: made from a file, not from a system
+        lines = [f"{name:<12}{_short(value)}" for name, value in record.items()]
+    lines.append("dims        " + ", ".join(f"{name} {size}" for name, size in result.sizes.items()))
     for name, array in result.data_vars.items():
         dims = ", ".join(map(str, array.dims))
         unit = array.attrs.get("units", "")
