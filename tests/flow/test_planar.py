@@ -283,3 +283,11 @@ def test_touches_of_a_damped_free_motion(method: str) -> None:
     assert np.max(np.abs(run["touch_time"] - t)) < 1e-7
     assert np.max(np.abs(run["touch_clearance"] - (g - np.exp(-a * t)))) < 1e-12
     assert np.max(np.abs(run["touch_u"].sel(state="x") - np.exp(-a * t))) < 1e-12
+
+
+def test_an_impact_that_meets_the_end_of_a_step_every_period_is_no_chatter():
+    """With the forcing as fast as the mode five steps make one period; a settled impact may lie on a step's end."""
+    run = ns.simulate(ns.models.impact_oscillator(A=0.12), periods=300)
+    gaps = np.diff(run["crossing_time"].values[-40:])
+    assert len(gaps) == 39
+    assert gaps == pytest.approx(2.0 * np.pi, abs=1e-8)  # one impact in each period of the forcing (omega = 1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 from typing import Any
 
 __all__ = ["add"]
@@ -27,5 +28,6 @@ def _run(options: argparse.Namespace) -> int:
     width = max(map(len, models.names()))
     for name in models.names():
         summary = (getattr(models, name).__doc__ or "").strip().partition("\n")[0]
+        summary = re.sub(r":math:`([^`]*)`", r"\1", summary)
         print(f"{name:{width}}  {summary}")
     return 0

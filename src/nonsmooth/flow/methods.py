@@ -58,7 +58,7 @@ def engine_for(
     if not isinstance(method, str) or method not in METHODS:
         raise ValueError(f"method = {method!r} does not exist; allowed: {', '.join(map(repr, METHODS))}")
     if getattr(system, "surfaces", ()):
-        names = ", ".join(repr(surface.indicator) for surface in system.surfaces)
+        names = ", ".join(repr(system.indicators[surface.indicator]) for surface in system.surfaces)
         raise SystemDefinitionError(
             f"{system.name!r} has sliding surfaces ({names}); motion along a Surface cannot be simulated yet. "
             "Write the stick or slide mode and its transitions out, or use .smoothed(eta)"

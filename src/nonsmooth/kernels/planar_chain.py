@@ -96,17 +96,21 @@ def chain(
         n_here = 0
         burst = 0
         waited = 0.0
+        since = 1e300  # time since the last crossing
         closed = False
         while code == OK and returns < transient + keep:
             ready = strides and returns < transient
             if ready:
                 counted = returns
+                began, turns = s, whole
                 s, whole, returns = stride(
                     prop, rot, fun, info, mode, rates, w, w1, rows, row_start, mode_start, mode_list, zero,
                     s, whole, target, T, returns, transient,
                 )  # fmt: skip
                 if returns > counted:
                     n_here = 0
+                if s != began or whole != turns:
+                    since = 1e300
             wait, timed = (1e300, -1) if strides else trigger(mode, s, T, mode_start, mode_list, at)
             step, t, full, crossed = leg(
                 prop, rot, fun, tay, info, mode, n_i, rates, w, wait, rows, row_start, mode_start, mode_list,
@@ -154,7 +158,8 @@ def chain(
                 w[1] = section[i, keep - 1, 1]
                 break
             waited += step
-            short = step < SHORT * info[mode, 0]
+            short = since + step < SHORT * info[mode, 0]
+            since = 0.0 if t >= 0 else since + step
             for j in range(M):
                 w[j] = w1[j] if full else end[j]
             s = s1

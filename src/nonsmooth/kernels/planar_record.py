@@ -91,6 +91,7 @@ def record(
     n_c = progress[1]
     n_t = progress[2]
     base = whole * T + s if T < 1e300 else s
+    since = 1e300  # time since the last crossing
     while code == OK and base < until:
         if n_c + 64 > crossing_time.shape[0] or n_t + 64 > touch_time.shape[0]:
             code = LOG_FULL
@@ -115,7 +116,8 @@ def record(
             step, base, prop, rot, fun, tay, info, mode, n_i, w, rows, row_start, mode_start, mode_list,
             wn, points, scr, touch_time, touch_indicator, touch_u, touch_gap, n_t,
         )  # fmt: skip
-        short = step < SHORT * info[mode, 0]
+        short = since + step < SHORT * info[mode, 0]
+        since = 0.0 if t >= 0 else since + step
         for j in range(M):
             w[j] = w1[j] if full else end[j]
         s += step

@@ -8,7 +8,7 @@ The places in ``choice``, ``control``, ``tally`` and ``memo`` have names in ``se
 ``crossing``, ``work`` (scratch) in ``flow.series_tables``.
 """
 
-from math import fabs, inf
+from math import fabs, inf, sqrt
 from math import log as ln
 
 from numba import types
@@ -60,7 +60,7 @@ def march(
     times, samples, crossings, touch_log = log
     C, W, J0, J1, K, powers, a, d, vals, u_new, q_new = work[:11]
     scale, measured, side, side_next, rise, usual, visited, stack, found, u_dense, u_before, dwell = work[11:]
-    parts = (C, W, J0, scale, measured, side, usual, vals, u_new, q_new, visited)  # what happens at an instant needs
+    parts = (C, W, J0, scale, measured, side, usual, vals, u_new, q_new, visited)  # for what happens at an instant
     n, n_indicators, order, method = u.shape[0], choice[place.N_INDICATORS], choice[place.ORDER], choice[place.METHOD]
     rows, n_modes = n + n_indicators + choice[place.N_OUTPUTS], lacking.shape[0]
     rkf, record, section = method == place.RKF45, choice[place.RECORD] == 1, choice[place.SECTION]
@@ -70,6 +70,9 @@ def march(
     phase, until, t_max = control[place.PHASE], control[place.UNTIL], control[place.T_MAX]
     log_rtol, tail, forced = ln(max(0.1 * rtol, 1e-16)), (1.0 if method == place.TAYLOR else 0.0), period < inf
     mode, t, status, zero_row, take = counters[0], clock[0], OK, -1, False
+    timed = False
+    for k in range(net[4].shape[0]):
+        timed = timed or net[4][k] >= 0.0
 
     if tally[place.BEGUN] == 0:
         tally[place.BEGUN] = 1
@@ -79,7 +82,21 @@ def march(
         clear(usual)
         clear(dwell)
         mode, status = begin(
-            jet, jump, mode, t, u, q, tally[place.SETTLED], choice, norms, log_rtol, rtol, fixed, exact_steps, net, parts
+            jet,
+            jump,
+            mode,
+            t,
+            u,
+            q,
+            tally[place.SETTLED],
+            choice,
+            norms,
+            log_rtol,
+            rtol,
+            fixed,
+            exact_steps,
+            net,
+            parts,
         )
         tally[place.READY] = 1
         if section >= 0:  # a start on the section is no return, nor is a carried state left there
@@ -114,7 +131,9 @@ def march(
 
         # --- the length of the step
         base = clock[1] * period if forced else 0.0
-        stop = next_stop(mode, t, base, period, phase, until, net)
+        # Returns of the transient are only counted, so no step needs to end there.
+        through = phase >= 0.0 and not timed and tally[place.RETURNS] + 1 < choice[place.TRANSIENT]
+        stop = inf if through else next_stop(mode, t, base, period, phase, until, net)
         remaining = stop - t
         h = planned_length(
             mode, method, J, u, n, n_indicators, order, fixed, usual, exact_steps, choice[place.NONLINEAR_ROWS], norms,
@@ -132,7 +151,9 @@ def march(
                 status = NO_CONVERGENCE
                 break
             h = min(h, t_max - waited)
-        if h == inf and remaining == inf:  # a polynomial solution: any length is right
+        if through:
+            h = min(h, period)
+        elif h == inf and remaining == inf:  # a polynomial solution: any length is right
             h = max(1.0, memo[place.SINCE_RETURN])
         planned = h
         if rkf and fixed <= 0.0 and dwell[mode] < 2.0 * h:  # a mode that was left soon the last time
@@ -152,7 +173,7 @@ def march(
                     k1[i] = J0[i, 1]
                 error = stages(field, mode, t, u, q, h, n, K, fixed <= 0.0, norms[1], rtol)
                 if fixed <= 0.0 and not (error <= 1.0):
-                    h *= max(0.2, 0.9 * error**-0.2) if error < inf else 0.1
+                    h *= max(0.2, 0.9 * error**-0.1) if error < inf else 0.1
                     planned, landing = h, False
                     if not (h > 1e-16 * t):
                         status = DIVERGED
@@ -161,7 +182,7 @@ def march(
                 jet(mode, 2, t + h, K[7], q, J1, W)
             for i in range(n_indicators):
                 side_next[i] = 0
-            slack = rtol * error if rkf and fixed <= 0.0 else 0.0
+            slack = rtol if rkf and fixed <= 0.0 else 0.0
             if rkf:
                 calm = choice[place.LOCATE] == 0 or quiet(
                     mode, J0, J1, n, h, net, side, side_next, scale, slack, section, choice[place.SECTION_MODE]
@@ -169,6 +190,7 @@ def march(
                 if calm and not watched:
                     break
                 hermite(J0, J1, rows, h, C)
+                slack *= sqrt(error)
             fill_powers(h, degree, powers)
             if calm or choice[place.LOCATE] == 0:
                 break
@@ -188,7 +210,7 @@ def march(
         if status != OK:
             break
         if rkf:
-            growth = min(5.0, 0.9 * float32(error) ** float32(-0.2)) if error > 1e-30 else 5.0
+            growth = min(5.0, 0.9 * float32(error) ** float32(-0.1)) if error > 1e-30 else 5.0
             usual[mode] = growth * h if growth < 1.0 else max(planned, growth * h)
         part = h
         if pending >= 0:
@@ -253,7 +275,17 @@ def march(
         if edge:
             sides_at(C, degree, n, n_indicators, 1.0 if watched else part / h, powers, scale, a, side)
         landing = landing and not cut
-        t = stop if landing else t + part
+        if through:
+            passed = t < phase <= t + part
+            t += part
+            if t >= period:
+                clock[1] += 1.0
+                t -= period
+                passed = passed or phase <= t
+            if passed:
+                count_pass(choice, tally, memo, clock, t, period, mode, u, sections, extremes)
+        else:
+            t = stop if landing else t + part
         memo[place.SINCE_RETURN] += part
         memo[place.SINCE_CROSSING] += part
         tally[place.STEPS] += 1
@@ -271,10 +303,10 @@ def march(
                 for i in range(n_indicators):
                     side[i] = side_next[i]
             if rkf:
-                for i in range(rows):
+                for i in range(rows if watched or landing else n + n_indicators):
                     J0[i, 0], J0[i, 1], J0[i, 2] = J1[i, 0], J1[i, 1], J1[i, 2]
                 for i in range(n_indicators):
-                    scale[i] = max(scale[i], fabs(J0[n + i, 0]))
+                    scale[i] = max(scale[i], fabs(J1[n + i, 0]))
                 ready = True
             if choice[place.LOCATE] == 0:
                 if not ready:

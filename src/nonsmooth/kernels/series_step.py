@@ -73,7 +73,7 @@ def polished(values, mode, t, q, C, m, n, row, h, tau, u_dense, vals):
         if not (fabs(at - move - tau) <= 1e-3 * h and 0.0 <= at - move <= h):
             break
         at -= move
-        if fabs(move) <= 4e-16 * h:
+        if fabs(move) <= 1e-8 * h:  # the next move would be its square
             break
     return at
 
