@@ -416,7 +416,8 @@ def test_ctrl_c_in_a_long_sweep(direction: str, tmp_path: Path) -> None:
     )
     # tells when the work has begun, so that the signal does not meet the imports
     code = (
-        "import sys, nonsmooth.analysis.sweep as s\n"
+        "import signal, sys, nonsmooth.analysis.sweep as s\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # a job in the background inherits "ignore"
         "run = s._run\n"
         "def told(*a):\n    print('running', flush=True)\n    return run(*a)\n"
         "s._run = told\n"

@@ -21,6 +21,7 @@ def test_nothing_heavy_is_loaded(module: str) -> None:
 def test_ctrl_c_in_a_process_gives_130_and_one_line() -> None:
     code = (
         "import sys, signal, os\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # a job in the background inherits "ignore"
         "from nonsmooth import models\n"
         "models.names = lambda: os.kill(os.getpid(), signal.SIGINT)\n"
         "from nonsmooth.cli.main import main\n"

@@ -169,7 +169,7 @@ def test_a_bang_bang_force_switched_at_phases(method: str) -> None:
     for k, instant in enumerate(times):
         z, t = centre + (z - centre) * np.exp(-1j * (instant - t)), instant
         found = run["u_before"].values[k]
-        assert abs(complex(*found) - z) < 1e-12
+        assert abs(complex(*found) - z) < (5e-12 if method == "rkf45" else 1e-12)
         centre = -centre
     assert run["crossing_transition"].values.tolist() == [0, 1] * 20
     sections = ns.poincare(system, n=3, section=ns.Stroboscopic(0.25), start=[0.3, 0.1], method=method)
@@ -281,8 +281,8 @@ def test_touches_of_a_damped_free_motion(method: str) -> None:
     t = t[t < 30.0]
     assert run["crossing_time"].size == 0
     assert np.max(np.abs(run["touch_time"] - t)) < 1e-7
-    assert np.max(np.abs(run["touch_clearance"] - (g - np.exp(-a * t)))) < 1e-12
-    assert np.max(np.abs(run["touch_u"].sel(state="x") - np.exp(-a * t))) < 1e-12
+    assert np.max(np.abs(run["touch_clearance"] - (g - np.exp(-a * t)))) < (5e-12 if method == "rkf45" else 1e-12)
+    assert np.max(np.abs(run["touch_u"].sel(state="x") - np.exp(-a * t))) < (5e-12 if method == "rkf45" else 1e-12)
 
 
 def test_an_impact_that_meets_the_end_of_a_step_every_period_is_no_chatter():

@@ -89,8 +89,26 @@ class SeriesEngine:
         return np.array(self.traced.lacking, dtype=np.int64).reshape(len(self.traced.mode_names), -1)
 
     @cached_property
-    def smooth(self) -> Any:
-        return np.array(self.model.smooth_outputs, dtype=np.int64)
+    def repeats(self) -> dict[int, int]:
+        """Rows (indicators, outputs) that are a state and nothing else: row -> state. Their extremes are its."""
+        traced = self.traced
+        outputs = [row[0] if len(set(row)) == 1 else None for row in traced.outputs]
+        found = {}
+        for row, expression in enumerate([*traced.indicators, *outputs], start=len(traced.u)):
+            if expression in traced.u:
+                state = traced.u.index(expression)
+                if not self.lacking[:, state].any():
+                    found[row] = state
+        return found
+
+    @cached_property
+    def kinds(self) -> Any:
+        """Per row of the jets: 1 it has a polynomial, 0 an output with a corner, -1 it repeats a state."""
+        traced = self.traced
+        kinds = np.ones(len(traced.u) + len(traced.indicators) + len(traced.outputs), dtype=np.int64)
+        kinds[len(traced.u) + len(traced.indicators) :] = self.model.smooth_outputs
+        kinds[list(self.repeats)] = -1
+        return kinds
 
     @cached_property
     def norms(self) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -146,6 +164,8 @@ class SeriesEngine:
             status = self._march(tables, i, choice, control, carried, q, scratch, sections, extremes, tally, memo, log)
             out.status[i] = status
             if status in (codes.OK, codes.NOT_GUARANTEED):
+                for row, original in self.repeats.items():
+                    extremes[:, row] = extremes[:, original]
                 out.section[i], out.section_time[i], out.section_mode[i] = sections[:, :n], *sections[:, n:].T
                 for high, low, part in (
                     (out.maximum, out.minimum, slice(0, n)),
@@ -250,7 +270,7 @@ class SeriesEngine:
 
         model = self.model
         status: int = march(
-            model.field, model.jet, model.values, model.jump, self.net, self.lacking, self.smooth, choice, control,
+            model.field, model.jet, model.values, model.jump, self.net, self.lacking, self.kinds, choice, control,
             self.norms, tables.steps[i], state.u, q, state.clock, state.counters, scratch.arrays, sections, extremes,
             tally, memo, log,
         )  # fmt: skip

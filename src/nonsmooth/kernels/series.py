@@ -51,7 +51,7 @@ _SIGNATURE = types.int64(
 
 @kernel(_SIGNATURE)
 def march(
-    field, jet, values, jump, net, lacking, smooth, choice, control, norms, exact_steps, u, q, clock, counters, work,
+    field, jet, values, jump, net, lacking, kinds, choice, control, norms, exact_steps, u, q, clock, counters, work,
     sections, extremes, tally, memo, log,
 ):  # fmt: skip
     """Run one trajectory until its section returns are counted, or its time is reached. Returns a status.
@@ -256,11 +256,9 @@ def march(
                     touch_log, tally[place.TOUCHES],
                 )  # fmt: skip
             else:
-                extend(C, degree, rows, powers, lacking, mode, n, smooth, extremes, a, stack)
+                extend(C, degree, rows, powers, lacking, mode, n, kinds, extremes, a, stack)
                 if choice[place.CORNERS] == 1:
-                    extend_corners(
-                        values, mode, t, part, C, degree, n, n_indicators, q, smooth, extremes, u_dense, vals
-                    )
+                    extend_corners(values, mode, t, part, C, degree, n, q, kinds, extremes, u_dense, vals)
         slope_before, value_before = 0.0, 0.0
         if pending >= 0 and section >= 0:
             value_before, slope_before = at_end(C, degree, n + section, part)

@@ -4,7 +4,7 @@ from math import inf
 
 from .cache import device
 from .crossing import NOISE
-from .polynomial import DOWN, NONE, dense, first_crossing, largest, load, shift, strip
+from .polynomial import DOWN, NONE, dense, first_crossing, largest, load, row_bounds, shift, strip
 from .taylor import dense_states
 
 __all__ = ["extend", "extend_at_node", "extend_corners", "forget", "sample", "touches", "write_sample"]
@@ -32,30 +32,30 @@ def extend_at_node(values, rows, lacking, mode, n, extremes):
 
 
 @device
-def extend(C, m, rows, powers, lacking, mode, n, smooth, extremes, a, stack):
-    """Take in the true extremes of all rows over the step; rows that cannot exceed the old ones cost a bound."""
-    n_smooth = rows - smooth.shape[0]
+def extend(C, m, rows, powers, lacking, mode, n, kinds, extremes, a, stack):
+    """Take in the true extremes of all rows over the step; rows that cannot exceed the old ones cost a bound.
+
+    ``kinds``: 1 a row with a polynomial, 0 an output with a corner, -1 a row that repeats a state."""
     for i in range(rows):
-        if (i < n and lacking[mode, i] == 1) or (i >= n_smooth and smooth[i - n_smooth] == 0):
+        if kinds[i] != 1 or (i < n and lacking[mode, i] == 1):
             continue
-        mr = load(C, i, 1.0, m, powers, a)
-        extremes[0, i] = largest(a, mr, extremes[0, i], stack)
-        for k in range(mr + 1):
-            a[k] = -a[k]
-        extremes[1, i] = -largest(a, mr, -extremes[1, i], stack)
+        _, low, high = row_bounds(C, i, 1.0, m, powers)
+        if high > extremes[0, i]:
+            extremes[0, i] = largest(a, load(C, i, 1.0, m, powers, a), extremes[0, i], stack)
+        if low < extremes[1, i]:
+            extremes[1, i] = -largest(a, load(C, i, -1.0, m, powers, a), -extremes[1, i], stack)
 
 
 @device
-def extend_corners(values, mode, t, h, C, m, n, n_indicators, q, smooth, extremes, u, out):
+def extend_corners(values, mode, t, h, C, m, n, q, kinds, extremes, u, out):
     """Outputs with a corner have no polynomial: sampled four times on the step."""
     for j in range(1, 5):
         dense_states(C, m, n, 0.25 * j * h, u)
         values(mode, t + 0.25 * j * h, u, q, out)
-        for i in range(smooth.shape[0]):
-            if smooth[i] == 0:
-                row, v = n + n_indicators + i, out[n_indicators + i]
-                extremes[0, row] = max(extremes[0, row], v)
-                extremes[1, row] = min(extremes[1, row], v)
+        for row in range(n, kinds.shape[0]):
+            if kinds[row] == 0:
+                extremes[0, row] = max(extremes[0, row], out[row - n])
+                extremes[1, row] = min(extremes[1, row], out[row - n])
 
 
 @device
