@@ -39,18 +39,18 @@ def replay(run: xr.Dataset, p: dict[str, float], tolerance: float) -> None:
 
     scale = np.array([1e-3, 1e-2])
     ends = [*run["crossing_time"].values, float(run["time"][-1])]
-    befores = np.concatenate([run["u_before"].values, run["u"].values[-1:]])
+    earlier = np.concatenate([run["u_before"].values, run["u"].values[-1:]])
     t0, u0, mode = float(run["time"][0]), run["u"].values[0], int(run["mode"][0])
     for k, t1 in enumerate(ends):
         if t1 > t0:
             times, states = flows[mode].along(t0, u0, t1, 1000)
-            assert np.max(np.abs(states[-1] - befores[k]) / scale) < tolerance, (k, t0, t1)
+            assert np.max(np.abs(states[-1] - earlier[k]) / scale) < tolerance, (k, t0, t1)
             within = (times > t0 + 1e-9) & (times < t1 - 1e-9)
             inside = (h_a(states) > 0) & (h_b(states) < 0)
             assert (inside[within] if mode == 1 else ~inside[within]).all(), (k, t0, t1, mode)
         if k < len(run["crossing_time"]):
             mode = 1 - mode
-            t0, u0 = t1, befores[k]
+            t0, u0 = t1, earlier[k]
             assert min(abs(h_a(u0)), abs(h_b(u0))) < 1e-13
 
 
