@@ -251,6 +251,16 @@ def test_stroboscopic_section_at_any_phase(method: str, phase: float) -> None:
 
 
 @pytest.mark.parametrize("method", TIGHT)
+@pytest.mark.parametrize("phase", [0.0, 0.3])
+def test_returns_of_the_transient_are_counted_like_those_kept(method: str, phase: float) -> None:
+    """In the transient no step ends at the section; the returns that follow are the same."""
+    whole = chain(forced(), [0.3], SectionPlan(phase=phase), keep=9, method=method)
+    last = chain(forced(), [0.3], SectionPlan(phase=phase), keep=2, transient=7, method=method)
+    np.testing.assert_allclose(last.section_time[0], whole.section_time[0, 7:], rtol=1e-14)
+    np.testing.assert_allclose(last.section[0], whole.section[0, 7:], atol=1e-11)
+
+
+@pytest.mark.parametrize("method", TIGHT)
 @pytest.mark.parametrize(
     ("rising", "every", "times"), [(1, 1, [2, 4, 6]), (-1, 1, [1, 3, 5]), (0, 1, [1, 2, 3]), (1, 2, [4, 8, 12])]
 )
@@ -261,7 +271,9 @@ def test_poincare_section_of_a_rotation(method: str, rising: int, every: int, ti
     assert out.status[0] == codes.OK
     np.testing.assert_allclose(out.section_time[0], np.pi * np.array(times), rtol=1e-12)
     np.testing.assert_allclose(out.section[0, :, 1], 0.0, atol=1e-11)
-    np.testing.assert_allclose(out.output_max[0], [1.0, 1.0], rtol=1e-3)
+    np.testing.assert_allclose(out.maximum[0], 1.0, rtol=1e-11)
+    np.testing.assert_allclose(out.indicator_min[0], -1.0, rtol=1e-11)
+    np.testing.assert_allclose(out.output_max[0], [1.0, 1.0], rtol=1e-3)  # one of them has a corner and is sampled
 
 
 def test_a_section_may_be_bound_to_a_mode() -> None:

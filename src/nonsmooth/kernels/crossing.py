@@ -174,14 +174,9 @@ def earliest(mode, C, m, n, powers, net, side, side_next, scale, tail, slack, a,
     return best, which, hit
 
 
-@inline
+@device
 def section_crossing(C, row, m, way, before, cursor, powers, scale, a, stack, found):
     """The next x > cursor (fraction of the step) where a row changes sign in the direction ``way``, or NONE."""
-    if cursor == 0.0:
-        a0, low, high = row_bounds(C, row, 1.0, m, powers)
-        if (low > 0.0 and before >= 0) or (high < 0.0 and before <= 0):
-            found[1] = 1 if low > 0.0 else -1
-            return NONE
     mr = load(C, row, 1.0, m, powers, a)
     if cursor > 0.0:
         shift(a, mr, cursor, 1.0 - cursor, a)

@@ -73,27 +73,28 @@ def strip(a, m):
 @device
 def bounds(a, m):
     """Certified (lower, upper) bound on [0, 1]: Bernstein coefficients of the first five terms, the rest by size."""
-    low, high = 0.0, 0.0
+    rest = 0.0
     for k in range(5, m + 1):
-        if a[k] > 0.0:
-            high += a[k]
-        else:
-            low += a[k]
+        rest += fabs(a[k])
     b1 = a[0] + 0.25 * a[1]
     b2 = a[0] + 0.5 * a[1] + a[2] / 6.0
     b3 = a[0] + 0.75 * a[1] + 0.5 * a[2] + 0.25 * a[3]
     b4 = a[0] + a[1] + a[2] + a[3] + a[4]
-    return low + min(a[0], b1, b2, b3, b4), high + max(a[0], b1, b2, b3, b4)
+    return min(a[0], b1, b2, b3, b4) - rest, max(a[0], b1, b2, b3, b4) + rest
 
 
 @inline
 def row_bounds(C, row, sign, m, powers):
     """``load`` and ``bounds`` in one pass that stores nothing. Returns (a_0, lower, upper)."""
-    low, high = 0.0, 0.0
-    for k in range(5, m + 1):
-        a = sign * C[row, k] * powers[k]
-        low += min(a, 0.0)
-        high += max(a, 0.0)
+    even, odd = 0.0, 0.0
+    k = 5
+    while k < m:
+        odd += fabs(C[row, k]) * powers[k]
+        even += fabs(C[row, k + 1]) * powers[k + 1]
+        k += 2
+    if k == m:
+        odd += fabs(C[row, k]) * powers[k]
+    rest = odd + even
     a0 = sign * C[row, 0]
     a1, a2, a3, a4 = sign * C[row, 1] * powers[1], 0.0, 0.0, 0.0
     if m >= 4:
@@ -106,7 +107,7 @@ def row_bounds(C, row, sign, m, powers):
     b2 = a0 + 0.5 * a1 + a2 / 6.0
     b3 = a0 + 0.75 * a1 + 0.5 * a2 + 0.25 * a3
     b4 = a0 + a1 + a2 + a3 + a4
-    return a0, low + min(a0, b1, b2, b3, b4), high + max(a0, b1, b2, b3, b4)
+    return a0, min(a0, b1, b2, b3, b4) - rest, max(a0, b1, b2, b3, b4) + rest
 
 
 @device
@@ -184,6 +185,8 @@ def _extremum(a, m, lo, hi, way):
 
     Its place is wrong by 1e-9 at most, its value by the square of that."""
     x = 0.5 * (lo + hi)
+    if lo == 0.0 and hi == 1.0 and a[1] != a[1] + 2.0 * a[2]:
+        x = min(max(-a[1] / (2.0 * a[2]), 0.0), 1.0)
     for _ in range(100):
         d, dd = m * a[m], 0.0
         for k in range(m - 1, 0, -1):
@@ -220,6 +223,11 @@ def _turns(b, base, m):
     return turns, first
 
 
+@inline
+def _sign(v):
+    return 1 if v > 0.0 else -1
+
+
 @device
 def first_crossing(a, m, way, before, error, stack, found):
     """The first x in [0, 1] where a changes sign in the direction ``way`` (1 up, -1 down, 0 either), or NONE.
@@ -229,6 +237,18 @@ def first_crossing(a, m, way, before, error, stack, found):
     found, at x = 0. ``found[0]`` becomes 1 where a graze is nearer to zero than ``error``; ``found[1]`` is the sign
     at the end of what was searched.
     """
+    end, bend = a[0] + a[1], 0.0
+    for k in range(2, m + 1):
+        end += a[k]
+        bend += k * fabs(a[k])
+    if fabs(a[1]) > bend:  # monotone: most crossings
+        first = _sign(a[0]) if a[0] != 0.0 else _sign(a[1])
+        last = _sign(end) if end != 0.0 else first
+        if before != 0 and first != before and (way == 0 or first == way):
+            found[1] = first
+            return 0.0
+        found[1] = last
+        return _zero(a, m, 0.0, 1.0, float(last)) if last != first and (way == 0 or last == way) else NONE
     bernstein(a, m, stack)
     stride = m + 3
     stack[m + 1], stack[m + 2] = 0.0, 1.0
@@ -299,6 +319,17 @@ def largest(a, m, current, stack):
     for k in range(m, -1, -1):
         end += a[k]
     current = max(current, a[0], end)
+    slope, bend, twist = 2.0 * a[2], 2.0 * fabs(a[2]), 0.0
+    for k in range(3, m + 1):
+        slope += k * a[k]
+        bend += k * fabs(a[k])
+        twist += k * (k - 1) * fabs(a[k])
+    if fabs(a[1]) >= bend:  # monotone
+        return current
+    if 2.0 * a[2] + twist < 0.0:  # concave: one maximum, inside where the slope changes its sign
+        if a[1] > 0.0 and a[1] + slope < 0.0:
+            current = max(current, dense(a, m, _extremum(a, m, 0.0, 1.0, 1.0)))
+        return current
     if bounds(a, m)[1] <= current:
         return current
     bernstein(a, m, stack)

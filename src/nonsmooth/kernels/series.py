@@ -17,10 +17,10 @@ from numpy import float32
 from . import series_places as place
 from .cache import kernel
 from .codes import DIVERGED, LOG_FULL, NO_CONVERGENCE, NOT_GUARANTEED, OK
-from .crossing import NOISE, earliest, section_crossing, sides_at
-from .polynomial import NONE
+from .crossing import NOISE, earliest, sides_at
+from .polynomial import NONE, row_bounds
 from .rkf45 import hermite, quiet, stages, transit
-from .series_node import begin, clear, count_pass, leap, meets_section, next_is_edge, open_window
+from .series_node import begin, clear, copy, count_pass, leap, meets_section, open_window, passes
 from .series_step import at_end, failed, judged_at_end, next_stop, planned_length, polished, triggered
 from .taylor import dense_states, end_states, fill_powers
 from .watch import extend, extend_at_node, extend_corners, sample, touches, write_sample
@@ -82,22 +82,9 @@ def march(
         clear(usual)
         clear(dwell)
         mode, status = begin(
-            jet,
-            jump,
-            mode,
-            t,
-            u,
-            q,
-            tally[place.SETTLED],
-            choice,
-            norms,
-            log_rtol,
-            rtol,
-            fixed,
-            exact_steps,
-            net,
+            jet, jump, mode, t, u, q, tally[place.SETTLED], choice, norms, log_rtol, rtol, fixed, exact_steps, net,
             parts,
-        )
+        )  # fmt: skip
         tally[place.READY] = 1
         if section >= 0:  # a start on the section is no return, nor is a carried state left there
             if fabs(J[n + section, 0]) <= 1e-9 * scale[section]:
@@ -221,31 +208,22 @@ def march(
         # --- passes of a Poincare section before that
         edge = False
         if section >= 0 and not calm and (choice[place.SECTION_MODE] < 0 or choice[place.SECTION_MODE] == mode):
-            cursor, limit, before = 0.0, part / h, side[section]
-            while cursor < 1.0:
-                x = section_crossing(
-                    C, n + section, degree, choice[place.RISING], before, cursor, powers, scale[section], a, stack,
-                    found,
+            _, low, high = row_bounds(C, n + section, 1.0, degree, powers)
+            if (low > 0.0 and side[section] >= 0) or (high < 0.0 and side[section] <= 0):
+                side_next[section] = 1 if low > 0.0 else -1
+            else:
+                tau = passes(
+                    values, mode, t, h, part, pending, clock, period, C, degree, n, q, rkf, choice, side, side_next,
+                    powers, scale, a, stack, found, u_dense, vals, sections, extremes, tally, memo,
                 )  # fmt: skip
-                side_next[section] = found[1]
-                if x == NONE or (pending >= 0 and x >= limit * (1.0 - 1e-10)):
-                    break
-                tau = x * h
-                if rkf:
-                    tau = polished(values, mode, t, q, C, degree, n, section, h, tau, u_dense, vals)
-                if next_is_edge(choice, tally):
+                if tau >= 0.0:
                     edge, pending, part = True, -1, tau
-                    break
-                dense_states(C, degree, n, tau, u_dense)
-                count_pass(choice, tally, memo, clock, t + tau, period, mode, u_dense, sections, extremes)
-                if memo[place.SINCE_RETURN] == 0.0:
-                    memo[place.SINCE_RETURN] = -tau
-                cursor, before = x, 0
 
         # --- what is observed on the step, then its end
         cut = edge or pending >= 0
         if watched:
-            fill_powers(part, degree, powers)
+            if part != h:
+                fill_powers(part, degree, powers)
             if record:
                 tally[place.SAMPLES] = sample(
                     times, tally[place.SAMPLES], base, t, part, C, degree, n, q, choice[place.N_PARAMETERS], mode,
@@ -297,22 +275,20 @@ def march(
         ready = False
         arrived = landing and record and stop == until - base
         if not cut:
-            if choice[place.LOCATE] == 1:
-                for i in range(n_indicators):
-                    side[i] = side_next[i]
             if rkf:
                 for i in range(rows if watched or landing else n + n_indicators):
                     J0[i, 0], J0[i, 1], J0[i, 2] = J1[i, 0], J1[i, 1], J1[i, 2]
-                for i in range(n_indicators):
-                    scale[i] = max(scale[i], fabs(J1[n + i, 0]))
                 ready = True
-            if choice[place.LOCATE] == 0:
+            if choice[place.LOCATE] == 1:
+                for i in range(n_indicators):
+                    side[i] = side_next[i]
+                    if rkf:
+                        scale[i] = max(scale[i], fabs(J1[n + i, 0]))
+            else:
                 if not ready:
                     jet(mode, order, t, u, q, C, W)
                     ready = True
                 pending = judged_at_end(mode, J, n, n_indicators, net, side, side_next)
-        for i in range(n):
-            u_before[i] = u[i]
         if landing and stop == period:
             clock[1] += 1.0
             t = 0.0
@@ -321,6 +297,7 @@ def march(
         if landing and pending < 0:
             pending = triggered(mode, t, period, net)
         if pending >= 0:
+            copy(u, u_before)
             counters[1] = hit
             dwell[mode] = memo[place.SINCE_CROSSING]
             mode, status = leap(

@@ -5,12 +5,14 @@ from math import fabs, inf
 from . import series_places as place
 from .cache import device
 from .codes import BEYOND_STOP, CHATTER, OK, TOO_MANY_CROSSINGS
-from .crossing import holding, holds, snap
+from .crossing import holding, holds, section_crossing, snap
+from .polynomial import NONE
 from .rkf45 import first_step
-from .taylor import step_length
+from .series_step import polished
+from .taylor import dense_states, step_length
 from .watch import extend_at_node, forget
 
-__all__ = ["begin", "clear", "copy", "count_pass", "leap", "look", "meets_section", "next_is_edge", "open_window"]
+__all__ = ["begin", "clear", "copy", "count_pass", "leap", "look", "meets_section", "open_window", "passes"]
 
 
 @device
@@ -176,6 +178,36 @@ def count_pass(choice, tally, memo, clock, t, period, mode, u, sections, extreme
         open_window(tally, memo, clock, t, extremes)
         return 1
     return 0
+
+
+@device
+def passes(
+    values, mode, t, h, part, pending, clock, period, C, m, n, q, interpolated, choice, side, side_next, powers, scale,
+    a, stack, found, u, vals, sections, extremes, tally, memo,
+):  # fmt: skip
+    """Count the passes of a Poincare section on the step, up to its part where a transition is ``pending``.
+
+    Returns the local time of the pass that opens or closes the kept window (the step ends there), else -1."""
+    section = choice[place.SECTION]
+    cursor, before = 0.0, side[section]
+    while cursor < 1.0:
+        x = section_crossing(
+            C, n + section, m, choice[place.RISING], before, cursor, powers, scale[section], a, stack, found
+        )
+        side_next[section] = found[1]
+        if x == NONE or (pending >= 0 and x * h >= part * (1.0 - 1e-10)):
+            break
+        tau = x * h
+        if interpolated:
+            tau = polished(values, mode, t, q, C, m, n, section, h, tau, u, vals)
+        if next_is_edge(choice, tally):
+            return tau
+        dense_states(C, m, n, tau, u)
+        count_pass(choice, tally, memo, clock, t + tau, period, mode, u, sections, extremes)
+        if memo[place.SINCE_RETURN] == 0.0:
+            memo[place.SINCE_RETURN] = -tau
+        cursor, before = x, 0
+    return -1.0
 
 
 @device

@@ -2,7 +2,7 @@
 
 from math import inf
 
-from .cache import device
+from .cache import device, inline
 from .crossing import NOISE
 from .polynomial import DOWN, NONE, dense, first_crossing, largest, load, row_bounds, shift, strip
 from .taylor import dense_states
@@ -31,7 +31,7 @@ def extend_at_node(values, rows, lacking, mode, n, extremes):
             extremes[1, i] = v
 
 
-@device
+@inline
 def extend(C, m, rows, powers, lacking, mode, n, kinds, extremes, a, stack):
     """Take in the true extremes of all rows over the step; rows that cannot exceed the old ones cost a bound.
 
