@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -54,7 +54,7 @@ def with_ramps(system: System, ramps: Mapping[str, Any], t_begin: float, t_end: 
         if name not in traced.parameter_names:
             raise ValueError(unknown(name, "a parameter", repr(system.name), traced.parameter_names))
         symbol = traced.p[traced.parameter_names.index(name)]
-        if isinstance(ramp, Callable):  # type: ignore[arg-type]
+        if callable(ramp):
             changes[symbol] = call_scalar(ramp, (Scalar(traced.t),), f"the ramp of {name!r}")
             refuse_corners(changes[symbol], {traced.t}, f"the ramp of {name!r}")
         else:
