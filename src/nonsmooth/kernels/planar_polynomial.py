@@ -154,13 +154,13 @@ def cubic_root(g0, s0, g1, s1, h):
         x = g0 / (g0 - g1)
     else:
         q0, q1, q2, q3 = c1, c2, c3, 0.0
-    for _ in range(4):
+    for _ in range(3):  # Halley's method
         value = q0 + x * (q1 + x * (q2 + x * q3))
         slope = q1 + x * (2.0 * q2 + 3.0 * x * q3)
         if slope <= 0.0:
             break
-        change = value / slope
+        change = value * slope / (slope * slope - value * (q2 + 3.0 * x * q3))
         x = min(max(x - change, 0.0), 1.0)
-        if fabs(change) < 1e-2:
+        if fabs(change) < 0.1:
             break
     return x

@@ -141,7 +141,7 @@ def dense(prop, rot, tay, info, mode, n_i, rates, w, tau, wn, scr, found, out):
 def refine(prop, rot, fun, tay, info, mode, n_i, w, f, sign, zero, guess, wn, scr, found):
     """The upward root of a functional near a good guess, on its polynomial beside the nearest node; -1: not found.
 
-    One step of Halley's method (third order), then Newton's."""
+    Halley's method: of third order, so that two steps mostly do."""
     spacing = info[mode, 1]
     tau = guess
     result = -1.0
@@ -152,20 +152,19 @@ def refine(prop, rot, fun, tay, info, mode, n_i, w, f, sign, zero, guess, wn, sc
         if node == 0 and zero != 0:
             scr[2, 0] = 0.0
         local = tau - node * spacing
-        value = horner(scr, 2, local)
-        slope = slope_at(scr, 2, local)
-        half = 0.5 * curvature_at(scr, 2, local)
-        local -= value * slope / (slope * slope - value * half)
         good = True
+        slope = 1.0
         for _k in range(10):
             good = fabs(local) <= 0.75 * spacing
             if not good:
                 break
             value = horner(scr, 2, local)
             slope = slope_at(scr, 2, local)
-            change = value / slope
+            half = 0.5 * curvature_at(scr, 2, local)
+            change = value * slope / (slope * slope - value * half)
             local -= change
-            if fabs(change) <= 1e-8 * spacing and fabs(change * half) <= 1e-8 * fabs(slope):
+            # the next change would be the cube of this one, over the square of the time scale
+            if fabs(change) <= 1e-4 * spacing and fabs(change * half) <= 4e-6 * fabs(slope):
                 break
         tau = node * spacing + local
         if good:

@@ -34,6 +34,7 @@ _ARGUMENTS = {
     "values": "mode, t, u, q, out",
     "jump": "transition, t, u, q, u_new, q_new",
 }
+_INLINED = {"cos": "cosine", "sin": "sine"}
 
 
 @dataclass(frozen=True)
@@ -112,7 +113,7 @@ def model_source(traced: Traced) -> str:
     smooth = tuple(all(jet.smooth[n_indicators + i] for jet in jets) for i in range(len(traced.outputs)))
     parts = [
         "from nonsmooth.kernels.cache import kernel",
-        f"from math import {', '.join(sorted(functions))}" if functions else "",
+        *_imports(functions),
         f"N_SCRATCH = {max([1, *(jet.n_scratch for jet in jets)])}",
         f"SMOOTH_OUTPUTS = {smooth!r}",
     ]
@@ -122,6 +123,14 @@ def model_source(traced: Traced) -> str:
     copies += [f"for i in range({n_constants}):", "    q_new[i] = q[i]"]
     parts += [_function(name, bodies[name], constants, copies if name == "jump" else []) for name in SIGNATURES]
     return "\n".join(part for part in parts if part) + "\n"
+
+
+def _imports(functions: set[str]) -> list[str]:
+    """Where the functions of ``math`` come from: cos and sin are inlined."""
+    plain = sorted(functions - _INLINED.keys())
+    inlined = [f"{_INLINED[f]} as {f}" for f in sorted(functions & _INLINED.keys())]
+    lines = [f"from math import {', '.join(plain)}"] if plain else []
+    return lines + ([f"from nonsmooth.kernels.circular import {', '.join(inlined)}"] if inlined else [])
 
 
 def _function(name: str, branches: list[list[str]], constants: list[str], always: list[str]) -> str:
