@@ -3,11 +3,19 @@
 Parameters are given by name: ``discontinuous_support(omega=3.69, g=-0.0045)``.
 """
 
+from typing import Any
+
 from nonsmooth.models.discontinuous_support import discontinuous_support
 from nonsmooth.models.impact_oscillator import impact_oscillator
 from nonsmooth.models.relief_valve import relief_valve
 
 __all__ = ["discontinuous_support", "impact_oscillator", "names", "relief_valve"]
+
+
+def __getattr__(name: str) -> Any:
+    from nonsmooth.system.names import unknown
+
+    raise AttributeError(unknown(name, "a model", "nonsmooth.models", names()))
 
 
 def names() -> tuple[str, ...]:

@@ -22,7 +22,7 @@ RESERVED = frozenset(
         # variables of results
         "section", "maximum", "minimum", "amplitude", "residual", "period", "period_number", "crossings_per_period",
         "contacts_per_period", "clearance", "signature", "stable", "label", "kind", "transition",
-        "floquet_multipliers",
+        "floquet_multipliers", "start_state", "state_unit", "state_symbol",
         # arguments of the user's functions
         "u", "t", "p",
     ]
@@ -40,6 +40,7 @@ def check_names(groups: Mapping[str, Iterable[str]], system: str) -> None:
         Name of the system, for the message.
     """
     seen: dict[str, str] = {}
+    extremes = {f"{o}_{which}": o for o in groups.get("output", ()) for which in ("maximum", "minimum")}
     for what, names in groups.items():
         for name in names:
             if not isinstance(name, str):
@@ -54,6 +55,11 @@ def check_names(groups: Mapping[str, Iterable[str]], system: str) -> None:
                 raise SystemDefinitionError(
                     f"{system!r}: {name!r} cannot name a {what}: the results use this name themselves; "
                     f"try {name}_ or {what}_{name}. Reserved: {', '.join(sorted(RESERVED))}"
+                )
+            if name in extremes:
+                raise SystemDefinitionError(
+                    f"{system!r}: {name!r} cannot name a {what}: a sweep gives this name to an extreme of the output "
+                    f"{extremes[name]!r}; try {name}_ or {what}_{name}"
                 )
             if name in seen:
                 raise SystemDefinitionError(
