@@ -164,10 +164,23 @@ def test_reading_text_loads_neither_scipy_nor_the_optional_libraries() -> None:
 
 
 def test_only_so_many_warnings_are_shown(tmp_path: Path) -> None:
-    header = ",".join(f"Time (s) r{k},x (m) r{k}" for k in range(30))
+    header = ",".join(f"Time (s) r{k},x_{chr(97 + k % 26)}{chr(97 + k // 26)} (m) r{k}" for k in range(30))
     (tmp_path / "x.csv").write_text(header + "\n" + "0,1," * 29 + "0,1\n")
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         recording = ns.load_recording(tmp_path / "x.csv")
     assert len(caught) == 21 and "10 more; see Recording.warnings" in str(caught[-1].message)
     assert len(recording.warnings) == 30
+
+
+def test_what_holds_for_many_runs_is_said_once() -> None:
+    from nonsmooth.experiment.remarks import Remarks
+
+    remarks = Remarks()
+    for i in range(30):
+        remarks.of(f"Run #{i}", "Turn", f"{100 + i} blank fields dropped")
+    remarks.of("Run #2", "Angle", "5 blank fields dropped")
+    assert remarks.sentences() == (
+        "run 'Run #0', channel 'Turn': 100 blank fields dropped (and likewise 29 more runs, to 'Run #29')",
+        "run 'Run #2', channel 'Angle': 5 blank fields dropped",
+    )

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import re
+
 __all__ = ["Remarks"]
 
 _NAMED = 4  # channels named in one remark
+_ALIKE = 3  # more runs than this of which the same is to be said, but for numbers, share one sentence
 
 
 class Remarks:
@@ -22,8 +25,18 @@ class Remarks:
         self._channels.setdefault((run, sentence), []).append(channel)
 
     def sentences(self) -> tuple[str, ...]:
-        """All of them; channels of one run of which the same is to be said stand together."""
-        return tuple(_sentence(run, channels, text) for (run, text), channels in self._channels.items())
+        """All of them; channels of one run of which the same is to be said stand together, and so do many runs."""
+        alike: dict[tuple[str, ...], list[tuple[str, list[str], str]]] = {}
+        for (run, text), channels in self._channels.items():
+            kind = (re.sub(r"\d+", "#", text), *channels) if run else (run, text)
+            alike.setdefault(kind, []).append((run, channels, text))
+        said: list[str] = []
+        for group in alike.values():
+            if len(group) <= _ALIKE:
+                said += [_sentence(*one) for one in group]
+            else:
+                said.append(f"{_sentence(*group[0])} (and likewise {len(group) - 1} more runs, to {group[-1][0]!r})")
+        return tuple(said)
 
 
 def _sentence(run: str, channels: list[str], text: str) -> str:
