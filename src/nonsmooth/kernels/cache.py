@@ -39,6 +39,8 @@ __all__ = ["cache_folder", "cache_statistics", "device", "inline", "kernel", "lo
 
 # Kernels allocate nothing (scratch is an argument), so they need no reference counts: "_nrt" off saves a third.
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}, "_nrt": False}
+# What only kernels call needs no way in from Python.
+_INNER: dict[str, Any] = {**_OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 _UNUSED_DAYS = 90.0
 _lock = threading.Lock()
 
@@ -252,7 +254,7 @@ def device(function: Callable[..., Any]) -> Any:
 
     It has no signature and no cache entry of its own, and costs nothing when its callers are loaded from disk.
     """
-    return numba.njit(**_OPTIONS)(function)
+    return numba.njit(**_INNER)(function)
 
 
 def inline(function: Callable[..., Any]) -> Any:
@@ -261,7 +263,7 @@ def inline(function: Callable[..., Any]) -> Any:
     An array argument is seven machine words and a reference count; a call that passes ten arrays costs more than
     the dozen multiplications behind it. Every call site grows the caller and its compile time, so use it sparingly.
     """
-    return numba.njit(**_OPTIONS, forceinline=True)(function)
+    return numba.njit(**_INNER, forceinline=True)(function)
 
 
 def load_module(source: str, stem: str) -> ModuleType:

@@ -109,11 +109,14 @@ def model_source(traced: Traced) -> str:
     bodies["jet"] = [jet.lines for jet in jets]
     functions = {f for parts in writers.values() for _, used in parts for f in used}
     functions |= {f for jet in jets for f in jet.functions}
+    inlined = sorted({_INLINED[f] for _, used in writers["field"] for f in used & _INLINED.keys()})
+    bodies["field"] = [_inlined(lines) for lines in bodies["field"]]
     n_indicators = len(traced.indicators)
     smooth = tuple(all(jet.smooth[n_indicators + i] for jet in jets) for i in range(len(traced.outputs)))
     parts = [
         "from nonsmooth.kernels.cache import kernel",
-        *_imports(functions),
+        f"from math import {', '.join(sorted(functions))}" if functions else "",
+        f"from nonsmooth.kernels.circular import {', '.join(inlined)}" if inlined else "",
         f"N_SCRATCH = {max([1, *(jet.n_scratch for jet in jets)])}",
         f"SMOOTH_OUTPUTS = {smooth!r}",
     ]
@@ -125,12 +128,10 @@ def model_source(traced: Traced) -> str:
     return "\n".join(part for part in parts if part) + "\n"
 
 
-def _imports(functions: set[str]) -> list[str]:
-    """Where the functions of ``math`` come from: cos and sin are inlined."""
-    plain = sorted(functions - _INLINED.keys())
-    inlined = [f"{_INLINED[f]} as {f}" for f in sorted(functions & _INLINED.keys())]
-    lines = [f"from math import {', '.join(plain)}"] if plain else []
-    return lines + ([f"from nonsmooth.kernels.circular import {', '.join(inlined)}"] if inlined else [])
+def _inlined(lines: list[str]) -> list[str]:
+    """The same code with the cos and sin of ``kernels.circular``: for the field alone, which is called six times a step
+    and would wait for the library; elsewhere they would only lengthen the compile."""
+    return [re.sub(r"\b(cos|sin)\(", lambda found: f"{_INLINED[found[1]]}(", line) for line in lines]
 
 
 def _function(name: str, branches: list[list[str]], constants: list[str], always: list[str]) -> str:
