@@ -48,7 +48,7 @@ def run(code: str) -> str:
 
 
 def best_of_three(code: str) -> float:
-    """The least processor time of three fresh processes that run ``code``, which may hold {number} for a new model each.
+    """The least processor time of three fresh processes that run ``code``; {number} in it makes a new model of each.
 
     One thread works, so on an idle machine it is the wall time; other jobs lengthen it little.
     """

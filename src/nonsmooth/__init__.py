@@ -24,6 +24,9 @@ if TYPE_CHECKING:
     from nonsmooth.flow.sections import Stroboscopic as Stroboscopic
     from nonsmooth.flow.simulate import simulate as simulate
     from nonsmooth.flow.starts import random_starts as random_starts
+    from nonsmooth.identification.chain import identify as identify
+    from nonsmooth.identification.compare.compare import compare as compare
+    from nonsmooth.identification.parameter_set import ParameterSet as ParameterSet
     from nonsmooth.results.store import load as load
     from nonsmooth.results.store import save as save
     from nonsmooth.system.mode import Band as Band
@@ -49,6 +52,9 @@ _WHERE = {
     "frequency_response": "analysis.response",
     "load_recording": "experiment.load",
     "Recording": "experiment.recording",
+    "identify": "identification.chain",
+    "ParameterSet": "identification.parameter_set",
+    "compare": "identification.compare.compare",
     "save": "results.store",
     "load": "results.store",
     "SystemDefinitionError": "errors",

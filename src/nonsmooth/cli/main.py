@@ -6,13 +6,13 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from nonsmooth.cli import models, reproduce, run, show
+from nonsmooth.cli import compare, identify, models, reproduce, rig, run, show
 from nonsmooth.errors import SolveError
 from nonsmooth.results.provenance import package_version
 
 __all__ = ["main"]
 
-_COMMANDS = (run, reproduce, models, show)
+_COMMANDS = (run, identify, compare, reproduce, models, show, rig)
 #: What a user can have caused and mend. Anything else is a fault of the package and keeps its traceback.
 _USER_ERRORS = (ValueError, TypeError, OSError, SolveError)
 

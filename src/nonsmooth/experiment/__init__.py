@@ -3,5 +3,8 @@
 from nonsmooth.experiment.capstone_writers import write_cap, write_capstone_csv
 from nonsmooth.experiment.load import load_recording
 from nonsmooth.experiment.recording import Recording, RecordingWarning
+from nonsmooth.experiment.session import Session, load_session
 
-__all__ = ["Recording", "RecordingWarning", "load_recording", "write_cap", "write_capstone_csv"]
+__all__ = [
+    "Recording", "RecordingWarning", "Session", "load_recording", "load_session", "write_cap", "write_capstone_csv",
+]  # fmt: skip

@@ -1,0 +1,52 @@
+"""``nonsmooth rig``: recordings of a virtual rig, as a lab would have them; all of them labelled synthetic."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+__all__ = ["add"]
+
+
+def add(commands: Any) -> None:
+    """Declare the sub-command."""
+    parser = commands.add_parser(
+        "rig",
+        help="record on a virtual rig",
+        description="Write the recordings of a virtual rig (Savi et al. 2007, Fig. 3) into a session folder, with the "
+        "notebook session.toml. What the rig really is goes to a file beside the folder. Everything is labelled "
+        "synthetic.",
+    )
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="draws the rig and its noise (default 0)")
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="the session folder, made if needed")
+    parser.add_argument(
+        "--figure", type=int, metavar="N",
+        help="what stands behind one of the paper's Figs. 4 to 18, on a rig with the published parameters",
+    )  # fmt: skip
+    parser.add_argument(
+        "--procedures", nargs="+", metavar="NAME",
+        help="which to record: springs, support, impulse, drop, response, voltage, crank, grazing, contact (all of "
+        "these where not given), rise, section",
+    )  # fmt: skip
+    parser.add_argument("--truth", type=Path, metavar="FILE", help="where the truth goes (default: DIR.truth.toml)")
+    parser.add_argument("--quiet", action="store_true", help="no summary")
+    parser.set_defaults(run=_run)
+
+
+def _run(options: argparse.Namespace) -> int:
+    from nonsmooth.experiment.rig import VirtualRig
+    from nonsmooth.experiment.rig.notebook import truth_path
+
+    if options.figure is not None and options.procedures:
+        raise ValueError("give --figure or --procedures, not both: a figure says itself what is to be recorded")
+    if options.figure is None:
+        folder = VirtualRig(options.seed).write_session(options.out, options.procedures, truth=options.truth)
+    else:
+        rig = VirtualRig.published(options.seed)
+        folder = rig.write_figure(options.figure, options.out, truth=options.truth)
+    if not options.quiet:
+        for file in sorted(path.name for path in folder.iterdir() if path.is_file()):
+            print(f"written to {folder / file}")
+        print(f"the truth, not to be shown to who identifies: {truth_path(folder, options.truth)}")
+    return 0

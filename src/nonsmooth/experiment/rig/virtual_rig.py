@@ -1,0 +1,260 @@
+"""``VirtualRig``: the experiment of Savi et al. (2007) on the computer, with more physics than the model has."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType, SimpleNamespace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.experiment.rig import sensors
+from nonsmooth.experiment.rig.truth import FEATURES, NOMINAL_GAP, drawn, published, switched
+from nonsmooth.experiment.session import PROCEDURES
+from nonsmooth.system.names import unknown
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from nonsmooth.experiment.recording import Recording
+    from nonsmooth.system.system import System
+
+__all__ = ["IDENTIFICATION", "VirtualRig"]
+
+#: The procedures of Section 3.1 and those for the gap: what identification needs.
+IDENTIFICATION = (
+    "springs", "support", "impulse", "response", "drop", "voltage", "crank", "grazing", "contact",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class VirtualRig:
+    """A rig whose parameters are known, to try on it what is to be done on a real one. All it records is synthetic.
+
+    Parameters
+    ----------
+    seed : int
+        Draws the truth and all noise. Each run of each procedure has its own stream, so that a record does not
+        depend on which others were made.
+    truth : mapping, optional
+        Values in place of those drawn; names and units are those of ``nonsmooth.experiment.rig.UNITS``.
+    ripple, string, friction, support_relaxation, jitter, noise, quantisation, gain_error : bool
+        Features that can be switched off: the motor's uneven turning, the finite length of the crank's string, dry
+        friction, the time the support takes to come back, the jitter of the clock, the noise of the force sensor,
+        the steps of both sensors, the gain error of the force sensor.
+
+    Attributes
+    ----------
+    truth : mapping of str to float
+        What the rig is, with all features that are off left out. ``g`` is the true gap where the support's screw
+        reads 1.8 mm.
+    """
+
+    seed: int = 0
+    truth: Mapping[str, float] = field(default_factory=dict)
+    ripple: bool = True
+    string: bool = True
+    friction: bool = True
+    support_relaxation: bool = True
+    jitter: bool = True
+    noise: bool = True
+    quantisation: bool = True
+    gain_error: bool = True
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.truth, Mapping):
+            raise TypeError(f"truth must map names to numbers, got {self.truth!r}")
+        if isinstance(self.seed, bool) or not isinstance(self.seed, int) or self.seed < 0:
+            raise ValueError(f"seed = {self.seed!r} must be a whole number, zero or more")
+        on = {}
+        for name in FEATURES:
+            on[name] = getattr(self, name)
+            if not isinstance(on[name], bool):
+                raise TypeError(f"{name} = {on[name]!r}: a feature is on (True) or off (False)")
+        truth = switched(drawn(self.seed), self.truth, on)
+        object.__setattr__(self, "truth", MappingProxyType(truth))
+
+    @classmethod
+    def published(cls, seed: int = 0, **options: Any) -> VirtualRig:
+        """The paper's rig: Table 1 and a gap as read, with the features beside the model at typical values."""
+        return cls(seed, truth={**published(), **options.pop("truth", {})}, **options)
+
+    # The system
+
+    def system(self, *, rising: bool = False) -> System:
+        """The rig as a ``System`` with the truth's parameters; ``rising`` with the crank's length as a slow state."""
+        from nonsmooth.experiment.rig.physics import car
+
+        return car(relaxing=self.support_relaxation, rising=rising).with_parameters(self.parameters(rising=rising))
+
+    def parameters(self, *, rising: bool = False, **settings: float) -> dict[str, float]:
+        """Values of the system's parameters: the truth, and the settings of a run (omega, crank_length, g)."""
+        shared = (
+            "m", "k", "k_s", "c", "c_s", "g", "friction", "creep_velocity", "pretension", "ripple", "ripple_phase",
+        )  # fmt: skip
+        values = {name: self.truth[name] for name in shared}
+        values |= {"curvature": 1.0 / self.truth["string_length"], "omega": 4.5}
+        values |= {"crank_rate": 0.0} if rising else {"crank_length": 0.0}
+        return values | settings
+
+    def named_parameters(self, **settings: float) -> SimpleNamespace:
+        """The same with the values as attributes, as the equations read them."""
+        return SimpleNamespace(**(self.parameters() | settings))
+
+    def true_gap(self, reading: float) -> float:
+        """The gap (m) where the support's screw reads ``reading``: its scale is right, its zero is not known."""
+        return reading + self.truth["g"] - NOMINAL_GAP
+
+    # What the procedures are made with
+
+    def generator(self, procedure: str, run: int) -> np.random.Generator:
+        """The stream of random numbers of one run."""
+        return np.random.default_rng([self.seed, 1, list(PROCEDURES).index(procedure), run])
+
+    def channels(
+        self, rng: np.random.Generator, run: str, time: Any, x: Any, v: Any, *, pulled: Any = None, crossed: Any = None
+    ) -> dict[str, xr.Dataset]:
+        """What the sensors record of a motion; a force sensor that is ``pulled``, a photogate that was ``crossed``."""
+        found = {"Angle": sensors.angle(self, run, time, x, v)}
+        if pulled is not None:
+            reading = sensors.force(self, rng, run, time, pulled)
+            found["Angle"] = found["Angle"].assign(Force=reading["Force"])
+        if crossed is not None:
+            found["Turn"] = sensors.turns(self, crossed)
+        return found
+
+    def recording(
+        self, procedure: str, runs: Sequence[tuple[str, Mapping[str, Any], Mapping[str, Any]]]
+    ) -> Recording:
+        """The runs (name, sensors, settings) as a Recording that says that it is synthetic."""
+        from nonsmooth.experiment.recording import Recording
+
+        record = {
+            "file": "", "format": "virtual rig", "procedure": procedure, "seed": self.seed,
+            "features": [name for name in FEATURES if getattr(self, name)],
+        }  # fmt: skip
+        return Recording.from_runs(
+            {name: dict(channels) for name, channels, _ in runs},
+            synthetic=True,
+            source=record,
+            run_attrs={name: {"procedure": procedure, **stated} for name, _, stated in runs},
+        )
+
+    # Procedures
+
+    def record(self, procedure: str, **options: Any) -> Recording:
+        """Make the recording of a procedure by its name; the options are those of the method of that name."""
+        if procedure not in PROCEDURES:
+            raise ValueError(unknown(procedure, "a procedure", "a virtual rig", PROCEDURES.keys()))
+        made: Recording = getattr(self, procedure)(**options)
+        return made
+
+    def springs(self, **options: Any) -> Recording:
+        """Slow pulls of the car through the force sensor: Fig. 4a. Options: ``reach``, ``n``."""
+        from nonsmooth.experiment.rig.hand import pull_car
+
+        return pull_car(self, **options)
+
+    def support(self, **options: Any) -> Recording:
+        """Slow pushes of the support's spring by the force sensor: Fig. 4b. Options: ``force``, ``n``."""
+        from nonsmooth.experiment.rig.hand import push_support
+
+        return push_support(self, **options)
+
+    def impulse(self, **options: Any) -> Recording:
+        """Taps of the car and its free decays: Fig. 5. Options: ``velocities``, ``duration``."""
+        from nonsmooth.experiment.rig.decays import impulse
+
+        return impulse(self, **options)
+
+    def drop(self, **options: Any) -> Recording:
+        """Free decays of the support with the test mass: Fig. 7. Options: ``n``, ``duration``."""
+        from nonsmooth.experiment.rig.decays import drop
+
+        return drop(self, **options)
+
+    def voltage(self, **options: Any) -> Recording:
+        """Frequency of the motor at several voltages: Fig. 8a. Options: ``voltages``, ``turns``."""
+        from nonsmooth.experiment.rig.motor import voltage
+
+        return voltage(self, **options)
+
+    def crank(self, **options: Any) -> Recording:
+        """Force of the drive on the held car at several crank lengths: Fig. 8b. Options: ``lengths``, ``voltage``."""
+        from nonsmooth.experiment.rig.motor import crank
+
+        return crank(self, **options)
+
+    def response(self, **options: Any) -> Recording:
+        """Frequency steps up and down: Fig. 6 (Figs. 9, 10 with ``gap``). Options: ``crank_lengths``, ``voltages``."""
+        from nonsmooth.experiment.rig.steps import response
+
+        return response(self, **options)
+
+    def grazing(self, **options: Any) -> Recording:
+        """Fine frequency steps through the first contact. Options: ``crank_length``, ``gap``, ``step``."""
+        from nonsmooth.experiment.rig.steps import grazing
+
+        return grazing(self, **options)
+
+    def contact(self, **options: Any) -> Recording:
+        """Records with contact in several regimes. Options: ``regimes``, ``gap``, ``duration``."""
+        from nonsmooth.experiment.rig.steps import contact
+
+        return contact(self, **options)
+
+    def rise(self, **options: Any) -> Recording:
+        """A slow rise of the forcing: Fig. 11. Options: ``crank_length``, ``voltage``, ``gap``, ``duration``."""
+        from nonsmooth.experiment.rig.figures import rise
+
+        return rise(self, **options)
+
+    def section(self, **options: Any) -> Recording:
+        """Long steady records at settings of Figs. 12 to 18. Options: ``figure``, ``periods``."""
+        from nonsmooth.experiment.rig.figures import section
+
+        return section(self, **options)
+
+    def figure(self, number: int, **options: Any) -> dict[str, Recording]:
+        """The recordings behind one of the paper's Figs. 4 to 18, by procedure."""
+        from nonsmooth.experiment.rig.figures import figure
+
+        return figure(self, number, **options)
+
+    def write_session(
+        self, folder: str | os.PathLike[str], procedures: Sequence[str] | None = None, *,
+        truth: str | os.PathLike[str] | None = None,
+    ) -> Path:  # fmt: skip
+        """Record and write a session folder; the truth goes to a file beside it, ``<folder>.truth.toml``.
+
+        Parameters
+        ----------
+        folder : path
+            Made if it is not there; files of the same names are replaced.
+        procedures : sequence of str, optional
+            Default: those that identification needs (``IDENTIFICATION``), without ``rise`` and ``section``.
+        truth : path, optional
+            Where the truth goes; never into the folder.
+
+        Returns
+        -------
+        Path
+            The folder.
+        """
+        names = IDENTIFICATION if procedures is None else tuple(procedures)
+        return self._write(folder, {name: self.record(name) for name in names}, truth, f"virtual rig, seed {self.seed}")
+
+    def write_figure(
+        self, number: int, folder: str | os.PathLike[str], *, truth: str | os.PathLike[str] | None = None
+    ) -> Path:
+        """Record and write what stands behind one of the paper's Figs. 4 to 18; see :meth:`write_session`."""
+        title = f"virtual rig, seed {self.seed}, Fig. {number}"
+        return self._write(folder, self.figure(number), truth, title)
+
+    def _write(self, folder: Any, made: Mapping[str, Recording], truth: Any, title: str) -> Path:
+        from nonsmooth.experiment.rig.notebook import write_session
+
+        return write_session(self, folder, made, truth, title=title)

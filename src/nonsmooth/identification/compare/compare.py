@@ -1,0 +1,307 @@
+"""``compare``: experiment against theory, as numbers and as what the overlays are drawn from."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.flow.arguments import real_number, whole_number
+from nonsmooth.identification.compare.draws import nominal, read_settings
+from nonsmooth.system.names import unknown
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from nonsmooth.identification.parameter_set import ParameterSet
+    from nonsmooth.system.system import System
+
+__all__ = ["compare"]
+
+DRAWS = 60
+NEGLIGIBLE = 1e-4  # relative uncertainties of settings below this ask for no band
+
+
+def compare(
+    measured: xr.Dataset,
+    theory: System | xr.Dataset,
+    *,
+    parameters: ParameterSet | Mapping[str, float] | None = None,
+    settings: Mapping[str, Any] | None = None,
+    noise: Any = None,
+    parameter: str | None = None,
+    values: Any = None,
+    direction: str = "down",
+    start: Any = None,
+    section_phase: float | list[float] = 0.0,
+    grid: int = 128,
+    transient: int = 300,
+    max_period: int = 16,
+    draws: int | None = None,
+    level: float = 0.95,
+    splits: int = 400,
+    seed: int = 0,
+    **options: Any,
+) -> xr.Dataset:
+    r"""Lay a measurement over the theory: what both show, how far apart they are, and how far they may be.
+
+    What is compared follows from what ``measured`` holds:
+
+    - a **motion**: ``u(time, state)`` with ``phase(time)`` in forcing periods (and ``u_error``), as
+      :func:`nonsmooth.identification.compare.measured_motion` makes it from a recording; or its section points alone,
+      ``section(iterate, state)``;
+    - a **response**: ``amplitude`` over ``run`` with the parameter (``omega``) and ``direction`` of each, or a result
+      of ``frequency_response``;
+    - a **diagram**: ``section(<parameter>, iterate, state)`` of steady runs, or ``section(iterate, state)`` with the
+      parameter over ``iterate`` for a slow rise.
+
+    Parameters
+    ----------
+    measured : xarray.Dataset
+    theory : System or xarray.Dataset
+        The model, or a result at hand: of ``simulate``, ``poincare`` or ``sweep`` for a motion, ``frequency_response``
+        for a response, ``sweep`` for a diagram.
+    parameters : ParameterSet or mapping, optional
+        Identified parameters; with a covariance their uncertainty is carried into the prediction.
+    settings : mapping, optional
+        What was set in this run (``omega``, ``rho``, ``g``): numbers, ``(value, standard uncertainty)``, or a function
+        of the other parameters (``lambda p: p["k"] * crank_length``). They win over ``parameters``.
+    noise : mapping or sequence, optional
+        Standard error of a section point in each state; from ``section_error`` or ``u_error`` where not given.
+    parameter : str, optional
+        The parameter of a response (``"omega"`` where not given) or of a diagram.
+    values : array, optional
+        Of the predicted diagram; 201 over the measured range where not given.
+    direction : {"up", "down", "both"}
+        Of the predicted diagram.
+    start : state or list of states, optional
+        Where predictions of a motion begin; rest and four measured section points where not given. Of all motions they
+        lead to the nearest is taken; all period numbers are kept.
+    section_phase : float or list of float
+        Phases of the stroboscopic sections, in forcing periods.
+    grid : int
+        Samples of an orbit per forcing period.
+    transient, max_period
+        See :func:`nonsmooth.sweep`.
+    draws : int, optional
+        Parameter sets drawn for the band: 60 where something is uncertain, else 0 (a frequency known to
+        1e-4 is not).
+    level : float
+        Of the band.
+    splits : int
+        Random halves drawn of each section cloud.
+    seed : int
+        Of all that is drawn at random.
+    **options
+        ``method``, ``rtol``, ``atol``: see :func:`nonsmooth.flow.methods.engine_for`.
+
+    Returns
+    -------
+    xarray.Dataset
+        Attribute ``comparison`` says which. Dims of length one stay where the argument was a sequence.
+
+        *motion*: ``measured_orbit``, ``theory_orbit`` over ``phase`` (or ``measured_phase`` and ``theory_phase`` for
+        motions without a period number), ``measured_scatter``, ``theory_low``, ``theory_median``, ``theory_high``;
+        ``orbit_distance`` (phase known), ``orbit_distance_any_phase``, ``phase_shift``; ``measured_section``,
+        ``theory_section``; ``energy_distance``, ``energy_distance_matched``, ``energy_ratio``,
+        ``measured_halves_median``,
+        ``measured_halves_p95`` (and of the theory), ``block``; ``wasserstein_distance`` for each state and
+        ``wasserstein_distance_joint``; ``measured_period_number``, ``theory_period_number``,
+        ``coexisting_period_number``, ``period_agrees``, ``period_coexists``; ``draw_energy_distance``,
+        ``draw_orbit_distance``, ``draw_period_number``, ``inside_band``, ``band_share``.
+
+        *response*: ``measured_amplitude``, ``theory_at_run``, ``relative_difference`` over ``run``;
+        ``theory_amplitude`` and its band over the parameter and ``direction``; ``measured_jump``, ``theory_jump``,
+        ``jump_difference``, ``jump_tolerance`` over ``jump``; ``inside_band``.
+
+        *diagram*: ``measured_section`` over ``sample``, ``theory_section`` over the parameter; period numbers;
+        ``measured_flip``, ``theory_flip``, ``flip_relative_difference`` over ``flip``.
+
+    Raises
+    ------
+    ValueError, TypeError
+        A measurement that is none of these, states that differ, noise that is not known.
+
+    Notes
+    -----
+    Distances of clouds are in units of the spread of the measured points in each state. The predicted points are given
+    the measured noise (seeded), so that a motion that is predicted exactly is at the distance of the measured cloud's
+    own halves. The energy distance is the root,
+    :math:`\sqrt{2 E|X-Y| - E|X-X'| - E|Y-Y'|}`, as SciPy defines it.
+    """
+    import xarray as xr
+
+    if not isinstance(measured, xr.Dataset):
+        raise TypeError(
+            f"compare takes a Dataset of measured signals, not {type(measured).__name__}; make one from a recording "
+            "with nonsmooth.identification.compare.measured_motion"
+        )
+    from nonsmooth.system.system import System
+
+    if not isinstance(theory, System | xr.Dataset):
+        raise TypeError(f"theory must be a System or a result, not {type(theory).__name__}")
+    is_system = isinstance(theory, System)
+    if not is_system and (parameters is not None or settings):
+        raise ValueError("parameters and settings change a System; this theory is a result that is at hand already")
+    set_ = read_settings(settings, theory) if isinstance(theory, System) else {}
+    if draws is None:
+        uncertain = hasattr(parameters, "covariance") or any(
+            not callable(pair) and pair[1] > NEGLIGIBLE * abs(pair[0]) for pair in set_.values()
+        )
+        draws = DRAWS if is_system and uncertain else 0
+    draws = whole_number(draws, "draws", 0)
+    if not 0 < real_number(level, "level") < 1:
+        raise ValueError(f"level = {level!r} must lie between 0 and 1, as 0.95")
+    kind = _kind(measured, parameter)
+    states = _states(measured, theory)
+    shared: dict[str, Any] = {
+        "parameters": parameters, "settings": set_, "transient": whole_number(transient, "transient", 0),
+        "draws": draws, "level": level, "seed": seed, "options": options,
+    }  # fmt: skip
+    squeeze: tuple[str, ...] = ()
+    if kind == "response":
+        from nonsmooth.identification.compare.response import compare_response
+
+        name = _parameter(parameter or "omega", theory)
+        variables = compare_response(measured, theory, name=name, state=states[0], **shared)
+    elif kind == "diagram":
+        from nonsmooth.identification.compare.diagram import compare_diagram
+
+        name = _parameter(parameter or _swept(measured, theory), theory)
+        if direction not in ("up", "down", "both"):
+            raise ValueError(f"direction = {direction!r}; allowed: 'up', 'down', 'both'")
+        variables = compare_diagram(
+            measured, theory, name=name, noise=_noise(measured, noise, states), direction=direction, values=values,
+            phase=real_number(section_phase, "section_phase"), max_period=max_period, **shared,
+        )  # fmt: skip
+    else:
+        from nonsmooth.identification.compare.motion import compare_motion
+
+        phases = [real_number(phase, "section_phase") for phase in np.atleast_1d(section_phase)]
+        if "u" not in measured and len(phases) > 1:
+            raise ValueError("measured section points are of one phase: give section_phase as one number")
+        squeeze = ("section_phase",) if np.ndim(section_phase) == 0 else ()
+        variables = compare_motion(
+            measured, theory, noise=_noise(measured, noise, states), states=states, start=start, phases=phases,
+            grid=whole_number(grid, "grid", 8), max_period=whole_number(max_period, "max_period", 1),
+            splits=whole_number(splits, "splits", 20), **shared,
+        )  # fmt: skip
+        variables["section_phase"] = (("section_phase",), np.array(phases), {
+            "long_name": "phase of the section", "units": "forcing periods"})  # fmt: skip
+    given = {
+        "settings": {key: "follows from others" if callable(pair) else list(pair) for key, pair in set_.items()},
+        "parameter": parameter, "direction": direction,
+        "section_phase": section_phase, "grid": grid, "transient": transient, "max_period": max_period,
+        "draws": draws, "level": level, "splits": splits, "seed": seed, **options,
+    }  # fmt: skip
+    result = _dataset(variables, measured, theory, parameters, set_, kind, given, seed)
+    return result.squeeze([dim for dim in squeeze if dim in result.dims])
+
+
+def _kind(measured: xr.Dataset, parameter: str | None) -> str:
+    if "amplitude" in measured:
+        return "response"
+    if "u" in measured:
+        if "phase" not in measured:
+            raise ValueError(
+                "a measured motion needs `phase` (of the drive, in forcing periods) over time beside `u`; see "
+                "nonsmooth.identification.compare.measured_motion"
+            )
+        return "motion"
+    if "section" in measured:
+        if parameter is not None or any(dim not in ("iterate", "state") for dim in measured["section"].dims):
+            return "diagram"
+        return "motion"
+    raise ValueError(
+        "nothing here can be compared: a motion holds `u` over time with `phase`, or `section` over iterate; a "
+        f"response `amplitude`; this Dataset holds {', '.join(map(str, measured.data_vars)) or 'nothing'}"
+    )
+
+
+def _states(measured: xr.Dataset, theory: Any) -> list[str]:
+    known = list(theory.states) if hasattr(theory, "states") else [str(s) for s in theory["state"].values]
+    if "state" not in measured.coords:
+        if "amplitude" in measured:
+            return known
+        raise ValueError(f"`state` must name the measured states; the theory has {', '.join(known)}")
+    held = [str(name) for name in np.atleast_1d(measured["state"].values)]
+    if held != known and not ("amplitude" in measured and held[0] in known):
+        raise ValueError(f"the measured states are {', '.join(held)}, those of the theory {', '.join(known)}")
+    return held
+
+
+def _noise(measured: xr.Dataset, noise: Any, states: list[str]) -> np.ndarray:
+    if noise is None:
+        for name in ("section_error", "u_error"):
+            if name in measured:
+                array = measured[name]
+                others = [dim for dim in array.dims if dim != "state"]
+                return np.asarray(array.median(others).values, dtype=float)
+        raise ValueError(
+            f"the standard error of the measured states is not known: give "
+            f"noise={{{', '.join(map(repr, states))}: ...}}, or `u_error` or `section_error` in the measured Dataset"
+        )
+    if isinstance(noise, Mapping):
+        for name in noise:
+            if name not in states:
+                raise ValueError(unknown(name, "a state", "this measurement", states))
+        if missing := [name for name in states if name not in noise]:
+            raise ValueError(f"noise is not given for {', '.join(missing)}")
+        noise = [noise[name] for name in states]
+    values = np.array([real_number(value, "noise") for value in np.atleast_1d(noise)])
+    if values.shape != (len(states),) or not (values > 0).all():
+        raise ValueError(f"noise must be a positive number for each of {', '.join(states)}; got {values.tolist()}")
+    return values
+
+
+def _parameter(name: str, theory: Any) -> str:
+    if hasattr(theory, "parameters") and name not in theory.parameters:
+        units = {key: item.unit for key, item in theory.parameters.items()}
+        raise ValueError(unknown(name, "a parameter", repr(theory.name), units))
+    return name
+
+
+def _swept(measured: xr.Dataset, theory: Any) -> str:
+    others = [str(dim) for dim in measured["section"].dims if dim not in ("iterate", "state")]
+    if len(others) != 1:
+        raise ValueError(f"which parameter the sections lie along is not clear ({others}): give parameter=")
+    return others[0]
+
+
+def _dataset(
+    variables: dict[str, Any], measured: xr.Dataset, theory: Any, parameters: Any, settings: Any, kind: str,
+    given: dict[str, Any], seed: int,
+) -> xr.Dataset:  # fmt: skip
+    import xarray as xr
+
+    from nonsmooth.results.labels import labels_of
+    from nonsmooth.results.provenance import ATTRIBUTE, options_as_data, provenance, read_provenance
+
+    if hasattr(theory, "data_vars"):
+        record = read_provenance(theory) | {"verb": "compare", "options": options_as_data(given), "seed": seed}
+        states = {str(n): str(u) for n, u in zip(theory["state"].values, theory["state_unit"].values, strict=True)}
+    else:
+        system = nominal(theory, parameters, settings)
+        labels = labels_of(system)
+        method = str(given.get("method", "auto"))
+        record = json.loads(provenance(labels, "compare", given, method=method, seed=seed)[ATTRIBUTE])
+        states = {name: quantity.unit for name, quantity in labels.states.items()}
+        for name, quantity in labels.parameters.items():
+            if name not in variables:
+                attributes = {"long_name": name, "units": quantity.unit}
+                variables[name] = ((), float(quantity.value or 0.0), attributes)
+    record["measured"] = {key: str(value) for key, value in measured.attrs.items() if key != ATTRIBUTE}
+    synthetic = str(measured.attrs.get("synthetic", "no"))
+    coords = {
+        "state": ("state", np.array(list(states)), {"long_name": "state"}),
+        "state_unit": ("state", np.array(list(states.values())), {"long_name": "unit"}),
+    }
+    parameter_names = set(getattr(theory, "parameters", ()))
+    named = {key for key, (dims, _, _) in variables.items() if dims == (key,) or (not dims and key in parameter_names)}
+    coords |= {key: variables.pop(key) for key in sorted(named)}
+    data = {key: (dims, np.asarray(values), attrs) for key, (dims, values, attrs) in variables.items()}
+    attrs = {"comparison": kind, "synthetic": synthetic, "title": str(measured.attrs.get("title", ""))}
+    attrs[ATTRIBUTE] = json.dumps(record, ensure_ascii=False, allow_nan=False)
+    return xr.Dataset(data, coords, attrs)

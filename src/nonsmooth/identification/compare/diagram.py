@@ -1,0 +1,168 @@
+"""Measured sections along a parameter against a predicted bifurcation diagram: the overlay, and where it flips."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.analysis.sweep import sweep
+from nonsmooth.flow.sections import Stroboscopic
+from nonsmooth.identification.compare.draws import Settings, draw_systems, drawn_variables, nominal
+from nonsmooth.identification.compare.periods import flips, measured_period, period_numbers
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from nonsmooth.system.system import System
+
+__all__ = ["compare_diagram"]
+
+FloatArray = NDArray[np.float64]
+
+FINE = 201
+KEEP = 64
+
+
+def compare_diagram(
+    measured: xr.Dataset,
+    theory: Any,
+    *,
+    parameters: Any,
+    settings: Settings,
+    name: str,
+    noise: FloatArray,
+    direction: str,
+    values: FloatArray | None,
+    phase: float,
+    transient: int,
+    max_period: int,
+    draws: int,
+    level: float,
+    seed: int,
+    options: dict[str, Any],
+) -> dict[str, Any]:
+    """The variables of the comparison, ``{name: (dims, values, attributes)}``; see :func:`compare` for each."""
+    at, points, numbers = _measured(measured, name, noise, max_period)
+    unit = measured[name].attrs.get("units", "1")
+    grid = np.linspace(at.min(), at.max(), FINE) if values is None else np.asarray(values, dtype=float)
+    is_system = not hasattr(theory, "data_vars")
+
+    def diagram(system: System) -> tuple[FloatArray, NDArray[np.int64]]:
+        common: dict[str, Any] = {"section": Stroboscopic(phase), "transient": transient, "keep": KEEP,
+                                  "max_period": max_period, "progress": False, **options}  # fmt: skip
+        if rules := _following(settings, system, name, grid):
+            return _marched(system, name, grid, rules, direction, common)
+        found = sweep(system, name, grid, direction=direction, **common)
+        sections = found["section"].transpose(..., name, "iterate", "state").values
+        periods = found["period_number"].transpose(..., name).values
+        return sections.reshape(-1, *sections.shape[-3:]), periods.reshape(-1, periods.shape[-1])
+
+    if is_system:
+        sections, periods = diagram(nominal(theory, parameters, settings))
+        words = ["up", "down"] if direction == "both" else [direction]
+    else:
+        grid = np.asarray(theory[name].values, dtype=float)
+        words = np.atleast_1d(theory["direction"].values).astype(str).tolist()
+        whole = theory["section"].transpose(..., name, "iterate", "state").values
+        sections = whole.reshape(-1, *whole.shape[-3:])
+        periods = theory["period_number"].transpose(..., name).values.reshape(-1, len(grid))
+    over = (name, "direction", "iterate", "state")
+    variables: dict[str, Any] = {
+        f"measured_{name}": (("sample",), at, {"long_name": f"measured {name}", "units": unit}),
+        "measured_section": (("sample", "state"), points, {"long_name": "measured section points"}),
+        "measured_period_number": (("sample",), numbers, {"long_name": "measured period number (0: none found)"}),
+        "theory_section": (over, np.moveaxis(sections, 0, 1), {"long_name": "predicted section points"}),
+        "theory_period_number": ((name, "direction"), periods.T, {"long_name": "predicted period number (0: none)"}),
+        name: ((name,), grid, {"long_name": name, "units": unit}),
+        "direction": (("direction",), np.array(words), {"long_name": "direction of the sweep"}),
+    }  # fmt: skip
+    drawn_flips: list[dict[str, float]] = []
+    if is_system and draws:
+        systems, drawn = draw_systems(theory, parameters, settings, draws, seed)
+        lows, highs = [], []
+        for one in systems:
+            cloud, counts = diagram(one)
+            lows.append(cloud[0].min(axis=1))
+            highs.append(cloud[0].max(axis=1))
+            drawn_flips.append(flips(grid, counts[0]))
+        q = (1 - level) / 2
+        for word, stack, at_q in (("low", lows, q), ("high", highs, 1 - q)):
+            variables[f"theory_{word}"] = ((name, "state"), np.nanquantile(np.stack(stack), at_q, axis=0), {
+                "long_name": f"{word} edge of the section points for drawn parameters"})  # fmt: skip
+        variables |= drawn_variables(drawn, theory)
+    return variables | _flips(flips(at, numbers), flips(grid, periods[0]), drawn_flips, unit, level)
+
+
+def _following(settings: Settings, system: System, name: str, grid: FloatArray) -> dict[str, Any]:
+    """The settings that change along the diagram, because they follow from its parameter."""
+    ends = [{**system.values, name: float(value)} for value in (grid.min(), grid.max())]
+    rules = {key: rule for key, rule in settings.items() if callable(rule)}
+    return {key: rule for key, rule in rules.items() if rule(ends[0]) != rule(ends[1])}
+
+
+def _marched(
+    system: System, name: str, grid: FloatArray, rules: dict[str, Any], direction: str, common: dict[str, Any]
+) -> tuple[FloatArray, NDArray[np.int64]]:
+    """The diagram point by point, the state carried along, where other parameters change with this one."""
+    words = ["up", "down"] if direction == "both" else [direction]
+    sections = np.full((len(words), len(grid), KEEP, len(system.states)), np.nan)
+    periods = np.zeros((len(words), len(grid)), dtype=np.int64)
+    for d, word in enumerate(words):
+        state = None
+        for i in np.argsort(grid, kind="stable")[:: 1 if word == "up" else -1]:
+            here = system.with_parameters({name: float(grid[i])})
+            here = here.with_parameters({key: float(rule(here.values)) for key, rule in rules.items()})
+            found = sweep(here, name, [float(grid[i])], direction=None, start=state, **common)
+            sections[d, i] = found["section"].isel({name: 0}).values
+            periods[d, i] = int(found["period_number"].values.ravel()[0])
+            last = sections[d, i, -1]
+            state = last.tolist() if np.isfinite(last).all() else None
+    return sections, periods
+
+
+def _measured(
+    measured: xr.Dataset, name: str, noise: FloatArray, max_period: int
+) -> tuple[FloatArray, FloatArray, NDArray[np.int64]]:
+    """Values, points and period numbers, one row for each point: steady runs, or one slow rise."""
+    section = measured["section"]
+    if name in section.dims:
+        stacked = section.transpose(name, "iterate", "state").values
+        numbers = [
+            measured_period(one[np.isfinite(one).all(axis=1)], noise, max_period=max_period).number for one in stacked
+        ]
+        at = np.repeat(measured[name].values.astype(float), stacked.shape[1])
+        points, found = stacked.reshape(-1, stacked.shape[2]), np.repeat(numbers, stacked.shape[1])
+    else:
+        points = section.transpose("iterate", "state").values
+        at = np.asarray(measured[name].values, dtype=float)
+        if at.shape != points.shape[:1]:
+            raise ValueError(f"{name} must be given for each of the {len(points)} section points; got {at.shape}")
+        found = np.zeros(len(points), dtype=np.int64)
+        good = np.isfinite(points).all(axis=1)
+        found[good] = period_numbers(points[good], noise, max_period=min(max_period, 8))
+    good = np.isfinite(points).all(axis=1)
+    return at[good], points[good], np.asarray(found, dtype=np.int64)[good]
+
+
+def _flips(
+    measured: dict[str, float], theory: dict[str, float], drawn: list[dict[str, float]], unit: str, level: float
+) -> dict[str, Any]:
+    words = sorted({*measured, *theory})
+    m, t = (np.array([side.get(word, np.nan) for word in words], dtype=float) for side in (measured, theory))
+    over = ("flip",)
+    variables: dict[str, Any] = {
+        "flip": (over, np.array(words, dtype=str), {"long_name": "period numbers on the two sides of the flip"}),
+        "measured_flip": (over, m, {"long_name": "measured flip (NaN: none was seen)", "units": unit}),
+        "theory_flip": (over, t, {"long_name": "predicted flip (NaN: none is predicted)", "units": unit}),
+        "flip_relative_difference": (over, t / m - 1, {"long_name": "predicted over measured flip, minus 1"}),
+    }  # fmt: skip
+    if drawn:
+        table = np.array([[one.get(word, np.nan) for word in words] for one in drawn], dtype=float)
+        known = np.isfinite(table).sum(axis=0) * 2 >= len(drawn)
+        for word, q in (("low", (1 - level) / 2), ("high", (1 + level) / 2)):
+            edge = [np.nanquantile(table[:, i], q) if known[i] else np.nan for i in range(len(words))]
+            variables[f"theory_flip_{word}"] = (over, np.array(edge, dtype=float), {
+                "long_name": f"{word} end of the interval for drawn parameters", "units": unit})  # fmt: skip
+    return variables

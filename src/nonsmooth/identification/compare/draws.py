@@ -1,0 +1,164 @@
+"""Draws of the parameters from what is known of them, so that their uncertainty reaches the prediction."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.flow.arguments import real_number
+
+if TYPE_CHECKING:
+    from nonsmooth.system.system import System
+
+__all__ = ["Setting", "Settings", "draw_systems", "drawn_variables", "nominal", "read_settings", "settled"]
+
+#: A setting is a value with its uncertainty, or follows from the other parameters.
+Setting = tuple[float, float] | Callable[[Mapping[str, float]], float]
+Settings = Mapping[str, Setting]
+
+MOST_REFUSED = 100  # draws per accepted one before the covariance is called unfit
+
+
+def read_settings(settings: Mapping[str, Any] | None, system: System) -> dict[str, Setting]:
+    """Settings of the run as ``{name: (value, standard uncertainty)}``.
+
+    Each is a number, a pair, ``{"value": ..., "uncertainty": ...}``, or a function of the other parameters (the
+    force of a crank is ``lambda p: p["k"] * a``, and uncertain as k is), which is kept.
+
+    Raises
+    ------
+    ValueError
+        A name that is no parameter of the system, or a negative uncertainty.
+    """
+    from nonsmooth.system.names import unknown
+
+    read: dict[str, Setting] = {}
+    for name, given in (settings or {}).items():
+        if name not in system.parameters:
+            units = {key: item.unit for key, item in system.parameters.items()}
+            raise ValueError(unknown(name, "a parameter", repr(system.name), units))
+        if callable(given):
+            read[name] = given
+            continue
+        if isinstance(given, Mapping):
+            extra = set(given) - {"value", "uncertainty"}
+            if extra or "value" not in given:
+                raise ValueError(f"setting {name!r} is {dict(given)!r}; write {{value = ..., uncertainty = ...}}")
+            pair = (given["value"], given.get("uncertainty", 0.0))
+        elif isinstance(given, tuple | list) and len(given) == 2:
+            pair = (given[0], given[1])
+        else:
+            pair = (given, 0.0)
+        value, error = real_number(pair[0], f"setting {name!r}"), real_number(pair[1], f"uncertainty of {name!r}")
+        if error < 0:
+            raise ValueError(f"the uncertainty of setting {name!r} is {error:g}; it must be zero or more")
+        read[name] = (value, error)
+    return read
+
+
+def nominal(system: System, parameters: Mapping[str, float] | None, settings: Settings) -> System:
+    """The system at the identified parameters and at the run's settings; settings win."""
+    if parameters is not None:
+        system = system.with_parameters({name: parameters[name] for name in parameters})
+    return system.with_parameters(settled(settings, system.values))
+
+
+def settled(settings: Settings, values: Mapping[str, float]) -> dict[str, float]:
+    """The nominal value of each setting; those that follow from other parameters are worked out last."""
+    plain = {name: pair[0] for name, pair in settings.items() if not callable(pair)}
+    known = {**values, **plain}
+    return plain | {name: float(rule(known)) for name, rule in settings.items() if callable(rule)}
+
+
+def draw_systems(
+    system: System, parameters: Any, settings: Settings, draws: int, seed: int
+) -> tuple[list[System], dict[str, np.ndarray]]:
+    """Systems whose parameters are drawn from their joint law, and the draws by name.
+
+    Parameters
+    ----------
+    system : System
+    parameters : ParameterSet or mapping, optional
+        With ``draw(n, seed)`` that is used; with ``covariance`` (a DataArray over the parameters, twice), a normal law.
+        A mapping without either is taken as exact.
+    settings : mapping
+        As from :func:`read_settings`: independent, normal; a setting that is also a parameter replaces it.
+    draws, seed : int
+
+    Raises
+    ------
+    ValueError
+        A covariance from which almost no draw is allowed by the system's equations.
+
+    Notes
+    -----
+    A draw that the equations refuse (a mass below zero), or in which a positive parameter has become negative, is
+    drawn again: a damping known only to a factor has a law that ends at zero.
+    """
+    rng = np.random.default_rng(seed)
+    base = nominal(system, parameters, settings)
+    systems: list[System] = []
+    kept: dict[str, list[float]] = {}
+    refused = 0
+    while len(systems) < draws:
+        missing = draws - len(systems)
+        table = _identified(parameters, missing, int(rng.integers(2**31)))
+        for name, setting in settings.items():
+            table.pop(name, None)
+            if not callable(setting):
+                table[name] = setting[0] + setting[1] * rng.standard_normal(missing)
+        for i in range(missing):
+            row = {name: float(column[i]) for name, column in table.items()}
+            row |= {name: float(rule({**base.values, **row})) for name, rule in settings.items() if callable(rule)}
+            try:
+                drawn = base.with_parameters(row)
+            except (SystemDefinitionError, ValueError):
+                refused += 1
+                continue
+            if any(base.values[name] > 0 >= value and name not in settings for name, value in row.items()):
+                refused += 1
+                continue
+            systems.append(drawn)
+            for name, value in row.items():
+                kept.setdefault(name, []).append(value)
+        if refused > MOST_REFUSED * draws:
+            raise ValueError(
+                f"of {refused + len(systems)} draws only {len(systems)} are allowed by {system.name!r}: a parameter's "
+                "uncertainty is many times its value; identify it better, or leave it out of the covariance"
+            )
+    return systems, {name: np.array(column) for name, column in kept.items()}
+
+
+def drawn_variables(drawn: Mapping[str, np.ndarray], system: System) -> dict[str, Any]:
+    """The draws as variables ``drawn_<name>`` over ``draw``, to be kept with a comparison."""
+    return {
+        f"drawn_{name}": (("draw",), column, {
+            "long_name": f"drawn {name}", "units": system.parameters[name].unit or "1"})
+        for name, column in drawn.items()
+    }  # fmt: skip
+
+
+def _identified(parameters: Any, count: int, seed: int) -> dict[str, np.ndarray]:
+    if parameters is None:
+        return {}
+    own = getattr(parameters, "draw", None)
+    if callable(own):
+        drawn = own(count, seed)
+        names = list(getattr(drawn, "data_vars", drawn))
+        return {str(name): np.asarray(drawn[name], dtype=float) for name in names if name in parameters}
+    covariance = getattr(parameters, "covariance", None)
+    if covariance is None:
+        return {name: np.full(count, float(parameters[name])) for name in parameters}
+    names = [str(name) for name in covariance[covariance.dims[0]].values]
+    held = [i for i, name in enumerate(names) if name in parameters]
+    matrix = np.asarray(covariance.values, dtype=float)[np.ix_(held, held)]
+    mean = np.array([float(parameters[names[i]]) for i in held])
+    sizes = np.sqrt(np.diag(matrix))
+    scale = np.where(sizes > 0, sizes, 1.0)  # parameters differ by 10^5 in size: draw in units of their own errors
+    correlation = matrix / np.outer(scale, scale)
+    unit = np.random.default_rng(seed).multivariate_normal(np.zeros(len(held)), correlation, count, method="eigh")
+    table = mean + unit * scale
+    return {names[i]: table[:, k] for k, i in enumerate(held)}

@@ -1,0 +1,217 @@
+"""One measured motion against theory: orbits modulo phase, section clouds, period numbers, and the band."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.identification.compare.band import motion_band
+from nonsmooth.identification.compare.clouds import cloud_distance, wasserstein
+from nonsmooth.identification.compare.draws import Settings, draw_systems, drawn_variables, nominal
+from nonsmooth.identification.compare.fold import fold, mean_orbit
+from nonsmooth.identification.compare.orbits import common_length, orbit_distance
+from nonsmooth.identification.compare.periods import measured_period
+from nonsmooth.identification.compare.predict import Attractor, orbit
+from nonsmooth.identification.compare.theory import Prediction, from_result, predict
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["compare_motion"]
+
+FloatArray = NDArray[np.float64]
+
+CLOUD = 2000  # section points of a predicted motion without a period number
+SHOWN = 16  # forcing periods of the record that are kept for overlays
+MEASURED_STARTS = 4
+
+
+def compare_motion(
+    measured: xr.Dataset,
+    theory: Any,
+    *,
+    parameters: Any,
+    settings: Settings,
+    noise: FloatArray,
+    states: list[str],
+    start: Any,
+    phases: list[float],
+    grid: int,
+    transient: int,
+    max_period: int,
+    draws: int,
+    level: float,
+    splits: int,
+    seed: int,
+    options: dict[str, Any],
+) -> dict[str, Any]:
+    """The variables of the comparison, ``{name: (dims, values, attributes)}``; see :func:`compare` for each."""
+    folded, sections = _measured(measured, phases, grid)
+    scale = _scale(sections)
+    number = measured_period(sections[0], noise, max_period=max_period).number
+    rng = np.random.default_rng(seed)
+    is_system = not hasattr(theory, "data_vars")
+    system = nominal(theory, parameters, settings) if is_system else None
+    if system is not None:
+        starts = _starts(sections[0] if phases[0] == 0 else None, folded, len(states), start)
+        common: dict[str, Any] = {"n": max(CLOUD, len(sections[0])), "grid": grid, "transient": transient,
+                                  "max_period": max_period, "options": options}  # fmt: skip
+        predicted = predict(system, sections, phases, scale, starts=starts, **common)
+    else:
+        predicted = from_result(theory, states, phases, grid, max_period)
+    blurred = [points + noise * rng.standard_normal(points.shape) for points in predicted.sections]
+    variables = _clouds(sections, blurred, predicted.sections, scale, splits, seed)
+    variables |= _periods(number, predicted)
+    predicted = _begun_with_the_measurement(system, folded, number, predicted, grid, options)
+    variables |= _orbits(folded, number, predicted, grid)
+    if system is not None and draws:
+        assert predicted.attractor is not None  # a System's prediction has one
+        systems, drawn = draw_systems(theory, parameters, settings, draws, seed)
+        both = ("measured_orbit", "theory_orbit")
+        closed = tuple(variables[key][1] for key in both) if "phase" in variables else None
+        variables |= motion_band(
+            systems, predicted.attractor, sections, phases, noise, scale, closed, level=level, seed=seed, grid=grid,
+            transient=transient, max_period=max_period, options=options,
+        )  # fmt: skip
+        variables |= drawn_variables(drawn, theory)
+    return variables
+
+
+def _measured(measured: xr.Dataset, phases: list[float], grid: int) -> tuple[FloatArray | None, list[FloatArray]]:
+    if "u" not in measured:
+        return None, [_finite(np.asarray(measured["section"].values, dtype=float))]
+    turns, u = np.asarray(measured["phase"].values, dtype=float), np.asarray(measured["u"].values, dtype=float)
+    return fold(turns, u, grid), [_finite(fold(turns - phase, u, 8)[:, 0]) for phase in phases]
+
+
+def _finite(points: FloatArray) -> FloatArray:
+    return points[np.isfinite(points).all(axis=1)]
+
+
+def _scale(sections: list[FloatArray]) -> FloatArray:
+    """One unit for each state: the spread of the measured section points, at all phases together."""
+    spread = np.concatenate(sections).std(axis=0)
+    return np.where(spread > 0, spread, 1.0)
+
+
+def _starts(points: FloatArray | None, folded: FloatArray | None, states: int, start: Any) -> Any:
+    """The starts given; else rest and measured points at phase 0, so that theory begins where the experiment was."""
+    if start is not None:
+        return np.atleast_2d(np.asarray(start, dtype=float))
+    at_zero = _finite(folded[:, 0]) if folded is not None else points
+    if at_zero is None:
+        return np.zeros((1, states))
+    chosen = at_zero[np.linspace(0, len(at_zero) - 1, min(MEASURED_STARTS, len(at_zero))).astype(int)]
+    return np.vstack([np.zeros((1, states)), chosen])
+
+
+def _clouds(
+    sections: list[FloatArray], blurred: list[FloatArray], exact: list[FloatArray], scale: FloatArray, splits: int,
+    seed: int,
+) -> dict[str, Any]:  # fmt: skip
+    from scipy.stats import wasserstein_distance
+
+    size = min(len(points) for points in sections)
+    at = ("section_phase",)
+    variables: dict[str, Any] = {
+        "measured_section": ((*at, "measured_iterate", "state"), np.stack([p[:size] for p in sections]),
+                             {"long_name": "measured section points"}),
+        "theory_section": ((*at, "theory_iterate", "state"), np.stack(exact),
+                           {"long_name": "predicted section points"}),
+        "section_scale": (("state",), scale, {"long_name": "unit of each state in the distances of clouds"}),
+    }  # fmt: skip
+    found = [
+        cloud_distance(a / scale, b / scale, splits=splits, seed=seed) if min(len(a), len(b)) >= 40 else None
+        for a, b in zip(sections, blurred, strict=True)
+    ]
+    moved = [
+        [wasserstein_distance(a[:, i], b[:, i]) for i in range(len(scale))]
+        for a, b in zip(sections, blurred, strict=True)
+    ]
+    both = [wasserstein(a / scale, b / scale, seed) for a, b in zip(sections, blurred, strict=True)]
+    variables["wasserstein_distance"] = ((*at, "state"), np.array(moved), {
+        "long_name": "Wasserstein distance of the section clouds, in the state's unit"})  # fmt: skip
+    variables["wasserstein_distance_joint"] = (at, np.array(both), {
+        "long_name": "Wasserstein distance of the section clouds in all states, scaled"})  # fmt: skip
+
+    def column(name: str, read: Any, long_name: str) -> None:
+        values = np.array([np.nan if one is None else read(one) for one in found], dtype=float)
+        variables[name] = (at, values, {"long_name": long_name})
+
+    column("energy_distance", lambda c: c.distance, "energy distance of the section clouds (root), scaled")
+    column("energy_distance_matched", lambda c: c.matched, "median energy distance of parts as large as a half, scaled")
+    column("energy_ratio", lambda c: c.ratio, "energy_distance_matched over the 95th percentile of measured halves")
+    for side, key in (("measured", "halves"), ("theory", "other_halves")):
+        for word, q in (("median", 0.5), ("p95", 0.95)):
+            column(
+                f"{side}_halves_{word}", lambda c, k=key, level=q: np.quantile(getattr(c, k), level),
+                f"energy distance of random halves of the {side} cloud: {'median' if q == 0.5 else '95th percentile'}",
+            )  # fmt: skip
+    column("block", lambda c: c.block, "successive section points kept together in random halves")
+    return variables
+
+
+def _periods(number: int, predicted: Prediction) -> dict[str, Any]:
+    coexisting = np.asarray(predicted.coexisting, dtype=np.int64)
+    return {
+        "measured_period_number": ((), np.int64(number), {"long_name": "measured period number (0: none found)"}),
+        "theory_period_number": ((), np.int64(predicted.period_number), {
+            "long_name": "period number of the nearest predicted motion (0: none found)"}),
+        "coexisting_period_number": (("attractor",), coexisting, {
+            "long_name": "period numbers of all predicted motions"}),
+        "period_agrees": ((), np.int8(number == predicted.period_number), {
+            "long_name": "1 where the nearest predicted motion has the measured period number"}),
+        "period_coexists": ((), np.int8(number in coexisting), {
+            "long_name": "1 where the measured period number is among the predicted ones"}),
+    }  # fmt: skip
+
+
+def _begun_with_the_measurement(
+    system: Any, folded: FloatArray | None, number: int, predicted: Prediction, grid: int, options: dict[str, Any]
+) -> Prediction:
+    """Where neither motion has a period, the predicted one shown begins at the first measured state that is shown."""
+    if system is None or folded is None or number or predicted.period_number:
+        return predicted
+    whole = folded[np.isfinite(folded).all(axis=(1, 2))][-SHOWN:]
+    if not len(whole):
+        return predicted
+    begun = Attractor(0, whole[0, 0], 0)
+    return replace(predicted, orbit=orbit(system, begun, grid, len(whole), options))
+
+
+def _orbits(folded: FloatArray | None, number: int, predicted: Prediction, grid: int) -> dict[str, Any]:
+    if folded is None or predicted.orbit is None:
+        return {}
+    shown = folded[np.isfinite(folded).all(axis=(1, 2))][-SHOWN:]
+    closed = number > 0 and predicted.period_number > 0
+    distances = (np.nan, np.nan, np.nan)
+    scatter = None
+    if closed:
+        length = int(np.lcm(number, predicted.period_number))
+        mean, spread = mean_orbit(folded, number)
+        a, scatter = common_length(mean, number, length), common_length(spread, number, length)
+        b = common_length(predicted.orbit, predicted.period_number, length)
+        found = orbit_distance(a, b, length)
+        b = np.roll(b, found.whole_shift * grid, axis=0) if found.whole_shift else b
+        distances = (found.distance, found.any_phase, found.phase_shift)
+    else:
+        a, b = shown.reshape(-1, shown.shape[2]), predicted.orbit
+    over = ("phase", "state")
+    names = ("phase", "phase") if closed else ("measured_phase", "theory_phase")
+    variables: dict[str, Any] = {
+        "measured_orbit": ((names[0], "state"), a, {"long_name": "measured motion over the phase of the drive"}),
+        "theory_orbit": ((names[1], "state"), b, {"long_name": "predicted motion over the phase of the drive"}),
+        "orbit_distance": ((), distances[0], {"long_name": "normalised distance of the orbits, phase known"}),
+        "orbit_distance_any_phase": ((), distances[1], {"long_name": "normalised distance modulo phase"}),
+        "phase_shift": ((), distances[2], {
+            "long_name": "lead of the predicted orbit in orbit_distance_any_phase", "units": "forcing periods"}),
+    }  # fmt: skip
+    if scatter is not None:
+        variables["measured_scatter"] = (over, scatter, {"long_name": "standard deviation of one pass"})
+    for name, values in zip(names, (a, b), strict=True):
+        coordinate = np.arange(len(values)) / grid
+        variables[name] = ((name,), coordinate, {"long_name": "phase of the drive", "units": "forcing periods"})
+    return variables

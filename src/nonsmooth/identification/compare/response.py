@@ -1,0 +1,208 @@
+"""A measured frequency response against theory: amplitudes run by run, jumps, and the band."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.analysis.response import jumps_in
+from nonsmooth.analysis.sweep import sweep
+from nonsmooth.identification.compare.draws import Settings, draw_systems, drawn_variables, nominal
+from nonsmooth.identification.compare.jumps import Jump, Jumps, match_jumps
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from nonsmooth.system.system import System
+
+__all__ = ["compare_response"]
+
+FloatArray = NDArray[np.float64]
+
+FINE = 301  # values of the predicted curve
+CERTAIN = 6.0  # a measured step is a jump only if it exceeds its standard error by this factor
+THIRD = 1 / 3  # of a predicted jump that a measured step must cover to be taken for it
+NEAR = 0.15  # and how far from it, in parts of the measured range
+
+
+def compare_response(
+    measured: xr.Dataset,
+    theory: Any,
+    *,
+    parameters: Any,
+    settings: Settings,
+    name: str,
+    state: str,
+    transient: int,
+    draws: int,
+    level: float,
+    seed: int,
+    options: dict[str, Any],
+) -> dict[str, Any]:
+    """The variables of the comparison, ``{name: (dims, values, attributes)}``; see :func:`compare` for each."""
+    runs = _runs(measured, name, state)
+    unit = measured[name].attrs.get("units", "1")
+    directions = [word for word in ("up", "down") if (runs["direction"] == word).any()]
+    if hasattr(theory, "data_vars"):
+        values, curves = _given(theory, name, state, directions)
+        at_runs = np.full(len(runs["value"]), np.nan)
+        for d, word in enumerate(directions):
+            mine = runs["direction"] == word
+            at_runs[mine] = np.interp(runs["value"][mine], values, curves[:, d])
+        system = None
+    else:
+        system = nominal(theory, parameters, settings)
+        values = np.linspace(runs["value"].min(), runs["value"].max(), FINE)
+        curves, at_runs = _curves(system, name, state, values, runs, directions, transient, options)
+    variables: dict[str, Any] = {
+        f"measured_{name}": (("run",), runs["value"], {"long_name": f"measured {name}", "units": unit}),
+        "measured_direction": (("run",), runs["direction"], {"long_name": "direction in which the run was reached"}),
+        "measured_amplitude": (("run",), runs["amplitude"], {"long_name": "measured amplitude"}),
+        "measured_amplitude_error": (("run",), runs["error"], {"long_name": "standard error of it"}),
+        "theory_amplitude": ((name, "direction"), curves, {"long_name": "predicted amplitude"}),
+        "theory_at_run": (("run",), at_runs, {"long_name": "predicted amplitude at the run"}),
+        "relative_difference": (("run",), at_runs / runs["amplitude"] - 1, {
+            "long_name": "prediction over measurement, minus 1"}),
+        name: ((name,), values, {"long_name": name, "units": unit}),
+        "direction": (("direction",), np.array(directions), {"long_name": "direction of the sweep"}),
+    }  # fmt: skip
+    expected = _jumps(values, curves, directions)
+    seen = _measured_jumps(measured, runs, directions, expected)
+    drawn_jumps: list[Jumps] = []
+    if system is not None and draws:
+        systems, drawn = draw_systems(theory, parameters, settings, draws, seed)
+        stack, stack_runs = [], []
+        for one in systems:
+            curve, points = _curves(one, name, state, values, runs, directions, transient, options)
+            stack.append(curve)
+            stack_runs.append(points)
+            drawn_jumps.append(_jumps(values, curve, directions))
+        q = [(1 - level) / 2, 0.5, (1 + level) / 2]
+        for word, curve in zip(("low", "median", "high"), np.nanquantile(np.stack(stack), q, axis=0), strict=True):
+            variables[f"theory_{word}"] = ((name, "direction"), curve, {"long_name": f"{word} of the band"})
+        low, _, high = np.nanquantile(np.stack(stack_runs), q, axis=0)
+        reach = 2 * np.nan_to_num(runs["error"])
+        inside = (runs["amplitude"] + reach >= low) & (runs["amplitude"] - reach <= high)
+        variables["inside_band"] = ((), float(inside.mean()), {
+            "long_name": "share of the runs within two standard errors of the band"})  # fmt: skip
+        variables |= drawn_variables(drawn, theory)
+    return variables | match_jumps(seen, expected, drawn_jumps, unit, level)
+
+
+def _runs(measured: xr.Dataset, name: str, state: str) -> dict[str, NDArray[Any]]:
+    """One row for each run: value, direction, amplitude, error, sorted by direction and value."""
+    amplitude = measured["amplitude"]
+    if "state" in amplitude.dims:
+        amplitude = amplitude.sel(state=state)
+    if name in amplitude.dims:  # the grid of frequency_response: value, direction
+        amplitude = amplitude.expand_dims([d for d in ("direction",) if d not in amplitude.dims])
+        stacked = amplitude.transpose("direction", name)
+        words = np.atleast_1d(stacked["direction"].values).astype(str)
+        value = np.tile(stacked[name].values, len(words))
+        direction = np.repeat(words, stacked.sizes[name])
+        heights, error = stacked.values.ravel(), np.full(stacked.size, np.nan)
+    else:
+        if amplitude.ndim != 1 or name not in measured:
+            raise ValueError(
+                f"a measured response holds `amplitude` over its runs, with `{name}` (and `direction`) for each; this "
+                f"one has {amplitude.dims} and {', '.join(map(str, measured.variables))}"
+            )
+        value, heights = np.asarray(measured[name].values, dtype=float), np.asarray(amplitude.values, dtype=float)
+        direction = (
+            np.asarray(measured["direction"].values, dtype=str) if "direction" in measured
+            else np.full(len(value), "up")
+        )  # fmt: skip
+        has_error = "amplitude_error" in measured
+        error = np.asarray(measured["amplitude_error"].values, float) if has_error else np.full(len(value), np.nan)
+    good = np.isfinite(value) & np.isfinite(heights)
+    order = np.lexsort((value, direction))
+    order = order[good[order]]
+    if not len(order):
+        raise ValueError("the measured response has no run with a finite amplitude")
+    return {"value": value[order], "direction": direction[order], "amplitude": heights[order], "error": error[order]}
+
+
+def _curves(
+    system: System, name: str, state: str, values: FloatArray, runs: dict[str, NDArray[Any]], directions: list[str],
+    transient: int, options: dict[str, Any],
+) -> tuple[FloatArray, FloatArray]:  # fmt: skip
+    """The predicted curve on a regular grid, and at the runs: one carried sweep over both for each direction."""
+    curves = np.empty((len(values), len(directions)))
+    at_runs = np.full(len(runs["value"]), np.nan)
+    for d, word in enumerate(directions):
+        mine = runs["direction"] == word
+        every = np.union1d(values, runs["value"][mine])
+        result = sweep(
+            system, name, every, direction=word, transient=transient, keep=32, progress=False, **options
+        )  # fmt: skip
+        heights = 0.5 * (result["maximum"] - result["minimum"]).sel(state=state).values
+        curves[:, d] = heights[np.searchsorted(every, values)]
+        at_runs[mine] = heights[np.searchsorted(every, runs["value"][mine])]
+    return curves, at_runs
+
+
+def _given(theory: xr.Dataset, name: str, state: str, directions: list[str]) -> tuple[FloatArray, FloatArray]:
+    if "amplitude" not in theory or name not in theory["amplitude"].dims:
+        raise ValueError(
+            f"the theory must be a System or a result of frequency_response over {name}; it holds "
+            f"{', '.join(map(str, theory.data_vars))}"
+        )
+    heights = theory["amplitude"].sel(state=state)
+    heights = heights.expand_dims([d for d in ("direction",) if d not in heights.dims]).sortby(name)
+    words = np.atleast_1d(heights["direction"].values).astype(str).tolist()
+    if missing := [word for word in directions if word not in words]:
+        raise ValueError(f"runs were made {' and '.join(missing)}, the theory has only: {', '.join(words)}")
+    chosen = heights.transpose(name, "direction").isel(direction=[words.index(word) for word in directions])
+    return np.asarray(chosen[name].values, dtype=float), np.asarray(chosen.values, dtype=float)
+
+
+def _jumps(values: FloatArray, curves: FloatArray, directions: list[str]) -> Jumps:
+    """The jumps of each direction: middle of the step in which they lie, half of it, amplitude before and after."""
+    found = {}
+    for d, word in enumerate(directions):
+        x, heights = (values, curves[:, d]) if word == "up" else (values[::-1], curves[::-1, d])
+        found[word] = [_jump(x, heights, i) for i in jumps_in(heights)]
+    return found
+
+
+def _jump(x: FloatArray, heights: FloatArray, i: int) -> Jump:
+    middle, half = 0.5 * float(x[i] + x[i + 1]), 0.5 * float(abs(x[i + 1] - x[i]))
+    return Jump(middle, half, float(heights[i]), float(heights[i + 1]))
+
+
+def _measured_jumps(
+    measured: xr.Dataset, runs: dict[str, NDArray[Any]], directions: list[str], expected: Jumps
+) -> Jumps:
+    """The jumps that the measurement states, else those in its steps.
+
+    Runs are often so far apart that a jump is not steeper than its neighbours by much. A step is a jump, too, if it
+    passes the middle of a predicted one, over a third of its height, near it.
+    """
+    found: dict[str, list[Jump]] = {}
+    if "jump_value" in measured and "run" in measured["amplitude"].dims:  # as the experimenter read them off
+        words = measured["jump_direction"].values.astype(str)
+        half = 0.5 * measured["jump_step"].values if "jump_step" in measured else np.zeros(len(words))
+        for word in directions:
+            rows = zip(measured["jump_value"].values, half, words, strict=True)
+            found[word] = [Jump(float(value), float(step), np.nan, np.nan) for value, step, w in rows if w == word]
+        return found
+    for word in directions:
+        mine = runs["direction"] == word
+        order = np.argsort(runs["value"][mine])[:: 1 if word == "up" else -1]
+        x, heights = runs["value"][mine][order], runs["amplitude"][mine][order]
+        error = np.nan_to_num(runs["error"][mine][order])
+        steps = set(jumps_in(heights))
+        for jump in expected.get(word, ()):
+            middle, rise = 0.5 * (jump.before + jump.after), jump.after - jump.before
+            passing = (heights[:-1] - middle) * (heights[1:] - middle) < 0
+            passing &= np.diff(heights) / rise > THIRD if rise else False
+            near = np.abs(0.5 * (x[:-1] + x[1:]) - jump.value) < NEAR * (x.max() - x.min())
+            if (passing & near).any():
+                steps.add(min(np.flatnonzero(passing & near).tolist(), key=lambda i: abs(x[i] - jump.value)))
+        found[word] = [
+            _jump(x, heights, i) for i in sorted(steps)
+            if abs(heights[i + 1] - heights[i]) > CERTAIN * np.hypot(error[i], error[i + 1])
+        ]  # fmt: skip
+    return found

@@ -1,0 +1,165 @@
+r"""Gap and contact parameters by multiple shooting: short pieces with one contact each, every start free.
+
+A piece runs from one turning point far from the support to the next but one contact; in between the motion is linear in
+each mode. What the free decay has told, :math:`\omega_0, c/m, F_C/m`, enters as known with its covariance; the drive's
+amplitude is the crank's length, while its phase at the mark, its second harmonic (string and ripple) and the place
+about which the car swings are free in each run. The gap comes out in the sensor's own count, and the place of the
+swing with it, so that their difference, the gap *referred to the car's mean position under the drive*, needs no zero.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.experiment.signals.phase import drive_phase
+from nonsmooth.identification.evidence import Run
+from nonsmooth.identification.free_decay import DecayFit
+from nonsmooth.identification.shooting import Piece, ShootingFit, shoot, start_state
+
+__all__ = ["ContactFit", "shoot_contacts"]
+
+FloatArray = NDArray[np.float64]
+_SHARED = 5  # omega_0, b, f, kappa, gamma
+_PER_RUN = 6  # gap, place, cosine and sine of the drive, its second harmonic
+LONGEST = 2.5  # s: of a piece
+
+
+@dataclass(frozen=True, eq=False)
+class ContactFit:
+    """Outcome: ``kappa`` = k_s/m, ``gamma`` = c_s/m, and for each run the gap and the place of the swing.
+
+    ``values`` and ``covariance``: omega_0, b, f, kappa, gamma, then per run g, x_e, cosine, sine, cosine_2, sine_2.
+    """
+
+    values: FloatArray
+    covariance: FloatArray
+    runs: tuple[Run, ...]
+    pieces: tuple[Piece, ...]
+    fit: ShootingFit
+
+    def place(self, run: int, which: int) -> int:
+        """Index of a run's own parameter: 0 gap, 1 place, 2-5 drive."""
+        return _SHARED + _PER_RUN * run + which
+
+    @property
+    def n_contacts(self) -> int:
+        """Pieces, each with at least one contact."""
+        return int(np.count_nonzero(self.fit.used))
+
+
+def shoot_contacts(
+    runs: Sequence[Run], decay: DecayFit, *, resolution: float, kappa: float, gamma: float, pieces_per_run: int = 25
+) -> ContactFit:
+    """Fit the runs with contact together.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        With ``x``, ``turns``, and the settings ``crank_length`` and ``gap`` (a first guess).
+    decay : DecayFit
+        What the free decay told.
+    resolution : float
+        Length of a count (m).
+    kappa, gamma : float
+        First guess of k_s/m (1/s^2) and c_s/m (1/s).
+    pieces_per_run : int
+        Pieces taken from each run, spread over it.
+
+    Raises
+    ------
+    ValueError
+        If no run has a contact.
+    """
+    values = [*decay.values[:3], kappa, gamma]
+    steps = [1e-4, 1e-4, 1e-5, 1e-4 * kappa, 1e-2]
+    precision = [np.linalg.inv(_regular(decay.covariance[:3, :3])), 1e-12 / kappa**2 * np.eye(2)]
+    pieces: list[Piece] = []
+    taken: list[Run] = []
+    for run in runs:
+        crank, gap = float(run.settings["crank_length"]), float(run.settings["gap"])
+        own = _SHARED + _PER_RUN * len(taken)
+        which = np.array([0, 1, 2, 3, 4, *range(own, own + _PER_RUN)])
+        here = _pieces(run, which, gap, pieces_per_run, decay.values, crank)
+        if not here:
+            continue
+        pieces += here
+        taken.append(run)
+        values += [gap, decay.values[3], crank, 0.0, 0.0, 0.0]
+        steps += [1e-6, 1e-6, 1e-5, 1e-5, 1e-5, 1e-5]
+        # the drive: amplitude as set to 0.5 %, a phase of the mark to 0.05 rad, a second harmonic to 3 %
+        spread = np.array([1.5e-3, 1e-3, 5e-3 * crank, 0.05 * crank, 0.03 * crank, 0.03 * crank])
+        precision.append(np.diag(spread**-2.0))
+    if not pieces:
+        raise ValueError("no run shows a contact: the gap and the support cannot be found from them")
+    p = len(values)
+    prior = np.zeros((p, p))
+    begin = 0
+    for block in precision:
+        rows = slice(begin, begin + len(block))
+        prior[rows, rows] = block
+        begin += len(block)
+    fit = shoot(
+        pieces, np.array(values), np.array(steps), resolution=resolution, known=np.array(values), precision=prior,
+        jitter=decay.fit.jitter, outliers=6.0,
+    )  # fmt: skip
+    return ContactFit(fit.values, fit.covariance, tuple(taken), tuple(pieces), fit)
+
+
+def _regular(matrix: FloatArray) -> FloatArray:
+    return matrix + 1e-12 * np.diag(np.diag(matrix))
+
+
+def _build(p: FloatArray) -> tuple[Any, Any, Any]:
+    return (
+        np.array([p[0], p[1], p[2], p[6]]), np.array([p[7], p[8], p[9], p[10]]), np.array([p[3], p[4], p[5]]),
+    )  # fmt: skip
+
+
+def _pieces(
+    run: Run, which: Any, gap: float, most: int, decay: FloatArray, crank: float
+) -> list[Piece]:
+    """Pieces from one low turning point to the next, in each of which the car rises above the gap."""
+    t, x = run.time, run.positions
+    phase = drive_phase(run.passages).phase(t)
+    low = _turning_points(x)
+    found: list[Piece] = []
+    # the screw's reading may be off by a millimetre: what rises above half of it is taken
+    level = gap - 1e-3 if gap < 2e-3 else 0.5 * gap
+    i = 0
+    while i < len(low) - 1:
+        j = i + 1
+        while j < len(low) - 1 and t[low[j]] - t[low[i]] < 0.3:
+            j += 1
+        begin, end = low[i], low[j] + 1
+        i = j
+        if end - begin < 12 or t[end - 1] - t[begin] > LONGEST or np.max(x[begin:end]) < level:
+            continue
+        if x[begin] > level or x[end - 1] > level:  # a piece begins and ends free
+            continue
+        local = t[begin:end] - t[begin]
+        found.append(
+            Piece(local, x[begin:end], phase[begin:end], which, _build, start_state(local, x[begin:end]),
+                  label=run.name)
+        )  # fmt: skip
+    if len(found) > most:
+        keep = np.unique(np.linspace(0, len(found) - 1, most).round().astype(int))
+        found = [found[k] for k in keep]
+    return found
+
+
+def _turning_points(x: FloatArray) -> list[int]:
+    """Samples at which the car turns on the far side from the support, below the middle of its way."""
+    middle = 0.5 * (np.quantile(x, 0.02) + np.quantile(x, 0.98))
+    below = x < middle
+    edges = np.flatnonzero(np.diff(below.astype(int)))
+    points: list[int] = []
+    for a, b in pairwise(edges.tolist()):
+        if below[a + 1]:
+            points.append(a + 1 + int(np.argmin(x[a + 1 : b + 1])))
+    return points

@@ -1,0 +1,213 @@
+"""``ParameterSet``: a model's parameters as identified, with covariance, ready for ``System.with_parameters``."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.identification.finding import Estimate, Finding
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["ParameterSet"]
+
+
+class ParameterSet(Mapping[str, float]):
+    """Parameters by name, with what is known of how well: ``system.with_parameters(parameter_set)``.
+
+    Parameters
+    ----------
+    estimates : mapping of str to Estimate
+        The model's parameters.
+    covariance : array (p + e, p + e)
+        Of the parameters and then ``extra``, in order.
+    extra : mapping of str to Estimate
+        What is not a parameter of the model: ``omega_0``, ``friction``, ...
+    findings : sequence of Finding
+    identifiability : mapping of str to str
+        For each parameter a sentence: what its value rests on, and what the data do not say.
+    synthetic : bool
+        Whether it was identified from computed recordings.
+    """
+
+    __slots__ = ("_covariance", "estimates", "extra", "findings", "identifiability", "notes", "synthetic")
+    estimates: Mapping[str, Estimate]
+    extra: Mapping[str, Estimate]
+    findings: tuple[Finding, ...]
+    identifiability: Mapping[str, str]
+    notes: tuple[str, ...]
+    synthetic: bool
+    _covariance: NDArray[np.float64]
+
+    def __init__(
+        self,
+        estimates: Mapping[str, Estimate],
+        covariance: Any,
+        *,
+        extra: Mapping[str, Estimate] | None = None,
+        findings: Sequence[Finding] = (),
+        identifiability: Mapping[str, str] | None = None,
+        notes: Sequence[str] = (),
+        synthetic: bool = False,
+    ) -> None:
+        put = object.__setattr__
+        put(self, "estimates", MappingProxyType(dict(estimates)))
+        put(self, "extra", MappingProxyType(dict(extra or {})))
+        put(self, "findings", tuple(findings))
+        put(self, "identifiability", MappingProxyType(dict(identifiability or {})))
+        put(self, "notes", tuple(notes))
+        put(self, "synthetic", bool(synthetic))
+        matrix = np.array(covariance, dtype=np.float64)
+        n = len(self.estimates) + len(self.extra)
+        if matrix.shape != (n, n):
+            raise ValueError(f"covariance must be ({n}, {n}): parameters, then extra; got {matrix.shape}")
+        matrix.flags.writeable = False
+        put(self, "_covariance", matrix)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        raise AttributeError(f"a ParameterSet does not change (tried to set {name!r})")
+
+    def __getitem__(self, name: str) -> float:
+        return self.estimates[name].value
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.estimates)
+
+    def __len__(self) -> int:
+        return len(self.estimates)
+
+    @property
+    def uncertainty(self) -> dict[str, float]:
+        """Standard uncertainty of each parameter."""
+        return {name: estimate.uncertainty for name, estimate in self.estimates.items()}
+
+    @property
+    def covariance(self) -> xr.DataArray:
+        """Covariance of the model's parameters, ``parameter`` x ``other``."""
+        names = list(self.estimates)
+        return self._labelled(names, self._covariance[: len(names), : len(names)])
+
+    @property
+    def full_covariance(self) -> xr.DataArray:
+        """Covariance of the parameters and of what is in ``extra``."""
+        return self._labelled([*self.estimates, *self.extra], self._covariance)
+
+    @staticmethod
+    def _labelled(names: list[str], matrix: NDArray[np.float64]) -> xr.DataArray:
+        import xarray as xr
+
+        return xr.DataArray(matrix, coords={"parameter": names, "other": names}, dims=("parameter", "other"))
+
+    def estimate(self, name: str) -> Estimate:
+        """A parameter or an extra quantity with all that is known of it.
+
+        Raises
+        ------
+        ValueError
+            If there is none of that name.
+        """
+        for group in (self.estimates, self.extra):
+            if name in group:
+                return group[name]
+        known = ", ".join([*self.estimates, *self.extra])
+        raise ValueError(f"{name!r} was not identified; there are: {known}")
+
+    def interval(self, name: str, level: float = 0.95) -> tuple[float, float]:
+        """The interval that holds a parameter (or an extra quantity) with this probability."""
+        return self.estimate(name).interval(level)
+
+    def draw(self, n: int, seed: int = 0) -> dict[str, NDArray[np.float64]]:
+        """``n`` sets of the model's parameters, correlated as known; those known to a factor are log-normal."""
+        names = list(self.estimates)
+        centre = np.array([self[name] for name in names])
+        matrix = np.array(self._covariance[: len(names), : len(names)])
+        logarithmic = np.array([self.estimates[name].logarithmic and self[name] > 0 for name in names])
+        scale = np.where(logarithmic, centre, 1.0)  # d ln x = dx / x
+        rng = np.random.default_rng(seed)
+        steps = rng.multivariate_normal(np.zeros(len(names)), matrix / np.outer(scale, scale), size=n, method="eigh")
+        values = np.where(logarithmic, centre * np.exp(np.where(logarithmic, steps, 0.0)), centre + steps)
+        return {name: values[:, i].copy() for i, name in enumerate(names)}
+
+    def to_dataset(self) -> xr.Dataset:
+        """All numbers and texts as a Dataset that ``nonsmooth.save`` takes; the findings' pictures stay behind."""
+        import xarray as xr
+
+        from nonsmooth.results.provenance import ATTRIBUTE, package_version
+
+        names = [*self.estimates, *self.extra]
+        rows = [*self.estimates.values(), *self.extra.values()]
+        record = {
+            "version": package_version(), "verb": "identify", "synthetic": self.synthetic, "notes": list(self.notes),
+            "n_parameters": len(self.estimates), "identifiability": dict(self.identifiability),
+            "units": [row.unit for row in rows], "findings": [_as_record(finding) for finding in self.findings],
+        }  # fmt: skip
+        return xr.Dataset(
+            {
+                "value": ("parameter", [row.value for row in rows]),
+                "uncertainty": ("parameter", [row.uncertainty for row in rows]),
+                "half_width": ("parameter", [row.half_width for row in rows]),
+                "logarithmic": ("parameter", np.array([int(row.logarithmic) for row in rows], dtype=np.int8)),
+                "covariance": (("parameter", "other"), self._covariance.copy()),
+            },
+            {"parameter": names, "other": names},
+            {ATTRIBUTE: json.dumps(record, ensure_ascii=False), "synthetic": "yes" if self.synthetic else "no"},
+        )
+
+    @classmethod
+    def from_dataset(cls, dataset: xr.Dataset) -> ParameterSet:
+        """The set that `to_dataset` made the Dataset from, its findings without their pictures' data.
+
+        Raises
+        ------
+        ValueError
+            If the Dataset was not made so.
+        """
+        from nonsmooth.results.provenance import ATTRIBUTE
+
+        record = json.loads(dataset.attrs.get(ATTRIBUTE, "{}"))
+        if record.get("verb") != "identify":
+            raise ValueError("this Dataset was not made by ParameterSet.to_dataset")
+        columns = [dataset[name].values for name in ("value", "uncertainty", "half_width", "logarithmic")]
+        rows = {
+            str(name): Estimate(float(v), float(u), unit, float(h), bool(g))
+            for name, v, u, h, g, unit in zip(
+                dataset["parameter"].values, *columns, record["units"], strict=True
+            )
+        }  # fmt: skip
+        names, n = list(rows), record["n_parameters"]
+        return cls(
+            {name: rows[name] for name in names[:n]}, dataset["covariance"].values,
+            extra={name: rows[name] for name in names[n:]},
+            findings=[_from_record(item) for item in record["findings"]],
+            identifiability=record["identifiability"], notes=record["notes"], synthetic=record["synthetic"],
+        )  # fmt: skip
+
+    def __repr__(self) -> str:
+        lines = [f"ParameterSet{' (synthetic recordings)' if self.synthetic else ''}"]
+        lines += [f"  {name} = {estimate}" for name, estimate in self.estimates.items()]
+        lines += [f"  ({name} = {estimate})" for name, estimate in self.extra.items()]
+        return "\n".join(lines + [f"  {note}" for note in self.notes])
+
+
+def _as_record(finding: Finding) -> dict[str, Any]:
+    def numbers(estimate: Estimate) -> list[Any]:
+        return [estimate.value, estimate.uncertainty, estimate.unit, estimate.half_width, estimate.logarithmic]
+
+    return {
+        "name": finding.name, "estimate": numbers(finding.estimate), "method": finding.method,
+        "samples_used": finding.samples_used, "runs": list(finding.runs), "notes": list(finding.notes),
+        "others": {name: numbers(other) for name, other in finding.others.items()}, "plot": finding.plot,
+    }  # fmt: skip
+
+
+def _from_record(item: Mapping[str, Any]) -> Finding:
+    return Finding(
+        item["name"], Estimate(*item["estimate"]), item["method"], item["samples_used"], tuple(item["runs"]),
+        tuple(item["notes"]), {name: Estimate(*row) for name, row in item["others"].items()}, plot=item["plot"],
+    )  # fmt: skip

@@ -1,0 +1,274 @@
+"""Uncertainty by the guide's rules: type A from scatter, type B from knowledge, combined, and stated as intervals.
+
+Residuals of an encoder are not white: where the car is slow the same rounding error stays for many samples. So a fit's
+covariance is scaled by the residuals' own correlation (:func:`correlated`), never by the number of samples alone.
+
+References: JCGM 100:2008 (GUM), 4.3.7 for limits without a distribution, 5.2.2 for correlated inputs; JCGM 101:2008.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = [
+    "Profile", "bootstrap", "correlated", "correlation_times", "coverage_factor", "factor_interval", "interval",
+    "profile_likelihood", "uniform",
+]  # fmt: skip
+
+FloatArray = NDArray[np.float64]
+
+
+def uniform(half_width: float) -> float:
+    r"""Standard uncertainty (type B) of a quantity known to lie within +- ``half_width``: :math:`a / \sqrt 3`.
+
+    Raises
+    ------
+    ValueError
+        If the half width is negative or not finite.
+    """
+    if not 0 <= half_width < np.inf:
+        raise ValueError(f"half_width = {half_width!r} must be finite and not negative")
+    return float(half_width) / np.sqrt(3.0)
+
+
+def coverage_factor(level: float = 0.95) -> float:
+    """How many standard uncertainties hold a normal quantity with this probability: 1.96 for 0.95."""
+    from scipy.special import ndtri
+
+    if not 0 < level < 1:
+        raise ValueError(f"level = {level!r} must lie between 0 and 1, as 0.95")
+    return float(ndtri(0.5 + level / 2))
+
+
+def interval(value: float, normal: float, half_width: float = 0.0, level: float = 0.95) -> tuple[float, float]:
+    """Symmetric interval of a normal quantity plus an independent uniform one, from their exact convolution.
+
+    Parameters
+    ----------
+    value : float
+        The estimate.
+    normal : float
+        Standard uncertainty of the normal part.
+    half_width : float
+        Half width of the uniform part; 0: none.
+    level : float
+        Probability of the interval.
+
+    Notes
+    -----
+    With z = r/s, w = a/s: P(|.| < r) = [M(z + w) - M(z - w)] / w - 1 with M(u) = u Phi(u) + phi(u), the integral of
+    the normal distribution function.
+    """
+    from scipy.optimize import brentq
+    from scipy.special import ndtr
+
+    if half_width < 1e-6 * normal or half_width == 0:
+        reach = coverage_factor(level) * normal
+    elif normal < 1e-6 * half_width:
+        reach = level * half_width
+    else:
+        w = half_width / normal
+
+        def integral(u: float) -> float:
+            return u * float(ndtr(u)) + float(np.exp(-u * u / 2)) / np.sqrt(2 * np.pi)
+
+        def excess(z: float) -> float:
+            return (integral(z + w) - integral(z - w)) / w - 1.0 - level
+
+        reach = normal * float(brentq(excess, 0.0, w + 10.0, xtol=1e-10))
+    return value - reach, value + reach
+
+
+def factor_interval(value: float, relative: float, level: float = 0.95) -> tuple[float, float, float]:
+    """Interval of a positive quantity whose logarithm is normal: (low, high, factor), low = value / factor.
+
+    ``relative`` is the standard uncertainty of the logarithm.
+    """
+    if value <= 0:
+        raise ValueError(f"value = {value!r}: only a positive quantity can be known to a factor")
+    factor = float(np.exp(coverage_factor(level) * relative))
+    return value / factor, value * factor, factor
+
+
+def correlation_times(residuals: Any, *, longest: int | None = None) -> float:
+    r"""How many samples share one independent error: :math:`\tau = 1 + 2 \sum \rho_k`, at least 1.
+
+    The sum stops at the first lag that is not positive (Geyer's initial sequence, Statist. Sci. 7 (1992) 473).
+    """
+    r = np.asarray(residuals, dtype=np.float64)
+    r = r - r.mean()
+    n = len(r)
+    power = float(np.dot(r, r))
+    if n < 4 or power == 0:
+        return 1.0
+    size = 1 << (2 * n - 1).bit_length()
+    spectrum = np.fft.rfft(r, size)
+    rho = np.fft.irfft(np.abs(spectrum) ** 2, size)[:n] / power
+    last = min(n - 1, longest if longest is not None else n // 4)
+    below = np.flatnonzero(rho[1 : last + 1] <= 0)
+    end = int(below[0]) + 1 if len(below) else last + 1
+    return max(1.0, float(1.0 + 2.0 * rho[1:end].sum()))
+
+
+def correlated(jacobian: Any, residuals: Any, pieces: Sequence[int] | None = None) -> FloatArray:
+    r"""Covariance of a least-squares estimate whose residuals are correlated in time.
+
+    .. math::
+
+        C = H^{-1} \Big[\sum_{|k| \le K} w_k \sum_i J_i r_i \, r_{i+k} J_{i+k}^T\Big] H^{-1}, \qquad H = J^T J
+
+    with Bartlett's weights (Newey and West, Econometrica 55 (1987) 703) and K from the residuals' own correlation.
+
+    Parameters
+    ----------
+    jacobian : array (n, p)
+        Derivatives of the weighted residuals.
+    residuals : array (n,)
+        Weighted residuals, in the order of time.
+    pieces : sequence of int, optional
+        Lengths of independent records that follow one another; no correlation is looked for across them.
+
+    Returns
+    -------
+    array (p, p)
+        Never smaller, along any parameter, than the covariance of white residuals of the same size.
+    """
+    j = np.asarray(jacobian, dtype=np.float64)
+    r = np.asarray(residuals, dtype=np.float64)
+    n, p = j.shape
+    lengths = [n] if pieces is None else [int(length) for length in pieces]
+    if sum(lengths) != n or len(r) != n:
+        raise ValueError(f"pieces {lengths} must add up to the {n} rows of the Jacobian and the {len(r)} residuals")
+    scale = np.linalg.norm(j, axis=0)
+    scale[scale == 0] = 1.0
+    inverse = np.linalg.pinv((j / scale).T @ (j / scale))
+    white = inverse * max(float(r @ r) / max(n - p, 1), 0.0)
+    meat = np.zeros((p, p))
+    begin = 0
+    for length in lengths:
+        piece = slice(begin, begin + length)
+        score = (j[piece] / scale) * r[piece, None]
+        meat += score.T @ score
+        lags = min(length - 1, int(np.ceil(4 * correlation_times(r[piece]))) + 2)
+        for k in range(1, lags + 1):
+            cross = score[k:].T @ score[:-k]
+            meat += (1.0 - k / (lags + 1)) * (cross + cross.T)
+        begin += length
+    sandwich = inverse @ meat @ inverse * n / max(n - p, 1)
+    found = sandwich
+    # a short record can make the sum small by chance: what is below white is raised to it
+    ratio = np.sqrt(np.maximum(np.diag(white), 1e-300) / np.maximum(np.diag(sandwich), 1e-300))
+    raise_by = np.maximum(ratio, 1.0)
+    found = sandwich * np.outer(raise_by, raise_by)
+    result: FloatArray = found / np.outer(scale, scale)
+    return result
+
+
+class Profile(NamedTuple):
+    """A parameter's profile likelihood: its values, the rise of chi^2 above its least, and the 95 % limits.
+
+    A limit is NaN where chi^2 does not rise to 3.84 within the values: the data do not bound the parameter there.
+    """
+
+    values: FloatArray
+    cost: FloatArray
+    best: float
+    low: float
+    high: float
+
+
+def profile_likelihood(
+    residual: Callable[[FloatArray], FloatArray],
+    start: Any,
+    which: int,
+    values: Any,
+    *,
+    level: float = 0.95,
+    scale: float = 1.0,
+) -> Profile:
+    """Fit again with one parameter held at each value: what the data say of it, without assuming a parabola.
+
+    Parameters
+    ----------
+    residual : callable
+        Weighted residuals (n,) of a vector of parameters.
+    start : array (p,)
+        The best fit.
+    which : int
+        Index of the parameter that is held.
+    values : array (m,)
+        Where it is held, in rising order, on both sides of the best.
+    level : float
+        Probability of the interval.
+    scale : float
+        Variance of one weighted residual: 1 where the weights are right, else (with their correlation) above 1.
+    """
+    from scipy.optimize import least_squares
+    from scipy.stats import chi2
+
+    best = np.asarray(start, dtype=np.float64)
+    grid = np.asarray(values, dtype=np.float64)
+    if grid.ndim != 1 or len(grid) < 3 or np.any(np.diff(grid) <= 0):
+        raise ValueError("values must be at least three, in rising order")
+    cost = np.empty(len(grid))
+    others = [i for i in range(len(best)) if i != which]
+    middle = int(np.argmin(np.abs(grid - best[which])))
+    sizes = np.where(best != 0, np.abs(best), 1.0)
+    for order in (range(middle, len(grid)), range(middle - 1, -1, -1)):
+        now = best.copy()
+        for i in order:
+            now[which] = grid[i]
+            if others:
+
+                def free(part: FloatArray, full: FloatArray = now) -> FloatArray:
+                    trial = full.copy()
+                    trial[others] = part
+                    return residual(trial)
+
+                now[others] = least_squares(free, now[others], x_scale=sizes[others]).x
+            cost[i] = float(np.sum(residual(now) ** 2))
+    least = min(float(cost.min()), float(np.sum(residual(best) ** 2)))
+    rise = (cost - least) / scale
+    bound = float(chi2.ppf(level, 1))
+    low, high = _crossed(grid[middle::-1], rise[middle::-1], bound), _crossed(grid[middle:], rise[middle:], bound)
+    return Profile(grid, rise, float(best[which]), low, high)
+
+
+def _crossed(values: FloatArray, rise: FloatArray, bound: float) -> float:
+    over = np.flatnonzero(rise > bound)
+    if len(over) == 0 or over[0] == 0:
+        return float("nan")
+    i = int(over[0])
+    part = (bound - rise[i - 1]) / (rise[i] - rise[i - 1])
+    return float(values[i - 1] + part * (values[i] - values[i - 1]))
+
+
+def bootstrap(
+    estimate: Callable[[NDArray[np.intp]], Any], n: int, *, draws: int = 200, block: int = 1, seed: int = 0
+) -> FloatArray:
+    """Estimates from records drawn again with replacement, (draws, p): their scatter is the type-A uncertainty.
+
+    Parameters
+    ----------
+    estimate : callable
+        The estimate from an array of indices into the data (runs, cycles, samples).
+    n : int
+        How many there are.
+    draws : int
+    block : int
+        Length of blocks that are kept together: longer than the errors are correlated.
+    seed : int
+    """
+    if not 1 <= block <= n:
+        raise ValueError(f"block = {block!r} must lie between 1 and n = {n}")
+    rng = np.random.default_rng(seed)
+    found = []
+    for _ in range(draws):
+        begins = rng.integers(0, n - block + 1, size=-(-n // block))
+        rows = (begins[:, None] + np.arange(block)).ravel()[:n]
+        found.append(np.atleast_1d(np.asarray(estimate(rows), dtype=np.float64)))
+    return np.array(found)

@@ -1,0 +1,33 @@
+"""What all pictures of a comparison share: who is who, and what is synthetic."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from nonsmooth.plot import style
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["ABOVE", "MEASURED", "THEORY", "check_kind", "measured_label"]
+
+#: Theory is a blue line or cloud with a pale band, the experiment black points.
+THEORY = style.COLORS["first"]
+MEASURED = style.COLORS["section"]
+
+#: A legend above the axes, for pictures that fill theirs.
+ABOVE: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.2}
+
+
+def measured_label(result: xr.Dataset | Any, word: str = "measured") -> str:
+    """The word for the measured side; it says ``synthetic`` where a virtual rig made the data."""
+    attrs = getattr(result, "attrs", {})
+    return "virtual rig (synthetic)" if str(attrs.get("synthetic", "no")) in ("yes", "True", "1") else word
+
+
+def check_kind(result: xr.Dataset, *kinds: str) -> None:
+    """ValueError where ``result`` is no comparison of one of these kinds."""
+    kind = result.attrs.get("comparison", "")
+    if kind not in kinds:
+        what = f"a comparison of a {kind}" if kind else "no result of compare"
+        raise ValueError(f"this picture needs a comparison of a {' or '.join(kinds)}; this is {what}")

@@ -1,0 +1,82 @@
+"""A measured frequency response over the predicted one, with the band and the jumps of both."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nonsmooth.plot import style
+from nonsmooth.plot.comparison import ABOVE, check_kind, measured_label
+from nonsmooth.plot.labels import first_states, label
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+
+__all__ = ["comparison_response"]
+
+_LOOKS = {"up": ("first", "^", "-", "increasing"), "down": ("second", "v", "--", "decreasing")}
+
+
+def comparison_response(result: xr.Dataset, ax: Axes | None = None, *, digits: int = 3) -> Axes:
+    """Draw a comparison of a response.
+
+    Parameters
+    ----------
+    result
+        A comparison of a response.
+    ax
+        Where to draw; a new one-column figure if None.
+    digits
+        Digits after the point of the jumps written into the legend.
+    """
+    check_kind(result, "response")
+    parameter = str(result["theory_amplitude"].dims[0])
+    (state,) = first_states(result, None)
+    word = measured_label(result)
+    with style.axes(ax) as drawn:
+        values = result[parameter].values
+        runs = result["measured_direction"].values.astype(str)
+        for i, direction in enumerate(result["direction"].values.astype(str)):
+            color, marker, line, name = _LOOKS[direction]
+            color = style.COLORS[color]
+            curve = result["theory_amplitude"].values[:, i]
+            if "theory_low" in result:
+                low, high = (result[f"theory_{edge}"].values[:, i] for edge in ("low", "high"))
+                drawn.fill_between(values, low, high, color=color, alpha=0.2, linewidth=0)
+            drawn.plot(values, curve, line, color=color, label=f"theory, {name}")
+            mine = runs == direction
+            error = result["measured_amplitude_error"].values[mine]
+            at, heights = result[f"measured_{parameter}"].values[mine], result["measured_amplitude"].values[mine]
+            drawn.errorbar(
+                at, heights, yerr=error if np.isfinite(error).any() else None, fmt=marker, color=color, markersize=3,
+                markerfacecolor="white", markeredgewidth=0.7, elinewidth=0.6, label=f"{word}, {name}",
+            )  # fmt: skip
+        _jumps(drawn, result, digits)
+        drawn.set_ylim(bottom=0)
+        drawn.margins(x=0.02)
+        drawn.legend(**ABOVE, ncols=2, handlelength=1.6, columnspacing=1.2)
+        drawn.set(xlabel=label(result, parameter), ylabel=f"amplitude of {label(result, state)}")
+    return drawn
+
+
+def _jumps(ax: Axes, result: xr.Dataset, digits: int) -> None:
+    """A tick at the foot for each jump: filled where measured, open where predicted, with the difference."""
+    foot = ax.get_xaxis_transform()
+    for row in range(result.sizes.get("jump", 0)):
+        direction = str(result["jump_direction"].values[row])
+        color = style.COLORS[_LOOKS[direction][0]]
+        seen, expected = (float(result[name].values[row]) for name in ("measured_jump", "theory_jump"))
+        if np.isfinite(seen):
+            ax.plot([seen], [0.03], "D", color=color, markersize=3.5, transform=foot, clip_on=False, zorder=6)
+        if np.isfinite(expected):
+            ax.plot(
+                [expected], [0.03], "D", color=color, markerfacecolor="white", markersize=3.5, transform=foot,
+                clip_on=False, zorder=6,
+            )  # fmt: skip
+        if np.isfinite(seen) and np.isfinite(expected):
+            ax.annotate(
+                f"{expected - seen:+.{digits}f}", ((seen + expected) / 2, 0.03), (0, 6), xycoords=foot,
+                textcoords="offset points", ha="center", fontsize="x-small", color=color,
+            )  # fmt: skip

@@ -1,0 +1,23 @@
+"""Pictures of what identification found, one for each procedure: ``(finding, ax=None) -> ax``."""
+
+from nonsmooth.plot.identification.amplitude_fit import amplitude_fit
+from nonsmooth.plot.identification.calibration import calibration
+from nonsmooth.plot.identification.decays import drop_decay, free_decay
+from nonsmooth.plot.identification.force_displacement import force_displacement
+from nonsmooth.plot.identification.gap import grazing, multiple_shooting
+from nonsmooth.plot.identification.impulse_response import impulse_history, impulse_response
+from nonsmooth.plot.identification.uncertainty import coverage, profile
+
+__all__ = [
+    "amplitude_fit",
+    "calibration",
+    "coverage",
+    "drop_decay",
+    "force_displacement",
+    "free_decay",
+    "grazing",
+    "impulse_history",
+    "impulse_response",
+    "multiple_shooting",
+    "profile",
+]

@@ -1,0 +1,61 @@
+"""Amplitude over frequency with the simulated ones: viscous damping alone, and with dry friction beside it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.plot import style
+from nonsmooth.plot.comparison import MEASURED, measured_label
+from nonsmooth.plot.identification.findings import data_of, number, with_error
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["amplitude_fit"]
+
+_MARKERS = {"up": "^", "down": "v"}
+
+
+def amplitude_fit(finding: Any, ax: Axes | None = None) -> Axes:
+    """Draw measured amplitudes over frequency with the fits.
+
+    The fit that knows no friction puts all losses into c; its bias is written beside it.
+
+    Parameters
+    ----------
+    finding
+        A viscous damping, or its data: ``amplitude`` over ``run`` with ``omega``; ``joint_amplitude`` and
+        ``viscous_amplitude`` over ``omega_fine``.
+    ax
+        Where to draw; a new one-column figure if None.
+    """
+    data = data_of(finding, "amplitude", "omega", "omega_fine")
+    omega, heights = data["omega"].values, 1e3 * data["amplitude"].values
+    error = 1e3 * data["amplitude_error"].values if "amplitude_error" in data else None
+    words = data["direction"].values.astype(str) if "direction" in data else np.full(len(omega), "")
+    with style.axes(ax) as drawn:
+        for i, word in enumerate(dict.fromkeys(words)):
+            mine = words == word
+            drawn.errorbar(
+                omega[mine], heights[mine], yerr=None if error is None else error[mine], fmt=_MARKERS.get(word, "o"),
+                color=MEASURED, markersize=3, markerfacecolor="white", markeredgewidth=0.7, elinewidth=0.6, zorder=4,
+                label=measured_label(data) + (f", steps {word}" if word else "") if i < 2 else None,
+            )  # fmt: skip
+        for name, word, color, line in (
+            ("joint", "c and dry friction", "first", "-"), ("viscous", "c alone", "second", "--"),
+        ):  # fmt: skip
+            if f"{name}_amplitude" in data:
+                label = word
+                if np.isfinite(value := number(data, f"c_{name}")):
+                    label += f":\n$c$ = {with_error(value, number(data, f'c_{name}_error'), 'N s/m')}"
+                drawn.plot(
+                    data["omega_fine"].values, 1e3 * data[f"{name}_amplitude"].values, line,
+                    color=style.COLORS[color], label=label,
+                )  # fmt: skip
+        drawn.set_ylim(bottom=0)
+        drawn.margins(x=0.02)
+        drawn.legend(loc="best", handlelength=1.6)
+        drawn.set(xlabel=r"$\omega$ (rad/s)", ylabel="amplitude of $x$ (mm)")
+    return drawn

@@ -1,0 +1,69 @@
+"""A calibration: readings over settings with the fitted line and its 95 % band, residuals below."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.plot import style
+from nonsmooth.plot.comparison import MEASURED, measured_label
+from nonsmooth.plot.identification.findings import data_of, number, with_error
+from nonsmooth.plot.identification.residuals import residual_strip
+from nonsmooth.plot.labels import name_with_unit
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+
+__all__ = ["calibration"]
+
+
+def calibration(finding: Any, ax: Axes | None = None) -> Axes:
+    """Draw a calibration: frequency over motor voltage, or the forcing's amplitude over the crank's length.
+
+    Parameters
+    ----------
+    finding
+        A calibration, or its data: ``setting``, ``reading``, ``reading_error`` over ``run``; ``setting_fine`` with
+        ``fitted``, ``fitted_low``, ``fitted_high``; ``slope``, ``intercept``.
+    ax
+        Where to draw; a new one-column figure if None.
+    """
+    data = data_of(finding, "setting", "reading")
+    error = data["reading_error"].values if "reading_error" in data else None
+    with style.axes(ax, ratio=0.85) as drawn:
+        if "fitted" in data:
+            at = data["setting_fine"].values
+            if "fitted_low" in data:
+                drawn.fill_between(
+                    at, data["fitted_low"].values, data["fitted_high"].values, color=style.COLORS["first"], alpha=0.25,
+                    linewidth=0, label="95 % band",
+                )  # fmt: skip
+            drawn.plot(at, data["fitted"].values, color=style.COLORS["first"], label=_law(data))
+        drawn.errorbar(
+            data["setting"].values, data["reading"].values, yerr=error, fmt="o", color=MEASURED, markersize=2.8,
+            elinewidth=0.6, label=measured_label(data), zorder=4,
+        )  # fmt: skip
+        drawn.margins(x=0.03)
+        drawn.legend(loc="upper left")
+        drawn.set(xlabel=_axis(data, "setting"), ylabel=_axis(data, "reading"))
+        if "fitted" in data:
+            setting, reading = data["setting"].values, data["reading"].values
+            left = reading - np.interp(setting, data["setting_fine"].values, data["fitted"].values)
+            residual_strip(drawn, setting, left, "residual", error=error)
+    return drawn
+
+
+def _axis(data: xr.Dataset, name: str) -> str:
+    attrs = data[name].attrs
+    return name_with_unit(str(attrs.get("long_name", name)), str(attrs.get("units", "")))
+
+
+def _law(data: xr.Dataset) -> str:
+    slope = number(data, "slope")
+    if not np.isfinite(slope):
+        return "fitted"
+    units = [str(data[name].attrs.get("units", "")) for name in ("reading", "setting")]
+    per = f"{units[0]}/{units[1]}" if all(units) and "/" not in units[0] else f"{units[0]} per {units[1]}"
+    return f"slope {with_error(slope, number(data, 'slope_error'), per)}"

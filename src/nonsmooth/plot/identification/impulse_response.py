@@ -1,0 +1,88 @@
+"""A free decay and its spectrum, with the grid of the transform: why a peak read off the grid is not the frequency."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.plot import style
+from nonsmooth.plot.comparison import MEASURED, measured_label
+from nonsmooth.plot.identification.findings import data_of, number
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["impulse_history", "impulse_response"]
+
+BINS = 9  # shown on either side of the peak
+
+
+def impulse_response(finding: Any, ax: Axes | None = None) -> Axes:
+    """Draw the spectrum of an impulse response about its peak.
+
+    Stems are the lines of the transform. The largest of them can be half a step away from the frequency; the
+    interpolated peak and the decay fit are not bound to the grid.
+
+    Parameters
+    ----------
+    finding
+        A natural frequency, or its data: ``magnitude`` over ``frequency``, ``peak_frequency``, ``grid_peak``,
+        ``grid_step``, ``decay_frequency``.
+    ax
+        Where to draw; a new one-column figure if None.
+    """
+    data = data_of(finding, "magnitude", "frequency", "peak_frequency")
+    frequency, magnitude = data["frequency"].values, data["magnitude"].values
+    top = int(np.argmin(np.abs(frequency - number(data, "grid_peak")))) if "grid_peak" in data else int(
+        np.nanargmax(magnitude)
+    )
+    first, last = max(top - BINS, 0), min(top + BINS + 1, len(frequency))
+    at, heights = frequency[first:last], 1e3 * magnitude[first:last]
+    with style.axes(ax) as drawn:
+        drawn.vlines(at, 0, heights, color=MEASURED, linewidth=0.7)
+        drawn.plot(at, heights, "o", color=MEASURED, markersize=2.6, label=f"DFT, {measured_label(data)}")
+        step = number(data, "grid_step")
+        if np.isfinite(step):
+            drawn.axvspan(
+                frequency[top] - step / 2, frequency[top] + step / 2, ymax=0.64, color=style.COLORS["zone"], alpha=0.25,
+                linewidth=0, zorder=0, label=f"largest line {_both(frequency[top])}, ± half a step",
+            )  # fmt: skip
+        places = (
+            ("peak_frequency", "interpolated peak", "first", "-"), ("decay_frequency", "decay fit", "second", "--"),
+        )  # fmt: skip
+        for name, word, color, line in places:
+            value = number(data, name)
+            if np.isfinite(value):
+                drawn.axvline(
+                    value, ymax=0.64, color=style.COLORS[color], linestyle=line, linewidth=1.0,
+                    label=f"{word} {_both(value)}",
+                )  # fmt: skip
+        drawn.set_ylim(0, 1.62 * heights.max())
+        drawn.legend(loc="upper right", handlelength=1.6)
+        drawn.margins(x=0.02)
+        drawn.set(xlabel="frequency (Hz)", ylabel="magnitude (mm)")
+    return drawn
+
+
+def impulse_history(finding: Any, ax: Axes | None = None) -> Axes:
+    """Draw the impulse response over time, with the decay that was fitted to it."""
+    data = data_of(finding, "x", "time")
+    with style.axes(ax) as drawn:
+        drawn.plot(
+            data["time"].values, 1e3 * data["x"].values, ".", color=MEASURED, markersize=1.6, markeredgewidth=0,
+            label=measured_label(data), rasterized=True,
+        )  # fmt: skip
+        if "fitted" in data:
+            drawn.plot(
+                data["time"].values, 1e3 * data["fitted"].values, color=style.COLORS["second"], linewidth=0.8,
+                label="fitted decay",
+            )  # fmt: skip
+        drawn.margins(x=0)
+        drawn.legend(loc="upper right", markerscale=3)
+        drawn.set(xlabel="time (s)", ylabel="displacement (mm)")
+    return drawn
+
+
+def _both(frequency: float) -> str:
+    return f"{frequency:.4f} Hz = {2 * np.pi * frequency:.3f} rad/s"

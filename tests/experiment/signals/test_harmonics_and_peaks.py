@@ -1,0 +1,92 @@
+"""Harmonic fits and extremes against signals in closed form; their errors against many of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from motions import COUNT, decay, rms, sine
+
+from nonsmooth.experiment.signals.displacement import found_resolution
+from nonsmooth.experiment.signals.harmonics import fit
+from nonsmooth.experiment.signals.peaks import extremes
+
+
+def test_a_signal_of_harmonics_is_found_exactly() -> None:
+    rng = np.random.default_rng(1)
+    t = np.sort(rng.uniform(3, 23, 900))
+    w, amplitudes, phases = 3.7, np.array([1.0, 0.2, 0.05]), np.array([1.0, 2.0, 5.5])
+    x = 0.1 + np.cos(np.multiply.outer(t, w * np.arange(1, 4)) - phases) @ amplitudes
+    for omega, refine in ((w, False), (w * 1.01, True)):
+        found = fit(t, x, omega, 3, refine=refine)
+        np.testing.assert_allclose([found.omega, found.mean], [w, 0.1], rtol=1e-10)
+        np.testing.assert_allclose(found.amplitudes, amplitudes, atol=1e-10)
+        np.testing.assert_allclose(found.phases, phases, atol=1e-9)
+        np.testing.assert_allclose(found.evaluate(t), x, atol=1e-9)
+
+
+@pytest.mark.parametrize("colour", ["white", "correlated"])
+def test_errors_are_as_stated(colour: str) -> None:
+    z: dict[str, list[float]] = {"omega": [], "mean": [], "amplitude": [], "phase": []}
+    rng = np.random.default_rng(2)
+    t = 7 + np.arange(1500) / 75
+    for _ in range(150):
+        w, phase = rng.uniform(3.6, 3.8), rng.uniform(0.5, 5.5)
+        noise = rng.normal(0, 0.05, len(t) + 200)
+        if colour == "correlated":  # an average over 8 samples
+            noise = np.convolve(noise, np.ones(8) / 8, mode="same")
+        x = 0.1 + np.cos(w * t - phase) + 0.2 * np.cos(2 * w * t - 2) + noise[100:-100]
+        found = fit(t, x, 3.7, 2, refine=True)
+        z["omega"].append((found.omega - w) / found.omega_error)
+        z["mean"].append((found.mean - 0.1) / found.mean_error)
+        z["amplitude"] += list((found.amplitudes - [1.0, 0.2]) / found.amplitude_errors)
+        z["phase"].append((found.phases[0] - phase) / found.phase_errors[0])
+    low, high = (0.85, 1.15) if colour == "white" else (0.7, 1.3)
+    assert all(low < rms(np.array(values)) < high for values in z.values()), {k: rms(np.array(v)) for k, v in z.items()}
+    assert found.correlation == pytest.approx(1.0 if colour == "white" else 8.0, rel=0.35)
+
+
+def test_subharmonics_count_parts_of_the_drive() -> None:
+    t = np.arange(3000) / 100
+    found = fit(t, 0.5 * np.cos(2.5 * t - 1) + 0.2 * np.cos(5 * t - 2), 5.0, 2, subharmonic=2)
+    np.testing.assert_allclose(found.amplitudes, [0.5, 0.2], atol=1e-12)
+    assert found.omega == 5.0
+
+
+def test_refused_fits() -> None:
+    t = np.arange(100) / 100
+    with pytest.raises(ValueError, match="lasts 0.99 s, less than one period of 1.257 s"):
+        fit(t, t, 5.0)
+    with pytest.raises(ValueError, match="harmonic 3 lies at 60 Hz, above half the sample rate"):
+        fit(t, t, 2 * np.pi * 20, 3)
+    with pytest.raises(ValueError, match="omega must be positive"):
+        fit(t, t, -1.0)
+
+
+@pytest.mark.parametrize(("amplitude", "omega", "rate"), [(0.02, 4.5, 0.5), (0.02, 4.5, 0.02), (0.003, 30.0, 0.2)])
+def test_extremes_of_a_decay(amplitude: float, omega: float, rate: float) -> None:
+    motion = decay(amplitude, omega, rate, 6.0 if rate == 0.5 else 15.0)
+    found = extremes(motion.t, motion.counted, resolution=COUNT)
+    lag = np.arctan(rate / omega)  # v = 0 at omega t = k pi - lag
+    k = np.round((omega * found.time.values + lag) / np.pi)
+    true = (k * np.pi - lag) / omega
+    value = amplitude * np.exp(-rate * true) * np.cos(omega * true)
+    assert 0.5 < rms((found.time.values - true) / found.time_error.values) < 1.5
+    assert 0.5 < rms((found.value.values - value) / found.value_error.values) < 1.4
+    assert (np.diff(k) == 1).all() and (found.kind.values == np.where(k % 2, -1, 1)).all()
+    assert len(extremes(motion.t, motion.counted, kind="maxima").time) == np.count_nonzero(found.kind == 1)
+
+
+def test_extremes_need_prominence() -> None:
+    motion = sine(0.02, 4.5, 0.0, 20.0)
+    toggling = motion.counted + COUNT * (np.arange(len(motion.t)) % 2)  # a count to and fro makes no extreme
+    assert len(extremes(motion.t, toggling, resolution=COUNT).time) == len(extremes(motion.t, motion.x).time)
+
+
+def test_the_step_is_read_off_the_values() -> None:
+    assert found_resolution(sine(0.02, 4.5).counted) == pytest.approx(COUNT, rel=1e-6)
+    # Written with few digits, as in a file: 54.8 micrometres at 8 decimals.
+    assert found_resolution(np.round(sine(0.02, 4.5).counted, 8)) == pytest.approx(COUNT, rel=1e-4)
+    with pytest.raises(ValueError, match="all its values are the same"):
+        found_resolution(np.ones(10))
+    with pytest.raises(ValueError, match="not multiples of one step"):
+        found_resolution(np.random.default_rng(1).normal(size=100))

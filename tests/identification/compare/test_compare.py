@@ -1,0 +1,197 @@
+"""compare() on records made from known systems: what is measured is what was put in."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import nonsmooth as ns
+from nonsmooth.identification.compare import compare
+
+NOISE = np.array([1e-5, 3e-4])
+MODEL = ns.models.discontinuous_support()
+RUN = {"rho": 0.33, "omega": 11.15}
+
+
+def record(system: ns.System, seconds: float = 120.0, seed: int = 0) -> xr.Dataset:
+    """A motion sampled at 100 Hz with noise, as a smoother would hand it on."""
+    begin = 200 * system.period()
+    time = begin + 0.0037 + np.arange(int(seconds * 100)) / 100
+    run = ns.simulate(system, duration=time[-1] + 0.1, samples=time)
+    at = np.searchsorted(run["time"].values, time)
+    u = run["u"].values[at] + NOISE * np.random.default_rng(seed).normal(size=(len(time), 2))
+    omega = system.values["omega"]
+    return xr.Dataset(
+        {
+            "u": (("time", "state"), u), "u_error": (("time", "state"), np.tile(NOISE, (len(time), 1))),
+            "phase": ("time", time * omega / (2 * np.pi)),
+        },
+        {"time": time, "state": ["x", "v"], "state_unit": ("state", ["m", "m/s"])},
+        {"synthetic": "yes", "title": "a test"},
+    )  # fmt: skip
+
+
+class Known(dict):
+    """Values with a covariance, as a ParameterSet has them."""
+
+    def __init__(self, **sizes: tuple[float, float]) -> None:
+        super().__init__({name: value for name, (value, _) in sizes.items()})
+        matrix = np.diag([error**2 for _, error in sizes.values()])
+        self.covariance = xr.DataArray(matrix, dims=["parameter", "parameter_"], coords={"parameter": list(sizes)})
+
+
+@pytest.mark.parametrize(("g", "number"), [(-0.0012, 1), (0.0009, 2), (0.0014, 3)])
+def test_the_same_system_is_found_again(g: float, number: int) -> None:
+    """Periods of Fig. 14 of Savi et al. (2007); the distance of the mean orbit is that of its noise."""
+    found = compare(record(MODEL.with_parameters(RUN, g=g)), MODEL, settings={**RUN, "g": g})
+    assert int(found["measured_period_number"]) == number
+    assert int(found["period_agrees"]) == 1 == int(found["period_coexists"])
+    assert float(found["orbit_distance"]) < 5e-3
+    assert abs(float(found["phase_shift"])) < 1e-3
+    assert found.sizes["phase"] == 128 * number
+
+
+def test_a_free_motion_has_its_closed_form() -> None:
+    """The amplitude is (rho/m) / (w0^2 - w^2 + i c w/m): another c moves the orbit by a known distance."""
+    free = {"rho": 0.14, "omega": 4.0, "g": 1.0}
+    c = 0.95
+
+    def amplitude(c: float) -> complex:
+        return (0.14 / 0.838) / (2 * 8.47 / 0.838 - 4.0**2 + 1j * c * 4.0 / 0.838)
+
+    found = compare(record(MODEL.with_parameters(free), 60.0), MODEL.with_parameters(c=c), settings=free)
+    a, b = amplitude(0.87), amplitude(c)
+    size = np.sqrt((abs(a) ** 2 + abs(b) ** 2) / 2)
+    assert float(found["orbit_distance"]) == pytest.approx(abs(a - b) / size, abs=1e-3)
+    assert float(found["orbit_distance_any_phase"]) == pytest.approx(abs(abs(a) - abs(b)) / size, abs=1e-3)
+    lead = (np.angle(b) - np.angle(a)) / (2 * np.pi)
+    assert float(found["phase_shift"]) == pytest.approx(lead, abs=2e-4)
+
+
+def test_chaos_of_the_same_system_is_within_its_own_halves() -> None:
+    settings = {**RUN, "g": 0.0018}
+    motion = record(MODEL.with_parameters(settings), 170.0)
+    found = compare(motion, MODEL, settings=settings, section_phase=[0.0, 0.25])
+    assert found["energy_ratio"].dims == ("section_phase",)
+    assert int(found["measured_period_number"]) == 0 == int(found["theory_period_number"])
+    assert (found["energy_ratio"] < 1.5).all()
+    assert np.isnan(float(found["orbit_distance"]))
+    # Where the motion is shown it begins with the measurement.
+    first = [found[f"{side}_orbit"].values[0] for side in ("measured", "theory")]
+    np.testing.assert_allclose(first[0], first[1], atol=1e-12)
+    other = compare(motion, MODEL, settings={**settings, "g": 0.0014})
+    assert float(other["energy_ratio"]) > 2 * float(found["energy_ratio"].max())
+
+
+def test_the_band_is_the_spread_of_the_prediction() -> None:
+    """For a free motion x depends on the draw through a closed form; its band is that of the drawn amplitudes."""
+    free = {"rho": 0.14, "omega": 6.5, "g": 1.0}
+    known = Known(k=(8.47, 0.08))
+    found = compare(
+        record(MODEL.with_parameters(free), 30.0), MODEL, parameters=known, settings=free, draws=40, seed=3
+    )
+    drawn = found["drawn_k"].values
+    response = (0.14 / 0.838) / (2 * drawn / 0.838 - 6.5**2 + 1j * 0.87 * 6.5 / 0.838)
+    x = (response[:, None] * np.exp(2j * np.pi * found["phase"].values)).real
+    low, high = np.quantile(x, [0.025, 0.975], axis=0)
+    np.testing.assert_allclose(found["theory_low"].sel(state="x").values, low, atol=1e-9)
+    np.testing.assert_allclose(found["theory_high"].sel(state="x").values, high, atol=1e-9)
+    assert float(found["band_share"]) == 1.0
+    again = compare(
+        record(MODEL.with_parameters(free), 30.0), MODEL, parameters=known, settings=free, draws=40, seed=3
+    )
+    xr.testing.assert_identical(found, again)
+
+
+def test_a_setting_that_follows_from_a_parameter_is_uncertain_with_it() -> None:
+    settings = {"rho": lambda p: p["k"] * 0.0165, "omega": 4.0, "g": 1.0}
+    motion = record(MODEL.with_parameters(rho=8.47 * 0.0165, omega=4.0, g=1.0), 30.0)
+    found = compare(motion, MODEL, parameters=Known(k=(8.47, 0.05)), settings=settings, draws=10)
+    np.testing.assert_allclose(found["drawn_rho"], 0.0165 * found["drawn_k"], rtol=1e-12)
+
+
+def test_a_result_at_hand_is_a_theory_too() -> None:
+    settings = {**RUN, "g": 0.0009}
+    system = MODEL.with_parameters(settings)
+    run = ns.simulate(system, periods=60, transient=300)
+    found = compare(record(system), run)
+    assert int(found["theory_period_number"]) == 2 and float(found["orbit_distance"]) < 5e-3
+    points = ns.poincare(system, n=100, transient=300)
+    assert int(compare(record(system), points)["period_agrees"]) == 1
+    with pytest.raises(ValueError, match="change a System"):
+        compare(record(system), run, settings={"g": 0.0})
+
+
+def test_a_response_with_its_jumps(tmp_path: Path) -> None:
+    """Fig. 9: jumps of the model at 5.8 (rising) and 5.16 (falling), from steps as coarse as an experiment's."""
+    settings = {"rho": 0.14, "g": 0.02}
+    system = MODEL.with_parameters(settings)
+    swept = ns.frequency_response(system, np.arange(4.5, 6.5, 0.05), transient=200, keep=16, progress=False)
+    runs = swept["amplitude"].sel(state="x").stack(run=("direction", "omega")).reset_index("run")
+    measured = xr.Dataset(
+        {"amplitude": ("run", runs.values), "amplitude_error": ("run", np.full(runs.size, 1e-5))},
+        {"omega": ("run", runs["omega"].values, {"units": "rad/s"}), "direction": ("run", runs["direction"].values)},
+    )
+    found = compare(measured, MODEL, settings=settings, transient=200)
+    assert np.abs(found["relative_difference"]).max() < 1e-6
+    assert found["jump_direction"].values.tolist() == ["up", "down"]
+    assert (np.abs(found["jump_difference"]) <= found["jump_tolerance"]).all()
+    ns.save(found, tmp_path / "response.nc")
+    xr.testing.assert_identical(ns.load(tmp_path / "response.nc"), found)
+
+
+def test_a_diagram_with_its_flips(tmp_path: Path) -> None:
+    """Steady runs around the first flip of Fig. 11: measured and predicted flips are one within a step."""
+    settings = {"omega": 3.69, "g": -0.0045}
+    system = MODEL.with_parameters(settings)
+    values = np.linspace(0.38, 0.43, 21)
+    swept = ns.sweep(system, "rho", values, direction="down", keep=40, progress=False)
+    section = swept["section"].values
+    noise = NOISE * np.random.default_rng(0).normal(size=section.shape)
+    measured = xr.Dataset(
+        {"section": (("rho", "iterate", "state"), section + noise)},
+        {"rho": ("rho", values, {"units": "N"}), "state": ["x", "v"]},
+    )
+    found = compare(measured, MODEL, settings=settings, noise={"x": NOISE[0], "v": NOISE[1]}, values=values)
+    assert found["flip"].values.tolist() == ["1-2"]
+    assert abs(float(found["flip_relative_difference"][0])) < 0.01
+    ns.save(found, tmp_path / "diagram.zarr")
+    xr.testing.assert_identical(ns.load(tmp_path / "diagram.zarr"), found)
+
+
+def test_a_comparison_is_kept_whole(tmp_path: Path) -> None:
+    settings = {**RUN, "g": 0.0009}
+    found = compare(record(MODEL.with_parameters(settings), 40.0), MODEL, settings=settings, draws=3)
+    assert found.attrs["synthetic"] == "yes"
+    for name in ("motion.nc", "motion.zarr"):
+        ns.save(found, tmp_path / name)
+        xr.testing.assert_identical(ns.load(tmp_path / name), found)
+
+
+def test_what_cannot_be_compared_is_refused() -> None:
+    motion = record(MODEL.with_parameters(RUN, g=0.0009), 20.0)
+    with pytest.raises(TypeError, match="measured_motion"):
+        compare("recording.csv", MODEL)  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="System or a result"):
+        compare(motion, 3)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="standard error of the measured states is not known"):
+        compare(motion.drop_vars("u_error"), MODEL)
+    with pytest.raises(ValueError, match="needs `phase`"):
+        compare(motion.drop_vars("phase"), MODEL)
+    with pytest.raises(ValueError, match="nothing here can be compared"):
+        compare(motion.drop_vars("u"), MODEL)
+    with pytest.raises(ValueError, match="`y` is not a state.*nearest|`y` is not a state"):
+        compare(motion, MODEL, noise={"y": 1.0})
+    with pytest.raises(ValueError, match="level = 95"):
+        compare(motion, MODEL, level=95)
+    with pytest.raises(ValueError, match="states are a, b"):
+        compare(motion.assign_coords(state=["a", "b"]), MODEL)
+    valve = ns.models.relief_valve()
+    states = list(valve.states)
+    u = np.tile(motion["u"].values[:, :1], (1, len(states)))
+    unforced = xr.Dataset({"u": (("time", "state"), u), "phase": motion["phase"]}, {"state": states})
+    with pytest.raises(ValueError, match="no forcing period"):
+        compare(unforced, valve, noise=np.ones(len(states)))

@@ -1,0 +1,73 @@
+"""Intervals, correlated residuals, profiles and lines against closed forms and published numbers."""
+
+import numpy as np
+import pytest
+
+from nonsmooth.identification.finding import Estimate
+from nonsmooth.identification.lines import york
+from nonsmooth.identification.uncertainty import (
+    bootstrap,
+    correlated,
+    correlation_times,
+    coverage_factor,
+    factor_interval,
+    interval,
+    profile_likelihood,
+    uniform,
+)
+
+
+def test_uniform_and_normal_limits():
+    assert uniform(1.0) == pytest.approx(1 / np.sqrt(3))
+    assert coverage_factor(0.95) == pytest.approx(1.959964, abs=1e-6)
+    assert interval(0.0, 1.0)[1] == pytest.approx(1.959964, abs=1e-6)
+    assert interval(0.0, 0.0, 1.0)[1] == pytest.approx(0.95)
+
+
+def test_uniform_and_normal_together_hold_what_they_say():
+    rng = np.random.default_rng(1)
+    low, high = interval(0.0, 0.5, 1.0)
+    drawn = 0.5 * rng.standard_normal(400_000) + rng.uniform(-1, 1, 400_000)
+    assert np.mean((drawn > low) & (drawn < high)) == pytest.approx(0.95, abs=0.002)
+
+
+def test_a_factor():
+    low, high, factor = factor_interval(2.0, np.log(2) / 1.959964)
+    assert (low, high, factor) == pytest.approx((1.0, 4.0, 2.0), rel=1e-6)
+    assert Estimate(2.0, 0.4, logarithmic=True).factor == pytest.approx(np.exp(1.959964 * 0.2))
+
+
+def test_correlation_of_an_autoregressive_series():
+    # tau = (1 + a) / (1 - a) for x_n = a x_(n-1) + e_n
+    rng, a = np.random.default_rng(0), 0.6
+    x = np.zeros(200_000)
+    for i, e in enumerate(rng.standard_normal(len(x) - 1), 1):
+        x[i] = a * x[i - 1] + e
+    assert correlation_times(x, longest=60) == pytest.approx(4.0, rel=0.05)
+    # and the variance of its mean is tau times that of white residuals
+    c = correlated(np.ones((20_000, 1)), x[:20_000] - x[:20_000].mean())
+    assert c[0, 0] * 20_000 == pytest.approx(1 / (1 - a) ** 2, rel=0.25)
+
+
+def test_profile_of_a_parabola_gives_the_normal_interval():
+    profile = profile_likelihood(lambda p: (p - [1.0, 2.0]) / [0.1, 0.2], [1.0, 2.0], 0, np.linspace(0.5, 1.5, 101))
+    assert (profile.low, profile.high) == pytest.approx((1 - 0.19600, 1 + 0.19600), abs=1e-3)
+
+
+def test_bootstrap_of_a_mean():
+    x = np.random.default_rng(3).standard_normal(400)
+    found = bootstrap(lambda rows: x[rows].mean(), 400, draws=2000)
+    assert found.std() == pytest.approx(x.std() / 20, rel=0.1)
+
+
+def test_york_on_pearsons_data_with_yorks_weights():
+    # York et al. (2004), Table 2: slope -0.480533 +- 0.057985, intercept 5.479910 +- 0.294971
+    x = [0.0, 0.9, 1.8, 2.6, 3.3, 4.4, 5.2, 6.1, 6.5, 7.4]
+    y = [5.9, 5.4, 4.4, 4.6, 3.5, 3.7, 2.8, 2.8, 2.4, 1.5]
+    wx = np.array([1000, 1000, 500, 800, 200, 80, 60, 20, 1.8, 1.0])
+    wy = np.array([1.0, 1.8, 4, 8, 20, 20, 70, 70, 100, 500])
+    line = york(x, y, wx**-0.5, wy**-0.5)
+    assert line.slope == pytest.approx(-0.480533, abs=2e-6)
+    assert line.intercept == pytest.approx(5.479910, abs=2e-5)
+    assert line.slope_error == pytest.approx(0.057985, abs=2e-5)
+    assert line.intercept_error == pytest.approx(0.294971, abs=1e-4)

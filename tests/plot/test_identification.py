@@ -1,0 +1,192 @@
+"""Pictures of identification and comparison: they draw what they are given, and say what is synthetic."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import matplotlib as mpl
+
+mpl.use("Agg")
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+import xarray as xr
+
+import nonsmooth as ns
+from nonsmooth.identification.compare import compare
+from nonsmooth.plot import comparison_diagram, comparison_motion, comparison_response, identification
+
+SYNTHETIC = {"synthetic": "yes"}
+
+
+@pytest.fixture(autouse=True)
+def close() -> Iterator[None]:
+    yield
+    plt.close("all")
+
+
+def words(ax: Any) -> str:
+    """All that is written on the figure of these axes."""
+    ax.figure.canvas.draw()
+    return " ".join(text.get_text() for text in ax.figure.findobj(mpl.text.Text))
+
+
+def spring() -> xr.Dataset:
+    x = np.concatenate([np.linspace(-0.08, 0.08, 50), np.linspace(0.08, -0.08, 50)])
+    pull = np.repeat([1, -1], 50)
+    return xr.Dataset(
+        {
+            "displacement": ("sample", x), "force": ("sample", 16.94 * x + 0.01 * pull), "pull": ("sample", pull),
+            "slope": ("line", [16.94]), "intercept": ("line", [0.0]), "slope_error": ("line", [0.02]),
+            "friction_force": 0.01, "friction_force_error": 0.001,
+        },
+        attrs=SYNTHETIC,
+    )  # fmt: skip
+
+
+def decay() -> xr.Dataset:
+    t = np.arange(2048) / 100
+    x = 0.08 * np.exp(-0.52 * t) * np.cos(4.466 * t)
+    magnitude, frequency = np.abs(np.fft.rfft(x)) / 1024, np.fft.rfftfreq(2048, 0.01)
+    return xr.Dataset(
+        {
+            "x": ("time", x), "fitted": ("time", x), "magnitude": ("frequency", magnitude), "peak_frequency": 0.711,
+            "grid_step": frequency[1], "grid_peak": frequency[np.argmax(magnitude)], "decay_frequency": 0.7155,
+        },
+        {"time": t, "frequency": frequency}, SYNTHETIC,
+    )  # fmt: skip
+
+
+def amplitudes() -> xr.Dataset:
+    omega = np.linspace(3, 6, 12)
+    return xr.Dataset(
+        {
+            "omega": ("run", omega), "amplitude": ("run", 0.02 / omega), "amplitude_error": ("run", 1e-4 + 0 * omega),
+            "joint_amplitude": ("omega_fine", 0.02 / omega), "viscous_amplitude": ("omega_fine", 0.021 / omega),
+            "c_joint": 0.87, "c_joint_error": 0.004, "c_viscous": 0.95, "c_viscous_error": 0.002,
+        },
+        {"omega_fine": omega}, SYNTHETIC,
+    )  # fmt: skip
+
+
+def peaks() -> xr.Dataset:
+    t = np.arange(1, 14) * 0.7
+    height = 0.08 * np.exp(-0.52 * t)
+    return xr.Dataset(
+        {
+            "peak_time": ("peak", t), "peak_height": ("peak", height), "log_height": ("peak", np.log(height)),
+            "used": ("peak", (t < 7).astype(int)), "slope": -0.52, "intercept": np.log(0.08), "damping_ratio": 0.0075,
+            "damping_ratio_error": 0.0001, "c": 0.87, "c_error": 0.01,
+        },
+        attrs=SYNTHETIC,
+    )  # fmt: skip
+
+
+def line() -> xr.Dataset:
+    v = np.arange(2.0, 12.0)
+    return xr.Dataset(
+        {
+            "setting": ("run", v, {"units": "V", "long_name": "voltage"}), "fitted": ("setting_fine", 1.2 * v - 0.9),
+            "reading": ("run", 1.2 * v - 0.9 + 0.01 * np.sin(v), {"units": "rad/s", "long_name": "frequency"}),
+            "reading_error": ("run", np.full(10, 0.02)), "slope": 1.2, "slope_error": 0.004,
+        },
+        {"setting_fine": v}, SYNTHETIC,
+    )  # fmt: skip
+
+
+def touch() -> xr.Dataset:
+    s = np.linspace(4.8, 5.5, 15)
+    return xr.Dataset(
+        {
+            "setting": ("run", s, {"units": "rad/s", "long_name": "frequency"}), "amplitude": ("run", 0.1 / s),
+            "contact": ("run", (s < 5.1).astype(int)), "grazing_low": 5.1, "grazing_high": 5.15, "gap": 0.0195,
+            "gap_error": 3e-5,
+        },
+        attrs=SYNTHETIC,
+    )  # fmt: skip
+
+
+def shots() -> xr.Dataset:
+    t = np.arange(400) / 100
+    x = 0.01 * np.cos(11.15 * t)
+    return xr.Dataset(
+        {
+            "x": ("time", x + 1e-5 * np.sin(99 * t)), "fitted": ("time", x), "segment": ("time", (t / 0.4).astype(int)),
+            "in_contact": ("time", (x > 0.009).astype(int)), "gap": 0.009, "gap_error": 2e-5,
+        },
+        {"time": t}, SYNTHETIC,
+    )  # fmt: skip
+
+
+def flat() -> xr.Dataset:
+    value = np.geomspace(0.06, 6, 30)
+    return xr.Dataset(
+        {"cost": ("value", 3 * np.log(value / 0.6) ** 2), "best": 0.6, "low": 0.2, "high": 1.9},
+        {"value": value}, {**SYNTHETIC, "parameter": "c_s", "units": "N s/m"},
+    )  # fmt: skip
+
+
+def many() -> xr.Dataset:
+    off = np.random.default_rng(0).normal(size=(40, 3))
+    over = ("rig", "parameter")
+    return xr.Dataset(
+        {"truth": (over, 0 * off), "estimate": (over, off), "uncertainty": (over, 1 + 0 * off)},
+        {"parameter": ["k", "c", "c_s"]}, SYNTHETIC,
+    )  # fmt: skip
+
+
+PICTURES = {
+    "force_displacement": spring, "impulse_response": decay, "impulse_history": decay, "amplitude_fit": amplitudes,
+    "free_decay": peaks, "drop_decay": peaks, "calibration": line, "grazing": touch, "multiple_shooting": shots,
+    "profile": flat, "coverage": many,
+}  # fmt: skip
+
+
+def test_every_picture_is_tested() -> None:
+    assert set(PICTURES) == set(identification.__all__)
+
+
+@pytest.mark.parametrize("name", PICTURES)
+def test_a_picture_says_that_it_is_synthetic(name: str) -> None:
+    assert "synthetic" in words(getattr(identification, name)(PICTURES[name]()))
+
+
+@pytest.mark.parametrize("name", PICTURES)
+def test_data_of_another_procedure_are_refused(name: str) -> None:
+    with pytest.raises(ValueError, match=r"this picture needs .*hold nothing_of_use"):
+        getattr(identification, name)(xr.Dataset({"nothing_of_use": 1.0}))
+
+
+def test_measured_data_are_not_called_synthetic() -> None:
+    assert "synthetic" not in words(identification.force_displacement(spring().assign_attrs(synthetic="no")))
+
+
+def test_numbers_are_written_with_their_errors() -> None:
+    written = words(identification.force_displacement(spring()))
+    assert "16.940 ± 0.020 N/m" in written and "10.0 ± 1.0 mN" in written
+
+
+def test_the_grid_of_the_transform_is_shown() -> None:
+    """A record of 20.48 s has lines 0.0488 Hz apart: 0.7324 Hz is the paper's 4.60 rad/s."""
+    assert "0.7324 Hz = 4.602 rad/s" in words(identification.impulse_response(decay()))
+
+
+def motion() -> xr.Dataset:
+    system = ns.models.discontinuous_support(g=0.0009, rho=0.33, omega=11.15)
+    run = ns.simulate(system, periods=60, transient=200, samples=60 * 50 + 1)
+    measured = xr.Dataset(
+        {"u": run["u"], "phase": ("time", run["time"].values * 11.15 / (2 * np.pi))}, attrs=SYNTHETIC
+    )
+    return compare(measured, system, noise=[1e-5, 1e-4], draws=0)
+
+
+def test_pictures_of_a_motion() -> None:
+    result = motion()
+    for name in ("comparison_time", "comparison_phase_portrait", "comparison_section", "comparison_distances"):
+        assert "synthetic" in words(getattr(comparison_motion, name)(result))
+    with pytest.raises(ValueError, match="needs a comparison of a response; this is a comparison of a motion"):
+        comparison_response.comparison_response(result)
+    with pytest.raises(ValueError, match="no result of compare"):
+        comparison_diagram.comparison_diagram(xr.Dataset())
