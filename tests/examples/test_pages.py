@@ -10,7 +10,7 @@ from page_code import blocks, run_page
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", ROOT / "docs" / "start.md", *sorted((ROOT / "docs" / "guides").glob("*.md"))]
-NEED_A_FILE = {"recordings"}  # of the reader's own
+NEED_A_FILE = {"recordings", "from_your_rig_to_parameters"}  # of the reader's own
 PAGES = [page for page in PAGES if page.stem not in NEED_A_FILE and blocks(page.read_text(encoding="utf-8"))]
 FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 

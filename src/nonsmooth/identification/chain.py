@@ -172,7 +172,7 @@ def _contacts(
             f"multiple shooting over {found.n_contacts} pieces split at contacts",
             found.fit.samples,
             tuple(run.name for run in found.runs),
-            ("one contact of 8 samples at 100 Hz tells next to nothing of c_s; only many contacts together do",),
+            ("one contact is 8 samples at 100 Hz: what is known of c_s comes from many fitted together",),
             {"k_s": Estimate(found.values[3] * m, float(error[3] * m), "N/m")},
         )
     )
@@ -257,8 +257,8 @@ def _identifiability(adjusted: Adjusted, contacts: ContactFit | None) -> dict[st
         "k": "from omega_0 and m; the force sensor's slope agrees within its gain",
         "c": "from the shape of the free decay, together with the dry friction: the rig's own viscous part",
         "k_s": "from the frequency of the test mass and of contacts; the force sensor's slope within its gain",
-        "c_s": "from the decay of the drop; a contact lasts 8 samples at 100 Hz and c_s/k_s is 0.5 ms, so that single "
-        "contacts hardly show it",
+        "c_s": "from the decay of the drop; a contact lasts 8 samples at 100 Hz and c_s/k_s is 0.5 ms, so that a single "
+        "contact tells it poorly",
         "g": "from where contacts begin, referred to the mean position under the drive",
     }
     if contacts is not None:
@@ -266,7 +266,7 @@ def _identifiability(adjusted: Adjusted, contacts: ContactFit | None) -> dict[st
         one = float(np.exp(1.96 * relative * np.sqrt(max(contacts.n_contacts, 1))))
         said["c_s"] += (
             f"; {contacts.n_contacts} pieces together know it within a factor {np.exp(1.96 * relative):.4g}, one alone "
-            f"within {one:.2g}"
+            f"about {one:.2g}"
         )
     return {name: said[name] for name in said if name in adjusted.names or name == "g"}
 

@@ -29,7 +29,8 @@ def tones(noise: float, n: int = 40, seed: int = 1) -> list[tuple[float, np.ndar
 @pytest.mark.parametrize("padding", [1, 4])
 def test_the_bias_stays_below_its_bound(window: object, interpolation: str, padding: int) -> None:
     for f, x in tones(0.0):
-        found = peak(spectrum(x, RATE, window=window, padding=padding), interpolation=interpolation)  # type: ignore[arg-type]
+        spectra = spectrum(x, RATE, window=window, padding=padding)
+        found = peak(spectra, interpolation=interpolation)  # type: ignore[arg-type]
         assert abs(found.frequency - f) <= found.bias * 1.001 + 1e-9
         assert found.grid_step == pytest.approx(0.1)
         if interpolation == "window":
