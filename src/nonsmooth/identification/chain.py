@@ -257,7 +257,7 @@ def _identifiability(adjusted: Adjusted, contacts: ContactFit | None) -> dict[st
         "k": "from omega_0 and m; the force sensor's slope agrees within its gain",
         "c": "from the shape of the free decay, together with the dry friction: the rig's own viscous part",
         "k_s": "from the frequency of the test mass and of contacts; the force sensor's slope within its gain",
-        "c_s": "from the decay of the drop; a contact lasts 8 samples at 100 Hz and c_s/k_s is 0.5 ms, so that a single "
+        "c_s": "from the decay of the drop; a contact lasts 8 samples at 100 Hz and c_s/k_s is 0.5 ms, so a single "
         "contact tells it poorly",
         "g": "from where contacts begin, referred to the mean position under the drive",
     }
@@ -265,8 +265,8 @@ def _identifiability(adjusted: Adjusted, contacts: ContactFit | None) -> dict[st
         relative = float(np.sqrt(contacts.covariance[4, 4]) / abs(contacts.values[4]))
         one = float(np.exp(1.96 * relative * np.sqrt(max(contacts.n_contacts, 1))))
         said["c_s"] += (
-            f"; {contacts.n_contacts} pieces together know it within a factor {np.exp(1.96 * relative):.4g}, one alone "
-            f"about {one:.2g}"
+            f"; {contacts.n_contacts} pieces together know it within a factor {np.exp(1.96 * relative):.4g}, one "
+            f"alone about {one:.2g}"
         )
     return {name: said[name] for name in said if name in adjusted.names or name == "g"}
 
