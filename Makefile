@@ -9,7 +9,7 @@ OUT    ?= out/savi2007
 PYTEST_ARGS ?= -n auto --dist loadfile
 
 .DEFAULT_GOAL := help
-.PHONY: help reproduce test fuzz check bench docs clean distclean
+.PHONY: help reproduce test fuzz coverage check bench docs clean distclean
 
 help:  ## list the targets
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 18
@@ -22,6 +22,9 @@ test: $(VENV)/.installed-test  ## run the tests
 
 fuzz: $(VENV)/.installed-test  ## read 100 000 damaged recordings with every reader
 	NONSMOOTH_FUZZ=1 $(BIN)/python -m pytest -m slow tests/experiment/test_fuzz.py -s
+
+coverage: $(VENV)/.installed-run  ## identify 40 virtual rigs; writes docs/measured_coverage.md
+	$(BIN)/python -m nonsmooth.identification.coverage --seeds 0-39 --out docs/measured_coverage.md
 
 check: $(VENV)/.installed-dev  ## ruff, mypy, import-linter, codespell
 	$(BIN)/ruff check .
