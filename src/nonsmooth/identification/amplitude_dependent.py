@@ -1,0 +1,193 @@
+r"""Natural frequency and damping over amplitude (the backbone), from forced responses that may hang over.
+
+Each measured point is a frequency, an amplitude and, where recorded, a force and a phase. The force is one function of
+the first two (:mod:`nonsmooth.identification.nonlinear_mode`), whether the point is stable, unstable, measured under
+constant force or constant amplitude. So the fit asks for each point what force and phase the mode needs for *this*
+amplitude at *this* frequency, and compares their logarithm,
+
+.. math::
+
+    r = \ln \frac{F}{m\,[\omega_n^2(a) - \Omega^2 + i D(a) \Omega]\, a e^{i\varphi}} ,
+
+real part: the force, imaginary part: the phase. Nothing asks for *the* amplitude at a frequency, which would lose the
+points of an overhanging curve.
+
+Curves measured one after the other differ by more than their points scatter: a joint settles, a room warms up. Each curve
+therefore has its own small shift of :math:`\ln \omega_n^2` and :math:`\ln D`, normal with standard deviations that are found
+from the data (a random effect); they are stated, and carried into the uncertainty of the backbone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from nonsmooth.identification.finding import Estimate, Finding
+from nonsmooth.identification.nonlinear_mode import NonlinearMode, interpolation
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from nonsmooth.experiment.recording import Recording
+
+__all__ = ["ResponseCurve", "amplitude_dependent", "response_curves"]
+
+FloatArray = NDArray[np.float64]
+
+_POWERS = {"m": 0, "m/s": 1, "m/s^2": 2, "m/s²": 2}
+_METHOD = "forced responses fitted along their curves by one mode with amplitude-dependent frequency and damping"
+
+
+@dataclass(frozen=True, eq=False)
+class ResponseCurve:
+    """Forced responses measured in one go: over the same points, frequency (Hz), amplitude of displacement (m), and
+    where they were recorded force (N) and phase of the displacement after the force (rad).
+    """
+
+    name: str
+    frequency: FloatArray
+    amplitude: FloatArray
+    force: FloatArray | None = None
+    phase: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        given = {"frequency": self.frequency, "amplitude": self.amplitude, "force": self.force, "phase": self.phase}
+        sizes = {key: np.shape(v) for key, v in given.items() if v is not None}
+        if len(set(sizes.values())) != 1 or len(next(iter(sizes.values()))) != 1:
+            raise ValueError(f"curve {self.name!r}: all must be arrays of one length, got {sizes}")
+        for key, v in given.items():
+            if v is not None and not np.isfinite(v).all():
+                bad = np.count_nonzero(~np.isfinite(v))
+                raise ValueError(f"curve {self.name!r}: {bad} values of {key} are not finite; leave those points out")
+            if v is not None and key != "phase" and not (np.asarray(v) > 0).all():
+                raise ValueError(f"curve {self.name!r}: {key} must be positive everywhere; leave other points out")
+
+
+def response_curves(
+    recording: Recording, *, amplitude: str = "amplitude", force: str | None = "force", phase: str | None = "phase"
+) -> tuple[ResponseCurve, ...]:
+    """The curves of a recording over ``frequency``, one for each run; amplitudes become displacements (m).
+
+    Parameters
+    ----------
+    recording : Recording
+        Read with ``load_recording(path, axis="frequency")``.
+    amplitude, force, phase : str
+        Names of the channels; None where there is none. The amplitude is one of displacement (m), velocity (m/s) or
+        acceleration (m/s^2); the phase is that of the displacement after the force, in rad.
+
+    Raises
+    ------
+    ValueError
+        If a channel is missing or its unit is not one of those.
+    """
+    from nonsmooth.experiment.signals.checks import take
+
+    curves = []
+    for run in recording.runs:
+        size = take(recording, amplitude, run, units=tuple(_POWERS), samples=3)
+        (axis,) = size.dims
+        if axis != "frequency":
+            raise ValueError(f"run {run!r}: stands over {axis!r}; read it with load_recording(..., axis='frequency')")
+        f = np.asarray(size["frequency"].values, dtype=np.float64)
+        beside: list[FloatArray | None] = []
+        for name, unit in ((force, "N"), (phase, "rad")):
+            at = None if name is None else take(recording, name, run, units=(unit,), samples=3).values
+            beside.append(None if at is None else np.asarray(at, dtype=np.float64))
+        power = _POWERS[size.attrs["units"]]
+        curves.append(ResponseCurve(run, f, np.asarray(size.values) / (2 * np.pi * f) ** power, *beside))
+    return tuple(curves)
+
+
+def amplitude_dependent(
+    curves: Sequence[ResponseCurve], *, knots: int | ArrayLike = 5, residual: bool = False, mass: float | None = None
+) -> tuple[Finding, NonlinearMode]:
+    r"""Fit :math:`\omega_n(a)` and :math:`\zeta(a)` of one mode to forced responses.
+
+    Parameters
+    ----------
+    curves : sequence of ResponseCurve
+        With forces: the modal mass is fitted with the rest. Without: each curve was measured under a force of constant,
+        unknown amplitude, and its force by mass is fitted.
+    knots : int or array_like
+        Amplitudes (m) at which frequency and damping are sought, or how many, evenly spaced; a cubic spline between.
+    residual : bool
+        Fit what other modes add, R (complex); needs forces and phases.
+    mass : float, optional
+        The modal mass (kg) where it is known.
+
+    Returns
+    -------
+    finding : Finding
+        ``f_n`` at the least amplitude measured; besides it ``zeta`` there, both at the largest, the modal mass, and how
+        far curves differ from each other. Its data hold the backbone with its errors over ``amplitude``, and every
+        point with its ``slope`` d ln F / d ln a and whether that makes it ``unstable``.
+    mode : NonlinearMode
+        The mode; ``mode.response(force)`` draws the curve for any force, unstable middle part included.
+
+    Raises
+    ------
+    ValueError
+        If the curves do not agree in what was recorded, or have fewer points than there are unknowns.
+    """
+    from nonsmooth.identification.response_fit import ResponseFit
+
+    fit = ResponseFit(curves, knots, residual=residual, mass=mass)
+    mode = fit.mode
+    grid = np.linspace(mode.knots[0], mode.knots[-1], 101)
+    basis = interpolation(mode.knots, grid)
+    K = len(mode.knots)
+    # omega_n^2 = scale * exp(shift) at the knots is linear in them; ln zeta = ln D - ln 2 - ln(omega_n^2) / 2.
+    square = mode.square(grid)
+    by_square = np.zeros((len(grid), fit.covariance.shape[0]))
+    by_square[:, :K] = basis * mode.squares / square[:, None]  # d ln omega_n^2
+    by_zeta = -0.5 * by_square
+    by_zeta[:, K : 2 * K] += basis
+    frequency, zeta = mode.natural_frequency(grid), mode.damping_ratio(grid)
+    frequency_error = 0.5 * frequency * np.sqrt(np.einsum("ij,jk,ik->i", by_square, fit.covariance, by_square))
+    zeta_error = zeta * np.sqrt(np.einsum("ij,jk,ik->i", by_zeta, fit.covariance, by_zeta))
+    data = _data(fit, grid, frequency, frequency_error, zeta, zeta_error)
+
+    def at(i: int) -> tuple[Estimate, Estimate]:
+        return (
+            Estimate(float(frequency[i]), float(frequency_error[i]), "Hz"),
+            Estimate(float(zeta[i]), float(zeta_error[i])),
+        )
+
+    others = {"zeta": at(0)[1], "f_n at the largest amplitude": at(-1)[0], "zeta at the largest amplitude": at(-1)[1]}
+    others |= fit.others()
+    finding = Finding(
+        "f_n", at(0)[0], _METHOD, sum(len(c.frequency) for c in curves), tuple(c.name for c in curves),
+        tuple(fit.notes()), others, None, data, "backbone",
+    )  # fmt: skip
+    return finding, mode
+
+
+def _data(
+    fit: Any, grid: FloatArray, f: FloatArray, f_error: FloatArray, zeta: FloatArray, zeta_error: FloatArray
+) -> xr.Dataset:
+    """What the pictures need."""
+    import xarray as xr
+
+    point = {"frequency": fit.omega / (2 * np.pi), "response": np.abs(fit.measured), "modal_amplitude": fit.amplitude}
+    units = {"frequency": "Hz", "response": "m", "modal_amplitude": "m"}
+    slope = fit.slopes()
+    rows: dict[str, Any] = {name: ("point", v, {"units": units[name]}) for name, v in point.items()}
+    if fit.force is not None:
+        rows["force"] = ("point", fit.force, {"units": "N"})
+    rows |= {
+        "curve": ("point", fit.curve), "slope": ("point", slope, {"long_name": "d ln F / d ln a"}),
+        "unstable": ("point", slope < 0),
+        "f_n": ("amplitude", f, {"long_name": "natural frequency", "units": "Hz"}),
+        "f_n_error": ("amplitude", f_error, {"units": "Hz"}),
+        "zeta": ("amplitude", zeta, {"long_name": "damping ratio"}), "zeta_error": ("amplitude", zeta_error),
+        "curve_f_n": ("curves", fit.own()[0], {"units": "Hz"}), "curve_zeta": ("curves", fit.own()[1]),
+        "curve_amplitude": ("curves", fit.own()[2], {"units": "m"}),
+    }  # fmt: skip
+    coords = {"amplitude": ("amplitude", grid, {"long_name": "amplitude of the mode", "units": "m"}),
+              "curves": ("curves", list(fit.names))}  # fmt: skip
+    return xr.Dataset(rows, coords, {"scatter": fit.sigma})

@@ -1,0 +1,190 @@
+r"""The gap from the grazing frequency: where the free motion, as the drive is stepped, first reaches the support.
+
+Up to the graze the support changes nothing, so the last free runs tell all about the motion that would have been: its
+amplitude over frequency is the free response, here scaled to the runs themselves. A soft support hardly distorts the
+motion at first, but it pushes one way only: the sign of contact is that the mean position leaves its place. The first
+run in which it does bounds the graze from the other side. A push that is too light to be seen widens the bracket: a
+motion of amplitude A that goes by p beyond the gap is held back by :math:`\tfrac43 k_s p \sqrt{2p/A}/(2\pi)` on the mean,
+and its place moves by this over 2k.
+
+Between the two lies the gap, with the uncertainty of the bracket (uniform), of the sensor and, at rest, of the zero.
+The screw's zero does not enter, and the place about which the car swings is seen in the same runs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.identification.evidence import Run
+from nonsmooth.identification.finding import Estimate, Finding
+from nonsmooth.identification.free_decay import DecayFit
+from nonsmooth.identification.gap import grazing_amplitude
+from nonsmooth.identification.steady import Steady, steady
+from nonsmooth.identification.uncertainty import uniform
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["grazing_gap"]
+
+FloatArray = NDArray[np.float64]
+_FIRST = 4  # runs that must be free
+_SIGMAS = 5.0  # by which the mean must leave its place
+_COUNTS = 0.06  # and by how much of a count: what the mean of a run can be off by rounding
+
+
+def grazing_gap(runs: Sequence[Run], decay: DecayFit, *, resolution: float, kappa: float) -> Finding:
+    r"""The gap referred to the mean position under the drive, from frequency steps through the first contact.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        Steady runs in the order of the steps, with ``x``, ``turns`` and one ``crank_length``, the support mounted;
+        the first four free.
+    decay : DecayFit
+        The free oscillator.
+    resolution : float
+        Length of a count (m).
+    kappa : float
+        About k_s/m (1/s^2): how light a push can be seen.
+
+    Returns
+    -------
+    Finding
+        ``gap_grazing`` (m), counted from the mean position of the car under this drive. ``others``: ``at_rest`` (m),
+        counted from where the car rests with the motor off, and ``grazing_frequency`` (rad/s).
+
+    Raises
+    ------
+    ValueError
+        If the first four runs are not free or none has contact, the crank's length changes, or a free run comes after
+        contact has begun.
+    """
+    seen = steady(runs)
+    if len(set(seen.crank.tolist())) != 1:
+        raise ValueError(
+            "the graze is sought in steps of the frequency at one crank length, these runs have "
+            f"{sorted(set(seen.crank.tolist()))} m: give one of them at a time"
+        )
+    contact, limit = _touching(seen, resolution)
+    last, first = _bracket(seen, contact)
+    free = ~contact
+    a, (natural, b, f) = float(seen.crank[0]), (float(v) for v in decay.values[:3])
+
+    def model(omega: FloatArray) -> FloatArray:
+        return np.array([grazing_amplitude(float(w), natural, b, f, a) for w in omega])
+
+    height = _height(seen, free, last, model)
+    ends = seen.omega[[last, first]]
+    low, high = height(ends)
+    place = float(np.mean(seen.mean[free]))
+    low -= _unseen(limit, float(seen.amplitude[last]), kappa / natural**2)
+    gap, half = 0.5 * (low + high), 0.5 * abs(high - low)
+    normal = _sensor_error(seen, free, height, resolution)
+    zero, zero_error = float(decay.values[3]), decay.error("x_e")
+    at_rest = float(np.hypot(np.hypot(normal, zero_error), uniform(half)))
+    total = float(np.hypot(normal, uniform(half)))
+    width = 0.5 * float(np.ptp(ends))
+    return Finding(
+        "gap_grazing", Estimate(gap, total, "m", half_width=half),
+        "largest free motion between the last run without contact and the first with it",
+        seen.samples, seen.names,
+        (
+            f"contact begins between {ends.min():.3f} and {ends.max():.3f} rad/s: the gap lies within "
+            f"±{1e6 * half:.1f} µm by the width of the step, {1e6 * normal:.1f} µm by the sensor",
+            f"counted from the mean position under the drive at a crank of {1e3 * a:.2f} mm, "
+            f"{1e6 * (place - zero):+.0f} µm from where the car rests",
+        ),
+        {
+            "at_rest": Estimate(gap + place - zero, at_rest, "m", half_width=half),
+            "grazing_frequency": Estimate(float(ends.mean()), uniform(width), "rad/s", half_width=width),
+        },
+        data=_data(seen, contact, place, ends, gap, total), plot="grazing",
+    )  # fmt: skip
+
+
+def _touching(seen: Steady, resolution: float) -> tuple[NDArray[np.bool_], float]:
+    """Which runs touch, from the first on, and how far a mean must leave the place of the free runs' for that."""
+    if len(seen) <= _FIRST:
+        raise ValueError(f"{len(seen)} runs are too few to find the graze: {_FIRST} free ones and those with contact")
+    contact, limit = np.zeros(len(seen), dtype=bool), 0.0
+    for i in range(_FIRST, len(seen)):
+        free = seen.mean[:i][~contact[:i]]
+        limit = max(_SIGMAS * float(np.std(free, ddof=1)), _COUNTS * resolution)
+        contact[i] = abs(seen.mean[i] - float(np.mean(free))) > limit
+    return contact, limit
+
+
+def _bracket(seen: Steady, contact: NDArray[np.bool_]) -> tuple[int, int]:
+    """Indices of the last free run and of the first with contact, in the order of the steps."""
+    if not contact.any():
+        raise ValueError(
+            f"none of the {len(seen)} runs touches, or the first {_FIRST} do already: step from free motion into "
+            "contact (where contact ends is not where it begins)"
+        )
+    begun = int(np.argmax(contact))
+    if not np.all(contact[begun:]):
+        again = float(seen.omega[begun + int(np.argmin(contact[begun:]))])
+        raise ValueError(
+            f"the run at {again:.3f} rad/s is free again after contact had begun: step one way only, or give the "
+            "steps of one direction"
+        )
+    if not all(seen.amplitude[i] < seen.amplitude[begun] for i in range(begun)):
+        raise ValueError(
+            "the motion does not grow towards the first contact; the steps must go towards resonance"
+        )
+    return begun - 1, begun
+
+
+def _unseen(limit: float, amplitude: float, stiff: float) -> float:
+    """How far beyond the gap a motion goes whose mean moves by ``limit``; ``stiff`` is k_s/(2k)."""
+    return float((1.5 * np.pi * limit / stiff * np.sqrt(amplitude / 2)) ** (2 / 3))
+
+
+def _height(
+    seen: Steady, free: NDArray[np.bool_], last: int, model: Callable[[FloatArray], FloatArray]
+) -> Callable[[FloatArray], FloatArray]:
+    """How far above its mean the free motion goes, over frequency.
+
+    The crank's length and the balance of friction are known to a few parts in a thousand: the model is scaled to the
+    free runs that are nearest to the graze. A second harmonic, by string and ripple, hardly changes among them.
+    """
+    rows = np.flatnonzero(free)
+    near = rows[np.argsort(np.abs(seen.omega[rows] - seen.omega[last]))[: max(_FIRST, len(rows) // 2)]]
+    scale = float(np.mean(seen.amplitude[near] / model(seen.omega[near])))
+    more = float(np.mean(seen.highest[near] - seen.mean[near] - seen.amplitude[near]))
+    return lambda omega: scale * model(np.asarray(omega)) + more
+
+
+def _sensor_error(
+    seen: Steady, free: NDArray[np.bool_], height: Callable[[FloatArray], FloatArray], resolution: float
+) -> float:
+    """Of a height above the mean, by the scatter of the free runs about the curve, not less than rounding allows."""
+    n = int(np.count_nonzero(free))
+    scatter = float(np.std(seen.highest[free] - seen.mean[free] - height(seen.omega[free]), ddof=1))
+    return max(scatter, resolution / np.sqrt(12 * n)) / np.sqrt(min(n, _FIRST))
+
+
+def _data(
+    seen: Steady, contact: NDArray[np.bool_], place: float, ends: FloatArray, gap: float, error: float
+) -> xr.Dataset:
+    import xarray as xr
+
+    return xr.Dataset(
+        {
+            "setting": ("run", seen.omega, {"units": "rad/s", "long_name": "frequency"}),
+            "amplitude": ("run", seen.highest - place, {"units": "m"}),
+            "amplitude_error": ("run", np.hypot(seen.error, seen.mean_error), {"units": "m"}),
+            "contact": ("run", contact.astype(np.int8)),
+            "mean": ("run", seen.mean - place, {"units": "m"}),
+            "grazing_setting": ((), float(ends.mean()), {"units": "rad/s"}),
+            "grazing_low": ((), float(ends.min()), {"units": "rad/s"}),
+            "grazing_high": ((), float(ends.max()), {"units": "rad/s"}),
+            "gap": ((), gap, {"units": "m"}), "gap_error": ((), error, {"units": "m"}),
+        },
+        attrs={"synthetic": seen.synthetic},
+    )  # fmt: skip

@@ -1,0 +1,232 @@
+"""The least squares behind :func:`~nonsmooth.identification.amplitude_dependent.amplitude_dependent`.
+
+Unknowns: ln omega_n^2 and ln D at the knots, then ln m or each curve's ln(F/m), the residual, and for each curve a
+shift of the first two with a normal prior. Standard deviations of points and of shifts are found by expectation and
+maximisation around the fit (A.P. Dempster et al., J. R. Stat. Soc. B 39 (1977) 1).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from nonsmooth.identification.finding import Estimate
+from nonsmooth.identification.nonlinear_mode import NonlinearMode, interpolation
+
+__all__ = ["ResponseFit"]
+
+FloatArray = NDArray[np.float64]
+_ROUNDS = 40
+_FEWEST = 4  # curves: how far they differ cannot be told from fewer
+
+
+class ResponseFit:
+    """Fit of a nonlinear mode to curves; see :mod:`nonsmooth.identification.amplitude_dependent`."""
+
+    def __init__(self, curves: Sequence[Any], knots: int | ArrayLike, *, residual: bool, mass: float | None) -> None:
+        if not curves:
+            raise ValueError("there are no response curves")
+        self.names = tuple(str(c.name) for c in curves)
+        self.phased = _all_or_none(curves, "phase")
+        self.forced = _all_or_none(curves, "force")
+        if residual and not (self.phased and self.forced):
+            raise ValueError("the residual of other modes can be told only with forces and phases; leave it out")
+        if mass is not None and not (mass > 0 and self.forced):
+            raise ValueError("a modal mass is a positive number, and of use only with forces in N")
+        self.residual, self.mass = residual, mass
+        self.curve = np.repeat(np.arange(len(curves)), [len(c.frequency) for c in curves])
+        self.omega = 2 * np.pi * np.concatenate([c.frequency for c in curves])
+        size = np.concatenate([c.amplitude for c in curves])
+        self.phase = np.concatenate([c.phase for c in curves]) if self.phased else None
+        self.force = np.concatenate([c.force for c in curves]) if self.forced else None
+        self.measured = size * np.exp(1j * self.phase) if self.phase is not None else size.astype(complex)
+        self.knots = _knots(knots, size)
+        self.shifts = len(curves) >= _FEWEST
+        self._fit()
+
+    # ------------------------------------------------------------------------------------------------- the unknowns
+
+    @property
+    def _sizes(self) -> tuple[int, int]:
+        """Where the shifts begin, and how many unknowns there are."""
+        K, n = len(self.knots), len(self.names)
+        first = 2 * K + (0 if self.mass is not None else 1 if self.forced else n) + 2 * self.residual
+        return first, first + 2 * n * self.shifts
+
+    def _unpack(self, p: FloatArray) -> tuple[NonlinearMode, Any, FloatArray, FloatArray]:
+        """The mode, ln(F/m) of each point, and the shifts of the points' ln omega_n^2 and ln D."""
+        K, (first, _) = len(self.knots), self._sizes
+        R = complex(*p[first - 2 : first]) * self._unit if self.residual else 0j
+        if self.force is None:
+            mass, load = 1.0, p[2 * K : 2 * K + len(self.names)][self.curve]
+        else:
+            mass = self.mass if self.mass is not None else float(np.exp(p[2 * K]))
+            load = np.log(self.force / mass)
+        mode = NonlinearMode(self.knots, np.exp(p[:K]), p[K : 2 * K], mass, R)
+        shift = p[first:].reshape(2, -1)[:, self.curve] if self.shifts else np.zeros((2, len(self.curve)))
+        return mode, load, shift[0], shift[1]
+
+    def _left(self, p: FloatArray) -> FloatArray:
+        """ln of force over what the mode needs (and its phase), for all points."""
+        mode, load, by_square, by_damping = self._unpack(p)
+        own = self.measured - mode.residual * self.force if self.force is not None else self.measured
+        a = np.abs(own)
+        G, D = mode.square(a) * np.exp(by_square), mode.damping(a) * np.exp(by_damping)
+        needed = (G - self.omega**2 + 1j * D * self.omega) * own
+        size = load - np.log(np.abs(needed))
+        if not self.phased:
+            return np.asarray(size)
+        return np.concatenate([size, -np.angle(needed)])
+
+    # ------------------------------------------------------------------------------------------------------ the fit
+
+    def _fit(self) -> None:
+        from scipy.optimize import least_squares
+
+        first, count = self._sizes
+        n, rows = len(self.names), len(self.omega) * (1 + self.phased)
+        if rows <= first:
+            raise ValueError(f"{rows} measured values cannot tell {first} unknowns: take fewer knots, or more points")
+        p = self._start(count)
+        sigma, spread = 0.05, np.array([1e-3, 0.1])
+        for k in range(_ROUNDS):
+
+            def weighted(q: FloatArray) -> FloatArray:
+                return np.concatenate([self._left(q) / sigma, q[first:] / np.repeat(spread, n if self.shifts else 0)])
+
+            done = least_squares(weighted, p, x_scale="jac", method="trf", xtol=1e-12, ftol=1e-12, gtol=1e-12)
+            p = done.x
+            J = done.jac
+            inverse = np.linalg.pinv(J.T @ J)
+            left = self._left(p)
+            # Points of a curve err alike; those that do count less.
+            self.alike = self._alike(left)
+            freedom = max(rows - float(np.trace(inverse @ (J[:rows].T @ J[:rows]))), 1.0)
+            before = (sigma, *spread)
+            sigma = max(float(np.sqrt(left @ left / freedom * self.alike)), 1e-9)
+            if self.shifts:
+                own = p[first:].reshape(2, n)
+                own_error = np.diag(inverse)[first:].reshape(2, n)
+                spread = np.sqrt(np.maximum(np.mean(own**2 + own_error, axis=1), 1e-18))
+            if k > 2 and np.allclose(before, (sigma, *spread), rtol=1e-3):
+                break
+        self.p, self.covariance, self.left = p, inverse, left
+        self.sigma = float(np.sqrt(left @ left / freedom))
+        self.spread = spread if self.shifts else np.array([np.nan, np.nan])
+        self.mode = self._unpack(p)[0]
+        own = self.measured - self.mode.residual * self.force if self.force is not None else self.measured
+        self.amplitude = np.abs(own)
+
+    def _start(self, count: int) -> FloatArray:
+        """A linear mode: from where a curve answers most for its force, and how wide that is."""
+        load = self.force if self.force is not None else np.ones_like(self.omega)
+        gain = np.abs(self.measured) / load
+        chosen = self.curve == self.curve[int(np.argmax(gain))]
+        w, h = self.omega[chosen], gain[chosen]
+        top = int(np.argmax(h))
+        wide = w[h > h[top] / np.sqrt(2.0)]
+        step = float(np.median(np.abs(np.diff(w)))) if len(w) > 1 else 0.01 * w[0]
+        D = max(float(np.ptp(wide)), step)
+        K, n = len(self.knots), len(self.names)
+        self._unit = 1.0 / float(np.median(1.0 / gain)) if self.residual else 1.0
+        p = np.zeros(count)
+        p[:K], p[K : 2 * K] = 2 * np.log(w[top]), np.log(D)
+        if self.force is None:
+            for c in range(n):
+                here = np.abs(self.measured[self.curve == c])
+                p[2 * K + c] = np.log(here.max() * D * w[top])
+        elif self.mass is None:
+            p[2 * K] = -np.log(h[top] * D * w[top])
+        return p
+
+    def _alike(self, left: FloatArray) -> float:
+        """How many neighbouring points of a curve say as much as one."""
+        blocks = left.reshape(-1, len(self.curve))
+        total = cross = 0.0
+        for row in blocks:
+            for c in range(len(self.names)):
+                r = row[self.curve == c]
+                total += float(r @ r)
+                cross += float(r[1:] @ r[:-1])
+        rho = min(max(cross / total, 0.0), 0.9) if total > 0 else 0.0
+        return (1 + rho) / (1 - rho)
+
+    # ----------------------------------------------------------------------------------------------------- outcomes
+
+    def slopes(self) -> FloatArray:
+        """d ln F / d ln a at the points' frequencies, each curve's own shift taken into account."""
+        mode, _, by_square, by_damping = self._unpack(self.p)
+        sizes = []
+        for step in (1e-5, -1e-5):
+            a = self.amplitude * (1 + step)
+            G, D = mode.square(a) * np.exp(by_square), mode.damping(a) * np.exp(by_damping)
+            sizes.append(np.log(np.abs(G - self.omega**2 + 1j * D * self.omega)))
+        return np.asarray(1 + (sizes[0] - sizes[1]) / 2e-5)
+
+    def own(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Natural frequency (Hz) and damping ratio of each curve alone, at the amplitude of its phase resonance."""
+        places = np.zeros(len(self.names))
+        for c in range(len(places)):
+            here = self.curve == c
+            off = np.abs(np.log(self.mode.square(self.amplitude[here]) / self.omega[here] ** 2))
+            places[c] = self.amplitude[here][int(np.argmin(off))]
+        first, _ = self._sizes
+        shift = self.p[first:].reshape(2, -1) if self.shifts else np.zeros((2, len(places)))
+        omega = np.sqrt(self.mode.square(places) * np.exp(shift[0]))
+        return omega / (2 * np.pi), self.mode.damping(places) * np.exp(shift[1]) / (2 * omega), places
+
+    def others(self) -> dict[str, Estimate]:
+        """Modal mass, residual, and how far curves differ."""
+        K, (first, _) = len(self.knots), self._sizes
+        error = np.sqrt(np.diag(self.covariance))
+        found: dict[str, Estimate] = {}
+        if self.forced and self.mass is None:
+            found["modal mass"] = Estimate(self.mode.mass, self.mode.mass * float(error[2 * K]), "kg")
+        if self.residual:
+            for name, k, value in (("real", first - 2, self.mode.residual.real), ("imag", first - 1, self.mode.residual.imag)):
+                found[f"residual, {name}"] = Estimate(value, float(error[k]) * self._unit, "m/N")
+        if self.shifts:
+            n = np.sqrt(2.0 * len(self.names))
+            f = float(np.sqrt(np.mean(self.mode.squares)) / (2 * np.pi))
+            found["f_n from curve to curve"] = Estimate(0.5 * f * float(self.spread[0]), 0.5 * f * float(self.spread[0]) / n, "Hz")
+            found["zeta from curve to curve, relative"] = Estimate(float(self.spread[1]), float(self.spread[1]) / n)
+        return found
+
+    def notes(self) -> list[str]:
+        """What a reader should know."""
+        slope = self.slopes()
+        unstable = int(np.count_nonzero(slope < 0))
+        said = [
+            f"{unstable} of {len(slope)} points lie on an unstable middle part (d ln F / d ln a < 0); the least slope is "
+            f"{slope.min():.2f}, 1 would be linear"
+        ]
+        if not self.shifts:
+            said.append(f"fewer than {_FEWEST} curves: how far one differs from the next is not known, nor stated")
+        if not self.forced:
+            said.append("no forces were recorded: the modal mass is not known")
+        if not self.phased:
+            said.append("no phases were recorded: damping comes from the amplitudes alone")
+        return said
+
+
+def _all_or_none(curves: Sequence[Any], name: str) -> bool:
+    """Whether all curves have it."""
+    having = [c.name for c in curves if getattr(c, name) is not None]
+    if having and len(having) < len(curves):
+        lacking = [c.name for c in curves if c.name not in having]
+        raise ValueError(f"some curves have a {name} and {', '.join(map(repr, lacking))} have none; fit them apart")
+    return bool(having)
+
+
+def _knots(knots: int | ArrayLike, size: FloatArray) -> FloatArray:
+    if isinstance(knots, int):
+        if knots < 1:
+            raise ValueError(f"knots must be at least 1, got {knots}")
+        return np.linspace(size.min(), size.max(), knots) if knots > 1 else np.array([float(np.median(size))])
+    given = np.asarray(knots, dtype=np.float64)
+    if given.ndim != 1 or len(given) < 1 or not (given > 0).all() or not (np.diff(given) > 0).all():
+        raise ValueError(f"knots must be positive, increasing amplitudes (m), got {given!r}")
+    return given

@@ -1,0 +1,128 @@
+"""The experimental side: one virtual rig with the paper's parameters, its sessions, and what is identified from them.
+
+The rig writes session folders as a lab would, everything labelled synthetic; its truth goes into a file beside them.
+Identification and comparison read the folders only.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from nonsmooth.experiment.recording import RecordingWarning
+from nonsmooth.models import discontinuous_support
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from nonsmooth.experiment.recording import Recording
+    from nonsmooth.experiment.rig import VirtualRig
+    from nonsmooth.experiment.session import Session
+    from nonsmooth.identification.parameter_set import ParameterSet
+    from nonsmooth.system.system import System
+
+__all__ = ["SEED", "TRUTH", "Laboratory"]
+
+SEED = 0  # of the rig's noise; its parameters are the published ones
+TRUTH = "truth.toml"
+
+
+class Laboratory:
+    """A virtual rig and who measures with it.
+
+    Parameters
+    ----------
+    folder : path
+        Holds one session folder for each figure (``fig09``, ...), the one that identification reads
+        (``identification``), and ``truth.toml``.
+    quick : bool
+        Shorter records and fewer steps.
+    """
+
+    def __init__(self, folder: Path, quick: bool = False) -> None:
+        self.folder, self.quick = Path(folder), quick
+        self.notes: list[str] = []
+        self.folder.mkdir(parents=True, exist_ok=True)
+
+    @cached_property
+    def rig(self) -> VirtualRig:
+        """The rig of Table 1, with more physics than the model: friction, strings, an uneven motor, sensors."""
+        from nonsmooth.experiment.rig import VirtualRig
+
+        return VirtualRig.published(SEED)
+
+    @cached_property
+    def identified(self) -> ParameterSet:
+        """The parameters, from the folder ``identification`` alone."""
+        from nonsmooth.identification.chain import identify
+
+        with self._noted():
+            return identify(self._identification)
+
+    @cached_property
+    def session(self) -> Session:
+        """The session that identification reads."""
+        from nonsmooth.experiment.session import load_session
+
+        return load_session(self._identification)
+
+    @cached_property
+    def _identification(self) -> Path:
+        return self.rig.write_session(self.folder / "identification", truth=self.folder / TRUTH)
+
+    def record(self, name: str, made: Mapping[str, Recording]) -> Session:
+        """Write recordings, by procedure, into the session folder ``name`` and read it."""
+        from nonsmooth.experiment.rig.notebook import write_session
+        from nonsmooth.experiment.session import load_session
+
+        title = f"virtual rig with the published parameters, {name}"
+        folder = write_session(self.rig, self.folder / name, made, self.folder / TRUTH, title=title)
+        return load_session(folder)
+
+    def measured(
+        self, session: Session, procedure: str, runs: str | Sequence[str] | None = None
+    ) -> tuple[xr.Dataset, dict[str, Any]]:
+        """What ``compare`` takes: a measurement, and the settings of the model that belong to it."""
+        from nonsmooth.identification.compare import session_measurement
+
+        with self._noted():
+            return session_measurement(
+                session, procedure, runs, k=self.identified["k"], gap_offset=self._gap_offset
+            )
+
+    def compare(self, measured: xr.Dataset, settings: Mapping[str, Any], **options: Any) -> xr.Dataset:
+        """The measurement over the model with the identified parameters."""
+        from nonsmooth.identification.compare.compare import compare
+
+        return compare(
+            measured, self.model, parameters=self.identified, settings=settings, **{"draws": 0, **options}
+        )
+
+    @property
+    def model(self) -> System:
+        """The paper's oscillator; the parameters are replaced by those identified."""
+        return discontinuous_support()
+
+    @cached_property
+    def _gap_offset(self) -> float:
+        """What the gap is more than the screw's reading, from the records with contact."""
+        readings = {float(item.settings["gap"]) for item in self.session.recordings("contact")}
+        (reading,) = readings
+        return float(self.identified.estimate("gap_at_rest")) - reading
+
+    @contextmanager
+    def _noted(self) -> Iterator[None]:
+        """Warnings about recordings are kept for the log; others stay warnings."""
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            yield
+        for item in caught:
+            if issubclass(item.category, RecordingWarning):
+                self.notes.append(str(item.message))
+        for item in caught:
+            if not issubclass(item.category, RecordingWarning):
+                warnings.warn_explicit(item.message, item.category, item.filename, item.lineno)
