@@ -3,8 +3,8 @@ r"""Calibrations of the drive (Fig. 8): the motor's frequency over its voltage, 
 A motor turns from an offset on, :math:`\omega = s\,(V - V_0)`: friction in it takes the first volt. The car held still
 feels :math:`k\,d(\varphi)`, whose fundamental is :math:`k a`: a string of length L adds to the mean and to the second
 harmonic only, uneven turning :math:`\epsilon` changes the fundamental by :math:`\epsilon^2/4` and by
-:math:`a\,\epsilon/(4L)` of it, 0.1 % together at worst (:math:`\epsilon` = 0.02, a = 60 mm, L = 0.5 m). A crank's length that is counted from
-a wrong zero shows as an intercept.
+:math:`a\,\epsilon/(4L)` of it, 0.1 % together at worst (:math:`\epsilon` = 0.02, a = 60 mm, L = 0.5 m). A crank's
+length that is counted from a wrong zero shows as an intercept.
 
 Both are straight lines with errors in both axes: what the notebook's voltages and lengths are rounded to is theirs.
 """
@@ -73,7 +73,10 @@ def voltage_frequency(runs: Sequence[Run], *, voltage_error: float = 0.0) -> Fin
         "voltage_frequency", Estimate(slope, float(errors[0]), "rad/(s V)"),
         "straight line with an offset through the frequencies that the photogate tells (Fig. 8a)",
         int(sum(len(run.passages) for run in runs)), tuple(run.name for run in runs), tuple(notes),
-        {"offset": Estimate(offset, float(errors[1]), "V"), "intercept": Estimate(intercept, float(errors[2]), "rad/s")},
+        {
+            "offset": Estimate(offset, float(errors[1]), "V"),
+            "intercept": Estimate(intercept, float(errors[2]), "rad/s"),
+        },
         covariance, _data(volts, omega, error * widened, line, block, ("motor voltage", "V"),
                           ("frequency", "rad/s"), runs), "calibration",
     )  # fmt: skip

@@ -2,121 +2,162 @@ r"""Damping from the steady response over frequency, by maximum amplitude as in 
 
 Dry friction :math:`F_C` takes per cycle what a viscous damper :math:`4 F_C/(\pi \omega A)` would take. A viscous fit
 adds it to c: at resonance, with 36 mm, 5 mN look like 0.04 N s/m (4.5 % of 0.87), and off resonance, where A is
-smaller, like more: 5 to 6 % over the range of Fig. 6 at 0.14 N, and in inverse proportion to the forcing. So the fit of
-Fig. 6 gives an equivalent c, not the damper's. The fit with friction balances the first harmonic only: 0.25 % of the
-amplitude at 0.7 of the natural frequency with 10 mN, less above.
+smaller, like more. :func:`viscous_bias` says by how much such a fit is off, for any rig and any crank: in inverse
+proportion to the forcing. So the fit of Fig. 6 gives an equivalent c, not the damper's. The fit with friction balances
+the first harmonic only: 0.25 % of the amplitude at 0.7 of the natural frequency with 10 mN, less above.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.experiment.signals.harmonics import fit as harmonic_fit
-from nonsmooth.experiment.signals.phase import drive_phase
-from nonsmooth.identification.evidence import Run
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.free_decay import DecayFit
 from nonsmooth.identification.gap import grazing_amplitude
+from nonsmooth.identification.steady import Steady
 
-__all__ = ["amplitude_fit", "steady_amplitude"]
+__all__ = ["amplitude_fit", "viscous_bias"]
 
 FloatArray = NDArray[np.float64]
+#: Frequencies relative to the natural one over which Fig. 6 is fitted, where no others are given.
+RANGE = (0.55, 0.7, 0.8, 0.9, 0.95, 1.0, 1.05, 1.1, 1.2, 1.3, 1.45, 1.7)
+LEAST = 5  # runs
 
 
-def steady_amplitude(run: Run) -> tuple[float, float, float]:
-    """Frequency (rad/s), amplitude of the fundamental (m) and its standard uncertainty of a steady run."""
-    drive = drive_phase(run.passages)
-    fitted = harmonic_fit(run.time, run.positions, drive.omega, 3)
-    return drive.omega, float(fitted.amplitudes[0]), float(fitted.amplitude_errors[0])
-
-
-def amplitude_fit(runs: Sequence[Run], decay: DecayFit, mass: float) -> list[Finding]:
+def amplitude_fit(seen: Steady, decay: DecayFit, mass: float) -> list[Finding]:
     r"""Fit c to the amplitudes over frequency: viscous only (the paper's way), and with dry friction.
 
     Parameters
     ----------
-    runs : sequence of Run
+    seen : Steady
         Frequency steps without support.
     decay : DecayFit
-        Gives :math:`\omega_0`, the start of the fit and, for the picture, nothing else: c and friction are fitted here.
+        Gives :math:`\omega_0` and the start of the fit; c and friction are fitted here.
     mass : float
         Mass (kg).
 
     Returns
     -------
     list of Finding
-        ``c_viscous_only`` and ``c_response``; empty where there are fewer than five runs.
-    """
-    if len(runs) < 5:
-        return []
-    import xarray as xr
-    from lmfit import Minimizer, Parameters
+        ``c_viscous_only`` and ``c_response``.
 
-    omega, amplitude, error = np.array([steady_amplitude(run) for run in runs]).T
-    crank = np.array([float(run.settings["crank_length"]) for run in runs])
+    Raises
+    ------
+    ValueError
+        If there are fewer than five runs.
+    """
+    if len(seen) < LEAST:
+        raise ValueError(f"{len(seen)} runs of the response are too few to fit a damping to; {LEAST} are needed")
     natural = float(decay.values[0])
     # transients, steps of the encoder, the harmonic balance itself: some tenths of a percent of the amplitude
-    spread = np.hypot(error, 3e-3 * amplitude)
-
-    def predicted(b: float, f: float, at: Any, a: Any) -> FloatArray:
-        rows = [grazing_amplitude(float(w), natural, b, f, float(length)) for w, length in zip(at, a, strict=True)]
-        return np.array(rows)
-
-    fits = {}
-    for friction in (False, True):
-        parameters = Parameters()
-        parameters.add("b", value=float(decay.values[1]), min=1e-6)
-        parameters.add("f", value=float(max(decay.values[2], 1e-4)) if friction else 0.0, vary=friction)
-
-        def residual(p: Any) -> FloatArray:
-            return (predicted(p["b"].value, p["f"].value, omega, crank) - amplitude) / spread
-
-        fits[friction] = Minimizer(residual, parameters, scale_covar=True).minimize()
-    viscous, both = fits[False].params, fits[True].params
-
-    def scaled(row: Any) -> tuple[float, float]:
-        return mass * row.value, mass * float(row.stderr if row.stderr is not None else np.inf)
-
-    c_viscous, c_both, dry = scaled(viscous["b"]), scaled(both["b"]), scaled(both["f"])
-    shown = crank == np.unique(crank)[0]
-    fine = np.linspace(omega[shown].min(), omega[shown].max(), 300)
-    directions = [str(run.settings.get("direction", "up")) for run, use in zip(runs, shown, strict=True) if use]
-    lengths = np.full(300, crank[shown][0])
-    data = xr.Dataset(
-        {
-            "omega": ("run", omega[shown], {"units": "rad/s"}), "amplitude": ("run", amplitude[shown], {"units": "m"}),
-            "amplitude_error": ("run", error[shown], {"units": "m"}),
-            "direction": ("run", directions),
-            "joint_amplitude": ("omega_fine", predicted(both["b"].value, both["f"].value, fine, lengths)),
-            "viscous_amplitude": ("omega_fine", predicted(viscous["b"].value, 0.0, fine, lengths)),
-            "c_joint": ((), c_both[0], {"units": "N s/m"}), "c_joint_error": ((), c_both[1], {"units": "N s/m"}),
-            "friction_joint": ((), dry[0], {"units": "N"}),
-            "c_viscous": ((), c_viscous[0], {"units": "N s/m"}),
-            "c_viscous_error": ((), c_viscous[1], {"units": "N s/m"}),
-        },
-        {"omega_fine": ("omega_fine", fine, {"units": "rad/s"})},
-        {"synthetic": "yes" if any(run.synthetic for run in runs) else "no"},
-    )  # fmt: skip
-    true = mass * float(decay.values[1])
-    names, n = tuple(run.name for run in runs), int(sum(len(run.time) for run in runs))
-    bias = 100 * (c_viscous[0] / true - 1)
+    spread = np.hypot(seen.error, 3e-3 * seen.amplitude)
+    start = (float(decay.values[1]), float(max(decay.values[2], 1e-4)))
+    both = _fit(seen.omega, seen.crank, seen.amplitude, spread, natural, start, friction=True)
+    viscous = _fit(seen.omega, seen.crank, seen.amplitude, spread, natural, start, friction=False)
+    c_viscous, c_both, dry = ((mass * value, mass * error) for value, error in (viscous["b"], both["b"], both["f"]))
+    shown = seen.only(seen.crank == np.min(seen.crank))
+    data = _data(shown, natural, viscous, both, mass)
+    bias = 100 * (c_viscous[0] / (mass * float(decay.values[1])) - 1)
+    b, f = float(decay.values[1]), float(decay.values[2])
+    alone = {float(a): viscous_bias(natural, b, f, float(a), seen.omega[seen.crank == a]) for a in np.unique(seen.crank)}
+    expected = [f"{1e3 * a:.1f} mm {100 * off:+.1f} %" for a, off in alone.items()]
     return [
         Finding(
             "c_viscous_only", Estimate(*c_viscous, "N s/m"), "maximum amplitude over frequency, viscous only (Fig. 6)",
-            n, names,
+            seen.samples, seen.names,
             (
                 f"an equivalent, not the damper's c: dry friction of {1e3 * mass * decay.values[2]:.1f} mN adds "
                 f"4 F_C/(pi omega A) to it; {bias:+.1f} % against the free decay",
+                f"what friction of this size does to such a fit by itself, at a crank of: {', '.join(expected)}",
             ),
             data=data, plot="amplitude_fit",
         ),
         Finding(
             "c_response", Estimate(*c_both, "N s/m"),
-            "amplitude over frequency, viscous damping and dry friction in first harmonic", n, names,
+            "amplitude over frequency, viscous damping and dry friction in first harmonic", seen.samples, seen.names,
             others={"friction": Estimate(*dry, "N")}, data=data, plot="amplitude_fit",
         ),
     ]  # fmt: skip
+
+
+def viscous_bias(omega_0: float, b: float, f: float, crank_length: float, omega: Any = None) -> float:
+    r"""Relative error of c in a viscous-only fit of the amplitudes, as Fig. 6, by dry friction alone.
+
+    Parameters
+    ----------
+    omega_0, b, f : float
+        Natural frequency (rad/s), c/m (1/s), friction over mass (N/kg).
+    crank_length : float
+        Length of the crank (m), :math:`\rho = k a`.
+    omega : array, optional
+        Frequencies of the fit (rad/s); 0.55 to 1.7 of the natural one where not given.
+
+    Notes
+    -----
+    The amplitudes are those of the harmonic balance of friction, without noise; every one has the same relative weight.
+    """
+    at = np.asarray([r * omega_0 for r in RANGE] if omega is None else omega, dtype=np.float64)
+    crank = np.full(len(at), float(crank_length))
+    amplitude = _predicted(at, crank, omega_0, b, f)
+    moving = amplitude > 0
+    if not moving.any():
+        raise ValueError("this friction holds the car at all frequencies: the crank is too short")
+    fitted = _fit(
+        at[moving], crank[moving], amplitude[moving], 3e-3 * amplitude[moving], omega_0, (b, 0.0), friction=False
+    )
+    return fitted["b"][0] / b - 1
+
+
+def _predicted(omega: FloatArray, crank: FloatArray, natural: float, b: float, f: float) -> FloatArray:
+    return np.array(
+        [grazing_amplitude(float(w), natural, b, f, float(a)) for w, a in zip(omega, crank, strict=True)]
+    )
+
+
+def _fit(
+    omega: FloatArray, crank: FloatArray, amplitude: FloatArray, spread: FloatArray, natural: float,
+    start: tuple[float, float], *, friction: bool,
+) -> dict[str, tuple[float, float]]:  # fmt: skip
+    """Values of b and f, each with its standard error."""
+    from lmfit import Minimizer, Parameters
+
+    parameters = Parameters()
+    parameters.add("b", value=start[0], min=1e-6)
+    parameters.add("f", value=start[1] if friction else 0.0, vary=friction)
+
+    def residual(p: Any) -> FloatArray:
+        return (_predicted(omega, crank, natural, p["b"].value, p["f"].value) - amplitude) / spread
+
+    found = Minimizer(residual, parameters, scale_covar=True).minimize().params
+    return {
+        name: (float(row.value), float(row.stderr if row.stderr is not None else np.inf))
+        for name, row in found.items()
+    }  # fmt: skip
+
+
+def _data(
+    shown: Steady, natural: float, viscous: dict[str, tuple[float, float]], both: dict[str, tuple[float, float]],
+    mass: float,
+) -> Any:  # fmt: skip
+    import xarray as xr
+
+    fine = np.linspace(shown.omega.min(), shown.omega.max(), 300)
+    lengths = np.full(300, shown.crank[0])
+    return xr.Dataset(
+        {
+            "omega": ("run", shown.omega, {"units": "rad/s"}), "amplitude": ("run", shown.amplitude, {"units": "m"}),
+            "amplitude_error": ("run", shown.error, {"units": "m"}), "direction": ("run", list(shown.direction)),
+            "joint_amplitude": ("omega_fine", _predicted(fine, lengths, natural, both["b"][0], both["f"][0])),
+            "viscous_amplitude": ("omega_fine", _predicted(fine, lengths, natural, viscous["b"][0], 0.0)),
+            "c_joint": ((), mass * both["b"][0], {"units": "N s/m"}),
+            "c_joint_error": ((), mass * both["b"][1], {"units": "N s/m"}),
+            "friction_joint": ((), mass * both["f"][0], {"units": "N"}),
+            "c_viscous": ((), mass * viscous["b"][0], {"units": "N s/m"}),
+            "c_viscous_error": ((), mass * viscous["b"][1], {"units": "N s/m"}),
+            "crank_length": ((), float(shown.crank[0]), {"units": "m"}),
+        },
+        {"omega_fine": ("omega_fine", fine, {"units": "rad/s"})}, {"synthetic": shown.synthetic},
+    )  # fmt: skip

@@ -27,7 +27,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.identification.shooting import Piece, ShootingFit, shoot, start_state
+from nonsmooth.identification.pieces import Piece, start_state
+from nonsmooth.identification.shooting import ShootingFit, shoot
 
 __all__ = ["DecayFit", "free_decay", "swing"]
 

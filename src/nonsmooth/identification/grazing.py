@@ -4,7 +4,7 @@ Up to the graze the support changes nothing, so the last free runs tell all abou
 amplitude over frequency is the free response, here scaled to the runs themselves. A soft support hardly distorts the
 motion at first, but it pushes one way only: the sign of contact is that the mean position leaves its place. The first
 run in which it does bounds the graze from the other side. A push that is too light to be seen widens the bracket: a
-motion of amplitude A that goes by p beyond the gap is held back by :math:`\tfrac43 k_s p \sqrt{2p/A}/(2\pi)` on the mean,
+motion of amplitude A that goes by p beyond the gap is pushed by :math:`\tfrac43 k_s p \sqrt{2p/A}/(2\pi)` on the mean,
 and its place moves by this over 2k.
 
 Between the two lies the gap, with the uncertainty of the bracket (uniform), of the sensor and, at rest, of the zero.
@@ -108,35 +108,35 @@ def grazing_gap(runs: Sequence[Run], decay: DecayFit, *, resolution: float, kapp
 
 
 def _touching(seen: Steady, resolution: float) -> tuple[NDArray[np.bool_], float]:
-    """Which runs touch, from the first on, and how far a mean must leave the place of the free runs' for that."""
-    if len(seen) <= _FIRST:
-        raise ValueError(f"{len(seen)} runs are too few to find the graze: {_FIRST} free ones and those with contact")
-    contact, limit = np.zeros(len(seen), dtype=bool), 0.0
-    for i in range(_FIRST, len(seen)):
-        free = seen.mean[:i][~contact[:i]]
+    """Which runs touch, and how far a mean must leave the place of the free runs' for that.
+
+    All runs from the first with contact on have left it: a single mean that strays among free runs is no contact.
+    """
+    n = len(seen)
+    if n <= _FIRST:
+        raise ValueError(f"{n} runs are too few to find the graze: {_FIRST} free ones and those with contact")
+    turn = np.sign(np.diff(seen.omega))
+    if not np.all(turn == turn[0]):
+        raise ValueError("the frequency does not go one way from run to run: give the steps of one direction")
+    begun, limit = _FIRST, 0.0
+    for _ in range(3):  # the scatter of the means from the free runs, the free runs from the scatter
+        free = seen.mean[:begun]
         limit = max(_SIGMAS * float(np.std(free, ddof=1)), _COUNTS * resolution)
-        contact[i] = abs(seen.mean[i] - float(np.mean(free))) > limit
-    return contact, limit
+        near = np.flatnonzero(np.abs(seen.mean - float(np.mean(free))) <= limit)
+        begun = max(int(near[-1]) + 1 if len(near) else 0, _FIRST)
+    if begun == n or len(near) < _FIRST:
+        what = "none touches" if begun == n else f"the first {_FIRST} do already"
+        raise ValueError(
+            f"of the {n} runs {what}: step from free motion into contact (where contact ends is not where it begins)"
+        )
+    return np.arange(n) >= begun, limit
 
 
 def _bracket(seen: Steady, contact: NDArray[np.bool_]) -> tuple[int, int]:
     """Indices of the last free run and of the first with contact, in the order of the steps."""
-    if not contact.any():
-        raise ValueError(
-            f"none of the {len(seen)} runs touches, or the first {_FIRST} do already: step from free motion into "
-            "contact (where contact ends is not where it begins)"
-        )
     begun = int(np.argmax(contact))
-    if not np.all(contact[begun:]):
-        again = float(seen.omega[begun + int(np.argmin(contact[begun:]))])
-        raise ValueError(
-            f"the run at {again:.3f} rad/s is free again after contact had begun: step one way only, or give the "
-            "steps of one direction"
-        )
-    if not all(seen.amplitude[i] < seen.amplitude[begun] for i in range(begun)):
-        raise ValueError(
-            "the motion does not grow towards the first contact; the steps must go towards resonance"
-        )
+    if not np.all(seen.amplitude[:begun] < seen.amplitude[begun]):
+        raise ValueError("the motion does not grow towards the first contact; the steps must go towards resonance")
     return begun - 1, begun
 
 

@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from nonsmooth.experiment.signals.phase import drive_phase
 from nonsmooth.identification.evidence import Run
 from nonsmooth.identification.free_decay import DecayFit
-from nonsmooth.identification.shooting import Piece, ShootingFit, shoot, start_state
+from nonsmooth.identification.pieces import Piece, start_state
+from nonsmooth.identification.shooting import ShootingFit, shoot
 
 __all__ = ["ContactFit", "shoot_contacts"]
 
@@ -145,7 +146,7 @@ def _pieces(
         local = t[begin:end] - t[begin]
         found.append(
             Piece(local, x[begin:end], phase[begin:end], which, _build, start_state(local, x[begin:end]),
-                  label=run.name)
+                  label=run.name, origin=float(t[begin]))
         )  # fmt: skip
     if len(found) > most:
         keep = np.unique(np.linspace(0, len(found) - 1, most).round().astype(int))

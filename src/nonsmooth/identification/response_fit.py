@@ -81,11 +81,36 @@ class ResponseFit:
             return np.asarray(size)
         return np.concatenate([size, -np.angle(needed)])
 
+    def _jacobian(self, p: FloatArray) -> FloatArray:
+        """Derivatives of :meth:`_left`; those by the residual, which moves the amplitudes, by differences."""
+        mode, _, by_square, by_damping = self._unpack(p)
+        K, (first, count), n = len(self.knots), self._sizes, len(self.names)
+        a = np.abs(self.measured - mode.residual * self.force if self.force is not None else self.measured)
+        basis = interpolation(self.knots, a)
+        plain = basis @ mode.squares
+        G, D = plain * np.exp(by_square), np.exp(basis @ mode.log_damping + by_damping)
+        needed = G - self.omega**2 + 1j * D * self.omega
+        to_square, to_damping = -G / needed, -1j * D * self.omega / needed
+        J = np.zeros((len(a), count), complex)
+        J[:, :K] = to_square[:, None] * basis * mode.squares / plain[:, None]
+        J[:, K : 2 * K] = to_damping[:, None] * basis
+        if self.force is None:
+            J[np.arange(len(a)), 2 * K + self.curve] = 1.0
+        elif self.mass is None:
+            J[:, 2 * K] = -1.0
+        if self.shifts:
+            J[np.arange(len(a)), first + self.curve] = to_square
+            J[np.arange(len(a)), first + n + self.curve] = to_damping
+        full = np.concatenate([J.real, J.imag]) if self.phased else J.real
+        for k in range(first - 2, first) if self.residual else ():
+            step = np.zeros(count)
+            step[k] = 1e-6
+            full[:, k] = (self._left(p + step) - self._left(p - step)) / 2e-6
+        return full
+
     # ------------------------------------------------------------------------------------------------------ the fit
 
     def _fit(self) -> None:
-        from scipy.optimize import least_squares
-
         first, count = self._sizes
         n, rows = len(self.names), len(self.omega) * (1 + self.phased)
         if rows <= first:
@@ -93,25 +118,20 @@ class ResponseFit:
         p = self._start(count)
         sigma, spread = 0.05, np.array([1e-3, 0.1])
         for k in range(_ROUNDS):
-
-            def weighted(q: FloatArray) -> FloatArray:
-                return np.concatenate([self._left(q) / sigma, q[first:] / np.repeat(spread, n if self.shifts else 0)])
-
-            done = least_squares(weighted, p, x_scale="jac", method="trf", xtol=1e-12, ftol=1e-12, gtol=1e-12)
-            p = done.x
-            J = done.jac
-            inverse = np.linalg.pinv(J.T @ J)
+            prior = np.zeros((count - first, count))
+            prior[:, first:] = np.diag(np.repeat(1 / spread, n)) if self.shifts else 0.0
+            p = self._settle(p, sigma, prior)
+            J = np.concatenate([self._jacobian(p) / sigma, prior])
+            inverse = np.linalg.pinv(J.T @ J, hermitian=True)
             left = self._left(p)
-            # Points of a curve err alike; those that do count less.
-            self.alike = self._alike(left)
-            freedom = max(rows - float(np.trace(inverse @ (J[:rows].T @ J[:rows]))), 1.0)
+            freedom = max(rows - float(np.sum((J[:rows] @ inverse) * J[:rows])), 1.0)
             before = (sigma, *spread)
-            sigma = max(float(np.sqrt(left @ left / freedom * self.alike)), 1e-9)
+            # Points of a curve that err alike count less.
+            sigma = max(float(np.sqrt(left @ left / freedom * self._alike(left))), 1e-9)
             if self.shifts:
-                own = p[first:].reshape(2, n)
-                own_error = np.diag(inverse)[first:].reshape(2, n)
+                own, own_error = p[first:].reshape(2, n), np.diag(inverse)[first:].reshape(2, n)
                 spread = np.sqrt(np.maximum(np.mean(own**2 + own_error, axis=1), 1e-18))
-            if k > 2 and np.allclose(before, (sigma, *spread), rtol=1e-3):
+            if k > 2 and np.allclose(before, (sigma, *spread), rtol=5e-3):
                 break
         self.p, self.covariance, self.left = p, inverse, left
         self.sigma = float(np.sqrt(left @ left / freedom))
@@ -119,6 +139,17 @@ class ResponseFit:
         self.mode = self._unpack(p)[0]
         own = self.measured - self.mode.residual * self.force if self.force is not None else self.measured
         self.amplitude = np.abs(own)
+
+    def _settle(self, p: FloatArray, sigma: float, prior: FloatArray) -> FloatArray:
+        """Least squares of what is left over sigma, and of the shifts over theirs, from ``p``."""
+        from scipy.optimize import least_squares
+
+        done = least_squares(
+            lambda q: np.concatenate([self._left(q) / sigma, prior @ q]), p,
+            jac=lambda q: np.concatenate([self._jacobian(q) / sigma, prior]),
+            x_scale="jac", xtol=1e-10, ftol=1e-10, gtol=1e-10,
+        )  # fmt: skip
+        return np.asarray(done.x)
 
     def _start(self, count: int) -> FloatArray:
         """A linear mode: from where a curve answers most for its force, and how wide that is."""

@@ -22,15 +22,20 @@ if TYPE_CHECKING:
 
 __all__ = ["Setting", "records", "rise"]
 
+
 @dataclass(frozen=True)
 class Setting:
-    """One steady run: voltage (V), crank length and gap at the screw (m; None: no support), and what to note."""
+    """One steady run: voltage (V), crank length and gap at the screw (m; None: no support), and what to note.
+
+    ``release`` is where the car is held and let go (m), the motor running; None: it begins at rest.
+    """
 
     voltage: float
     crank_length: float
     gap: float | None = None
     duration: float = 15.0
     notes: tuple[tuple[str, Any], ...] = ()
+    release: float | None = None
 
     def stated(self) -> dict[str, Any]:
         """The settings as they go into the notebook."""
@@ -64,7 +69,7 @@ def _steady(
     recorded = int(np.ceil(phase + (setting.duration + 1 / sensors.RATE) / period))
     time, at = sensors.instants(rig, rng, setting.duration)
     begin = (before + phase) * period
-    start = _at_rest(gap) if last is None else last
+    start = _at_rest(gap, setting.release or 0.0) if last is None else last
     (x, v), result = simulated(
         system, name, instants=begin + at, end=_end(system, before, recorded), periods=recorded, transient=before,
         start=start,
@@ -108,6 +113,6 @@ def _end(system: System, before: int, recorded: int) -> float:
     return before * period + recorded * period
 
 
-def _at_rest(gap: float) -> dict[str, float]:
-    """At the mean position, or just clear of a support that reaches beyond it."""
-    return {"x": min(0.0, gap)}
+def _at_rest(gap: float, place: float = 0.0) -> dict[str, float]:
+    """Held still at ``place``, the rest position where not given, or just clear of a support that reaches beyond."""
+    return {"x": min(place, gap)}

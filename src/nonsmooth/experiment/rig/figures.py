@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     from nonsmooth.experiment.recording import Recording
     from nonsmooth.experiment.rig.virtual_rig import VirtualRig
 
-__all__ = ["FIGURES", "SECTIONS", "crank_for", "figure", "rise", "screw_for", "section"]
+__all__ = [
+    "FIGURES", "RELEASES", "SECTIONS", "crank_for", "figure", "rise", "screw_for", "section", "without_support",
+]  # fmt: skip
 
 #: Settings of the sections: frequency (rad/s), forcing (N), gap (m).
 SECTIONS: dict[int, tuple[tuple[float, float, float], ...]] = {
@@ -33,12 +35,16 @@ SECTIONS: dict[int, tuple[tuple[float, float, float], ...]] = {
     18: tuple((omega, 0.23, 0.0036) for omega in (8.64, 9.55, 9.88)),
 }
 _PERIODS = {15: 1500, 16: 1500, 17: 60}
+#: Where else the car is let go at each setting (m): of motions that coexist, the start at rest shows one.
+RELEASES: dict[int, tuple[float, ...]] = {14: (-0.01, -0.02, -0.03, -0.04)}
 _RISE = (3.69, 0.2, 0.5, -0.0045)  # rad/s, N, N, m
 _RESPONSES = {9: (0.14, 0.02), 10: (0.16, 0.0145)}
-#: What each figure needs.
+_STEPS = {9: (3.0, 6.6), 10: (2.4, 7.4)}  # rad/s
+#: What each figure needs. Those with the support mounted also need a few runs without it, in ``response``: where the
+#: car swings about, from which the gap is counted.
 FIGURES: dict[int, tuple[str, ...]] = {
     4: ("springs", "support"), 5: ("impulse",), 6: ("response",), 7: ("drop",), 8: ("voltage", "crank"),
-    9: ("response",), 10: ("response",), 11: ("rise",), **dict.fromkeys(SECTIONS, ("section",)),
+    9: ("response",), 10: ("response",), 11: ("rise", "response"), **dict.fromkeys(SECTIONS, ("section", "response")),
 }  # fmt: skip
 
 
@@ -54,20 +60,29 @@ def screw_for(rig: VirtualRig, gap: float, crank_length: float, *, referred: boo
 
 
 def section(
-    rig: VirtualRig, *, figure: int = 14, periods: int | None = None, referred: bool = True
-) -> Recording:
-    """Long steady records at the settings of Figs. 12 to 18, ``periods`` turns of the crank each."""
+    rig: VirtualRig, *, figure: int = 14, periods: int | None = None, referred: bool = True,
+    releases: Sequence[float] | None = None, settle: float = 60.0,
+) -> Recording:  # fmt: skip
+    """Long steady records at the settings of Figs. 12 to 18, ``periods`` turns of the crank each.
+
+    First all settings from rest, then all again for each of ``releases`` (m), the places where the car is let go
+    while the motor runs; for Fig. 14 four of them where not given. ``settle`` seconds pass before a record.
+    """
     if figure not in SECTIONS:
         shown = ", ".join(map(str, SECTIONS))
         raise ValueError(f"figure = {figure!r} shows no sections of steady motion; those are {shown}")
     n = _PERIODS.get(figure, 200) if periods is None else periods
     settings = []
-    for omega, rho, gap in SECTIONS[figure]:
-        length = crank_for(rig, rho)
-        reading = screw_for(rig, gap, length, referred=referred)
-        notes = (("figure", figure), ("note", f"rho {rho} N, gap {gap} m, omega {omega} rad/s"))
-        settings.append(Setting(voltage_for(rig, omega), length, reading, n * 2 * np.pi / omega, notes))
-    return records(rig, "section", settings, settle=60.0, carry=figure == 17)
+    for place in (None, *(RELEASES.get(figure, ()) if releases is None else releases)):
+        for omega, rho, gap in SECTIONS[figure]:
+            length = crank_for(rig, rho)
+            reading = screw_for(rig, gap, length, referred=referred)
+            remark = f"rho {rho} N, gap {gap} m, omega {omega} rad/s"
+            remark += "" if place is None else f"; the car let go at {1e3 * place:g} mm"
+            notes = (("figure", figure), ("note", remark))
+            duration = n * 2 * np.pi / omega
+            settings.append(Setting(voltage_for(rig, omega), length, reading, duration, notes, place))
+    return records(rig, "section", settings, settle=settle, carry=figure == 17)
 
 
 def rise(
@@ -82,8 +97,21 @@ def rise(
     return driven.rise(rig, voltage=knob, crank_length=lengths, gap=screw, duration=duration)
 
 
+def without_support(rig: VirtualRig, number: int) -> list[Setting]:
+    """Runs at the crank lengths of a figure with the support taken away: they show where the car swings about."""
+    if number in _RESPONSES:
+        pairs = {(6.5, crank_for(rig, _RESPONSES[number][0]))}
+    elif number == 11:
+        omega, low, high, _ = _RISE
+        pairs = {(omega, crank_for(rig, rho)) for rho in (low, 0.5 * (low + high), high)}
+    else:
+        pairs = {(SECTIONS[number][0][0], crank_for(rig, rho)) for _, rho, _ in SECTIONS[number]}
+    notes = (("figure", number), ("note", "no support: the place about which the car swings"))
+    return [Setting(voltage_for(rig, omega), length, None, 30.0, notes) for omega, length in sorted(pairs)]
+
+
 def figure(rig: VirtualRig, number: int, **options: Any) -> dict[str, Recording]:
-    """The recordings behind a figure, by procedure; the options are those of its procedure.
+    """The recordings behind a figure, by procedure; the options are those of its (first) procedure.
 
     Raises
     ------
@@ -92,16 +120,19 @@ def figure(rig: VirtualRig, number: int, **options: Any) -> dict[str, Recording]
     """
     if number not in FIGURES:
         raise ValueError(f"figure {number!r}: measurements stand behind Figs. {', '.join(map(str, sorted(FIGURES)))}")
-    if number in SECTIONS:
-        options = {"figure": number, **options}
+    if number in SECTIONS or number == 11:
+        options = {"figure": number, **options} if number in SECTIONS else options
+        shown, _ = FIGURES[number]
+        free = records(rig, "response", without_support(rig, number))
+        return {shown: rig.record(shown, **options), "response": free}
     if number == 6:
         options = {"crank_lengths": (crank_for(rig, 0.14),), **options}
     if number in _RESPONSES:
         rho, gap = _RESPONSES[number]
         length = crank_for(rig, rho)
-        steps: Sequence[float] = np.arange(3.0, 6.6, 0.05).tolist()
+        steps: Sequence[float] = np.arange(*_STEPS[number], 0.05).tolist()
         options = {
-            "crank_lengths": (length,), "gap": screw_for(rig, gap, length),
-            "voltages": [voltage_for(rig, omega) for omega in steps], **options,
+            "crank_lengths": (length,), "gap": screw_for(rig, gap, length), "duration": 20.0,
+            "voltages": [voltage_for(rig, omega) for omega in steps], "after": without_support(rig, number), **options,
         }  # fmt: skip
     return {procedure: rig.record(procedure, **options) for procedure in FIGURES[number]}

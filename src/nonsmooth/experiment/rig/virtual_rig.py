@@ -213,7 +213,7 @@ class VirtualRig:
         return rise(self, **options)
 
     def section(self, **options: Any) -> Recording:
-        """Long steady records at settings of Figs. 12 to 18. Options: ``figure``, ``periods``."""
+        """Long steady records at settings of Figs. 12 to 18. Options: those of ``figures.section``."""
         from nonsmooth.experiment.rig.figures import section
 
         return section(self, **options)
@@ -248,11 +248,15 @@ class VirtualRig:
         return self._write(folder, {name: self.record(name) for name in names}, truth, f"virtual rig, seed {self.seed}")
 
     def write_figure(
-        self, number: int, folder: str | os.PathLike[str], *, truth: str | os.PathLike[str] | None = None
-    ) -> Path:
-        """Record and write what stands behind one of the paper's Figs. 4 to 18; see :meth:`write_session`."""
+        self, number: int, folder: str | os.PathLike[str], *, truth: str | os.PathLike[str] | None = None,
+        **options: Any,
+    ) -> Path:  # fmt: skip
+        """Record and write what stands behind one of the paper's Figs. 4 to 18; see :meth:`write_session`.
+
+        The options are those of the figure's procedure, as for :meth:`figure`.
+        """
         title = f"virtual rig, seed {self.seed}, Fig. {number}"
-        return self._write(folder, self.figure(number), truth, title)
+        return self._write(folder, self.figure(number, **options), truth, title)
 
     def _write(self, folder: Any, made: Mapping[str, Recording], truth: Any, title: str) -> Path:
         from nonsmooth.experiment.rig.notebook import write_session

@@ -32,6 +32,8 @@ class Figure:
         Datasets -> a Matplotlib figure.
     caption : callable
         Datasets -> the caption, with the numbers of this run.
+    rig : bool
+        Whether it is measured on the virtual rig (``settings.bench``); what it shows is then synthetic.
     """
 
     name: str
@@ -40,6 +42,7 @@ class Figure:
     compute: Callable[[Settings], dict[str, xr.Dataset]]
     draw: Callable[[Mapping[str, xr.Dataset]], Canvas]
     caption: Callable[[Mapping[str, xr.Dataset]], str]
+    rig: bool = False
 
 
 def sheet(width: float, height: float) -> Canvas:

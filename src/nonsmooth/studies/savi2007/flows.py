@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from nonsmooth.flow.starts import random_starts
 from nonsmooth.models import discontinuous_support
 from nonsmooth.system.system import System
+
+if TYPE_CHECKING:
+    from nonsmooth.studies.savi2007.laboratory import Laboratory
 
 __all__ = ["ETA", "EXACT", "FLOWS", "SMOOTHED", "Flow", "Settings", "starts"]
 
@@ -40,10 +43,18 @@ FLOWS = (EXACT, SMOOTHED)
 
 @dataclass(frozen=True)
 class Settings:
-    """How much work: ``quick`` for a first look."""
+    """How much work: ``quick`` for a first look. ``laboratory``: where the figures of the rig are measured."""
 
     quick: bool = False
     progress: bool = True
+    laboratory: Laboratory | None = None
+
+    @property
+    def bench(self) -> Laboratory:
+        """The laboratory; ValueError where there is none."""
+        if self.laboratory is None:
+            raise ValueError("a figure of the rig is measured in a laboratory: give Settings(laboratory=...)")
+        return self.laboratory
 
     def of(self, flow: Flow, *, exact: _Choice, smoothed: _Choice, quick: _Choice) -> _Choice:
         """A number for this flow; ``quick`` takes the place of both in a quick run."""

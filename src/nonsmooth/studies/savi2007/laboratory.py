@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from nonsmooth.identification.parameter_set import ParameterSet
     from nonsmooth.system.system import System
 
-__all__ = ["SEED", "TRUTH", "Laboratory"]
+__all__ = ["SEED", "TRUTH", "Laboratory", "with_support"]
 
 SEED = 0  # of the rig's noise; its parameters are the published ones
 TRUTH = "truth.toml"
@@ -73,6 +73,35 @@ class Laboratory:
     @cached_property
     def _identification(self) -> Path:
         return self.rig.write_session(self.folder / "identification", truth=self.folder / TRUTH)
+
+    def sensors(self) -> xr.Dataset:
+        """What the files of the session say of the sensors: rate, steps, ranges used."""
+        import numpy as np
+        import xarray as xr
+
+        from nonsmooth.experiment.signals.displacement import found_resolution
+
+        with self._noted():
+            item = self.session.recordings("springs")[0]
+            angle, force = (item.recording.channel(name, item.run) for name in ("Angle", "Force"))
+            volts = [float(one.settings["voltage"]) for one in self.session.recordings("voltage")]
+            pushed = [one.recording.channel("Force", one.run) for one in self.session.recordings("support")]
+            taps = [one.recording.channel("Angle", one.run) for one in self.session.recordings("impulse")]
+        steps = np.diff(angle["time"].values)
+        turning = max(float(np.abs(np.diff(tap.values) / np.diff(tap["time"].values)).max()) for tap in taps)
+        values = {
+            "rate": (1 / float(np.median(steps)), "Hz", "sample rate"),
+            "rate_spread": (float(steps.std() / np.mean(steps)), "", "scatter of the sampling step, relative"),
+            "angle_step": (float(np.degrees(found_resolution(angle))), "deg", "step of the rotary sensor"),
+            "force_step": (float(found_resolution(force)), "N", "step of the force sensor"),
+            "force_used": (max(float(np.abs(one.values).max()) for one in pushed), "N", "largest force recorded"),
+            "turning": (turning / (2 * np.pi), "1/s", "fastest turning of the rotary sensor after a tap"),
+            "volts_low": (min(volts), "V", "lowest motor voltage"), "volts_high": (max(volts), "V", "highest"),
+        }  # fmt: skip
+        return xr.Dataset(
+            {name: ((), value, {"units": unit, "long_name": text}) for name, (value, unit, text) in values.items()},
+            attrs={"synthetic": "yes"},
+        )
 
     def record(self, name: str, made: Mapping[str, Recording]) -> Session:
         """Write recordings, by procedure, into the session folder ``name`` and read it."""
@@ -126,3 +155,8 @@ class Laboratory:
         for item in caught:
             if not issubclass(item.category, RecordingWarning):
                 warnings.warn_explicit(item.message, item.category, item.filename, item.lineno)
+
+
+def with_support(session: Session, procedure: str) -> list[str]:
+    """The runs of a procedure in which the support was mounted."""
+    return [item.run for item in session.recordings(procedure) if "gap" in item.settings]

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "APERIODIC", "UNSETTLED", "Interval", "changes", "highest", "jumps", "lowest", "periods_reached", "range_of",
-    "regimes", "separation_rate",
+    "APERIODIC", "UNSETTLED", "Interval", "changes", "highest", "jumps", "lowest", "measured_jumps",
+    "measured_periods", "periods_reached", "range_of", "regimes", "separation_rate",
 ]  # fmt: skip
 
 APERIODIC = 0  # no period found up to the longest looked for
@@ -93,6 +93,25 @@ def jumps(response: xr.Dataset, direction: str) -> list[Interval]:
         (Interval(float(a - 0.5 * b), float(a + 0.5 * b)) for a, b in zip(value, step, strict=True)),
         key=lambda interval: interval.low,
     )
+
+
+def measured_jumps(runs: xr.Dataset, direction: str) -> list[Interval]:
+    """The steps of a measured response in which its amplitude jumps, at rising values; read off the runs alone."""
+    from nonsmooth.analysis.response import jumps_in
+
+    mine = runs.isel(run=runs["direction"].values.astype(str) == direction)
+    order = np.argsort(mine["omega"].values)
+    omega, heights = mine["omega"].values[order], mine["amplitude"].values[order]
+    found = jumps_in(heights if direction == "up" else heights[::-1])
+    first = [i if direction == "up" else len(omega) - 2 - i for i in found]
+    return [Interval(float(omega[i]), float(omega[i + 1])) for i in sorted(first)]
+
+
+def measured_periods(runs: xr.Dataset, direction: str | None = None) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Frequencies, rising, and the period number measured at each; of one direction or of all runs."""
+    mine = runs if direction is None else runs.isel(run=runs["direction"].values.astype(str) == direction)
+    order = np.argsort(mine["omega"].values, kind="stable")
+    return mine["omega"].values[order], mine["period_number"].values[order].astype(np.int64)
 
 
 def periods_reached(survey: xr.Dataset, value: float) -> dict[int, int]:

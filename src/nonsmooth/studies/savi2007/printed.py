@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 __all__ = [
     "FIGURE_9", "FIGURE_10", "FIGURE_11", "FIGURE_12", "FIGURE_13", "FIGURE_14", "FIGURE_14_TEXT", "FIGURE_17",
-    "FIGURE_17_TEXT", "FIGURE_18", "NUMBERS", "Printed",
+    "FIGURE_17_TEXT", "FIGURE_18", "NUMBERS", "TABLE_1", "TEST_MASS", "Printed",
 ]  # fmt: skip
 
 
@@ -30,7 +30,7 @@ class Printed:
         return 0.5 * 10.0**-digits
 
     def __str__(self) -> str:
-        return f"{self.text} {self.unit}"
+        return f"{self.text} {self.unit}".rstrip()
 
 
 # Parameters of the figures (captions and Section 4), with Table 1 for the rest.
@@ -45,10 +45,25 @@ FIGURE_17 = {"rho": 0.23, "g": 0.0036}
 FIGURE_17_TEXT = {8.64: "periodic, no contact", 9.55: "chaotic", 9.88: "periodic, with contact"}  # omega
 FIGURE_18 = {8.64: 1, 9.55: 0, 9.88: 1}  # omega -> period number (0: chaotic)
 
+# Parameters as identified in Section 3.1.
+_T = "Table 1"
+TABLE_1 = {
+    "k": Printed("8.47", "N/m", f"Fig. 4, {_T}"),
+    "k_s": Printed("1210", "N/m", f"Fig. 4, {_T}"),
+    "c": Printed("0.87", "N s/m", f"Fig. 6, {_T}"),
+    "c_s": Printed("0.60", "N s/m", f"Fig. 7, {_T}"),
+    "m": Printed("0.838", "kg", f"Section 3.1, {_T}"),
+    "omega_0": Printed("4.60", "rad/s", f"Fig. 5, {_T}"),
+}
+TEST_MASS = 1.33  # kg, Fig. 7
+
 _9, _11 = "Section 4, on Fig. 9", "Section 4, on Fig. 11"
 NUMBERS = {
     "natural frequency": Printed("4.50", "rad/s", "Section 3.1"),
     "natural frequency, measured": Printed("4.60", "rad/s", "Section 3.1, Table 1"),
+    "peak of the DFT": Printed("0.732", "Hz", "Fig. 5"),
+    "damping ratio": Printed("0.115", "", "Fig. 6"),
+    "damping ratio of the support": Printed("0.0075", "", "Fig. 7"),
     "period 2 near": Printed("3.63", "rad/s", _9),
     "jump rising": Printed("5.88", "rad/s", _9),
     "jump falling": Printed("5.29", "rad/s", _9),

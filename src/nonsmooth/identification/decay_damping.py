@@ -1,0 +1,117 @@
+r"""Damping from free decays, viscous and dry told apart: the finding and the heights of its turning points.
+
+From a height h the car swings about :math:`\pm\delta`, :math:`\delta = f/\omega_0^2`, and turns at
+:math:`q (h - \delta) - \delta` on the other side, :math:`q = e^{-\pi b/(2\omega_d)}`. The heights therefore lie on
+
+.. math::
+
+    h(t) = (h_0 + h_*)\, e^{-b t/2} - h_*, \qquad h_* = \delta\,\frac{1 + q}{1 - q},
+
+a straight line in the logarithm where there is no friction, bent down towards the end where there is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.identification.evidence import Run
+from nonsmooth.identification.finding import Estimate, Finding
+from nonsmooth.identification.free_decay import DecayFit, free_decay
+from nonsmooth.identification.support_damping import log_decrement
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["decay_damping", "envelope"]
+
+FloatArray = NDArray[np.float64]
+
+
+def envelope(time: FloatArray, first: float, omega_0: float, b: float, f: float) -> FloatArray:
+    """Heights of the turning points of a free decay (m) over the time since the first of height ``first``.
+
+    Zero from where friction holds the car.
+    """
+    q = np.exp(-np.pi * b / (2 * np.sqrt(omega_0**2 - b**2 / 4)))
+    below = f / omega_0**2 * (1 + q) / (1 - q)
+    return np.maximum((first + below) * np.exp(-b * np.asarray(time) / 2) - below, 0.0)
+
+
+def decay_damping(runs: Sequence[Run], decay: DecayFit, mass: float, *, resolution: float) -> Finding:
+    r"""Viscous damping and dry friction from the shape of free decays, with a viscous-only fit beside it.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        The taps.
+    decay : DecayFit
+        Their fit, by `free_decay`.
+    mass : float
+        Mass (kg), taken as exact: its uncertainty is the adjustment's matter.
+    resolution : float
+        Length of a count (m).
+
+    Returns
+    -------
+    Finding
+        c (N s/m). ``others``: ``friction`` (N), ``c_viscous_only`` of the same decays without friction in the law;
+        ``covariance`` is that of c and friction.
+    """
+    viscous = free_decay(
+        [(run.time, run.positions) for run in runs], resolution=resolution, friction=False, doubt_law=False
+    )
+    c, friction = mass * float(decay.values[1]), mass * float(decay.values[2])
+    c_error, friction_error = mass * decay.error("b"), mass * decay.error("f")
+    plain = mass * float(viscous.values[1])
+    covariance = mass**2 * decay.covariance[1:3, 1:3]
+    related = float(covariance[0, 1] / (c_error * friction_error)) if friction_error else 0.0
+    notes = [
+        f"without friction in the law the same decays give {plain:.4g} N s/m, {100 * (plain / c - 1):+.1f} %",
+        f"c and the dry friction are told apart by the shape; correlation {related:+.2f}",
+        *decay.notes,
+    ]
+    return Finding(
+        "c_decay", Estimate(c, c_error, "N s/m"), "free decays, viscous damping and dry friction at once",
+        decay.samples, tuple(runs[i].name for i in decay.runs), tuple(notes),
+        {
+            "friction": Estimate(friction, friction_error, "N"),
+            "c_viscous_only": Estimate(plain, mass * viscous.error("b"), "N s/m"),
+        },
+        covariance, _data(runs, decay, viscous, mass, resolution), "free_decay",
+    )  # fmt: skip
+
+
+def _data(runs: Sequence[Run], decay: DecayFit, viscous: DecayFit, mass: float, resolution: float) -> xr.Dataset:
+    import xarray as xr
+
+    natural, b, f, rest = (float(v) for v in decay.values)
+    swings = [run.positions[begin:end] for run, (begin, end) in zip((runs[i] for i in decay.runs), decay.spans, strict=True)]
+    which = int(np.argmax([np.ptp(x) for x in swings]))
+    run, (begin, end) = runs[decay.runs[which]], decay.spans[which]
+    time, x = run.time[begin:end], run.positions[begin:end]
+    at, height, error = log_decrement(time, x, rest, resolution=resolution)
+    # the first turning point is where the fit begins
+    at, height, error = np.append(time[0], at), np.append(abs(x[0] - rest), height), np.append(error[:1], error)
+    at, unique = np.unique(at, return_index=True)
+    height, error = height[unique], error[unique]
+    fine = np.linspace(0.0, float(at[-1] - at[0]), 200)
+    fitted = decay.fit.fitted[which][:, 0] - rest
+    both = envelope(fine, abs(fitted[0]), natural, b, f)
+    plain = envelope(fine, abs(viscous.fit.fitted[which][0, 0] - viscous.values[3]), natural, float(viscous.values[1]), 0.0)
+    return xr.Dataset(
+        {
+            "peak_time": ("peak", at - at[0], {"units": "s"}), "peak_height": ("peak", height, {"units": "m"}),
+            "peak_height_error": ("peak", error, {"units": "m"}),
+            "x": ("time", x - rest, {"units": "m"}), "fitted": ("time", fitted, {"units": "m"}),
+            "envelope_both": ("fine_time", both, {"units": "m"}),
+            "envelope_viscous": ("fine_time", plain, {"units": "m"}),
+            "c": ((), mass * b, {"units": "N s/m"}), "c_error": ((), mass * decay.error("b"), {"units": "N s/m"}),
+            "friction_force": ((), mass * f, {"units": "N"}),
+            "friction_force_error": ((), mass * decay.error("f"), {"units": "N"}),
+        },
+        {"time": time - time[0], "fine_time": fine}, {"synthetic": "yes" if run.synthetic else "no"},
+    )  # fmt: skip

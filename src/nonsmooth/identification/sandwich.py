@@ -1,0 +1,82 @@
+"""The covariance of a fit over pieces: by the scatter of the scores, which correlate in time within a piece."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.identification.arrow import reduced
+from nonsmooth.identification.pieces import Piece, Problem, State
+from nonsmooth.identification.uncertainty import correlation_times
+
+__all__ = ["Sandwich", "sandwich"]
+
+FloatArray = NDArray[np.float64]
+
+
+class Sandwich(NamedTuple):
+    """State at the best fit, covariance (p, p), chi^2 per degree of freedom, samples that share an error."""
+
+    state: State
+    covariance: FloatArray
+    reduced: float
+    correlation: float
+
+
+def sandwich(
+    problem: Problem, theta: FloatArray, starts: FloatArray, spread: float, used: NDArray[np.bool_], prior: FloatArray
+) -> Sandwich:
+    """Covariance of the parameters, never smaller along any of them than that of white residuals of the same size.
+
+    Parameters
+    ----------
+    theta, starts : array (p,), (n_pieces, 2)
+        The best fit.
+    spread : float
+        Standard deviation of a reading's instant (s).
+    used : array of bool (n_pieces,)
+    prior : array (p, p)
+        Precision of what was known before.
+    """
+    p = len(theta)
+    state = problem.derivatives(theta, starts)
+    weights = problem.weights(state, spread)
+    normal, _, back = reduced(problem, state, weights, used, p)
+    scores, rows, chi2 = [], [], 0.0
+    for i, piece in enumerate(problem.pieces):
+        if not used[i]:
+            continue
+        g, s = state.in_parameters[i] * weights[i][:, None], state.in_start[i] * weights[i][:, None]
+        r = state.residuals[i] * weights[i]
+        block, cross, _ = back[i]
+        scores.append((piece, (g - s @ (block @ cross)), r))
+        chi2 += float(r @ r)
+        rows.append(len(r))
+    freedom = max(sum(rows) - 2 * len(rows) - p, 1)
+    size = chi2 / freedom
+    tau = float(np.median([correlation_times(r) for _, _, r in scores]))
+    meat = _meat(scores, p)
+    inverse = np.linalg.inv(normal + prior)
+    data = normal * size
+    # what the scatter of the scores shows, and never less than white residuals of their size
+    raised = np.maximum(1.0, np.sqrt(np.maximum(np.diag(data), 1e-300) / np.maximum(np.diag(meat), 1e-300)))
+    meat = meat * np.outer(raised, raised) * sum(rows) / freedom
+    covariance = inverse @ (meat + prior) @ inverse
+    return Sandwich(state, covariance, size, tau)
+
+
+def _meat(scores: Sequence[tuple[Piece, FloatArray, FloatArray]], p: int) -> FloatArray:
+    """Sum of products of scores up to a lag of a few correlation times, Bartlett's weights, within pieces."""
+    meat = np.zeros((p, p))
+    for piece, g, r in scores:
+        score = g * r[:, None]
+        here = score.T @ score
+        lags = min(len(r) - 1, int(np.ceil(4 * correlation_times(r))) + 2)
+        for k in range(1, lags + 1):
+            cross = score[k:].T @ score[:-k]
+            here += (1.0 - k / (lags + 1)) * (cross + cross.T)
+        meat[np.ix_(piece.which, piece.which)] += here
+    return meat

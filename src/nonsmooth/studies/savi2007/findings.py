@@ -1,0 +1,104 @@
+"""Findings of identification as datasets that stand by themselves: the picture's data, and what was found, as text."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from nonsmooth.results.provenance import ATTRIBUTE, package_version, read_provenance
+from nonsmooth.studies.savi2007.measure import Interval
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from nonsmooth.identification.finding import Estimate, Finding
+    from nonsmooth.identification.parameter_set import ParameterSet
+
+__all__ = ["Found", "Number", "estimates_of", "found_in", "kept", "the_finding"]
+
+
+@dataclass(frozen=True)
+class Number:
+    """A value with its standard uncertainty and its 95 % interval."""
+
+    value: float
+    uncertainty: float
+    low: float
+    high: float
+    unit: str
+
+    @property
+    def interval(self) -> Interval:
+        """The 95 % interval about the value; where it is not even, the wider side counts."""
+        half = max(self.high - self.value, self.value - self.low)
+        return Interval(self.value - half, self.value + half)
+
+    def times(self, factor: float, unit: str = "") -> Number:
+        """The number in another unit."""
+        rest = (self.uncertainty * abs(factor), *sorted((self.low * factor, self.high * factor)))
+        return Number(self.value * factor, *rest, unit or self.unit)
+
+    def __str__(self) -> str:
+        return f"{self.interval} {self.unit}".rstrip()
+
+
+@dataclass(frozen=True)
+class Found:
+    """What one procedure found: its number, what came with it, and what there is to say."""
+
+    name: str
+    number: Number
+    others: Mapping[str, Number]
+    method: str
+    notes: tuple[str, ...]
+    samples: int
+    runs: int
+
+
+def the_finding(identified: ParameterSet, name: str) -> Finding:
+    """The finding of that name; ValueError where the session did not tell it."""
+    for finding in identified.findings:
+        if finding.name == name:
+            return finding
+    known = ", ".join(finding.name for finding in identified.findings)
+    raise ValueError(f"identification made no finding {name!r}; it made: {known}")
+
+
+def kept(finding: Finding) -> xr.Dataset:
+    """The finding's data for its picture, with the finding itself in the attribute ``nonsmooth``."""
+    import xarray as xr
+
+    data = xr.Dataset(attrs={"synthetic": "yes"}) if finding.data is None else finding.data.copy()
+    record = {
+        "version": package_version(), "verb": "identify", "synthetic": data.attrs.get("synthetic") == "yes",
+        "name": finding.name, "number": _plain(finding.estimate), "method": finding.method,
+        "others": {name: _plain(other) for name, other in finding.others.items()}, "notes": list(finding.notes),
+        "samples": finding.samples_used, "runs": len(finding.runs),
+    }  # fmt: skip
+    return data.assign_attrs({ATTRIBUTE: json.dumps(record, ensure_ascii=False)})
+
+
+def found_in(data: xr.Dataset) -> Found:
+    """What :func:`kept` put into the dataset."""
+    record = read_provenance(data)
+    others = {name: Number(*row) for name, row in record["others"].items()}
+    return Found(
+        record["name"], Number(*record["number"]), others, record["method"], tuple(record["notes"]),
+        record["samples"], record["runs"],
+    )  # fmt: skip
+
+
+def estimates_of(dataset: xr.Dataset) -> dict[str, Number]:
+    """All parameters of a saved ``ParameterSet``, with their 95 % intervals."""
+    from nonsmooth.identification.parameter_set import ParameterSet
+
+    found = ParameterSet.from_dataset(dataset)
+    rows = {**found.estimates, **found.extra}
+    return {name: Number(*_plain(row)) for name, row in rows.items()}
+
+
+def _plain(estimate: Estimate) -> tuple[float, float, float, float, str]:
+    low, high = estimate.interval()
+    return float(estimate.value), float(estimate.uncertainty), float(low), float(high), estimate.unit

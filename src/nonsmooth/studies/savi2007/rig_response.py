@@ -1,0 +1,76 @@
+"""The experimental side of Figs. 9 and 10: frequency steps on the virtual rig over the model's response."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nonsmooth import plot
+from nonsmooth.plot.comparison_response import comparison_response
+from nonsmooth.studies.savi2007.figure import Figure, sheet
+from nonsmooth.studies.savi2007.flows import Settings
+from nonsmooth.studies.savi2007.laboratory import with_support
+from nonsmooth.studies.savi2007.measure import measured_jumps, measured_periods
+from nonsmooth.studies.savi2007.printed import NUMBERS
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure as Canvas
+
+__all__ = ["FIGURES"]
+
+
+def _compute(number: int) -> Callable[[Settings], dict[str, xr.Dataset]]:
+    def compute(settings: Settings) -> dict[str, xr.Dataset]:
+        bench = settings.bench
+        session = bench.record(f"fig{number:02d}", bench.rig.figure(number))
+        measured, set_ = bench.measured(session, "response", with_support(session, "response"))
+        return {"compared": bench.compare(measured, set_), "runs": measured}
+
+    return compute
+
+
+def _draw(printed: Mapping[str, float]) -> Callable[[Mapping[str, xr.Dataset]], Canvas]:
+    def draw(data: Mapping[str, xr.Dataset]) -> Canvas:
+        with plot.journal():
+            canvas = sheet(0.72 * plot.PAGE, 0.52 * plot.PAGE)
+            ax = canvas.subplots()
+            comparison_response(data["compared"], ax)
+            for i, value in enumerate(printed.values()):
+                ax.plot(
+                    value, 1.0, "v", transform=ax.get_xaxis_transform(), color="black", markersize=4, clip_on=False,
+                    label="printed in the paper" if i == 0 else None, linestyle="none",
+                )  # fmt: skip
+            ax.legend(loc="upper right" if not printed else "lower left", handlelength=1.6)
+        return canvas
+
+    return draw
+
+
+def _caption(data: Mapping[str, xr.Dataset]) -> str:
+    runs, compared = data["runs"], data["compared"]
+    words = []
+    for direction, word in (("up", "rising"), ("down", "falling")):
+        found = ", ".join(str(jump) for jump in measured_jumps(runs, direction)) or "none"
+        words.append(f"{word}: {found} rad/s")
+    doubled = int(np.count_nonzero(measured_periods(runs)[1] == 2))
+    differences = 100 * np.abs(compared["relative_difference"].values)
+    return (
+        f"Frequency steps on the virtual rig (synthetic), {runs.sizes['run']} runs with rising and falling frequency, "
+        f"over the model's response with the parameters identified, rho = {float(compared['rho']):.4f} N and g = "
+        f"{1e3 * float(compared['g']):.3f} mm. Jumps of the rig, {'; '.join(words)}; {doubled} runs with period 2. Half "
+        f"of the runs lie within {np.nanmedian(differences):.2f} % of the model, nine of ten within "
+        f"{np.nanquantile(differences, 0.9):.1f} %. Diamonds: jumps measured (full) and predicted (open)."
+    )
+
+
+_PRINTED_9 = {key: NUMBERS[key].value for key in ("period 2 near", "jump rising", "jump falling")}
+
+FIGURES = (
+    Figure("fig09_rig", 9, "Frequency response with a period-2 range, on the virtual rig", _compute(9),
+           _draw(_PRINTED_9), _caption, rig=True),
+    Figure("fig10_rig", 10, "Frequency response with a small jump, on the virtual rig", _compute(10), _draw({}),
+           _caption, rig=True),
+)  # fmt: skip
