@@ -67,7 +67,8 @@ class Adjusted:
     """The unknowns that the observations determine, their covariance, and how well all fits together.
 
     ``birge`` is the root of chi^2 per degree of freedom (NaN where nothing is left over); ``pulls`` are the residuals
-    of the observations over their standard uncertainties.
+    of the observations over their standard uncertainties. ``influence`` (p, n) is how much each unknown moves with each
+    observed value, ``labels`` their names in order.
     """
 
     names: tuple[str, ...]
@@ -75,6 +76,8 @@ class Adjusted:
     covariance: FloatArray
     birge: float
     pulls: Mapping[str, float]
+    influence: FloatArray
+    labels: tuple[str, ...]
 
     def __getitem__(self, name: str) -> float:
         return float(self.values[self.names.index(name)])
@@ -146,7 +149,8 @@ def adjust(observations: list[Observation], *, gain_limit: float) -> Adjusted:
     for i, label in enumerate(labels):
         pulls[label if label not in pulls else f"{label} ({i})"] = float(residual[i] / np.sqrt(covariance[i, i]))
     birge = float(np.sqrt(chi2 / freedom)) if freedom > 0 else float("nan")
-    return Adjusted(names, u, np.asarray(found, dtype=np.float64), birge, pulls)
+    influence = np.linalg.solve(normal, jacobian.T @ weight) * scale[:, None] / size
+    return Adjusted(names, u, np.asarray(found, dtype=np.float64), birge, pulls, influence, tuple(labels))
 
 
 def _scaled(covariance: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:

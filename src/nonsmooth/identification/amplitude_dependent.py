@@ -12,9 +12,9 @@ amplitude at *this* frequency, and compares their logarithm,
 real part: the force, imaginary part: the phase. Nothing asks for *the* amplitude at a frequency, which would lose the
 points of an overhanging curve.
 
-Curves measured one after the other differ by more than their points scatter: a joint settles, a room warms up. Each curve
-therefore has its own small shift of :math:`\ln \omega_n^2` and :math:`\ln D`, normal with standard deviations that are found
-from the data (a random effect); they are stated, and carried into the uncertainty of the backbone.
+Curves measured one after the other differ by more than their points scatter: a joint settles, a room warms up. Each
+curve therefore has its own small shift of :math:`\ln \omega_n^2` and :math:`\ln D`, normal with standard deviations
+that are found from the data (a random effect); they are stated, and carried into the uncertainty of the backbone.
 """
 
 from __future__ import annotations

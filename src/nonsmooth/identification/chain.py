@@ -3,22 +3,34 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.errors import SolveError
+from nonsmooth.experiment.recording import RecordingWarning
 from nonsmooth.experiment.session import Session
 from nonsmooth.identification.adjustment import UNKNOWNS, Adjusted, Observation, adjust
+from nonsmooth.identification.calibrations import crank_force, voltage_frequency
+from nonsmooth.identification.contact_findings import contact_finding, one_contact
 from nonsmooth.identification.damping import amplitude_fit
-from nonsmooth.identification.evidence import Evidence, gather
+from nonsmooth.identification.decay_damping import decay_damping
+from nonsmooth.identification.evidence import Evidence, Run, gather
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.free_decay import DecayFit, free_decay
-from nonsmooth.identification.gap import mean_shift
+from nonsmooth.identification.grazing import grazing_gap
+from nonsmooth.identification.half_power import half_power
 from nonsmooth.identification.multiple_shooting import ContactFit, shoot_contacts
 from nonsmooth.identification.natural_frequency import natural_frequency
 from nonsmooth.identification.parameter_set import ParameterSet
+from nonsmooth.identification.receptance import receptance_fit
+from nonsmooth.identification.referral import Referred, refer
+from nonsmooth.identification.statements import agreement, for_model, identifiability
+from nonsmooth.identification.steady import Steady, steady
 from nonsmooth.identification.stiffness import stiffness
 from nonsmooth.identification.support_damping import support_damping
 
@@ -26,6 +38,7 @@ __all__ = ["identify"]
 
 FloatArray = NDArray[np.float64]
 _PARAMETERS = ("m", "k", "k_s", "c", "c_s")
+_BESIDE = ("friction", "gain")
 
 
 def identify(
@@ -39,14 +52,16 @@ def identify(
 
     Each procedure gives what it can tell, and one adjustment joins them: the scale gives m, free decay
     :math:`\omega_0`, c/m and the dry friction, pulls and pushes 2k and k_s but for the force sensor's gain, the drop
-    k_s/M and c_s/M, and records with contact k_s/m, c_s/m and the gap.
+    k_s/M and c_s/M, and records with contact k_s/m, c_s/m and the gap. What the paper does besides (Fig. 6, Fig. 8),
+    the half-power bandwidth, the complex response and the grazing frequency are findings beside it: they take dry
+    friction for damping, or tell less of the same.
 
     Parameters
     ----------
     recordings : Session, path, or mapping
         A session folder, or recordings by procedure; see :func:`nonsmooth.identification.gather`.
     model : System, optional
-        The result keeps only its parameters; an error names what it has that recordings cannot tell.
+        The result then holds only this model's parameters; what else was found stands in ``extra``.
     apparatus : mapping, optional
         What is known of the apparatus, where there is no notebook.
     crank_length : float, optional
@@ -56,130 +71,175 @@ def identify(
     Returns
     -------
     ParameterSet
-        ``m, k, k_s, c, c_s, g`` as far as the recordings tell them.
+        ``m, k, k_s, c, c_s, g`` as far as the recordings tell them; ``system.with_parameters`` takes it.
+
+    Warns
+    -----
+    RecordingWarning
+        Where the recordings of a procedure cannot be used for a finding that the parameters do not rest on; the
+        result's notes say it too.
 
     Raises
     ------
     ValueError
-        If there is no mass, or no recording from which anything can be identified.
+        If there is no mass, no recording from which anything can be identified, or a procedure on which a parameter
+        rests was recorded so that nothing can be told from it.
+
+    Examples
+    --------
+    >>> found = ns.identify("rig_03")                                              # doctest: +SKIP
+    >>> system = ns.models.discontinuous_support().with_parameters(found)          # doctest: +SKIP
     """
-    evidence = gather(recordings, apparatus=apparatus)
-    findings: list[Finding] = []
-    observations = [_weighed(evidence, "mass")]
-    decay = _decay(evidence, findings, observations)
-    _forces(evidence, findings, observations)
-    _drop(evidence, findings, observations)
-    limit = evidence.apparatus["force_gain_limit"].value if "force_gain_limit" in evidence.apparatus else 0.01
-    contacts = None
-    if decay is not None and evidence.runs.get("contact"):
-        rough = adjust(observations, gain_limit=limit)
-        if "k_s" in rough.names:
-            contacts = _contacts(evidence, decay, rough, observations, findings)
-    adjusted = adjust(observations, gain_limit=limit)
-    estimates = {
-        name: _estimate(adjusted, name) for name in _PARAMETERS if name in adjusted.names
-    }  # fmt: skip
-    extra: dict[str, Estimate] = {
-        name: _estimate(adjusted, name) for name in ("friction", "gain") if name in adjusted.names
-    }
-    columns = [_row(adjusted, name) for name in estimates]
-    extra_columns = [_row(adjusted, name) for name in extra]
-    size = len(adjusted.names)
-    joint = adjusted.covariance
-    gaps = _gaps(evidence, decay, contacts, crank_length) if contacts is not None and decay is not None else None
-    if {"m", "k"} <= set(estimates):
-        row = np.zeros(size)
-        omega = float(np.sqrt(2 * adjusted["k"] / adjusted["m"]))
-        row[adjusted.names.index("k")] = omega / (2 * adjusted["k"])
-        row[adjusted.names.index("m")] = -omega / (2 * adjusted["m"])
-        extra["omega_0"] = Estimate(omega, float(np.sqrt(row @ joint @ row)), "rad/s")
-        extra_columns.append(row)
-    jacobian = np.array(columns + extra_columns).reshape(-1, size)
-    covariance = jacobian @ joint @ jacobian.T
-    if gaps is not None:
-        estimates, extra, covariance = _with_gaps(estimates, extra, covariance, gaps)
-    result = ParameterSet(
-        estimates, covariance, extra=extra, findings=findings, identifiability=_identifiability(adjusted, contacts),
-        notes=_notes(adjusted, evidence), synthetic=evidence.synthetic,
-    )  # fmt: skip
-    if model is not None:
-        _check_model(result, model)
-    return result
+    if crank_length is not None and not 0 < crank_length < np.inf:
+        raise ValueError(f"crank_length = {crank_length!r} must be a positive length in m")
+    chain = _Chain(gather(recordings, apparatus=apparatus))
+    decay = chain.taps()
+    seen = chain.response(decay)
+    chain.forces()
+    chain.drop()
+    grazing = chain.graze(decay)
+    contacts, single = chain.contact(decay)
+    adjusted = chain.adjusted()
+    chain.calibrations(adjusted)
+    gap = None
+    if contacts is not None and decay is not None:
+        gap = refer(chain.evidence, decay, contacts, adjusted, seen, crank_length)
+        chain.findings.append(gap.finding(contacts, grazing))
+    found = _joined(adjusted, gap, chain, identifiability(adjusted, contacts, single))
+    return found if model is None else for_model(found, model)
 
 
-def _weighed(evidence: Evidence, name: str) -> Observation:
-    quantity = evidence.quantity(name)
-    if quantity.uncertainty <= 0:
-        raise ValueError(f"the notebook states no uncertainty of `{name}`; write {{ value = ..., uncertainty = ... }}")
-    return Observation((name,), np.array([quantity.value]), np.array([[quantity.uncertainty**2]]), "weighed")
+@dataclass(eq=False)
+class _Chain:
+    """The procedures in their order, with what they observed, found and could not use."""
 
+    evidence: Evidence
+    findings: list[Finding] = field(default_factory=list)
+    observations: list[Observation] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
 
-def _decay(evidence: Evidence, findings: list[Finding], observations: list[Observation]) -> DecayFit | None:
-    runs = evidence.runs.get("impulse", ())
-    if not runs:
-        return None
-    decay = free_decay([(run.time, run.positions) for run in runs], resolution=evidence.resolution)
-    observations.append(
-        Observation(("omega_0", "b", "f"), decay.values[:3], decay.covariance[:3, :3], "free decay")
-    )  # fmt: skip
-    mass = evidence.quantity("mass")
-    findings.append(natural_frequency(runs, decay))
-    findings += amplitude_fit(evidence.runs.get("response", ()), decay, mass.value)
-    return decay
+    def __post_init__(self) -> None:
+        self.observations.append(self.weighed("mass"))
 
+    @property
+    def mass(self) -> float:
+        return self.evidence.quantity("mass").value
 
-def _forces(evidence: Evidence, findings: list[Finding], observations: list[Observation]) -> None:
-    limit = evidence.apparatus["force_gain_limit"].value if "force_gain_limit" in evidence.apparatus else 0.01
-    for procedure, law, mass, friction in (
-        ("springs", "spring_slope", evidence.quantity("mass").value, True), ("support", "support_slope", 0.0, False),
-    ):  # fmt: skip
-        runs = evidence.runs.get(procedure, ())
+    @property
+    def gain_limit(self) -> float:
+        known = self.evidence.apparatus.get("force_gain_limit")
+        return 0.01 if known is None else known.value
+
+    def runs(self, procedure: str) -> tuple[Run, ...]:
+        return self.evidence.runs.get(procedure, ())
+
+    def adjusted(self) -> Adjusted:
+        return adjust(self.observations, gain_limit=self.gain_limit)
+
+    def observe(self, names: tuple[str, ...], values: FloatArray, covariance: FloatArray, source: str) -> None:
+        self.observations.append(Observation(names, values, covariance, source))
+
+    def weighed(self, name: str) -> Observation:
+        quantity = self.evidence.quantity(name)
+        if quantity.uncertainty <= 0:
+            raise ValueError(
+                f"the notebook states no uncertainty of `{name}`; write {{ value = ..., uncertainty = ... }}"
+            )
+        return Observation((name,), np.array([quantity.value]), np.array([[quantity.uncertainty**2]]), "weighed")
+
+    def beside(self, what: str, find: Callable[[], Finding | list[Finding]]) -> Finding | None:
+        """A finding that no parameter rests on: where it cannot be had, say why and go on."""
+        try:
+            found = find()
+        except (ValueError, SolveError) as error:
+            sentence = f"{what}: not found: {error}"
+            self.notes.append(sentence)
+            warnings.warn(sentence, RecordingWarning, stacklevel=4)
+            return None
+        self.findings += found if isinstance(found, list) else [found]
+        return found[0] if isinstance(found, list) else found
+
+    def taps(self) -> DecayFit | None:
+        runs, resolution = self.runs("impulse"), self.evidence.resolution
         if not runs:
-            continue
-        found = stiffness(
-            runs, resolution=evidence.resolution, mass=mass, gain_limit=limit, friction=friction, name=law
-        )
-        findings.append(found)
-        error = found.others["slope_a"].uncertainty
-        observations.append(Observation((law,), np.array([found.value]), np.array([[error**2]]), procedure))
+            return None
+        decay = free_decay([(run.time, run.positions) for run in runs], resolution=resolution)
+        self.observe(("omega_0", "b", "f"), decay.values[:3], decay.covariance[:3, :3], "free decay")
+        self.beside("natural frequency (Fig. 5)", lambda: natural_frequency(runs, decay))
+        self.beside("damping by free decay", lambda: decay_damping(runs, decay, self.mass, resolution=resolution))
+        return decay
 
+    def response(self, decay: DecayFit | None) -> Steady:
+        """The steady runs without support, and the dampings found from them."""
+        free = [run for run in self.runs("response") if "gap" not in run.settings]
+        if mounted := len(self.runs("response")) - len(free):
+            self.notes.append(
+                f"{mounted} runs of the response state a gap: the support was mounted, no damping from them"
+            )
+        seen = steady(free)
+        if free and decay is not None:
+            self.beside("damping by amplitude (Fig. 6)", lambda: amplitude_fit(seen, decay, self.mass))
+            self.beside("complex frequency response", lambda: receptance_fit(seen, decay, self.mass))
+        if free:
+            self.beside("half-power bandwidth", lambda: half_power(seen, self.mass))
+        return seen
 
-def _drop(evidence: Evidence, findings: list[Finding], observations: list[Observation]) -> None:
-    runs = evidence.runs.get("drop", ())
-    if not runs:
-        return
-    found, decay = support_damping(runs, resolution=evidence.resolution, test_mass=evidence.quantity("test_mass"))
-    findings.append(found)
-    observations.append(_weighed(evidence, "test_mass"))
-    observations.append(
-        Observation(("omega_s", "b_s"), decay.values[:2], decay.covariance[:2, :2], "drop of the test mass")
-    )  # fmt: skip
+    def forces(self) -> None:
+        for procedure, law, mass, friction in (
+            ("springs", "spring_slope", self.mass, True), ("support", "support_slope", 0.0, False),
+        ):  # fmt: skip
+            runs = self.runs(procedure)
+            if not runs:
+                continue
+            found = stiffness(
+                runs, resolution=self.evidence.resolution, mass=mass, gain_limit=self.gain_limit, friction=friction,
+                name=law,
+            )  # fmt: skip
+            self.findings.append(found)
+            error = found.others["slope_a"].uncertainty
+            self.observe((law,), np.array([found.value]), np.array([[error**2]]), procedure)
 
+    def drop(self) -> None:
+        runs = self.runs("drop")
+        if not runs:
+            return
+        mass = self.evidence.quantity("test_mass")
+        found, decay = support_damping(runs, resolution=self.evidence.resolution, test_mass=mass)
+        self.findings.append(found)
+        self.observations.append(self.weighed("test_mass"))
+        self.observe(("omega_s", "b_s"), decay.values[:2], decay.covariance[:2, :2], "drop of the test mass")
 
-def _contacts(
-    evidence: Evidence, decay: DecayFit, rough: Adjusted, observations: list[Observation], findings: list[Finding]
-) -> ContactFit:
-    m = rough["m"]
-    gamma = rough["c_s"] / m if "c_s" in rough.names else 1e-3 * rough["k_s"] / m
-    found = shoot_contacts(
-        evidence.runs["contact"], decay, resolution=evidence.resolution, kappa=rough["k_s"] / m, gamma=gamma
-    )
-    error = np.sqrt(np.diag(found.covariance))
-    findings.append(
-        Finding(
-            "c_s_contact",
-            Estimate(found.values[4] * m, float(error[4] * m), "N s/m", logarithmic=True),
-            f"multiple shooting over {found.n_contacts} pieces split at contacts",
-            found.fit.samples,
-            tuple(run.name for run in found.runs),
-            ("one contact is 8 samples at 100 Hz: what is known of c_s comes from many fitted together",),
-            {"k_s": Estimate(found.values[3] * m, float(error[3] * m), "N/m")},
-        )
-    )
-    observations.append(
-        Observation(("kappa", "gamma"), found.values[3:5], found.covariance[3:5, 3:5], "multiple shooting")
-    )  # fmt: skip
-    return found
+    def calibrations(self, adjusted: Adjusted) -> None:
+        if runs := self.runs("voltage"):
+            self.beside("voltage calibration (Fig. 8a)", lambda: voltage_frequency(runs))
+        if held := self.runs("crank"):
+            k = _estimate(adjusted, "k") if "k" in adjusted.names else None
+            self.beside("crank calibration (Fig. 8b)", lambda: crank_force(held, gain_limit=self.gain_limit, k=k))
+
+    def graze(self, decay: DecayFit | None) -> Finding | None:
+        runs, rough = self.runs("grazing"), self.adjusted()
+        if not runs or decay is None or "k_s" not in rough.names:
+            return None
+        return self.beside(
+            "gap by the grazing frequency",
+            lambda: grazing_gap(
+                runs, decay, resolution=self.evidence.resolution, kappa=rough["k_s"] / rough["m"]
+            ),
+        )  # fmt: skip
+
+    def contact(self, decay: DecayFit | None) -> tuple[ContactFit | None, Finding | None]:
+        runs, resolution, rough = self.runs("contact"), self.evidence.resolution, self.adjusted()
+        if not runs:
+            return None, None
+        if decay is None or "k_s" not in rough.names:
+            self.notes.append("contact: not used: needs taps of the car (impulse), and the support's stiffness")
+            return None, None
+        m = rough["m"]
+        gamma = rough["c_s"] / m if "c_s" in rough.names else 1e-3 * rough["k_s"] / m
+        found = shoot_contacts(runs, decay, resolution=resolution, kappa=rough["k_s"] / m, gamma=gamma)
+        self.observe(("kappa", "gamma"), found.values[3:5], found.covariance[3:5, 3:5], "multiple shooting")
+        self.findings.append(contact_finding(found, m, resolution=resolution))
+        return found, self.beside("c_s from one contact", lambda: one_contact(found, m, resolution=resolution))
 
 
 def _estimate(adjusted: Adjusted, name: str) -> Estimate:
@@ -188,93 +248,31 @@ def _estimate(adjusted: Adjusted, name: str) -> Estimate:
     return Estimate(adjusted[name], error, UNKNOWNS[name], logarithmic=name == "c_s")
 
 
-def _row(adjusted: Adjusted, name: str) -> FloatArray:
-    row = np.zeros(len(adjusted.names))
-    row[adjusted.names.index(name)] = 1.0
-    return row
-
-
-def _gaps(
-    evidence: Evidence, decay: DecayFit, contacts: ContactFit, crank_length: float | None
-) -> tuple[Estimate, Estimate, Estimate]:
-    """The gap referred to the mean position, at rest, and the shift between, at the most frequent screw reading."""
-    readings = [float(run.settings["gap"]) for run in contacts.runs]
-    reading = max(set(readings), key=readings.count)
-    index = [contacts.place(i, 0) for i, value in enumerate(readings) if value == reading]
-    block = contacts.covariance[np.ix_(index, index)]
-    weight = np.linalg.solve(block, np.ones(len(index)))
-    seen = float(weight @ contacts.values[index] / weight.sum())
-    chi2 = float((contacts.values[index] - seen) @ np.linalg.solve(block, contacts.values[index] - seen))
-    error = float(np.sqrt(max(chi2 / max(len(index) - 1, 1), 1.0) / weight.sum()))
-    zero, zero_error = float(decay.values[3]), decay.error("x_e")
-    length = evidence.apparatus.get("string_length")
-    shift = mean_shift(
-        evidence.runs.get("response", ()), zero, zero_error,
-        string_length=length.value if length else None, string_error=length.uncertainty if length else 0.0,
+def _joined(adjusted: Adjusted, gap: Referred | None, chain: _Chain, said: Mapping[str, str]) -> ParameterSet:
+    """The model's parameters, then what is beside them, with one covariance by their rows over the unknowns."""
+    size, names = len(adjusted.names), adjusted.names
+    unit = np.eye(size)
+    rows = {name: (_estimate(adjusted, name), unit[names.index(name)]) for name in names}
+    if {"m", "k"} <= set(names):
+        omega, row = float(np.sqrt(2 * adjusted["k"] / adjusted["m"])), np.zeros(size)
+        row[names.index("k")], row[names.index("m")] = omega / (2 * adjusted["k"]), -omega / (2 * adjusted["m"])
+        error = float(np.sqrt(row @ adjusted.covariance @ row))
+        rows["omega_0"] = (Estimate(omega, error, "rad/s"), row)
+    inner = [name for name in _PARAMETERS if name in rows]
+    outer = [name for name in (*_BESIDE, "omega_0") if name in rows]
+    jacobian = np.array([rows[name][1] for name in inner + outer]).reshape(-1, size)
+    estimates = {name: rows[name][0] for name in inner}
+    extra = {name: rows[name][0] for name in outer}
+    covariance = jacobian @ adjusted.covariance @ jacobian.T
+    if gap is not None:
+        n = len(inner)
+        cross = gap.cross @ jacobian.T
+        stacked = np.block([[covariance, cross.T], [cross, gap.covariance]])
+        order = [*range(n), len(covariance), *range(n, len(covariance)), len(covariance) + 1, len(covariance) + 2]
+        covariance = stacked[np.ix_(order, order)]
+        estimates["g"] = gap.gap
+        extra |= {"gap_at_rest": gap.at_rest, "mean_shift": gap.shift}
+    return ParameterSet(
+        estimates, covariance, extra=extra, findings=chain.findings, identifiability=said,
+        notes=[*agreement(adjusted, chain.evidence), *chain.notes], synthetic=chain.evidence.synthetic,
     )  # fmt: skip
-    longest = max(float(run.settings["crank_length"]) for run in contacts.runs)
-    moved, moved_error = shift.at(longest if crank_length is None else crank_length)
-    at_rest = float(np.hypot(error, zero_error))
-    return (
-        Estimate(seen - zero - moved, float(np.hypot(at_rest, moved_error)), "m"),
-        Estimate(seen - zero, at_rest, "m"),
-        Estimate(moved, moved_error, "m"),
-    )
-
-
-def _with_gaps(
-    estimates: dict[str, Estimate], extra: dict[str, Estimate], covariance: FloatArray, gaps: tuple[Estimate, ...]
-) -> tuple[dict[str, Estimate], dict[str, Estimate], FloatArray]:
-    """Put the gap behind the parameters and the gap at rest and the shift behind the extras."""
-    n, e = len(estimates), len(extra)
-    referred, at_rest, shift = gaps
-    full = np.zeros((n + e + 3, n + e + 3))
-    keep = [*range(n), *range(n + 1, n + 1 + e)]
-    full[np.ix_(keep, keep)] = covariance
-    g, r, s = n, n + 1 + e, n + 2 + e
-    full[r, r], full[s, s] = at_rest.uncertainty**2, shift.uncertainty**2
-    full[g, g] = full[r, r] + full[s, s]
-    full[g, r] = full[r, g] = full[r, r]
-    full[g, s] = full[s, g] = -full[s, s]
-    return {**estimates, "g": referred}, {**extra, "gap_at_rest": at_rest, "mean_shift": shift}, full
-
-
-def _notes(adjusted: Adjusted, evidence: Evidence) -> list[str]:
-    notes = []
-    if adjusted.birge == adjusted.birge:
-        notes.append(f"the procedures agree: Birge ratio {adjusted.birge:.2f}" if adjusted.birge < 2 else
-                     f"the procedures disagree: Birge ratio {adjusted.birge:.2f}; largest pull "
-                     f"{max(adjusted.pulls.items(), key=lambda row: abs(row[1]))}")  # fmt: skip
-    needed = ("springs", "support", "impulse", "drop", "response", "contact")
-    if lacking := [name for name in needed if name in evidence.missing]:
-        notes.append(f"no recordings of: {', '.join(lacking)}")
-    return notes
-
-
-def _identifiability(adjusted: Adjusted, contacts: ContactFit | None) -> dict[str, str]:
-    said = {
-        "m": "weighed; no recording tells it but through the force sensor, whose gain is known to a percent",
-        "k": "from omega_0 and m; the force sensor's slope agrees within its gain",
-        "c": "from the shape of the free decay, together with the dry friction: the rig's own viscous part",
-        "k_s": "from the frequency of the test mass and of contacts; the force sensor's slope within its gain",
-        "c_s": "from the decay of the drop; a contact lasts 8 samples at 100 Hz and c_s/k_s is 0.5 ms, so a single "
-        "contact tells it poorly",
-        "g": "from where contacts begin, referred to the mean position under the drive",
-    }
-    if contacts is not None:
-        relative = float(np.sqrt(contacts.covariance[4, 4]) / abs(contacts.values[4]))
-        one = float(np.exp(1.96 * relative * np.sqrt(max(contacts.n_contacts, 1))))
-        said["c_s"] += (
-            f"; {contacts.n_contacts} pieces together know it within a factor {np.exp(1.96 * relative):.4g}, one "
-            f"alone about {one:.2g}"
-        )
-    return {name: said[name] for name in said if name in adjusted.names or name == "g"}
-
-
-def _check_model(found: ParameterSet, model: Any) -> None:
-    names = getattr(model, "parameters", {})
-    if lacking := [name for name in found if name not in names]:
-        raise ValueError(
-            f"the model {getattr(model, 'name', '')!r} has no parameter {', '.join(lacking)}; identify knows the "
-            "oscillator with a discontinuous support (m, k, k_s, c, c_s, g)"
-        )

@@ -42,12 +42,12 @@ def contact_finding(found: ContactFit, mass: float, *, resolution: float) -> Fin
     Returns
     -------
     Finding
-        ``c_s_contact`` (N s/m), known to a factor. ``others``: ``k_s`` (N/m), and ``gap_`` with the name of each run, in
-        the sensor's count (m).
+        ``c_s_contact`` (N s/m), known to a factor. ``others``: ``k_s`` (N/m), and ``gap, Run #1`` and so on, the gap
+        of each run in the sensor's count (m).
     """
     error = np.sqrt(np.diag(found.covariance))
     gaps = {
-        f"gap_{run.name}": Estimate(float(found.values[found.place(i, 0)]), float(error[found.place(i, 0)]), "m")
+        f"gap, {run.name}": Estimate(float(found.values[found.place(i, 0)]), float(error[found.place(i, 0)]), "m")
         for i, run in enumerate(found.runs)
     }
     left = int(np.count_nonzero(~found.fit.used))

@@ -1,4 +1,4 @@
-"""Coverage: do the stated intervals hold the truth as often as they say? Forty virtual rigs, one table.
+"""Coverage: do the stated intervals hold the truth as often as they say? Forty virtual rigs, two tables.
 
 ``python -m nonsmooth.identification.coverage --seeds 0-39 --out docs/measured_coverage.md``
 
@@ -20,14 +20,9 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["campaign", "main", "one_rig", "table"]
+from nonsmooth.identification.coverage_tables import ASKED, BESIDE, page, to_dataset
 
-#: What is counted, with the largest allowed median and maximum of the relative error (None: by coverage only).
-ASKED: Mapping[str, tuple[float, float] | None] = {
-    "k": (0.01, 0.03), "k_s": (0.01, 0.03), "m": (0.01, 0.03), "omega_0": (0.01, 0.03), "c": (0.02, 0.05),
-    "g": None, "gap_at_rest": None, "c_s": None, "friction": None, "gain": None,
-}  # fmt: skip
-GAP_LIMIT = 1e-4  # m
+__all__ = ["campaign", "main", "one_rig"]
 
 
 def one_rig(seed: int, folder: str) -> dict[str, Any]:
@@ -47,23 +42,26 @@ def one_rig(seed: int, folder: str) -> dict[str, Any]:
         session = VirtualRig(seed).write_session(Path(top) / "session", truth=truth_file)
         result = identify(session)
         truth = load_truth(truth_file)
-        crank = max(
-            float(run.settings["crank_length"]) for run in _contact_runs(session)
-        )  # fmt: skip
+        crank = max(float(settings["crank_length"]) for settings in _contact_settings(session))
     expected = {
         **truth, "omega_0": float(np.sqrt(2 * truth["k"] / truth["m"])), "gain": truth["force_gain"],
         "gap_at_rest": truth["g"], "g": truth["g"] - drive_mean(truth, crank) / 2,
     }  # fmt: skip
-    rows = {}
-    for name in ASKED:
-        estimate = result.estimate(name)
-        low, high = estimate.interval()
-        rows[name] = [expected[name], estimate.value, estimate.uncertainty, low, high]
-    viscous = {f.name: f.value for f in result.findings}.get("c_viscous_only", float("nan"))
-    found = {"seed": seed, "rows": rows, "viscous_only_c": viscous, "friction": truth["friction"]}
-    found["notes"] = list(result.notes)
+    rows = {name: _row(expected[name], result.estimate(name)) for name in ASKED}
+    findings = {finding.name: finding for finding in result.findings}
+    beside = {}
+    for label, (name, other, of) in BESIDE.items():
+        if name in findings:
+            finding = findings[name]
+            beside[label] = _row(expected[of], finding.others[other] if other else finding.estimate)
+    found = {"seed": seed, "rows": rows, "beside": beside, "friction": truth["friction"], "notes": list(result.notes)}
     kept.write_text(json.dumps(found), encoding="utf-8")
     return found
+
+
+def _row(truth: float, estimate: Any) -> list[float]:
+    low, high = estimate.interval()
+    return [truth, estimate.value, estimate.uncertainty, low, high]
 
 
 def drive_mean(truth: Mapping[str, float], crank: float) -> float:
@@ -74,10 +72,10 @@ def drive_mean(truth: Mapping[str, float], crank: float) -> float:
     return float(np.mean(crank * np.cos(phi) + length - np.sqrt(length**2 - (crank * np.sin(phi)) ** 2)))
 
 
-def _contact_runs(session: Path) -> list[Any]:
+def _contact_settings(session: Path) -> list[Mapping[str, Any]]:
     from nonsmooth.experiment.session import load_session
 
-    return load_session(session).recordings("contact")
+    return [run.settings for run in load_session(session).recordings("contact")]
 
 
 def campaign(seeds: Sequence[int], folder: Path, processes: int = 2) -> list[dict[str, Any]]:
@@ -93,58 +91,25 @@ def campaign(seeds: Sequence[int], folder: Path, processes: int = 2) -> list[dic
     return [found[seed] for seed in seeds]
 
 
-def table(results: Sequence[Mapping[str, Any]]) -> str:
-    """The coverage table as Markdown."""
-    n = len(results)
-    lines = [
-        f"{n} virtual rigs (synthetic), seeds {results[0]['seed']} to {results[-1]['seed']}.", "",
-        "| parameter | in the 95 % interval | rms of normalised errors | median relative error | largest | "
-        "median stated uncertainty |",
-        "|---|---|---|---|---|---|",
-    ]  # fmt: skip
-    for name in ASKED:
-        rows = np.array([result["rows"][name] for result in results])
-        truth, value, error, low, high = rows.T
-        inside = int(np.count_nonzero((low <= truth) & (truth <= high)))
-        log = name == "c_s"
-        z = np.log(value / truth) / (error / value) if log else (value - truth) / error
-        if name in ("g", "gap_at_rest"):
-            shown = [f"{1e6 * v:.1f} µm" for v in (np.median(np.abs(value - truth)), np.max(np.abs(value - truth)))]
-            stated = f"{1e6 * np.median(error):.1f} µm"
-        else:
-            size = np.abs(value - truth) / np.abs(truth)
-            shown = [f"{100 * v:.3f} %" for v in (np.median(size), np.max(size))]
-            stated = f"{100 * np.median(error / np.abs(value)):.3f} %"
-        lines.append(
-            f"| {name} | {inside} of {n} | {np.sqrt(np.mean(z**2)):.2f} | {shown[0]} | {shown[1]} | {stated} |"
-        )
-    factor = np.median([np.exp(1.96 * r["rows"]["c_s"][2] / r["rows"]["c_s"][1]) for r in results])
-    bias = [r["viscous_only_c"] / r["rows"]["c"][0] - 1 for r in results]
-    dry = [r["friction"] for r in results]
-    slope = float(np.dot(dry, bias) / np.dot(dry, dry))
-    lines += [
-        "", f"c_s is known within a factor {factor:.3f} (median, 95 %).",
-        f"The viscous-only fit of Fig. 6 is off by {100 * np.median(bias):.1f} % (median; {100 * np.min(bias):.1f} to "
-        f"{100 * np.max(bias):.1f} %), {100 * slope * 0.005:.1f} % per 5 mN of dry friction.",
-    ]  # fmt: skip
-    return "\n".join(lines) + "\n"
-
-
 def _seeds(text: str) -> list[int]:
     first, _, last = text.partition("-")
     return list(range(int(first), int(last or first) + 1))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the campaign, print its table, and write it."""
+    """Run the campaign, print its tables, and write them; the numbers go to ``coverage.nc`` in the folder."""
     parser = argparse.ArgumentParser(prog="coverage", description="Coverage of identify over virtual rigs.")
     parser.add_argument("--seeds", type=_seeds, default=list(range(40)), help="as 0-39")
-    parser.add_argument("--out", type=Path, help="Markdown file for the table")
+    parser.add_argument("--out", type=Path, help="Markdown file for the tables")
     parser.add_argument("--folder", type=Path, default=Path("out/coverage"), help="where finished seeds are kept")
     parser.add_argument("--processes", type=int, default=2)
     options = parser.parse_args(arguments)
-    text = table(campaign(options.seeds, options.folder, options.processes))
+    results = campaign(options.seeds, options.folder, options.processes)
+    text = page(results)
     print(text)
+    from nonsmooth.results.store import save
+
+    save(to_dataset(results), options.folder / "coverage.nc")
     if options.out is not None:
         head = "# Measured coverage\n\nPrinted by `python -m nonsmooth.identification.coverage`: synthetic rigs.\n\n"
         options.out.write_text(head + text, encoding="utf-8")

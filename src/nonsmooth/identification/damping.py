@@ -62,7 +62,7 @@ def amplitude_fit(seen: Steady, decay: DecayFit, mass: float) -> list[Finding]:
     data = _data(shown, natural, viscous, both, mass)
     bias = 100 * (c_viscous[0] / (mass * float(decay.values[1])) - 1)
     b, f = float(decay.values[1]), float(decay.values[2])
-    alone = {float(a): viscous_bias(natural, b, f, float(a), seen.omega[seen.crank == a]) for a in np.unique(seen.crank)}
+    alone = {a: viscous_bias(natural, b, f, a, seen.omega[seen.crank == a]) for a in np.unique(seen.crank).tolist()}
     expected = [f"{1e3 * a:.1f} mm {100 * off:+.1f} %" for a, off in alone.items()]
     return [
         Finding(

@@ -89,8 +89,8 @@ def _data(runs: Sequence[Run], decay: DecayFit, viscous: DecayFit, mass: float, 
     import xarray as xr
 
     natural, b, f, rest = (float(v) for v in decay.values)
-    swings = [run.positions[begin:end] for run, (begin, end) in zip((runs[i] for i in decay.runs), decay.spans, strict=True)]
-    which = int(np.argmax([np.ptp(x) for x in swings]))
+    widths = [np.ptp(runs[i].positions[slice(*at)]) for i, at in zip(decay.runs, decay.spans, strict=True)]
+    which = int(np.argmax(widths))
     run, (begin, end) = runs[decay.runs[which]], decay.spans[which]
     time, x = run.time[begin:end], run.positions[begin:end]
     at, height, error = log_decrement(time, x, rest, resolution=resolution)
@@ -101,7 +101,8 @@ def _data(runs: Sequence[Run], decay: DecayFit, viscous: DecayFit, mass: float, 
     fine = np.linspace(0.0, float(at[-1] - at[0]), 200)
     fitted = decay.fit.fitted[which][:, 0] - rest
     both = envelope(fine, abs(fitted[0]), natural, b, f)
-    plain = envelope(fine, abs(viscous.fit.fitted[which][0, 0] - viscous.values[3]), natural, float(viscous.values[1]), 0.0)
+    alone = abs(float(viscous.fit.fitted[which][0, 0] - viscous.values[3]))
+    plain = envelope(fine, alone, natural, float(viscous.values[1]), 0.0)
     return xr.Dataset(
         {
             "peak_time": ("peak", at - at[0], {"units": "s"}), "peak_height": ("peak", height, {"units": "m"}),

@@ -3,83 +3,99 @@ r"""The gap, referred to the car's mean position under the drive.
 The string moves the driven end by :math:`a\cos\varphi + L - \sqrt{L^2 - a^2 \sin^2\varphi}`, whose mean is
 :math:`a^2/(4L)` and not zero; the car's mean position moves by half of it, :math:`a^2/(8L)`: 0.4 mm at Fig. 13 with
 L = 0.5 m, a quarter of the gap. A motor that turns unevenly,
-:math:`\varphi = \omega t + \epsilon \sin(\omega t + \beta)`, moves it by :math:`-a\,\epsilon \cos\beta/4` more.
+:math:`\varphi = \omega t + \epsilon \sin(\omega t + \beta)`, moves it by :math:`-a\,\epsilon \cos\beta/4` more
+(:func:`mean_of_drive` derives both).
 The model's drive, :math:`\rho\cos\omega t`, has no mean: its gap must be counted from where the car swings about. Both
 parts are read off the mean positions of steady runs without contact.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.experiment.signals.harmonics import fit as harmonic_fit
-from nonsmooth.experiment.signals.phase import drive_phase
-from nonsmooth.identification.evidence import Run
+from nonsmooth.identification.steady import Steady
 
-__all__ = ["MeanShift", "grazing_amplitude", "mean_shift"]
+__all__ = ["MeanShift", "grazing_amplitude", "mean_of_drive", "mean_shift"]
 
 FloatArray = NDArray[np.float64]
 
 
 class MeanShift(NamedTuple):
-    r"""Mean position over crank length: :math:`\alpha a^2 + \beta a`, covariance of (alpha, beta), number of runs."""
+    r"""Mean position over crank length: :math:`\alpha a^2 + \beta a`.
+
+    ``covariance`` of (alpha, beta) without the zero's part; ``by_zero``, how they move with the place of rest, whose
+    standard uncertainty is ``zero_error``; number of ``runs``.
+    """
 
     alpha: float
     beta: float
     covariance: FloatArray
+    by_zero: FloatArray
+    zero_error: float
     runs: int
 
     def at(self, crank_length: float) -> tuple[float, float]:
         """The shift (m) and its standard uncertainty at a crank length."""
+        value, own, slope = self.parts(crank_length)
+        return value, float(np.hypot(own, slope * self.zero_error))
+
+    def parts(self, crank_length: float) -> tuple[float, float, float]:
+        """The shift (m), its standard uncertainty without the zero's, and how much it moves with the zero."""
         row = np.array([crank_length**2, crank_length])
-        return float(row @ [self.alpha, self.beta]), float(np.sqrt(row @ self.covariance @ row))
+        own = float(np.sqrt(row @ self.covariance @ row))
+        return float(row @ [self.alpha, self.beta]), own, float(row @ self.by_zero)
+
+
+def mean_of_drive(crank_length: float, string_length: float, ripple: float = 0.0, ripple_phase: float = 0.0) -> float:
+    r"""Mean of the driven end over a turn (m), string and uneven turning to their lowest orders.
+
+    .. math::
+
+        \langle d \rangle = \frac{a^2}{4L}\Big(1 + \frac{3a^2}{16L^2}\Big) - \frac{a\,\epsilon}{2}\cos\beta
+
+    since :math:`L - \sqrt{L^2 - a^2\sin^2\varphi} = a^2\sin^2\varphi/2L + a^4\sin^4\varphi/8L^3 + \ldots` with the
+    means 1/2 and 3/8, and :math:`\cos(\theta + \epsilon\sin(\theta + \beta)) \approx \cos\theta - \epsilon \sin\theta
+    \sin(\theta + \beta)`, whose mean is :math:`-\epsilon\cos\beta/2`. The car between two equal springs moves by half.
+    """
+    a = crank_length
+    string = a**2 / (4 * string_length) * (1 + 3 * a**2 / (16 * string_length**2))
+    return string - 0.5 * a * ripple * float(np.cos(ripple_phase))
 
 
 def mean_shift(
-    runs: Sequence[Run], zero: float, zero_error: float, *, string_length: float | None, string_error: float = 0.0
+    seen: Steady, zero: float, zero_error: float, *, string_length: float | None, string_error: float = 0.0
 ) -> MeanShift:
     """Fit the mean positions of steady runs without contact.
 
     Parameters
     ----------
-    runs : sequence of Run
-        Steady, with ``x``, ``turns`` and the setting ``crank_length``.
+    seen : Steady
+        Steady runs; without any, the string's length alone tells.
     zero, zero_error : float
         Where the car rests (m), from the free decay.
     string_length, string_error : float, optional
         Length of the string: alpha = 1/(8 L) is known from it.
     """
-    rows, values, weights = [], [], []
-    for run in runs:
-        a = float(run.settings["crank_length"])
-        drive = drive_phase(run.passages)
-        time, x = run.time, run.positions
-        whole = int(np.floor((time[-1] - time[0]) / drive.period))
-        inside = time <= time[0] + whole * drive.period
-        fitted = harmonic_fit(time[inside], x[inside], drive.omega, 3)
-        rows.append([a**2, a])
-        values.append(float(fitted.mean) - zero)
-        weights.append(1.0)
-    matrix, y = np.array(rows).reshape(-1, 2), np.array(values)
-    normal, right = np.zeros((2, 2)), np.zeros(2)
+    matrix, y = np.column_stack([seen.crank**2, seen.crank]), seen.mean - zero
+    normal, right, spread = np.zeros((2, 2)), np.zeros(2), 1e-5
     if len(y):
-        spread = 1e-5  # m: of a run's mean, replaced below by what the means show
-        for _ in range(2):
-            normal = matrix.T @ matrix / spread**2
-            right = matrix.T @ y / spread**2
+        for _ in range(2):  # the scatter of the means from what the fit leaves of them
+            normal, right = matrix.T @ matrix / spread**2, matrix.T @ y / spread**2
             full, known = _with_string(normal, right, string_length, string_error)
             found = np.linalg.solve(full, known)
-            spread = max(float(np.sqrt(np.mean((y - matrix @ found) ** 2))), 1e-6)
+            left = y - matrix @ found
+            spread = max(float(np.sqrt(left @ left / max(len(y) - 2, 1))), 1e-6)
+        normal, right = matrix.T @ matrix / spread**2, matrix.T @ y / spread**2
     full, known = _with_string(normal, right, string_length, string_error)
     found, covariance = np.linalg.solve(full, known), np.linalg.inv(full)
-    if len(y):  # the zero is common to all
-        pull = covariance @ matrix.T @ np.ones(len(y)) / spread**2
-        covariance = covariance + np.outer(pull, pull) * zero_error**2
-    return MeanShift(float(found[0]), float(found[1]), np.asarray(covariance, dtype=np.float64), len(y))
+    by_zero = -covariance @ matrix.T @ np.ones(len(y)) / spread**2 if len(y) else np.zeros(2)
+    return MeanShift(
+        float(found[0]), float(found[1]), np.asarray(covariance, dtype=np.float64),
+        np.asarray(by_zero, dtype=np.float64), zero_error, len(y),
+    )  # fmt: skip
 
 
 def _with_string(

@@ -57,7 +57,7 @@ def half_power_points(omega: FloatArray, amplitude: FloatArray) -> tuple[float, 
     use = amplitude >= amplitude.max() / _DEEPEST
     if np.count_nonzero(use) < 8:
         raise ValueError(
-            f"only {np.count_nonzero(use)} points stand above a third of the largest amplitude, 8 are needed: step finer"
+            f"{np.count_nonzero(use)} points stand above a third of the largest amplitude, 8 are needed: step finer"
         )
     squares, middle = omega[use] ** 2, float(np.mean(omega[use] ** 2))
     width = float(np.ptp(squares)) / 2

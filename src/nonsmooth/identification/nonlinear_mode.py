@@ -87,10 +87,10 @@ class NonlinearMode:
 
     def slope(self, amplitude: ArrayLike, omega: ArrayLike) -> FloatArray:
         r"""d ln F / d ln a at a fixed frequency: 1 if linear, 0 at a fold, negative on the unstable middle part."""
-        a = np.asarray(amplitude, dtype=np.float64)
-        step = 1e-5
-        high, low = self.stiffness(a * (1 + step), omega), self.stiffness(a * (1 - step), omega)
-        return np.asarray(1.0 + np.log(np.abs(high) / np.abs(low)) / (2 * step))
+        a, w = np.asarray(amplitude, dtype=np.float64), np.asarray(omega, dtype=np.float64)
+        G, D, change = self.square(a), self.damping(a), interpolation(self.knots, a, 1)
+        turn = change @ self.squares + 1j * w * D * (change @ self.log_damping)
+        return np.asarray(1.0 + np.real(a * turn / (G - w**2 + 1j * w * D)))
 
     def response(self, force: float, *, points: int = 400, low: float | None = None) -> xr.Dataset:
         """The response to a force of constant amplitude, along its curve: up one side, over the top, down the other.
@@ -148,14 +148,16 @@ class NonlinearMode:
         return float(a[k - 1] + (a[k] - a[k - 1]) * room[k - 1] / (room[k - 1] - room[k]))
 
 
-def interpolation(knots: FloatArray, amplitude: ArrayLike) -> FloatArray:
-    """Matrix that takes values at the knots to values at the amplitudes; cubics are met exactly.
+def interpolation(knots: FloatArray, amplitude: ArrayLike, derivative: int = 0) -> FloatArray:
+    """Matrix that takes values at the knots to values (or a derivative) at the amplitudes; cubics are met exactly.
 
     Outside of the knots the nearest knot's value: nothing was measured there.
     """
     from scipy.interpolate import CubicSpline
 
-    a: Any = np.clip(np.asarray(amplitude, dtype=np.float64), knots[0], knots[-1])
+    at = np.asarray(amplitude, dtype=np.float64)
+    a: Any = np.clip(at, knots[0], knots[-1])
     if len(knots) == 1:
-        return np.ones((*np.shape(a), 1))
-    return np.asarray(CubicSpline(knots, np.eye(len(knots)), bc_type="not-a-knot")(a))
+        return np.full((*at.shape, 1), float(derivative == 0))
+    found = np.asarray(CubicSpline(knots, np.eye(len(knots)), bc_type="not-a-knot")(a, derivative))
+    return np.where((a == at)[..., None], found, 0.0) if derivative else found

@@ -122,6 +122,19 @@ class ParameterSet(Mapping[str, float]):
         """The interval that holds a parameter (or an extra quantity) with this probability."""
         return self.estimate(name).interval(level)
 
+    def only(self, names: Sequence[str], note: str = "") -> ParameterSet:
+        """The same set with these parameters alone; the others go to ``extra``, with their covariance."""
+        kept = [name for name in self.estimates if name in names]
+        moved = [name for name in self.estimates if name not in names]
+        every = [*self.estimates, *self.extra]
+        order = [every.index(name) for name in (*kept, *moved, *self.extra)]
+        return ParameterSet(
+            {name: self.estimates[name] for name in kept}, self._covariance[np.ix_(order, order)],
+            extra={**{name: self.estimates[name] for name in moved}, **self.extra}, findings=self.findings,
+            identifiability=self.identifiability, notes=[*self.notes, note] if note else self.notes,
+            synthetic=self.synthetic,
+        )  # fmt: skip
+
     def draw(self, n: int, seed: int = 0) -> dict[str, NDArray[np.float64]]:
         """``n`` sets of the model's parameters, correlated as known; those known to a factor are log-normal."""
         names = list(self.estimates)

@@ -91,7 +91,7 @@ class ResponseFit:
         G, D = plain * np.exp(by_square), np.exp(basis @ mode.log_damping + by_damping)
         needed = G - self.omega**2 + 1j * D * self.omega
         to_square, to_damping = -G / needed, -1j * D * self.omega / needed
-        J = np.zeros((len(a), count), complex)
+        J: Any = np.zeros((len(a), count), complex)
         J[:, :K] = to_square[:, None] * basis * mode.squares / plain[:, None]
         J[:, K : 2 * K] = to_damping[:, None] * basis
         if self.force is None:
@@ -101,7 +101,7 @@ class ResponseFit:
         if self.shifts:
             J[np.arange(len(a)), first + self.curve] = to_square
             J[np.arange(len(a)), first + n + self.curve] = to_damping
-        full = np.concatenate([J.real, J.imag]) if self.phased else J.real
+        full: FloatArray = np.concatenate([J.real, J.imag]) if self.phased else np.asarray(J.real)
         for k in range(first - 2, first) if self.residual else ():
             step = np.zeros(count)
             step[k] = 1e-6
@@ -131,7 +131,7 @@ class ResponseFit:
             if self.shifts:
                 own, own_error = p[first:].reshape(2, n), np.diag(inverse)[first:].reshape(2, n)
                 spread = np.sqrt(np.maximum(np.mean(own**2 + own_error, axis=1), 1e-18))
-            if k > 2 and np.allclose(before, (sigma, *spread), rtol=5e-3):
+            if k > 2 and np.allclose(before, (sigma, *spread), rtol=1e-2):
                 break
         self.p, self.covariance, self.left = p, inverse, left
         self.sigma = float(np.sqrt(left @ left / freedom))
@@ -152,11 +152,13 @@ class ResponseFit:
         return np.asarray(done.x)
 
     def _start(self, count: int) -> FloatArray:
-        """A linear mode: from where a curve answers most for its force, and how wide that is."""
+        """Natural frequencies by the tops of the curves; damping by the width of the lowest, the least bent of them."""
         load = self.force if self.force is not None else np.ones_like(self.omega)
-        gain = np.abs(self.measured) / load
-        chosen = self.curve == self.curve[int(np.argmax(gain))]
-        w, h = self.omega[chosen], gain[chosen]
+        size = np.abs(self.measured)
+        gain = size / load
+        tops = [int(np.argmax(np.where(self.curve == c, gain, 0.0))) for c in range(len(self.names))]
+        tops.sort(key=lambda i: size[i])
+        w, h = (v[self.curve == self.curve[tops[0]]] for v in (self.omega, gain))
         top = int(np.argmax(h))
         wide = w[h > h[top] / np.sqrt(2.0)]
         step = float(np.median(np.abs(np.diff(w)))) if len(w) > 1 else 0.01 * w[0]
@@ -164,7 +166,8 @@ class ResponseFit:
         K, n = len(self.knots), len(self.names)
         self._unit = 1.0 / float(np.median(1.0 / gain)) if self.residual else 1.0
         p = np.zeros(count)
-        p[:K], p[K : 2 * K] = 2 * np.log(w[top]), np.log(D)
+        p[:K] = 2 * np.log(np.interp(self.knots, size[tops], self.omega[tops]))
+        p[K : 2 * K] = np.log(D)
         if self.force is None:
             for c in range(n):
                 here = np.abs(self.measured[self.curve == c])
@@ -190,12 +193,10 @@ class ResponseFit:
     def slopes(self) -> FloatArray:
         """d ln F / d ln a at the points' frequencies, each curve's own shift taken into account."""
         mode, _, by_square, by_damping = self._unpack(self.p)
-        sizes = []
-        for step in (1e-5, -1e-5):
-            a = self.amplitude * (1 + step)
-            G, D = mode.square(a) * np.exp(by_square), mode.damping(a) * np.exp(by_damping)
-            sizes.append(np.log(np.abs(G - self.omega**2 + 1j * D * self.omega)))
-        return np.asarray(1 + (sizes[0] - sizes[1]) / 2e-5)
+        a, w, change = self.amplitude, self.omega, interpolation(self.knots, self.amplitude, 1)
+        G, D = mode.square(a) * np.exp(by_square), mode.damping(a) * np.exp(by_damping)
+        turn = (change @ mode.squares) * np.exp(by_square) + 1j * w * D * (change @ mode.log_damping)
+        return np.asarray(1.0 + np.real(a * turn / (G - w**2 + 1j * w * D)))
 
     def own(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Natural frequency (Hz) and damping ratio of each curve alone, at the amplitude of its phase resonance."""
@@ -217,12 +218,13 @@ class ResponseFit:
         if self.forced and self.mass is None:
             found["modal mass"] = Estimate(self.mode.mass, self.mode.mass * float(error[2 * K]), "kg")
         if self.residual:
-            for name, k, value in (("real", first - 2, self.mode.residual.real), ("imag", first - 1, self.mode.residual.imag)):
+            R = self.mode.residual
+            for name, k, value in (("real", first - 2, R.real), ("imag", first - 1, R.imag)):
                 found[f"residual, {name}"] = Estimate(value, float(error[k]) * self._unit, "m/N")
         if self.shifts:
             n = np.sqrt(2.0 * len(self.names))
-            f = float(np.sqrt(np.mean(self.mode.squares)) / (2 * np.pi))
-            found["f_n from curve to curve"] = Estimate(0.5 * f * float(self.spread[0]), 0.5 * f * float(self.spread[0]) / n, "Hz")
+            f = 0.5 * float(np.sqrt(np.mean(self.mode.squares)) / (2 * np.pi)) * float(self.spread[0])
+            found["f_n from curve to curve"] = Estimate(f, f / n, "Hz")
             found["zeta from curve to curve, relative"] = Estimate(float(self.spread[1]), float(self.spread[1]) / n)
         return found
 
@@ -231,8 +233,8 @@ class ResponseFit:
         slope = self.slopes()
         unstable = int(np.count_nonzero(slope < 0))
         said = [
-            f"{unstable} of {len(slope)} points lie on an unstable middle part (d ln F / d ln a < 0); the least slope is "
-            f"{slope.min():.2f}, 1 would be linear"
+            f"{unstable} of {len(slope)} points lie on an unstable middle part (d ln F / d ln a < 0); the least slope "
+            f"is {slope.min():.2f}, that of a linear mode 1"
         ]
         if not self.shifts:
             said.append(f"fewer than {_FEWEST} curves: how far one differs from the next is not known, nor stated")

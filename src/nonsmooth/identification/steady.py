@@ -81,10 +81,7 @@ class Steady:
             self.omega, self.omega_error, self.crank, self.amplitude, self.error, self.response, self.mean,
             self.mean_error, self.highest, self.rest,
         )  # fmt: skip
-        return Steady(
-            *(array[rows] for array in arrays),
-            tuple(self.direction[i] for i in rows), tuple(self.runs[i] for i in rows),
-        )  # fmt: skip
+        return _steady([array[rows] for array in arrays], [self.runs[i] for i in rows])
 
 
 def harmonics_of(run: Run, time: FloatArray, values: Any) -> tuple[HarmonicFit, float, float, float]:
@@ -123,5 +120,12 @@ def steady(runs: Sequence[Run]) -> Steady:
             response, fitted.mean, fitted.mean_error, fitted.mean + float(shape.max()), fitted.residual,
         ))  # fmt: skip
     columns = [np.array(column) for column in zip(*rows, strict=True)] if rows else [np.zeros(0)] * 10
-    directions = tuple(str(run.settings.get("direction", "up")) for run in runs)
-    return Steady(*columns, directions, tuple(runs))
+    return _steady(columns, runs)
+
+
+def _steady(columns: list[Any], runs: Sequence[Run]) -> Steady:
+    omega, omega_error, crank, amplitude, error, response, mean, mean_error, highest, rest = columns
+    return Steady(
+        omega, omega_error, crank, amplitude, error, response, mean, mean_error, highest, rest,
+        tuple(str(run.settings.get("direction", "up")) for run in runs), tuple(runs),
+    )  # fmt: skip

@@ -135,17 +135,17 @@ def restitution(
     noise = math.sqrt(sum(side.squares for row in rows for side in row[6:8]) / freedom) if freedom else math.nan
     table = np.array([row[:6] for row in rows], np.float64).reshape(-1, 6)
     errors = np.array([[side.slope_error(row[8], noise) for side in row[6:8]] for row in rows]).reshape(-1, 2)
-    v0, v1 = table[:, 2], table[:, 3]
+    before_v, after_v = table[:, 2], table[:, 3]
     with np.errstate(divide="ignore", invalid="ignore"):
-        e = np.where(v0 < -3.0 * errors[:, 0], -v1 / v0, np.nan)
-        e_error = np.hypot(errors[:, 1], e * errors[:, 0]) / np.abs(v0)
+        e = np.where(before_v < -3.0 * errors[:, 0], -after_v / before_v, np.nan)
+        e_error = np.hypot(errors[:, 1], e * errors[:, 0]) / np.abs(before_v)
     return xr.Dataset(
         {
             "impact_time": ("impact", table[:, 0], {"long_name": "time of the impact", "units": "s"}),
             "impact_height": ("impact", table[:, 1], {"long_name": "height at the impact"}),
-            "v_before": ("impact", v0, {"long_name": "velocity before the impact"}),
+            "v_before": ("impact", before_v, {"long_name": "velocity before the impact"}),
             "v_before_error": ("impact", errors[:, 0]),
-            "v_after": ("impact", v1, {"long_name": "velocity after the impact"}),
+            "v_after": ("impact", after_v, {"long_name": "velocity after the impact"}),
             "v_after_error": ("impact", errors[:, 1]),
             "restitution": ("impact", e, {"long_name": "restitution"}),
             "restitution_error": ("impact", e_error),

@@ -66,8 +66,8 @@ def compare(
     parameters : ParameterSet or mapping, optional
         Identified parameters; with a covariance their uncertainty is carried into the prediction.
     settings : mapping, optional
-        What was set in this run (``omega``, ``rho``, ``g``): numbers, ``(value, standard uncertainty)``, or a function
-        of the other parameters (``lambda p: p["k"] * crank_length``). They win over ``parameters``.
+        What was set in this run (``omega``, ``rho``, ``g``): numbers, or ``(value, standard uncertainty)``; the value
+        may be a function of the other parameters (``lambda p: p["k"] * crank_length``). They win over ``parameters``.
     noise : mapping or sequence, optional
         Standard error of a section point in each state; from ``section_error`` or ``u_error`` where not given.
     parameter : str, optional
@@ -148,7 +148,7 @@ def compare(
     set_ = read_settings(settings, theory) if isinstance(theory, System) else {}
     if draws is None:
         uncertain = hasattr(parameters, "covariance") or any(
-            not callable(pair) and pair[1] > NEGLIGIBLE * abs(pair[0]) for pair in set_.values()
+            pair.uncertainty > (0.0 if pair.follows else NEGLIGIBLE * abs(pair.at({}))) for pair in set_.values()
         )
         draws = DRAWS if is_system and uncertain else 0
     draws = whole_number(draws, "draws", 0)
@@ -191,7 +191,7 @@ def compare(
         variables["section_phase"] = (("section_phase",), np.array(phases), {
             "long_name": "phase of the section", "units": "forcing periods"})  # fmt: skip
     given = {
-        "settings": {key: "follows from others" if callable(pair) else list(pair) for key, pair in set_.items()},
+        "settings": {key: ["follows from others", pair.uncertainty] if pair.follows else list(pair) for key, pair in set_.items()},
         "parameter": parameter, "direction": direction,
         "section_phase": section_phase, "grid": grid, "transient": transient, "max_period": max_period,
         "draws": draws, "level": level, "splits": splits, "seed": seed, **options,

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from nonsmooth.analysis.sweep import sweep
 from nonsmooth.flow.sections import Stroboscopic
-from nonsmooth.identification.compare.draws import Settings, draw_systems, drawn_variables, nominal
+from nonsmooth.identification.compare.draws import Setting, Settings, draw_systems, drawn_variables, nominal
 from nonsmooth.identification.compare.periods import flips, measured_period, period_numbers
 
 if TYPE_CHECKING:
@@ -95,25 +95,27 @@ def compare_diagram(
     return variables | _flips(flips(at, numbers), flips(grid, periods[0]), drawn_flips, unit, level)
 
 
-def _following(settings: Settings, system: System, name: str, grid: FloatArray) -> dict[str, Any]:
+def _following(settings: Settings, system: System, name: str, grid: FloatArray) -> dict[str, Setting]:
     """The settings that change along the diagram, because they follow from its parameter."""
     ends = [{**system.values, name: float(value)} for value in (grid.min(), grid.max())]
-    rules = {key: rule for key, rule in settings.items() if callable(rule)}
-    return {key: rule for key, rule in rules.items() if rule(ends[0]) != rule(ends[1])}
+    rules = {key: setting for key, setting in settings.items() if setting.follows}
+    return {key: rule for key, rule in rules.items() if rule.at(ends[0]) != rule.at(ends[1])}
 
 
 def _marched(
-    system: System, name: str, grid: FloatArray, rules: dict[str, Any], direction: str, common: dict[str, Any]
+    system: System, name: str, grid: FloatArray, rules: dict[str, Setting], direction: str, common: dict[str, Any]
 ) -> tuple[FloatArray, NDArray[np.int64]]:
     """The diagram point by point, the state carried along, where other parameters change with this one."""
     words = ["up", "down"] if direction == "both" else [direction]
     sections = np.full((len(words), len(grid), KEEP, len(system.states)), np.nan)
     periods = np.zeros((len(words), len(grid)), dtype=np.int64)
+    # A drawn system is off its rule by an error that stays the same along the diagram.
+    beside = {key: system.values[key] - rule.at(system.values) for key, rule in rules.items()}
     for d, word in enumerate(words):
         state = None
         for i in np.argsort(grid, kind="stable")[:: 1 if word == "up" else -1]:
             here = system.with_parameters({name: float(grid[i])})
-            here = here.with_parameters({key: float(rule(here.values)) for key, rule in rules.items()})
+            here = here.with_parameters({key: rule.at(here.values) + beside[key] for key, rule in rules.items()})
             found = sweep(here, name, [float(grid[i])], direction=None, start=state, **common)
             sections[d, i] = found["section"].isel({name: 0}).values
             periods[d, i] = int(found["period_number"].values.ravel()[0])

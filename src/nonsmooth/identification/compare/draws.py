@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -15,18 +15,35 @@ if TYPE_CHECKING:
 
 __all__ = ["Setting", "Settings", "draw_systems", "drawn_variables", "nominal", "read_settings", "settled"]
 
-#: A setting is a value with its uncertainty, or follows from the other parameters.
-Setting = tuple[float, float] | Callable[[Mapping[str, float]], float]
+Rule = Callable[[Mapping[str, float]], float]
+
+
+class Setting(NamedTuple):
+    """What was set in a run: a value, or a rule by which it follows from the other parameters; standard uncertainty."""
+
+    value: float | Rule
+    uncertainty: float = 0.0
+
+    @property
+    def follows(self) -> bool:
+        """Whether it is a rule."""
+        return callable(self.value)
+
+    def at(self, values: Mapping[str, float]) -> float:
+        """The value, the other parameters being these."""
+        return float(self.value(values) if callable(self.value) else self.value)
+
+
 Settings = Mapping[str, Setting]
 
 MOST_REFUSED = 100  # draws per accepted one before the covariance is called unfit
 
 
 def read_settings(settings: Mapping[str, Any] | None, system: System) -> dict[str, Setting]:
-    """Settings of the run as ``{name: (value, standard uncertainty)}``.
+    """Settings of the run as ``{name: Setting}``.
 
-    Each is a number, a pair, ``{"value": ..., "uncertainty": ...}``, or a function of the other parameters (the
-    force of a crank is ``lambda p: p["k"] * a``, and uncertain as k is), which is kept.
+    Each is a number, a pair, or ``{"value": ..., "uncertainty": ...}``; the value may be a function of the other
+    parameters (the force of a crank is ``lambda p: p["k"] * a``, and uncertain as k is).
 
     Raises
     ------
@@ -40,9 +57,6 @@ def read_settings(settings: Mapping[str, Any] | None, system: System) -> dict[st
         if name not in system.parameters:
             units = {key: item.unit for key, item in system.parameters.items()}
             raise ValueError(unknown(name, "a parameter", repr(system.name), units))
-        if callable(given):
-            read[name] = given
-            continue
         if isinstance(given, Mapping):
             extra = set(given) - {"value", "uncertainty"}
             if extra or "value" not in given:
@@ -52,10 +66,11 @@ def read_settings(settings: Mapping[str, Any] | None, system: System) -> dict[st
             pair = (given[0], given[1])
         else:
             pair = (given, 0.0)
-        value, error = real_number(pair[0], f"setting {name!r}"), real_number(pair[1], f"uncertainty of {name!r}")
+        value = pair[0] if callable(pair[0]) else real_number(pair[0], f"setting {name!r}")
+        error = real_number(pair[1], f"uncertainty of {name!r}")
         if error < 0:
             raise ValueError(f"the uncertainty of setting {name!r} is {error:g}; it must be zero or more")
-        read[name] = (value, error)
+        read[name] = Setting(value, error)
     return read
 
 
@@ -68,9 +83,9 @@ def nominal(system: System, parameters: Mapping[str, float] | None, settings: Se
 
 def settled(settings: Settings, values: Mapping[str, float]) -> dict[str, float]:
     """The nominal value of each setting; those that follow from other parameters are worked out last."""
-    plain = {name: pair[0] for name, pair in settings.items() if not callable(pair)}
+    plain = {name: setting.at({}) for name, setting in settings.items() if not setting.follows}
     known = {**values, **plain}
-    return plain | {name: float(rule(known)) for name, rule in settings.items() if callable(rule)}
+    return plain | {name: setting.at(known) for name, setting in settings.items() if setting.follows}
 
 
 def draw_systems(
@@ -106,13 +121,16 @@ def draw_systems(
     while len(systems) < draws:
         missing = draws - len(systems)
         table = _identified(parameters, missing, int(rng.integers(2**31)))
+        beside = {}  # what is added to the value of each setting
         for name, setting in settings.items():
             table.pop(name, None)
-            if not callable(setting):
-                table[name] = setting[0] + setting[1] * rng.standard_normal(missing)
+            beside[name] = setting.uncertainty * rng.standard_normal(missing)
+            if not setting.follows:
+                table[name] = setting.at({}) + beside[name]
         for i in range(missing):
             row = {name: float(column[i]) for name, column in table.items()}
-            row |= {name: float(rule({**base.values, **row})) for name, rule in settings.items() if callable(rule)}
+            known = {**base.values, **row}
+            row |= {name: one.at(known) + float(beside[name][i]) for name, one in settings.items() if one.follows}
             try:
                 drawn = base.with_parameters(row)
             except (SystemDefinitionError, ValueError):

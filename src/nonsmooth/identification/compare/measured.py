@@ -14,9 +14,12 @@ if TYPE_CHECKING:
 
     from nonsmooth.experiment.recording import Recording
 
-__all__ = ["measured_motion", "measured_response", "measured_rise"]
+__all__ = ["measured_motion", "measured_response", "measured_rise", "measured_sections"]
 
 ANGLES = ("rad", "deg", "rev")
+LONG = 150.0  # s: of a longer record the support and the smoother's intensity are found in its middle
+PIECE = 75.0  # s
+FEW = 6  # turns of the drive below which no period number is sought
 
 
 def measured_motion(
@@ -67,9 +70,7 @@ def measured_motion(
 
     from nonsmooth.experiment.signals.checks import take
     from nonsmooth.experiment.signals.displacement import position, resolution
-    from nonsmooth.experiment.signals.impacts import contacts
     from nonsmooth.experiment.signals.phase import drive_phase
-    from nonsmooth.experiment.signals.smoothing import smooth
 
     name = run if run is not None else recording.runs[0]
     turned = take(recording, angle, run, units=ANGLES, samples=64)
@@ -79,9 +80,7 @@ def measured_motion(
     time = x[x.dims[0]].values
     drive = drive_phase(turns, span=(float(time[0]), float(time[-1])))
     step = resolution(distance_per_turn=distance_per_turn, counts_per_turn=counts_per_turn)
-    # Without a support the motion is smooth: no contact is an answer that the smoother takes, too.
-    touching: Any = contacts(time, x, resolution=step, omega=drive.omega) if support else ((), ())
-    smoothed = smooth(time, x, resolution=step, contacts=touching)
+    smoothed = _smoothed(time, x, step, drive.omega, support)
     # Beyond the first and last turn the phase would be a guess.
     inside = (time >= turns[0]) & (time <= turns[-1])
     states = ("x", "v")
@@ -105,6 +104,44 @@ def measured_motion(
     )  # fmt: skip
 
 
+def _smoothed(time: Any, x: xr.DataArray, step: float, omega: float, support: bool) -> xr.Dataset:
+    """The motion by the Kalman smoother, contacts with the support told apart.
+
+    Of a long record a piece in the middle tells the support's place and the intensities of the smoother's noise; to
+    find them in the whole would take ten passes over it.
+    """
+    from nonsmooth.experiment.signals.impacts import contacts
+    from nonsmooth.experiment.signals.sections import poincare
+    from nonsmooth.experiment.signals.smoothing import smooth
+
+    # Without a support the motion is smooth: no contact is an answer that the smoother takes, too.
+    def touching(t: Any, values: Any) -> Any:
+        return contacts(t, values, resolution=step, omega=omega) if support else ((), ())
+
+    if time[-1] - time[0] <= LONG:
+        return smooth(time, x, resolution=step, contacts=touching(time, x))
+    middle = 0.5 * (time[0] + time[-1])
+    inside = np.abs(time - middle) <= PIECE / 2
+    piece = x.isel({x.dims[0]: inside})
+    found = touching(time[inside], piece)
+    quiet = smooth(time[inside], piece, resolution=step, contacts=found).attrs
+    if not support or not found.sizes["contact"]:
+        if not support:
+            return smooth(time, x, resolution=step, contacts=((), ()), intensity=quiet["intensity"])
+        return smooth(time, x, resolution=step, contacts=touching(time, x))
+    gap = float(found["gap"])
+    rough = smooth(time[inside], piece, resolution=step).attrs["intensity"]
+    first = smooth(time, x, resolution=step, intensity=rough)
+    begin, end = (
+        poincare(time, first["x"], first["v"].values, level=gap, rising=rising)["time"].values for rising in (True, False)
+    )
+    # A contact that the record cuts off is whole within it.
+    begin = np.concatenate([time[:1], begin]) if x.values[0] > gap else begin
+    end = np.concatenate([end, time[-1:]]) if len(end) < len(begin) else end
+    levels = (quiet["intensity"], quiet["intensity_in_contact"])
+    return smooth(time, x, resolution=step, contacts=(begin, end), intensity=levels)
+
+
 def measured_response(motions: Sequence[xr.Dataset], directions: Sequence[str], *, settle: int = 4) -> xr.Dataset:
     """The frequency response that steady runs make: amplitude over frequency, run by run.
 
@@ -121,15 +158,23 @@ def measured_response(motions: Sequence[xr.Dataset], directions: Sequence[str], 
     -------
     xarray.Dataset
         Over ``run``: ``amplitude`` (half the range of x, the mean over forcing periods), ``amplitude_error`` (that of
-        the mean: the scatter of the periods, and the error of a sample), ``omega``, ``direction``.
+        the mean: the scatter of the periods, and the error of a sample), ``omega``, ``direction``, and
+        ``period_number`` (0: none found, -1: fewer than six turns).
     """
     import xarray as xr
 
+    from nonsmooth.identification.compare.periods import measured_period
+
     if len(motions) != len(directions) or not len(motions):
         raise ValueError(f"{len(motions)} runs and {len(directions)} directions: each run needs its own")
-    heights, errors = [], []
+    heights, errors, periods = [], [], []
     for motion in motions:
-        whole = fold(motion["phase"].values, motion["u"].values[:, :1], 64)[:, :, 0]
+        folded = fold(motion["phase"].values, motion["u"].values, 64)
+        points, noise = folded[:, 0], np.median(motion["u_error"].values, axis=0)
+        points = points[np.isfinite(points).all(axis=1)]
+        many = len(points) >= FEW
+        periods.append(measured_period(points, noise, max_period=8).number if many else -1)
+        whole = folded[:, :, 0]
         whole = whole[min(settle, len(whole) - 1) :]
         whole = whole[np.isfinite(whole).all(axis=1)]
         # Pairs of periods, so that a motion of period two shows its whole range.
@@ -148,6 +193,8 @@ def measured_response(motions: Sequence[xr.Dataset], directions: Sequence[str], 
             "amplitude_error": ("run", np.array(errors), {"long_name": "standard error of it", "units": "m"}),
             "omega": ("run", omega, {"long_name": "frequency of the drive", "units": "rad/s"}),
             "direction": ("run", np.array(directions, dtype=str), {"long_name": "how the run was reached"}),
+            "period_number": ("run", np.array(periods, dtype=np.int64), {
+                "long_name": "period number (0: none found, -1: too few turns)"}),
         },
         attrs=attrs,
     )  # fmt: skip
@@ -184,6 +231,50 @@ def measured_rise(motion: xr.Dataset, parameter: str, first: float, last: float,
         },
         {"state": motion["state"].values, "state_unit": ("state", motion["state_unit"].values)},
         motion.attrs,
+    )  # fmt: skip
+
+
+def measured_sections(
+    motions: Sequence[xr.Dataset], parameter: str, values: Sequence[float], *, unit: str = ""
+) -> xr.Dataset:
+    """The section points of steady runs over the parameter in which they differ.
+
+    Parameters
+    ----------
+    motions : sequence of Dataset
+        As from :func:`measured_motion`.
+    parameter : str
+    values : sequence of float
+        Its value in each run.
+    unit : str
+
+    Returns
+    -------
+    xarray.Dataset
+        ``section(<parameter>, iterate, state)`` at phase 0, in rising order of the parameter (NaN behind the end of a
+        shorter run), and ``section_error(state)``.
+    """
+    import xarray as xr
+
+    order = np.argsort(values)
+    clouds = [fold(motions[i]["phase"].values, motions[i]["u"].values, 8)[:, 0] for i in order]
+    points = np.full((len(clouds), max(map(len, clouds)), clouds[0].shape[1]), np.nan)
+    for row, cloud in zip(points, clouds, strict=True):
+        row[: len(cloud)] = cloud
+    error = np.median(np.concatenate([motion["u_error"].values for motion in motions]), axis=0)
+    first = motions[0]
+    attrs = {**first.attrs, "title": f"{first.attrs.get('file') or 'in memory'}, {len(motions)} runs"}
+    attrs.pop("run", None)
+    return xr.Dataset(
+        {
+            "section": ((parameter, "iterate", "state"), points, {"long_name": "section points"}),
+            "section_error": (("state",), error),
+        },
+        {
+            parameter: (parameter, np.asarray(values, dtype=float)[order], {"long_name": parameter, "units": unit}),
+            "state": first["state"].values, "state_unit": ("state", first["state_unit"].values),
+        },
+        attrs,
     )  # fmt: skip
 
 

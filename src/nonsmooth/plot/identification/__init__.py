@@ -5,7 +5,9 @@ from nonsmooth.plot.identification.calibration import calibration
 from nonsmooth.plot.identification.decays import drop_decay, free_decay
 from nonsmooth.plot.identification.force_displacement import force_displacement
 from nonsmooth.plot.identification.gap import grazing, multiple_shooting
+from nonsmooth.plot.identification.half_power import half_power
 from nonsmooth.plot.identification.impulse_response import impulse_history, impulse_response
+from nonsmooth.plot.identification.nyquist import nyquist
 from nonsmooth.plot.identification.uncertainty import coverage, profile
 
 __all__ = [
@@ -16,8 +18,10 @@ __all__ = [
     "force_displacement",
     "free_decay",
     "grazing",
+    "half_power",
     "impulse_history",
     "impulse_response",
     "multiple_shooting",
+    "nyquist",
     "profile",
 ]

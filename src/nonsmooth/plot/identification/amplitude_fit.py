@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.plot import style
-from nonsmooth.plot.comparison import MEASURED, measured_label
+from nonsmooth.plot.comparison import ABOVE, MEASURED, measured_label
 from nonsmooth.plot.identification.findings import data_of, number, with_error
 
 if TYPE_CHECKING:
@@ -49,13 +49,13 @@ def amplitude_fit(finding: Any, ax: Axes | None = None) -> Axes:
             if f"{name}_amplitude" in data:
                 label = word
                 if np.isfinite(value := number(data, f"c_{name}")):
-                    label += f":\n$c$ = {with_error(value, number(data, f'c_{name}_error'), 'N s/m')}"
+                    label += f",\n$c$ = {with_error(value, number(data, f'c_{name}_error'), 'N s/m')}"
                 drawn.plot(
                     data["omega_fine"].values, 1e3 * data[f"{name}_amplitude"].values, line,
                     color=style.COLORS[color], label=label,
                 )  # fmt: skip
         drawn.set_ylim(bottom=0)
         drawn.margins(x=0.02)
-        drawn.legend(loc="best", handlelength=1.6)
+        drawn.legend(**ABOVE, ncols=2, columnspacing=1.0, handlelength=1.6)
         drawn.set(xlabel=r"$\omega$ (rad/s)", ylabel="amplitude of $x$ (mm)")
     return drawn

@@ -73,4 +73,6 @@ def force_displacement(finding: Any, ax: Axes | None = None) -> Axes:
 def _lines_label(slopes: np.ndarray, errors: np.ndarray) -> str:
     if len(slopes) == 1:
         return f"slope {with_error(float(slopes[0]), float(errors[0]), 'N/m')}"
+    if np.ptp(slopes) < 1e-9 * abs(slopes[0]):  # one slope was fitted to all
+        return f"slope {with_error(float(slopes[0]), float(errors[0]), 'N/m')}"
     return f"{len(slopes)} lines, slopes {slopes.min():.4g} to {slopes.max():.4g} N/m"

@@ -42,6 +42,13 @@ def impulse_response(finding: Any, ax: Axes | None = None) -> Axes:
     with style.axes(ax) as drawn:
         drawn.vlines(at, 0, heights, color=MEASURED, linewidth=0.7)
         drawn.plot(at, heights, "o", color=MEASURED, markersize=2.6, label=f"DFT, {measured_label(data)}")
+        if "fine_magnitude" in data:
+            fine = data["fine_frequency"].values
+            inside = (fine >= at[0]) & (fine <= at[-1])
+            drawn.plot(
+                fine[inside], 1e3 * data["fine_magnitude"].values[inside], color=style.COLORS["muted"], linewidth=0.7,
+                label="transform between its lines",
+            )  # fmt: skip
         step = number(data, "grid_step")
         if np.isfinite(step):
             drawn.axvspan(

@@ -7,11 +7,11 @@ Identification and comparison read the folders only.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from nonsmooth.experiment.recording import RecordingWarning
 from nonsmooth.models import discontinuous_support
@@ -30,6 +30,8 @@ __all__ = ["SEED", "TRUTH", "Laboratory", "with_support"]
 SEED = 0  # of the rig's noise; its parameters are the published ones
 TRUTH = "truth.toml"
 
+_Measured = TypeVar("_Measured")
+
 
 class Laboratory:
     """A virtual rig and who measures with it.
@@ -46,6 +48,7 @@ class Laboratory:
     def __init__(self, folder: Path, quick: bool = False) -> None:
         self.folder, self.quick = Path(folder), quick
         self.notes: list[str] = []
+        self._kept: dict[str, Any] = {}
         self.folder.mkdir(parents=True, exist_ok=True)
 
     @cached_property
@@ -122,6 +125,13 @@ class Laboratory:
             return session_measurement(
                 session, procedure, runs, k=self.identified["k"], gap_offset=self._gap_offset
             )
+
+    def once(self, name: str, measure: Callable[[], _Measured]) -> _Measured:
+        """What ``measure`` gives, measured when first asked for."""
+        if name not in self._kept:
+            self._kept[name] = measure()
+        made: _Measured = self._kept[name]
+        return made
 
     def compare(self, measured: xr.Dataset, settings: Mapping[str, Any], **options: Any) -> xr.Dataset:
         """The measurement over the model with the identified parameters."""

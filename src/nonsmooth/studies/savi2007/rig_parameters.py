@@ -96,7 +96,7 @@ def _caption_8(data: Mapping[str, xr.Dataset]) -> str:
     return (
         f"Calibrations of the drive with fitted lines and what they leave. (a) Frequency over motor voltage, "
         f"{motor.runs} runs: slope {motor.number}; the motor turns from {motor.others['offset']} on. (b) Forcing "
-        f"amplitude over crank length, {crank.runs} runs: slope {crank.number}, which is k. The paper prints no numbers."
+        f"amplitude over crank length, {crank.runs} runs: slope {crank.number}, which is k. The paper has no numbers."
     )
 
 

@@ -60,8 +60,8 @@ def _caption(data: Mapping[str, xr.Dataset]) -> str:
     return (
         f"Frequency steps on the virtual rig (synthetic), {runs.sizes['run']} runs with rising and falling frequency, "
         f"over the model's response with the parameters identified, rho = {float(compared['rho']):.4f} N and g = "
-        f"{1e3 * float(compared['g']):.3f} mm. Jumps of the rig, {'; '.join(words)}; {doubled} runs with period 2. Half "
-        f"of the runs lie within {np.nanmedian(differences):.2f} % of the model, nine of ten within "
+        f"{1e3 * float(compared['g']):.3f} mm. Jumps of the rig, {'; '.join(words)}; {doubled} runs with period 2. "
+        f"Half of the runs lie within {np.nanmedian(differences):.2f} % of the model, nine of ten within "
         f"{np.nanquantile(differences, 0.9):.1f} %. Diamonds: jumps measured (full) and predicted (open)."
     )
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from nonsmooth.studies.savi2007.bench import Bench
 from nonsmooth.studies.savi2007.figure import Figure
 from nonsmooth.studies.savi2007.flows import Settings
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["Reproduction", "figures_of_the_study", "reproduce"]
 
 PICTURE_DPI = 200
+PARAMETERS = "table1"  # identified for every figure of the rig
 
 
 @dataclass(frozen=True)
@@ -34,28 +36,49 @@ class Reproduction:
 
 
 def figures_of_the_study() -> tuple[Figure, ...]:
-    """All figures, in the order of the paper; the effect of eta last."""
-    from nonsmooth.studies.savi2007 import amplitude, band, frequency, gap, regions, resonance
+    """All figures, in the order of the paper, the model's before the rig's; the effect of eta last."""
+    from nonsmooth.studies.savi2007 import (
+        amplitude,
+        band,
+        frequency,
+        gap,
+        regions,
+        resonance,
+        rig_amplitude,
+        rig_frequency,
+        rig_gap,
+        rig_parameters,
+        rig_response,
+    )
 
-    rooms = (regions, resonance, amplitude, gap, frequency, band)
-    return tuple(figure for room in rooms for figure in room.FIGURES)
+    rooms = (
+        regions, rig_parameters, resonance, rig_response, amplitude, rig_amplitude, gap, rig_gap, frequency,
+        rig_frequency, band,
+    )  # fmt: skip
+    figures = [figure for room in rooms for figure in room.FIGURES]
+    places = {PARAMETERS: 8.5, "eta": 99.0}
+    return tuple(sorted(figures, key=lambda figure: (places.get(figure.name, figure.number or 0), figure.rig)))
 
 
 def reproduce(
     out: str | Path, figures: Sequence[int] | None = None, quick: bool = False, progress: bool = True
 ) -> Reproduction:
-    """Reproduce the numerical figures of Savi et al. (2007) and check the paper's statements.
+    """Reproduce the figures of Savi et al. (2007) by model and virtual rig, and check the paper's statements.
+
+    What the paper measured is measured here on a virtual rig with the paper's parameters: a session is recorded, the
+    parameters are identified from its files, and the records are laid over the model with these parameters. All of
+    that is synthetic and says so.
 
     Parameters
     ----------
     out : path
         Folder to write into, made where missing: ``figNN.pdf``, ``figNN.png``, datasets ``figNN_*.nc``,
-        ``report.md``, ``report.html`` (self-contained), ``claims.json``.
+        ``report.md``, ``report.html`` (self-contained), ``claims.json``; the rig's sessions in ``rig``.
     figures : list of int, optional
         Numbers of the paper's figures; all, and the effect of eta, where not given. The report then holds the
         statements that these figures decide.
     quick : bool
-        Coarse grids and short transients: a first look, whose numbers have wide intervals.
+        Coarse grids, short transients and records: a first look, whose numbers have wide intervals.
     progress : bool
         Bars and a line per figure, on a terminal.
 
@@ -67,6 +90,8 @@ def reproduce(
     ------
     ValueError
         A figure that is not one of the study.
+    RuntimeError
+        If the measurement on the virtual rig failed.
     """
     from nonsmooth.studies.savi2007.claims import measure_claims
     from nonsmooth.studies.savi2007.report import write_report
@@ -77,13 +102,22 @@ def reproduce(
     settings = Settings(quick=quick, progress=progress)
     data: dict[str, dict[str, xr.Dataset]] = {}
     seconds: dict[str, float] = {}
-    for i, figure in enumerate(chosen):
-        if progress and sys.stderr.isatty():
-            print(f"[{i + 1}/{len(chosen)}] {figure.name}: {figure.title}", file=sys.stderr)
-        begin = time.perf_counter()
-        data[figure.name] = figure.compute(settings)
-        _write(figure, data[figure.name], folder)
-        seconds[figure.name] = time.perf_counter() - begin
+    computed = [figure for figure in chosen if not figure.rig]
+    with Bench(folder, [figure for figure in chosen if figure.rig], quick) as bench:
+        for i, figure in enumerate(computed):
+            _say(progress, f"[{i + 1}/{len(computed)}] {figure.name}: {figure.title}")
+            begin = time.perf_counter()
+            data[figure.name] = figure.compute(settings)
+            _save(figure, data[figure.name], folder)
+            _draw(figure, data[figure.name], folder)
+            seconds[figure.name] = time.perf_counter() - begin
+        _say(progress and bool(bench.figures), "waiting for the records of the virtual rig")
+        measured, times = bench.results()
+    data |= measured
+    seconds |= times
+    for figure in chosen:
+        if figure.rig:
+            _draw(figure, data[figure.name], folder)
     rows = measure_claims(data)
     write_report(folder, chosen, data, rows, settings, complete=figures is None)
     return Reproduction(folder, chosen, data, rows, seconds)
@@ -97,18 +131,30 @@ def _chosen(numbers: Sequence[int] | None) -> tuple[Figure, ...]:
     wrong = sorted(set(numbers) - there)
     if wrong or not numbers:
         raise ValueError(
-            f"figure {', '.join(map(str, wrong)) or '(none)'} is not among the paper's numerical figures: "
-            f"{', '.join(map(str, sorted(there)))} (3-8 and 16 are of the rig)"
+            f"figure {', '.join(map(str, wrong)) or '(none)'} is not among the paper's figures that are reproduced: "
+            f"{', '.join(map(str, sorted(there)))} (1 is a sketch, 3 a photograph)"
         )
-    return tuple(figure for figure in known if figure.number in numbers)
+    with_rig = any(figure.rig and figure.number in numbers for figure in known)
+    return tuple(
+        figure for figure in known if figure.number in numbers or (with_rig and figure.name == PARAMETERS)
+    )
 
 
-def _write(figure: Figure, data: dict[str, xr.Dataset], folder: Path) -> None:
-    from nonsmooth.plot import journal, save_figure
+def _say(aloud: bool, text: str) -> None:
+    if aloud and sys.stderr.isatty():
+        print(text, file=sys.stderr)
+
+
+def _save(figure: Figure, data: dict[str, xr.Dataset], folder: Path) -> None:
     from nonsmooth.results.store import save
 
     for key, dataset in data.items():
         save(dataset, folder / f"{figure.name}_{key}.nc")
+
+
+def _draw(figure: Figure, data: dict[str, xr.Dataset], folder: Path) -> None:
+    from nonsmooth.plot import journal, save_figure
+
     canvas = figure.draw(data)
     save_figure(canvas, folder / f"{figure.name}.pdf")
     with journal():

@@ -1,0 +1,172 @@
+r"""Where a motion doubles its period, read off a record in which the parameter rises slowly.
+
+A rise is late: near the flip the amplitude A by which successive section points part, :math:`\pm A`, settles ever more
+slowly, and it is seen to vanish (or to appear) only some way beyond. How far depends on the rate and on the noise, so
+the place where it is lost is no property of the motion. What holds on the way is the amplitude equation of a flip,
+
+.. math::
+
+    \frac{\mathrm d A}{\mathrm d n} = \kappa A \Big[ y + q y^2 - \frac{A^2}{C} \Big], \qquad y = \pm (\rho_f - \rho_n)
+
+with y > 0 on the side of the doubled motion and n counting returns. Its steady amplitude is the square root law
+:math:`A^2 = C (y + q y^2)`; the flip is at :math:`\rho_f` whatever the rate. With :math:`w = A^{-2}` it is linear, and
+is solved step by step. The four numbers and the first amplitude are fitted to the record. Source of the equation: the
+normal form of the flip, Kuznetsov, *Elements of Applied Bifurcation Theory* (2004), Section 4.5, with its parameter
+drifting.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.identification.compare.periods import flips
+
+__all__ = ["Flip", "delayed_flips"]
+
+FloatArray = NDArray[np.float64]
+
+FEWEST = 12  # points with a splitting that can be seen
+STRAY = 12  # points of another period number in a row that end the doubled side
+ALIKE = 8 / 3  # second differences overlap: as many of them say as much as one
+
+
+@dataclass(frozen=True)
+class Flip:
+    """A flip found in a slow rise.
+
+    Attributes
+    ----------
+    value, error : float
+        The parameter at the flip and its standard error; NaN where the amplitude could not be followed.
+    read : float
+        Where the record itself changes its period number: later than the flip.
+    """
+
+    value: float
+    error: float
+    read: float
+
+
+def delayed_flips(
+    at: FloatArray, points: FloatArray, noise: FloatArray, numbers: NDArray[np.int64]
+) -> dict[str, Flip]:
+    """The flips along a slow and even rise (or fall) of a parameter, ``{"1-2": Flip, "2-4": ...}``.
+
+    Parameters
+    ----------
+    at : array (n,)
+        The parameter at each section point, in the order in which they came.
+    points : array (n, states)
+    noise : array (states,)
+        Standard error of a point.
+    numbers : array (n,)
+        The period number at each point, as
+        :func:`nonsmooth.identification.compare.periods.period_numbers` finds it.
+    """
+    return {word: _followed(at, points / noise, numbers, word, read) for word, read in flips(at, numbers).items()}
+
+
+def _followed(at: FloatArray, points: FloatArray, numbers: NDArray[np.int64], word: str, read: float) -> Flip:
+    p = int(word.split("-")[0])
+    nothing = Flip(np.nan, np.nan, read)
+    cut = int(np.argmin(np.abs(at - read)))
+    # Time runs from the doubled side to the other (closing), or the other way round.
+    doubled = numbers == 2 * p
+    closing = doubled[max(cut - 4 * STRAY, 0) : cut].mean() > 0.5 if cut else False
+    order = slice(None, None, 1 if closing else -1)  # now the doubled side comes first
+    where, cloud, known = at[order], points[order], numbers[order]
+    cut = cut if closing else len(at) - 1 - cut
+    begin, end = _reach(known, cut, 2 * p), len(known) - _reach(known[::-1], len(known) - 1 - cut, p)
+    best: tuple[float, FloatArray, FloatArray] | None = None
+    for k in range(p):
+        one = slice(begin + k, end, p)
+        rho, size = _splitting(where[one], cloud[one])
+        if len(size) >= FEWEST and (best is None or size.max() > best[0]):
+            best = (float(size.max()), rho, size)
+    if best is None:
+        return nothing
+    largest, rho, size = best
+    # The square root law and its next order hold near the flip: from half of the largest square on.
+    first = int(np.flatnonzero(size**2 > 0.5 * largest**2).max()) + 1
+    rho, size = rho[first:], size[first:]
+    seen = int(np.count_nonzero(size > 3.0))
+    if seen < FEWEST:
+        return nothing
+    stop = min(len(size), 2 * seen + FEWEST)
+    rho, size = rho[:stop], size[:stop]
+    found = _fitted(rho, size, 1.0 if closing else -1.0)
+    return nothing if found is None else Flip(*found, read)
+
+
+def _reach(numbers: NDArray[np.int64], cut: int, number: int) -> int:
+    """How far back from the cut the record keeps this number, strays apart."""
+    stray = 0
+    for i in range(cut, -1, -1):
+        stray = 0 if numbers[i] == number else stray + 1
+        if stray > STRAY and i < cut - 2 * STRAY:
+            return i + stray
+    return 0
+
+
+def _splitting(at: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The amplitude of the alternation, in standard errors of a point, along its main direction; no even drift in it."""
+    if len(points) < FEWEST:
+        return at[:0], at[:0]
+    parity = np.where(np.arange(len(points) - 2) % 2 == 0, 0.25, -0.25)[:, None]
+    parted = parity * (points[2:] - 2 * points[1:-1] + points[:-2])
+    along = np.linalg.svd(parted, full_matrices=False)[2][0]
+    size = parted @ along
+    return at[1:-1], size if size.sum() > 0 else -size
+
+
+def _fitted(rho: FloatArray, size: FloatArray, time: float) -> tuple[float, float] | None:
+    """Flip and its standard error; ``rho`` leads from the doubled side across, ``time`` is -1 where it runs back."""
+    from scipy.optimize import least_squares
+
+    span = rho[-1] - rho[0]
+    forward = slice(None, None, 1 if time > 0 else -1)
+
+    def model(z: FloatArray) -> FloatArray:
+        flip, rate, height, curve, first = z
+        y = (flip - rho) / span  # in 0 ... 1 along the record
+        growth = (2 * np.exp(rate) * (y + curve * y**2))[forward]
+        gain = 2 * np.exp(rate - 2 * height)
+        return _amplitude(growth, gain, first)[forward]
+
+    near = rho[int(np.count_nonzero(size > 0.2 * size[:FEWEST].max()) * 0.8)]
+    top = float(np.log(size[:4].mean())) if size[:4].mean() > 0 else 0.0
+    start_height = top - 0.5 * np.log(max((near - rho[0]) / span, 1e-2))
+    edge = -2 * np.log(max(size[forward][:4].mean(), 0.3))
+    best = None
+    for rate in (-1.0, 1.0):
+        tried = least_squares(
+            lambda z: model(z) - size, [near, rate, start_height, 0.0, edge], x_scale=[0.1 * abs(span), 1, 1, 1, 1],
+            loss="soft_l1", f_scale=2.0, max_nfev=200,
+        )  # fmt: skip
+        best = tried if best is None or tried.cost < best.cost else best
+    assert best is not None  # two were tried
+    flip = float(best.x[0])
+    low, high = sorted((float(rho[0]), float(rho[-1])))
+    if not (low < flip < high):
+        return None
+    freedom = max(len(size) - 5, 1)
+    variance = max(float(np.sum((model(best.x) - size) ** 2)) / freedom, 0.375)
+    try:
+        covariance = np.linalg.inv(best.jac.T @ best.jac) * variance * ALIKE
+    except np.linalg.LinAlgError:
+        return None
+    return flip, float(np.sqrt(covariance[0, 0]))
+
+
+def _amplitude(growth: FloatArray, gain: float, first: float) -> FloatArray:
+    """A along the record from w' = -growth w + gain, exact for constant growth within a step; w_0 = exp(first)."""
+    w, found = float(np.exp(min(first, 600.0))), np.empty(len(growth))
+    decay = np.exp(-np.clip(growth, -50.0, 50.0))
+    fed = gain * np.where(np.abs(growth) < 1e-9, 1.0, (1 - decay) / np.where(growth == 0, 1.0, growth))
+    for i in range(len(growth)):
+        found[i] = w
+        w = min(w * decay[i] + fed[i], 1e250)
+    return np.asarray(found**-0.5)

@@ -1,0 +1,121 @@
+"""The gap referred to the mean position: multiple shooting's gap in the sensor's count, the zero, and the shift."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.identification.adjustment import Adjusted
+from nonsmooth.identification.evidence import Evidence
+from nonsmooth.identification.finding import Estimate, Finding
+from nonsmooth.identification.free_decay import DecayFit
+from nonsmooth.identification.gap import mean_shift
+from nonsmooth.identification.multiple_shooting import ContactFit
+from nonsmooth.identification.steady import Steady
+
+__all__ = ["Referred", "refer"]
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Referred:
+    """The gap, and how it varies together with what else is identified.
+
+    Attributes
+    ----------
+    gap, at_rest, shift : Estimate
+        Counted from the mean position under the drive, from where the car rests, and the one less the other (m).
+    covariance : array (3, 3)
+        Of gap, at_rest and shift.
+    cross : array (3, p)
+        With the unknowns of the adjustment: the same records tell the gap and k_s/m, the same decays zero and omega_0.
+    crank_length, reading : float
+        The crank to which the gap is referred, and the screw's reading that it stands for (m).
+    """
+
+    gap: Estimate
+    at_rest: Estimate
+    shift: Estimate
+    covariance: FloatArray
+    cross: FloatArray
+    crank_length: float
+    reading: float
+
+    def finding(self, contacts: ContactFit, grazing: Finding | None) -> Finding:
+        """The gap as a finding, compared with that from the grazing frequency where there is one."""
+        notes = [
+            f"counted from the mean position under the drive at a crank of {1e3 * self.crank_length:.2f} mm, "
+            f"{1e6 * self.shift.value:+.0f} µm from where the car rests (string and uneven turning); as read at rest, "
+            "the model would stand at another gap by as much",
+            f"stands for a reading of {1e3 * self.reading:.4g} mm at the screw, whose zero is off by "
+            f"{1e6 * (self.at_rest.value - self.reading):+.0f} µm",
+        ]
+        others = {"gap_at_rest": self.at_rest, "mean_shift": self.shift}
+        if grazing is not None:
+            seen = grazing.others["at_rest"]
+            off = seen.value - self.at_rest.value
+            notes.append(
+                f"the grazing frequency says {1e6 * off:+.0f} µm more at rest, "
+                f"{abs(off) / np.hypot(seen.uncertainty, self.at_rest.uncertainty):.1f} uncertainties"
+            )
+        return Finding(
+            "g", self.gap, "multiple shooting over records with contact, referred to the mean position",
+            contacts.fit.samples, tuple(run.name for run in contacts.runs), tuple(notes), others, self.covariance,
+        )  # fmt: skip
+
+
+def refer(
+    evidence: Evidence, decay: DecayFit, contacts: ContactFit, adjusted: Adjusted, seen: Steady,
+    crank_length: float | None,
+) -> Referred:  # fmt: skip
+    """The gap at the most frequent screw reading, referred to the mean position at ``crank_length``.
+
+    Parameters
+    ----------
+    seen : Steady
+        Steady runs without contact: their mean positions tell the shift.
+    crank_length : float, optional
+        The longest of the runs with contact where not given.
+    """
+    readings = [float(run.settings["gap"]) for run in contacts.runs]
+    reading = max(set(readings), key=readings.count)
+    index = [contacts.place(i, 0) for i, value in enumerate(readings) if value == reading]
+    block = contacts.covariance[np.ix_(index, index)]
+    weight = np.linalg.solve(block, np.ones(len(index)))
+    weight /= weight.sum()
+    counted = float(weight @ contacts.values[index])
+    off = contacts.values[index] - counted
+    chi2 = float(off @ np.linalg.solve(block, off))
+    # the runs may differ by more than they say: then their scatter counts
+    error = float(np.sqrt(max(chi2 / max(len(index) - 1, 1), 1.0) * (weight @ block @ weight)))
+    zero, zero_error = float(decay.values[3]), decay.error("x_e")
+    length = evidence.apparatus.get("string_length")
+    shift = mean_shift(
+        seen, zero, zero_error, string_length=length.value if length else None,
+        string_error=length.uncertainty if length else 0.0,
+    )  # fmt: skip
+    longest = max(float(run.settings["crank_length"]) for run in contacts.runs)
+    crank = longest if crank_length is None else crank_length
+    moved, own, slope = shift.parts(crank)
+    # gap = counted - zero - moved, at rest = counted - zero; moved itself goes with the zero
+    rows = np.array([[1.0, -1.0 - slope, -1.0], [1.0, -1.0, 0.0], [0.0, slope, 1.0]])
+    covariance = rows @ np.diag([error**2, zero_error**2, own**2]) @ rows.T
+    gap, at_rest, by = (
+        Estimate(float(value), float(np.sqrt(covariance[i, i])), "m")
+        for i, value in enumerate((counted - zero - moved, counted - zero, moved))
+    )
+    with_counted = _cross(adjusted, ("kappa", "gamma"), contacts.covariance[3:5][:, index] @ weight)
+    with_zero = _cross(adjusted, ("omega_0", "b", "f"), decay.covariance[:3, 3])
+    cross = rows @ np.array([with_counted, with_zero, np.zeros(len(adjusted.names))])
+    return Referred(gap, at_rest, by, covariance, cross, crank, reading)
+
+
+def _cross(adjusted: Adjusted, labels: tuple[str, ...], shared: FloatArray) -> FloatArray:
+    """Covariance of the unknowns with something that varies with these observations."""
+    columns = [adjusted.labels.index(label) for label in labels if label in adjusted.labels]
+    if len(columns) != len(labels):
+        return np.zeros(len(adjusted.names))
+    return np.asarray(adjusted.influence[:, columns] @ shared)

@@ -1,0 +1,148 @@
+"""Branches of periodic orbits over a parameter: stable solid, unstable dashed, special points marked."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nonsmooth.plot import style
+from nonsmooth.plot.labels import first_states, label, variable_along
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+__all__ = ["MARKS", "branch", "draw_branch"]
+
+#: Marker and words of each kind of special point.
+MARKS = {
+    "fold": ("o", "fold"),
+    "flip": ("s", "flip"),
+    "neimark_sacker": ("D", "Neimark-Sacker"),
+    "pitchfork": ("^", "pitchfork"),
+    "branch_point": ("v", "branch point"),
+    "grazing": ("X", "grazing"),
+    "corner": ("P", "corner"),
+    "hopf": ("H", "Hopf"),
+    "boundary_equilibrium": ("p", "boundary equilibrium"),
+}
+_OTHER = "*"
+
+
+def branch(
+    result: xr.Dataset,
+    ax: Axes | None = None,
+    *,
+    y: str | None = None,
+    quantity: str = "section",
+    special: bool = True,
+    color: str | None = None,
+) -> Axes:
+    """Draw a branch over its parameter: stable parts solid, unstable ones dashed, virtual ones dotted.
+
+    Parameters
+    ----------
+    result
+        A ``continue_orbit`` or ``continue_equilibrium``.
+    ax
+        Where to draw; a new one-column figure if None.
+    y
+        The state of the ordinate; by default the first.
+    quantity : {"section", "maximum", "minimum"}
+        Section points (all of a period-n orbit), or extremes over the orbit.
+    special
+        Mark the special points, each kind with its own sign, named in the legend.
+    color
+        Colour of the lines.
+    """
+    variable_along(result, "stable", "continue_orbit")
+    with style.axes(ax) as drawn:
+        draw_branch(drawn, result, y=y, quantity=quantity, special=special, color=color)
+        parameter = _parameter(result)
+        (name,) = first_states(result, y)
+        drawn.set(xlabel=label(result, parameter), ylabel=_ordinate(result, name, quantity))
+        if special and result.sizes.get("special", 0):
+            drawn.legend(loc="best")
+    return drawn
+
+
+def draw_branch(
+    ax: Axes,
+    result: xr.Dataset,
+    *,
+    y: str | None = None,
+    quantity: str = "section",
+    special: bool = True,
+    color: str | None = None,
+) -> None:
+    """Draw the lines and marks of a branch on axes that are labelled by the caller."""
+    variable_along(result, "stable", "continue_orbit")
+    if quantity not in ("section", "maximum", "minimum"):
+        raise ValueError(f'quantity = {quantity!r}; allowed: "section", "maximum", "minimum"')
+    (name,) = first_states(result, y)
+    values = result[_parameter(result)].values
+    ordinates = _ordinates(result, name, quantity)
+    shade = color or style.COLORS["first"]
+    stable = result["stable"].values.astype(bool)
+    virtual = _virtual(result)
+    for wanted, line in (
+        (stable & ~virtual, "-"), (~stable & ~virtual, "--"), (virtual, ":"),
+    ):  # fmt: skip
+        chosen = _with_neighbours(wanted, virtual if line != ":" else np.zeros_like(virtual))
+        if not chosen.any():
+            continue
+        for row in ordinates:
+            ax.plot(values, np.where(chosen, row, np.nan), line, color=shade, linewidth=0.9, zorder=3)
+    if special:
+        _mark(ax, result, name, quantity)
+
+
+def _ordinates(result: xr.Dataset, name: str, quantity: str) -> NDArray[np.float64]:
+    """One line for each section point of the orbit, (lines, point)."""
+    source = "returns" if quantity == "section" and "returns" in result else quantity
+    chosen = result[source].sel(state=name)
+    others = [dim for dim in chosen.dims if dim != "point"]
+    return np.asarray(chosen.transpose(*others, "point").values, dtype=float).reshape(-1, result.sizes["point"])
+
+
+def _mark(ax: Axes, result: xr.Dataset, name: str, quantity: str) -> None:
+    if not result.sizes.get("special", 0):
+        return
+    values = result[f"special_{_parameter(result)}"].values
+    kinds = [str(kind) for kind in result["kind"].values]
+    held = f"special_{quantity}"
+    ordinates = result[held if held in result else "special_section"].sel(state=name).values
+    known = ax.get_legend_handles_labels()[1]
+    for kind in dict.fromkeys(kinds):
+        here = np.array([one == kind for one in kinds])
+        marker, words = MARKS.get(kind, (_OTHER, kind.replace("_", " ")))
+        ax.plot(
+            values[here], ordinates[here], marker, markersize=4, markerfacecolor="white", zorder=5, linestyle="none",
+            markeredgecolor=style.COLORS["section"], markeredgewidth=0.8,
+            label=None if words in known else words,
+        )  # fmt: skip
+
+
+def _parameter(result: xr.Dataset) -> str:
+    """The parameter of the branch: the coordinate over ``point`` with its own name."""
+    return str(result.attrs["parameter"])
+
+
+def _ordinate(result: xr.Dataset, name: str, quantity: str) -> str:
+    words = {"section": "", "maximum": "largest ", "minimum": "smallest "}[quantity]
+    return words + label(result, name)
+
+
+def _virtual(result: xr.Dataset) -> NDArray[np.bool_]:
+    if "virtual" not in result:
+        return np.zeros(result.sizes["point"], dtype=bool)
+    return np.asarray(result["virtual"].values, dtype=bool)
+
+
+def _with_neighbours(chosen: NDArray[np.bool_], barred: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """The chosen points and the next one, so that the line has no gap where the stability changes."""
+    grown = chosen.copy()
+    grown[1:] |= chosen[:-1] & ~barred[1:]
+    return grown

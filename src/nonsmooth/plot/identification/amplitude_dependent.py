@@ -1,0 +1,109 @@
+"""A mode over its amplitude: natural frequency (the backbone), damping ratio, and the forced responses behind them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.plot import style
+from nonsmooth.plot.comparison import MEASURED, measured_label
+from nonsmooth.plot.identification.findings import data_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["backbone", "forced_responses", "modal_damping"]
+
+
+def backbone(finding: Any, ax: Axes | None = None) -> Axes:
+    """Draw the natural frequency over the amplitude with its 95 % band, and each curve's own beside it.
+
+    Parameters
+    ----------
+    finding
+        What ``amplitude_dependent`` found, or its data.
+    ax
+        Where to draw; a new one-column figure if None.
+    """
+    return _over_amplitude(finding, ax, "f_n", 1.0, "natural frequency (Hz)")
+
+
+def modal_damping(finding: Any, ax: Axes | None = None) -> Axes:
+    """Draw the damping ratio over the amplitude, as :func:`backbone` does the frequency."""
+    return _over_amplitude(finding, ax, "zeta", 100.0, "damping ratio (%)")
+
+
+def _over_amplitude(finding: Any, ax: Axes | None, name: str, scale: float, label: str) -> Axes:
+    data = data_of(finding, name, f"{name}_error", "amplitude", f"curve_{name}")
+    factor, unit = _length(data["amplitude"].values)
+    a, y, error = factor * data["amplitude"].values, scale * data[name].values, scale * data[f"{name}_error"].values
+    with style.axes(ax) as drawn:
+        drawn.fill_between(
+            a, y - 1.96 * error, y + 1.96 * error, color=style.COLORS["first"], alpha=0.2, linewidth=0, label="95 %"
+        )
+        drawn.plot(a, y, color=style.COLORS["first"], label="mode")
+        drawn.plot(
+            factor * data["curve_amplitude"].values, scale * data[f"curve_{name}"].values, "o", color=MEASURED,
+            markersize=2.6, markerfacecolor="white", markeredgewidth=0.7, label="each curve by itself", zorder=4,
+        )  # fmt: skip
+        drawn.margins(x=0.02)
+        drawn.legend(loc="best")
+        drawn.set(xlabel=f"amplitude ({unit})", ylabel=label)
+    return drawn
+
+
+def forced_responses(finding: Any, ax: Axes | None = None, *, responses: Sequence[Any] = ()) -> Axes:
+    """Draw the measured points over frequency, the backbone, and computed responses along their curves.
+
+    Parameters
+    ----------
+    finding
+        What ``amplitude_dependent`` found, or its data.
+    ax
+        Where to draw; a new one-column figure if None.
+    responses : sequence of Dataset
+        Curves for constant forces, from ``NonlinearMode.response``; their unstable parts are dashed.
+    """
+    data = data_of(finding, "frequency", "response", "unstable", "f_n", "amplitude")
+    factor, unit = _length(data["amplitude"].values)
+    with style.axes(ax) as drawn:
+        unstable = data["unstable"].values.astype(bool)
+        for chosen, face, word in ((~unstable, MEASURED, measured_label(data)), (unstable, "white", "unstable part")):
+            if chosen.any():
+                drawn.plot(
+                    data["frequency"].values[chosen], factor * data["response"].values[chosen], "o", color=MEASURED,
+                    markersize=1.5, markerfacecolor=face, markeredgewidth=0.4, zorder=3, label=word,
+                )  # fmt: skip
+        for k, curve in enumerate(responses):
+            f, a, stable = curve["frequency"].values, factor * curve["amplitude"].values, curve["stable"].values
+            drawn.plot(
+                f, np.where(stable, a, np.nan), color=style.COLORS["second"], zorder=4,
+                label="mode, constant force" if k == 0 else None,
+            )  # fmt: skip
+            if not stable.all():
+                middle = ~stable
+                wide = middle | np.roll(middle, 1) | np.roll(middle, -1)
+                drawn.plot(f, np.where(wide, a, np.nan), "--", color=style.COLORS["second"], zorder=4)
+            top = int(np.argmax(a)) if len(a) else 0
+            if len(a):
+                drawn.annotate(
+                    f"{curve.attrs['force']:.3g} N", (f[top], a[top]), xytext=(-4, 2), textcoords="offset points",
+                    ha="right", va="bottom", fontsize="x-small", color=style.COLORS["second"], zorder=5,
+                )  # fmt: skip
+        drawn.plot(
+            data["f_n"].values, factor * data["amplitude"].values, color=style.COLORS["first"], linewidth=1.1, zorder=5,
+            label="backbone",
+        )  # fmt: skip
+        drawn.set_ylim(bottom=0, top=1.32 * factor * float(data["response"].max()))
+        drawn.margins(x=0.02)
+        drawn.legend(loc="upper left", ncols=2, columnspacing=1.0, handlelength=1.6, markerscale=2)
+        drawn.set(xlabel="frequency (Hz)", ylabel=f"amplitude ({unit})")
+    return drawn
+
+
+def _length(values: Any) -> tuple[float, str]:
+    """A factor and a unit in which lengths of this size are read easily."""
+    largest = float(np.nanmax(np.abs(values)))
+    return (1e6, "µm") if largest < 1e-3 else (1e3, "mm") if largest < 1 else (1.0, "m")

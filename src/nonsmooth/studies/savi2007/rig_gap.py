@@ -1,0 +1,120 @@
+"""The experimental side of Figs. 13, 14 and 16: the gap is varied on the virtual rig; the strange attractor."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nonsmooth import plot
+from nonsmooth.plot.comparison import MEASURED, THEORY
+from nonsmooth.plot.comparison_diagram import comparison_diagram
+from nonsmooth.studies.savi2007.figure import Figure, sheet
+from nonsmooth.studies.savi2007.flows import Settings
+from nonsmooth.studies.savi2007.gap import PHASES
+from nonsmooth.studies.savi2007.printed import FIGURE_14
+from nonsmooth.studies.savi2007.rig_motions import Motions, compared, diagram_of, draw_pairs, motions, said
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure as Canvas
+
+    from nonsmooth.studies.savi2007.laboratory import Laboratory
+
+__all__ = ["FIGURES"]
+
+_ANGLES = ("0", r"\pi/2", r"\pi", r"3\pi/2")
+
+
+def _records(bench: Laboratory) -> Motions:
+    """The steady records at four gaps, measured once for Figs. 13 and 14."""
+    return bench.once("fig14", lambda: motions(bench, 14, tuple(FIGURE_14), periods=80 if bench.quick else 200))
+
+
+def _compute_13(settings: Settings) -> dict[str, xr.Dataset]:
+    measured, set_ = diagram_of(_records(settings.bench), "g")
+    fine = 71 if settings.quick else 351
+    result = settings.bench.compare(
+        measured, set_, parameter="g", direction="both", values=np.linspace(-0.0015, 0.002, fine)
+    )
+    return {"compared": result}
+
+
+def _draw_13(data: Mapping[str, xr.Dataset]) -> Canvas:
+    with plot.journal():
+        canvas = sheet(0.72 * plot.PAGE, 0.5 * plot.PAGE)
+        ax = canvas.subplots()
+        comparison_diagram(data["compared"], ax, y="v", size=2.4)
+        ax.legend(loc="lower left", markerscale=3)
+    return canvas
+
+
+def _caption_13(data: Mapping[str, xr.Dataset]) -> str:
+    gaps = ", ".join(f"{1e3 * g:.2f}" for g in np.unique(data["compared"]["measured_g"].values))
+    return (
+        "Velocity at the section over the gap: the virtual rig (synthetic) at four settings of the support, over the "
+        "model's diagram with the parameters identified, swept up and down. Gaps referred to the car's mean position "
+        f"under the drive: {gaps} mm."
+    )
+
+
+def _compute_14(settings: Settings) -> dict[str, xr.Dataset]:
+    return compared(settings.bench, _records(settings.bench))
+
+
+def _caption_14(data: Mapping[str, xr.Dataset]) -> str:
+    return (
+        "State space at the gaps of the paper's caption, the model with the parameters identified (above) and the "
+        "virtual rig (synthetic, below); rings are the model's section points, the contact zone is shaded. "
+        f"Rig: {said(data, FIGURE_14)}."
+    )
+
+
+def _compute_16(settings: Settings) -> dict[str, xr.Dataset]:
+    bench = settings.bench
+    found = motions(bench, 16, (0.0018,), periods=300 if settings.quick else 1500)
+    measured, set_ = found["0.0018"]
+    return {"attractor": bench.compare(measured, set_, section_phase=list(PHASES.values()))}
+
+
+def _draw_16(data: Mapping[str, xr.Dataset]) -> Canvas:
+    result = data["attractor"]
+    with plot.journal():
+        canvas = sheet(plot.PAGE, 0.56 * plot.PAGE)
+        grid = canvas.subplots(2, 4, sharex="col", sharey="col")
+        for row, side, color, word in (
+            (grid[0], "measured", MEASURED, "virtual rig (synthetic)"), (grid[1], "theory", THEORY, "model, identified")
+        ):  # fmt: skip
+            for i, ax in enumerate(row):
+                points = result[f"{side}_section"].isel(section_phase=i).values
+                looks = {"color": color, "markersize": 1.4, "markeredgewidth": 0, "rasterized": True}
+                ax.plot(points[:, 0], points[:, 1], ".", **looks)
+                ax.ticklabel_format(axis="y", style="plain")
+                ax.set_xlabel("$x$ (m)" if side == "theory" else "")
+                ax.set_ylabel(f"{word}\n" + r"$\dot x$ (m/s)" if i == 0 else "")
+                if side == "measured":
+                    ax.set_title(f"({'abcd'[i]}) phase ${_ANGLES[i]}$", y=1.0, pad=9)
+    return canvas
+
+
+def _caption_16(data: Mapping[str, xr.Dataset]) -> str:
+    result = data["attractor"]
+    far, halves = result["energy_distance_matched"].values, result["measured_halves_p95"].values
+    words = ", ".join(f"{a:.3f} ({a / b:.2f})" for a, b in zip(far, halves, strict=True))
+    return (
+        "Strange attractor at g = 0.0018 m, omega = 11.15 rad/s, rho = 0.33 N: sections at four phases of the forcing "
+        f"from one record of the virtual rig (synthetic, {result.sizes['measured_iterate']} turns) and by the model "
+        "with the parameters identified. Energy distances of the two clouds at the four phases, and over the 95th "
+        f"percentile of those of the record's own halves: {words}."
+    )
+
+
+FIGURES = (
+    Figure("fig13_rig", 13, "Bifurcation diagram over the gap, with the virtual rig's sections", _compute_13, _draw_13,
+           _caption_13, rig=True),
+    Figure("fig14_rig", 14, "State space over the gap, on the virtual rig", _compute_14,
+           draw_pairs("m", "g", FIGURE_14), _caption_14, rig=True),
+    Figure("fig16", 16, "Strange attractor at four section phases, on the virtual rig", _compute_16, _draw_16,
+           _caption_16, rig=True),
+)  # fmt: skip

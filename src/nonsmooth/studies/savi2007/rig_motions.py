@@ -1,0 +1,154 @@
+"""Steady motions of the virtual rig beside the model's: one record per setting, portraits in pairs, diagrams."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from nonsmooth import plot
+from nonsmooth.plot.comparison import MEASURED, THEORY
+from nonsmooth.studies.savi2007.figure import sheet
+from nonsmooth.studies.savi2007.laboratory import with_support
+from nonsmooth.studies.savi2007.measure import APERIODIC
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure as Canvas
+
+    from nonsmooth.studies.savi2007.laboratory import Laboratory
+
+__all__ = [
+    "Motions", "chosen", "compared", "diagram_of", "draw_pairs", "measured_periods_at", "motions", "runs_at", "said",
+]  # fmt: skip
+
+#: Measured motions and the settings that belong to them, by key.
+Motions: TypeAlias = "dict[str, tuple[xr.Dataset, dict[str, Any]]]"
+
+
+def motions(bench: Laboratory, number: int, values: Sequence[float], **options: Any) -> Motions:
+    """Record what stands behind a figure and measure each run: the motion and its settings by ``<value>``.
+
+    The runs follow the values, in turn; where they are gone through again, from other starts, the keys are
+    ``<value>_2``, ``<value>_3``, ...
+    """
+    session = bench.record(f"fig{number:02d}", bench.rig.figure(number, **options))
+    found = {}
+    for i, run in enumerate(with_support(session, "section")):
+        again, place = divmod(i, len(values))
+        key = f"{values[place]:g}" + (f"_{again + 1}" if again else "")
+        found[key] = bench.measured(session, "section", run)
+    return found
+
+
+def compared(bench: Laboratory, found: Motions, **options: Any) -> dict[str, xr.Dataset]:
+    """Each motion over the model's."""
+    return {key: bench.compare(motion, settings, **options) for key, (motion, settings) in found.items()}
+
+
+def diagram_of(found: Motions, parameter: str) -> tuple[xr.Dataset, dict[str, Any]]:
+    """The section points of motions at several values of a parameter, as ``compare`` takes a diagram; settings."""
+    import xarray as xr
+
+    from nonsmooth.identification.compare.fold import fold
+
+    points = [fold(motion["phase"].values, motion["u"].values, 8)[:, 0] for motion, _ in found.values()]
+    n = min(len(rows) for rows in points)
+    at = [settings[parameter] for _, settings in found.values()]
+    first, settings = next(iter(found.values()))
+    errors = np.median(np.concatenate([motion["u_error"].values for motion, _ in found.values()]), axis=0)
+    unit = {"g": "m", "omega": "rad/s", "rho": "N"}[parameter]
+    measured = xr.Dataset(
+        {
+            "section": ((parameter, "iterate", "state"), np.stack([rows[-n:] for rows in points])),
+            "section_error": ("state", errors),
+        },
+        {
+            parameter: (parameter, [float(np.atleast_1d(value)[0]) for value in at], {"units": unit}),
+            "state": first["state"].values, "state_unit": ("state", first["state_unit"].values),
+        },
+        {key: first.attrs[key] for key in ("synthetic", "file") if key in first.attrs}
+        | {"title": f"{len(found)} steady runs"},
+    )  # fmt: skip
+    return measured, {key: value for key, value in settings.items() if key != parameter}
+
+
+def runs_at(data: Mapping[str, xr.Dataset], value: float) -> list[xr.Dataset]:
+    """The comparisons of all runs at one value, in the order in which they were recorded."""
+    key = f"{value:g}"
+    return [result for name, result in data.items() if name == key or name.startswith(f"{key}_")]
+
+
+def measured_periods_at(data: Mapping[str, xr.Dataset], value: float) -> dict[int, int]:
+    """How many runs at a value have which measured period number (0: none found)."""
+    numbers = [int(result["measured_period_number"]) for result in runs_at(data, value)]
+    return {number: numbers.count(number) for number in sorted(set(numbers))}
+
+
+def chosen(data: Mapping[str, xr.Dataset], value: float, wanted: int) -> xr.Dataset:
+    """The first run with the wanted period number; the first of all where none has it."""
+    runs = runs_at(data, value)
+    return next((run for run in runs if int(run["measured_period_number"]) == wanted), runs[0])
+
+
+def said(data: Mapping[str, xr.Dataset], shown: Mapping[float, int]) -> str:
+    """What the rig did at each value, and what the model has there."""
+    words = []
+    for value in shown:
+        rig = " and ".join(_name(n) for n in measured_periods_at(data, value))
+        model = sorted({int(n) for run in runs_at(data, value) for n in run["coexisting_period_number"].values})
+        words.append(f"{value:g}: {rig} (model: {', '.join(_name(n) for n in model)})")
+    return "; ".join(words)
+
+
+def _name(period: int) -> str:
+    return "no period" if period == APERIODIC else f"period {period}"
+
+
+def draw_pairs(
+    unit: str, symbol: str, shown: Mapping[float, int]
+) -> Callable[[Mapping[str, xr.Dataset]], Canvas]:
+    """The sheet: columns are values; the model above, the rig below, in the same axes."""
+
+    def draw(data: Mapping[str, xr.Dataset]) -> Canvas:
+        with plot.journal():
+            canvas = sheet(plot.PAGE, 0.62 * plot.PAGE * 2 / max(len(shown) - 1, 2) + 0.3)
+            grid = canvas.subplots(2, len(shown), sharex="col", sharey="col", squeeze=False)
+            for i, (value, wanted) in enumerate(shown.items()):
+                result = chosen(data, value, wanted)
+                for ax, side in zip(grid[:, i], ("theory", "measured"), strict=True):
+                    _portrait(ax, result, side)
+                    ax.set(xlabel="$x$ (m)" if side == "measured" else "")
+                    ax.ticklabel_format(axis="y", style="plain")
+                grid[0, i].set_title(f"({'abcd'[i]}) ${symbol} = {value:g}$ {unit}", y=1.0, pad=9)
+            for ax, word in zip(grid[:, 0], ("model, identified", "virtual rig (synthetic)"), strict=True):
+                ax.set_ylabel(f"{word}\n" + r"$\dot x$ (m/s)")
+        return canvas
+
+    return draw
+
+
+def _portrait(ax: Axes, result: xr.Dataset, side: str) -> None:
+    """One side's orbit and section points; of motions with a period the model's points as rings on both sides."""
+    color = THEORY if side == "theory" else MEASURED
+    closed = "phase" in result.coords
+    orbit = result[f"{side}_orbit"].values
+    orbit = np.vstack([orbit, orbit[:1]]) if closed else orbit
+    ax.plot(orbit[:, 0], orbit[:, 1], color=color, linewidth=0.7 if closed else 0.35)
+    points = result[f"{side}_section"].values.reshape(-1, 2)
+    size = 2.4 if closed else 1.6
+    ax.plot(points[:, 0], points[:, 1], "o", color=color, markersize=size, markeredgewidth=0, rasterized=True, zorder=4)
+    n = int(result["theory_period_number"])
+    if n:
+        rings = result["theory_section"].values.reshape(-1, 2)[:n]
+        ax.plot(
+            rings[:, 0], rings[:, 1], "o", color=THEORY, markersize=6, markerfacecolor="none", markeredgewidth=0.8,
+            zorder=5,
+        )  # fmt: skip
+    edge, (left, right) = float(result["g"]), ax.get_xlim()
+    ax.axvline(edge, color=plot.COLORS["muted"], linewidth=0.6, linestyle="--", zorder=1)
+    if edge < right:
+        ax.axvspan(max(edge, left), right, color=plot.COLORS["zone"], alpha=0.18, linewidth=0, zorder=0)
+    ax.set_xlim(left, right)
