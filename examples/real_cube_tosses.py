@@ -30,13 +30,21 @@ COLUMNS = {"run": "toss", "time": "t_s"} | {
 }
 
 
+def measured() -> Path:
+    """The file, or a sentence that says what is lacking."""
+    file = Path(os.environ.get("NONSMOOTH_DATA", "")) / NEEDS
+    if not file.is_file():
+        raise SystemExit(f"this example reads {NEEDS}; set NONSMOOTH_DATA to a folder that holds it (source: above)")
+    return file
+
+
 def main() -> Figure:
     """Find the flights of each toss, and the restitution of the corner that hits between two of them."""
     import matplotlib.pyplot as plt
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ns.experiment.RecordingWarning)  # units that are no SI units
-        recording = ns.load_recording(Path(os.environ["NONSMOOTH_DATA"]) / NEEDS, columns=COLUMNS)
+        recording = ns.load_recording(measured(), columns=COLUMNS)
     found, falls, longer, lows = [], [], 0, []
     for run in recording.runs:
         z = recording.channel("z", run)
@@ -54,8 +62,8 @@ def main() -> Figure:
     print(
         f"{longer + impacts.sizes['impact']} contacts between two flights: {longer} longer than 4 samples, "
         f"{impacts.sizes['impact'] - len(e)} of several corners or sliding, {len(e)} impacts of one corner\n"
-        f"restitution: median {np.median(e):.3f}, middle half {np.quantile(e, 0.25):.3f} to {np.quantile(e, 0.75):.3f}, "
-        f"from {e.min():.3f} to {e.max():.3f}, standard deviation {e.std(ddof=1):.3f}\n"
+        f"restitution: median {np.median(e):.3f}, from {e.min():.3f} to {e.max():.3f}, standard deviation "
+        f"{e.std(ddof=1):.3f}\n"
         f"of each: fits {np.median(single.restitution_error):.3f}, half a sample {np.median(single.half_sample):.3f}\n"
         f"gravity {-np.median(falls):.1f} half-widths/s^2: 9.81 m/s^2 makes the half-width "
         f"{-9.81e3 / np.median(falls):.1f} mm"

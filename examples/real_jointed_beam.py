@@ -9,6 +9,7 @@ if there were one (M. Cenedese's measurements, distributed with T. Breunung and 
 from __future__ import annotations
 
 import os
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,17 +25,31 @@ if TYPE_CHECKING:
 NEEDS = "FrID_jointed_beam_ForcedFrequencyResponses.mat"
 
 
+def measured() -> Path:
+    """The file, or a sentence that says what is lacking."""
+    file = Path(os.environ.get("NONSMOOTH_DATA", "")) / NEEDS
+    if not file.is_file():
+        raise SystemExit(f"this example reads {NEEDS}; set NONSMOOTH_DATA to a folder that holds it (source: above)")
+    return file
+
+
 def main() -> Figure:
     """Fit one mode to all points, along the curves, and look for points where more amplitude needs less force."""
     import matplotlib.pyplot as plt
 
-    recording = ns.load_recording(Path(os.environ["NONSMOOTH_DATA"]) / NEEDS, axis="frequency")
+    recording = ns.load_recording(measured(), axis="frequency")
     curves = response_curves(recording)
     finding, mode = amplitude_dependent(curves, knots=6, residual=True)
     print(finding)
+    # Everywhere between the points too: at no frequency and amplitude does more amplitude need less force.
+    a, f = np.meshgrid(np.linspace(mode.knots[0], mode.knots[-1], 301), np.linspace(79.0, 81.2, 221))
+    slope = mode.slope(a, 2 * np.pi * f)
+    print(f"least d ln F / d ln a of the mode: {slope.min():.2f} at {1e6 * a.flat[slope.argmin()]:.0f} micrometres")
 
     with ns.plot.journal():
-        figure, (left, middle, right) = plt.subplots(1, 3, figsize=(ns.plot.PAGE, 0.34 * ns.plot.PAGE))
+        figure, (left, middle, right) = plt.subplots(
+            1, 3, figsize=(ns.plot.PAGE, 0.36 * ns.plot.PAGE), width_ratios=(1.5, 1, 1)
+        )
         forces = [float(np.median(c.force)) for c in curves if "ForceControl" in c.name and c.force is not None]
         forced_responses(finding, left, responses=[mode.response(force) for force in forces])
         backbone(finding, middle)
@@ -42,7 +57,7 @@ def main() -> Figure:
 
     # Without any model: of two levels of amplitude at one frequency the higher one needs the greater force.
     levels = [c for c in curves if "ResponseControl" in c.name]
-    for low, high in zip(levels, levels[1:], strict=False):
+    for low, high in pairwise(levels):
         f, i, j = np.intersect1d(np.round(low.frequency, 4), np.round(high.frequency, 4), return_indices=True)
         assert low.force is not None and high.force is not None
         assert len(f) > 30 and np.all(high.force[j] > low.force[i])

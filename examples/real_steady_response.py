@@ -23,13 +23,21 @@ if TYPE_CHECKING:
 NEEDS = "lvm_sample_1200lines.lvm"
 
 
+def measured() -> Path:
+    """The file, or a sentence that says what is lacking."""
+    file = Path(os.environ.get("NONSMOOTH_DATA", "")) / NEEDS
+    if not file.is_file():
+        raise SystemExit(f"this example reads {NEEDS}; set NONSMOOTH_DATA to a folder that holds it (source: above)")
+    return file
+
+
 def main() -> Figure:
     """Read the strain, find its frequency by three methods, and ask whether it decays."""
     import matplotlib.pyplot as plt
 
     with warnings.catch_warnings():  # the file's oddities: its header counts 1000 samples, 1176 follow, ...
         warnings.simplefilter("ignore", ns.experiment.RecordingWarning)
-        recording = ns.load_recording(Path(os.environ["NONSMOOTH_DATA"]) / NEEDS)
+        recording = ns.load_recording(measured())
     strain = take(recording, "Strain_0", "Segment 1", units=("Strain",))
     found = steady_response(strain.time, strain)
     print(found)

@@ -101,7 +101,7 @@ class ResponseFit:
         if self.shifts:
             J[np.arange(len(a)), first + self.curve] = to_square
             J[np.arange(len(a)), first + n + self.curve] = to_damping
-        full: FloatArray = np.concatenate([J.real, J.imag]) if self.phased else np.asarray(J.real)
+        full: FloatArray = np.concatenate([J.real, J.imag] if self.phased else [J.real])
         for k in range(first - 2, first) if self.residual else ():
             step = np.zeros(count)
             step[k] = 1e-6
@@ -118,13 +118,13 @@ class ResponseFit:
         p = self._start(count)
         sigma, spread = 0.05, np.array([1e-3, 0.1])
         for k in range(_ROUNDS):
-            prior = np.zeros((count - first, count))
-            prior[:, first:] = np.diag(np.repeat(1 / spread, n)) if self.shifts else 0.0
-            p = self._settle(p, sigma, prior)
-            J = np.concatenate([self._jacobian(p) / sigma, prior])
-            inverse = np.linalg.pinv(J.T @ J, hermitian=True)
+            prior = np.zeros(count)
+            prior[first:] = np.repeat(1 / spread**2, n) if self.shifts else 0.0
+            p, normal = self._settle(p, sigma, prior)
+            inverse = np.linalg.pinv(normal, hermitian=True)
             left = self._left(p)
-            freedom = max(rows - float(np.sum((J[:rows] @ inverse) * J[:rows])), 1.0)
+            # Unknowns that the measurement determined: all but what the prior of the shifts did.
+            freedom = max(rows - (count - float(prior @ np.diag(inverse))), 1.0)
             before = (sigma, *spread)
             # Points of a curve that err alike count less.
             sigma = max(float(np.sqrt(left @ left / freedom * self._alike(left))), 1e-9)
@@ -140,16 +140,35 @@ class ResponseFit:
         own = self.measured - self.mode.residual * self.force if self.force is not None else self.measured
         self.amplitude = np.abs(own)
 
-    def _settle(self, p: FloatArray, sigma: float, prior: FloatArray) -> FloatArray:
-        """Least squares of what is left over sigma, and of the shifts over theirs, from ``p``."""
-        from scipy.optimize import least_squares
+    def _settle(self, p: FloatArray, sigma: float, prior: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Levenberg-Marquardt from ``p``; the outcome and its normal matrix. ``prior``: 1 / variance of unknowns."""
 
-        done = least_squares(
-            lambda q: np.concatenate([self._left(q) / sigma, prior @ q]), p,
-            jac=lambda q: np.concatenate([self._jacobian(q) / sigma, prior]),
-            x_scale="jac", xtol=1e-10, ftol=1e-10, gtol=1e-10,
-        )  # fmt: skip
-        return np.asarray(done.x)
+        def cost(q: FloatArray) -> float:
+            left = self._left(q) / sigma
+            return float(left @ left + prior @ q**2)
+
+        damping, now = 1e-4, cost(p)
+        for _ in range(200):
+            J = self._jacobian(p) / sigma
+            # Without BLAS: its threads take longer to meet than so small a product takes.
+            normal = np.einsum("ki,kj->ij", J, J) + np.diag(prior)
+            slope = J.T @ (self._left(p) / sigma) + prior * p
+            scale = np.sqrt(np.maximum(np.diag(normal), 1e-30))
+            change = np.zeros_like(p)
+            while damping < 1e12:
+                step = normal / np.outer(scale, scale) + damping * np.eye(len(p))
+                change = -np.linalg.solve(step, slope / scale) / scale
+                then = cost(p + change)
+                if then <= now:
+                    break
+                damping *= 10.0
+            else:
+                return p, normal
+            fall, p, now = now - then, p + change, then
+            damping = max(0.1 * damping, 1e-12)
+            if fall <= 1e-10 * now or float(np.max(np.abs(change * scale))) < 1e-9:
+                break
+        return p, normal
 
     def _start(self, count: int) -> FloatArray:
         """Natural frequencies by the tops of the curves; damping by the width of the lowest, the least bent of them."""
@@ -220,7 +239,7 @@ class ResponseFit:
         if self.residual:
             R = self.mode.residual
             for name, k, value in (("real", first - 2, R.real), ("imag", first - 1, R.imag)):
-                found[f"residual, {name}"] = Estimate(value, float(error[k]) * self._unit, "m/N")
+                found[f"residual, {name}"] = Estimate(1e6 * value, 1e6 * float(error[k]) * self._unit, "µm/N")
         if self.shifts:
             n = np.sqrt(2.0 * len(self.names))
             f = 0.5 * float(np.sqrt(np.mean(self.mode.squares)) / (2 * np.pi)) * float(self.spread[0])

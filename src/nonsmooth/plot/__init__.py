@@ -1,10 +1,21 @@
 """Figures of results, one file per kind: ``(result, ax=None, ...) -> ax``.
 
-Matplotlib is loaded when the first figure is drawn.
+Those of identified parameters stand in ``plot.identification``. Matplotlib is loaded when the first figure is drawn.
 """
 
+from nonsmooth.plot import identification
 from nonsmooth.plot.bifurcation import bifurcation
+from nonsmooth.plot.branch import branch
+from nonsmooth.plot.comparison_diagram import comparison_diagram
+from nonsmooth.plot.comparison_motion import (
+    comparison_distances,
+    comparison_phase_portrait,
+    comparison_section,
+    comparison_time,
+)
+from nonsmooth.plot.comparison_response import comparison_response
 from nonsmooth.plot.frequency_response import frequency_response
+from nonsmooth.plot.multipliers import multipliers
 from nonsmooth.plot.phase_portrait import phase_portrait
 from nonsmooth.plot.regions import regions
 from nonsmooth.plot.section import section
@@ -16,8 +27,17 @@ __all__ = [
     "COLUMN",
     "PAGE",
     "bifurcation",
+    "branch",
+    "comparison_diagram",
+    "comparison_distances",
+    "comparison_phase_portrait",
+    "comparison_response",
+    "comparison_section",
+    "comparison_time",
     "frequency_response",
+    "identification",
     "journal",
+    "multipliers",
     "phase_portrait",
     "regions",
     "save_figure",

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth.plot import style
+from nonsmooth.plot.branch import draw_branch
 from nonsmooth.plot.labels import column, first_states, label, variable_along
 
 if TYPE_CHECKING:
@@ -15,18 +16,27 @@ if TYPE_CHECKING:
 
 __all__ = ["bifurcation"]
 
+_LINES = ("second", "third", "fourth")
 _COLORS = {"up": "first", "down": "second", "none": "section"}
 
 
 def bifurcation(
-    result: xr.Dataset, ax: Axes | None = None, *, y: str | None = None, size: float = 0.8, color: str | None = None
+    result: xr.Dataset,
+    *over: xr.Dataset | Axes | None,
+    ax: Axes | None = None,
+    y: str | None = None,
+    size: float = 0.8,
+    color: str | None = None,
 ) -> Axes:
-    """Draw the section points of a ``sweep`` over its parameter, up and down in two colours.
+    """Draw the section points of a ``sweep`` over its parameter, up and down in two colours, and branches over them.
 
     Parameters
     ----------
     result
         A ``sweep`` (or ``frequency_response``); of one swept both ways, the falling one is drawn on top.
+    *over
+        Branches of ``continue_orbit`` over the same parameter: stable solid, unstable dashed, special points marked.
+        Axes to draw on may stand here too, as in the other plots.
     ax
         Where to draw; a new one-column figure if None.
     y
@@ -43,6 +53,7 @@ def bifurcation(
     variable_along(result, "section", "sweep")
     (name,) = first_states(result, y)
     parameter = str(result["maximum"].dims[0])
+    ax, branches = _sorted_out(over, ax, parameter)
     points = column(result, "section", name)
     directions = [str(word) for word in np.atleast_1d(result["direction"].values)]
     with style.axes(ax) as drawn:
@@ -56,8 +67,30 @@ def bifurcation(
             )  # fmt: skip
         if len(directions) > 1:
             drawn.legend(markerscale=6 / max(size, 0.1), loc="best")
+        for k, one in enumerate(branches):
+            draw_branch(drawn, one, y=name, color=style.COLORS[_LINES[k % len(_LINES)]])
+        if branches and (drawn.get_legend_handles_labels()[1] or len(directions) > 1):
+            drawn.legend(loc="best", markerscale=1.0)
         # The whole sweep shows, its ends too where every point diverged.
         drawn.dataLim.update_from_data_x(result[parameter].values, ignore=False)
         drawn.margins(x=0)
         drawn.set(xlabel=label(result, parameter), ylabel=label(result, name))
     return drawn
+
+
+def _sorted_out(
+    over: tuple[xr.Dataset | Axes | None, ...], ax: Axes | None, parameter: str
+) -> tuple[Axes | None, list[xr.Dataset]]:
+    """Axes given in place of a branch, and the branches, which must be over the same parameter."""
+    branches: list[xr.Dataset] = []
+    for one in over:
+        if one is None:
+            continue
+        if not hasattr(one, "data_vars"):
+            ax = one
+            continue
+        of = one.attrs.get("parameter")
+        if of != parameter:
+            raise ValueError(f"the diagram is over {parameter!r}, this branch over {of!r}: they share no axis")
+        branches.append(one)
+    return ax, branches

@@ -110,10 +110,9 @@ def _ordinates(result: xr.Dataset, name: str, quantity: str) -> NDArray[np.float
 def _mark(ax: Axes, result: xr.Dataset, name: str, quantity: str) -> None:
     if not result.sizes.get("special", 0):
         return
-    values = result[f"special_{_parameter(result)}"].values
-    kinds = [str(kind) for kind in result["kind"].values]
-    held = f"special_{quantity}"
-    ordinates = result[held if held in result else "special_section"].sel(state=name).values
+    values = result["special_value"].values
+    kinds = [str(kind) for kind in result["special_kind"].values]
+    ordinates = result[quantity].sel(state=name).values[result["special_point"].values]
     known = ax.get_legend_handles_labels()[1]
     for kind in dict.fromkeys(kinds):
         here = np.array([one == kind for one in kinds])

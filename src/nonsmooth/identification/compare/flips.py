@@ -128,45 +128,59 @@ def _fitted(rho: FloatArray, size: FloatArray, time: float) -> tuple[float, floa
 
     span = rho[-1] - rho[0]
     forward = slice(None, None, 1 if time > 0 else -1)
+    place = (rho - rho[0]) / span  # 0 ... 1 from the doubled side across
 
     def model(z: FloatArray) -> FloatArray:
-        flip, rate, height, curve, first = z
-        y = (flip - rho) / span  # in 0 ... 1 along the record
+        flip, rate, height, curve, mixed, first = z
+        y = flip - place
         growth = (2 * np.exp(rate) * (y + curve * y**2))[forward]
-        gain = 2 * np.exp(rate - 2 * height)
+        gain = (2 * np.exp(rate - 2 * height) * (1 + mixed * y))[forward]
         return _amplitude(growth, gain, first)[forward]
 
-    near = rho[int(np.count_nonzero(size > 0.2 * size[:FEWEST].max()) * 0.8)]
-    top = float(np.log(size[:4].mean())) if size[:4].mean() > 0 else 0.0
-    start_height = top - 0.5 * np.log(max((near - rho[0]) / span, 1e-2))
-    edge = -2 * np.log(max(size[forward][:4].mean(), 0.3))
-    best = None
-    for rate in (-1.0, 1.0):
-        tried = least_squares(
-            lambda z: model(z) - size, [near, rate, start_height, 0.0, edge], x_scale=[0.1 * abs(span), 1, 1, 1, 1],
-            loss="soft_l1", f_scale=2.0, max_nfev=200,
-        )  # fmt: skip
-        best = tried if best is None or tried.cost < best.cost else best
-    assert best is not None  # two were tried
-    flip = float(best.x[0])
-    low, high = sorted((float(rho[0]), float(rho[-1])))
-    if not (low < flip < high):
+    guess = _guess(place[forward], size[forward])
+    if guess is None:
         return None
-    freedom = max(len(size) - 5, 1)
-    variance = max(float(np.sum((model(best.x) - size) ** 2)) / freedom, 0.375)
+    edge = -2 * np.log(max(size[forward][:4].mean(), 0.3))
+    found = least_squares(
+        lambda z: model(z) - size, [*guess, 0.0, 0.0, edge], x_scale=[0.1, 1, 1, 1, 1, 1], loss="soft_l1", f_scale=2.0,
+        max_nfev=300,
+    )  # fmt: skip
+    freedom = max(len(size) - len(found.x), 1)
+    variance = max(float(np.sum((model(found.x) - size) ** 2)) / freedom, 0.375)
     try:
-        covariance = np.linalg.inv(best.jac.T @ best.jac) * variance * ALIKE
+        covariance = np.linalg.inv(found.jac.T @ found.jac) * variance * ALIKE
     except np.linalg.LinAlgError:
         return None
-    return flip, float(np.sqrt(covariance[0, 0]))
+    flip, error = float(found.x[0]), float(np.sqrt(covariance[0, 0]))
+    if not (0 < flip < 1) or not error < 0.5:
+        return None
+    return float(rho[0] + span * flip), abs(span) * error
+
+
+def _guess(place: FloatArray, size: FloatArray) -> tuple[float, float, float] | None:
+    """Flip, log of the rate and of the height from d(ln A)/dn = rate (flip - place) - rate A^2 / height^2, linear."""
+    smooth = np.convolve(size, np.ones(5) / 5, mode="valid")
+    at = place[2 : len(place) - 2]
+    good = smooth > 2.0
+    both = good[4:] & good[:-4]
+    if np.count_nonzero(both) < 6:
+        return None
+    middle = smooth[2:-2][both]
+    slope = np.log(smooth[4:][both] / smooth[:-4][both]) / 4
+    columns = np.column_stack([np.ones(len(middle)), -at[2:-2][both], -(middle**2)])
+    weight = middle[:, None]  # the error of ln A goes like 1/A
+    (constant, rate, fall), *_ = np.linalg.lstsq(columns * weight, slope * middle, rcond=None)
+    if rate <= 0 or fall <= 0:
+        return None
+    return float(constant / rate), float(np.log(rate)), float(0.5 * np.log(rate / fall))
 
 
 def _amplitude(growth: FloatArray, gain: float, first: float) -> FloatArray:
     """A along the record from w' = -growth w + gain, exact for constant growth within a step; w_0 = exp(first)."""
-    w, found = float(np.exp(min(first, 600.0))), np.empty(len(growth))
+    w, found = float(np.exp(np.clip(first, -500.0, 500.0))), np.empty(len(growth))
     decay = np.exp(-np.clip(growth, -50.0, 50.0))
     fed = gain * np.where(np.abs(growth) < 1e-9, 1.0, (1 - decay) / np.where(growth == 0, 1.0, growth))
     for i in range(len(growth)):
         found[i] = w
-        w = min(w * decay[i] + fed[i], 1e250)
+        w = min(max(w * decay[i] + fed[i], 1e-250), 1e250)
     return np.asarray(found**-0.5)

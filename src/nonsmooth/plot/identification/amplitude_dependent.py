@@ -86,18 +86,20 @@ def forced_responses(finding: Any, ax: Axes | None = None, *, responses: Sequenc
                 middle = ~stable
                 wide = middle | np.roll(middle, 1) | np.roll(middle, -1)
                 drawn.plot(f, np.where(wide, a, np.nan), "--", color=style.COLORS["second"], zorder=4)
-            top = int(np.argmax(a)) if len(a) else 0
             if len(a):
+                top = int(np.argmax(a))
                 drawn.annotate(
-                    f"{curve.attrs['force']:.3g} N", (f[top], a[top]), xytext=(-4, 2), textcoords="offset points",
-                    ha="right", va="bottom", fontsize="x-small", color=style.COLORS["second"], zorder=5,
+                    f"{curve.attrs['force']:.2g} N", (f[top], a[top]), xytext=(3, 2), textcoords="offset points",
+                    ha="left", va="bottom", fontsize="x-small", color=style.COLORS["second"], zorder=6,
+                    bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.4},
                 )  # fmt: skip
         drawn.plot(
             data["f_n"].values, factor * data["amplitude"].values, color=style.COLORS["first"], linewidth=1.1, zorder=5,
             label="backbone",
         )  # fmt: skip
         drawn.set_ylim(bottom=0, top=1.32 * factor * float(data["response"].max()))
-        drawn.margins(x=0.02)
+        low, high = float(data["frequency"].min()), float(data["frequency"].max())
+        drawn.set_xlim(low - 0.03 * (high - low), high + 0.03 * (high - low))
         drawn.legend(loc="upper left", ncols=2, columnspacing=1.0, handlelength=1.6, markerscale=2)
         drawn.set(xlabel="frequency (Hz)", ylabel=f"amplitude ({unit})")
     return drawn

@@ -32,9 +32,11 @@ def calibration(finding: Any, ax: Axes | None = None) -> Axes:
     """
     data = data_of(finding, "setting", "reading")
     error = data["reading_error"].values if "reading_error" in data else None
+    scale = 1e3 if data["setting"].attrs.get("units") == "m" else 1.0  # lengths in mm
     with style.axes(ax, ratio=0.85) as drawn:
+        setting, reading = scale * data["setting"].values, data["reading"].values
         if "fitted" in data:
-            at = data["setting_fine"].values
+            at = scale * data["setting_fine"].values
             if "fitted_low" in data:
                 drawn.fill_between(
                     at, data["fitted_low"].values, data["fitted_high"].values, color=style.COLORS["first"], alpha=0.25,
@@ -42,16 +44,19 @@ def calibration(finding: Any, ax: Axes | None = None) -> Axes:
                 )  # fmt: skip
             drawn.plot(at, data["fitted"].values, color=style.COLORS["first"], label=_law(data))
         drawn.errorbar(
-            data["setting"].values, data["reading"].values, yerr=error, fmt="o", color=MEASURED, markersize=2.8,
+            setting, reading, yerr=error, fmt="o", color=MEASURED, markersize=2.8,
             elinewidth=0.6, label=measured_label(data), zorder=4,
         )  # fmt: skip
         drawn.margins(x=0.03)
         drawn.legend(loc="upper left")
-        drawn.set(xlabel=_axis(data, "setting"), ylabel=_axis(data, "reading"))
+        drawn.set(xlabel=_axis(data, "setting").replace("(m)", "(mm)"), ylabel=_axis(data, "reading"))
         if "fitted" in data:
-            setting, reading = data["setting"].values, data["reading"].values
-            left = reading - np.interp(setting, data["setting_fine"].values, data["fitted"].values)
-            residual_strip(drawn, setting, left, "residual", error=error)
+            left = reading - np.interp(setting, at, data["fitted"].values)
+            power = 3 * int(np.clip(np.ceil(-np.log10(max(float(np.max(np.abs(left))), 1e-12)) / 3), 0, 3))
+            unit = str(data["reading"].attrs.get("units", ""))
+            word = f"residual ({unit})" if power == 0 else rf"residual ($10^{{-{power}}}$ {unit})"
+            size = 10.0**power
+            residual_strip(drawn, setting, size * left, word, error=None if error is None else size * error)
     return drawn
 
 
@@ -64,6 +69,10 @@ def _law(data: xr.Dataset) -> str:
     slope = number(data, "slope")
     if not np.isfinite(slope):
         return "fitted"
+    slope_error, offset = number(data, "slope_error"), -number(data, "intercept") / slope
     units = [str(data[name].attrs.get("units", "")) for name in ("reading", "setting")]
     per = f"{units[0]}/{units[1]}" if all(units) and "/" not in units[0] else f"{units[0]} per {units[1]}"
-    return f"slope {with_error(slope, number(data, 'slope_error'), per)}"
+    text = f"slope {with_error(slope, slope_error, per)}"
+    # a line that does not pass through the origin: where it begins
+    away = abs(number(data, "intercept")) > 5 * number(data, "intercept_error")
+    return f"{text},\nfrom {offset:.4g} {units[1]} on" if away and np.isfinite(offset) else text

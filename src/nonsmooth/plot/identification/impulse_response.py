@@ -52,7 +52,7 @@ def impulse_response(finding: Any, ax: Axes | None = None) -> Axes:
         step = number(data, "grid_step")
         if np.isfinite(step):
             drawn.axvspan(
-                frequency[top] - step / 2, frequency[top] + step / 2, ymax=0.64, color=style.COLORS["zone"], alpha=0.25,
+                frequency[top] - step / 2, frequency[top] + step / 2, ymax=0.5, color=style.COLORS["zone"], alpha=0.25,
                 linewidth=0, zorder=0, label=f"largest line {_both(frequency[top])}, ± half a step",
             )  # fmt: skip
         places = (
@@ -62,10 +62,10 @@ def impulse_response(finding: Any, ax: Axes | None = None) -> Axes:
             value = number(data, name)
             if np.isfinite(value):
                 drawn.axvline(
-                    value, ymax=0.64, color=style.COLORS[color], linestyle=line, linewidth=1.0,
+                    value, ymax=0.5, color=style.COLORS[color], linestyle=line, linewidth=1.0,
                     label=f"{word} {_both(value)}",
                 )  # fmt: skip
-        drawn.set_ylim(0, 1.62 * heights.max())
+        drawn.set_ylim(0, 2.1 * heights.max())
         drawn.legend(loc="upper right", handlelength=1.6)
         drawn.margins(x=0.02)
         drawn.set(xlabel="frequency (Hz)", ylabel="magnitude (mm)")

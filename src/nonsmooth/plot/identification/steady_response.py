@@ -1,4 +1,4 @@
-"""Amplitude and phase of a steady response over the blocks of its record: nothing falls, so nothing tells the damping."""
+"""Amplitude and phase of a steady response over its record: nothing falls, so nothing tells the damping."""
 
 from __future__ import annotations
 

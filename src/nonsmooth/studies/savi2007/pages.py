@@ -36,11 +36,11 @@ class Bullets:
 
 @dataclass(frozen=True)
 class Table:
-    """Plain cells; ``marked`` is the column by whose text a row is coloured in HTML."""
+    """Plain cells; ``marked`` are the columns whose verdicts are coloured in HTML."""
 
     header: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
-    marked: int | None = None
+    marked: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -82,8 +82,8 @@ h1, h2, h3 { line-height: 1.2; } h2 { margin-top: 2.2rem; border-bottom: 1px sol
 .wide { overflow-x: auto; }
 table { border-collapse: collapse; font-size: .82rem; line-height: 1.35; }
 th, td { border: 1px solid #ccc; padding: .3rem .5rem; text-align: left; vertical-align: top; }
-th { background: #f2f2f2; } tr.agrees td.mark { background: #d9efe0; } tr.partly td.mark { background: #fbeecb; }
-tr.differs td.mark { background: #f9d9cf; }
+th { background: #f2f2f2; } td.agrees { background: #d9efe0; } td.partly { background: #fbeecb; }
+td.differs { background: #f9d9cf; }
 figure { margin: 1.5rem 0; } figure img { max-width: 100%; height: auto; }
 figcaption { font-size: .9rem; max-width: 60rem; }
 """
@@ -119,13 +119,17 @@ def _html(block: Block) -> str:
             )
 
 
-def _row(row: tuple[str, ...], marked: int | None) -> str:
-    kind = "" if marked is None else f' class="{_kind(row[marked])}"'
-    cells = "".join(f"<td{' class=mark' if i == marked else ''}>{escape(cell)}</td>" for i, cell in enumerate(row))
-    return f"<tr{kind}>{cells}</tr>"
+def _row(row: tuple[str, ...], marked: tuple[int, ...]) -> str:
+    cells = "".join(
+        f"<td{_kind(cell) if i in marked else ''}>{escape(cell)}</td>" for i, cell in enumerate(row)
+    )  # fmt: skip
+    return f"<tr>{cells}</tr>"
 
 
 def _kind(verdict: str) -> str:
+    """The class of a cell with a verdict; none where nothing was asked."""
     if verdict == "agrees" or verdict.startswith("agrees within"):
-        return "agrees"
-    return "differs" if verdict.startswith("differs") else "partly"
+        return ' class="agrees"'
+    if verdict.startswith("differs"):
+        return ' class="differs"'
+    return ' class="partly"' if verdict.startswith(("agrees", "adds")) else ""

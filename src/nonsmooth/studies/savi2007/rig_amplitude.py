@@ -12,13 +12,13 @@ from nonsmooth.plot.comparison_diagram import comparison_diagram
 from nonsmooth.studies.savi2007.figure import Figure, sheet
 from nonsmooth.studies.savi2007.flows import Settings
 from nonsmooth.studies.savi2007.printed import FIGURE_12, NUMBERS
-from nonsmooth.studies.savi2007.rig_motions import compared, draw_pairs, motions, said
+from nonsmooth.studies.savi2007.rig_motions import GRID, compared, draw_pairs, motions, said
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure as Canvas
 
-__all__ = ["FIGURES", "RISES", "flips_said", "rate_of"]
+__all__ = ["FIGURES", "RISES", "flips_said", "rate_of", "slowest"]
 
 RISES = (450.0, 900.0, 1800.0)  # s, from 0.2 to 0.5 N; the second is drawn
 _DRAWN = "900"
@@ -68,6 +68,11 @@ def _caption_11(data: Mapping[str, xr.Dataset]) -> str:
     )
 
 
+def slowest(data: Mapping[str, xr.Dataset]) -> xr.Dataset:
+    """The rise that took longest."""
+    return min(data.values(), key=rate_of)
+
+
 def flips_said(result: xr.Dataset, side: str) -> str:
     """``1-2 at 0.4013, 2-4 at 0.2698``: the flips of one side."""
     rows = zip(result["flip"].values, result[f"{side}_flip"].values, strict=True)
@@ -76,7 +81,7 @@ def flips_said(result: xr.Dataset, side: str) -> str:
 
 def _compute_12(settings: Settings) -> dict[str, xr.Dataset]:
     periods = 60 if settings.quick else 200
-    return compared(settings.bench, motions(settings.bench, 12, tuple(FIGURE_12), periods=periods))
+    return compared(settings.bench, motions(settings.bench, 12, tuple(FIGURE_12), periods=periods), grid=GRID)
 
 
 def _caption_12(data: Mapping[str, xr.Dataset]) -> str:

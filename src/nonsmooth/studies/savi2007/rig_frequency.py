@@ -13,7 +13,16 @@ from nonsmooth.plot.comparison_motion import comparison_phase_portrait
 from nonsmooth.studies.savi2007.figure import Figure, sheet
 from nonsmooth.studies.savi2007.flows import Settings
 from nonsmooth.studies.savi2007.printed import FIGURE_18
-from nonsmooth.studies.savi2007.rig_motions import chosen, compared, diagram_of, motions, said
+from nonsmooth.studies.savi2007.rig_motions import (
+    GRID,
+    chosen,
+    compared,
+    diagram_of,
+    motions,
+    runs_of,
+    said,
+    without_flips,
+)  # fmt: skip
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -33,20 +42,23 @@ def _compute_17(settings: Settings) -> dict[str, xr.Dataset]:
     result = bench.compare(
         measured, set_, parameter="omega", direction="both", values=np.linspace(8.4, 10.4, fine)
     )
-    return {"compared": result}
+    return {"compared": result, "runs": runs_of(found, "omega")}
 
 
 def _draw_17(data: Mapping[str, xr.Dataset]) -> Canvas:
     with plot.journal():
         canvas = sheet(plot.PAGE, 0.44 * plot.PAGE)
         for ax, state, letter in zip(canvas.subplots(1, 2), "xv", "ab", strict=True):
-            comparison_diagram(data["compared"], ax, y=state, size=2.0)
-            for omega in FIGURE_18:
-                ax.axvline(omega, color="black", linewidth=0.6, linestyle=":", zorder=0)
+            comparison_diagram(without_flips(data["compared"]), ax, y=state, size=2.0)
+            for i, omega in enumerate(FIGURE_18):
+                ax.axvline(
+                    omega, color="black", linewidth=0.6, linestyle=":", zorder=0,
+                    label="frequencies of Fig. 18" if i == 0 else None,
+                )  # fmt: skip
             ax.get_legend().remove()
-            ax.set_title(f"({letter})", loc="left")
+            ax.set_title(f"({letter})", loc="left", pad=12)
             if state == "x":
-                ax.legend(loc="lower left", markerscale=3)
+                ax.legend(loc="lower right", markerscale=3)
     return canvas
 
 
@@ -62,7 +74,8 @@ def _caption_17(data: Mapping[str, xr.Dataset]) -> str:
 
 def _compute_18(settings: Settings) -> dict[str, xr.Dataset]:
     return compared(
-        settings.bench, motions(settings.bench, 18, tuple(FIGURE_18), periods=60 if settings.quick else 200)
+        settings.bench, motions(settings.bench, 18, tuple(FIGURE_18), periods=60 if settings.quick else 200),
+        grid=GRID,
     )
 
 
@@ -73,8 +86,10 @@ def _draw_18(data: Mapping[str, xr.Dataset]) -> Canvas:
             comparison_phase_portrait(chosen(data, omega, wanted), ax, zone="g")
             ax.ticklabel_format(axis="y", style="plain")
             ax.set_title(rf"({letter}) $\omega = {omega:g}$ rad/s", loc="left")
-            if letter != "a":
-                ax.get_legend().remove()
+            ax.get_legend().remove()
+            if letter == "a":
+                canvas.legend(*ax.get_legend_handles_labels(), loc="outside upper center", ncols=2)
+            else:
                 ax.set_ylabel("")
     return canvas
 

@@ -14,7 +14,17 @@ from nonsmooth.studies.savi2007.figure import Figure, sheet
 from nonsmooth.studies.savi2007.flows import Settings
 from nonsmooth.studies.savi2007.gap import PHASES
 from nonsmooth.studies.savi2007.printed import FIGURE_14
-from nonsmooth.studies.savi2007.rig_motions import Motions, compared, diagram_of, draw_pairs, motions, said
+from nonsmooth.studies.savi2007.rig_motions import (
+    GRID,
+    Motions,
+    compared,
+    diagram_of,
+    draw_pairs,
+    motions,
+    runs_of,
+    said,
+    without_flips,
+)  # fmt: skip
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -38,14 +48,14 @@ def _compute_13(settings: Settings) -> dict[str, xr.Dataset]:
     result = settings.bench.compare(
         measured, set_, parameter="g", direction="both", values=np.linspace(-0.0015, 0.002, fine)
     )
-    return {"compared": result}
+    return {"compared": result, "runs": runs_of(_records(settings.bench), "g")}
 
 
 def _draw_13(data: Mapping[str, xr.Dataset]) -> Canvas:
     with plot.journal():
         canvas = sheet(0.72 * plot.PAGE, 0.5 * plot.PAGE)
         ax = canvas.subplots()
-        comparison_diagram(data["compared"], ax, y="v", size=2.4)
+        comparison_diagram(without_flips(data["compared"]), ax, y="v", size=2.4)
         ax.legend(loc="lower left", markerscale=3)
     return canvas
 
@@ -60,7 +70,7 @@ def _caption_13(data: Mapping[str, xr.Dataset]) -> str:
 
 
 def _compute_14(settings: Settings) -> dict[str, xr.Dataset]:
-    return compared(settings.bench, _records(settings.bench))
+    return compared(settings.bench, _records(settings.bench), grid=GRID)
 
 
 def _caption_14(data: Mapping[str, xr.Dataset]) -> str:
@@ -92,7 +102,7 @@ def _draw_16(data: Mapping[str, xr.Dataset]) -> Canvas:
                 ax.plot(points[:, 0], points[:, 1], ".", **looks)
                 ax.ticklabel_format(axis="y", style="plain")
                 ax.set_xlabel("$x$ (m)" if side == "theory" else "")
-                ax.set_ylabel(f"{word}\n" + r"$\dot x$ (m/s)" if i == 0 else "")
+                ax.set_ylabel(f"{word}\n" + "$v$ (m/s)" if i == 0 else "")
                 if side == "measured":
                     ax.set_title(f"({'abcd'[i]}) phase ${_ANGLES[i]}$", y=1.0, pad=9)
     return canvas

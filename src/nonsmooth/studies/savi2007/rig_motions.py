@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from nonsmooth import plot
 from nonsmooth.plot.comparison import MEASURED, THEORY
+from nonsmooth.results.provenance import ATTRIBUTE, package_version
 from nonsmooth.studies.savi2007.figure import sheet
 from nonsmooth.studies.savi2007.laboratory import with_support
 from nonsmooth.studies.savi2007.measure import APERIODIC
@@ -21,8 +23,11 @@ if TYPE_CHECKING:
     from nonsmooth.studies.savi2007.laboratory import Laboratory
 
 __all__ = [
-    "Motions", "chosen", "compared", "diagram_of", "draw_pairs", "measured_periods_at", "motions", "runs_at", "said",
+    "GRID", "Motions", "chosen", "compared", "diagram_of", "draw_pairs", "measured_periods_at", "motions", "runs_at",
+    "runs_of", "said", "without_flips",
 ]  # fmt: skip
+
+GRID = 384  # samples of an orbit in each forcing period: enough for the eye within a contact
 
 #: Measured motions and the settings that belong to them, by key.
 Motions: TypeAlias = "dict[str, tuple[xr.Dataset, dict[str, Any]]]"
@@ -75,6 +80,40 @@ def diagram_of(found: Motions, parameter: str) -> tuple[xr.Dataset, dict[str, An
     return measured, {key: value for key, value in settings.items() if key != parameter}
 
 
+def runs_of(found: Motions, parameter: str) -> xr.Dataset:
+    """Of each motion the parameter's ``setting`` and measured ``value``, the ``period_number`` and whether the car touched the support."""
+    import xarray as xr
+
+    from nonsmooth.identification.compare.fold import fold
+    from nonsmooth.identification.compare.periods import measured_period
+
+    values, numbers, touches = [], [], []
+    for motion, settings in found.values():
+        points = fold(motion["phase"].values, motion["u"].values, 8)[:, 0]
+        error = np.median(motion["u_error"].values, axis=0)
+        values.append(float(np.atleast_1d(settings[parameter])[0]))
+        numbers.append(measured_period(points, error, max_period=16).number)
+        # where turning points lie: one outlier is no contact
+        reach = np.quantile(motion["u"].sel(state="x").values, 0.999)
+        touches.append(bool(reach > float(np.atleast_1d(settings["g"])[0]) + 3 * error[0]))
+    record = {"version": package_version(), "verb": "rig", "runs": list(found)}
+    nominal = [float(key.partition("_")[0]) for key in found]
+    return xr.Dataset(
+        {
+            "setting": ("run", nominal, {"long_name": f"{parameter} that was meant"}),
+            "value": ("run", values, {"long_name": f"{parameter} as measured"}),
+            "period_number": ("run", np.array(numbers, dtype=np.int64)),
+            "contact": ("run", np.array(touches, dtype=np.int8)),
+        },
+        attrs={"synthetic": "yes", ATTRIBUTE: json.dumps(record)},
+    )  # fmt: skip
+
+
+def without_flips(result: xr.Dataset) -> xr.Dataset:
+    """A diagram for a picture of steady runs: a few settings do not tell where a period doubles."""
+    return result.isel(flip=slice(0, 0)) if "flip" in result.dims else result
+
+
 def runs_at(data: Mapping[str, xr.Dataset], value: float) -> list[xr.Dataset]:
     """The comparisons of all runs at one value, in the order in which they were recorded."""
     key = f"{value:g}"
@@ -124,7 +163,7 @@ def draw_pairs(
                     ax.ticklabel_format(axis="y", style="plain")
                 grid[0, i].set_title(f"({'abcd'[i]}) ${symbol} = {value:g}$ {unit}", y=1.0, pad=9)
             for ax, word in zip(grid[:, 0], ("model, identified", "virtual rig (synthetic)"), strict=True):
-                ax.set_ylabel(f"{word}\n" + r"$\dot x$ (m/s)")
+                ax.set_ylabel(f"{word}\n" + "$v$ (m/s)")
         return canvas
 
     return draw

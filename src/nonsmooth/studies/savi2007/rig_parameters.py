@@ -18,6 +18,7 @@ from nonsmooth.studies.savi2007.printed import TABLE_1
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Canvas
 
 __all__ = ["FIGURES", "NAMES", "table_rows"]
@@ -49,10 +50,17 @@ def _side_by_side(
             axes = np.atleast_1d(canvas.subplots(1, len(parts)))
             for ax, (key, picture, title) in zip(axes, parts, strict=True):
                 picture(data[key], ax)
-                ax.set_title(title, loc="left")
+                # some pictures have their legend above the axes
+            ax.set_title(title, loc="left", pad=6 if ax.get_legend() is None or not _above(ax) else 16)
         return canvas
 
     return draw
+
+
+def _above(ax: Axes) -> bool:
+    """Whether the legend stands above the axes."""
+    box = ax.get_legend().get_bbox_to_anchor()
+    return bool(box.transformed(ax.transAxes.inverted()).y0 >= 0.99)
 
 
 def _caption_4(data: Mapping[str, xr.Dataset]) -> str:

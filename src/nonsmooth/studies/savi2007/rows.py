@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, TypeAlias
 
 from nonsmooth.studies.savi2007.measure import Interval
@@ -13,7 +13,9 @@ from nonsmooth.studies.savi2007.printed import Printed
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["CLOSE", "Data", "Row", "against_closed_form", "against_printed", "compare"]
+__all__ = [
+    "CLOSE", "NOT_ASKED", "Cell", "Data", "Row", "against_closed_form", "against_printed", "compare", "printed_cell",
+]  # fmt: skip
 
 #: Datasets by figure and key.
 Data: TypeAlias = "Mapping[str, Mapping[str, xr.Dataset]]"
@@ -21,9 +23,23 @@ Data: TypeAlias = "Mapping[str, Mapping[str, xr.Dataset]]"
 CLOSE = 2.0  # percent; the paper's own two natural frequencies, 4.50 and 4.60 rad/s, are 2.2 % apart
 
 
+NOT_ASKED = "not asked"
+
+
+@dataclass(frozen=True)
+class Cell:
+    """What the virtual rig says to a statement, and how that stands to the paper; without a verdict it is not asked."""
+
+    text: str
+    verdict: str = NOT_ASKED
+
+
 @dataclass(frozen=True)
 class Row:
-    """One statement: what the paper says (``place``: where), what both flows give, and what follows."""
+    """One statement: what the paper says (``place``: where), what both flows and the rig give, and what follows.
+
+    ``verdict`` is on the exact flow, ``rig_verdict`` on the virtual rig.
+    """
 
     id: str
     place: str
@@ -33,6 +49,12 @@ class Row:
     difference: str
     verdict: str
     why: str = ""
+    rig: str = NOT_ASKED
+    rig_verdict: str = NOT_ASKED
+
+    def measured(self, cell: Cell) -> Row:
+        """The row with what the rig says."""
+        return replace(self, rig=cell.text, rig_verdict=cell.verdict)
 
 
 def compare(printed: Printed, found: Interval | None) -> tuple[str, str]:
@@ -50,6 +72,14 @@ def compare(printed: Printed, found: Interval | None) -> tuple[str, str]:
     else:
         verdict = f"differs by {abs(percent):.1f} %"
     return f"{percent:+.1f} %", verdict
+
+
+def printed_cell(printed: Printed, found: Interval | None, note: str = "") -> Cell:
+    """The rig's number beside a printed one."""
+    difference, verdict = compare(printed, found)
+    if found is None:
+        return Cell(f"not found{note}", verdict)
+    return Cell(f"{_with_unit(found, printed.unit)} ({difference}){note}", verdict)
 
 
 def against_printed(
@@ -88,4 +118,4 @@ def against_closed_form(
 
 
 def _with_unit(found: Interval | None, unit: str) -> str:
-    return "not found" if found is None else f"{found} {unit}"
+    return "not found" if found is None else f"{found} {unit}".rstrip()
