@@ -1,22 +1,51 @@
-"""``nonsmooth identify SESSION``: the parameters behind a session's recordings, with their uncertainty."""
+"""``nonsmooth identify STUDY.toml``: the parameters behind a session's recordings, with their uncertainty."""
 
 from __future__ import annotations
 
 import argparse
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from nonsmooth.system.names import unknown
+
 __all__ = ["add"]
+
+_KEYS = {
+    "identify": ("session", "model", "parameters", "crank_length", "apparatus"),
+    "output": ("data", "table", "figures", "format"),
+}  # fmt: skip
+_FORMATS = ("pdf", "png", "svg")
+
+
+@dataclass(frozen=True)
+class _Study:
+    """What is asked for, paths already relative to where the command runs."""
+
+    session: Path
+    model: Any = None
+    parameters: tuple[str, ...] = ()
+    crank_length: float | None = None
+    apparatus: Mapping[str, Any] = field(default_factory=dict)
+    data: Path | None = None
+    table: Path | None = None
+    figures: Path | None = None
+    format: str = "pdf"
 
 
 def add(commands: Any) -> None:
     """Declare the sub-command."""
     parser = commands.add_parser(
         "identify",
-        help="identify parameters from a session folder",
-        description="Identify the parameters of the oscillator from a folder with recordings and session.toml.",
+        help="identify parameters from a session's recordings",
+        description="Identify the parameters of the oscillator from recordings. A study file says which: [identify] "
+        "with `session`, the folder of session.toml, and optionally `model`, `parameters` that must be found, "
+        "`crank_length` and `apparatus`; [output] with `data` (.nc or .zarr), `table` (.md) and `figures` (a folder). "
+        "Paths in the file are relative to the file. A session folder in its place prints what is found.",
     )
-    parser.add_argument("session", type=Path, metavar="SESSION", help="folder with session.toml, or that file")
+    parser.add_argument("study", type=Path, metavar="STUDY.toml", help="the study file, or a session folder")
     parser.add_argument("--out", type=Path, help="write the parameters with their covariance (.nc or .zarr)")
     parser.add_argument("--crank", type=float, help="crank length (m) to whose mean position the gap is referred")
     parser.add_argument("--quiet", action="store_true", help="parameters only, no findings")
@@ -25,9 +54,14 @@ def add(commands: Any) -> None:
 
 def _run(options: argparse.Namespace) -> int:
     from nonsmooth.identification.chain import identify
+    from nonsmooth.identification.statements import require
 
-    folder = options.session.parent if options.session.suffix == ".toml" else options.session
-    found = identify(folder, crank_length=options.crank)
+    study = _read(options.study)
+    found = identify(
+        study.session, study.model, apparatus=study.apparatus,
+        crank_length=study.crank_length if options.crank is None else options.crank,
+    )  # fmt: skip
+    require(found, study.parameters)
     print(found)
     if not options.quiet:
         for finding in found.findings:
@@ -35,8 +69,108 @@ def _run(options: argparse.Namespace) -> int:
         print()
         for name, sentence in found.identifiability.items():
             print(f"{name}: {sentence}")
-    if options.out is not None:
+    for path in _write(found, study, study.data if options.out is None else options.out):
+        print(f"written to {path}")
+    return 0
+
+
+def _read(path: Path) -> _Study:
+    from nonsmooth.experiment.session import NOTEBOOK
+
+    if path.is_dir():
+        if not (path / NOTEBOOK).is_file():
+            raise ValueError(f"{path}: this folder has no {NOTEBOOK}; a session has one, beside its recordings")
+        return _Study(path)
+    if path.name == NOTEBOOK:
+        return _Study(path.parent)
+    try:
+        document = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise ValueError(f"{path}: no such study file or session folder") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path}: is not a TOML file: {error}") from None
+    _check(document, _KEYS, str(path), "a table")
+    for name, table in document.items():
+        if not isinstance(table, dict):
+            raise ValueError(f"{path}: `{name}` must be a table: write [{name}] and its keys below it")
+        _check(table, _KEYS[name], f"{path}, table [{name}]", "a key")
+    if "session" not in document.get("identify", {}):
+        raise ValueError(f'{path}: needs a table [identify] with session = "..." (the folder of a {NOTEBOOK})')
+    return _study(path, document["identify"], document.get("output", {}))
+
+
+def _study(path: Path, asked: Mapping[str, Any], output: Mapping[str, Any]) -> _Study:
+    from nonsmooth.cli.study import load_model
+    from nonsmooth.experiment.session import APPARATUS
+
+    where, folder = f"{path}, table [identify]", path.parent
+    for key, table, place in (
+        ("session", asked, where), ("model", asked, where),
+        *((key, output, f"{path}, table [output]") for key in _KEYS["output"]),
+    ):  # fmt: skip
+        if key in table and not isinstance(table[key], str):
+            raise ValueError(f"{place}: {key} = {table[key]!r} must be a text")
+    session = folder / asked["session"]
+    if not session.is_dir():
+        raise ValueError(f"{where}: session = {asked['session']!r}: no such folder beside the study file ({session})")
+    parameters = asked.get("parameters", [])
+    if not isinstance(parameters, list) or not all(isinstance(name, str) for name in parameters):
+        raise ValueError(f'{where}: parameters = {parameters!r} must be a list of names, as ["k", "c", "g"]')
+    apparatus = asked.get("apparatus", {})
+    if not isinstance(apparatus, dict):
+        raise ValueError(f"{where}: apparatus must be a table of numbers or of {{ value = ..., uncertainty = ... }}")
+    _check(apparatus, APPARATUS, f"{where}, apparatus", "a key")
+    crank = asked.get("crank_length")
+    if crank is not None and (isinstance(crank, bool) or not isinstance(crank, int | float)):
+        raise ValueError(f"{where}: crank_length = {crank!r} must be a length in m")
+    style = output.get("format", "pdf")
+    if style not in _FORMATS:
+        raise ValueError(f"{path}, table [output]: {unknown(style, 'a format', 'figures', _FORMATS)}")
+    places = {key: folder / output[key] if key in output else None for key in ("data", "table", "figures")}
+    return _Study(
+        session, load_model(asked["model"], folder) if "model" in asked else None, tuple(parameters),
+        None if crank is None else float(crank), {name: _quantity(value) for name, value in apparatus.items()},
+        **places, format=style,
+    )  # fmt: skip
+
+
+def _quantity(value: Any) -> Any:
+    return (value.get("value"), value.get("uncertainty", 0.0)) if isinstance(value, dict) else value
+
+
+def _write(found: Any, study: _Study, data: Path | None) -> list[Path]:
+    written = []
+    if data is not None:
         from nonsmooth.results.store import save
 
-        print(f"written to {save(found.to_dataset(), options.out)}")
-    return 0
+        written.append(save(found.to_dataset(), _with_folder(data)))
+    if study.table is not None:
+        from nonsmooth.identification.report import report
+
+        _with_folder(study.table).write_text(report(found), encoding="utf-8")
+        written.append(study.table)
+    if study.figures is not None:
+        import matplotlib as mpl
+
+        mpl.use("Agg")
+        from matplotlib import pyplot as plt
+
+        from nonsmooth import plot
+        from nonsmooth.plot.identification.pictures import pictures
+
+        for name, ax in pictures(found):
+            written.append(plot.save_figure(ax, _with_folder(study.figures / f"{name}.{study.format}")))
+            plt.close("all")
+    return written
+
+
+def _check(table: Mapping[str, Any], allowed: Iterable[str], where: str, what: str) -> None:
+    known = list(allowed)
+    for key in table:
+        if key not in known:
+            raise ValueError(f"{where}: {unknown(key, what, 'this place', known)}")
+
+
+def _with_folder(path: Path) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    return path

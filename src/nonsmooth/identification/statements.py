@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -11,9 +12,15 @@ from nonsmooth.identification.evidence import Evidence
 from nonsmooth.identification.finding import Finding
 from nonsmooth.identification.multiple_shooting import ContactFit
 from nonsmooth.identification.parameter_set import ParameterSet
+from nonsmooth.system.names import unknown
 
-__all__ = ["agreement", "for_model", "identifiability"]
+__all__ = ["agreement", "for_model", "identifiability", "require"]
 
+#: What must have been recorded to know a parameter.
+_RESTS_ON = {
+    "m": "the notebook's mass", "k": "impulse (taps) or springs (pulls)", "c": "impulse (taps)",
+    "k_s": "support (pushes), drop or contact", "c_s": "drop or contact", "g": "contact, impulse, and support or drop",
+}  # fmt: skip
 _NEEDED = ("springs", "support", "impulse", "drop", "response", "contact")
 
 
@@ -89,3 +96,19 @@ def for_model(found: ParameterSet, model: Any) -> ParameterSet:
             )
     dropped = [key for key in found if key not in units]
     return found.only(shared, note=f"{name!r} has no parameter {', '.join(dropped)}: kept in extra" if dropped else "")
+
+
+def require(found: ParameterSet, names: Iterable[str]) -> None:
+    """Check that these parameters were identified.
+
+    Raises
+    ------
+    ValueError
+        If one was not: the message says which procedures would tell it, and which were not recorded.
+    """
+    for name in names:
+        if name not in _RESTS_ON:
+            raise ValueError(unknown(name, "a parameter", "identify", _RESTS_ON))
+        if name not in found and name not in found.extra:
+            lacking = next((note for note in found.notes if note.startswith("no recordings of")), "")
+            raise ValueError(f"{name!r} was not identified: it needs {_RESTS_ON[name]}; {lacking or 'see the notes'}")

@@ -117,7 +117,9 @@ def compare(
         ``jump_difference``, ``jump_tolerance`` over ``jump``; ``inside_band``.
 
         *diagram*: ``measured_section`` over ``sample``, ``theory_section`` over the parameter; period numbers;
-        ``measured_flip``, ``theory_flip``, ``flip_relative_difference`` over ``flip``.
+        ``measured_flip``, ``measured_flip_error``, ``measured_flip_read``, ``theory_flip``,
+        ``flip_relative_difference`` over ``flip``. Of a slow rise ``measured_flip`` is where the amplitude equation of
+        a flip puts it, and the record itself reads ``measured_flip_read``, later by the delay; ``rise_per_return``.
 
     Raises
     ------

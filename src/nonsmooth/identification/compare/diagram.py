@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from nonsmooth.analysis.sweep import sweep
 from nonsmooth.flow.sections import Stroboscopic
 from nonsmooth.identification.compare.draws import Setting, Settings, draw_systems, drawn_variables, nominal
+from nonsmooth.identification.compare.flips import Flip, delayed_flips
 from nonsmooth.identification.compare.periods import flips, measured_period, period_numbers
 
 if TYPE_CHECKING:
@@ -92,7 +93,13 @@ def compare_diagram(
             variables[f"theory_{word}"] = ((name, "state"), np.nanquantile(np.stack(stack), at_q, axis=0), {
                 "long_name": f"{word} edge of the section points for drawn parameters"})  # fmt: skip
         variables |= drawn_variables(drawn, theory)
-    return variables | _flips(flips(at, numbers), flips(grid, periods[0]), drawn_flips, unit, level)
+    if name in measured["section"].dims:  # steady runs: a flip lies between two of them
+        seen = {word: Flip(place, np.nan, place) for word, place in flips(at, numbers).items()}
+    else:
+        seen = delayed_flips(at, points, noise, numbers)
+        variables["rise_per_return"] = ((), float((at[-1] - at[0]) / (len(at) - 1)), {
+            "long_name": f"rise of {name} per return", "units": unit})  # fmt: skip
+    return variables | _flips(seen, flips(grid, periods[0]), drawn_flips, unit, level)
 
 
 def _following(settings: Settings, system: System, name: str, grid: FloatArray) -> dict[str, Setting]:
@@ -149,14 +156,19 @@ def _measured(
 
 
 def _flips(
-    measured: dict[str, float], theory: dict[str, float], drawn: list[dict[str, float]], unit: str, level: float
+    measured: dict[str, Flip], theory: dict[str, float], drawn: list[dict[str, float]], unit: str, level: float
 ) -> dict[str, Any]:
     words = sorted({*measured, *theory})
-    m, t = (np.array([side.get(word, np.nan) for word in words], dtype=float) for side in (measured, theory))
+    nothing = Flip(np.nan, np.nan, np.nan)
+    m, error, read = np.array([measured.get(word, nothing) for word in words], dtype=float).reshape(-1, 3).T
+    t = np.array([theory.get(word, np.nan) for word in words], dtype=float)
     over = ("flip",)
     variables: dict[str, Any] = {
         "flip": (over, np.array(words, dtype=str), {"long_name": "period numbers on the two sides of the flip"}),
         "measured_flip": (over, m, {"long_name": "measured flip (NaN: none was seen)", "units": unit}),
+        "measured_flip_error": (over, error, {"long_name": "standard error of it", "units": unit}),
+        "measured_flip_read": (over, read, {
+            "long_name": "where the record changes its period number; in a rise later than the flip", "units": unit}),
         "theory_flip": (over, t, {"long_name": "predicted flip (NaN: none is predicted)", "units": unit}),
         "flip_relative_difference": (over, t / m - 1, {"long_name": "predicted over measured flip, minus 1"}),
     }  # fmt: skip

@@ -17,7 +17,7 @@ drifting.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,8 +33,7 @@ STRAY = 12  # points of another period number in a row that end the doubled side
 ALIKE = 8 / 3  # second differences overlap: as many of them say as much as one
 
 
-@dataclass(frozen=True)
-class Flip:
+class Flip(NamedTuple):
     """A flip found in a slow rise.
 
     Attributes
@@ -123,38 +122,53 @@ def _splitting(at: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArr
 
 
 def _fitted(rho: FloatArray, size: FloatArray, time: float) -> tuple[float, float] | None:
-    """Flip and its standard error; ``rho`` leads from the doubled side across, ``time`` is -1 where it runs back."""
-    from scipy.optimize import least_squares
+    """Flip and its standard error; ``rho`` leads from the doubled side across, ``time`` is -1 where it runs back.
 
+    The next order of the equation is fitted in two ways, of which data rarely choose one: the better is taken, and
+    half of what they differ counts as an error of its own.
+    """
     span = rho[-1] - rho[0]
     forward = slice(None, None, 1 if time > 0 else -1)
     place = (rho - rho[0]) / span  # 0 ... 1 from the doubled side across
-
-    def model(z: FloatArray) -> FloatArray:
-        flip, rate, height, curve, mixed, first = z
-        y = flip - place
-        growth = (2 * np.exp(rate) * (y + curve * y**2))[forward]
-        gain = (2 * np.exp(rate - 2 * height) * (1 + mixed * y))[forward]
-        return _amplitude(growth, gain, first)[forward]
-
     guess = _guess(place[forward], size[forward])
     if guess is None:
         return None
     edge = -2 * np.log(max(size[forward][:4].mean(), 0.3))
+    tried = [_one_fit(place, size, forward, [*guess, 0.0, edge, *more]) for more in ([], [0.0])]
+    held = sorted(one for one in tried if one is not None)
+    if not held:
+        return None
+    _, flip, error = held[0]
+    spread = 0.5 * (max(one[1] for one in held) - min(one[1] for one in held))
+    return float(rho[0] + span * flip), float(abs(span) * np.hypot(error, spread))
+
+
+def _one_fit(
+    place: FloatArray, size: FloatArray, forward: slice, start: list[float]
+) -> tuple[float, float, float] | None:
+    """Cost (with its price for parameters), flip and standard error in 0 ... 1; None where nothing is found there."""
+    from scipy.optimize import least_squares
+
+    def model(z: FloatArray) -> FloatArray:
+        y = z[0] - place
+        growth = (2 * np.exp(z[1]) * (y + z[3] * y**2))[forward]
+        gain = (2 * np.exp(z[1] - 2 * z[2]) * (1 + (z[5] * y if len(z) > 5 else 0 * y)))[forward]
+        return _amplitude(growth, gain, z[4])[forward]
+
     found = least_squares(
-        lambda z: model(z) - size, [*guess, 0.0, 0.0, edge], x_scale=[0.1, 1, 1, 1, 1, 1], loss="soft_l1", f_scale=2.0,
-        max_nfev=300,
+        lambda z: model(z) - size, start, x_scale=[0.1, *[1.0] * (len(start) - 1)], loss="soft_l1", f_scale=2.0,
+        max_nfev=200,
     )  # fmt: skip
-    freedom = max(len(size) - len(found.x), 1)
+    freedom = max(len(size) - len(start), 1)
     variance = max(float(np.sum((model(found.x) - size) ** 2)) / freedom, 0.375)
     try:
         covariance = np.linalg.inv(found.jac.T @ found.jac) * variance * ALIKE
     except np.linalg.LinAlgError:
         return None
     flip, error = float(found.x[0]), float(np.sqrt(covariance[0, 0]))
-    if not (0 < flip < 1) or not error < 0.5:
+    if not (0 < flip < 1 and error < 0.5):
         return None
-    return float(rho[0] + span * flip), abs(span) * error
+    return float(found.cost) / variance + len(start), flip, error
 
 
 def _guess(place: FloatArray, size: FloatArray) -> tuple[float, float, float] | None:

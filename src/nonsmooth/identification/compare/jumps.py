@@ -1,13 +1,21 @@
-"""Measured jumps beside predicted ones: which belongs to which, and how far apart they are."""
+"""Jumps in measured steps, found without a glance at the prediction; and which predicted jump belongs to which."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import combinations
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-__all__ = ["Jump", "Jumps", "match_jumps"]
+__all__ = ["Jump", "Jumps", "jumps_in_steps", "match_jumps"]
+
+FloatArray = NDArray[np.float64]
+
+STEEPER = 2.5  # a jump exceeds the steps on both sides by this factor
+LEAST = 0.02  # and this part of the amplitude
+CERTAIN = 6.0  # and its standard error by this factor
 
 
 class Jump(NamedTuple):
@@ -22,12 +30,50 @@ class Jump(NamedTuple):
 Jumps = Mapping[str, Sequence[Jump]]
 
 
+def jumps_in_steps(x: FloatArray, heights: FloatArray, error: FloatArray) -> list[Jump]:
+    """The jumps in an amplitude measured step by step, in the order in which the steps were taken.
+
+    On the way to a fold the steps grow, so a jump need not be many times its neighbours. It is one where the step is
+    larger than both by 2.5 times, and where the steps before and the steps after, each carried on evenly, both leave
+    more than half of it over.
+
+    Parameters
+    ----------
+    x, heights, error : array (n,)
+        Value of the parameter, amplitude and its standard error (0 where it is not known).
+    """
+    step = np.diff(heights)
+    found = []
+    for i in range(len(step)):
+        beside = [abs(step[j]) for j in (i - 1, i + 1) if 0 <= j < len(step)]
+        if not beside or abs(step[i]) <= STEEPER * max(beside):
+            continue
+        carried = []
+        if i >= 1:
+            carried.append(2 * step[i - 1] - step[i - 2] if i >= 2 else step[i - 1])
+        if i + 1 < len(step):
+            carried.append(2 * step[i + 1] - step[i + 2] if i + 2 < len(step) else step[i + 1])
+        if any(abs(step[i] - one) < 0.5 * abs(step[i]) for one in carried):
+            continue
+        if abs(step[i]) <= LEAST * max(abs(heights[i]), abs(heights[i + 1])):
+            continue
+        if abs(step[i]) <= CERTAIN * np.hypot(error[i], error[i + 1]):
+            continue
+        middle, half = 0.5 * float(x[i] + x[i + 1]), 0.5 * float(abs(x[i + 1] - x[i]))
+        found.append(Jump(middle, half, float(heights[i]), float(heights[i + 1])))
+    return found
+
+
 def match_jumps(measured: Jumps, theory: Jumps, drawn: Sequence[Jumps], unit: str, level: float) -> dict[str, Any]:
-    """Pair the jumps of each direction so that the sum of the distances is least, and say what has no partner.
+    """Pair the jumps of each direction in the order in which they are met, rises with rises and falls with falls.
+
+    Where one side has more of a kind, those stay without a partner that leave the sum of the distances least, the
+    order being kept.
 
     Parameters
     ----------
     measured, theory : mapping of direction to sequence of Jump
+        In the order of the sweep.
     drawn : sequence of such mappings
         The predicted jumps for drawn parameters.
     unit : str
@@ -41,17 +87,14 @@ def match_jumps(measured: Jumps, theory: Jumps, drawn: Sequence[Jumps], unit: st
         ``jump_difference`` (theory minus measurement), ``jump_tolerance`` (both half steps together: the difference is
         not known better), and with draws ``theory_jump_low``, ``theory_jump_high``.
     """
-    from scipy.optimize import linear_sum_assignment
-
     rows: list[tuple[str, float, float, float, float, float]] = []
     for word in dict.fromkeys([*measured, *theory]):
         seen, expected = list(measured.get(word, ())), list(theory.get(word, ()))
-        cost = np.abs(np.subtract.outer([jump.value for jump in seen], [jump.value for jump in expected]))
-        pairs = dict(zip(*linear_sum_assignment(cost), strict=True)) if seen and expected else {}
+        pairs = _pairs(seen, expected)
         for i, jump in enumerate(seen):
             other, step, *_ = expected[pairs[i]] if i in pairs else Jump(np.nan, np.nan)
             rows.append((word, jump.value, other, jump.half + step, *_interval(other, word, drawn, level)))
-        for j in sorted(set(range(len(expected))) - {int(k) for k in pairs.values()}):
+        for j in sorted(set(range(len(expected))) - set(pairs.values())):
             other, step, *_ = expected[j]
             rows.append((word, np.nan, other, step, *_interval(other, word, drawn, level)))
     words, values, others, steps, lows, highs = zip(*rows, strict=True) if rows else ((),) * 6
@@ -69,6 +112,29 @@ def match_jumps(measured: Jumps, theory: Jumps, drawn: Sequence[Jumps], unit: st
             variables[f"theory_jump_{word}"] = (over, np.array(column, dtype=float), {
                 "long_name": f"{word} end of the interval for drawn parameters", "units": unit})  # fmt: skip
     return variables
+
+
+def _pairs(seen: list[Jump], expected: list[Jump]) -> dict[int, int]:
+    """Which predicted jump belongs to which measured one."""
+    # Jumps as an experimenter read them off do not say whether the amplitude rose.
+    if any(np.isnan(jump.after) for jump in seen):
+        groups = [(list(range(len(seen))), list(range(len(expected))))]
+    else:
+        groups = [
+            tuple([i for i, jump in enumerate(side) if (jump.after > jump.before) == rises] for side in (seen, expected))
+            for rises in (False, True)
+        ]  # type: ignore[misc]
+    pairs: dict[int, int] = {}
+    for mine, theirs in groups:
+        few, many = sorted((mine, theirs), key=len)
+        values = [[jump.value for jump in side] for side in ((seen, expected) if few is mine else (expected, seen))]
+        best = min(
+            combinations(many, len(few)),
+            key=lambda chosen: sum(abs(values[0][a] - values[1][b]) for a, b in zip(few, chosen, strict=True)),
+        )
+        both = zip(few, best, strict=True)
+        pairs |= dict(both) if few is mine else {b: a for a, b in both}
+    return pairs
 
 
 def _interval(value: float, word: str, drawn: Sequence[Jumps], level: float) -> tuple[float, float]:

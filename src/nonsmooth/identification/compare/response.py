@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from nonsmooth.analysis.response import jumps_in
 from nonsmooth.analysis.sweep import sweep
 from nonsmooth.identification.compare.draws import Settings, draw_systems, drawn_variables, nominal
-from nonsmooth.identification.compare.jumps import Jump, Jumps, match_jumps
+from nonsmooth.identification.compare.jumps import Jump, Jumps, jumps_in_steps, match_jumps
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -22,9 +22,6 @@ __all__ = ["compare_response"]
 FloatArray = NDArray[np.float64]
 
 FINE = 301  # values of the predicted curve
-CERTAIN = 6.0  # a measured step is a jump only if it exceeds its standard error by this factor
-THIRD = 1 / 3  # of a predicted jump that a measured step must cover to be taken for it
-NEAR = 0.15  # and how far from it, in parts of the measured range
 
 
 def compare_response(
@@ -61,6 +58,8 @@ def compare_response(
         "measured_direction": (("run",), runs["direction"], {"long_name": "direction in which the run was reached"}),
         "measured_amplitude": (("run",), runs["amplitude"], {"long_name": "measured amplitude"}),
         "measured_amplitude_error": (("run",), runs["error"], {"long_name": "standard error of it"}),
+        "measured_period_number": (("run",), runs["period"], {
+            "long_name": "measured period number (0: none found, -1: not known)"}),
         "theory_amplitude": ((name, "direction"), curves, {"long_name": "predicted amplitude"}),
         "theory_at_run": (("run",), at_runs, {"long_name": "predicted amplitude at the run"}),
         "relative_difference": (("run",), at_runs / runs["amplitude"] - 1, {
@@ -69,7 +68,7 @@ def compare_response(
         "direction": (("direction",), np.array(directions), {"long_name": "direction of the sweep"}),
     }  # fmt: skip
     expected = _jumps(values, curves, directions)
-    seen = _measured_jumps(measured, runs, directions, expected)
+    seen = _measured_jumps(measured, runs, directions)
     drawn_jumps: list[Jumps] = []
     if system is not None and draws:
         systems, drawn = draw_systems(theory, parameters, settings, draws, seed)
@@ -92,7 +91,7 @@ def compare_response(
 
 
 def _runs(measured: xr.Dataset, name: str, state: str) -> dict[str, NDArray[Any]]:
-    """One row for each run: value, direction, amplitude, error, sorted by direction and value."""
+    """One row for each run: value, direction, amplitude, error, period number, sorted by direction and value."""
     amplitude = measured["amplitude"]
     if "state" in amplitude.dims:
         amplitude = amplitude.sel(state=state)
@@ -103,6 +102,7 @@ def _runs(measured: xr.Dataset, name: str, state: str) -> dict[str, NDArray[Any]
         value = np.tile(stacked[name].values, len(words))
         direction = np.repeat(words, stacked.sizes[name])
         heights, error = stacked.values.ravel(), np.full(stacked.size, np.nan)
+        period = np.full(stacked.size, -1)
     else:
         if amplitude.ndim != 1 or name not in measured:
             raise ValueError(
@@ -116,12 +116,15 @@ def _runs(measured: xr.Dataset, name: str, state: str) -> dict[str, NDArray[Any]
         )  # fmt: skip
         has_error = "amplitude_error" in measured
         error = np.asarray(measured["amplitude_error"].values, float) if has_error else np.full(len(value), np.nan)
+        known = "period_number" in measured
+        period = np.asarray(measured["period_number"].values) if known else np.full(len(value), -1)
     good = np.isfinite(value) & np.isfinite(heights)
     order = np.lexsort((value, direction))
     order = order[good[order]]
     if not len(order):
         raise ValueError("the measured response has no run with a finite amplitude")
-    return {"value": value[order], "direction": direction[order], "amplitude": heights[order], "error": error[order]}
+    columns = {"value": value, "direction": direction, "amplitude": heights, "error": error, "period": period}
+    return {key: column[order] for key, column in columns.items()}
 
 
 def _curves(
@@ -172,37 +175,20 @@ def _jump(x: FloatArray, heights: FloatArray, i: int) -> Jump:
     return Jump(middle, half, float(heights[i]), float(heights[i + 1]))
 
 
-def _measured_jumps(
-    measured: xr.Dataset, runs: dict[str, NDArray[Any]], directions: list[str], expected: Jumps
-) -> Jumps:
-    """The jumps that the measurement states, else those in its steps.
-
-    Runs are often so far apart that a jump is not steeper than its neighbours by much. A step is a jump, too, if it
-    passes the middle of a predicted one, over a third of its height, near it.
-    """
+def _measured_jumps(measured: xr.Dataset, runs: dict[str, NDArray[Any]], directions: list[str]) -> Jumps:
+    """The jumps that the measurement states, else those in its steps; the prediction has no say in it."""
     found: dict[str, list[Jump]] = {}
     if "jump_value" in measured and "run" in measured["amplitude"].dims:  # as the experimenter read them off
         words = measured["jump_direction"].values.astype(str)
         half = 0.5 * measured["jump_step"].values if "jump_step" in measured else np.zeros(len(words))
         for word in directions:
             rows = zip(measured["jump_value"].values, half, words, strict=True)
-            found[word] = [Jump(float(value), float(step), np.nan, np.nan) for value, step, w in rows if w == word]
+            stated = [Jump(float(value), float(step), np.nan, np.nan) for value, step, w in rows if w == word]
+            found[word] = sorted(stated, key=lambda jump: jump.value, reverse=word == "down")
         return found
     for word in directions:
         mine = runs["direction"] == word
         order = np.argsort(runs["value"][mine])[:: 1 if word == "up" else -1]
-        x, heights = runs["value"][mine][order], runs["amplitude"][mine][order]
-        error = np.nan_to_num(runs["error"][mine][order])
-        steps = set(jumps_in(heights))
-        for jump in expected.get(word, ()):
-            middle, rise = 0.5 * (jump.before + jump.after), jump.after - jump.before
-            passing = (heights[:-1] - middle) * (heights[1:] - middle) < 0
-            passing &= np.diff(heights) / rise > THIRD if rise else False
-            near = np.abs(0.5 * (x[:-1] + x[1:]) - jump.value) < NEAR * (x.max() - x.min())
-            if (passing & near).any():
-                steps.add(min(np.flatnonzero(passing & near).tolist(), key=lambda i: abs(x[i] - jump.value)))
-        found[word] = [
-            _jump(x, heights, i) for i in sorted(steps)
-            if abs(heights[i + 1] - heights[i]) > CERTAIN * np.hypot(error[i], error[i + 1])
-        ]  # fmt: skip
+        columns = (runs[key][mine][order] for key in ("value", "amplitude", "error"))
+        found[word] = jumps_in_steps(*(np.nan_to_num(column) for column in columns))
     return found

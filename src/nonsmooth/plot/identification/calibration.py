@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.plot import style
-from nonsmooth.plot.comparison import MEASURED, measured_label
+from nonsmooth.plot.comparison import ABOVE, MEASURED, measured_label
 from nonsmooth.plot.identification.findings import data_of, number, with_error
 from nonsmooth.plot.identification.residuals import residual_strip
 from nonsmooth.plot.labels import name_with_unit
@@ -42,13 +42,14 @@ def calibration(finding: Any, ax: Axes | None = None) -> Axes:
                     at, data["fitted_low"].values, data["fitted_high"].values, color=style.COLORS["first"], alpha=0.25,
                     linewidth=0, label="95 % band",
                 )  # fmt: skip
-            drawn.plot(at, data["fitted"].values, color=style.COLORS["first"], label=_law(data))
+            drawn.plot(at, data["fitted"].values, color=style.COLORS["first"], label="fitted")
         drawn.errorbar(
             setting, reading, yerr=error, fmt="o", color=MEASURED, markersize=2.8,
             elinewidth=0.6, label=measured_label(data), zorder=4,
         )  # fmt: skip
         drawn.margins(x=0.03)
-        drawn.legend(loc="upper left")
+        drawn.legend(**ABOVE, ncols=3, columnspacing=1.0)
+        drawn.annotate(_law(data), (0.97, 0.36), xycoords="axes fraction", ha="right", fontsize="small")
         drawn.set(xlabel=_axis(data, "setting").replace("(m)", "(mm)"), ylabel=_axis(data, "reading"))
         if "fitted" in data:
             left = reading - np.interp(setting, at, data["fitted"].values)
@@ -68,7 +69,7 @@ def _axis(data: xr.Dataset, name: str) -> str:
 def _law(data: xr.Dataset) -> str:
     slope = number(data, "slope")
     if not np.isfinite(slope):
-        return "fitted"
+        return ""
     slope_error, offset = number(data, "slope_error"), -number(data, "intercept") / slope
     units = [str(data[name].attrs.get("units", "")) for name in ("reading", "setting")]
     per = f"{units[0]}/{units[1]}" if all(units) and "/" not in units[0] else f"{units[0]} per {units[1]}"

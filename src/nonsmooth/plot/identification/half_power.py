@@ -46,7 +46,7 @@ def half_power(finding: Any, ax: Axes | None = None) -> Axes:
         ratio = with_error(number(data, "damping_ratio"), number(data, "damping_ratio_error"))
         drawn.annotate(
             rf"$\xi$ = {ratio}" + "\n" + rf"$c$ = {with_error(number(data, 'c'), number(data, 'c_error'), 'N s/m')}",
-            (0.03, 0.95), xycoords="axes fraction", va="top", fontsize="small",
+            (0.97, 0.95), xycoords="axes fraction", ha="right", va="top", fontsize="small",
         )  # fmt: skip
         drawn.set_ylim(bottom=0)
         drawn.margins(x=0.02)

@@ -65,10 +65,11 @@ def impulse_response(finding: Any, ax: Axes | None = None) -> Axes:
                     value, ymax=0.5, color=style.COLORS[color], linestyle=line, linewidth=1.0,
                     label=f"{word} {_both(value)}",
                 )  # fmt: skip
+        unit = "mm s" if data["magnitude"].attrs.get("units") == "m s" else "mm"
         drawn.set_ylim(0, 2.1 * heights.max())
         drawn.legend(loc="upper right", handlelength=1.6)
         drawn.margins(x=0.02)
-        drawn.set(xlabel="frequency (Hz)", ylabel="magnitude (mm)")
+        drawn.set(xlabel="frequency (Hz)", ylabel=f"magnitude ({unit})")
     return drawn
 
 

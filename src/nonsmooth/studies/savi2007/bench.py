@@ -1,8 +1,9 @@
 """The rig's figures are measured by a process of their own, beside the numerical ones.
 
 Reading and smoothing records is Python with short compiled pieces, the sweeps are compiled and use all cores: two
-processes take little more than the longer of both. ``python -m nonsmooth.studies.savi2007.bench FOLDER NAME ...`` is
-that process; it writes the figures' datasets and ``rig/measured.json``, in which their keys and times stand.
+processes take little more than the longer of both. That process runs :func:`main`; it writes the figures' datasets and
+``rig/measured.json``, in which their keys and times stand. It is a fresh interpreter, not a fork: compiled kernels that
+run in threads cannot be forked, and a caller's script is not run a second time.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
     from nonsmooth.studies.savi2007.figure import Figure
 
-__all__ = ["Bench", "measure"]
+__all__ = ["Bench", "main", "measure"]
 
 RIG = "rig"
 _MANIFEST, _LOG = "measured.json", "log.txt"
@@ -35,7 +36,8 @@ class Bench:
         self.process: subprocess.Popen[bytes] | None = None
         if figures:
             (folder / RIG).mkdir(parents=True, exist_ok=True)
-            command = [sys.executable, "-m", __name__, str(folder), *(figure.name for figure in figures)]
+            run = f"from {__name__} import main; main()"
+            command = [sys.executable, "-c", run, str(folder), *(figure.name for figure in figures)]
             with open(folder / RIG / _LOG, "wb") as log:
                 self.process = subprocess.Popen(
                     command + (["--quick"] if quick else []), stdin=subprocess.DEVNULL, stdout=log,
@@ -97,14 +99,11 @@ def measure(folder: Path, names: Sequence[str], quick: bool) -> None:
     (folder / RIG / _MANIFEST).write_text(json.dumps(manifest, indent=1) + "\n", encoding="utf-8")
 
 
-def _main() -> None:
+def main() -> None:
+    """Measure the figures named on the command line."""
     parser = argparse.ArgumentParser(description="Measure figures of Savi et al. (2007) on the virtual rig.")
     parser.add_argument("folder", type=Path)
     parser.add_argument("names", nargs="+")
     parser.add_argument("--quick", action="store_true")
     options = parser.parse_args()
     measure(options.folder, options.names, options.quick)
-
-
-if __name__ == "__main__":
-    _main()

@@ -37,8 +37,8 @@ class Number:
 
     def times(self, factor: float, unit: str = "") -> Number:
         """The number in another unit."""
-        rest = (self.uncertainty * abs(factor), *sorted((self.low * factor, self.high * factor)))
-        return Number(self.value * factor, *rest, unit or self.unit)
+        low, high = sorted((self.low * factor, self.high * factor))
+        return Number(self.value * factor, self.uncertainty * abs(factor), low, high, unit or self.unit)
 
     def __str__(self) -> str:
         return f"{self.interval} {self.unit}".rstrip()

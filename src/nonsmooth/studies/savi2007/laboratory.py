@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from nonsmooth.identification.parameter_set import ParameterSet
     from nonsmooth.system.system import System
 
-__all__ = ["SEED", "TRUTH", "Laboratory", "with_support"]
+__all__ = ["SEED", "TRUTH", "Laboratory"]
 
 SEED = 0  # of the rig's noise; its parameters are the published ones
 TRUTH = "truth.toml"
@@ -94,7 +94,6 @@ class Laboratory:
         turning = max(float(np.abs(np.diff(tap.values) / np.diff(tap["time"].values)).max()) for tap in taps)
         values = {
             "rate": (1 / float(np.median(steps)), "Hz", "sample rate"),
-            "rate_spread": (float(steps.std() / np.mean(steps)), "", "scatter of the sampling step, relative"),
             "angle_step": (float(np.degrees(found_resolution(angle))), "deg", "step of the rotary sensor"),
             "force_step": (float(found_resolution(force)), "N", "step of the force sensor"),
             "force_used": (max(float(np.abs(one.values).max()) for one in pushed), "N", "largest force recorded"),
@@ -114,6 +113,11 @@ class Laboratory:
         title = f"virtual rig with the published parameters, {name}"
         folder = write_session(self.rig, self.folder / name, made, self.folder / TRUTH, title=title)
         return load_session(folder)
+
+    def with_support(self, session: Session, procedure: str) -> list[str]:
+        """The runs of a procedure in which the support was mounted."""
+        with self._noted():
+            return [item.run for item in session.recordings(procedure) if "gap" in item.settings]
 
     def measured(
         self, session: Session, procedure: str, runs: str | Sequence[str] | None = None
@@ -165,8 +169,3 @@ class Laboratory:
         for item in caught:
             if not issubclass(item.category, RecordingWarning):
                 warnings.warn_explicit(item.message, item.category, item.filename, item.lineno)
-
-
-def with_support(session: Session, procedure: str) -> list[str]:
-    """The runs of a procedure in which the support was mounted."""
-    return [item.run for item in session.recordings(procedure) if "gap" in item.settings]

@@ -54,7 +54,8 @@ def _blocks(
             "nonlinear dynamics and chaos in non-smooth systems, J. Sound Vib. 301 (2007) 59-73, "
             "doi:10.1016/j.jsv.2006.09.014. Every statement is measured here on the paper's own model with the "
             "parameters of its Table 1, none of them tuned: by the exact flow, and by the paper's smoothed switch with "
-            f"eta = {ETA:g} m, integrated by Runge-Kutta-Fehlberg at rtol = {SMOOTHED.options['rtol']:g}. Written by nonsmooth {package_version()}; all numbers are read off the "
+            f"eta = {ETA:g} m, integrated by Runge-Kutta-Fehlberg at rtol = {SMOOTHED.options['rtol']:g}. Written by "
+            f"nonsmooth {package_version()}; all numbers are read off the "
             "datasets beside this file."
         ),
     ]

@@ -29,7 +29,7 @@ def _compute_11(settings: Settings) -> dict[str, xr.Dataset]:
     bench, data = settings.bench, {}
     for duration in RISES[:2] if settings.quick else RISES:
         session = bench.record(f"fig11_{duration:g}_s", bench.rig.figure(11, duration=duration))
-        measured, set_ = bench.measured(session, "rise", session.recordings("rise")[0].run)
+        measured, set_ = bench.measured(session, "rise", bench.with_support(session, "rise"))
         fine = 121 if settings.quick else 301
         data[f"{duration:g}"] = bench.compare(
             measured, set_, parameter="rho", direction="up", values=np.linspace(0.2, 0.5, fine)

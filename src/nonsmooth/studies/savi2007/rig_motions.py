@@ -12,7 +12,6 @@ from nonsmooth import plot
 from nonsmooth.plot.comparison import MEASURED, THEORY
 from nonsmooth.results.provenance import ATTRIBUTE, package_version
 from nonsmooth.studies.savi2007.figure import sheet
-from nonsmooth.studies.savi2007.laboratory import with_support
 from nonsmooth.studies.savi2007.measure import APERIODIC
 
 if TYPE_CHECKING:
@@ -41,7 +40,7 @@ def motions(bench: Laboratory, number: int, values: Sequence[float], **options: 
     """
     session = bench.record(f"fig{number:02d}", bench.rig.figure(number, **options))
     found = {}
-    for i, run in enumerate(with_support(session, "section")):
+    for i, run in enumerate(bench.with_support(session, "section")):
         again, place = divmod(i, len(values))
         key = f"{values[place]:g}" + (f"_{again + 1}" if again else "")
         found[key] = bench.measured(session, "section", run)
@@ -81,7 +80,7 @@ def diagram_of(found: Motions, parameter: str) -> tuple[xr.Dataset, dict[str, An
 
 
 def runs_of(found: Motions, parameter: str) -> xr.Dataset:
-    """Of each motion the parameter's ``setting`` and measured ``value``, the ``period_number`` and whether the car touched the support."""
+    """Of each motion: the parameter's ``setting`` and measured ``value``, ``period_number``, ``contact`` (0 or 1)."""
     import xarray as xr
 
     from nonsmooth.identification.compare.fold import fold

@@ -50,16 +50,18 @@ def _side_by_side(
             axes = np.atleast_1d(canvas.subplots(1, len(parts)))
             for ax, (key, picture, title) in zip(axes, parts, strict=True):
                 picture(data[key], ax)
-                # some pictures have their legend above the axes
-            ax.set_title(title, loc="left", pad=6 if ax.get_legend() is None or not _above(ax) else 16)
+                ax.set_title(title, loc="left", pad=16 if _legend_above(ax) else 6)
         return canvas
 
     return draw
 
 
-def _above(ax: Axes) -> bool:
-    """Whether the legend stands above the axes."""
-    box = ax.get_legend().get_bbox_to_anchor()
+def _legend_above(ax: Axes) -> bool:
+    """Whether the legend stands above the axes, where the title would be."""
+    legend = ax.get_legend()
+    if legend is None:
+        return False
+    box = legend.get_bbox_to_anchor()
     return bool(box.transformed(ax.transAxes.inverted()).y0 >= 0.99)
 
 
