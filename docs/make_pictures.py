@@ -1,8 +1,9 @@
-"""Draw the pictures of the documentation: one per example, and that of the first page from that page's own code.
+"""Draw the pictures of the documentation: one per example, and some from a page's own code.
 
-Run it from anywhere: ``python docs/make_pictures.py``. It takes some ten seconds (longer the first time) and writes
-``docs/pictures/*.png``, which are kept with the source so that the pages can be built without computing anything.
-Examples of measured data need the environment variable NONSMOOTH_DATA; without it their pictures stay as they are.
+Run it from anywhere: ``python docs/make_pictures.py``, with names of pictures for some of them only. It takes some ten
+seconds (longer the first time) and writes ``docs/pictures/*.png``, which are kept with the source so that the pages can
+be built without computing anything. Examples of measured data need the environment variable NONSMOOTH_DATA; without it
+their pictures stay as they are.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import contextlib
 import os
 import re
 import runpy
+import sys
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -39,15 +41,21 @@ def first_code(page: Path) -> str:
     return found[1]
 
 
-def main() -> None:
-    """All pictures."""
+def main(wanted: list[str]) -> None:
+    """The pictures named, or all."""
     mpl.use("Agg")
     PICTURES.mkdir(exist_ok=True)
-    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
-        names: dict[str, Any] = {}
-        exec(first_code(DOCS / "start.md"), names)
-        keep(names["ax"], "start")
+    for page in ("start", "guides/signals"):
+        stem = Path(page).name
+        if wanted and stem not in wanted:
+            continue
+        with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+            names: dict[str, Any] = {}
+            exec(first_code(DOCS / f"{page}.md"), names)
+            keep(names["ax"], stem)
     for path in sorted((DOCS.parent / "examples").glob("*.py")):
+        if wanted and path.stem not in wanted:
+            continue
         example = runpy.run_path(str(path))
         needs = example.get("NEEDS", "")
         if needs and not (Path(os.environ.get("NONSMOOTH_DATA", "")) / needs).is_file():
@@ -59,4 +67,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])

@@ -1,9 +1,9 @@
 """A real beam with a friction joint: natural frequency and damping over amplitude, from twelve forced responses.
 
 Four curves under (roughly) constant force, eight under constant acceleration, which would hold an unstable middle part
-if there were one (M. Cenedese's measurements, distributed with T. Breunung and B. Balachandran, J. Sound Vib. (2024)
-118651; github.com/tbreunung/FrID, MIT licence). The environment variable NONSMOOTH_DATA names the folder with
-``FrID_jointed_beam_ForcedFrequencyResponses.mat``.
+if there were one (measured by M. Cenedese, github.com/mattiacenedese/BRBtesting; distributed with T. Breunung and
+B. Balachandran, J. Sound Vib. (2024) 118651, github.com/tbreunung/FrID, MIT licence). The environment variable
+NONSMOOTH_DATA names the folder with ``FrID_jointed_beam_ForcedFrequencyResponses.mat``.
 """
 
 from __future__ import annotations

@@ -72,7 +72,7 @@ def test_points_of_the_middle_part_alone_are_enough() -> None:
         here = overhang(c) < 0
         parts.append(ResponseCurve(c.name, c.frequency[here], c.amplitude[here], c.force[here], c.phase[here]))
         assert np.count_nonzero(here) > 20
-    finding, mode = amplitude_dependent(parts, knots=4)
+    finding, _ = amplitude_dependent(parts, knots=4)
     a = finding.data.amplitude.values
     np.testing.assert_allclose(finding.data.f_n, np.sqrt(square(a)) / (2 * np.pi), rtol=1e-7)
     assert finding.data.unstable.all()

@@ -1,4 +1,4 @@
-"""``nonsmooth compare STUDY.toml``: a measurement of a session against a model, as numbers and as a picture."""
+"""``nonsmooth compare STUDY.toml`` or a session folder: measurements against a model, as numbers and as a picture."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["add"]
 
 _TABLES = ("system", "identified", "measured", "compare", "output")
 _KEYS = {
-    "system": ("model", "parameters", "smoothed"), "identified": ("data",),
+    "system": ("model", "parameters", "smoothed"), "identified": ("data", "session"),
     "measured": ("session", "procedure", "run", "crank_force", "gap_offset", "referred"),
     "output": ("data", "figure", "picture", "x", "y"),
 }  # fmt: skip
@@ -39,24 +39,68 @@ def add(commands: Any) -> None:
         description="Lay a measurement of a session over a model, as the study file describes it: [system], "
         "[identified], [measured], [compare], [output]. Paths in the file are relative to the file.",
     )
-    parser.add_argument("study", type=Path, metavar="STUDY.toml", help="the study file")
+    parser.add_argument(
+        "study", type=Path, metavar="STUDY.toml",
+        help="the study file; or a session folder: all that it holds is compared, run by run, and no file is written",
+    )  # fmt: skip
+    parser.add_argument("--model", default="discontinuous_support", help="the model for a session folder")
+    parser.add_argument("--identified", type=Path, metavar="FILE", help="identified parameters for a session folder")
+    parser.add_argument(
+        "--identified-from", type=Path, metavar="SESSION",
+        help="the session that they were identified from: its screw readings tell the screw's zero",
+    )  # fmt: skip
     parser.add_argument("--quiet", action="store_true", help="no summary")
     parser.set_defaults(run=_run)
 
 
 def _run(options: argparse.Namespace) -> int:
+    if options.study.is_dir():
+        return _run_folder(options)
+    if options.identified is not None or options.identified_from is not None:
+        raise ValueError("--identified and --identified-from go with a session folder; a study file has [identified]")
+    return _run_study(_read(options.study), options.study.parent, options.quiet)
+
+
+def _run_folder(options: argparse.Namespace) -> int:
+    """Everything in a session that a model can be laid over: a response, a rise, and each section by itself."""
+    from nonsmooth.experiment.session import load_session
+    from nonsmooth.identification.compare.notebook import SHOWS
+
+    here = Path()
+    session = load_session(options.study)
+    wanted: list[dict[str, Any]] = []
+    for procedure in session.procedures:
+        runs = [item for item in session.recordings(procedure) if "gap" in item.settings]
+        if not runs or procedure not in SHOWS:
+            continue
+        shown: list[dict[str, Any]] = [{}] if SHOWS[procedure] != "motion" else [{"run": item.run} for item in runs]
+        wanted += [{"session": str(options.study.resolve()), "procedure": procedure, **one} for one in shown]
+    if not wanted:
+        raise ValueError(
+            f"{options.study}: has no run with the support mounted; it has: {', '.join(session.procedures)}"
+        )
+    study: dict[str, Any] = {"system": {"model": options.model}}
+    if options.identified is not None:
+        study["identified"] = {"data": str(options.identified.resolve())}
+        if options.identified_from is not None:
+            study["identified"]["session"] = str(options.identified_from.resolve())
+    for measured in wanted:
+        _run_study({**study, "measured": measured}, here, options.quiet, keep=False)
+    return 0
+
+
+def _run_study(study: Mapping[str, Any], folder: Path, quiet: bool, keep: bool = True) -> int:
     from nonsmooth.experiment.session import load_session
     from nonsmooth.identification.compare import compare, session_measurement
 
-    study = _read(options.study)
-    folder = options.study.parent
     system, parameters = _theory(study, folder)
     table = dict(study["measured"])
     session = load_session(folder / table.pop("session"))
     procedure, runs = table.pop("procedure"), table.pop("run", None)
     k = float((parameters or system.values).get("k", system.values.get("k", 1.0)))
     if "gap_offset" not in table and "gap_at_rest" in getattr(parameters, "extra", {}):
-        table["gap_offset"] = _offset(parameters, session)
+        source = study["identified"].get("session")
+        table["gap_offset"] = _offset(parameters, session if source is None else load_session(folder / source))
     measured, settings = session_measurement(session, procedure, runs, k=k, **table)
     given = dict(study.get("compare", {}))
     settings |= given.pop("settings", {})
@@ -65,19 +109,20 @@ def _run(options: argparse.Namespace) -> int:
         given.setdefault("direction", "up")
     result = compare(measured, system, parameters=parameters, settings=settings, **given)
     written = _write(result, study.get("output", {}), folder)
-    if not options.quiet:
+    if not quiet:
         print(_summary(result))
         for path in written:
             print(f"written to {path}")
-        if not written:
+        if keep and not written:
             print("nothing was kept: the file has no [output] with `data` or `figure`")
     return 0
 
 
-def _offset(parameters: Any, session: Any) -> float:
-    """What the gap identified from the runs with contact is more than the screw read in them; 0 without such runs."""
-    readings = {run.settings["gap"] for run in session.recordings("contact")}
-    return float(parameters.extra["gap_at_rest"]) - readings.pop() if len(readings) == 1 else 0.0
+def _offset(parameters: Any, session: Any) -> float | tuple[float, float]:
+    """What the identified gap is more than the screw read; 0 where the session has no runs with contact."""
+    from nonsmooth.identification.compare import gap_offset
+
+    return gap_offset(parameters, session) if session.recordings("contact") else 0.0
 
 
 def _read(path: Path) -> dict[str, Any]:

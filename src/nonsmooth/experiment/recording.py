@@ -133,7 +133,8 @@ class Recording:
             run = self.runs[0]
         if run not in self.runs:
             raise ValueError(f"no run {run!r}; there are: {', '.join(self.runs)}")
-        here = [(channel, array) for r, _, channel, array in self._all() if r == run]
+        leaves = [leaf.to_dataset() for leaf in self.tree.children[run].children.values()]
+        here = [(str(channel), array) for leaf in leaves for channel, array in leaf.data_vars.items()]
         for attribute in (None, "long_name", "measurement"):
             fits = [a for c, a in here if name == (c if attribute is None else a.attrs.get(attribute))]
             if len(fits) == 1:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from nonsmooth.experiment.signals.phase import drive_phase
 from nonsmooth.identification.evidence import Run
 from nonsmooth.identification.finding import Estimate, Finding
-from nonsmooth.identification.lines import StraightLine, york
+from nonsmooth.identification.lines import StraightLine, scattered_line
 from nonsmooth.identification.steady import harmonics_of
 from nonsmooth.identification.uncertainty import coverage_factor, uniform
 
@@ -58,17 +58,16 @@ def voltage_frequency(runs: Sequence[Run], *, voltage_error: float = 0.0) -> Fin
     drives = [drive_phase(run.passages) for run in runs]
     omega = np.array([drive.omega for drive in drives])
     error = np.array([drive.omega_error for drive in drives])
-    line = york(volts, omega, voltage_error, error)
-    widened = max(1.0, float(np.sqrt(line.reduced)))
+    line, scatter = scattered_line(volts, omega, voltage_error, error)
     slope, intercept = line.slope, line.intercept
     offset = -intercept / slope
-    block = _block(line) * widened**2
+    block = _block(line)
     # slope, offset = -intercept / slope, intercept
     jacobian = np.array([[1.0, 0.0], [intercept / slope**2, -1 / slope], [0.0, 1.0]])
     covariance = jacobian @ block @ jacobian.T
     errors = np.sqrt(np.diag(covariance))
     notes = [f"the motor turns from {offset:.3f} V on; omega = {slope:.5g} rad/(s V) x (V - {offset:.4g} V)"]
-    notes += _scatter(line, len(runs))
+    notes += _scatter(scatter, error, "rad/s")
     return Finding(
         "voltage_frequency", Estimate(slope, float(errors[0]), "rad/(s V)"),
         "straight line with an offset through the frequencies that the photogate tells (Fig. 8a)",
@@ -77,7 +76,7 @@ def voltage_frequency(runs: Sequence[Run], *, voltage_error: float = 0.0) -> Fin
             "offset": Estimate(offset, float(errors[1]), "V"),
             "intercept": Estimate(intercept, float(errors[2]), "rad/s"),
         },
-        covariance, _data(volts, omega, error * widened, line, block, ("motor voltage", "V"),
+        covariance, _data(volts, omega, np.hypot(error, scatter), line, block, ("motor voltage", "V"),
                           ("frequency", "rad/s"), runs), "calibration",
     )  # fmt: skip
 
@@ -114,9 +113,8 @@ def crank_force(
     for i, run in enumerate(runs):
         fitted = harmonics_of(run, np.asarray(run.force["time"].values, dtype=np.float64), run.force)[0]
         force[i], error[i] = float(fitted.amplitudes[0]), float(fitted.amplitude_errors[0])
-    line = york(length, force, length_error, error)
-    widened = max(1.0, float(np.sqrt(line.reduced)))
-    block = _block(line) * widened**2
+    line, scatter = scattered_line(length, force, length_error, error)
+    block = _block(line)
     type_a, half = float(np.sqrt(block[0, 0])), gain_limit * line.slope
     total = float(np.hypot(type_a, uniform(half)))
     notes = [
@@ -126,7 +124,7 @@ def crank_force(
     if k is not None:
         off = (line.slope - k.value) / np.hypot(total, k.uncertainty)
         notes.append(f"k = {k} from elsewhere: {100 * (line.slope / k.value - 1):+.2f} %, {abs(off):.1f} uncertainties")
-    notes += _scatter(line, len(runs))
+    notes += _scatter(scatter, error, "N")
     return Finding(
         "crank_force", Estimate(line.slope, total, "N/m", half_width=half),
         "straight line through the fundamentals of the force on the held car (Fig. 8b)",
@@ -135,7 +133,7 @@ def crank_force(
             "slope_a": Estimate(line.slope, type_a, "N/m"),
             "intercept": Estimate(line.intercept, float(np.sqrt(block[1, 1])), "N"),
         },
-        data=_data(length, force, error * widened, line, block, ("crank length", "m"),
+        data=_data(length, force, np.hypot(error, scatter), line, block, ("crank length", "m"),
                    ("forcing amplitude", "N"), runs), plot="calibration",
     )  # fmt: skip
 
@@ -150,12 +148,12 @@ def _block(line: StraightLine) -> FloatArray:
     return np.array([[line.slope_error**2, line.covariance], [line.covariance, line.intercept_error**2]])
 
 
-def _scatter(line: StraightLine, n: int) -> list[str]:
-    if line.reduced <= 4:
+def _scatter(scatter: float, error: FloatArray, unit: str) -> list[str]:
+    if scatter <= 2 * float(np.median(error)):
         return []
     return [
-        f"the {n} points scatter {np.sqrt(line.reduced):.1f} times wider about the line than their errors say; the "
-        "uncertainties are widened by that"
+        f"the points scatter by {scatter:.2g} {unit} about the line, more than their own errors, {np.median(error):.2g} "
+        f"{unit}; it is taken as common to all"
     ]
 
 

@@ -34,6 +34,7 @@ __all__ = ["grazing_gap"]
 FloatArray = NDArray[np.float64]
 _FIRST = 4  # runs that must be free
 _SIGMAS = 5.0  # by which the mean must leave its place
+_STEADY = 0.5  # counts: by which the mean of free runs may move
 _COUNTS = 0.06  # and by how much of a count: what the mean of a run can be off by rounding
 
 
@@ -118,17 +119,19 @@ def _touching(seen: Steady, resolution: float) -> tuple[NDArray[np.bool_], float
     turn = np.sign(np.diff(seen.omega))
     if not np.all(turn == turn[0]):
         raise ValueError("the frequency does not go one way from run to run: give the steps of one direction")
+    if float(np.std(seen.mean[:_FIRST], ddof=1)) > _STEADY * resolution:
+        raise ValueError(
+            f"the mean position moves among the first {_FIRST} runs: they touch already, or are not steady; begin "
+            "farther away from resonance, in free motion (where contact ends is not where it begins)"
+        )
     begun, limit = _FIRST, 0.0
     for _ in range(3):  # the scatter of the means from the free runs, the free runs from the scatter
         free = seen.mean[:begun]
         limit = max(_SIGMAS * float(np.std(free, ddof=1)), _COUNTS * resolution)
         near = np.flatnonzero(np.abs(seen.mean - float(np.mean(free))) <= limit)
         begun = max(int(near[-1]) + 1 if len(near) else 0, _FIRST)
-    if begun == n or len(near) < _FIRST:
-        what = "none touches" if begun == n else f"the first {_FIRST} do already"
-        raise ValueError(
-            f"of the {n} runs {what}: step from free motion into contact (where contact ends is not where it begins)"
-        )
+    if begun == n:
+        raise ValueError(f"none of the {n} runs touches: step on from free motion into contact")
     return np.arange(n) >= begun, limit
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from nonsmooth.identification.uncertainty import correlated
 
-__all__ = ["LinearLaw", "StraightLine", "linear_law", "york"]
+__all__ = ["LinearLaw", "StraightLine", "linear_law", "scattered_line", "york"]
 
 FloatArray = NDArray[np.float64]
 
@@ -74,6 +74,31 @@ def york(x: Any, y: Any, x_error: Any, y_error: Any) -> StraightLine:
         slope, intercept, float(np.sqrt(slope_var)), float(np.sqrt(intercept_var)), float(-centre * slope_var),
         chi2 / max(len(xs) - 2, 1),
     )  # fmt: skip
+
+
+def scattered_line(x: Any, y: Any, x_error: Any, y_error: Any) -> tuple[StraightLine, float]:
+    """The line through points that scatter more than their errors say: with the scatter that all have in common.
+
+    Returns the line and that scatter, the standard deviation s in y which, added to every error, brings chi^2 to its
+    expectation; 0 where the errors do. Widening all errors by one factor instead would leave the weight with the points
+    whose own errors are smallest.
+
+    References: R.C. Paule and J. Mandel, J. Res. Natl. Bur. Stand. 87 (1982) 377.
+    """
+    ys = np.asarray(y, dtype=np.float64)
+    own = np.broadcast_to(np.asarray(y_error, dtype=np.float64), ys.shape)
+
+    def fitted(s: float) -> StraightLine:
+        return york(x, ys, x_error, np.hypot(own, s))
+
+    line = fitted(0.0)
+    if len(ys) < 3 or line.reduced <= 1:
+        return line, 0.0
+    from scipy.optimize import brentq
+
+    high = float(np.std(ys - np.polyval(np.polyfit(x, ys, 1), x))) * np.sqrt(len(ys)) + float(own.max())
+    s = float(brentq(lambda s: fitted(s).reduced - 1.0, 0.0, high, xtol=1e-4 * high))
+    return fitted(s), s
 
 
 class LinearLaw(NamedTuple):

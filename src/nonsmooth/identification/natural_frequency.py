@@ -6,8 +6,8 @@ is the 15th value of a DFT of 2048 samples at 100 Hz, whose values stand 0.0488 
 
 Between the grid's values the transform of the whole record is known too. Its peak is not the natural frequency
 either: that of a tap, :math:`|X| \propto [(\omega_0^2 - \omega^2)^2 + b^2\omega^2]^{-1/2}`, stands at
-:math:`\sqrt{\omega_0^2 - b^2/2}`, 1.3 % below for the paper's damping (and the grid's largest value at 4.295); that of a
-car let go from a displacement, :math:`|X| \propto [(\omega^2 + b^2)/\ldots]^{1/2}`, within 0.1 % of :math:`\omega_0`
+:math:`\sqrt{\omega_0^2 - b^2/2}`, 1.3 % below for the paper's damping (and the grid's largest value at 4.295); that of
+a car let go from a displacement, :math:`|X| \propto [(\omega^2 + b^2)/\ldots]^{1/2}`, within 0.1 % of :math:`\omega_0`
 (and the grid's largest at 4.602, as the paper has it). Dry friction moves it further, 0.6 % down for 5 mN and a tap.
 So the value stated is that of the fit in the time domain.
 """

@@ -63,14 +63,16 @@ def test_errors_cover_noise() -> None:
         rng = np.random.default_rng(100 + seed)
         place[:, 2] += 5e-4 * rng.standard_normal(len(t))
         free = flights(t, place[:, 2])
-        if free.sizes["flight"] == 2:
-            one = corner_restitution(t, place, q, cube(), free).isel(impact=0)
+        if free.sizes["flight"] != 2:
+            continue
+        found = corner_restitution(t, place, q, cube(), free)
+        for one in (found.isel(impact=k) for k in range(found.sizes["impact"])):
             z.append((float(one.restitution) - E) / np.hypot(one.restitution_error, one.half_sample / 7))
     assert len(z) > 20 and np.sqrt(np.mean(np.square(z))) < 2
 
 
 def test_a_ball_needs_its_height_only() -> None:
-    t = np.arange(300) / RATE
+    t = np.arange(170) / RATE  # the bounces end at 1.43 s
     times, speeds = [0.0], [40.0]
     while times[-1] < t[-1]:
         times.append(times[-1] + 2 * speeds[-1] / G)

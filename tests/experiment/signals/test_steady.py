@@ -50,5 +50,6 @@ def test_the_bound_bounds() -> None:
 def test_too_short_says_whose_and_what_to_do() -> None:
     t, x = record(0.0, 0, duration=0.5)
     signal = xr.DataArray(x, {"time": t}, ("time",), "Strain", {"run": "Run #3", "long_name": "Strain"})
-    with pytest.raises(ValueError, match=r"run 'Run #3', channel 'Strain': holds 10 periods; at least 15 .* record longer"):
+    expected = r"run 'Run #3', channel 'Strain': holds 10 periods; at least 15 .* record longer"
+    with pytest.raises(ValueError, match=expected):
         steady_response(t, signal)

@@ -124,8 +124,8 @@ def corner_restitution(
         after = _Flight(t, place, turns, slice(j, min(int(last[k + 1]), j + window - 1) + 1), fall)
         corner = int(np.argmin(before.heights(0.5 * (t[i] + t[j]), points)))
         grid = np.linspace(t[i], t[j], 41)
-        apart = [before.heights(s, points)[corner] - after.heights(s, points)[corner] for s in grid]
-        when = float(grid[int(np.argmin(np.abs(apart)))])
+        apart = np.array([before.heights(s, points)[corner] - after.heights(s, points)[corner] for s in grid])
+        when = _nearest_zero(grid, apart)
         heights = before.heights(when, points)
         v0, e0 = before.velocity(when, points[corner])
         v1, e1 = after.velocity(when, points[corner])
@@ -162,6 +162,15 @@ def corner_restitution(
         },
         attrs={"left_out": left_out},
     )
+
+
+def _nearest_zero(t: Floats, y: Floats) -> float:
+    """Where y vanishes, between two of its samples; where it does not, the sample nearest to zero."""
+    k = np.flatnonzero(np.sign(y[:-1]) != np.sign(y[1:]))
+    if len(k) == 0:
+        return float(t[int(np.argmin(np.abs(y)))])
+    i = int(k[0])
+    return float(t[i] + (t[i + 1] - t[i]) * y[i] / (y[i] - y[i + 1]))
 
 
 class _Flight:

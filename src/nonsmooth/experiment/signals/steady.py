@@ -123,8 +123,8 @@ def steady_response(
     Returns
     -------
     SteadyResponse
-        The frequency is that of the fit; its error is the largest of those of the methods, and of half of what they
-        differ. The recorder's clock comes on top: 50 parts per million are common.
+        The frequency is that of the fit; its error is the largest of the fit's, the line's, and half of what all
+        methods differ. The recorder's clock comes on top: 50 parts per million are common.
 
     Raises
     ------
@@ -172,7 +172,7 @@ def steady_response(
         line = peak(spectrum(values, rate), low=0.9 * by_fit, high=1.1 * by_fit)
         methods["spectrum"] = (line.frequency, math.hypot(line.error, line.bias))
     found = np.array(list(methods.values()))
-    error = max(float(found[:, 1].max()), 0.5 * float(np.ptp(found[:, 0])))
+    error = max(float(found[:2, 1].max()), 0.5 * float(np.ptp(found[:, 0])))
     unit = str(getattr(x, "attrs", {}).get("units", ""))
     table = xr.Dataset(
         {

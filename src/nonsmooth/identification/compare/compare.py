@@ -193,7 +193,7 @@ def compare(
         variables["section_phase"] = (("section_phase",), np.array(phases), {
             "long_name": "phase of the section", "units": "forcing periods"})  # fmt: skip
     given = {
-        "settings": {key: ["follows from others", pair.uncertainty] if pair.follows else list(pair) for key, pair in set_.items()},
+        "settings": {key: ["follows" if one.follows else one.value, one.uncertainty] for key, one in set_.items()},
         "parameter": parameter, "direction": direction,
         "section_phase": section_phase, "grid": grid, "transient": transient, "max_period": max_period,
         "draws": draws, "level": level, "splits": splits, "seed": seed, **options,

@@ -111,7 +111,7 @@ def _reach(numbers: NDArray[np.int64], cut: int, number: int) -> int:
 
 
 def _splitting(at: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The amplitude of the alternation, in standard errors of a point, along its main direction; no even drift in it."""
+    """Amplitude of the alternation along its main direction, in standard errors of a point; an even drift has none."""
     if len(points) < FEWEST:
         return at[:0], at[:0]
     parity = np.where(np.arange(len(points) - 2) % 2 == 0, 0.25, -0.25)[:, None]

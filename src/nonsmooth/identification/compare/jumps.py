@@ -116,25 +116,28 @@ def match_jumps(measured: Jumps, theory: Jumps, drawn: Sequence[Jumps], unit: st
 
 def _pairs(seen: list[Jump], expected: list[Jump]) -> dict[int, int]:
     """Which predicted jump belongs to which measured one."""
+    every = (range(len(seen)), range(len(expected)))
+    groups: list[tuple[list[int], list[int]]] = [(list(every[0]), list(every[1]))]
     # Jumps as an experimenter read them off do not say whether the amplitude rose.
-    if any(np.isnan(jump.after) for jump in seen):
-        groups = [(list(range(len(seen))), list(range(len(expected))))]
-    else:
+    if not any(np.isnan(jump.after) for jump in seen):
         groups = [
-            tuple([i for i, jump in enumerate(side) if (jump.after > jump.before) == rises] for side in (seen, expected))
-            for rises in (False, True)
-        ]  # type: ignore[misc]
+            ([i for i in every[0] if _rises(seen[i]) == up], [j for j in every[1] if _rises(expected[j]) == up])
+            for up in (False, True)
+        ]
     pairs: dict[int, int] = {}
     for mine, theirs in groups:
-        few, many = sorted((mine, theirs), key=len)
-        values = [[jump.value for jump in side] for side in ((seen, expected) if few is mine else (expected, seen))]
-        best = min(
-            combinations(many, len(few)),
-            key=lambda chosen: sum(abs(values[0][a] - values[1][b]) for a, b in zip(few, chosen, strict=True)),
-        )
-        both = zip(few, best, strict=True)
-        pairs |= dict(both) if few is mine else {b: a for a, b in both}
+        away = np.abs(np.subtract.outer([seen[i].value for i in mine], [expected[j].value for j in theirs]))
+        if len(mine) <= len(theirs):
+            best = min(combinations(range(len(theirs)), len(mine)), key=lambda c, d=away: d[range(len(c)), c].sum())
+            pairs |= {i: theirs[j] for i, j in zip(mine, best, strict=True)}
+        else:
+            best = min(combinations(range(len(mine)), len(theirs)), key=lambda c, d=away: d[c, range(len(c))].sum())
+            pairs |= {mine[i]: j for i, j in zip(best, theirs, strict=True)}
     return pairs
+
+
+def _rises(jump: Jump) -> bool:
+    return jump.after > jump.before
 
 
 def _interval(value: float, word: str, drawn: Sequence[Jumps], level: float) -> tuple[float, float]:

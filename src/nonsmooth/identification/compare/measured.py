@@ -132,9 +132,8 @@ def _smoothed(time: Any, x: xr.DataArray, step: float, omega: float, support: bo
     gap = float(found["gap"])
     rough = smooth(time[inside], piece, resolution=step).attrs["intensity"]
     first = smooth(time, x, resolution=step, intensity=rough)
-    begin, end = (
-        poincare(time, first["x"], first["v"].values, level=gap, rising=rising)["time"].values for rising in (True, False)
-    )
+    motion = (time, first["x"], first["v"].values)
+    begin, end = (poincare(*motion, level=gap, rising=rising)["time"].values for rising in (True, False))
     # A contact that the record cuts off is whole within it.
     begin = np.concatenate([time[:1], begin]) if x.values[0] > gap else begin
     end = np.concatenate([end, time[-1:]]) if len(end) < len(begin) else end

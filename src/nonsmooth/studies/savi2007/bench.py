@@ -10,10 +10,14 @@ from __future__ import annotations
 
 import argparse
 import json
+import multiprocessing
+import os
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,6 +25,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from nonsmooth.studies.savi2007.figure import Figure
+    from nonsmooth.studies.savi2007.flows import Settings
 
 __all__ = ["Bench", "main", "measure"]
 
@@ -77,26 +82,76 @@ class Bench:
 
 
 def measure(folder: Path, names: Sequence[str], quick: bool) -> None:
-    """Measure figures of the rig one after the other, and write what they show."""
-    from nonsmooth.results.store import save
+    """Measure figures of the rig, and write what they show.
+
+    Identification comes first; what needs only its result is shared among processes, where the system can fork this
+    one (which has no threads then).
+    """
     from nonsmooth.studies.savi2007.flows import Settings
     from nonsmooth.studies.savi2007.laboratory import Laboratory
     from nonsmooth.studies.savi2007.study import figures_of_the_study
 
+    known = {figure.name: figure for figure in figures_of_the_study() if figure.rig}
+    if wrong := sorted(set(names) - set(known)):
+        raise ValueError(f"{', '.join(wrong)}: not measured on the rig; that are {', '.join(sorted(known))}")
     laboratory = Laboratory(folder / RIG, quick)
-    settings = Settings(quick=quick, progress=False, laboratory=laboratory)
-    manifest = {}
-    for figure in figures_of_the_study():
-        if figure.name in names:
-            begin = time.perf_counter()
-            data = figure.compute(settings)
-            for key, dataset in data.items():
-                save(dataset, folder / f"{figure.name}_{key}.nc")
-            manifest[figure.name] = {"keys": list(data), "seconds": time.perf_counter() - begin}
-            print(f"{figure.name}: {manifest[figure.name]['seconds']:.1f} s", flush=True)
-    for note in dict.fromkeys(laboratory.notes):
+    job = _Job(folder, Settings(quick=quick, progress=False, laboratory=laboratory), known)
+    laboratory.identified  # noqa: B018  # kept there for all that follows
+    tasks = [[name for name in group if name in names] for group in _GROUPS]
+    tasks += [[name] for name in names if not any(name in group for group in _GROUPS)]
+    rows = [row for done in job.shared([task for task in tasks if task]) for row in done]
+    entries = {name: {"keys": keys, "seconds": seconds} for name, keys, seconds, _ in rows}
+    for note in dict.fromkeys([*laboratory.notes, *(note for row in rows for note in row[3])]):
         print(f"note: {note}")
+    manifest = {name: entries[name] for name in known if name in entries}
     (folder / RIG / _MANIFEST).write_text(json.dumps(manifest, indent=1) + "\n", encoding="utf-8")
+
+
+#: Figures that use the same records, and the longest first.
+_GROUPS = (("fig10_rig",), ("fig09_rig",), ("fig13_rig", "fig14_rig"), ("fig11_rig",), ("fig12_rig",), ("fig17_rig",))
+
+_Row = tuple[str, list[str], float, list[str]]
+
+
+@dataclass(frozen=True)
+class _Job:
+    """What the processes share."""
+
+    folder: Path
+    settings: Settings
+    figures: Mapping[str, Figure]
+
+    def shared(self, tasks: Sequence[Sequence[str]]) -> list[list[_Row]]:
+        """Name, keys, seconds and notes of each figure, task by task."""
+        workers = min(os.cpu_count() or 1, len(tasks))
+        if workers < 2 or "fork" not in multiprocessing.get_all_start_methods():
+            return [self.task(task) for task in tasks]
+        global _job
+        _job = self  # the forked processes have it; closures cannot be sent to them
+        with ProcessPoolExecutor(workers, multiprocessing.get_context("fork")) as pool:
+            return list(pool.map(_forked, tasks))
+
+    def task(self, names: Sequence[str]) -> list[_Row]:
+        """Figures one after the other."""
+        from nonsmooth.results.store import save
+
+        rows = []
+        for name in names:
+            begin = time.perf_counter()
+            data = self.figures[name].compute(self.settings)
+            for key, dataset in data.items():
+                save(dataset, self.folder / f"{name}_{key}.nc")
+            rows.append((name, list(data), time.perf_counter() - begin, list(self.settings.bench.notes)))
+            print(f"{name}: {rows[-1][2]:.1f} s", flush=True)
+        return rows
+
+
+_job: _Job | None = None
+
+
+def _forked(names: Sequence[str]) -> list[_Row]:
+    assert _job is not None
+    return _job.task(names)
 
 
 def main() -> None:

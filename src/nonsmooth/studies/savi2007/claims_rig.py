@@ -54,8 +54,8 @@ def _step(runs: xr.Dataset, direction: str, jump: Interval) -> float:
     mine = runs.isel(run=runs["direction"].values.astype(str) == direction)
     order = np.argsort(mine["omega"].values)
     heights = mine["amplitude"].values[order]
-    at = np.searchsorted(mine["omega"].values[order], [jump.low, jump.high])
-    return float(abs(heights[at[1]] - heights[at[0]]))
+    i = int(np.searchsorted(mine["omega"].values[order], jump.middle))
+    return float(abs(heights[i] - heights[i - 1]))
 
 
 def _doubled(runs: xr.Dataset, direction: str) -> Interval | None:

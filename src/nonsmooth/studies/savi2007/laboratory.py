@@ -30,6 +30,13 @@ __all__ = ["SEED", "TRUTH", "Laboratory"]
 SEED = 0  # of the rig's noise; its parameters are the published ones
 TRUTH = "truth.toml"
 
+#: Shorter procedures for a quick run: fewer taps, frequency steps and records with contact.
+_FEWER = {
+    "impulse": {"velocities": (0.5, -0.35, 0.2)},
+    "response": {"voltages": (3.9, 4.2, 4.4, 4.6, 4.8, 5.1, 5.6)},
+    "contact": {"regimes": ((11.15, 0.039), (9.88, 0.027), (6.0, 0.0165)), "duration": 12.0},
+}  # fmt: skip
+
 _Measured = TypeVar("_Measured")
 
 
@@ -75,7 +82,17 @@ class Laboratory:
 
     @cached_property
     def _identification(self) -> Path:
-        return self.rig.write_session(self.folder / "identification", truth=self.folder / TRUTH)
+        from nonsmooth.experiment.rig import IDENTIFICATION
+
+        options: dict[str, Any] = _FEWER if self.quick else {}
+        names = [name for name in IDENTIFICATION if not (self.quick and name == "grazing")]
+        return self._write("identification", {name: self.rig.record(name, **options.get(name, {})) for name in names})
+
+    def _write(self, name: str, made: Mapping[str, Recording]) -> Path:
+        from nonsmooth.experiment.rig.notebook import write_session
+
+        title = f"virtual rig with the published parameters, {name}"
+        return write_session(self.rig, self.folder / name, made, self.folder / TRUTH, title=title)
 
     def sensors(self) -> xr.Dataset:
         """What the files of the session say of the sensors: rate, steps, ranges used."""
@@ -107,12 +124,9 @@ class Laboratory:
 
     def record(self, name: str, made: Mapping[str, Recording]) -> Session:
         """Write recordings, by procedure, into the session folder ``name`` and read it."""
-        from nonsmooth.experiment.rig.notebook import write_session
         from nonsmooth.experiment.session import load_session
 
-        title = f"virtual rig with the published parameters, {name}"
-        folder = write_session(self.rig, self.folder / name, made, self.folder / TRUTH, title=title)
-        return load_session(folder)
+        return load_session(self._write(name, made))
 
     def with_support(self, session: Session, procedure: str) -> list[str]:
         """The runs of a procedure in which the support was mounted."""

@@ -97,14 +97,14 @@ def jumps(response: xr.Dataset, direction: str) -> list[Interval]:
 
 def measured_jumps(runs: xr.Dataset, direction: str) -> list[Interval]:
     """The steps of a measured response in which its amplitude jumps, at rising values; read off the runs alone."""
-    from nonsmooth.analysis.response import jumps_in
+    from nonsmooth.identification.compare.jumps import jumps_in_steps
 
     mine = runs.isel(run=runs["direction"].values.astype(str) == direction)
-    order = np.argsort(mine["omega"].values)
-    omega, heights = mine["omega"].values[order], mine["amplitude"].values[order]
-    found = jumps_in(heights if direction == "up" else heights[::-1])
-    first = [i if direction == "up" else len(omega) - 2 - i for i in found]
-    return [Interval(float(omega[i]), float(omega[i + 1])) for i in sorted(first)]
+    order = np.argsort(mine["omega"].values)[:: 1 if direction == "up" else -1]
+    found = jumps_in_steps(*(mine[name].values[order] for name in ("omega", "amplitude", "amplitude_error")))
+    return sorted(
+        (Interval(jump.value - jump.half, jump.value + jump.half) for jump in found), key=lambda jump: jump.low
+    )
 
 
 def measured_periods(runs: xr.Dataset, direction: str | None = None) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

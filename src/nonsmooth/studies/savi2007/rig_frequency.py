@@ -102,8 +102,8 @@ def _caption_18(data: Mapping[str, xr.Dataset]) -> str:
 
 
 FIGURES = (
-    Figure("fig17_rig", 17, "Sections over the forcing frequency, on the virtual rig", _compute_17, _draw_17,
+    Figure("fig17_rig", 17, "Sections over the forcing frequency", _compute_17, _draw_17,
            _caption_17, rig=True),
-    Figure("fig18_rig", 18, "State space over the forcing frequency, on the virtual rig", _compute_18, _draw_18,
+    Figure("fig18_rig", 18, "State space over the forcing frequency", _compute_18, _draw_18,
            _caption_18, rig=True),
 )  # fmt: skip

@@ -121,10 +121,10 @@ def _caption_16(data: Mapping[str, xr.Dataset]) -> str:
 
 
 FIGURES = (
-    Figure("fig13_rig", 13, "Bifurcation diagram over the gap, with the virtual rig's sections", _compute_13, _draw_13,
+    Figure("fig13_rig", 13, "Sections at four gaps over the bifurcation diagram", _compute_13, _draw_13,
            _caption_13, rig=True),
-    Figure("fig14_rig", 14, "State space over the gap, on the virtual rig", _compute_14,
+    Figure("fig14_rig", 14, "State space over the gap", _compute_14,
            draw_pairs("m", "g", FIGURE_14), _caption_14, rig=True),
-    Figure("fig16", 16, "Strange attractor at four section phases, on the virtual rig", _compute_16, _draw_16,
+    Figure("fig16", 16, "Strange attractor at four section phases", _compute_16, _draw_16,
            _caption_16, rig=True),
 )  # fmt: skip

@@ -1,0 +1,55 @@
+"""Flips in a slow rise: those of the logistic map are known exactly, 3 and 1 + sqrt(6)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from nonsmooth.identification.compare.flips import delayed_flips
+from nonsmooth.identification.compare.periods import period_numbers
+
+NOISE = np.array([1e-3])
+
+
+def logistic(first: float, last: float, n: int, seed: int = 1) -> tuple[np.ndarray, np.ndarray]:
+    """x' = r x (1 - x) with r drifting evenly; measured with noise."""
+    rng = np.random.default_rng(seed)
+    r = np.linspace(first, last, n)
+    x = 0.5
+    for _ in range(300):
+        x = first * x * (1 - x)
+    points = np.empty((n, 1))
+    for i in range(n):
+        x = r[i] * x * (1 - x) + 1e-7 * rng.standard_normal()
+        points[i] = x
+    return r, points + NOISE * rng.standard_normal(points.shape)
+
+
+@pytest.mark.parametrize(("first", "last", "word", "flip"), [
+    (3.3, 2.8, "1-2", 3.0), (3.53, 3.3, "2-4", 1 + np.sqrt(6)),
+])  # fmt: skip
+def test_the_delay_is_taken_out(first: float, last: float, word: str, flip: float) -> None:
+    late = []
+    for n in (300, 1000, 3000):
+        r, points = logistic(first, last, n)
+        found = delayed_flips(r, points, NOISE, period_numbers(points, NOISE))[word]
+        assert abs(found.value - flip) < 3 * found.error < 0.03
+        assert found.read < flip  # r falls: the record itself is late
+        assert abs(found.value - flip) < 0.3 * (flip - found.read)
+        late.append(flip - found.read)
+    assert late[0] > 1.5 * late[1] > 2.25 * late[2]
+
+
+def test_the_amplitude_equation_itself_is_solved() -> None:
+    """Its steady amplitude for parameters that stand still, and its exponential decay beyond the flip."""
+    from nonsmooth.identification.compare.flips import _amplitude
+
+    still = _amplitude(np.full(400, 0.2), np.full(400, 0.05), 0.0)  # w' = -0.2 w + 0.05: w = 1/4, A = 2
+    assert still[0] == 1.0 and still[-1] == pytest.approx(2.0, rel=1e-12)
+    decay = _amplitude(np.full(50, -0.4), np.zeros(50), 0.0)
+    np.testing.assert_allclose(decay, np.exp(-0.2 * np.arange(50)), rtol=1e-12)
+
+
+def test_a_record_without_a_flip_has_none() -> None:
+    r, points = logistic(3.05, 3.3, 300)
+    assert delayed_flips(r, points, NOISE, period_numbers(points, NOISE)) == {}

@@ -1,0 +1,73 @@
+"""Jumps in steps, found without the prediction, and paired in order."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from nonsmooth.identification.compare.jumps import Jump, jumps_in_steps, match_jumps
+
+ZERO = np.zeros
+
+
+def duffing(direction: str, step: float) -> tuple[np.ndarray, np.ndarray, float]:
+    """Amplitude of x'' + 0.05 x' + x + x^3 = 0.1 cos(w t) by one harmonic, carried; and where the branch ends."""
+
+    def amplitudes(w: float) -> np.ndarray:
+        # (1 - w^2 + 3/4 s)^2 s + (0.05 w)^2 s = 0.01 for s = A^2
+        roots = np.roots([9 / 16, 1.5 * (1 - w**2), (1 - w**2) ** 2 + (0.05 * w) ** 2, -0.01])
+        return np.sqrt(np.sort(roots[np.abs(roots.imag) < 1e-9].real))
+
+    values = np.arange(0.6, 2.4, step)
+    order = values if direction == "up" else values[::-1]
+    pick = -1 if direction == "up" else 0
+    heights = np.array([amplitudes(w)[pick] for w in order])
+    fine = np.arange(0.6, 2.4, 1e-4)
+    three = fine[[len(amplitudes(w)) == 3 for w in fine]]
+    return order, heights, float(three.max() if direction == "up" else three.min())
+
+
+@pytest.mark.parametrize("direction", ["up", "down"])
+@pytest.mark.parametrize("step", [0.1, 0.05, 0.02])
+def test_the_fold_is_found_whatever_the_step(direction: str, step: float) -> None:
+    """Towards a fold the steps grow; the jump lies in the step that holds the fold."""
+    order, heights, fold = duffing(direction, step)
+    (jump,) = jumps_in_steps(order, heights, ZERO(len(order)))
+    assert abs(jump.value - fold) <= jump.half * (1 + 1e-9)
+    assert (jump.after > jump.before) == (direction == "down")
+
+
+@pytest.mark.parametrize("step", [0.1, 0.05, 0.02])
+def test_a_resonance_peak_has_no_jump(step: float) -> None:
+    w = np.arange(0.5, 2.0, step)
+    heights = 1 / np.sqrt((1 - w**2) ** 2 + (0.1 * w) ** 2)
+    assert jumps_in_steps(w, heights, ZERO(len(w))) == []
+    bend = np.where(w < 1.2, 0.5 + w, 1.7 + 0.2 * (w - 1.2))  # a corner, as at the first contact
+    assert jumps_in_steps(w, bend, ZERO(len(w))) == []
+
+
+def test_noise_is_no_jump() -> None:
+    w = np.arange(40.0)
+    heights = 1 + 0.1 * np.random.default_rng(0).standard_normal(40)
+    assert jumps_in_steps(w, heights, np.full(40, 0.1)) == []
+
+
+def test_pairs_keep_order_and_direction() -> None:
+    """A rise is never paired with a fall, near as it may be; of two falls the first belongs to the first."""
+    fall, rise = (2.0, 1.0), (1.0, 2.0)
+    measured = {"up": [Jump(4.0, 0.1, *fall), Jump(5.7, 0.1, *fall)], "down": [Jump(5.1, 0.1, *rise)]}
+    theory = {"up": [Jump(5.6, 0.0, *fall), Jump(5.9, 0.0, *fall)], "down": [Jump(5.0, 0.0, *fall)]}
+    found = match_jumps(measured, theory, [], "rad/s", 0.95)
+    rows = list(zip(found["jump_direction"][1], found["measured_jump"][1], found["theory_jump"][1], strict=True))
+    assert rows[:2] == [("up", 4.0, 5.6), ("up", 5.7, 5.9)]
+    assert rows[2][:2] == ("down", 5.1) and np.isnan(rows[2][2])
+    assert np.isnan(rows[3][1]) and rows[3][2] == 5.0
+
+
+def test_what_is_too_many_has_no_partner() -> None:
+    fall = (2.0, 1.0)
+    measured = {"up": [Jump(5.7, 0.1, *fall)]}
+    theory = {"up": [Jump(4.1, 0.0, *fall), Jump(5.8, 0.0, *fall)]}
+    found = match_jumps(measured, theory, [], "rad/s", 0.95)
+    np.testing.assert_array_equal(found["theory_jump"][1], [5.8, 4.1])
+    np.testing.assert_array_equal(found["measured_jump"][1], [5.7, np.nan])

@@ -1,0 +1,190 @@
+"""From records to what compare takes: closed forms of the free motion, and a session of a rig that is known."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import nonsmooth as ns
+from nonsmooth.experiment import Recording, load_session
+from nonsmooth.experiment.rig import VirtualRig
+from nonsmooth.experiment.rig.driven import Setting, records
+from nonsmooth.experiment.rig.figures import without_support
+from nonsmooth.experiment.rig.motor import frequency, mean_position, voltage_for
+from nonsmooth.experiment.rig.notebook import write_session
+from nonsmooth.identification.compare import (
+    compare,
+    gap_reference,
+    measured_motion,
+    measured_response,
+    measured_rise,
+    measured_sections,
+    session_measurement,
+)
+from nonsmooth.identification.compare import measured as module
+
+pytestmark = pytest.mark.filterwarnings("ignore::nonsmooth.experiment.RecordingWarning")
+TRAVEL = 0.0789
+COUNT = TRAVEL / 1440
+OMEGA = 5.3
+
+
+def recorded(x: object, seconds: float = 30.0, omega: float = OMEGA, seed: int = 0) -> Recording:
+    """A motion x(t) as the rotary sensor counts it, with the photogate of a drive of this frequency."""
+    time = np.arange(int(seconds * 100)) / 100
+    counts = np.rint(x(time) / COUNT)  # type: ignore[operator]
+    turns = 2 * np.pi / omega * np.arange(1, int(seconds * omega / (2 * np.pi)))
+    angle = xr.Dataset({"Angle": ("time", counts * 2 * np.pi / 1440, {"units": "rad"})}, {"time": time})
+    gate = xr.Dataset({"Turn": ("time", np.arange(1.0, len(turns) + 1), {"units": "turns"})}, {"time": turns})
+    return Recording.from_runs({"Run #1": {"Angle": angle, "Turn": gate}}, synthetic=True)
+
+
+def test_a_motion_is_what_was_put_in() -> None:
+    """x = 0.3 mm + 12 mm cos(w t - 0.4): position, velocity and phase of the drive, within the stated errors."""
+    found = measured_motion(
+        recorded(lambda t: 3e-4 + 0.012 * np.cos(OMEGA * t - 0.4)), distance_per_turn=TRAVEL, zero=3e-4, support=False
+    )
+    t = found["time"].values
+    x, v = 0.012 * np.cos(OMEGA * t - 0.4), -0.012 * OMEGA * np.sin(OMEGA * t - 0.4)
+    error = (found["u"].values - np.column_stack([x, v])) / found["u_error"].values
+    inner = slice(20, -20)
+    assert 0.5 < np.sqrt(np.mean(error[inner, 0] ** 2)) < 1.6
+    assert 0.5 < np.sqrt(np.mean(error[inner, 1] ** 2)) < 1.6
+    np.testing.assert_allclose(found["phase"].values - found["phase"].values[0], (t - t[0]) * OMEGA / (2 * np.pi),
+                               atol=1e-9)  # fmt: skip
+    assert float(found["phase"].values[0]) % 1 == pytest.approx(t[0] * OMEGA / (2 * np.pi) % 1, abs=1e-9)
+    assert float(found["omega"]) == pytest.approx(OMEGA, rel=1e-9)
+    assert found.attrs["synthetic"] == "yes" and found.attrs["run"] == "Run #1"
+
+
+def test_a_missing_channel_is_named() -> None:
+    whole = recorded(np.cos)
+    lone = Recording.from_runs({"Run #1": {"Angle": whole.tree["Run #1"]["Angle"].to_dataset()}}, synthetic=True)
+    with pytest.raises(ValueError, match="Turn"):
+        measured_motion(lone, distance_per_turn=TRAVEL)
+
+
+def test_a_response_has_amplitudes_and_periods() -> None:
+    """Amplitudes put in; a subharmonic of order 2 is seen as period 2; a few turns say nothing."""
+    motions = [
+        measured_motion(recorded(x, seconds), distance_per_turn=TRAVEL, support=False)
+        for x, seconds in (
+            (lambda t: 0.010 * np.cos(OMEGA * t), 30.0),
+            (lambda t: 0.010 * np.cos(OMEGA * t) + 0.002 * np.cos(OMEGA * t / 2 + 1), 30.0),
+            (lambda t: 0.004 * np.cos(OMEGA * t), 6.0),
+        )
+    ]
+    found = measured_response(motions, ["up", "up", "down"])
+    assert found["period_number"].values.tolist() == [1, 2, -1]
+    error = found["amplitude"].values - [0.010, np.nan, 0.004]
+    assert (np.abs(error[[0, 2]]) < 4 * found["amplitude_error"].values[[0, 2]] + 5e-6).all()
+    time = np.linspace(0, 4 * np.pi / OMEGA, 20001)
+    two = 0.010 * np.cos(OMEGA * time) + 0.002 * np.cos(OMEGA * time / 2 + 1)
+    assert float(found["amplitude"][1]) == pytest.approx(np.ptp(two) / 2, abs=2e-5)
+    with pytest.raises(ValueError, match="each run needs its own"):
+        measured_response(motions, ["up"])
+
+
+def test_a_rise_knows_its_parameter() -> None:
+    """The amplitude grows with the parameter: section points at phase 0 lie on a straight line over it."""
+    motion = measured_motion(
+        recorded(lambda t: (0.004 + 1e-4 * t) * np.cos(OMEGA * t), 60.0), distance_per_turn=TRAVEL, support=False
+    )
+    first, last = float(motion["time"][0]), float(motion["time"][-1])
+    found = measured_rise(motion, "rho", 0.004 + 1e-4 * first, 0.004 + 1e-4 * last, unit="N")
+    np.testing.assert_allclose(found["section"].sel(state="x"), found["rho"], atol=3e-5)
+    assert found["rho"].attrs["units"] == "N"
+
+
+def test_sections_lie_over_their_parameter_in_order() -> None:
+    motions = [
+        measured_motion(recorded(lambda t, a=a: a * np.cos(OMEGA * t), s), distance_per_turn=TRAVEL, support=False)
+        for a, s in ((0.008, 20.0), (0.005, 30.0))
+    ]
+    found = measured_sections(motions, "rho", [0.2, 0.1])
+    assert found["rho"].values.tolist() == [0.1, 0.2]
+    np.testing.assert_allclose(found["section"].sel(state="x").mean("iterate"), [0.005, 0.008], atol=2e-5)
+    assert np.isnan(found["section"].values[1, -1]).all()  # the shorter run
+
+
+@pytest.fixture(scope="module")
+def rig() -> VirtualRig:
+    return VirtualRig.published(truth={"ripple": 0.02, "ripple_phase": 0.3})
+
+
+@pytest.fixture(scope="module")
+def session(rig: VirtualRig, tmp_path_factory: pytest.TempPathFactory) -> object:
+    """Fig. 14's settings with the period-1 and period-2 gaps, and the run without the support."""
+    length, knob = 0.03896, voltage_for(rig, 11.15)
+    shift = mean_position(rig, length)
+    mounted = [Setting(knob, length, gap + shift, 40.0) for gap in (-0.0012, 0.0006)]
+    made = {
+        "section": records(rig, "section", mounted, settle=40.0),
+        "response": records(rig, "response", without_support(rig, 14)),
+    }
+    return load_session(write_session(rig, tmp_path_factory.mktemp("lab") / "s", made, title="a test"))
+
+
+def test_the_gap_is_referred_by_string_and_ripple(rig: VirtualRig, session: object) -> None:
+    """a^2/(8 L) - a eps cos(beta)/4: with this ripple most of the string's shift is taken back."""
+    a = 0.03896
+    string, ripple = a**2 / 8, -a * 0.02 * np.cos(0.3) / 4
+    assert mean_position(rig, a) == pytest.approx(string + ripple, abs=3e-7)
+    reference = gap_reference(session)  # type: ignore[arg-type]
+    value, error = reference.mean(a)
+    assert reference.runs == 1
+    assert abs(value - (string + ripple)) < 3 * error < 5e-6
+    gap, gap_error = reference.gap(0.001, a)
+    assert gap == pytest.approx(0.001 - value, abs=1e-12)
+    assert gap_error == pytest.approx(np.hypot(error, COUNT / np.sqrt(12)), rel=1e-9)
+    assert gap_reference(session, referred=False).mean(a) == (0.0, 0.0)  # type: ignore[arg-type]
+
+
+def test_a_session_is_compared_with_the_model(rig: VirtualRig, session: object) -> None:
+    model = ns.models.discontinuous_support()
+    for run, gap, number in (("Run #1", -0.0012, 1), ("Run #2", 0.0006, 2)):
+        measured, settings = session_measurement(session, "section", run, k=8.47)  # type: ignore[arg-type]
+        assert settings["g"][0] == pytest.approx(gap, abs=5e-6) and settings["g"][1] > 1e-5
+        assert settings["omega"][0] == pytest.approx(frequency(rig, voltage_for(rig, 11.15)), rel=1e-6)
+        assert settings["rho"]({"k": 8.0}) == pytest.approx(8.0 * 0.03896)
+        found = compare(measured, model, settings=settings, draws=8)
+        assert int(found["measured_period_number"]) == number == int(found["theory_period_number"])
+        assert float(found["orbit_distance"]) < 0.1
+        # The gap's uncertainty enters the band.
+        assert np.std(found["drawn_g"].values) == pytest.approx(settings["g"][1], rel=0.6)
+
+
+def test_runs_at_several_gaps_are_a_diagram(session: object) -> None:
+    measured, settings = session_measurement(session, "section", ["Run #1", "Run #2"], k=8.47)  # type: ignore[arg-type]
+    np.testing.assert_allclose(measured["g"], [-0.0012, 0.0006], atol=5e-6)
+    assert set(settings) == {"rho", "omega"}
+    found = compare(measured, ns.models.discontinuous_support(), settings=settings, values=[-0.0012, 0.0, 0.0006])
+    assert found["theory_period_number"].values[[0, 2], 0].tolist() == [1, 2]
+    assert set(found["measured_period_number"].values.tolist()) == {1, 2}
+    assert "rise_per_return" not in found
+
+
+def test_what_a_session_lacks_is_named(session: object) -> None:
+    for procedure, runs, message in (
+        ("sections", None, "`sections` is not a procedure of compare.*nearest"),
+        ("rise", None, "has no run of 'rise'; it has: section, response"),
+        ("section", None, "2 runs of 'section'; a motion is one: run = ... one of Run #1, Run #2"),
+        ("section", "Run #9", "`Run #9` is not a run"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            session_measurement(session, procedure, runs, k=8.47)  # type: ignore[arg-type]
+
+
+def test_a_long_record_is_smoothed_as_a_short_one(session: object, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What the middle of the record tells serves the whole: the motion stays within a fraction of its own errors."""
+    item = session.recordings("section")[1]  # type: ignore[attr-defined]
+    whole = measured_motion(item.recording, item.run, distance_per_turn=TRAVEL)
+    monkeypatch.setattr(module, "LONG", 10.0)
+    monkeypatch.setattr(module, "PIECE", 20.0)
+    quick = measured_motion(item.recording, item.run, distance_per_turn=TRAVEL)
+    away = (quick["u"] - whole["u"]) / whole["u_error"]
+    assert float(np.sqrt((away**2).mean())) < 0.2
+    np.testing.assert_allclose(quick["u_error"].median("time"), whole["u_error"].median("time"), rtol=0.2)

@@ -1,0 +1,98 @@
+"""The gap: the drive's mean by quadrature, its fit, and the bracket of the graze from runs in closed form."""
+
+import numpy as np
+import pytest
+from tests.identification.made import COUNT, decay_of, swinging
+
+from nonsmooth.identification.gap import grazing_amplitude, mean_of_drive, mean_shift
+from nonsmooth.identification.grazing import grazing_gap
+from nonsmooth.identification.steady import steady
+
+W, B, F, KAPPA = 4.5, 1.04, 0.01, 1400.0
+
+
+@pytest.mark.parametrize(("a", "length", "ripple", "beta"), [(0.039, 0.5, 0.0, 0.0), (0.06, 0.5, 0.02, 0.7),
+                                                             (0.0165, 2.0, 0.02, 3.0)])  # fmt: skip
+def test_the_mean_of_the_drive(a, length, ripple, beta):
+    theta = np.arange(4096) * 2 * np.pi / 4096
+    phi = theta + ripple * np.sin(theta + beta)
+    d = a * np.cos(phi) + length - np.sqrt(length**2 - (a * np.sin(phi)) ** 2)
+    # left out: ripple times string, of the second order together
+    assert mean_of_drive(a, length, ripple, beta) == pytest.approx(d.mean(), abs=1e-8 + ripple**2 * a**2 / length)
+
+
+def test_fig_13_with_half_a_metre_of_string_is_off_by_0_4_mm():
+    # rho = 0.33 N on 8.47 N/m; the car moves by half of what its driven end does
+    assert mean_of_drive(0.33 / 8.47, 0.5) / 2 == pytest.approx(0.38e-3, abs=1e-5)
+
+
+def moved(length, ripple_part, zero, n=6, seed=0):
+    rng = np.random.default_rng(seed)
+    return steady([
+        swinging(omega, 0.01, 0.3, zero + a**2 / (8 * length) + ripple_part * a, crank=a, rng=rng)
+        for a in (0.0165, 0.035) for omega in np.linspace(3, 7, n)
+    ])  # fmt: skip
+
+
+def test_the_shift_is_that_of_string_and_ripple():
+    found = mean_shift(moved(0.7, 2e-3, 1e-4), 1e-4, 1e-7, string_length=0.705, string_error=0.005)
+    value, error = found.at(0.039)
+    assert abs(value - (0.039**2 / (8 * 0.7) + 2e-3 * 0.039)) < 3.5 * error < 2e-5
+    assert found.runs == 12
+    nothing = mean_shift(moved(0.7, 0, 0).only([]), 0.0, 1e-6, string_length=0.5, string_error=0.005)
+    value, error = nothing.at(0.039)
+    assert value == pytest.approx(0.039**2 / 4) and error > 0.03 / 4 * 0.03
+
+
+def test_a_wrong_zero_moves_the_shift_as_stated():
+    seen, step = moved(0.7, 2e-3, 0.0), 1e-6
+    one, other = (mean_shift(seen, zero, 1e-6, string_length=0.7, string_error=0.005) for zero in (0.0, step))
+    slope = one.parts(0.039)[2]
+    assert other.at(0.039)[0] - one.at(0.039)[0] == pytest.approx(slope * step, rel=1e-2)
+    assert one.at(0.039)[1] == pytest.approx(np.hypot(one.parts(0.039)[1], slope * 1e-6))
+
+
+def stepping(gap, place=2e-5, crank=0.010, scale=1.0, order=-1, seed=1, mixed=False):
+    """Frequency steps towards resonance; where the free motion would pass the gap, the mean is pushed back."""
+    rng, found = np.random.default_rng(seed), []
+    for i, omega in enumerate(np.arange(9.0, 7.99, -0.05)[::-order]):
+        size = scale * grazing_amplitude(omega, W, B, F, crank)
+        beyond = max(size - gap, 0.0)
+        name = f"Run #{i + 1}"
+        a = crank if not mixed or i else 2 * crank
+        found.append(swinging(omega, size, 0.3, place - 1.5 * beyond, crank=a, rng=rng, name=name))
+    return found
+
+
+def test_the_graze_brackets_the_gap():
+    gap = grazing_amplitude(8.43, W, B, F, 0.010)
+    found = grazing_gap(stepping(gap), decay_of(W, B, F, 1e-6), resolution=COUNT, kappa=KAPPA)
+    low, high = found.interval(0.999)
+    assert low < gap < high and high - low < 8e-5
+    frequency = found.others["grazing_frequency"]
+    assert abs(frequency.value - 8.43) <= frequency.half_width + 1e-4
+    assert found.others["at_rest"].value == pytest.approx(found.value + 2e-5 - 1e-6, abs=2e-6)
+    assert found.data["contact"].values.sum() == 9
+
+
+def test_the_cranks_length_need_not_be_right():
+    gap = 1.004 * grazing_amplitude(8.43, W, B, F, 0.010)
+    found = grazing_gap(stepping(gap, scale=1.004), decay_of(W, B, F), resolution=COUNT, kappa=KAPPA)
+    low, high = found.interval(0.999)
+    assert low < gap < high
+
+
+@pytest.mark.parametrize(
+    ("runs", "said"),
+    [
+        (lambda g: stepping(1.0), "none of the 21 runs touches: step on from free motion into contact"),
+        (lambda g: stepping(1e-4), "the mean position moves among the first 4 runs: they touch already"),
+        (lambda g: stepping(g)[:4], "4 runs are too few"),
+        (lambda g: [*stepping(g)[:9], *stepping(g)[5:]], "does not go one way"),
+        (lambda g: stepping(g, mixed=True), "at one crank length"),
+    ],
+)
+def test_what_does_not_show_a_graze_is_refused(runs, said):
+    gap = grazing_amplitude(8.43, W, B, F, 0.010)
+    with pytest.raises(ValueError, match=said):
+        grazing_gap(runs(gap), decay_of(W, B, F), resolution=COUNT, kappa=KAPPA)
