@@ -71,6 +71,33 @@ def amplitudes() -> xr.Dataset:
     )  # fmt: skip
 
 
+def band() -> xr.Dataset:
+    omega = np.linspace(3, 6, 20)
+    height = 0.02 / np.sqrt((20.25 - omega**2) ** 2 + 1.08 * omega**2)
+    return xr.Dataset(
+        {
+            "omega": ("run", omega), "amplitude": ("run", height), "omega_low": 3.9, "omega_high": 5.0,
+            "largest": height.max(), "damping_ratio": 0.115, "damping_ratio_error": 0.001, "c": 0.87, "c_error": 0.01,
+        },
+        attrs=SYNTHETIC,
+    )  # fmt: skip
+
+
+def circle() -> xr.Dataset:
+    omega = np.linspace(3, 6, 40)
+    response = 10 / (20.25 - omega**2 + 1.04j * omega)
+    over = ("crank_length", "omega_fine")
+    return xr.Dataset(
+        {
+            "omega": ("run", omega), "crank": ("run", np.full(40, 0.0165)), "real": ("run", response.real),
+            "imaginary": ("run", response.imag), "fitted_real": (over, response.real[None]),
+            "fitted_imaginary": (over, response.imag[None]), "omega_0": 4.5, "omega_0_error": 0.001, "c": 0.87,
+            "c_error": 0.01,
+        },
+        {"omega_fine": omega, "crank_length": [0.0165]}, SYNTHETIC,
+    )  # fmt: skip
+
+
 def peaks() -> xr.Dataset:
     t = np.arange(1, 14) * 0.7
     height = 0.08 * np.exp(-0.52 * t)
@@ -140,7 +167,7 @@ def many() -> xr.Dataset:
 PICTURES = {
     "force_displacement": spring, "impulse_response": decay, "impulse_history": decay, "amplitude_fit": amplitudes,
     "free_decay": peaks, "drop_decay": peaks, "calibration": line, "grazing": touch, "multiple_shooting": shots,
-    "profile": flat, "coverage": many,
+    "profile": flat, "coverage": many, "half_power": band, "nyquist": circle,
 }  # fmt: skip
 
 
@@ -171,6 +198,26 @@ def test_numbers_are_written_with_their_errors() -> None:
 def test_the_grid_of_the_transform_is_shown() -> None:
     """A record of 20.48 s has lines 0.0488 Hz apart: 0.7324 Hz is the paper's 4.60 rad/s."""
     assert "0.7324 Hz = 4.602 rad/s" in words(identification.impulse_response(decay()))
+
+
+def test_a_calibration_says_where_its_line_begins() -> None:
+    written = words(identification.calibration(line().assign(intercept=-0.9, intercept_error=0.01)))
+    assert "from 0.75 V on" in written and "1.2000 ± 0.0040 rad/s per V" in written
+
+
+def test_lengths_are_drawn_in_millimetres() -> None:
+    length = {"units": "m", "long_name": "crank length"}
+    data = line().assign(setting=("run", np.arange(2.0, 12.0) / 1e3, length))
+    ax = identification.calibration(data.assign_coords(setting_fine=data["setting"].values))
+    assert ax.get_xlabel() == "crank length (mm)" and ax.lines[0].get_xdata()[0] == pytest.approx(2.0)
+
+
+def test_one_slope_of_many_pulls_is_one_number() -> None:
+    lines = xr.Dataset({"slope": ("line", [16.94] * 12), "intercept": ("line", [0.0] * 12),
+                        "slope_error": ("line", [0.02] * 12)})  # fmt: skip
+    data = spring().drop_vars(["slope", "intercept", "slope_error"]).merge(lines, combine_attrs="no_conflicts")
+    written = words(identification.force_displacement(data))
+    assert "slope 16.940 ± 0.020 N/m" in written and "12 lines" not in written
 
 
 def motion() -> xr.Dataset:

@@ -91,7 +91,7 @@ def _layout(header: list[str], source: Source) -> tuple[dict[int, tuple[str, str
             f"no time column with a run's name, as 'Time (s) Run #1'; the columns are {names_of(header)}. "
             "Export the time too, or read the file with format='csv' and columns= or rate=",
         )
-    runs = sorted({run for run, _ in times.values()}, key=len, reverse=True)
+    runs = sorted(dict.fromkeys(run for run, _ in times.values()), key=len, reverse=True)
     channels: dict[int, tuple[str, str]] = {}
     for column, text in enumerate(header):
         if column in times or not text.strip():
@@ -100,8 +100,8 @@ def _layout(header: list[str], source: Source) -> tuple[dict[int, tuple[str, str
         if run is None:
             raise source.error(
                 "line 1",
-                f"column {column + 1} ({text!r}) belongs to no run that has a time column ({names_of(runs[::-1])}); "
-                "export the time of its run too",
+                f"column {column + 1} ({text!r}) belongs to no run that has a time column "
+                f"({names_of(sorted(runs, key=len))}); export the time of its run too",
             )
         channels[column] = (run, text.strip().removesuffix(run).strip())
     if not channels:

@@ -152,8 +152,8 @@ def _scatter(scatter: float, error: FloatArray, unit: str) -> list[str]:
     if scatter <= 2 * float(np.median(error)):
         return []
     return [
-        f"the points scatter by {scatter:.2g} {unit} about the line, more than their own errors, {np.median(error):.2g} "
-        f"{unit}; it is taken as common to all"
+        f"the points scatter by {scatter:.2g} {unit} about the line, more than their own errors of "
+        f"{np.median(error):.2g} {unit}; it is taken as common to all"
     ]
 
 

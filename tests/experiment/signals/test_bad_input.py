@@ -155,7 +155,7 @@ def test_runs_of_nan_are_said_while_reading(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", [name for name in USES if name not in ("smooth", "contacts", "impacts")])
 def test_runs_of_nan_are_refused_where_they_cannot_be_bridged(tmp_path: Path, name: str) -> None:
-    x = take(quietly(gap_of_nan(tmp_path)), "Angle", "Run #2")
+    x = take(quietly(gap_of_nan(tmp_path)), "Angle", "Run #2", missing="keep")
     expected = rf"{WHO}: 30 of 400 values .* longest run of them 30 from t = 1 s on; .*cut the record there, or smooth"
     with pytest.raises(ValueError, match=expected):
         USES[name](x)
@@ -163,18 +163,24 @@ def test_runs_of_nan_are_refused_where_they_cannot_be_bridged(tmp_path: Path, na
 
 @pytest.mark.parametrize("name", ["contacts", "impacts"])
 def test_runs_of_nan_hide_contacts(tmp_path: Path, name: str) -> None:
-    x = take(quietly(gap_of_nan(tmp_path)), "Angle", "Run #2")
+    x = take(quietly(gap_of_nan(tmp_path)), "Angle", "Run #2", missing="keep")
     with pytest.raises(ValueError, match=rf"{WHO}: 30 of 400 values are not finite"):
         USES[name](x)
 
 
 def test_the_smoother_bridges_nan_and_says_so(tmp_path: Path) -> None:
-    x = take(quietly(gap_of_nan(tmp_path)), "Angle", "Run #2")
+    x = take(quietly(gap_of_nan(tmp_path)), "Angle", "Run #2", missing="keep")
     with pytest.warns(RecordingWarning, match=rf"{WHO}: 30 of 400 .*; they are bridged, with errors that say so"):
         result = smooth(x.time, x, resolution=1e-6)
     z = (result.x - np.cos(4 * result.time)) / result.x_error
     assert result.sizes["time"] == 400 and float(np.abs(z[100:130]).max()) < 4
     assert float(result.x_error[115]) > 20 * float(result.x_error[50])
+
+
+def test_runs_of_nan_are_refused_where_a_channel_is_taken(tmp_path: Path) -> None:
+    expected = rf"{WHO}: 30 of 400 values are not finite .* from time = 1 on; cut the record there, leave this run out"
+    with pytest.raises(ValueError, match=expected):
+        take(quietly(gap_of_nan(tmp_path)), "Angle", "Run #2")
 
 
 # -------------------------------------------------------------------------------------------------------------- short

@@ -123,6 +123,7 @@ def take(
     units: tuple[str, ...] | None = None,
     samples: int = 32,
     duration: float | None = None,
+    missing: str = "error",
 ) -> xr.DataArray:
     """A channel of a run, checked, with the run's name in its attributes.
 
@@ -137,12 +138,15 @@ def take(
         The fewest samples of use.
     duration : float, optional
         The shortest length of use, in seconds.
+    missing : {"error", "keep"}
+        What values that are not finite lead to: an error, or nothing, for what can do without them (``smooth`` bridges
+        them and says so).
 
     Raises
     ------
     ValueError
-        If there is no such channel, its unit is another, or the run is too short; the message says which run, which
-        channel, and what to do.
+        If there is no such channel, its unit is another, values are missing, or the run is too short; the message says
+        which run, which channel, and what to do.
     """
     array = recording.channel(channel, run)
     array = array.assign_attrs(run=run if run is not None else recording.runs[0])
@@ -157,6 +161,13 @@ def take(
     if array.size < samples:
         raise ValueError(f"{name}: {array.size} samples are too short to identify anything from; {samples} are needed")
     (axis,) = array.dims
+    total, start, longest = missing_runs(np.asarray(array.values, np.float64))
+    if total and missing == "error":
+        raise ValueError(
+            f"{name}: {total} of {array.size} values are not finite numbers, the longest run of them {longest} from "
+            f"{axis} = {float(array[axis][start]):.9g} on; cut the record there, leave this run out (of the notebook, "
+            "where there is one), or take(..., missing='keep') and smooth it, which bridges them"
+        )
     if duration is not None:
         length = float(array[axis][-1] - array[axis][0])
         if length < duration:

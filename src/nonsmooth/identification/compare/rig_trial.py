@@ -136,7 +136,7 @@ class RigTrial:
         rows = []
         for duration in rates:
             session = self.figure(11, f"fig11_{duration:.0f}", duration=duration)
-            found = self.against(*self.measured(session, "rise"))
+            found = self.against(*self.measured(session, "rise"), parameter="rho", direction="up")
             rows.append({"duration": duration, "rise_per_turn": float(found["rise_per_return"]), **_flips(found)})
         return {"rises": rows, "stairs": self.stairs()}
 
