@@ -66,6 +66,16 @@ def test_results_own_their_numbers(labels: Labels) -> None:
     assert result["section"].min() >= 0
 
 
+def test_what_is_done_to_one_result_does_not_reach_the_next(labels: Labels) -> None:
+    first = build(labels, ("up",), 1, ())
+    for state in (first["state"], first.coords["state"], first.variables["state"]):
+        state.attrs["note"] = "mine"
+        assert not state.values.flags.writeable
+    second = build(labels, ("up",), 1, ())
+    assert second["state"].attrs == {"long_name": "state"}
+    assert list(second["state"].values) == list(labels.states)
+
+
 def test_the_response_adds_amplitude_and_jumps(responded: xr.Dataset) -> None:
     assert responded["amplitude"].dims == responded["maximum"].dims == ("omega", "direction", "state")
     xr.testing.assert_allclose(responded["amplitude"], responded["maximum"])

@@ -73,6 +73,22 @@ def test_the_hash_of_the_equations_does_not_see_values():
     assert system.smoothed(1e-5).content_hash() == system.smoothed(2e-5).content_hash() != system.content_hash()
 
 
+def test_copies_are_written_with_their_own_values():
+    """What copies share is put together once; numbers and widths of bands are those of the copy."""
+    etas = ({}, {"eta": 1e-5}, {"eta": 2e-5}, {"eta": {"penetration": 1e-5, "separation": 3e-5}})
+    for eta in (*etas, *etas):
+        for given in ({"rho": 0.1 + 0.2, "g": -0.0}, {"rho": 1e300}, {}):
+            system = models.discontinuous_support().with_parameters(given)
+            system = system.smoothed(eta["eta"]) if eta else system
+            content = json.loads(system.to_text())
+            assert {key: part["value"] for key, part in content["parameters"].items()} == {
+                key: value for key, value in system.values.items() if not key.startswith("eta")
+            }
+            assert content.get("smoothing", {}) == eta
+            assert json.dumps(content, indent=1, ensure_ascii=False) == system.to_text()
+            assert System.from_text(system.to_text()) == system
+
+
 def test_the_text_is_the_same_in_another_process():
     code = (
         "from nonsmooth import models; print(models.discontinuous_support().smoothed(1e-5).content_hash(values=True))"

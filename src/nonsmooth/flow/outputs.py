@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,14 +20,19 @@ def output_values(
     traced: Traced, parameters: FloatArray, time: FloatArray, u: FloatArray, memory: FloatArray, mode: Any
 ) -> FloatArray:
     """Outputs (N, n_outputs) at N samples, each by the expression of the sample's mode."""
-    from sympy import lambdify
-
     result = np.full((len(time), len(traced.output_names)), np.nan)
-    arguments = [traced.t, *traced.u, *traced.m, *traced.p]
     for m in np.unique(mode):
         here = np.flatnonzero(mode == m)
-        for i, output in enumerate(traced.outputs):
-            function = lambdify(arguments, output[m], modules="numpy", cse=True)
-            values = function(time[here], *u[here].T, *memory[here].T, *parameters)
-            result[here, i] = values
+        columns = (time[here], *u[here].T, *memory[here].T, *parameters)
+        for i, function in enumerate(_functions(traced, int(m))):
+            result[here, i] = function(*columns)
     return result
+
+
+@lru_cache(maxsize=128)
+def _functions(traced: Traced, mode: int) -> tuple[Callable[..., Any], ...]:
+    """The outputs in one mode, of time, states, memory and parameters; to write them costs more than a short run."""
+    from sympy import lambdify
+
+    arguments = [traced.t, *traced.u, *traced.m, *traced.p]
+    return tuple(lambdify(arguments, output[mode], modules="numpy", cse=True) for output in traced.outputs)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.flow.engine import Chain, FloatArray, Log, SectionPlan, State
+from nonsmooth.flow.layers import Layers, layers
 from nonsmooth.flow.series_tables import Scratch, Tables, exact_steps, pack_net, periods
 from nonsmooth.kernels import codes
 from nonsmooth.kernels import series_places as at
@@ -106,7 +107,7 @@ class SeriesEngine:
         """Per row of the jets: 1 it has a polynomial, 0 an output with a corner, -1 it repeats a state."""
         traced = self.traced
         kinds = np.ones(len(traced.u) + len(traced.indicators) + len(traced.outputs), dtype=np.int64)
-        kinds[len(traced.u) + len(traced.indicators) :] = self.model.smooth_outputs
+        kinds[len(traced.u) + len(traced.indicators) :] = self.smooth_outputs
         kinds[list(self.repeats)] = -1
         return kinds
 
@@ -121,7 +122,19 @@ class SeriesEngine:
         """The generated functions of the system."""
         from nonsmooth.system.generate import compile_model
 
-        return compile_model(self.traced)
+        return compile_model(self.layers.model)
+
+    @cached_property
+    def layers(self) -> Layers:
+        """What a step has to be checked for: only Taylor steps whose length follows from the tolerance."""
+        if self.name == "taylor" and self.step is None:
+            return layers(self.traced)
+        return Layers(self.traced, 0, False)
+
+    @property
+    def smooth_outputs(self) -> tuple[bool, ...]:
+        """Per output of the system: whether it has a series."""
+        return self.model.smooth_outputs[: len(self.traced.outputs)]
 
     def prepare(self, points: FloatArray) -> Tables:
         """Periods, and for ``"exact"`` the length of a step in each mode, at the parameter points (P, n_parameters)."""
@@ -232,7 +245,7 @@ class SeriesEngine:
         )  # fmt: skip
 
     def _choice(self, tables: Tables) -> np.ndarray:
-        traced, model = self.traced, self.model
+        traced = self.traced
         choice = np.zeros(at.N_CHOICE, dtype=np.int64)
         choice[at.METHOD] = METHODS[self.name]
         choice[at.ORDER] = self._order()
@@ -241,8 +254,9 @@ class SeriesEngine:
         choice[[at.N_PARAMETERS, at.N_INDICATORS, at.N_OUTPUTS]] = (
             len(traced.p), len(traced.indicators), len(traced.outputs),
         )  # fmt: skip
-        choice[at.CORNERS] = not all(model.smooth_outputs)
+        choice[at.CORNERS] = not all(self.smooth_outputs)
         choice[at.NONLINEAR_ROWS] = tables.nonlinear_rows
+        choice[[at.CHECKED, at.N_GUARDS]] = self.layers.checked, self.layers.count
         return choice
 
     def _order(self) -> int:
@@ -258,7 +272,7 @@ class SeriesEngine:
 
     def _scratch(self) -> Scratch:
         traced = self.traced
-        rows = len(traced.u) + len(traced.indicators) + len(traced.outputs)
+        rows = len(traced.u) + len(traced.indicators) + len(traced.outputs) + self.layers.count
         sizes = (len(traced.u), len(traced.indicators), rows, len(traced.mode_names), len(self.net[3]))
         return Scratch.of(*sizes, len(traced.p) + len(traced.m), self._order(), self.model.n_scratch)
 

@@ -46,7 +46,7 @@ class Scratch:
             tuple(vector(n) for _ in range(8)), vector(width), vector(width), vector(width), vector(rows - n),
             vector(n), vector(n_q), vector(n_indicators), vector(n_indicators), integers(n_indicators),
             integers(n_indicators), integers(n_rows), vector(n_modes), integers(n_modes),
-            vector(stack_size(width)), integers(2), vector(n), vector(n), vector(n_modes),
+            vector(stack_size(width)), integers(2), vector(n), vector(n), vector(n_modes), vector(rows - n),
         ))  # fmt: skip
 
 

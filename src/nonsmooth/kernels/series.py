@@ -23,6 +23,7 @@ from .rkf45 import hermite, quiet, stages, transit
 from .series_node import begin, clear, copy, count_pass, leap, meets_section, open_window, passes
 from .series_step import at_end, failed, judged_at_end, next_stop, planned_length, polished, triggered
 from .taylor import dense_states, end_states, fill_powers
+from .trust import trusted
 from .watch import extend, extend_at_node, extend_corners, sample, touches, write_sample
 
 __all__ = ["march"]
@@ -38,7 +39,7 @@ JUMP = types.FunctionType(types.void(_i, _f, _f1, _f1, _f1, _f1))
 NET = types.Tuple((_i1, _i1, _i2, _i2, _f1))
 WORK = types.Tuple((
     _f2, _f2, _f2, _f2, types.UniTuple(_f1, 8), _f1, _f1, _f1, _f1, _f1, _f1,
-    _f1, _f1, _i1, _i1, _i1, _f1, _i1, _f1, _i1, _f1, _f1, _f1,
+    _f1, _f1, _i1, _i1, _i1, _f1, _i1, _f1, _i1, _f1, _f1, _f1, _f1,
 ))  # fmt: skip
 NORMS = types.UniTuple(_f1, 3)
 LOG = types.Tuple((_f1, _f2, _f2, _f2))
@@ -59,7 +60,7 @@ def march(
     LOG_FULL asks for larger logs and to be called again with the same arrays."""
     times, samples, crossings, touch_log = log
     C, W, J0, J1, K, powers, a, d, vals, u_new, q_new = work[:11]
-    scale, measured, side, side_next, rise, usual, visited, stack, found, u_dense, u_before, dwell = work[11:]
+    scale, measured, side, side_next, rise, usual, visited, stack, found, u_dense, u_before, dwell, near = work[11:]
     parts = (C, W, J0, scale, measured, side, usual, vals, u_new, q_new, visited)  # for what happens at an instant
     n, n_indicators, order, method = u.shape[0], choice[place.N_INDICATORS], choice[place.ORDER], choice[place.METHOD]
     rows, n_modes = n + n_indicators + choice[place.N_OUTPUTS], lacking.shape[0]
@@ -68,6 +69,7 @@ def march(
     J = J0 if rkf else C  # the jets at the beginning of a step
     rtol, fixed, period = control[place.RTOL], control[place.STEP], control[place.PERIOD]
     phase, until, t_max = control[place.PHASE], control[place.UNTIL], control[place.T_MAX]
+    checked = choice[place.CHECKED] == 1 and method == place.TAYLOR and fixed <= 0.0
     log_rtol, tail, forced = ln(max(0.1 * rtol, 1e-16)), (1.0 if method == place.TAYLOR else 0.0), period < inf
     mode, t, status, zero_row, take = counters[0], clock[0], OK, -1, False
     timed = False
@@ -152,7 +154,7 @@ def march(
             h = 0.5 * remaining
 
         # --- the step, and the first transition on it
-        pending, hit, x, calm, halvings, error = -1, -1, NONE, False, 0, 0.0
+        pending, hit, x, calm, halvings, error, sure = -1, -1, NONE, False, 0, 0.0, 0.0
         while True:
             if rkf:
                 k1 = K[0]
@@ -179,21 +181,35 @@ def march(
                 hermite(J0, J1, rows, h, C)
                 slack *= sqrt(error)
             fill_powers(h, degree, powers)
-            if calm or choice[place.LOCATE] == 0:
+            if calm:
                 break
-            found[0] = 0
-            for i in range(n_indicators):
-                side_next[i] = 0
-            x, pending, hit = earliest(
-                mode, C, degree, n, powers, net, side, side_next, scale, tail, slack, a, d, stack, found
-            )
-            if found[0] == 0 or fixed > 0.0 or halvings == place.HALVINGS:
+            if choice[place.LOCATE] == 1:
+                found[0] = 0
+                for i in range(n_indicators):
+                    side_next[i] = 0
+                x, pending, hit = earliest(
+                    mode, C, degree, n, powers, net, side, side_next, scale, tail, slack, a, d, stack, found
+                )
+                if found[0] == 1 and fixed <= 0.0 and halvings < place.HALVINGS:
+                    h *= 0.5  # a graze nearer than the polynomial is sure of
+                    landing = False
+                    halvings += 1
+                    continue
                 if found[0] == 1:
                     tally[place.DOUBTFUL] = 1
+            if not checked or h <= sure:
                 break
-            h *= 0.5  # a graze nearer than the polynomial is sure of
-            landing = False
-            halvings += 1
+            whole = x * h if pending >= 0 else h
+            sure = trusted(
+                field, values, mode, t, u, q, C, order, h, whole, n_indicators, rows, choice[place.N_GUARDS], powers,
+                norms[0], scale, rtol, a, d, stack, found, K, vals, near,
+            )  # fmt: skip
+            if sure >= whole:
+                break
+            h, landing = sure, False
+            if not (h > 1e-16 * t):
+                status = DIVERGED
+                break
         if status != OK:
             break
         if rkf:

@@ -5,8 +5,8 @@ TAYLOR, RKF45, EXACT = 0, 1, 2
 
 # choice: what is asked for
 METHOD, ORDER, LOCATE, TRANSIENT, KEEP, SECTION, RISING, SECTION_MODE, AFTER, EVERY = range(10)
-RECORD, N_PARAMETERS, N_INDICATORS, N_OUTPUTS, CORNERS, NONLINEAR_ROWS = range(10, 16)
-N_CHOICE = 16
+RECORD, N_PARAMETERS, N_INDICATORS, N_OUTPUTS, CORNERS, NONLINEAR_ROWS, CHECKED, N_GUARDS = range(10, 18)
+N_CHOICE = 18
 
 # control: tolerances and times (the phase in time units, -1 where the section is not stroboscopic)
 RTOL, STEP, PERIOD, PHASE, T_MAX, UNTIL = range(6)

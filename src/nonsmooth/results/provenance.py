@@ -15,6 +15,7 @@ import json
 import math
 from collections.abc import Mapping
 from datetime import UTC, datetime
+from functools import cache
 from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
@@ -30,6 +31,7 @@ __all__ = ["ATTRIBUTE", "options_as_data", "package_version", "provenance", "rea
 ATTRIBUTE = "nonsmooth"
 
 
+@cache  # it is read from a file, and every result holds it
 def package_version() -> str:
     """The installed version of ``nonsmooth``."""
     return metadata.version("nonsmooth")

@@ -25,6 +25,7 @@ one is a dim). The dims of the Datasets come in the order of the schema: paramet
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -217,10 +218,16 @@ def section_points(
     return xr.Dataset(variables, coords, dict(attrs)).squeeze(list(squeeze))
 
 
+@lru_cache(maxsize=64)
+def _state_index(names: tuple[str, ...]) -> xr.IndexVariable:
+    """The index of the states' names, made once: a Dataset takes a copy whose attributes are its own."""
+    return xr.IndexVariable("state", _strings(names), {"long_name": "state"})
+
+
 def _state_coords(d: Labels) -> dict[str, Any]:
     """The states' names, with their units and symbols beside them (each state has its own)."""
     coords: dict[str, Any] = {
-        "state": ("state", _strings(d.states), {"long_name": "state"}),
+        "state": _state_index(tuple(d.states)),
         "state_unit": ("state", _strings(q.unit for q in d.states.values()), {"long_name": "unit"}),
     }
     if any(q.symbol for q in d.states.values()):

@@ -31,17 +31,39 @@ _FORMAT = "nonsmooth system"
 _VERSION = 1
 
 
+_GAP = "\0value\0"  # stands where a number is to be written; no name or unit holds it
+
+
 def write_system(system: System, values: bool = True) -> str:
     """Return the system as text; without ``values`` only what copies share (for the hash of the equations)."""
-    content = _content(system._description)
+    description, eta = system._description, system.eta
+    bands = sorted(eta) if isinstance(eta, Mapping) else [] if eta is None else ["all"]
+    # Every result holds this text: what copies share is put together once.
+    key = ("text", values, eta is None, *bands)
+    if key not in description.variants:
+        description.variants[key] = _pieces(description, eta, values)
+    pieces = description.variants[key]
+    if not values:
+        return "".join(pieces)
+    now = system.values
+    numbers = [now[name] for name in description.parameters]
+    numbers += eta.values() if isinstance(eta, Mapping) else [] if eta is None else [eta]
+    text = [pieces[0]]
+    for number, piece in zip(numbers, pieces[1:], strict=True):
+        text += (repr(number), piece)
+    return "".join(text)
+
+
+def _pieces(description: Description, eta: float | Mapping[str, float] | None, values: bool) -> list[str]:
+    """The text between the values of the parameters, and of the widths of the bands after them."""
+    content = _content(description)
     if values:
-        now = system.values
-        content["parameters"] = {key: {"value": now[key], **rest} for key, rest in content["parameters"].items()}
-    eta = system.eta
+        content["parameters"] = {key: {"value": _GAP, **rest} for key, rest in content["parameters"].items()}
     if eta is not None:
         kind = sorted(eta) if isinstance(eta, Mapping) else "all"
-        content["smoothing"] = {"eta": eta} if values else {"bands": kind}
-    return json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False)
+        gaps = dict.fromkeys(eta, _GAP) if isinstance(eta, Mapping) else _GAP
+        content["smoothing"] = {"eta": gaps} if values else {"bands": kind}
+    return json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False).split(json.dumps(_GAP))
 
 
 def _content(d: Description) -> dict[str, Any]:
