@@ -128,12 +128,17 @@ def _pairs(seen: list[Jump], expected: list[Jump]) -> dict[int, int]:
     for mine, theirs in groups:
         away = np.abs(np.subtract.outer([seen[i].value for i in mine], [expected[j].value for j in theirs]))
         if len(mine) <= len(theirs):
-            best = min(combinations(range(len(theirs)), len(mine)), key=lambda c, d=away: d[range(len(c)), c].sum())
-            pairs |= {i: theirs[j] for i, j in zip(mine, best, strict=True)}
+            pairs |= {i: theirs[j] for i, j in zip(mine, _nearest(away), strict=True)}
         else:
-            best = min(combinations(range(len(mine)), len(theirs)), key=lambda c, d=away: d[c, range(len(c))].sum())
-            pairs |= {mine[i]: j for i, j in zip(best, theirs, strict=True)}
+            pairs |= {mine[i]: j for i, j in zip(_nearest(away.T), theirs, strict=True)}
     return pairs
+
+
+def _nearest(away: FloatArray) -> tuple[int, ...]:
+    """The columns, in rising order, one for each row, that leave the sum of the distances least."""
+    rows, columns = away.shape
+    sums = {chosen: float(away[range(rows), chosen].sum()) for chosen in combinations(range(columns), rows)}
+    return min(sums, key=sums.__getitem__)
 
 
 def _rises(jump: Jump) -> bool:

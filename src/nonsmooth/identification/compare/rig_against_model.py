@@ -36,39 +36,48 @@ def campaign(seeds: Sequence[int], folder: Path, say: Callable[[str], None] = la
     found: dict[str, Any] = {}
     for name, rig in rigs.items():
         trial = RigTrial(rig, folder / name.replace(" ", "_"))
-        full = name == "published"
-        one = found[name] = {"truth": dict(rig.truth)}
-
-        def kept(
-            key: str, make: Callable[[], Any], one: dict[str, Any] = one, trial: RigTrial = trial, name: str = name
-        ) -> Any:
-            file = trial.folder / f"{key}.json"
-            if not file.is_file():
-                made = make()
-                file.parent.mkdir(parents=True, exist_ok=True)
-                file.write_text(json.dumps(made, indent=1), encoding="utf-8")
-                say(f"{name}: {key}")
-            one[key] = json.loads(file.read_text(encoding="utf-8"))
-            return one[key]
-
-        kept("identified", lambda trial=trial: _parameters(trial))
-        kept("response", trial.response)
-        if full:
-            kept("rises", trial.rises)
-        kept("stairs", trial.stairs)
-        kept("periods", trial.periods)
-        attractor = kept("attractor", trial.attractor)
-        chaotic = attractor["measured_period_number"] == 0 == attractor["theory_period_number"]
-        for feature in (*MOTION, *(SENSORS if full else ())):
-            if chaotic and (full or attractor["energy_ratio"] >= 2):
-                kept(f"attractor_without_{feature}", lambda f=feature, t=trial: t.without(f).attractor())
-            if full and feature in MOTION:
-                kept(f"stairs_without_{feature}", lambda f=feature, t=trial: t.without(f).stairs())
-                kept(f"transients_without_{feature}", lambda f=feature, t=trial: t.without(f).transients())
-        if full:
-            kept("transients", trial.transients)
-            kept("response_without_friction", lambda t=trial: t.without("friction").response())
+        keep = _Kept(name, trial, say)
+        found[name] = keep.found
+        keep.found["truth"] = dict(rig.truth)
+        keep("identified")
+        keep("response")
+        if name == "published":
+            keep("rises")
+        keep("stairs")
+        keep("periods")
+        one = keep("attractor")
+        chaotic = one["measured_period_number"] == 0 == one["theory_period_number"]
+        if name == "published":
+            keep("transients")
+            keep("response", "friction")
+        for feature in (*MOTION, *(SENSORS if name == "published" else ())):
+            if chaotic and (name == "published" or one["energy_ratio"] >= 2):
+                keep("attractor", feature)
+            if name == "published" and feature in MOTION:
+                keep("stairs", feature)
+                keep("transients", feature)
     return found
+
+
+class _Kept:
+    """Results of one trial, each in a file of its own; computed where there is no such file."""
+
+    def __init__(self, name: str, trial: RigTrial, say: Callable[[str], None]) -> None:
+        self.name, self.trial, self.say = name, trial, say
+        self.found: dict[str, Any] = {}
+
+    def __call__(self, what: str, without: str = "") -> Any:
+        """The result of this method of the trial, with a feature switched off or none."""
+        key = f"{what}_without_{without}" if without else what
+        file = self.trial.folder / f"{key}.json"
+        if not file.is_file():
+            trial = self.trial.without(without) if without else self.trial
+            made = _parameters(trial) if what == "identified" else getattr(trial, what)()
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_text(json.dumps(made, indent=1), encoding="utf-8")
+            self.say(f"{self.name}: {key}")
+        self.found[key] = json.loads(file.read_text(encoding="utf-8"))
+        return self.found[key]
 
 
 def _parameters(trial: RigTrial) -> dict[str, list[float]]:

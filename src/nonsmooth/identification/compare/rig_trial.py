@@ -64,8 +64,9 @@ class RigTrial:
 
     def without(self, feature: str) -> RigTrial:
         """The same rig with one feature switched off, over the same identified parameters."""
+        off: dict[str, Any] = {feature: False}
         return RigTrial(
-            replace(self.rig, **{feature: False}), self.folder / f"without_{feature}", self.identified, self.reading
+            replace(self.rig, **off), self.folder / f"without_{feature}", self.identified, self.reading
         )
 
     @cached_property
