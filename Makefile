@@ -6,6 +6,8 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 OUT    ?= out/savi2007
+# Matrices are tiny: threads of the linear algebra only wait for each other and for a core.
+export OPENBLAS_NUM_THREADS ?= 1
 PYTEST_ARGS ?= -n auto --dist loadfile
 
 .DEFAULT_GOAL := help

@@ -1,7 +1,7 @@
 """Damaged session folders, all the way through ``identify``: which run, which channel, what to do.
 
-A session of the virtual rig (pulls and taps, three runs of each) is written as Capstone exports it, and one run of one file
-is damaged as it happens in a laboratory. What can be used is used, with a warning; what cannot is an error.
+A session of the virtual rig (pulls and taps, three runs of each) is written as Capstone exports it, and one run of one
+file is damaged as it happens in a laboratory. What can be used is used, with a warning; what cannot is an error.
 """
 
 from __future__ import annotations
@@ -120,24 +120,25 @@ def cut(n: int) -> Damage:
 
 
 WHO = "run 'Run #2', channel '{}'"
-CAPSTONE = r"column \d+ \('{} \(\w+\) Run #2.*'\) belongs to no run that has a time column .*export the time of its run too"
+ANGLE, FORCE = WHO.format("Angle"), WHO.format("Force")
+TIMELESS = r"line 1: column \d+ \('Angle \(rad\) Run #2.*'\) belongs to no run .*export the time of its run too"
 
 
 @pytest.mark.parametrize(
     ("procedure", "damage", "error", "sentence"),
     [
-        ("impulse", without("Time"), DataFileError, r"impulse\.csv: line 1: " + CAPSTONE.format("Angle")),
-        ("springs", without("Time"), DataFileError, r"springs\.csv: line 1: " + CAPSTONE.format("Angle")),
+        ("impulse", without("Time"), DataFileError, r"impulse\.csv: " + TIMELESS),
+        ("springs", without("Time"), DataFileError, r"springs\.csv: " + TIMELESS),
         ("springs", without("Force"), ValueError, "run 'Run #2' has no channel 'Force'; it has: Angle"),
-        ("impulse", in_unit("Angle", "(N)"), ValueError, WHO.format("Angle") + ": its unit is 'N', needed is rad or"),
-        ("impulse", in_unit("Angle", ""), ValueError, WHO.format("Angle") + ": it has no unit, .*; say it with"),
-        ("springs", in_unit("Force", "(kN)", 1e-3), ValueError, WHO.format("Force") + ": its unit is 'kN', needed is N"),
-        ("springs", slower, ValueError, WHO.format("Angle") + ": the sample rate changes from 100 Hz to 50 Hz near t ="),
-        ("impulse", holes("Angle"), ValueError, WHO.format("Angle") + ": 40 of .* not finite .* leave this run out"),
-        ("springs", holes("Force"), ValueError, WHO.format("Force") + ": 40 of .* 40 from time = 3 on; cut the record"),
-        ("springs", holes("Angle"), ValueError, WHO.format("Angle") + ": 40 of .* 40 from time = 3 on; cut the record"),
-        ("impulse", cut(20), ValueError, WHO.format("Angle") + ": 20 samples are too short .* 32 are needed"),
-        ("springs", cut(20), ValueError, WHO.format("Angle") + ": 20 samples are too short .* 32 are needed"),
+        ("impulse", in_unit("Angle", "(N)"), ValueError, ANGLE + ": its unit is 'N', needed is rad or"),
+        ("impulse", in_unit("Angle", ""), ValueError, ANGLE + ": it has no unit, .*; say it with"),
+        ("springs", in_unit("Force", "(kN)", 1e-3), ValueError, FORCE + ": its unit is 'kN', needed is N"),
+        ("springs", slower, ValueError, ANGLE + ": the sample rate changes from 100 Hz to 50 Hz near t ="),
+        ("impulse", holes("Angle"), ValueError, ANGLE + ": 40 of .* not finite .* leave this run out"),
+        ("springs", holes("Force"), ValueError, FORCE + ": 40 of .* 40 from time = 3 on; cut the record"),
+        ("springs", holes("Angle"), ValueError, ANGLE + ": 40 of .* 40 from time = 3 on; cut the record"),
+        ("impulse", cut(20), ValueError, ANGLE + ": 20 samples are too short .* 32 are needed"),
+        ("springs", cut(20), ValueError, ANGLE + ": 20 samples are too short .* 32 are needed"),
     ],
     ids=lambda value: getattr(value, "__qualname__", "").split(".")[0] if callable(value) else None,
 )
@@ -165,7 +166,7 @@ def undamaged(whole: Path) -> ns.identification.ParameterSet:
 
 def same(found: ns.identification.ParameterSet, undamaged: ns.identification.ParameterSet) -> bool:
     """Equal within the standard uncertainty."""
-    return all(abs(found[name].value - undamaged[name].value) <= undamaged[name].uncertainty for name in undamaged)
+    return all(abs(found[name] - undamaged[name]) <= undamaged.uncertainty[name] for name in undamaged)
 
 
 def test_other_units_of_an_angle_are_converted_and_said(whole: Path, tmp_path: Path, undamaged: object) -> None:
@@ -182,12 +183,11 @@ def test_a_changed_rate_is_said_where_it_does_no_harm(whole: Path, tmp_path: Pat
     assert f"{WHO.format('Angle')}: the sample rate changes from 100 Hz to 50 Hz" in sentence and "split" in sentence
 
 
-def test_a_tap_that_is_too_short_is_left_out_and_said(whole: Path, tmp_path: Path, undamaged: object) -> None:
+def test_a_tap_that_is_too_short_is_left_out_and_said(whole: Path, tmp_path: Path) -> None:
     found, said = said_by(damaged(whole, tmp_path, "impulse", cut(60)))
     notes = [note for finding in found.findings for note in finding.notes]
     told = [text for text in [*said, *notes] if "not used" in text]
-    assert told and all("half swings" in text for text in told)
-    assert found.findings[0].runs != RUNS or "Run #2" in "".join(told) or "decay 2" in "".join(told)
+    assert told and all("half swings" in text and ("Run #2" in text or "decay 2" in text) for text in told)
 
 
 def test_a_file_without_any_time_says_how_to_read_it(whole: Path, tmp_path: Path) -> None:
@@ -195,7 +195,7 @@ def test_a_file_without_any_time_says_how_to_read_it(whole: Path, tmp_path: Path
         keep = [i for i, text in enumerate(head) if not text.startswith("Time")]
         return [head[i] for i in keep], [[row[i] for i in keep] for row in rows]
 
-    with pytest.raises(DataFileError, match=r"impulse\.csv: line 1: no time column .* columns= or rate="):
+    with pytest.raises(DataFileError, match=r"impulse\.csv: no time column among .* give its sample rate in Hz, rate="):
         ns.identify(damaged(whole, tmp_path, "impulse", timeless))
 
 

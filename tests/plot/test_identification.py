@@ -16,7 +16,15 @@ import xarray as xr
 
 import nonsmooth as ns
 from nonsmooth.identification.compare import compare
-from nonsmooth.plot import comparison_diagram, comparison_motion, comparison_response, identification
+from nonsmooth.plot import identification
+from nonsmooth.plot.comparison_diagram import comparison_diagram
+from nonsmooth.plot.comparison_motion import (
+    comparison_distances,
+    comparison_phase_portrait,
+    comparison_section,
+    comparison_time,
+)
+from nonsmooth.plot.comparison_response import comparison_response
 
 SYNTHETIC = {"synthetic": "yes"}
 
@@ -231,9 +239,9 @@ def motion() -> xr.Dataset:
 
 def test_pictures_of_a_motion() -> None:
     result = motion()
-    for name in ("comparison_time", "comparison_phase_portrait", "comparison_section", "comparison_distances"):
-        assert "synthetic" in words(getattr(comparison_motion, name)(result))
+    for draw in (comparison_time, comparison_phase_portrait, comparison_section, comparison_distances):
+        assert "synthetic" in words(draw(result))
     with pytest.raises(ValueError, match="needs a comparison of a response; this is a comparison of a motion"):
-        comparison_response.comparison_response(result)
+        comparison_response(result)
     with pytest.raises(ValueError, match="no result of compare"):
-        comparison_diagram.comparison_diagram(xr.Dataset())
+        comparison_diagram(xr.Dataset())

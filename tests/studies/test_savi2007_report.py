@@ -9,16 +9,24 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.studies.savi2007 import Reproduction, reproduce
+from nonsmooth.studies.savi2007.bench import Bench
 from nonsmooth.studies.savi2007.claims import CLAIMS
+from nonsmooth.studies.savi2007.findings import estimates_of
+from nonsmooth.studies.savi2007.printed import TABLE_1
 from nonsmooth.studies.savi2007.study import figures_of_the_study
 
-NUMBERS = {2, 9, 10, 11, 12, 13, 14, 15, 17, 18}
-CLAIM_IDS = {"M1", "M2", "M3", "M4", "F9a", "F9b", "F9c", "F10", "F11", "F12", "F13", "F14", "F15", "F17", "F18", "C1"}
+NUMBERS = {2, *range(4, 19)}
+MEASURED = {*range(4, 15), 16, 17, 18}
+CLAIM_IDS = {
+    "M1", "M2", "M3", "M4", "R1", "R2", "P1", "P2", "P3", "P4", "P5", "P6", "P7", "P8", "F9a", "F9b", "F9c", "F10",
+    "F11", "F12", "F13", "F14", "F15", "F16", "F17", "F18", "C1",
+}  # fmt: skip
 
 
-def test_the_study_has_all_numerical_figures_and_claims() -> None:
+def test_the_study_has_all_figures_and_claims() -> None:
     figures = figures_of_the_study()
     assert {figure.number for figure in figures if figure.number is not None} == NUMBERS
+    assert {figure.number for figure in figures if figure.rig and figure.number is not None} == MEASURED
     assert {claim.id for claim in CLAIMS} == CLAIM_IDS
     names = {figure.name for figure in figures}
     assert all(set(claim.figures) <= names for claim in CLAIMS)
@@ -34,11 +42,38 @@ def test_files_are_there_and_can_be_read(quick: Reproduction) -> None:
 
 def test_every_row_is_complete(quick: Reproduction) -> None:
     rows = json.loads((quick.out / "claims.json").read_text(encoding="utf-8"))
-    assert {row["id"] for row in rows} == {"F9a", "F9b", "F9c", "F10", "F11"}
+    assert {row["id"] for row in rows} == {"R1", "R2", "P8", "F9a", "F9b", "F9c", "F11"}
     for row in rows:
-        assert all(row[key] for key in ("place", "says", "exact", "smoothed", "difference"))
-        assert re.match(r"agrees|differs|adds to the paper", row["verdict"])
-        assert not re.search(r"nan|None|not found", " ".join(row.values())), row
+        assert all(row[key] for key in ("place", "says", "exact", "smoothed", "difference", "rig", "rig_verdict"))
+        for verdict in (row["verdict"], row["rig_verdict"]):
+            assert re.match(r"agrees|differs|adds to the paper|not asked", verdict)
+        assert not re.search(r"nan|None", " ".join(row.values())), row
+        assert "not found" not in row["exact"] + row["smoothed"]
+
+
+def test_the_rig_finds_the_parameters_that_it_was_given(quick: Reproduction) -> None:
+    """Table 1 as printed is the rig's truth, but for omega_0: sqrt(2k/m) of it (closed form)."""
+    found = estimates_of(quick.data["table1"]["identified"])
+    truth = {name: printed.value for name, printed in TABLE_1.items()}
+    truth |= {"omega_0": (2 * 8.47 / 0.838) ** 0.5, "gap_at_rest": 0.0018}
+    for name, expected in truth.items():
+        assert abs(found[name].value - expected) <= 4 * found[name].uncertainty, name
+        assert found[name].value == pytest.approx(expected, rel=0.01), name
+    rows = {row.says: row for row in quick.rows if row.id == "P8"}
+    assert all(row.rig_verdict == "agrees" for says, row in rows.items() if not says.startswith("omega_0"))
+    assert rows["omega_0 = 4.60 rad/s"].rig_verdict == "differs by 2.3 %"  # 4.496 against 4.60
+
+
+def test_all_that_the_rig_gives_is_labelled_synthetic(quick: Reproduction) -> None:
+    markdown = (quick.out / "report.md").read_text(encoding="utf-8")
+    for figure in quick.figures:
+        if figure.rig:
+            assert all(one.attrs["synthetic"] == "yes" for one in quick.data[figure.name].values())
+            assert f"{figure.title} (virtual rig, synthetic)" in markdown
+    for notebook in (quick.out / "rig").glob("*/session.toml"):
+        assert "synthetic = true" in notebook.read_text(encoding="utf-8")
+        assert not list(notebook.parent.glob("truth*"))
+    assert (quick.out / "rig" / "truth.toml").exists()
 
 
 def test_exact_and_smoothed_agree_on_the_printed_numbers(quick: Reproduction) -> None:
@@ -59,20 +94,29 @@ def test_the_report_is_self_contained(quick: Reproduction) -> None:
     markdown = (quick.out / "report.md").read_text(encoding="utf-8")
     for row in quick.rows:
         assert row.says in markdown
-    assert "A partial run (fig09, fig10, fig11)" in markdown
+    assert "A partial run (table1, fig09, fig09_rig, fig11, fig11_rig)" in markdown
 
 
-def test_a_figure_of_the_rig_is_refused(tmp_path) -> None:
-    with pytest.raises(ValueError, match=r"figure 16 is not among .* 2, 9, 10"):
-        reproduce(tmp_path, figures=[16], progress=False)
+def test_a_photograph_is_refused(tmp_path) -> None:
+    with pytest.raises(ValueError, match=r"figure 3 is not among .* 2, 4, 5"):
+        reproduce(tmp_path, figures=[3], progress=False)
+
+
+def test_a_failed_measurement_says_where_to_look(tmp_path) -> None:
+    (sketch,) = (figure for figure in figures_of_the_study() if figure.name == "fig02")  # not of the rig
+    with Bench(tmp_path, [sketch], quick=True) as bench, pytest.raises(RuntimeError, match="log.txt.*fig02: not meas"):
+        bench.results()
 
 
 @pytest.mark.slow
 def test_the_whole_study_runs_quickly(tmp_path) -> None:
-    """All figures at coarse settings: every claim has its rows, and both flows say the same of each."""
+    """All figures at coarse settings: every claim has its rows, and both flows say the same of each.
+
+    Of the rig: what was printed in the paper and put into the rig comes out of the procedures of Section 3.1.
+    """
     whole = reproduce(tmp_path, quick=True, progress=False)
     assert {row.id for row in whole.rows} == CLAIM_IDS
-    assert not any("nan" in " ".join(vars(row).values()) for row in whole.rows)
+    assert not any(re.search(r"\bnan\b", " ".join(vars(row).values())) for row in whole.rows)
     assert {figure.number for figure in whole.figures} == NUMBERS | {None}
     text = (tmp_path / "report.md").read_text(encoding="utf-8")
     assert "A quick run" in text
@@ -82,3 +126,8 @@ def test_the_whole_study_runs_quickly(tmp_path) -> None:
     assert "swapped" in says["omega = 8.64 rad/s: periodic, no contact"].why
     assert says["the choice of eta is important"].verdict == "agrees"
     assert says["g = 0.0018 m: a strange attractor, sections at four phases"].verdict == "agrees"
+    procedures = [row for row in whole.rows if row.id in ("P1", "P2", "P5")]
+    assert procedures
+    assert all(row.rig_verdict == "agrees" for row in procedures)
+    viscous = next(row for row in whole.rows if row.says.startswith("c = 0.87"))
+    assert float(re.search(r"\(([+-]\d\.\d) %\)", viscous.rig).group(1)) > 1  # dry friction passes for viscous

@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
+
+# Matrices here are tiny: threads of the linear algebra would wait for each other (20 times the processor time in small
+# fits), and beside our own threads for a core. Must stand before NumPy is loaded.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from nonsmooth.cli import compare, identify, models, reproduce, rig, run, show
 from nonsmooth.errors import SolveError

@@ -28,6 +28,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.nonlinear_mode import NonlinearMode, interpolation
+from nonsmooth.identification.response_fit import FEWEST_CURVES, ResponseFit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -134,17 +135,15 @@ def amplitude_dependent(
     ValueError
         If the curves do not agree in what was recorded, or have fewer points than there are unknowns.
     """
-    from nonsmooth.identification.response_fit import ResponseFit
-
     fit = ResponseFit(curves, knots, residual=residual, mass=mass)
     mode = fit.mode
     grid = np.linspace(mode.knots[0], mode.knots[-1], 101)
     basis = interpolation(mode.knots, grid)
     K = len(mode.knots)
-    # omega_n^2 = scale * exp(shift) at the knots is linear in them; ln zeta = ln D - ln 2 - ln(omega_n^2) / 2.
+    # The unknowns are ln omega_n^2 and ln D at the knots; ln zeta = ln D - ln 2 - ln(omega_n^2) / 2.
     square = mode.square(grid)
     by_square = np.zeros((len(grid), fit.covariance.shape[0]))
-    by_square[:, :K] = basis * mode.squares / square[:, None]  # d ln omega_n^2
+    by_square[:, :K] = basis * mode.squares / square[:, None]
     by_zeta = -0.5 * by_square
     by_zeta[:, K : 2 * K] += basis
     frequency, zeta = mode.natural_frequency(grid), mode.damping_ratio(grid)
@@ -159,16 +158,16 @@ def amplitude_dependent(
         )
 
     others = {"zeta": at(0)[1], "f_n at the largest amplitude": at(-1)[0], "zeta at the largest amplitude": at(-1)[1]}
-    others |= fit.others()
+    others |= _others(fit)
     finding = Finding(
         "f_n", at(0)[0], _METHOD, sum(len(c.frequency) for c in curves), tuple(c.name for c in curves),
-        tuple(fit.notes()), others, None, data, "backbone",
+        tuple(_notes(fit)), others, None, data, "backbone",
     )  # fmt: skip
     return finding, mode
 
 
 def _data(
-    fit: Any, grid: FloatArray, f: FloatArray, f_error: FloatArray, zeta: FloatArray, zeta_error: FloatArray
+    fit: ResponseFit, grid: FloatArray, f: FloatArray, f_error: FloatArray, zeta: FloatArray, zeta_error: FloatArray
 ) -> xr.Dataset:
     """What the pictures need."""
     import xarray as xr
@@ -191,3 +190,39 @@ def _data(
     coords = {"amplitude": ("amplitude", grid, {"long_name": "amplitude of the mode", "units": "m"}),
               "curves": ("curves", list(fit.names))}  # fmt: skip
     return xr.Dataset(rows, coords, {"scatter": fit.sigma})
+
+
+def _others(fit: ResponseFit) -> dict[str, Estimate]:
+    """Modal mass, residual, and how far curves differ."""
+    K, (first, _) = len(fit.knots), fit.sizes
+    error = np.sqrt(np.diag(fit.covariance))
+    found: dict[str, Estimate] = {}
+    if fit.forced and fit.mass is None:
+        found["modal mass"] = Estimate(fit.mode.mass, fit.mode.mass * float(error[2 * K]), "kg")
+    if fit.residual:
+        R = fit.mode.residual
+        for name, k, value in (("real", first - 2, R.real), ("imag", first - 1, R.imag)):
+            found[f"residual, {name}"] = Estimate(1e6 * value, 1e6 * float(error[k]) * fit.unit, "µm/N")
+    if fit.shifts:
+        n = np.sqrt(2.0 * len(fit.names))
+        f = 0.5 * float(np.sqrt(np.mean(fit.mode.squares)) / (2 * np.pi)) * float(fit.spread[0])
+        found["f_n from curve to curve"] = Estimate(f, f / n, "Hz")
+        found["zeta from curve to curve, relative"] = Estimate(float(fit.spread[1]), float(fit.spread[1]) / n)
+    return found
+
+
+def _notes(fit: ResponseFit) -> list[str]:
+    """What a reader should know."""
+    slope = fit.slopes()
+    unstable = int(np.count_nonzero(slope < 0))
+    said = [
+        f"{unstable} of {len(slope)} points lie on an unstable middle part (d ln F / d ln a < 0); the least slope "
+        f"is {slope.min():.2f}, that of a linear mode 1"
+    ]
+    if not fit.shifts:
+        said.append(f"fewer than {FEWEST_CURVES} curves: how far one differs from the next is not known, nor stated")
+    if not fit.forced:
+        said.append("no forces were recorded: the modal mass is not known")
+    if not fit.phased:
+        said.append("no phases were recorded: damping comes from the amplitudes alone")
+    return said

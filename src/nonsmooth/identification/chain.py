@@ -152,18 +152,28 @@ class _Chain:
         try:
             found = find()
         except (ValueError, SolveError) as error:
-            sentence = f"{what}: not found: {error}"
-            self.notes.append(sentence)
-            warnings.warn(sentence, RecordingWarning, stacklevel=4)
+            self.say(f"{what}: not found: {error}")
             return None
         self.findings += found if isinstance(found, list) else [found]
         return found[0] if isinstance(found, list) else found
+
+    def left_out(self, procedure: str, decay: DecayFit) -> None:
+        """Say which decays were not used, and why."""
+        for note in decay.notes:
+            self.say(f"{procedure}: {note}")
+
+    def say(self, sentence: str) -> None:
+        self.notes.append(sentence)
+        warnings.warn(sentence, RecordingWarning, stacklevel=5)
 
     def taps(self) -> DecayFit | None:
         runs, resolution = self.runs("impulse"), self.evidence.resolution
         if not runs:
             return None
-        decay = free_decay([(run.time, run.positions) for run in runs], resolution=resolution)
+        decay = free_decay(
+            [(run.time, run.positions) for run in runs], resolution=resolution, names=[run.name for run in runs]
+        )
+        self.left_out("impulse", decay)
         self.observe(("omega_0", "b", "f"), decay.values[:3], decay.covariance[:3, :3], "free decay")
         self.beside("natural frequency (Fig. 5)", lambda: natural_frequency(runs, decay))
         self.beside("damping by free decay", lambda: decay_damping(runs, decay, self.mass, resolution=resolution))
@@ -173,7 +183,7 @@ class _Chain:
         """The steady runs without support, and the dampings found from them."""
         free = [run for run in self.runs("response") if "gap" not in run.settings]
         if mounted := len(self.runs("response")) - len(free):
-            self.notes.append(
+            self.say(
                 f"{mounted} runs of the response state a gap: the support was mounted, no damping from them"
             )
         seen = steady(free)
@@ -205,6 +215,7 @@ class _Chain:
             return
         mass = self.evidence.quantity("test_mass")
         found, decay = support_damping(runs, resolution=self.evidence.resolution, test_mass=mass)
+        self.left_out("drop", decay)
         self.findings.append(found)
         self.observations.append(self.weighed("test_mass"))
         self.observe(("omega_s", "b_s"), decay.values[:2], decay.covariance[:2, :2], "drop of the test mass")
@@ -232,14 +243,20 @@ class _Chain:
         if not runs:
             return None, None
         if decay is None or "k_s" not in rough.names:
-            self.notes.append("contact: not used: needs taps of the car (impulse), and the support's stiffness")
+            self.say("contact: not used: needs taps of the car (impulse), and the support's stiffness")
             return None, None
         m = rough["m"]
         gamma = rough["c_s"] / m if "c_s" in rough.names else 1e-3 * rough["k_s"] / m
         found = shoot_contacts(runs, decay, resolution=resolution, kappa=rough["k_s"] / m, gamma=gamma)
         self.observe(("kappa", "gamma"), found.values[3:5], found.covariance[3:5, 3:5], "multiple shooting")
         self.findings.append(contact_finding(found, m, resolution=resolution))
-        return found, self.beside("c_s from one contact", lambda: one_contact(found, m, resolution=resolution))
+        i, j = rough.names.index("k_s"), rough.names.index("m")
+        relative = rough.covariance[np.ix_([i, j], [i, j])] / np.outer([rough["k_s"], m], [rough["k_s"], m])
+        # of the ratio k_s/m: both come from masses and forces that are known apart
+        error = rough["k_s"] / m * float(np.sqrt(np.array([1, -1]) @ relative @ [1, -1]))
+        return found, self.beside(
+            "c_s from one contact", lambda: one_contact(found, m, resolution=resolution, kappa_error=error)
+        )
 
 
 def _estimate(adjusted: Adjusted, name: str) -> Estimate:

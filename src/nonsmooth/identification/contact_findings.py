@@ -1,21 +1,23 @@
 r"""What multiple shooting says of the support: gap and contact parameters, and how much of them one contact tells.
 
 :math:`c_s/k_s` is half a millisecond and a contact eight samples: no sample shows it, but the speed that a contact
-takes, some 3 %, shows in the free motion after it. The profile over one contact, everything else held as known, says
-what that is worth; many contacts fitted together are worth the root of their number more.
+takes, some 3 %, shows in the free motion after it. The profile over one contact says what that is worth; what many
+contacts fitted together are worth is more, by the root of their number and by what they tell of gap and drive.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.errors import SolveError
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.multiple_shooting import ContactFit
-from nonsmooth.identification.pieces import Problem
-from nonsmooth.identification.uncertainty import profile_likelihood
+from nonsmooth.identification.shooting import ShootingFit, shoot
+from nonsmooth.identification.uncertainty import coverage_factor, crossed
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -23,8 +25,9 @@ if TYPE_CHECKING:
 __all__ = ["contact_finding", "one_contact"]
 
 FloatArray = NDArray[np.float64]
-_GAMMA = 4  # index of c_s/m among the common parameters
-_POINTS = 41
+_KAPPA, _GAMMA = 3, 4  # indices of k_s/m and c_s/m among the parameters
+_POINTS = 24
+_TRIED = 15  # pieces of which the median one is shown
 
 
 def contact_finding(found: ContactFit, mass: float, *, resolution: float) -> Finding:
@@ -68,8 +71,11 @@ def contact_finding(found: ContactFit, mass: float, *, resolution: float) -> Fin
     )  # fmt: skip
 
 
-def one_contact(found: ContactFit, mass: float, *, resolution: float) -> Finding:
-    r"""The profile of c_s over a single piece with contact, all else known: what one contact tells.
+def one_contact(found: ContactFit, mass: float, *, resolution: float, kappa_error: float) -> Finding:
+    r"""The profile of c_s over a single piece with contact: what one contact tells on its own.
+
+    Known besides is what does not come from contacts: the free oscillator, k_s/m, and the drive as set. Gap, place and
+    the drive's details are this piece's own to find, as they were for all pieces together.
 
     Parameters
     ----------
@@ -78,73 +84,86 @@ def one_contact(found: ContactFit, mass: float, *, resolution: float) -> Finding
         Mass (kg).
     resolution : float
         Length of a count (m).
+    kappa_error : float
+        Standard uncertainty of k_s/m from elsewhere (1/s^2).
 
     Returns
     -------
     Finding
-        ``c_s_one_contact``, from the piece whose curvature is the median one.
+        ``c_s_one_contact``, from the piece that is the median one in how well it tells c_s.
     """
-    theta = found.values
-    pieces = [i for i in range(len(found.pieces)) if found.fit.used[i]]
-    widths = np.array([_width(found, i, resolution) for i in pieces])
-    chosen = pieces[int(np.argsort(widths)[len(widths) // 2])]
-    piece, width = found.pieces[chosen], float(np.sort(widths)[len(widths) // 2])
-    problem = Problem([piece], np.ones(len(theta)), resolution)
-    local = theta[piece.which]
-    weight = 1.0 / np.sqrt(resolution**2 / 12 + (found.fit.jitter * found.fit.fitted[chosen][:, 1]) ** 2)
-
-    def residual(p: FloatArray) -> FloatArray:
-        here = local.copy()
-        here[_GAMMA] = p[0]
-        motion = problem.motion(piece, here, p[1:] * [1e-3, 1e-2])
-        return np.asarray((piece.x - motion[:, 0]) * weight)
-
-    start = np.append(local[_GAMMA], found.fit.starts[chosen] / [1e-3, 1e-2])
-    reach = min(4 * width, 0.98 * float(local[_GAMMA]))
-    values = np.linspace(local[_GAMMA] - reach, local[_GAMMA] + 4 * width, _POINTS)
-    scale = max(found.fit.reduced, 1.0)
-    profile = profile_likelihood(residual, start, 0, values, scale=scale)
-    best = mass * float(profile.values[int(np.argmin(profile.cost))])
-    low, high = mass * profile.low, mass * profile.high
-    bounded = np.isfinite(low) and np.isfinite(high) and low > 0
-    error = (high - low) / (2 * 1.96) if bounded else width * mass
+    used = [i for i in range(len(found.pieces)) if found.fit.used[i]]
+    alone = {i: _Alone(found, i, resolution, kappa_error) for i in used[:: max(len(used) // _TRIED, 1)]}
+    widths = {i: one.width() for i, one in alone.items()}
+    order = sorted((i for i in widths if np.isfinite(widths[i])), key=lambda i: widths[i])
+    if not order:
+        raise ValueError("no piece with contact can be fitted on its own")
+    chosen = order[len(order) // 2]
+    one, width, gamma = alone[chosen], widths[chosen], float(found.values[_GAMMA])
+    low_end = max(gamma - 3.5 * width, 0.02 * gamma)
+    values = np.append(np.linspace(low_end, gamma, _POINTS // 2, endpoint=False),
+                       np.linspace(gamma, gamma + 3.5 * width, _POINTS - _POINTS // 2))  # fmt: skip
+    cost = np.array([one.cost(float(value)) for value in values])
+    kept = np.isfinite(cost)
+    values, cost = values[kept], (cost[kept] - np.min(cost[kept])) / max(found.fit.reduced, 1.0)
+    top = int(np.argmin(cost))
+    low, high = mass * crossed(values[top::-1], cost[top::-1]), mass * crossed(values[top:], cost[top:])
+    best, bounded = mass * float(values[top]), bool(np.isfinite(low) and np.isfinite(high))
+    error = best * float(np.log(high / low)) / (2 * coverage_factor()) if bounded else mass * width
     return Finding(
-        "c_s_one_contact", Estimate(best, error, "N s/m", logarithmic=best > 0),
-        "profile likelihood of one piece with contact, all other parameters held", len(piece.x), (piece.label,),
+        "c_s_one_contact", Estimate(best, error, "N s/m", logarithmic=True),
+        "profile likelihood of one piece with contact, its gap, place and drive found with it",
+        len(found.pieces[chosen].x), (found.pieces[chosen].label,),
         (
             (f"95 % limits {low:.3g} to {high:.3g} N s/m" if bounded else "the profile does not bound it on both sides")
-            + "; the piece is the median one of all that were fitted",
+            + f"; the piece is the median one of {len(order)}",
         ),
-        data=_profile(profile.values * mass, profile.cost, best, low, high, found), plot="profile",
+        data=_profile(values * mass, cost, best, low, high, found), plot="profile",
     )  # fmt: skip
 
 
-def _width(found: ContactFit, i: int, resolution: float) -> float:
-    """Standard error of c_s/m from one piece, its start free and all else known, to first order."""
-    piece = found.pieces[i]
-    problem = Problem([piece], np.ones(len(found.values)), resolution)
-    local, start = found.values[piece.which], found.fit.starts[i]
+class _Alone:
+    """One piece with the eleven parameters that act on it, and what is known of them besides contacts."""
 
-    def slope(step: FloatArray, parameter: bool) -> FloatArray:
-        ends = []
-        for sign in (1, -1):
-            here, begun = (local + sign * step, start) if parameter else (local, start + sign * step)
-            ends.append(problem.motion(piece, here, begun)[:, 0])
-        return np.asarray((ends[0] - ends[1]) / (2 * np.max(step)))
+    def __init__(self, found: ContactFit, i: int, resolution: float, kappa_error: float) -> None:
+        piece = found.pieces[i]
+        self.piece = replace(piece, which=np.arange(len(piece.which)), start=found.fit.starts[i])
+        self.rows = piece.which
+        self.values, self.resolution, self.jitter = found.values[self.rows], resolution, found.fit.jitter
+        self.known = found.known[self.rows].copy()
+        self.known[_KAPPA] = self.values[_KAPPA]
+        self.precision = found.precision[np.ix_(self.rows, self.rows)].copy()
+        self.precision[_KAPPA, _KAPPA] += kappa_error**-2.0
+        self.steps = np.array([1e-4, 1e-4, 1e-5, 1e-4 * self.values[_KAPPA], 1e-2, 1e-6, 1e-6, *[1e-5] * 4])
 
-    gamma = np.zeros(len(local))
-    gamma[_GAMMA] = 1e-2
-    columns = [slope(gamma, True), slope(np.array([1e-6, 0.0]), False), slope(np.array([0.0, 1e-5]), False)]
-    weight = 1.0 / np.sqrt(resolution**2 / 12 + (found.fit.jitter * found.fit.fitted[i][:, 1]) ** 2)
-    matrix = np.array(columns).T * weight[:, None]
-    return float(np.sqrt(found.fit.reduced / max(_left_over(matrix), 1e-300)))
+    def fit(self, gamma: float, hold: float) -> ShootingFit:
+        """The other parameters at this c_s/m, which is held with the precision ``hold``."""
+        values, known, precision = self.values.copy(), self.known.copy(), self.precision.copy()
+        values[_GAMMA] = known[_GAMMA] = gamma
+        precision[_GAMMA, _GAMMA] = hold
+        return shoot(
+            [self.piece], values, self.steps, resolution=self.resolution, known=known, precision=precision,
+            jitter=self.jitter,
+        )  # fmt: skip
 
+    def width(self) -> float:
+        """Standard error of c_s/m, free but for a factor of ten; inf where this piece cannot be fitted alone."""
+        gamma = float(self.values[_GAMMA])
+        try:
+            return float(np.sqrt(self.fit(gamma, (10 * gamma) ** -2.0).covariance[_GAMMA, _GAMMA]))
+        except SolveError:
+            return float("inf")
 
-def _left_over(matrix: FloatArray) -> float:
-    """Squared length of the first column that the others do not take."""
-    rest = matrix[:, 1:]
-    part, *_ = np.linalg.lstsq(rest, matrix[:, 0], rcond=None)
-    return float(np.sum((matrix[:, 0] - rest @ part) ** 2))
+    def cost(self, gamma: float) -> float:
+        """chi^2 of readings and of what is known, the rest fitted; NaN where that fails."""
+        try:
+            found = self.fit(gamma, (1e-4 * gamma) ** -2.0)
+        except SolveError:
+            return float("nan")
+        weight = 1.0 / (self.resolution**2 / 12 + (self.jitter * found.fitted[0][:, 1]) ** 2)
+        off = found.values - self.known
+        off[_GAMMA] = 0.0
+        return float(np.sum(found.residuals[0] ** 2 * weight) + off @ self.precision @ off)
 
 
 def _data(found: ContactFit, resolution: float) -> xr.Dataset:

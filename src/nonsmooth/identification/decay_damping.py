@@ -85,6 +85,13 @@ def decay_damping(runs: Sequence[Run], decay: DecayFit, mass: float, *, resoluti
     )  # fmt: skip
 
 
+def _turn(decay: DecayFit, which: int) -> tuple[float, float]:
+    """Time of the first turning point after the first fitted sample (s), and its height, to second order."""
+    x, v = decay.fit.fitted[which][0] - [decay.values[3], 0.0]
+    late = v / (decay.values[0] ** 2 * x)
+    return float(late), float(abs(x) * (1 + (decay.values[0] * late) ** 2 / 2))
+
+
 def _data(runs: Sequence[Run], decay: DecayFit, viscous: DecayFit, mass: float, resolution: float) -> xr.Dataset:
     import xarray as xr
 
@@ -93,19 +100,19 @@ def _data(runs: Sequence[Run], decay: DecayFit, viscous: DecayFit, mass: float, 
     which = int(np.argmax(widths))
     run, (begin, end) = runs[decay.runs[which]], decay.spans[which]
     time, x = run.time[begin:end], run.positions[begin:end]
-    at, height, error = log_decrement(time, x, rest, resolution=resolution)
-    # the first turning point is where the fit begins
-    at, height, error = np.append(time[0], at), np.append(abs(x[0] - rest), height), np.append(error[:1], error)
-    at, unique = np.unique(at, return_index=True)
-    height, error = height[unique], error[unique]
-    fine = np.linspace(0.0, float(at[-1] - at[0]), 200)
+    # the first turning point lies within a sample of where the fit begins
+    early = slice(max(begin - 3, 0), end)
+    at, height, error = log_decrement(run.time[early], run.positions[early], rest, resolution=resolution)
+    begun, first = _turn(decay, which)
+    at = at - (time[0] + begun)
+    fine = np.linspace(0.0, float(at[-1]), 200)
     fitted = decay.fit.fitted[which][:, 0] - rest
-    both = envelope(fine, abs(fitted[0]), natural, b, f)
-    alone = abs(float(viscous.fit.fitted[which][0, 0] - viscous.values[3]))
-    plain = envelope(fine, alone, natural, float(viscous.values[1]), 0.0)
+    both = envelope(fine, first, natural, b, f)
+    shift, alone = _turn(viscous, which)
+    plain = envelope(fine + begun - shift, alone, natural, float(viscous.values[1]), 0.0)
     return xr.Dataset(
         {
-            "peak_time": ("peak", at - at[0], {"units": "s"}), "peak_height": ("peak", height, {"units": "m"}),
+            "peak_time": ("peak", at, {"units": "s"}), "peak_height": ("peak", height, {"units": "m"}),
             "peak_height_error": ("peak", error, {"units": "m"}),
             "x": ("time", x - rest, {"units": "m"}), "fitted": ("time", fitted, {"units": "m"}),
             "envelope_both": ("fine_time", both, {"units": "m"}),

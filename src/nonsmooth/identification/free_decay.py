@@ -111,6 +111,7 @@ def free_decay(
     friction: bool = True,
     jitter: float | None = None,
     doubt_law: bool = True,
+    names: Sequence[str] | None = None,
 ) -> DecayFit:
     r"""Fit :math:`\omega_0`, c/m and F_C/m to free decays.
 
@@ -128,6 +129,8 @@ def free_decay(
         Standard deviation of the sampling instants (s), where known.
     doubt_law : bool
         Add to the covariance how far the estimate moves with half of ``slowest``.
+    names : sequence of str, optional
+        Names of the records for the notes on those that cannot be used.
 
     Returns
     -------
@@ -147,7 +150,8 @@ def free_decay(
         try:
             begin, end = swing(t, position, resolution=resolution, slowest=slowest)
         except ValueError as error:
-            notes.append(f"decay {i + 1} is not used: {error}")
+            name = f"decay {i + 1}" if names is None else f"run {names[i]!r}, channel 'Angle'"
+            notes.append(f"{name}: not used: {error}")
             continue
         taken.append(i)
         spans.append((begin, end))
@@ -157,7 +161,7 @@ def free_decay(
             Piece(t, position, np.zeros_like(t), which, _build(friction), start_state(t, position), label=str(i))
         )
     if not pieces:
-        raise ValueError("no free decay can be used: " + "; ".join(notes))
+        raise ValueError("no free decay can be used; " + "; ".join(notes))
     guess = _guess(pieces)
     used = [0, 1, 2, 3] if friction else [0, 1, 3]
     place = {name: k for k, name in enumerate(used)}

@@ -10,13 +10,14 @@ swing with it, so that their difference, the gap *referred to the car's mean pos
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.errors import SolveError
 from nonsmooth.experiment.signals.phase import drive_phase
 from nonsmooth.identification.evidence import Run
 from nonsmooth.identification.free_decay import DecayFit
@@ -29,13 +30,15 @@ FloatArray = NDArray[np.float64]
 _SHARED = 5  # omega_0, b, f, kappa, gamma
 _PER_RUN = 6  # gap, place, cosine and sine of the drive, its second harmonic
 LONGEST = 2.5  # s: of a piece
+_LARGE, _LEFT_OUT = 3.0, 0.2  # chi^2 per degree of freedom, and share of pieces, from which a fit is doubted
 
 
 @dataclass(frozen=True, eq=False)
 class ContactFit:
     """Outcome: ``kappa`` = k_s/m, ``gamma`` = c_s/m, and for each run the gap and the place of the swing.
 
-    ``values`` and ``covariance``: omega_0, b, f, kappa, gamma, then per run g, x_e, cosine, sine, cosine_2, sine_2.
+    ``values`` and ``covariance``: omega_0, b, f, kappa, gamma, then per run g, x_e, cosine, sine, cosine_2, sine_2;
+    ``known`` and ``precision``: what was known of them before.
     """
 
     values: FloatArray
@@ -43,6 +46,8 @@ class ContactFit:
     runs: tuple[Run, ...]
     pieces: tuple[Piece, ...]
     fit: ShootingFit
+    known: FloatArray
+    precision: FloatArray
 
     def place(self, run: int, which: int) -> int:
         """Index of a run's own parameter: 0 gap, 1 place, 2-5 drive."""
@@ -79,13 +84,14 @@ def shoot_contacts(
     """
     values = [*decay.values[:3], kappa, gamma]
     steps = [1e-4, 1e-4, 1e-5, 1e-4 * kappa, 1e-2]
-    precision = [np.linalg.inv(_regular(decay.covariance[:3, :3])), 1e-12 / kappa**2 * np.eye(2)]
+    told: FloatArray = np.asarray(np.linalg.inv(_regular(decay.covariance[:3, :3])))
+    precision: list[FloatArray] = [told, 1e-12 / kappa**2 * np.eye(2)]
     pieces: list[Piece] = []
     taken: list[Run] = []
     for run in runs:
         crank, gap = float(run.settings["crank_length"]), float(run.settings["gap"])
         own = _SHARED + _PER_RUN * len(taken)
-        which = np.array([0, 1, 2, 3, 4, *range(own, own + _PER_RUN)])
+        which = np.array([*range(_SHARED), *range(own, own + _PER_RUN)])
         here = _pieces(run, which, gap, pieces_per_run, decay.values, crank)
         if not here:
             continue
@@ -98,18 +104,83 @@ def shoot_contacts(
         precision.append(np.diag(spread**-2.0))
     if not pieces:
         raise ValueError("no run shows a contact: the gap and the support cannot be found from them")
-    p = len(values)
-    prior = np.zeros((p, p))
-    begin = 0
-    for block in precision:
-        rows = slice(begin, begin + len(block))
-        prior[rows, rows] = block
-        begin += len(block)
-    fit = shoot(
-        pieces, np.array(values), np.array(steps), resolution=resolution, known=np.array(values), precision=prior,
-        jitter=decay.fit.jitter, outliers=6.0,
-    )  # fmt: skip
-    return ContactFit(fit.values, fit.covariance, tuple(taken), tuple(pieces), fit)
+    joint = _Joint(pieces, np.array(values), np.array(steps), precision, resolution, decay.fit.jitter)
+    fit = joint.best(len(taken))
+    return ContactFit(
+        fit.values, fit.covariance, tuple(taken), tuple(pieces), fit, joint.values, _blocks(precision)
+    )
+
+
+def _poor(fit: ShootingFit) -> bool:
+    """Whether a fit leaves more than it should: chi^2, or a fifth of its pieces as outliers."""
+    return fit.reduced > _LARGE or float(np.mean(~fit.used)) > _LEFT_OUT
+
+
+@dataclass(frozen=True, eq=False)
+class _Joint:
+    """All pieces with the common vector: first guess, sizes for derivatives, precision of what is known by blocks."""
+
+    pieces: list[Piece]
+    values: FloatArray
+    steps: FloatArray
+    precision: list[FloatArray]
+    resolution: float
+    jitter: float
+
+    def best(self, runs: int) -> ShootingFit:
+        """The joint fit; where it does not get there, once more from fits of each run alone.
+
+        Far from the solution the cost is rough, the rougher the more runs: each alone finds the way.
+        """
+        first: ShootingFit | None = None
+        try:
+            first = self.fit(self.values)
+        except SolveError:
+            if runs == 1:
+                raise
+        if first is not None and (runs == 1 or not _poor(first)):
+            return first
+        again = self.fit(self.one_by_one(runs))
+        rows = [again] if first is None else [first, again]
+        return min(rows, key=lambda found: (float(np.mean(~found.used)), found.reduced))
+
+    def fit(self, start: FloatArray) -> ShootingFit:
+        """Fit all runs together from these parameters."""
+        return self._shoot(self.pieces, start, slice(None), self.precision)
+
+    def one_by_one(self, runs: int) -> FloatArray:
+        """Start for the joint fit from fits of each run alone; what they share by its median."""
+        start, shared = self.values.copy(), []
+        for i in range(runs):
+            own = slice(_SHARED + _PER_RUN * i, _SHARED + _PER_RUN * (i + 1))
+            pieces = [
+                replace(piece, which=np.arange(_SHARED + _PER_RUN)) for piece in self.pieces
+                if piece.which[_SHARED] == own.start
+            ]  # fmt: skip
+            rows = np.r_[np.arange(_SHARED), np.arange(own.start, own.stop)]
+            blocks = [*self.precision[:2], self.precision[2 + i]]
+            try:
+                alone = self._shoot(pieces, self.values[rows], rows, blocks)
+            except SolveError:
+                continue
+            if not _poor(alone):
+                shared.append(alone.values[:_SHARED])
+                start[own] = alone.values[_SHARED:]
+        if shared:
+            start[:_SHARED] = np.median(shared, axis=0)
+        return start
+
+    def _shoot(self, pieces: list[Piece], start: FloatArray, rows: Any, blocks: list[FloatArray]) -> ShootingFit:
+        return shoot(
+            pieces, start, self.steps[rows], resolution=self.resolution, known=self.values[rows],
+            precision=_blocks(blocks), jitter=self.jitter, outliers=6.0,
+        )  # fmt: skip
+
+
+def _blocks(blocks: list[FloatArray]) -> FloatArray:
+    from scipy.linalg import block_diag
+
+    return np.asarray(block_diag(*blocks), dtype=np.float64)
 
 
 def _regular(matrix: FloatArray) -> FloatArray:

@@ -13,14 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nonsmooth.identification.finding import Estimate
 from nonsmooth.identification.nonlinear_mode import NonlinearMode, interpolation
 
-__all__ = ["ResponseFit"]
+__all__ = ["FEWEST_CURVES", "ResponseFit"]
 
 FloatArray = NDArray[np.float64]
 _ROUNDS = 40
-_FEWEST = 4  # curves: how far they differ cannot be told from fewer
+FEWEST_CURVES = 4  # curves: how far they differ cannot be told from fewer
 
 
 class ResponseFit:
@@ -44,13 +43,13 @@ class ResponseFit:
         self.force = np.concatenate([c.force for c in curves]) if self.forced else None
         self.measured = size * np.exp(1j * self.phase) if self.phase is not None else size.astype(complex)
         self.knots = _knots(knots, size)
-        self.shifts = len(curves) >= _FEWEST
+        self.shifts = len(curves) >= FEWEST_CURVES
         self._fit()
 
     # ------------------------------------------------------------------------------------------------- the unknowns
 
     @property
-    def _sizes(self) -> tuple[int, int]:
+    def sizes(self) -> tuple[int, int]:
         """Where the shifts begin, and how many unknowns there are."""
         K, n = len(self.knots), len(self.names)
         first = 2 * K + (0 if self.mass is not None else 1 if self.forced else n) + 2 * self.residual
@@ -58,8 +57,8 @@ class ResponseFit:
 
     def _unpack(self, p: FloatArray) -> tuple[NonlinearMode, Any, FloatArray, FloatArray]:
         """The mode, ln(F/m) of each point, and the shifts of the points' ln omega_n^2 and ln D."""
-        K, (first, _) = len(self.knots), self._sizes
-        R = complex(*p[first - 2 : first]) * self._unit if self.residual else 0j
+        K, (first, _) = len(self.knots), self.sizes
+        R = complex(*p[first - 2 : first]) * self.unit if self.residual else 0j
         if self.force is None:
             mass, load = 1.0, p[2 * K : 2 * K + len(self.names)][self.curve]
         else:
@@ -84,7 +83,7 @@ class ResponseFit:
     def _jacobian(self, p: FloatArray) -> FloatArray:
         """Derivatives of :meth:`_left`; those by the residual, which moves the amplitudes, by differences."""
         mode, _, by_square, by_damping = self._unpack(p)
-        K, (first, count), n = len(self.knots), self._sizes, len(self.names)
+        K, (first, count), n = len(self.knots), self.sizes, len(self.names)
         a = np.abs(self.measured - mode.residual * self.force if self.force is not None else self.measured)
         basis = interpolation(self.knots, a)
         plain = basis @ mode.squares
@@ -111,7 +110,7 @@ class ResponseFit:
     # ------------------------------------------------------------------------------------------------------ the fit
 
     def _fit(self) -> None:
-        first, count = self._sizes
+        first, count = self.sizes
         n, rows = len(self.names), len(self.omega) * (1 + self.phased)
         if rows <= first:
             raise ValueError(f"{rows} measured values cannot tell {first} unknowns: take fewer knots, or more points")
@@ -137,8 +136,8 @@ class ResponseFit:
         self.sigma = float(np.sqrt(left @ left / freedom))
         self.spread = spread if self.shifts else np.array([np.nan, np.nan])
         self.mode = self._unpack(p)[0]
-        own = self.measured - self.mode.residual * self.force if self.force is not None else self.measured
-        self.amplitude = np.abs(own)
+        R = self.mode.residual
+        self.amplitude = np.abs(self.measured - R * self.force if self.force is not None else self.measured)
 
     def _settle(self, p: FloatArray, sigma: float, prior: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Levenberg-Marquardt from ``p``; the outcome and its normal matrix. ``prior``: 1 / variance of unknowns."""
@@ -183,7 +182,7 @@ class ResponseFit:
         step = float(np.median(np.abs(np.diff(w)))) if len(w) > 1 else 0.01 * w[0]
         D = max(float(np.ptp(wide)), step)
         K, n = len(self.knots), len(self.names)
-        self._unit = 1.0 / float(np.median(1.0 / gain)) if self.residual else 1.0
+        self.unit = 1.0 / float(np.median(1.0 / gain)) if self.residual else 1.0
         p = np.zeros(count)
         p[:K] = 2 * np.log(np.interp(self.knots, size[tops], self.omega[tops]))
         p[K : 2 * K] = np.log(D)
@@ -224,44 +223,10 @@ class ResponseFit:
             here = self.curve == c
             off = np.abs(np.log(self.mode.square(self.amplitude[here]) / self.omega[here] ** 2))
             places[c] = self.amplitude[here][int(np.argmin(off))]
-        first, _ = self._sizes
+        first, _ = self.sizes
         shift = self.p[first:].reshape(2, -1) if self.shifts else np.zeros((2, len(places)))
         omega = np.sqrt(self.mode.square(places) * np.exp(shift[0]))
         return omega / (2 * np.pi), self.mode.damping(places) * np.exp(shift[1]) / (2 * omega), places
-
-    def others(self) -> dict[str, Estimate]:
-        """Modal mass, residual, and how far curves differ."""
-        K, (first, _) = len(self.knots), self._sizes
-        error = np.sqrt(np.diag(self.covariance))
-        found: dict[str, Estimate] = {}
-        if self.forced and self.mass is None:
-            found["modal mass"] = Estimate(self.mode.mass, self.mode.mass * float(error[2 * K]), "kg")
-        if self.residual:
-            R = self.mode.residual
-            for name, k, value in (("real", first - 2, R.real), ("imag", first - 1, R.imag)):
-                found[f"residual, {name}"] = Estimate(1e6 * value, 1e6 * float(error[k]) * self._unit, "µm/N")
-        if self.shifts:
-            n = np.sqrt(2.0 * len(self.names))
-            f = 0.5 * float(np.sqrt(np.mean(self.mode.squares)) / (2 * np.pi)) * float(self.spread[0])
-            found["f_n from curve to curve"] = Estimate(f, f / n, "Hz")
-            found["zeta from curve to curve, relative"] = Estimate(float(self.spread[1]), float(self.spread[1]) / n)
-        return found
-
-    def notes(self) -> list[str]:
-        """What a reader should know."""
-        slope = self.slopes()
-        unstable = int(np.count_nonzero(slope < 0))
-        said = [
-            f"{unstable} of {len(slope)} points lie on an unstable middle part (d ln F / d ln a < 0); the least slope "
-            f"is {slope.min():.2f}, that of a linear mode 1"
-        ]
-        if not self.shifts:
-            said.append(f"fewer than {_FEWEST} curves: how far one differs from the next is not known, nor stated")
-        if not self.forced:
-            said.append("no forces were recorded: the modal mass is not known")
-        if not self.phased:
-            said.append("no phases were recorded: damping comes from the amplitudes alone")
-        return said
 
 
 def _all_or_none(curves: Sequence[Any], name: str) -> bool:

@@ -67,13 +67,16 @@ def support_damping(
     import xarray as xr
 
     decay = free_decay(
-        [(run.time, run.positions) for run in runs], resolution=resolution, slowest=slowest, friction=False
-    )
+        [(run.time, run.positions) for run in runs], resolution=resolution, slowest=slowest, friction=False,
+        names=[run.name for run in runs],
+    )  # fmt: skip
     slopes, weights, data = [], [], None
+    notes = list(decay.notes)
     for i, (begin, end) in zip(decay.runs, decay.spans, strict=True):
         time, x = runs[i].time[begin:end], runs[i].positions[begin:end]
         t, height, error = log_decrement(time, x, float(decay.values[3]), resolution=resolution)
         if len(t) < 4:
+            notes.append(f"run {runs[i].name!r}: no logarithmic decrement, {len(t)} turning points above ten counts")
             continue
         line, covariance = np.polyfit(t, np.log(height), 1, w=height / error, cov=True)
         slopes.append(float(line[0]))
@@ -102,7 +105,7 @@ def support_damping(
     finding = Finding(
         "c_s_drop", Estimate(value, error_total, "N s/m", logarithmic=value > 0),
         "logarithmic decrement, regression over all turning points (Fig. 7)", decay.samples,
-        tuple(runs[i].name for i in decay.runs),
+        tuple(runs[i].name for i in decay.runs), tuple(notes),
         others={
             "c_s_fit": Estimate(float(decay.values[1]) * mass, decay.error("b") * mass, "N s/m"),
             "omega_s": Estimate(float(decay.values[0]), decay.error("omega_0"), "rad/s"),

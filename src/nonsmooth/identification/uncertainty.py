@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
-    "Profile", "bootstrap", "correlated", "correlation_times", "coverage_factor", "factor_interval", "interval",
-    "profile_likelihood", "uniform",
+    "Profile", "bootstrap", "correlated", "correlation_times", "coverage_factor", "crossed", "factor_interval",
+    "interval",    "profile_likelihood", "uniform",
 ]  # fmt: skip
 
 FloatArray = NDArray[np.float64]
@@ -234,11 +234,12 @@ def profile_likelihood(
     least = min(float(cost.min()), float(np.sum(residual(best) ** 2)))
     rise = (cost - least) / scale
     bound = float(chi2.ppf(level, 1))
-    low, high = _crossed(grid[middle::-1], rise[middle::-1], bound), _crossed(grid[middle:], rise[middle:], bound)
+    low, high = crossed(grid[middle::-1], rise[middle::-1], bound), crossed(grid[middle:], rise[middle:], bound)
     return Profile(grid, rise, float(best[which]), low, high)
 
 
-def _crossed(values: FloatArray, rise: FloatArray, bound: float) -> float:
+def crossed(values: FloatArray, rise: FloatArray, bound: float = 3.841) -> float:
+    """Where the rise of chi^2, from the best value on, passes the bound; NaN where it does not."""
     over = np.flatnonzero(rise > bound)
     if len(over) == 0 or over[0] == 0:
         return float("nan")

@@ -99,9 +99,11 @@ def comparison_phase_portrait(
             drawn.plot(*curves, color=color, linewidth=wide if closed else 0.4, label=word, **line if closed else {})
             section = _one_phase(result, f"{side}_section")
             points = [section.sel(state=name).values for name in names]
+            # Rings about the few points of a closed orbit; of an attractor a cloud, the measured points on it.
+            ring = side == "theory" and closed
             drawn.plot(
-                *points, "o", color=color, markersize=4.5 if side == "theory" and closed else 2.0,
-                markerfacecolor="none" if side == "theory" else color, markeredgewidth=0.9 if side == "theory" else 0,
+                *points, "o", color=color, markersize=4.5 if ring else 0.9 if side == "theory" else 2.0,
+                markerfacecolor="none" if ring else color, markeredgewidth=0.9 if ring else 0,
                 zorder=4 if side == "theory" else 5, rasterized=points[0].size > 500, linestyle="none",
             )  # fmt: skip
         if zone is not None:

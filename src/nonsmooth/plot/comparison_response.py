@@ -56,7 +56,8 @@ def comparison_response(result: xr.Dataset, ax: Axes | None = None, *, digits: i
         _jumps(drawn, result, digits)
         drawn.set_ylim(bottom=0)
         drawn.margins(x=0.02)
-        drawn.legend(**ABOVE, ncols=2, handlelength=1.6, columnspacing=1.2)
+        # Clear of the power of ten at the top of the axis.
+        drawn.legend(**{**ABOVE, "bbox_to_anchor": (1.0, 1.07)}, ncols=2, handlelength=1.6, columnspacing=1.2)
         drawn.set(xlabel=label(result, parameter), ylabel=f"amplitude of {label(result, state)}")
     return drawn
 

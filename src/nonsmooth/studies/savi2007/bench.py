@@ -96,7 +96,10 @@ def measure(folder: Path, names: Sequence[str], quick: bool) -> None:
         raise ValueError(f"{', '.join(wrong)}: not measured on the rig; that are {', '.join(sorted(known))}")
     laboratory = Laboratory(folder / RIG, quick)
     job = _Job(folder, Settings(quick=quick, progress=False, laboratory=laboratory), known)
-    laboratory.identified  # noqa: B018  # kept there for all that follows
+    begin, busy = time.perf_counter(), time.process_time()
+    n = len(laboratory.identified)  # kept there for all that follows
+    took = time.perf_counter() - begin
+    print(f"{n} parameters identified: {took:.1f} s, {time.process_time() - busy:.1f} s of a processor", flush=True)
     tasks = [[name for name in group if name in names] for group in _GROUPS]
     tasks += [[name] for name in names if not any(name in group for group in _GROUPS)]
     rows = [row for done in job.shared([task for task in tasks if task]) for row in done]
@@ -137,12 +140,12 @@ class _Job:
 
         rows = []
         for name in names:
-            begin = time.perf_counter()
+            begin, busy = time.perf_counter(), time.process_time()
             data = self.figures[name].compute(self.settings)
             for key, dataset in data.items():
                 save(dataset, self.folder / f"{name}_{key}.nc")
             rows.append((name, list(data), time.perf_counter() - begin, list(self.settings.bench.notes)))
-            print(f"{name}: {rows[-1][2]:.1f} s", flush=True)
+            print(f"{name}: {rows[-1][2]:.1f} s, {time.process_time() - busy:.1f} s of a processor", flush=True)
         return rows
 
 

@@ -47,7 +47,7 @@ CLAIMS = (
     Claim("R1", ("table1",), parameters.r1),
     Claim("R2", ("table1",), parameters.r2),
     Claim("P1", ("fig04",), parameters.p1),
-    Claim("P2", ("table1",), parameters.p2),
+    Claim("P2", ("table1", "fig04"), parameters.p2),
     Claim("P3", ("fig05",), parameters.p3),
     Claim("P4", ("fig06",), parameters.p4),
     Claim("P5", ("fig07",), parameters.p5),

@@ -86,13 +86,17 @@ def p1(data: Data) -> list[Row]:
 
 def p2(data: Data) -> list[Row]:
     """Mass, and the natural frequency that follows."""
-    rows = table_rows(data["table1"])
+    mass = table_rows(data["table1"])["m"][1]
+    slope = found_in(data["fig04"]["oscillator"]).number
+    value = math.sqrt(slope.value / mass.value)
+    spread = 0.5 * math.hypot(slope.interval.uncertainty / slope.value, mass.interval.uncertainty / mass.value)
+    natural = Interval(value * (1 - spread), value * (1 + spread))
     printed = NUMBERS["natural frequency"]
     return [
         _row("P2", TABLE_1["m"].place, f"m = {TABLE_1['m']} by weighing",
-             printed_cell(TABLE_1["m"], rows["m"][1].interval), "", _GIVEN),
+             printed_cell(TABLE_1["m"], mass.interval), "", _GIVEN),
         _closed("P2", f"natural frequency from stiffness and mass: {printed}", printed, _natural(),
-                printed_cell(printed, rows["omega_0"][1].interval, ", of the free decay"),
+                printed_cell(printed, natural, ", from the slope of Fig. 4"),
                 "sqrt(2k/m), by Eq. 2; the formula printed is sqrt(k/m)."),
     ]  # fmt: skip
 

@@ -6,6 +6,7 @@ Identification and comparison read the folders only.
 
 from __future__ import annotations
 
+import json
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -15,6 +16,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from nonsmooth.experiment.recording import RecordingWarning
 from nonsmooth.models import discontinuous_support
+from nonsmooth.results.provenance import ATTRIBUTE, package_version
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -25,7 +27,7 @@ if TYPE_CHECKING:
     from nonsmooth.identification.parameter_set import ParameterSet
     from nonsmooth.system.system import System
 
-__all__ = ["SEED", "TRUTH", "Laboratory"]
+__all__ = ["SEED", "TRUTH", "Laboratory", "as_result"]
 
 SEED = 0  # of the rig's noise; its parameters are the published ones
 TRUTH = "truth.toml"
@@ -117,10 +119,10 @@ class Laboratory:
             "turning": (turning / (2 * np.pi), "1/s", "fastest turning of the rotary sensor after a tap"),
             "volts_low": (min(volts), "V", "lowest motor voltage"), "volts_high": (max(volts), "V", "highest"),
         }  # fmt: skip
-        return xr.Dataset(
-            {name: ((), value, {"units": unit, "long_name": text}) for name, (value, unit, text) in values.items()},
-            attrs={"synthetic": "yes"},
-        )
+        columns = {
+            name: ((), value, {"units": unit, "long_name": text}) for name, (value, unit, text) in values.items()
+        }  # fmt: skip
+        return as_result(xr.Dataset(columns), "what the files say of the sensors")
 
     def record(self, name: str, made: Mapping[str, Recording]) -> Session:
         """Write recordings, by procedure, into the session folder ``name`` and read it."""
@@ -139,10 +141,9 @@ class Laboratory:
         """What ``compare`` takes: a measurement, and the settings of the model that belong to it."""
         from nonsmooth.identification.compare import session_measurement
 
+        offset = self._gap_offset
         with self._noted():
-            return session_measurement(
-                session, procedure, runs, k=self.identified["k"], gap_offset=self._gap_offset
-            )
+            return session_measurement(session, procedure, runs, k=self.identified["k"], gap_offset=offset)
 
     def once(self, name: str, measure: Callable[[], _Measured]) -> _Measured:
         """What ``measure`` gives, measured when first asked for."""
@@ -165,11 +166,12 @@ class Laboratory:
         return discontinuous_support()
 
     @cached_property
-    def _gap_offset(self) -> float:
-        """What the gap is more than the screw's reading, from the records with contact."""
-        readings = {float(item.settings["gap"]) for item in self.session.recordings("contact")}
-        (reading,) = readings
-        return float(self.identified.estimate("gap_at_rest")) - reading
+    def _gap_offset(self) -> tuple[float, float]:
+        """What the gap is more than the screw's reading, from the records with contact, and its uncertainty."""
+        from nonsmooth.identification.compare import gap_offset
+
+        with self._noted():
+            return gap_offset(self.identified, self.session)
 
     @contextmanager
     def _noted(self) -> Iterator[None]:
@@ -183,3 +185,9 @@ class Laboratory:
         for item in caught:
             if not issubclass(item.category, RecordingWarning):
                 warnings.warn_explicit(item.message, item.category, item.filename, item.lineno)
+
+
+def as_result(dataset: xr.Dataset, what: str) -> xr.Dataset:
+    """A dataset that was put together here, with the record that ``nonsmooth.load`` asks for; synthetic."""
+    record = {"version": package_version(), "verb": "rig", "what": what, "synthetic": True}
+    return dataset.assign_attrs({"synthetic": "yes", ATTRIBUTE: json.dumps(record)})

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -10,8 +9,8 @@ import numpy as np
 
 from nonsmooth import plot
 from nonsmooth.plot.comparison import MEASURED, THEORY
-from nonsmooth.results.provenance import ATTRIBUTE, package_version
 from nonsmooth.studies.savi2007.figure import sheet
+from nonsmooth.studies.savi2007.laboratory import as_result
 from nonsmooth.studies.savi2007.measure import APERIODIC
 
 if TYPE_CHECKING:
@@ -95,17 +94,16 @@ def runs_of(found: Motions, parameter: str) -> xr.Dataset:
         # where turning points lie: one outlier is no contact
         reach = np.quantile(motion["u"].sel(state="x").values, 0.999)
         touches.append(bool(reach > float(np.atleast_1d(settings["g"])[0]) + 3 * error[0]))
-    record = {"version": package_version(), "verb": "rig", "runs": list(found)}
     nominal = [float(key.partition("_")[0]) for key in found]
-    return xr.Dataset(
+    runs = xr.Dataset(
         {
             "setting": ("run", nominal, {"long_name": f"{parameter} that was meant"}),
             "value": ("run", values, {"long_name": f"{parameter} as measured"}),
             "period_number": ("run", np.array(numbers, dtype=np.int64)),
             "contact": ("run", np.array(touches, dtype=np.int8)),
-        },
-        attrs={"synthetic": "yes", ATTRIBUTE: json.dumps(record)},
+        }
     )  # fmt: skip
+    return as_result(runs, f"steady runs over {parameter}")
 
 
 def without_flips(result: xr.Dataset) -> xr.Dataset:
@@ -120,7 +118,7 @@ def runs_at(data: Mapping[str, xr.Dataset], value: float) -> list[xr.Dataset]:
 
 
 def measured_periods_at(data: Mapping[str, xr.Dataset], value: float) -> dict[int, int]:
-    """How many runs at a value have which measured period number (0: none found)."""
+    """The period numbers measured at a value (0: none found), each with how many of the runs here have it."""
     numbers = [int(result["measured_period_number"]) for result in runs_at(data, value)]
     return {number: numbers.count(number) for number in sorted(set(numbers))}
 

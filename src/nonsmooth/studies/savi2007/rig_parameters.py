@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +9,6 @@ import numpy as np
 
 from nonsmooth import plot
 from nonsmooth.plot import identification as pictures
-from nonsmooth.results.provenance import ATTRIBUTE, package_version
 from nonsmooth.studies.savi2007.figure import Figure, sheet
 from nonsmooth.studies.savi2007.findings import Number, estimates_of, found_in, kept, the_finding
 from nonsmooth.studies.savi2007.flows import Settings
@@ -114,7 +112,7 @@ def _compute_table(settings: Settings) -> dict[str, xr.Dataset]:
     import xarray as xr
 
     from nonsmooth.experiment.rig import UNITS, load_truth
-    from nonsmooth.studies.savi2007.laboratory import TRUTH
+    from nonsmooth.studies.savi2007.laboratory import TRUTH, as_result
 
     bench = settings.bench
     identified = bench.identified.to_dataset()  # first: it reads the session folder only
@@ -123,16 +121,11 @@ def _compute_table(settings: Settings) -> dict[str, xr.Dataset]:
     units = [UNITS.get(name, NAMES.get(name, ("",))[0]) for name in truth]
     return {
         "identified": identified,
-        "truth": xr.Dataset(
+        "truth": as_result(xr.Dataset(
             {"value": ("name", list(truth.values())), "unit": ("name", units)}, {"name": list(truth)},
-            {"synthetic": "yes", ATTRIBUTE: _record("truth of the virtual rig")},
-        ),
-        "sensors": bench.sensors().assign_attrs({ATTRIBUTE: _record("sensors of the virtual rig")}),
+        ), "truth of the virtual rig"),
+        "sensors": bench.sensors(),
     }  # fmt: skip
-
-
-def _record(what: str) -> str:
-    return json.dumps({"version": package_version(), "verb": "rig", "what": what, "synthetic": True})
 
 
 def table_rows(data: Mapping[str, xr.Dataset]) -> dict[str, tuple[str, Number, float]]:

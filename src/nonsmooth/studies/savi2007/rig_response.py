@@ -11,6 +11,7 @@ from nonsmooth import plot
 from nonsmooth.plot.comparison_response import comparison_response
 from nonsmooth.studies.savi2007.figure import Figure, sheet
 from nonsmooth.studies.savi2007.flows import Settings
+from nonsmooth.studies.savi2007.laboratory import as_result
 from nonsmooth.studies.savi2007.measure import measured_jumps, measured_periods
 from nonsmooth.studies.savi2007.printed import NUMBERS
 
@@ -26,7 +27,7 @@ def _compute(number: int) -> Callable[[Settings], dict[str, xr.Dataset]]:
         bench = settings.bench
         session = bench.record(f"fig{number:02d}", bench.rig.figure(number, **_steps(settings)))
         measured, set_ = bench.measured(session, "response", bench.with_support(session, "response"))
-        return {"compared": bench.compare(measured, set_), "runs": measured}
+        return {"compared": bench.compare(measured, set_), "runs": as_result(measured, "response over frequency")}
 
     return compute
 

@@ -28,10 +28,14 @@ NOT_ASKED = "not asked"
 
 @dataclass(frozen=True)
 class Cell:
-    """What the virtual rig says to a statement, and how that stands to the paper; without a verdict it is not asked."""
+    """What the virtual rig says to a statement, and how that stands to the paper; without a verdict it is not asked.
+
+    ``why`` is added to the row's own.
+    """
 
     text: str
     verdict: str = NOT_ASKED
+    why: str = ""
 
 
 @dataclass(frozen=True)
@@ -54,7 +58,8 @@ class Row:
 
     def measured(self, cell: Cell) -> Row:
         """The row with what the rig says."""
-        return replace(self, rig=cell.text, rig_verdict=cell.verdict)
+        why = f"{self.why} {cell.why}".strip()
+        return replace(self, rig=cell.text, rig_verdict=cell.verdict, why=why)
 
 
 def compare(printed: Printed, found: Interval | None) -> tuple[str, str]:
@@ -71,15 +76,15 @@ def compare(printed: Printed, found: Interval | None) -> tuple[str, str]:
         verdict = f"agrees within {math.ceil(10 * abs(percent)) / 10:.1f} %"
     else:
         verdict = f"differs by {abs(percent):.1f} %"
-    return f"{percent:+.1f} %", verdict
+    return f"{round(percent, 1) + 0.0:+.1f} %", verdict  # + 0.0: no negative zero
 
 
-def printed_cell(printed: Printed, found: Interval | None, note: str = "") -> Cell:
+def printed_cell(printed: Printed, found: Interval | None, note: str = "", why: str = "") -> Cell:
     """The rig's number beside a printed one."""
     difference, verdict = compare(printed, found)
     if found is None:
-        return Cell(f"not found{note}", verdict)
-    return Cell(f"{_with_unit(found, printed.unit)} ({difference}){note}", verdict)
+        return Cell(f"not found{note}", verdict, why)
+    return Cell(f"{_with_unit(found, printed.unit)} ({difference}){note}", verdict, why)
 
 
 def against_printed(

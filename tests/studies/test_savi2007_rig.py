@@ -1,0 +1,121 @@
+"""How the report reads the virtual rig's records: against responses and numbers that were made up by hand."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import nonsmooth as ns
+from nonsmooth.identification.finding import Estimate, Finding
+from nonsmooth.studies.savi2007 import claims_rig
+from nonsmooth.studies.savi2007.findings import Number, found_in, kept, the_finding
+from nonsmooth.studies.savi2007.flows import Settings
+from nonsmooth.studies.savi2007.measure import Interval, measured_jumps, measured_periods
+from nonsmooth.studies.savi2007.printed import FIGURE_14, NUMBERS, TABLE_1
+from nonsmooth.studies.savi2007.rig_motions import chosen, measured_periods_at, said
+from nonsmooth.studies.savi2007.rows import NOT_ASKED, Cell, Row, printed_cell
+
+STEP = 0.05
+
+
+def _response(jumps: dict[str, float], doubled: tuple[float, float] = (3.6, 4.0)) -> dict[str, xr.Dataset]:
+    """Amplitudes that fall evenly, and by half of them at a jump; period 2 within ``doubled``."""
+    omega = np.round(np.arange(3.0, 6.5, STEP), 6)
+    columns: dict[str, list[np.ndarray]] = {"omega": [], "amplitude": [], "direction": [], "period_number": []}
+    for direction, jump in jumps.items():
+        columns["omega"].append(omega)
+        columns["amplitude"].append(0.02 - 1e-3 * (omega - 3.0) - np.where(omega > jump, 0.01, 0.0))
+        columns["direction"].append(np.full(len(omega), direction))
+        columns["period_number"].append(np.where((omega >= doubled[0]) & (omega <= doubled[1]), 2, 1))
+    runs = xr.Dataset({name: ("run", np.concatenate(parts)) for name, parts in columns.items()})
+    runs["amplitude_error"] = ("run", np.full(runs.sizes["run"], 1e-5))
+    return {"runs": runs}
+
+
+def test_jumps_and_periods_of_a_response_made_by_hand() -> None:
+    runs = _response({"up": 5.81, "down": 5.16})["runs"]
+    (up,), (down,) = (measured_jumps(runs, direction) for direction in ("up", "down"))
+    assert (up.low, up.high) == pytest.approx((5.80, 5.85))
+    assert (down.low, down.high) == pytest.approx((5.15, 5.20))
+    omega, number = measured_periods(runs, "up")
+    assert omega[number == 2][[0, -1]] == pytest.approx((3.6, 4.0))
+
+
+def test_the_cells_of_figure_9_are_those_of_the_response() -> None:
+    data = {"fig09_rig": _response({"up": 5.86, "down": 5.26})}
+    region, rising = claims_rig.f9a(data)
+    assert region == Cell("period 2 from 3.600 to 4.000 rad/s (9 runs)", "agrees")  # 3.63 lies within
+    assert rising.verdict == "agrees"  # 5.88 lies in the step 5.85 ... 5.90
+    falling, closed, again = claims_rig.f9b(data)
+    assert falling.verdict == "agrees"  # 5.29 in 5.25 ... 5.30, by its rounding
+    assert closed.verdict.startswith("differs by 2.2")  # 5.275 against grazing at 5.15986
+    assert again.verdict == "agrees"
+    (between,) = claims_rig.f9c(data)
+    assert between.verdict == "agrees in part"
+    assert "not found" in claims_rig.f9a({"fig09_rig": _response({"up": 9.0, "down": 9.0})})[1].text
+
+
+def _steady(numbers: dict[str, int]) -> dict[str, xr.Dataset]:
+    return {
+        key: xr.Dataset({"measured_period_number": number, "coexisting_period_number": ("attractor", [1, 3])})
+        for key, number in numbers.items()
+    }
+
+
+def test_motions_at_a_gap_are_a_set_over_its_starts() -> None:
+    data = _steady({"-0.0012": 1, "0.0009": 0, "0.0014": 4, "0.0018": 0, "0.0009_2": 2, "0.0014_2": 4, "0.0018_2": 0})
+    assert measured_periods_at(data, 0.0009) == {0: 1, 2: 1}
+    assert chosen(data, 0.0009, 2) is data["0.0009_2"]
+    assert chosen(data, 0.0014, 3) is data["0.0014"]  # none has it: the first
+    verdicts = [cell.verdict for cell in claims_rig.f14({"fig14_rig": data})]
+    assert verdicts == ["agrees", "agrees", "differs", "agrees", NOT_ASKED]
+    assert "0.0009: no period and period 2 (model: period 1, period 3)" in said(data, FIGURE_14)
+
+
+def test_the_sections_of_figure_16_agree_below_twice_the_halves() -> None:
+    far = xr.Dataset(
+        {
+            "energy_distance_matched": ("section_phase", [0.1, 0.1]),
+            "measured_halves_p95": ("section_phase", [0.1, 0.06]), "measured_period_number": 0,
+            "measured_section": (("section_phase", "measured_iterate"), np.zeros((2, 7))),
+        }
+    )  # fmt: skip
+    (row,) = claims_rig.f16({"fig16": {"attractor": far}})
+    assert (row.rig, row.rig_verdict) == ("no period, 7 turns", "agrees")
+    worse = far.assign(measured_halves_p95=("section_phase", [0.1, 0.04]))
+    assert claims_rig.f16({"fig16": {"attractor": worse}})[0].rig_verdict == "differs"
+
+
+def test_a_cell_beside_a_printed_number() -> None:
+    assert printed_cell(TABLE_1["k"], Interval(8.40, 8.50)) == Cell("8.450 ± 0.050 N/m (-0.2 %)", "agrees")
+    assert printed_cell(NUMBERS["jump falling"], None).text == "not found"
+    row = Row("F9b", "here", "5.29", "a", "b", "none", "agrees", "Model.").measured(Cell("c", "differs", "Rig."))
+    assert (row.rig, row.rig_verdict, row.verdict, row.why) == ("c", "differs", "agrees", "Model. Rig.")
+
+
+def test_a_finding_is_kept_with_its_numbers(tmp_path) -> None:
+    picture = xr.Dataset({"x": ("time", [1.0, 2.0])}, {"time": [0.0, 0.1]}, {"synthetic": "yes"})
+    finding = Finding(
+        "slope", Estimate(16.94, 0.04, "N/m"), "by hand", 200, ("Run #1", "Run #2"), ("a note",),
+        {"slope_a": Estimate(16.94, 0.01, "N/m")}, data=picture,
+    )  # fmt: skip
+    back = ns.load(ns.save(kept(finding), tmp_path / "finding.nc"))
+    found = found_in(back)
+    assert back["x"].identical(picture["x"])
+    assert (found.name, found.samples, found.runs, found.notes) == ("slope", 200, 2, ("a note",))
+    assert (found.number.low, found.number.high) == pytest.approx((16.94 - 1.959964 * 0.04, 16.94 + 1.959964 * 0.04))
+    assert found.others["slope_a"].uncertainty == 0.01
+    half = found.number.times(0.5)
+    assert (half.value, half.uncertainty) == (8.47, 0.02)
+    assert Number(2.0, 1.0, 1.5, 3.0, "m").interval == Interval(1.0, 3.0)  # the wider side
+
+
+def test_what_is_not_there_is_said() -> None:
+    nothing = SimpleNamespace(findings=())
+    with pytest.raises(ValueError, match="made no finding 'crank_force'"):
+        the_finding(nothing, "crank_force")
+    with pytest.raises(ValueError, match="measured in a laboratory"):
+        Settings().bench  # noqa: B018
