@@ -5,6 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from tests.identification.made import COUNT, counted, decay_of, run
 
+from nonsmooth.experiment.session import Quantity
 from nonsmooth.identification.contact_findings import contact_finding, one_contact
 from nonsmooth.identification.multiple_shooting import shoot_contacts
 
@@ -65,7 +66,7 @@ def test_contact_parameters_and_gap_lie_within_their_uncertainty(fitted):
 
 def test_one_contact_tells_less_than_all_together(fitted):
     m = 0.84
-    many, single = contact_finding(fitted, m, resolution=COUNT), one_contact(fitted, m, resolution=COUNT, kappa_error=1e-3 * KAPPA)
+    many, single = contact_finding(fitted, Quantity(m), resolution=COUNT), one_contact(fitted, m, resolution=COUNT, kappa_error=1e-3 * KAPPA)
     assert many.estimate.logarithmic and single.estimate.factor > many.estimate.factor > 1
     # by the root of their number and more
     ratio = np.log(single.estimate.factor) / np.log(many.estimate.factor)

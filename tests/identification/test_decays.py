@@ -84,7 +84,7 @@ def test_viscous_and_dry_are_told_apart():
         x[stopped] = x[np.argmax(stopped) - 1] if stopped.any() else 0.0
         runs.append(run("impulse", t, counted(x), name=f"Run #{i + 1}"))
     decay = free_decay([(r.time, r.positions) for r in runs], resolution=COUNT)
-    found = decay_damping(runs, decay, m, resolution=COUNT)
+    found = decay_damping(runs, decay, Quantity(m), resolution=COUNT)
     assert abs(found.value - m * b) < 3.5 * found.uncertainty < 0.01
     assert abs(found.others["friction"].value - m * f) < 3.5 * found.others["friction"].uncertainty < 1e-3
     assert found.others["c_viscous_only"].value > 1.02 * m * b

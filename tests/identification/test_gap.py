@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from tests.identification.made import COUNT, decay_of, swinging
+from tests.identification.made import COUNT, counted, decay_of, run, swinging
 
 from nonsmooth.identification.gap import grazing_amplitude, mean_of_drive, mean_shift
 from nonsmooth.identification.grazing import grazing_gap
@@ -50,6 +50,20 @@ def test_a_wrong_zero_moves_the_shift_as_stated():
     slope = one.parts(0.039)[2]
     assert other.at(0.039)[0] - one.at(0.039)[0] == pytest.approx(slope * step, rel=1e-2)
     assert one.at(0.039)[1] == pytest.approx(np.hypot(one.parts(0.039)[1], slope * 1e-6))
+
+
+def test_friction_moves_the_place_of_a_car_that_goes_longer_one_way():
+    # x = A cos t + A_2 sin 2t: v = -A sin t + 2 A_2 cos 2t turns near 0 and pi, both later by 2 A_2/A and earlier by it
+    seen = steady([swinging(5.0, 0.02, 0.0, 0.0, crank=0.0165, second=0.0)])
+    assert seen.lean[0] == pytest.approx(0, abs=2e-4)
+    time = np.arange(0, 12, 0.01)
+    a, a2 = 0.02, 2e-4
+    x = counted(a * np.cos(5 * time) + a2 * np.sin(10 * time))
+    turned = steady([run("response", time, x, turns=np.arange(0, 12, 2 * np.pi / 5), crank_length=0.0165)])
+    assert turned.lean[0] == pytest.approx(4 * a2 / (np.pi * a), rel=0.02)
+    dry = 1e-3
+    still, held = (mean_shift(turned, 0.0, 1e-7, string_length=0.7, string_error=0.05, dry=d) for d in (0.0, dry))
+    assert held.at(0.0165)[0] - still.at(0.0165)[0] == pytest.approx(dry * turned.lean[0], rel=0.05)
 
 
 def stepping(gap, place=2e-5, crank=0.010, scale=1.0, order=-1, seed=1, mixed=False):

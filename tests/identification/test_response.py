@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from tests.identification.made import COUNT, decay_of, run, swinging
 
+from nonsmooth.experiment.session import Quantity
 from nonsmooth.identification.damping import amplitude_fit, viscous_bias
 from nonsmooth.identification.gap import grazing_amplitude
 from nonsmooth.identification.half_power import half_power, half_power_points
@@ -57,7 +58,7 @@ def test_without_friction_the_response_is_the_linear_one():
 def test_the_complex_response_tells_all_five():
     f, scale, mark = 0.012, 1.01, 0.02
     seen = responding(f, scale=scale, mark=mark)
-    found = receptance_fit(seen, decay_of(W, B, f), M)
+    found = receptance_fit(seen, decay_of(W, B, f), Quantity(M))
     rows = [found.estimate, *(found.others[n] for n in ("omega_0", "friction", "drive_scale", "mark"))]
     for row, truth in zip(rows, (M * B, W, M * f, scale, mark), strict=True):
         assert abs(row.value - truth) < 3.5 * row.uncertainty
@@ -66,10 +67,10 @@ def test_the_complex_response_tells_all_five():
 
 
 def test_half_power_of_steady_runs_and_what_friction_does_to_it():
-    found = half_power(responding(), M)
+    found = half_power(responding(), Quantity(M))
     assert abs(found.value - M * B) < 3.5 * found.uncertainty < 0.02
     assert abs(found.others["omega_0"].value - W) < 3.5 * found.others["omega_0"].uncertainty
-    rough = half_power(responding(0.012), M)
+    rough = half_power(responding(0.012), Quantity(M))
     assert rough.value > 1.01 * M * B and rough.others["c_16.5mm"].value > rough.value
 
 
@@ -94,12 +95,12 @@ def test_the_bias_of_fig_6_for_5_mn():
 
 def test_amplitudes_with_and_without_friction_in_the_law():
     f = 0.012
-    viscous, both = amplitude_fit(responding(f), decay_of(W, B, f), M)
+    viscous, both = amplitude_fit(responding(f), decay_of(W, B, f), Quantity(M))
     assert abs(both.value - M * B) < 3.5 * both.uncertainty
     assert viscous.value > 1.04 * M * B and "an equivalent" in viscous.notes[0]
     assert viscous.data["joint_amplitude"].size == 300
     with pytest.raises(ValueError, match="5 are needed"):
-        amplitude_fit(responding(f).only([0, 1]), decay_of(W, B, f), M)
+        amplitude_fit(responding(f).only([0, 1]), decay_of(W, B, f), Quantity(M))
 
 
 def test_a_steady_run_is_its_closed_form():

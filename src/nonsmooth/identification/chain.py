@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from nonsmooth.errors import SolveError
 from nonsmooth.experiment.recording import RecordingWarning
-from nonsmooth.experiment.session import Session
+from nonsmooth.experiment.session import Quantity, Session
 from nonsmooth.identification.adjustment import UNKNOWNS, Adjusted, Observation, adjust
 from nonsmooth.identification.calibrations import crank_force, voltage_frequency
 from nonsmooth.identification.contact_findings import contact_finding, one_contact
@@ -122,8 +122,8 @@ class _Chain:
         self.observations.append(self.weighed("mass"))
 
     @property
-    def mass(self) -> float:
-        return self.evidence.quantity("mass").value
+    def mass(self) -> Quantity:
+        return self.evidence.quantity("mass")
 
     @property
     def gain_limit(self) -> float:
@@ -196,7 +196,7 @@ class _Chain:
 
     def forces(self) -> None:
         for procedure, law, mass, friction in (
-            ("springs", "spring_slope", self.mass, True), ("support", "support_slope", 0.0, False),
+            ("springs", "spring_slope", self.mass.value, True), ("support", "support_slope", 0.0, False),
         ):  # fmt: skip
             runs = self.runs(procedure)
             if not runs:
@@ -249,7 +249,8 @@ class _Chain:
         gamma = rough["c_s"] / m if "c_s" in rough.names else 1e-3 * rough["k_s"] / m
         found = shoot_contacts(runs, decay, resolution=resolution, kappa=rough["k_s"] / m, gamma=gamma)
         self.observe(("kappa", "gamma"), found.values[3:5], found.covariance[3:5, 3:5], "multiple shooting")
-        self.findings.append(contact_finding(found, m, resolution=resolution))
+        own = Quantity(m, float(np.sqrt(rough.covariance[rough.names.index("m"), rough.names.index("m")])))
+        self.findings.append(contact_finding(found, own, resolution=resolution))
         i, j = rough.names.index("k_s"), rough.names.index("m")
         relative = rough.covariance[np.ix_([i, j], [i, j])] / np.outer([rough["k_s"], m], [rough["k_s"], m])
         # of the ratio k_s/m: both come from masses and forces that are known apart

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.errors import SolveError
+from nonsmooth.experiment.session import Quantity
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.multiple_shooting import ContactFit
 from nonsmooth.identification.shooting import ShootingFit, shoot
@@ -30,15 +31,15 @@ _POINTS = 24
 _TRIED = 15  # pieces of which the median one is shown
 
 
-def contact_finding(found: ContactFit, mass: float, *, resolution: float) -> Finding:
+def contact_finding(found: ContactFit, mass: Quantity, *, resolution: float) -> Finding:
     r"""Support damping, stiffness and the gap of each run from records with contact.
 
     Parameters
     ----------
     found : ContactFit
         Outcome of `shoot_contacts`.
-    mass : float
-        Mass (kg), taken as exact.
+    mass : Quantity
+        Mass (kg) with its standard uncertainty.
     resolution : float
         Length of a count (m).
 
@@ -54,7 +55,8 @@ def contact_finding(found: ContactFit, mass: float, *, resolution: float) -> Fin
         for i, run in enumerate(found.runs)
     }
     left = int(np.count_nonzero(~found.fit.used))
-    value = float(found.values[_GAMMA]) * mass
+    value = float(found.values[_GAMMA])
+    stiff = Estimate(float(found.values[_KAPPA]), float(error[_KAPPA])).times(mass.value, mass.uncertainty, "N/m")
     notes = [
         f"root of chi^2 per degree of freedom {np.sqrt(found.fit.reduced):.2f}; the clock jitters by "
         f"{1e6 * found.fit.jitter:.0f} µs",
@@ -63,10 +65,11 @@ def contact_finding(found: ContactFit, mass: float, *, resolution: float) -> Fin
     if left:
         notes.append(f"{left} of {len(found.pieces)} pieces are left out: they fit far worse than the others")
     return Finding(
-        "c_s_contact", Estimate(value, float(error[_GAMMA]) * mass, "N s/m", logarithmic=value > 0),
+        "c_s_contact",
+        Estimate(value, float(error[_GAMMA]), logarithmic=value > 0).times(mass.value, mass.uncertainty, "N s/m"),
         f"multiple shooting over {found.n_contacts} pieces split at contacts", found.fit.samples,
         tuple(run.name for run in found.runs), tuple(notes),
-        {"k_s": Estimate(float(found.values[3]) * mass, float(error[3]) * mass, "N/m"), **gaps},
+        {"k_s": stiff, **gaps},
         data=_data(found, resolution), plot="multiple_shooting",
     )  # fmt: skip
 

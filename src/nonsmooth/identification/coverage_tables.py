@@ -23,7 +23,7 @@ ASKED: Mapping[str, tuple[float, float] | None] = {
 }  # fmt: skip
 #: Findings that no parameter rests on: label, (finding, which of its others, truth).
 BESIDE: Mapping[str, tuple[str, str, str]] = {
-    "gap by the grazing frequency": ("gap_grazing", "at_rest", "g"),
+    "gap by the grazing frequency": ("gap_grazing", "at_rest", "gap_at_rest"),
     "k by the crank's force": ("crank_force", "", "k"),
     "motor, slope": ("voltage_frequency", "", "motor_slope"),
     "motor, offset": ("voltage_frequency", "offset", "motor_offset"),

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.experiment.session import Quantity
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.free_decay import DecayFit
 from nonsmooth.identification.gap import grazing_amplitude
@@ -27,7 +28,7 @@ RANGE = (0.55, 0.7, 0.8, 0.9, 0.95, 1.0, 1.05, 1.1, 1.2, 1.3, 1.45, 1.7)
 LEAST = 5  # runs
 
 
-def amplitude_fit(seen: Steady, decay: DecayFit, mass: float) -> list[Finding]:
+def amplitude_fit(seen: Steady, decay: DecayFit, mass: Quantity) -> list[Finding]:
     r"""Fit c to the amplitudes over frequency: viscous only (the paper's way), and with dry friction.
 
     Parameters
@@ -36,8 +37,8 @@ def amplitude_fit(seen: Steady, decay: DecayFit, mass: float) -> list[Finding]:
         Frequency steps without support.
     decay : DecayFit
         Gives :math:`\omega_0` and the start of the fit; c and friction are fitted here.
-    mass : float
-        Mass (kg).
+    mass : Quantity
+        Mass (kg) with its standard uncertainty.
 
     Returns
     -------
@@ -57,28 +58,31 @@ def amplitude_fit(seen: Steady, decay: DecayFit, mass: float) -> list[Finding]:
     start = (float(decay.values[1]), float(max(decay.values[2], 1e-4)))
     both = _fit(seen.omega, seen.crank, seen.amplitude, spread, natural, start, friction=True)
     viscous = _fit(seen.omega, seen.crank, seen.amplitude, spread, natural, start, friction=False)
-    c_viscous, c_both, dry = ((mass * value, mass * error) for value, error in (viscous["b"], both["b"], both["f"]))
+    c_viscous, c_both, dry = (
+        Estimate(*row).times(mass.value, mass.uncertainty, unit)
+        for row, unit in ((viscous["b"], "N s/m"), (both["b"], "N s/m"), (both["f"], "N"))
+    )
     shown = seen.only(seen.crank == np.min(seen.crank))
-    data = _data(shown, natural, viscous, both, mass)
-    bias = 100 * (c_viscous[0] / (mass * float(decay.values[1])) - 1)
+    data = _data(shown, natural, viscous, both, (c_viscous, c_both, dry))
+    bias = 100 * (c_viscous.value / (mass.value * float(decay.values[1])) - 1)
     b, f = float(decay.values[1]), float(decay.values[2])
     alone = {a: viscous_bias(natural, b, f, a, seen.omega[seen.crank == a]) for a in np.unique(seen.crank).tolist()}
     expected = [f"{1e3 * a:.1f} mm {100 * off:+.1f} %" for a, off in alone.items()]
     return [
         Finding(
-            "c_viscous_only", Estimate(*c_viscous, "N s/m"), "maximum amplitude over frequency, viscous only (Fig. 6)",
+            "c_viscous_only", c_viscous, "maximum amplitude over frequency, viscous only (Fig. 6)",
             seen.samples, seen.names,
             (
-                f"an equivalent, not the damper's c: dry friction of {1e3 * mass * decay.values[2]:.1f} mN adds "
+                f"an equivalent, not the damper's c: dry friction of {1e3 * mass.value * decay.values[2]:.1f} mN adds "
                 f"4 F_C/(pi omega A) to it; {bias:+.1f} % against the free decay",
                 f"what friction of this size does to such a fit by itself, at a crank of: {', '.join(expected)}",
             ),
             data=data, plot="amplitude_fit",
         ),
         Finding(
-            "c_response", Estimate(*c_both, "N s/m"),
+            "c_response", c_both,
             "amplitude over frequency, viscous damping and dry friction in first harmonic", seen.samples, seen.names,
-            others={"friction": Estimate(*dry, "N")}, data=data, plot="amplitude_fit",
+            others={"friction": dry}, data=data, plot="amplitude_fit",
         ),
     ]  # fmt: skip
 
@@ -140,7 +144,7 @@ def _fit(
 
 def _data(
     shown: Steady, natural: float, viscous: dict[str, tuple[float, float]], both: dict[str, tuple[float, float]],
-    mass: float,
+    found: tuple[Estimate, Estimate, Estimate],
 ) -> Any:  # fmt: skip
     import xarray as xr
 
@@ -152,11 +156,11 @@ def _data(
             "amplitude_error": ("run", shown.error, {"units": "m"}), "direction": ("run", list(shown.direction)),
             "joint_amplitude": ("omega_fine", _predicted(fine, lengths, natural, both["b"][0], both["f"][0])),
             "viscous_amplitude": ("omega_fine", _predicted(fine, lengths, natural, viscous["b"][0], 0.0)),
-            "c_joint": ((), mass * both["b"][0], {"units": "N s/m"}),
-            "c_joint_error": ((), mass * both["b"][1], {"units": "N s/m"}),
-            "friction_joint": ((), mass * both["f"][0], {"units": "N"}),
-            "c_viscous": ((), mass * viscous["b"][0], {"units": "N s/m"}),
-            "c_viscous_error": ((), mass * viscous["b"][1], {"units": "N s/m"}),
+            "c_joint": ((), found[1].value, {"units": "N s/m"}),
+            "c_joint_error": ((), found[1].uncertainty, {"units": "N s/m"}),
+            "friction_joint": ((), found[2].value, {"units": "N"}),
+            "c_viscous": ((), found[0].value, {"units": "N s/m"}),
+            "c_viscous_error": ((), found[0].uncertainty, {"units": "N s/m"}),
             "crank_length": ((), float(shown.crank[0]), {"units": "m"}),
         },
         {"omega_fine": ("omega_fine", fine, {"units": "rad/s"})}, {"synthetic": shown.synthetic},

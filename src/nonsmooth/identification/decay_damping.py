@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.experiment.session import Quantity
 from nonsmooth.identification.evidence import Run
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.free_decay import DecayFit, free_decay
@@ -41,7 +42,7 @@ def envelope(time: FloatArray, first: float, omega_0: float, b: float, f: float)
     return np.maximum((first + below) * np.exp(-b * np.asarray(time) / 2) - below, 0.0)
 
 
-def decay_damping(runs: Sequence[Run], decay: DecayFit, mass: float, *, resolution: float) -> Finding:
+def decay_damping(runs: Sequence[Run], decay: DecayFit, mass: Quantity, *, resolution: float) -> Finding:
     r"""Viscous damping and dry friction from the shape of free decays, with a viscous-only fit beside it.
 
     Parameters
@@ -50,8 +51,8 @@ def decay_damping(runs: Sequence[Run], decay: DecayFit, mass: float, *, resoluti
         The taps.
     decay : DecayFit
         Their fit, by `free_decay`.
-    mass : float
-        Mass (kg), taken as exact: its uncertainty is the adjustment's matter.
+    mass : Quantity
+        Mass (kg) with its standard uncertainty.
     resolution : float
         Length of a count (m).
 
@@ -64,11 +65,12 @@ def decay_damping(runs: Sequence[Run], decay: DecayFit, mass: float, *, resoluti
     viscous = free_decay(
         [(run.time, run.positions) for run in runs], resolution=resolution, friction=False, doubt_law=False
     )
-    c, friction = mass * float(decay.values[1]), mass * float(decay.values[2])
-    c_error, friction_error = mass * decay.error("b"), mass * decay.error("f")
-    plain = mass * float(viscous.values[1])
-    covariance = mass**2 * decay.covariance[1:3, 1:3]
-    related = float(covariance[0, 1] / (c_error * friction_error)) if friction_error else 0.0
+    c, friction = mass.value * float(decay.values[1]), mass.value * float(decay.values[2])
+    plain = mass.value * float(viscous.values[1])
+    own = mass.value**2 * decay.covariance[1:3, 1:3]
+    covariance = own + mass.uncertainty**2 * np.outer(decay.values[1:3], decay.values[1:3])
+    c_error, friction_error = (float(e) for e in np.sqrt(np.diag(covariance)))
+    related = float(own[0, 1] / np.sqrt(own[0, 0] * own[1, 1])) if own[1, 1] else 0.0
     notes = [
         f"without friction in the law the same decays give {plain:.4g} N s/m, {100 * (plain / c - 1):+.1f} %",
         f"c and the dry friction are told apart by the shape; correlation {related:+.2f}",
@@ -79,9 +81,11 @@ def decay_damping(runs: Sequence[Run], decay: DecayFit, mass: float, *, resoluti
         decay.samples, tuple(runs[i].name for i in decay.runs), tuple(notes),
         {
             "friction": Estimate(friction, friction_error, "N"),
-            "c_viscous_only": Estimate(plain, mass * viscous.error("b"), "N s/m"),
+            "c_viscous_only": Estimate(float(viscous.values[1]), viscous.error("b")).times(
+                mass.value, mass.uncertainty, "N s/m"
+            ),
         },
-        covariance, _data(runs, decay, viscous, mass, resolution), "free_decay",
+        covariance, _data(runs, decay, viscous, (c, c_error, friction, friction_error), resolution), "free_decay",
     )  # fmt: skip
 
 
@@ -92,7 +96,9 @@ def _turn(decay: DecayFit, which: int) -> tuple[float, float]:
     return float(late), float(abs(x) * (1 + (decay.values[0] * late) ** 2 / 2))
 
 
-def _data(runs: Sequence[Run], decay: DecayFit, viscous: DecayFit, mass: float, resolution: float) -> xr.Dataset:
+def _data(
+    runs: Sequence[Run], decay: DecayFit, viscous: DecayFit, numbers: tuple[float, ...], resolution: float
+) -> xr.Dataset:
     import xarray as xr
 
     natural, b, f, rest = (float(v) for v in decay.values)
@@ -117,9 +123,9 @@ def _data(runs: Sequence[Run], decay: DecayFit, viscous: DecayFit, mass: float, 
             "x": ("time", x - rest, {"units": "m"}), "fitted": ("time", fitted, {"units": "m"}),
             "envelope_both": ("fine_time", both, {"units": "m"}),
             "envelope_viscous": ("fine_time", plain, {"units": "m"}),
-            "c": ((), mass * b, {"units": "N s/m"}), "c_error": ((), mass * decay.error("b"), {"units": "N s/m"}),
-            "friction_force": ((), mass * f, {"units": "N"}),
-            "friction_force_error": ((), mass * decay.error("f"), {"units": "N"}),
+            "c": ((), numbers[0], {"units": "N s/m"}), "c_error": ((), numbers[1], {"units": "N s/m"}),
+            "friction_force": ((), numbers[2], {"units": "N"}),
+            "friction_force_error": ((), numbers[3], {"units": "N"}),
         },
         {"time": time - time[0], "fine_time": fine}, {"synthetic": "yes" if run.synthetic else "no"},
     )  # fmt: skip

@@ -44,6 +44,14 @@ class Estimate:
     def __float__(self) -> float:
         return self.value
 
+    def times(self, size: float, error: float = 0.0, unit: str | None = None) -> Estimate:
+        """The product with a number of its own standard uncertainty: c = m b."""
+        value = self.value * size
+        return Estimate(
+            value, float(np.hypot(self.uncertainty * size, self.value * error)), self.unit if unit is None else unit,
+            self.half_width * abs(size), self.logarithmic,
+        )  # fmt: skip
+
     @property
     def relative(self) -> float:
         """Standard uncertainty over the value's size."""

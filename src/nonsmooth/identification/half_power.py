@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.experiment.session import Quantity
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.steady import Steady
 from nonsmooth.identification.uncertainty import bootstrap
@@ -86,15 +87,15 @@ def _damping(omega: FloatArray, amplitude: FloatArray) -> tuple[float, ...]:
     return float(xi), float(natural), first, second, largest
 
 
-def half_power(seen: Steady, mass: float, *, seed: int = 0) -> Finding:
+def half_power(seen: Steady, mass: Quantity, *, seed: int = 0) -> Finding:
     r"""Viscous damping by half-power bandwidth, from the runs at the longest crank, where friction matters least.
 
     Parameters
     ----------
     seen : Steady
         Frequency steps without support.
-    mass : float
-        Mass (kg).
+    mass : Quantity
+        Mass (kg) with its standard uncertainty.
     seed : int
         Of the bootstrap over runs that gives the uncertainty.
 
@@ -113,10 +114,8 @@ def half_power(seen: Steady, mass: float, *, seed: int = 0) -> Finding:
     part, value, error = found[longest]
     for a, (_, row, spread) in found.items():
         if a != longest:
-            others[f"c_{1e3 * a:.1f}mm"] = Estimate(
-                2 * mass * float(row[0] * row[1]), 2 * mass * float(spread[5]), "N s/m"
-            )
-    c = 2 * mass * float(value[0] * value[1])
+            others[f"c_{1e3 * a:.1f}mm"] = _c(row, spread, mass)
+    c = _c(value, error, mass)
     notes = [
         f"half power at {value[2]:.4f} and {value[3]:.4f} rad/s, by a cubic of 1/A^2 over omega^2; uncertainty by "
         f"bootstrap over the {len(part)} runs at a crank of {1e3 * longest:.1f} mm"
@@ -124,14 +123,19 @@ def half_power(seen: Steady, mass: float, *, seed: int = 0) -> Finding:
     if others:
         notes.append("a c that falls as the crank grows is dry friction, not damping")
     return Finding(
-        "c_half_power", Estimate(c, 2 * mass * float(error[5]), "N s/m"),
+        "c_half_power", c,
         "half-power bandwidth of the frequency response", part.samples, part.names, tuple(notes),
         {
             "damping_ratio": Estimate(float(value[0]), float(error[0])),
             "omega_0": Estimate(float(value[1]), float(error[1]), "rad/s"), **others,
         },
-        data=_data(part, value, error, c, 2 * mass * float(error[5])), plot="half_power",
+        data=_data(part, value, error, c), plot="half_power",
     )  # fmt: skip
+
+
+def _c(value: FloatArray, error: FloatArray, mass: Quantity) -> Estimate:
+    product = Estimate(2 * float(value[0] * value[1]), 2 * float(error[5]))
+    return product.times(mass.value, mass.uncertainty, "N s/m")
 
 
 def _scatter(part: Steady, seed: int) -> FloatArray:
@@ -148,7 +152,7 @@ def _scatter(part: Steady, seed: int) -> FloatArray:
     return np.asarray(np.nanstd(drawn, axis=0, ddof=1))
 
 
-def _data(part: Steady, value: FloatArray, error: FloatArray, c: float, c_error: float) -> xr.Dataset:
+def _data(part: Steady, value: FloatArray, error: FloatArray, c: Estimate) -> xr.Dataset:
     import xarray as xr
 
     return xr.Dataset(
@@ -157,8 +161,8 @@ def _data(part: Steady, value: FloatArray, error: FloatArray, c: float, c_error:
             "amplitude_error": ("run", part.error, {"units": "m"}), "direction": ("run", list(part.direction)),
             "omega_low": ((), value[2], {"units": "rad/s"}), "omega_high": ((), value[3], {"units": "rad/s"}),
             "largest": ((), value[4], {"units": "m"}), "damping_ratio": ((), value[0]),
-            "damping_ratio_error": ((), error[0]), "c": ((), c, {"units": "N s/m"}),
-            "c_error": ((), c_error, {"units": "N s/m"}),
+            "damping_ratio_error": ((), error[0]), "c": ((), c.value, {"units": "N s/m"}),
+            "c_error": ((), c.uncertainty, {"units": "N s/m"}),
         },
         attrs={"synthetic": part.synthetic},
     )  # fmt: skip

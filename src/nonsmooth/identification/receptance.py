@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.errors import SolveError
+from nonsmooth.experiment.session import Quantity
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.free_decay import DecayFit
 from nonsmooth.identification.gap import grazing_amplitude
@@ -51,7 +52,7 @@ def receptance(
     return np.asarray(size * np.exp(1j * (mark - lag)))
 
 
-def receptance_fit(seen: Steady, decay: DecayFit, mass: float) -> Finding:
+def receptance_fit(seen: Steady, decay: DecayFit, mass: Quantity) -> Finding:
     r"""Fit damping, natural frequency, dry friction, the drive's size and the mark to the complex response.
 
     Parameters
@@ -60,8 +61,8 @@ def receptance_fit(seen: Steady, decay: DecayFit, mass: float) -> Finding:
         Frequency steps without support.
     decay : DecayFit
         Only the start of the fit.
-    mass : float
-        Mass (kg).
+    mass : Quantity
+        Mass (kg) with its standard uncertainty.
 
     Returns
     -------
@@ -84,8 +85,9 @@ def receptance_fit(seen: Steady, decay: DecayFit, mass: float) -> Finding:
         moved = _fit(seen.only(longest), decay)[0] - values
         covariance = covariance + np.outer(moved, moved)
         doubt = "; how far the fit moves with the longest crank alone is added to it"
-    factor = np.array([mass, 1.0, mass, 1.0, 1.0])
-    values, covariance = factor * values, covariance * np.outer(factor, factor)
+    factor = np.array([mass.value, 1.0, mass.value, 1.0, 1.0])
+    by_mass = mass.uncertainty * values * [1, 0, 1, 0, 0]
+    values, covariance = factor * values, covariance * np.outer(factor, factor) + np.outer(by_mass, by_mass)
     errors = np.sqrt(np.diag(covariance))
     units = ("N s/m", "rad/s", "N", "", "rad")
     rows = [Estimate(float(v), float(e), unit) for v, e, unit in zip(values, errors, units, strict=True)]
@@ -98,7 +100,7 @@ def receptance_fit(seen: Steady, decay: DecayFit, mass: float) -> Finding:
             f"uncertainty by the residuals' own scatter; friction in first harmonic only{doubt}",
         ),
         dict(zip(("omega_0", "friction", "drive_scale", "mark"), rows[1:], strict=True)), covariance,
-        _data(seen, rows, mass), "nyquist",
+        _data(seen, rows, mass.value), "nyquist",
     )  # fmt: skip
 
 

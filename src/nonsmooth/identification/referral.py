@@ -95,7 +95,7 @@ def refer(
     length = evidence.apparatus.get("string_length")
     shift = mean_shift(
         seen, zero, zero_error, string_length=length.value if length else None,
-        string_error=length.uncertainty if length else 0.0,
+        string_error=length.uncertainty if length else 0.0, dry=float(decay.values[2] / decay.values[0] ** 2),
     )  # fmt: skip
     longest = max(float(run.settings["crank_length"]) for run in contacts.runs)
     crank = longest if crank_length is None else crank_length

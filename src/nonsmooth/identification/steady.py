@@ -39,6 +39,8 @@ class Steady:
         Mean position (m).
     highest : array (n,)
         Largest position of mean and harmonics together (m).
+    lean : array (n,)
+        Mean of the velocity's sign: even harmonics let the car go longer one way than the other.
     rest : array (n,)
         Standard deviation of what the harmonics leave (m): the sensor's own in free motion, more in contact.
     """
@@ -53,6 +55,7 @@ class Steady:
     mean_error: FloatArray
     highest: FloatArray
     rest: FloatArray
+    lean: FloatArray
     direction: tuple[str, ...]
     runs: tuple[Run, ...]
 
@@ -79,7 +82,7 @@ class Steady:
         rows = np.flatnonzero(chosen) if np.asarray(chosen).dtype == bool else np.asarray(chosen, dtype=int)
         arrays = (
             self.omega, self.omega_error, self.crank, self.amplitude, self.error, self.response, self.mean,
-            self.mean_error, self.highest, self.rest,
+            self.mean_error, self.highest, self.rest, self.lean,
         )  # fmt: skip
         return _steady([array[rows] for array in arrays], [self.runs[i] for i in rows])
 
@@ -117,15 +120,27 @@ def steady(runs: Sequence[Run]) -> Steady:
         shape = np.cos(np.multiply.outer(turn, order) - fitted.phases) @ fitted.amplitudes
         rows.append((
             omega, omega_error, float(run.settings["crank_length"]), amplitude, float(fitted.amplitude_errors[0]),
-            response, fitted.mean, fitted.mean_error, fitted.mean + float(shape.max()), fitted.residual,
+            response, fitted.mean, fitted.mean_error, fitted.mean + float(shape.max()), fitted.residual, _lean(fitted),
         ))  # fmt: skip
-    columns = [np.array(column) for column in zip(*rows, strict=True)] if rows else [np.zeros(0)] * 10
+    columns = [np.array(column) for column in zip(*rows, strict=True)] if rows else [np.zeros(0)] * 11
     return _steady(columns, runs)
 
 
+def _lean(fitted: HarmonicFit) -> float:
+    """Mean sign of the velocity over a turn, its zeros by interpolation."""
+    turn = np.linspace(0, 2 * np.pi, 721)
+    order = np.arange(1, HARMONICS + 1)
+    v = -np.sin(np.multiply.outer(turn, order) - fitted.phases) @ (order * fitted.amplitudes)
+    before, after = v[:-1], v[1:]
+    # the share of each step in which v is positive
+    step = np.where(before == after, 1.0, np.abs(after - before))
+    part = np.where(before * after < 0, np.maximum(before, after) / step, (before + after > 0).astype(float))
+    return float(2 * np.mean(part) - 1)
+
+
 def _steady(columns: list[Any], runs: Sequence[Run]) -> Steady:
-    omega, omega_error, crank, amplitude, error, response, mean, mean_error, highest, rest = columns
+    omega, omega_error, crank, amplitude, error, response, mean, mean_error, highest, rest, lean = columns
     return Steady(
-        omega, omega_error, crank, amplitude, error, response, mean, mean_error, highest, rest,
+        omega, omega_error, crank, amplitude, error, response, mean, mean_error, highest, rest, lean,
         tuple(str(run.settings.get("direction", "up")) for run in runs), tuple(runs),
     )  # fmt: skip

@@ -134,8 +134,8 @@ def _columns(run: Run, resolution: float, mass: float, friction: bool) -> tuple[
         inside = np.abs(v) > 3e-3
         if np.count_nonzero(inside) < 50:
             raise ValueError(
-                f"{run.label}, channel 'Angle': the hand moves faster than 3 mm/s in {np.count_nonzero(inside)} samples "
-                "only, and 50 are needed: pull farther or faster, or record longer"
+                f"{run.label}, channel 'Angle': the hand moves faster than 3 mm/s in {np.count_nonzero(inside)} "
+                "samples only, and 50 are needed: pull farther or faster, or record longer"
             )
     return np.array(parts).T[inside], force[inside]
 

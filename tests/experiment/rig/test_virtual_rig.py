@@ -8,6 +8,8 @@ import pytest
 import nonsmooth as ns
 from nonsmooth.experiment import RecordingWarning
 from nonsmooth.experiment.rig import FEATURES, UNITS, VirtualRig, sensors
+from nonsmooth.experiment.rig.driven import Setting, records
+from nonsmooth.experiment.rig.figures import RELEASES, stairs
 from nonsmooth.experiment.rig.motor import frequency, passages, voltage_for
 from nonsmooth.experiment.rig.truth import published
 from nonsmooth.experiment.session import PROCEDURES
@@ -290,3 +292,50 @@ def test_wrong_arguments_are_refused() -> None:
 def test_passages_are_counted_in_the_window_only() -> None:
     rig = VirtualRig(0, ripple=False)
     np.testing.assert_allclose(passages(rig, 2 * np.pi, 0.5, 3.5), [1, 2, 3], atol=1e-12)
+
+
+def test_figure_14_is_recorded_from_several_places() -> None:
+    """First all gaps from rest, then all again for each place where the car is let go."""
+    rig = VirtualRig.published()
+    recording = rig.section(figure=14, periods=2, settle=1.0)
+    assert len(recording.runs) == 4 * (1 + len(RELEASES[14]))
+    gaps = [recording.tree[run].attrs["gap"] for run in recording.runs]
+    assert gaps[:4] == gaps[4:8] == gaps[16:20]
+    assert "let go at -10 mm" in recording.tree["Run #5"].attrs["note"]
+    assert "let go" not in recording.tree["Run #4"].attrs["note"]
+    assert len(rig.section(figure=14, periods=2, settle=1.0, releases=()).runs) == 4
+
+
+def test_a_release_begins_where_it_says() -> None:
+    """No waiting, a motor hardly driving, no support: the car swings freely from where it was let go."""
+    rig = VirtualRig.published(friction=False, quantisation=False, jitter=False, ripple=False)
+    settings = [Setting(4.0, 0.0, None, 1.0, (), -0.03)]
+    x = position(records(rig, "response", settings, settle=1e-9), "Run #1")
+    p, omega = rig.truth, frequency(rig, 4.0)
+    begin = float(rig.generator("response", 0).uniform()) * 2 * np.pi / omega + 2 * np.pi / omega
+    decay, natural = p["c"] / (2 * p["m"]), np.sqrt(2 * p["k"] / p["m"])
+    t = begin + np.arange(len(x)) / 100
+    w = np.sqrt(natural**2 - decay**2)
+    np.testing.assert_allclose(x, -0.03 * np.exp(-decay * t) * (np.cos(w * t) + decay / w * np.sin(w * t)), atol=1e-7)
+
+
+@pytest.mark.parametrize("number", [9, 11, 12, 16])
+def test_each_figure_with_the_support_has_runs_without_it(number: int) -> None:
+    """One for each crank length that is used, far apart enough for a rise."""
+    rig = VirtualRig(5)
+    few = {"periods": 2, "settle": 1.0}
+    short = {9: {"voltages": (4.0,), "duration": 1.0}, 11: {"duration": 20.0}}.get(number, few)
+    made = rig.figure(number, **short)
+    free = [run for run in made["response"].runs if "gap" not in made["response"].tree[run].attrs]
+    lengths = {made["response"].tree[run].attrs["crank_length"] for run in free}
+    shown = made["response" if number == 9 else "rise" if number == 11 else "section"]
+    used = {shown.tree[run].attrs["crank_length"] for run in shown.runs}
+    assert used <= lengths and len(free) == len(lengths) == {9: 1, 11: 3, 12: 4, 16: 1}[number]
+
+
+def test_the_rise_in_steps_carries_the_motion() -> None:
+    rig = VirtualRig.published()
+    recording = stairs(rig, forcing=(0.38, 0.39), settle=20.0, duration=4.0)
+    cranks = [recording.tree[run].attrs["crank_length"] for run in recording.runs]
+    assert cranks == [round(rho / 8.47, 5) for rho in (0.38, 0.39)]
+    assert {recording.tree[run].attrs["gap"] for run in recording.runs} == {-0.0045}

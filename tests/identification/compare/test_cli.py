@@ -87,10 +87,10 @@ def test_quiet_is_quiet(folder: Path, capsys: pytest.CaptureFixture[str]) -> Non
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("[measured]", "[measurd]", "`measurd` is not a table.*nearest: measured"),
+        ("[measured]", "[measuerd]", "`measuerd` is not a table.*nearest: measured"),
         ("procedure =", "procedur =", "`procedur` is not a key.*nearest: procedure"),
         ('run = "Run #1"', 'run = "Run #7"', "`Run #7` is not a run"),
-        ('picture = "phase_portrait"', 'picture = "response"', "`response` is not a picture of a comparison of a motion"),
+        ('picture = "phase_portrait"', 'picture = "response"', "`response` is not a picture of a comparison"),
         ("draws = 3", "drows = 3", "`drows` is not a key.*nearest: draws"),
         ('session = "session"', 'session = "nowhere"', "nowhere"),
     ],

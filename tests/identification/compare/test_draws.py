@@ -12,9 +12,8 @@ MODEL = ns.models.discontinuous_support()
 
 
 def test_settings_are_numbers_pairs_tables_or_rules() -> None:
-    read = read_settings(
-        {"rho": lambda p: 0.01 * p["k"], "omega": 4.0, "g": {"value": 0.01, "uncertainty": 1e-3}, "c": (0.9, 0.1)}, MODEL
-    )
+    gap = {"value": 0.01, "uncertainty": 1e-3}
+    read = read_settings({"rho": lambda p: 0.01 * p["k"], "omega": 4.0, "g": gap, "c": (0.9, 0.1)}, MODEL)
     assert read["rho"].follows and not read["omega"].follows
     assert read["g"] == (0.01, 1e-3) and read["c"].uncertainty == 0.1
     assert settled(read, {"k": 8.0}) == {"rho": 0.08, "omega": 4.0, "g": 0.01, "c": 0.9}

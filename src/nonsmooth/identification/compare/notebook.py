@@ -12,13 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.identification.compare.measured import (
-    measured_motion,
-    measured_response,
-    measured_rise,
-    measured_sections,
-)
+from nonsmooth.identification.compare.measured import measured_motion
 from nonsmooth.identification.compare.reference import GapReference, gap_reference
+from nonsmooth.identification.compare.series import measured_response, measured_rise, measured_sections
 
 if TYPE_CHECKING:
     import xarray as xr

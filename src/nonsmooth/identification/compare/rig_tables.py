@@ -10,6 +10,7 @@ import numpy as np
 __all__ = ["page"]
 
 Results = Mapping[str, Any]
+STEP = 0.006  # N: of the rise in steps
 _OFF = {
     "friction": "dry friction", "string": "string", "ripple": "ripple", "support_relaxation": "relaxing support",
     "quantisation": "quantisation", "jitter": "clock jitter", "noise": "force noise",
@@ -60,7 +61,7 @@ model's flip moves, too):
 
 _PERIODS = """## Periods at four gaps (Fig. 14)
 
-The rig is let go at five places (0, -10, -20, -30 and -40 mm), with 60 s of waiting before 300 turns of record; the
+The rig is let go at five places (0, -10, -20, -30 and -40 mm), with 60 s of waiting before 200 turns of record; the
 model begins at 64 random states. 0 stands for a motion without a period number up to 16. ± is the standard uncertainty
 of the gap.
 
@@ -134,7 +135,8 @@ def _rise(found: Mapping[str, Results]) -> str:
             f"| in {row['duration']:.0f} s | {1e3 * row['rise_per_turn']:.3f} | {read:.4f} | {read - place:+.4f} | "
             f"{equation or 'too fast'} | {flip.get('theory_flip', np.nan):.4f} |"
         )
-    lines.append(f"| in steps | 0 | {place:.4f} | 0 | | {still.get('theory_flip', np.nan):.4f} |")
+    expected = still.get("theory_flip", np.nan)
+    lines.append(f"| in steps | 0 | {place:.3f} ± {0.5 * STEP:.3f} | 0 | | {expected:.4f} |")
     lines.append(_FLIPS)
     for name, one in found.items():
         lines.append(_flip_row(name, one["stairs"]))
@@ -148,7 +150,8 @@ def _flip_row(name: str, stairs: Results) -> str:
     flip = stairs.get("1-2", {})
     seen, expected = flip.get("measured_flip", np.nan), flip.get("theory_flip", np.nan)
     off = "" if np.isnan(seen) or np.isnan(expected) else f"{100 * (seen / expected - 1):+.1f} %"
-    return f"| {name} | {_or_none(seen, 4)} | {_or_none(expected, 4)} | {off} |"
+    mine = "none" if np.isnan(seen) else f"{seen:.3f} ± {0.5 * STEP:.3f}"
+    return f"| {name} | {mine} | {_or_none(expected, 4)} | {off} |"
 
 
 def _periods(found: Mapping[str, Results]) -> str:

@@ -24,9 +24,13 @@ from nonsmooth.experiment.rig.motor import mean_position
 from nonsmooth.experiment.rig.notebook import write_session
 from nonsmooth.experiment.session import Session, load_session
 from nonsmooth.identification.compare.compare import compare
-from nonsmooth.identification.compare.measured import measured_motion, measured_sections
+from nonsmooth.identification.compare.fold import fold
+from nonsmooth.identification.compare.measured import measured_motion
 from nonsmooth.identification.compare.notebook import session_measurement
+from nonsmooth.identification.compare.periods import measured_period
 from nonsmooth.identification.compare.reference import gap_offset, gap_reference
+from nonsmooth.identification.compare.rig_tables import STEP
+from nonsmooth.identification.compare.series import measured_sections
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,7 +43,6 @@ __all__ = ["RigTrial"]
 
 STARTS = 64
 RATES = (900.0, 1800.0, 3600.0, 7200.0)  # s for the rise from 0.2 to 0.5 N
-STAIRS = 0.006  # N
 LONGEST = 6000  # turns that a transient is followed
 
 
@@ -146,7 +149,7 @@ class RigTrial:
         length = figures.crank_for(self.rig, 0.42)
         screw = figures.screw_for(self.rig, -0.0045, 0.0)
         centre = self._first_flip(screw - mean_position(self.rig, length) + self.reading[0])
-        forcing = np.arange(centre - 0.066, centre + 0.0331, STAIRS).round(4).tolist()
+        forcing = np.arange(centre - 0.066, centre + 0.0331, STEP).round(4).tolist()
         free = records(self.rig, "response", figures.without_support(self.rig, 11))
         made = {"section": figures.stairs(self.rig, forcing=forcing), "response": free}
         folder = write_session(self.rig, self.folder / "stairs", made, title="Fig. 11 in steps")
@@ -181,7 +184,7 @@ class RigTrial:
 
     def periods(self) -> list[dict[str, Any]]:
         """Fig. 14: the rig's period number from each start, and those of the model from many starts."""
-        session = self.figure(14, periods=300)
+        session = self.figure(14, periods=200)
         gaps = [gap for _, _, gap in figures.SECTIONS[14]]
         rows: list[dict[str, Any]] = [{"gap": gap, "rig": [], "model": {}} for gap in gaps]
         for i, item in enumerate(session.recordings("section")):
@@ -190,8 +193,9 @@ class RigTrial:
             if i < len(gaps):
                 row["referred"], row["uncertainty"] = settings["g"]
                 row["model"] = self._coexisting(settings)
-            found = self.against(measured, settings)
-            row["rig"].append(int(found["measured_period_number"]))
+            points = fold(measured["phase"].values, measured["u"].values, 8)[:, 0]
+            noise = np.median(measured["u_error"].values, axis=0)
+            row["rig"].append(measured_period(points, noise).number)
         return rows
 
     def _coexisting(self, settings: Mapping[str, Any]) -> dict[int, int]:

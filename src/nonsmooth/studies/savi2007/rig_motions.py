@@ -19,10 +19,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Canvas
 
     from nonsmooth.studies.savi2007.laboratory import Laboratory
+    from nonsmooth.system.system import System
 
 __all__ = [
-    "GRID", "Motions", "chosen", "compared", "diagram_of", "draw_pairs", "measured_periods_at", "motions", "runs_at",
-    "runs_of", "said", "without_flips",
+    "GRID", "Motions", "chosen", "compared", "diagram_of", "draw_pairs", "measured_periods_at", "model_at", "motions",
+    "runs_at", "runs_of", "said", "without_flips",
 ]  # fmt: skip
 
 GRID = 384  # samples of an orbit in each forcing period: enough for the eye within a contact
@@ -76,6 +77,16 @@ def diagram_of(found: Motions, parameter: str) -> tuple[xr.Dataset, dict[str, An
         | {"title": f"{len(found)} steady runs"},
     )  # fmt: skip
     return measured, {key: value for key, value in settings.items() if key != parameter}
+
+
+def model_at(bench: Laboratory, settings: Mapping[str, Any]) -> System:
+    """The model with the parameters identified, at the settings of a measurement."""
+    system = bench.model.with_parameters(dict(bench.identified))
+    values = {
+        name: float(rule(system.values) if callable(rule) else np.atleast_1d(rule)[0])
+        for name, rule in settings.items()
+    }
+    return system.with_parameters(values)
 
 
 def runs_of(found: Motions, parameter: str) -> xr.Dataset:

@@ -1,0 +1,153 @@
+"""From several measured motions, or one that drifts, to what ``compare`` takes: a response, a rise, sections."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nonsmooth.identification.compare.fold import fold
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["measured_response", "measured_rise", "measured_sections"]
+
+FEW = 6  # turns of the drive below which no period number is sought
+
+
+def measured_response(motions: Sequence[xr.Dataset], directions: Sequence[str], *, settle: int = 4) -> xr.Dataset:
+    """The frequency response that steady runs make: amplitude over frequency, run by run.
+
+    Parameters
+    ----------
+    motions : sequence of Dataset
+        As from :func:`nonsmooth.identification.compare.measured_motion`, one for each step of the frequency.
+    directions : sequence of str
+        ``"up"`` or ``"down"``: how each step was reached.
+    settle : int
+        Forcing periods passed over at the beginning of each run.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over ``run``: ``amplitude`` (half the range of x, the mean over forcing periods), ``amplitude_error`` (that of
+        the mean: the scatter of the periods, and the error of a sample), ``omega``, ``direction``, and
+        ``period_number`` (0: none found, -1: fewer than six turns).
+    """
+    import xarray as xr
+
+    from nonsmooth.identification.compare.periods import measured_period
+
+    if len(motions) != len(directions) or not len(motions):
+        raise ValueError(f"{len(motions)} runs and {len(directions)} directions: each run needs its own")
+    heights, errors, periods = [], [], []
+    for motion in motions:
+        folded = fold(motion["phase"].values, motion["u"].values, 64)
+        points, noise = folded[:, 0], np.median(motion["u_error"].values, axis=0)
+        points = points[np.isfinite(points).all(axis=1)]
+        many = len(points) >= FEW
+        periods.append(measured_period(points, noise, max_period=8).number if many else -1)
+        whole = folded[:, :, 0]
+        whole = whole[min(settle, len(whole) - 1) :]
+        whole = whole[np.isfinite(whole).all(axis=1)]
+        # Pairs of periods, so that a motion of period two shows its whole range.
+        pairs = whole[: len(whole) // 2 * 2].reshape(-1, 2 * whole.shape[1]) if len(whole) > 1 else whole
+        half = 0.5 * np.ptp(pairs, axis=1)
+        heights.append(float(half.mean()))
+        sample = float(np.median(motion["u_error"].values[:, 0])) / np.sqrt(2)
+        scatter = float(half.std(ddof=1) / np.sqrt(len(half))) if len(half) > 1 else 0.0
+        errors.append(float(np.hypot(scatter, sample / np.sqrt(len(half)))))
+    attrs = {key: motions[0].attrs[key] for key in ("synthetic", "file", "sha256") if key in motions[0].attrs}
+    attrs["title"] = f"{attrs.get('file') or 'in memory'}, {len(motions)} runs"
+    omega = np.array([float(motion["omega"]) for motion in motions])
+    return xr.Dataset(
+        {
+            "amplitude": ("run", np.array(heights), {"long_name": "half the range of x", "units": "m"}),
+            "amplitude_error": ("run", np.array(errors), {"long_name": "standard error of it", "units": "m"}),
+            "omega": ("run", omega, {"long_name": "frequency of the drive", "units": "rad/s"}),
+            "direction": ("run", np.array(directions, dtype=str), {"long_name": "how the run was reached"}),
+            "period_number": ("run", np.array(periods, dtype=np.int64), {
+                "long_name": "period number (0: none found, -1: too few turns)"}),
+        },
+        attrs=attrs,
+    )  # fmt: skip
+
+
+def measured_rise(motion: xr.Dataset, parameter: str, first: float, last: float, *, unit: str = "") -> xr.Dataset:
+    """The section points of a run in which a parameter rose slowly and evenly from ``first`` to ``last``.
+
+    Parameters
+    ----------
+    motion : Dataset
+        As from :func:`nonsmooth.identification.compare.measured_motion`.
+    parameter : str
+    first, last : float
+        Its values at the first and the last sample of the record.
+    unit : str
+
+    Returns
+    -------
+    xarray.Dataset
+        ``section(iterate, state)`` at phase 0 with the parameter over ``iterate``, and ``section_error(state)``.
+    """
+    import xarray as xr
+
+    time, phase = motion["time"].values, motion["phase"].values
+    columns = np.column_stack([motion["u"].values, time])
+    points = fold(phase, columns, 8)[:, 0]
+    at = first + (last - first) * (points[:, 2] - time[0]) / (time[-1] - time[0])
+    return xr.Dataset(
+        {
+            "section": (("iterate", "state"), points[:, :2], {"long_name": "section points"}),
+            "section_error": (("state",), np.median(motion["u_error"].values, axis=0)),
+            parameter: ("iterate", at, {"long_name": parameter, "units": unit}),
+        },
+        {"state": motion["state"].values, "state_unit": ("state", motion["state_unit"].values)},
+        motion.attrs,
+    )  # fmt: skip
+
+
+def measured_sections(
+    motions: Sequence[xr.Dataset], parameter: str, values: Sequence[float], *, unit: str = ""
+) -> xr.Dataset:
+    """The section points of steady runs over the parameter in which they differ.
+
+    Parameters
+    ----------
+    motions : sequence of Dataset
+        As from :func:`nonsmooth.identification.compare.measured_motion`.
+    parameter : str
+    values : sequence of float
+        Its value in each run.
+    unit : str
+
+    Returns
+    -------
+    xarray.Dataset
+        ``section(<parameter>, iterate, state)`` at phase 0, in rising order of the parameter (NaN behind the end of a
+        shorter run), and ``section_error(state)``.
+    """
+    import xarray as xr
+
+    order = np.argsort(values)
+    clouds = [fold(motions[i]["phase"].values, motions[i]["u"].values, 8)[:, 0] for i in order]
+    points = np.full((len(clouds), max(map(len, clouds)), clouds[0].shape[1]), np.nan)
+    for row, cloud in zip(points, clouds, strict=True):
+        row[: len(cloud)] = cloud
+    error = np.median(np.concatenate([motion["u_error"].values for motion in motions]), axis=0)
+    first = motions[0]
+    attrs = {**first.attrs, "title": f"{first.attrs.get('file') or 'in memory'}, {len(motions)} runs"}
+    attrs.pop("run", None)
+    return xr.Dataset(
+        {
+            "section": ((parameter, "iterate", "state"), points, {"long_name": "section points"}),
+            "section_error": (("state",), error),
+        },
+        {
+            parameter: (parameter, np.asarray(values, dtype=float)[order], {"long_name": parameter, "units": unit}),
+            "state": first["state"].values, "state_unit": ("state", first["state_unit"].values),
+        },
+        attrs,
+    )  # fmt: skip
