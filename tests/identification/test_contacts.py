@@ -66,7 +66,8 @@ def test_contact_parameters_and_gap_lie_within_their_uncertainty(fitted):
 
 def test_one_contact_tells_less_than_all_together(fitted):
     m = 0.84
-    many, single = contact_finding(fitted, Quantity(m), resolution=COUNT), one_contact(fitted, m, resolution=COUNT, kappa_error=1e-3 * KAPPA)
+    many = contact_finding(fitted, Quantity(m), resolution=COUNT)
+    single = one_contact(fitted, m, resolution=COUNT, kappa_error=1e-3 * KAPPA)
     assert many.estimate.logarithmic and single.estimate.factor > many.estimate.factor > 1
     # by the root of their number and more
     ratio = np.log(single.estimate.factor) / np.log(many.estimate.factor)

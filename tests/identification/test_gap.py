@@ -41,7 +41,7 @@ def test_the_shift_is_that_of_string_and_ripple():
     assert found.runs == 12
     nothing = mean_shift(moved(0.7, 0, 0).only([]), 0.0, 1e-6, string_length=0.5, string_error=0.005)
     value, error = nothing.at(0.039)
-    assert value == pytest.approx(0.039**2 / 4) and error > 0.03 / 4 * 0.03
+    assert value == pytest.approx(mean_of_drive(0.039, 0.5) / 2) and error > 0.03 / 4 * 0.03
 
 
 def test_a_wrong_zero_moves_the_shift_as_stated():

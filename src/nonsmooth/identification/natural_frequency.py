@@ -50,9 +50,8 @@ def spectral_peak(time: FloatArray, x: FloatArray, about: float, step: float, no
     """
     low, high = about - step, about + step
     for _ in range(3):
-        f = np.linspace(low, high, FINE)
-        square = np.abs(np.exp(-2j * np.pi * np.outer(f, time)) @ x) ** 2
-        top = int(np.clip(np.argmax(square), 1, FINE - 2))
+        f, magnitude = _between(time, x, low, high)
+        top = int(np.clip(np.argmax(magnitude), 1, FINE - 2))
         low, high = float(f[top - 1]), float(f[top + 1])
     at = 0.5 * (low + high)
     wave = np.exp(-2j * np.pi * at * time)
@@ -61,6 +60,15 @@ def spectral_peak(time: FloatArray, x: FloatArray, about: float, step: float, no
     delay = float((1j * first / value).real) / (2 * np.pi)
     own = 2 * np.pi * noise * float(np.sqrt(np.sum((time - delay) ** 2)))
     return at, float(np.sqrt(2) * abs(value) * own / abs(bend))
+
+
+def _between(time: FloatArray, x: FloatArray, low: float, high: float) -> tuple[FloatArray, FloatArray]:
+    """Frequencies between two (Hz), and the modulus of the sum of the samples there."""
+    from scipy.signal import zoom_fft
+
+    rate = (len(time) - 1) / float(time[-1] - time[0])
+    lines = zoom_fft(x, [low, high], m=FINE, fs=rate, endpoint=True)
+    return np.linspace(low, high, FINE), np.abs(lines)
 
 
 def natural_frequency(runs: Sequence[Run], decay: DecayFit) -> Finding:
@@ -123,8 +131,8 @@ def natural_frequency(runs: Sequence[Run], decay: DecayFit) -> Finding:
         },
         {"time": time, "frequency": frequency}, {"synthetic": "yes" if run.synthetic else "no"},
     )  # fmt: skip
-    fine = np.linspace(frequency[max(top - 12, 1)], frequency[top + 12], FINE)
-    data["fine_magnitude"] = ("fine_frequency", np.abs(np.exp(-2j * np.pi * np.outer(fine, time)) @ x) / rate)
+    fine, between = _between(time, x, float(frequency[max(top - 12, 1)]), float(frequency[top + 12]))
+    data["fine_magnitude"] = ("fine_frequency", between / rate)
     data["fine_frequency"] = ("fine_frequency", fine, {"units": "Hz"})
     return Finding(
         "omega_0", Estimate(value, error, "rad/s"), "free decay in the time domain, viscous damping and dry friction",
