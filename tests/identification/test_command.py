@@ -27,8 +27,8 @@ def study(folder, text):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("session = 3", "`session` must be a table: write [session]"),
-        ("[identfy]\nsession = 'x'", "identify"),
+        ("identify = 3", "`identify` must be a table: write [identify]"),
+        ("[identifi]\nsession = 'x'", "identify"),
         ("[output]\ndata = 'a.nc'", "needs a table [identify] with session"),
         ("[identify]\nsession = 3", "session = 3 must be a text"),
         ("[identify]\nsession = 'nowhere'", "session = 'nowhere': no such folder beside the study file"),

@@ -1,5 +1,8 @@
 """Damping from steady runs: half power, amplitudes and the complex response against their closed forms."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 from tests.identification.made import COUNT, decay_of, run, swinging
@@ -91,6 +94,13 @@ def test_the_bias_of_fig_6_for_5_mn():
     assert 0.02 < bias[2] < 0.03 and 0.05 < bias[1] < 0.065 and 0.085 < bias[0] < 0.11
     with pytest.raises(ValueError, match="holds the car"):
         viscous_bias(W, B, 1.0, 0.01)
+
+
+def test_the_table_of_the_theory_page_is_what_its_code_prints(capsys):
+    page = (Path(__file__).parents[2] / "docs" / "theory" / "uncertainty.md").read_text(encoding="utf-8")
+    code, expected = re.search(r"```python\n(.*?)```\n\n```text\n(.*?)```", page, re.DOTALL).groups()
+    exec(code, {})
+    assert capsys.readouterr().out == expected
 
 
 def test_amplitudes_with_and_without_friction_in_the_law():

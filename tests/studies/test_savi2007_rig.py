@@ -119,3 +119,10 @@ def test_what_is_not_there_is_said() -> None:
         the_finding(nothing, "crank_force")
     with pytest.raises(ValueError, match="measured in a laboratory"):
         Settings().bench  # noqa: B018
+
+
+def test_single_runs_with_period_two_make_no_range() -> None:
+    data = {"fig10_rig": _response({"up": 5.81, "down": 5.16}, doubled=(3.6, 3.6))}
+    cell = claims_rig.f10(data)[2]
+    assert (cell.text, cell.verdict) == ("2 of 140 runs with period 2, no two neighbours", "agrees")
+    assert claims_rig.f10({"fig10_rig": _response({"up": 5.81, "down": 5.16})})[2].verdict == "differs"

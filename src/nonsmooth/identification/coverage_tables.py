@@ -50,10 +50,13 @@ class _Counted:
         self.length = name in _LENGTHS
         self.off = np.abs(value - truth) / (1.0 if self.length else np.abs(truth))
         self.bias = float(np.median((value - truth) / (1.0 if self.length else np.abs(truth))))
+        self.coarse = bool(np.median(self.off) > 5e-6)
         self.stated = float(np.median(error / (1.0 if self.length else np.abs(value))))
 
     def written(self, size: float) -> str:
-        return f"{1e6 * size:.1f} µm" if self.length else f"{100 * size:.3f} %"
+        if self.length:
+            return f"{1e6 * size:.1f} µm"
+        return f"{100 * size:.3f} %" if self.coarse else f"{1e6 * size:.2f} ppm"
 
 
 def misses(results: Sequence[Mapping[str, Any]]) -> list[str]:

@@ -64,6 +64,8 @@ def test_the_campaign_asks_what_a_miss_needs(tmp_path: Path, monkeypatch: pytest
     def one(name: str) -> Any:
         def result(trial: RigTrial) -> Any:
             made.append((name, trial.folder.relative_to(tmp_path).as_posix()))
+            if name == "periods" and trial.folder.name == "seed_4":
+                return [{**RIG["periods"][0], "rig": [2, 2, 2]}]
             kept = RIG.get(name, [10, 20])
             return {**ATTRACTOR, "energy_ratio": distances[trial.folder.parts[-1]]} if (
                 name == "attractor" and trial.folder.parts[-1] in distances) else kept
@@ -78,7 +80,7 @@ def test_the_campaign_asks_what_a_miss_needs(tmp_path: Path, monkeypatch: pytest
     arguments = ["--seeds", "3", "4", "--folder", str(tmp_path), "--out", str(out)]
     assert main(arguments) == 0
     first = out.read_text(encoding="utf-8")
-    assert ("attractor", "seed_3/without_friction") in made
+    assert ("attractor", "seed_3/without_friction") in made and ("periods", "seed_3/without_string") in made
     assert not [place for _, place in made if place.startswith("seed_4/")]
     assert ("stairs", "published/without_string") in made and ("stairs", "seed_3") in made
     assert ("rises", "seed_3") not in made

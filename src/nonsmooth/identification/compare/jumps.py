@@ -92,7 +92,7 @@ def match_jumps(measured: Jumps, theory: Jumps, drawn: Sequence[Jumps], unit: st
         seen, expected = list(measured.get(word, ())), list(theory.get(word, ()))
         pairs = _pairs(seen, expected)
         for i, jump in enumerate(seen):
-            other, step, *_ = expected[pairs[i]] if i in pairs else Jump(np.nan, np.nan)
+            other, step, *_ = expected[pairs[i]] if i in pairs else Jump(np.nan)
             rows.append((word, jump.value, other, jump.half + step, *_interval(other, word, drawn, level)))
         for j in sorted(set(range(len(expected))) - set(pairs.values())):
             other, step, *_ = expected[j]

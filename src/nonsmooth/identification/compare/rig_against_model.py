@@ -44,7 +44,10 @@ def campaign(seeds: Sequence[int], folder: Path, say: Callable[[str], None] = la
         if name == "published":
             keep("rises")
         keep("stairs")
-        keep("periods")
+        periods = keep("periods")
+        missed = any(str(number) not in row["model"] for row in periods for number in row["rig"])
+        for feature in MOTION if missed else ():
+            keep("periods", feature)
         one = keep("attractor")
         chaotic = one["measured_period_number"] == 0 == one["theory_period_number"]
         if name == "published":

@@ -23,7 +23,11 @@ def page(found: Mapping[str, Results]) -> str:
     return "\n".join(parts)
 
 
-_HEAD = """# The virtual rig against the model
+_HEAD = """---
+orphan: true
+---
+
+# The virtual rig against the model
 
 Written by `make rig-against-model`. **Every "rig" on this page is a virtual one: its records are synthetic.**
 
@@ -63,7 +67,7 @@ _PERIODS = """## Periods at four gaps (Fig. 14)
 
 The rig is let go at five places (0, -10, -20, -30 and -40 mm), with 60 s of waiting before 200 turns of record; the
 model begins at 64 random states. 0 stands for a motion without a period number up to 16. ± is the standard uncertainty
-of the gap.
+of the gap. Where a period of the rig is not among the model's, each feature is switched off in turn.
 
 | rig | gap (mm) | period of the rig, from its five starts | of the model (share of the starts) | among them |
 |---|---|---|---|---|"""
@@ -158,12 +162,11 @@ def _periods(found: Mapping[str, Results]) -> str:
     lines = [_PERIODS]
     for name, one in found.items():
         for row in one["periods"]:
-            total = sum(row["model"].values())
-            model = ", ".join(f"{number} ({100 * count / total:.0f} %)" for number, count in row["model"].items())
-            held = [str(number) in row["model"] for number in row["rig"]]
-            word = "all" if all(held) else f"{sum(held)} of {len(held)}" if any(held) else "**none**"
-            gap = f"{1e3 * row['referred']:.3f} ± {1e3 * row['uncertainty']:.3f}"
-            lines.append(f"| {name} | {gap} | {', '.join(map(str, row['rig']))} | {model} | {word} |")
+            lines.append(_period_row(name, row))
+        missing = [i for i, row in enumerate(one["periods"]) if any(str(n) not in row["model"] for n in row["rig"])]
+        for feature, word in _OFF.items():
+            for i in missing if f"periods_without_{feature}" in one else ():
+                lines.append(_period_row(f"{name}, without {word}", one[f"periods_without_{feature}"][i]))
     plain = found["published"]
     if "transients" in plain:
         lines += [_TRANSIENTS, f"| published | {', '.join(map(str, plain['transients']))} |"]
@@ -172,6 +175,15 @@ def _periods(found: Mapping[str, Results]) -> str:
                 turns = ", ".join(map(str, plain[f"transients_without_{feature}"]))
                 lines.append(f"| without {word} | {turns} |")
     return "\n".join(lines) + "\n"
+
+
+def _period_row(name: str, row: Results) -> str:
+    total = sum(row["model"].values())
+    model = ", ".join(f"{number} ({100 * count / total:.0f} %)" for number, count in row["model"].items())
+    held = [str(number) in row["model"] for number in row["rig"]]
+    word = "all" if all(held) else f"{sum(held)} of {len(held)}" if any(held) else "**none**"
+    gap = f"{1e3 * row['referred']:.3f} ± {1e3 * row['uncertainty']:.3f}"
+    return f"| {name} | {gap} | {', '.join(map(str, row['rig']))} | {model} | {word} |"
 
 
 def _attractor(found: Mapping[str, Results]) -> str:

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nonsmooth.experiment.recording import RecordingWarning
 from nonsmooth.experiment.rig import figures
@@ -149,7 +150,15 @@ class RigTrial:
         length = figures.crank_for(self.rig, 0.42)
         screw = figures.screw_for(self.rig, -0.0045, 0.0)
         centre = self._first_flip(screw - mean_position(self.rig, length) + self.reading[0])
-        forcing = np.arange(centre - 0.066, centre + 0.0331, STEP).round(4).tolist()
+        found = self._stairs(np.arange(centre - 0.066, centre + 0.0331, STEP))
+        if np.isnan(found.get("1-2", {}).get("measured_flip", np.nan)):  # far from the model: look lower down
+            lower = self._stairs(np.arange(centre - 0.180, centre - 0.06, STEP)).get("1-2", {})
+            kept = ("measured_flip", "measured_flip_error", "measured_flip_read")
+            found["1-2"] = found.get("1-2", {}) | {name: lower.get(name, np.nan) for name in kept}
+        return found
+
+    def _stairs(self, steps: NDArray[np.float64]) -> dict[str, Any]:
+        forcing = steps[steps > 0.05].round(4).tolist()
         free = records(self.rig, "response", figures.without_support(self.rig, 11))
         made = {"section": figures.stairs(self.rig, forcing=forcing), "response": free}
         folder = write_session(self.rig, self.folder / "stairs", made, title="Fig. 11 in steps")
@@ -157,10 +166,11 @@ class RigTrial:
         reference = gap_reference(session, offset=self.reading)
         runs = session.recordings("section")
         k = self.identified["k"]
+        travel = session.apparatus["distance_per_turn"].value
         lengths = [float(item.settings["crank_length"]) for item in runs]
         with _quiet():
             motions = [
-                measured_motion(item.recording, item.run, distance_per_turn=0.0789, zero=reference.mean(a)[0])
+                measured_motion(item.recording, item.run, distance_per_turn=travel, zero=reference.mean(a)[0])
                 for item, a in zip(runs, lengths, strict=True)
             ]
         measured = measured_sections(motions, "rho", [k * a for a in lengths], unit="N")
@@ -169,8 +179,7 @@ class RigTrial:
             "omega": float(motions[0]["omega"]), "g": lambda p: reference.gap(reading, p["rho"] / k)[0],
         }  # fmt: skip
         values = np.arange(forcing[0], forcing[-1] + 0.03, 0.0005)
-        found = self.against(measured, settings, direction="up", values=values)
-        return _flips(found)
+        return _flips(self.against(measured, settings, direction="up", values=values))
 
     def _first_flip(self, gap: float) -> float:
         """Roughly where the model halves its period in a rise."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
@@ -21,7 +22,7 @@ from nonsmooth.studies.savi2007.printed import (
 )
 from nonsmooth.studies.savi2007.rig_amplitude import flip_of, rate_of, slowest
 from nonsmooth.studies.savi2007.rig_motions import measured_periods_at
-from nonsmooth.studies.savi2007.rows import NOT_ASKED, Cell, Data, Row, printed_cell
+from nonsmooth.studies.savi2007.rows import CLOSE, NOT_ASKED, Cell, Data, Row, printed_cell
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -80,10 +81,13 @@ def _against(found: Interval | None, truth: float) -> Cell:
     if found is None:
         return Cell("not found", "differs")
     off = found.middle - truth
+    percent = 100 * abs(off) / truth
     if abs(off) <= 2 * found.uncertainty:
         verdict = "agrees"
+    elif percent <= CLOSE:
+        verdict = f"agrees within {math.ceil(10 * percent) / 10:.1f} %"
     else:
-        verdict = f"differs by {100 * abs(off) / truth:.1f} %"
+        verdict = f"differs by {percent:.1f} %"
     return Cell(f"{found} rad/s ({off:+.3f} rad/s)", verdict)
 
 
@@ -138,15 +142,24 @@ def f10(data: Data) -> list[Cell]:
     runs = data["fig10_rig"]["runs"]
     up, down, small = _main(runs, "up"), _main(runs, "down"), _small(runs, "up")
     grazing = _closed(FIGURE_10)
-    doubled = int(np.count_nonzero(measured_periods(runs)[1] == 2))
     words = [str(jump) if jump is not None else "none found" for jump in (small, _small(runs, "down"))]
     return [
         Cell(f"rising {up}, falling {down} rad/s", "agrees" if up and down else "differs"),
         _against(down, grazing[-1]),
-        Cell(f"{doubled} of {runs.sizes['run']} runs with period 2", "differs" if doubled else "agrees"),
+        _no_doubled(runs),
         Cell(f"rising {words[0]}, falling {words[1]} rad/s", "agrees" if small is not None else "differs"),
         _against(small, grazing[0]),
     ]
+
+
+def _no_doubled(runs: xr.Dataset) -> Cell:
+    """No range of period 2: a response has it where neighbouring runs of one direction do."""
+    doubled = {direction: measured_periods(runs, direction)[1] == 2 for direction in ("up", "down")}
+    count = sum(int(here.sum()) for here in doubled.values())
+    ranges = any((here[1:] & here[:-1]).any() for here in doubled.values())
+    text = f"{count} of {runs.sizes['run']} runs with period 2" + ("" if ranges or not count else ", no two neighbours")
+    why = "" if ranges or not count else "Rig: a record of some eight turns can show a motion that is still settling."
+    return Cell(text, "differs" if ranges else "agrees", why)
 
 
 def grazing_behind_both(data: Data) -> list[Cell]:
@@ -307,10 +320,10 @@ def c1(data: Data) -> list[Cell]:
         (_main(ninth, "down"), _closed(FIGURE_9)[-1]), (_main(tenth, "down"), _closed(FIGURE_10)[-1]),
         (_small(tenth, "up"), _closed(FIGURE_10)[0]),
     ]  # fmt: skip
-    near = sum(_against(found, truth).verdict == "agrees" for found, truth in pairs)
+    near = sum(_against(found, truth).verdict.startswith("agrees") for found, truth in pairs)
     kind = "no period" if chaos else "a period"
     return [
         Cell(f"{count} jumps in Figs. 9-10, {flips} flips in Fig. 11, {kind} in Fig. 16",
              "agrees" if count and flips and chaos else "agrees in part"),
-        Cell(f"{near} of 3 within one step of the closed-form grazing", "agrees" if near == 3 else "agrees in part"),
+        Cell(f"{near} of 3 within {CLOSE:g} % of the closed-form grazing", "agrees" if near == 3 else "agrees in part"),
     ]  # fmt: skip

@@ -25,21 +25,26 @@ __all__ = ["FIGURES"]
 def _compute(number: int) -> Callable[[Settings], dict[str, xr.Dataset]]:
     def compute(settings: Settings) -> dict[str, xr.Dataset]:
         bench = settings.bench
-        session = bench.record(f"fig{number:02d}", bench.rig.figure(number, **_steps(settings)))
+        session = bench.record(f"fig{number:02d}", bench.rig.figure(number, **_steps(settings, number)))
         measured, set_ = bench.measured(session, "response", bench.with_support(session, "response"))
         return {"compared": bench.compare(measured, set_), "runs": as_result(measured, "response over frequency")}
 
     return compute
 
 
-def _steps(settings: Settings) -> dict[str, Any]:
-    """The rig's own steps of the frequency; for a quick run a few, and shorter ones."""
+def _steps(settings: Settings, number: int) -> dict[str, Any]:
+    """Steps of the frequency: the rig's own for Fig. 9; for Fig. 10 finer about its small jump; few for a quick run."""
     from nonsmooth.experiment.rig.motor import voltage_for
 
-    if not settings.quick:
+    if settings.quick:
+        omegas, options = np.arange(2.5, 6.6, 0.25), {"duration": 14.0}
+    elif number == 10:
+        parts = ((2.4, 2.6, 0.05), (2.64, 2.78, 0.01), (2.8, 5.4, 0.1), (5.45, 6.65, 0.05), (6.7, 7.3, 0.1))
+        omegas = np.concatenate([np.arange(low, high + step / 2, step) for low, high, step in parts])
+        options = {}
+    else:
         return {}
-    return {"voltages": [voltage_for(settings.bench.rig, omega) for omega in np.arange(2.5, 6.6, 0.25)],
-            "duration": 14.0}  # fmt: skip
+    return {"voltages": [voltage_for(settings.bench.rig, float(omega)) for omega in omegas], **options}
 
 
 def _draw(printed: Mapping[str, float]) -> Callable[[Mapping[str, xr.Dataset]], Canvas]:
