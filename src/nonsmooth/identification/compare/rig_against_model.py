@@ -43,7 +43,10 @@ def campaign(seeds: Sequence[int], folder: Path, say: Callable[[str], None] = la
         keep("response")
         if name == "published":
             keep("rises")
-        keep("stairs")
+        flip = keep("stairs").get("1-2", {})
+        off = abs(flip.get("measured_flip", float("nan")) / flip.get("theory_flip", 1.0) - 1)
+        for feature in MOTION if name == "published" or not off < 0.05 else ():
+            keep("stairs", feature)
         periods = keep("periods")
         missed = any(str(number) not in row["model"] for row in periods for number in row["rig"])
         for feature in MOTION if missed else ():
@@ -57,7 +60,6 @@ def campaign(seeds: Sequence[int], folder: Path, say: Callable[[str], None] = la
             if chaotic and (name == "published" or one["energy_ratio"] >= 2):
                 keep("attractor", feature)
             if name == "published" and feature in MOTION:
-                keep("stairs", feature)
                 keep("transients", feature)
     return found
 

@@ -144,9 +144,9 @@ def _rise(found: Mapping[str, Results]) -> str:
     lines.append(_FLIPS)
     for name, one in found.items():
         lines.append(_flip_row(name, one["stairs"]))
-    for feature, word in _OFF.items():
-        if f"stairs_without_{feature}" in plain:
-            lines.append(_flip_row(f"published, without {word}", plain[f"stairs_without_{feature}"]))
+        for feature, word in _OFF.items():
+            if f"stairs_without_{feature}" in one:
+                lines.append(_flip_row(f"{name}, without {word}", one[f"stairs_without_{feature}"]))
     return "\n".join(lines) + "\n"
 
 

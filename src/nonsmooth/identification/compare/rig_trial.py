@@ -178,7 +178,7 @@ class RigTrial:
         settings = {
             "omega": float(motions[0]["omega"]), "g": lambda p: reference.gap(reading, p["rho"] / k)[0],
         }  # fmt: skip
-        values = np.arange(forcing[0], forcing[-1] + 0.03, 0.0005)
+        values = np.arange(forcing[0], forcing[-1] + 0.15, 0.001)
         return _flips(self.against(measured, settings, direction="up", values=values))
 
     def _first_flip(self, gap: float) -> float:
