@@ -110,6 +110,7 @@ class VariationalFlow:
     """
 
     def __init__(self, traced: Traced, active: tuple[str, ...], scale: FloatArray) -> None:
+        from nonsmooth.kernels.pointers import addresses
         from nonsmooth.system.variations import variational_model
 
         self.traced, self.active = traced, active
@@ -118,6 +119,7 @@ class VariationalFlow:
         self.n_u, self.n = len(traced.u), len(traced.u) + len(traced.m)
         self.n_active, self.n_p = len(active), len(traced.p)
         self.scale = np.concatenate([scale, np.ones(len(traced.m))])
+        self._functions = addresses(self.model.jet, self.model.field, self.model.switch)
         self._local = threading.local()
         self._touches: dict[tuple[int, int], Any] = {}
         rows = max([0, *(len(jump.rows) for jump in traced.transitions)])
@@ -168,7 +170,7 @@ class VariationalFlow:
             np.empty((m, n)), np.empty(m), np.empty(m, dtype=np.int64),
         )  # fmt: skip
         march_legs(
-            self.model.jet, self.model.field, self.model.entries, self.model.kinds, modes, _floats(t0), _floats(tau),
+            self._functions, self.model.entries, self.model.kinds, modes, _floats(t0), _floats(tau),
             _floats(z0), _floats(values), out.z, out.Phi, out.P, out.f_begin, out.f_end, out.divergence, out.status,
             self._work(),
         )  # fmt: skip
@@ -191,7 +193,7 @@ class VariationalFlow:
         out, result = np.empty(self._n_out), np.empty(self._n_result)
         row = int(
             cross(
-                self.model.field, self.model.switch, k, source, target, n_rows, row, t, _floats(z), values, timing,
+                self._functions, k, source, target, n_rows, row, t, _floats(z), values, timing,
                 self.scale, out, result, self._work(),
             )  # fmt: skip
         )

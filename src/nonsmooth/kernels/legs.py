@@ -12,6 +12,7 @@ from numba import types
 
 from .cache import device, kernel
 from .codes import DIVERGED, NO_CONVERGENCE, OK
+from .pointers import function_at
 
 __all__ = ["ORDER", "cross", "march_legs"]
 
@@ -23,6 +24,7 @@ _i, _f = types.int64, types.float64
 _f1, _f2, _f3, _i1, _i2 = _f[::1], _f[:, ::1], _f[:, :, ::1], _i[::1], _i[:, ::1]
 JET = types.FunctionType(types.void(_i, _i, _f, _f1, _f1, _f2, _f2))
 FIELD = types.FunctionType(types.void(_i, _f, _f1, _f1, _f1))
+jet_at, field_at, switch_at = function_at(JET), function_at(FIELD), function_at(FIELD)
 WORK = types.Tuple((_f2, _f2, _f3, _f2, _f2, _f2, _f1, _f1, _f1))
 
 
@@ -171,13 +173,14 @@ def march_one(jet, mode, t0, tau, entries, kinds, n_u, u, q, total, work, guess)
 
 @kernel(
     types.void(
-        JET, FIELD, _i2, _i2, _i1, _f1, _f1, _f2, _f1, _f2, _f3, _f3, _f2, _f2, _f1, _i1, WORK
+        _i1, _i2, _i2, _i1, _f1, _f1, _f2, _f1, _f2, _f3, _f3, _f2, _f2, _f1, _i1, WORK
     )
 )
 def march_legs(
-    jet, field, entries, kinds, modes, t0, tau, z0, values, z, phi, p, f_begin, f_end, divergence, status, work
+    functions, entries, kinds, modes, t0, tau, z0, values, z, phi, p, f_begin, f_end, divergence, status, work
 ):
-    """Legs one after the other: state at the end, dz/dz0, dz/dp, the field at both ends, integral of div f, status."""
+    """``functions``: addresses of jet, field, switch. Legs one after the other: state at the end, dz/dz0, dz/dp, the field at both ends, integral of div f, status."""
+    jet, field = jet_at(functions[0]), field_at(functions[1])
     total, u, q = work[5], work[7], work[8]
     n_u, n_p, n = u.shape[0], values.shape[0], z0.shape[1]
     guess = inf
@@ -205,15 +208,16 @@ def march_legs(
                 p[leg, i, c - n] = total[i, c] if i < n_u else 0.0
 
 
-@kernel(types.int64(FIELD, types.FunctionType(types.void(_i, _f, _f1, _f1, _f1)), _i, _i, _i, _i, _i, _f, _f1, _f1,
+@kernel(types.int64(_i1, _i, _i, _i, _i, _i, _f, _f1, _f1,
                     _f1, _f1, _f1, _f1, WORK))  # fmt: skip
-def cross(field, switch, k, source, target, n_rows, row, t, z, values, timing, scale, out, result, work):
+def cross(functions, k, source, target, n_rows, row, t, z, values, timing, scale, out, result, work):
     """Saltation of transition k at (t, z): its matrix and parameter columns, and all they are made of.
 
     ``row``: the row of the condition that is zero, or -1: the one nearest to zero. ``timing`` = dt/dp where the
     transition happens at a given phase (no rows). ``out`` is filled by ``switch``; ``result`` gets f_before (n),
     f_after (n), the saltation matrix (n, n), the parameter columns (n, n_active), dt/dz (n), dt/dp (n_active).
     Returns the row."""
+    field, switch = field_at(functions[1]), switch_at(functions[2])
     u, q = work[7], work[8]
     n, n_u, n_p, n_a = z.shape[0], u.shape[0], values.shape[0], timing.shape[0]
     for j in range(n_p):
