@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from nonsmooth.system.system import System
 
-__all__ = ["simulate"]
+__all__ = ["run_length", "simulate"]
 
 SAMPLES_PER_PERIOD = 256
 SAMPLES = 4096
@@ -83,7 +83,7 @@ def simulate(
     check_system(system, "simulate")
     check_options(system, expert, simulate)
     period = system.period()
-    unit, length = _length(system, periods, duration, period, transient)
+    unit, length = run_length(system, periods, duration, period, transient)
     if not is_one_start(start):
         raise ValueError("simulate marches one trajectory: give one start; sweep and poincare take several")
     t_begin, t_end = transient * unit, transient * unit + length
@@ -111,7 +111,7 @@ def simulate(
     return _dataset(system, traced, engine.name, options, log, instants, period)
 
 
-def _length(
+def run_length(
     system: System, periods: float | None, duration: float | None, period: float | None, transient: float
 ) -> tuple[float, float]:
     """The unit of the length (the period, or 1) and the length in time."""

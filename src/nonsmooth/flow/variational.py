@@ -22,6 +22,8 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.flow.saltation import Jump, Touch, chained
+
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
     from nonsmooth.system.traced import Traced
@@ -47,51 +49,6 @@ class Legs:
     def start_time(self) -> FloatArray:
         """dz/dt0 at fixed tau (m, n): f_end - Phi f_begin."""
         return np.asarray(self.f_end - np.einsum("mij,mj->mi", self.Phi, self.f_begin))
-
-
-@dataclass(slots=True)
-class Jump:
-    """A transition at (t, z): the state after it and all first derivatives.
-
-    ``row`` is the row of the condition whose indicator is zero (-1: at a given phase), ``indicator`` that indicator.
-    """
-
-    z_after: FloatArray  # (n,)
-    R_z: FloatArray  # (n, n)
-    R_t: FloatArray  # (n,)
-    R_p: FloatArray  # (n, n_active)
-    h: float
-    h_z: FloatArray  # (n,)
-    h_t: float
-    h_p: FloatArray  # (n_active,)
-    f_before: FloatArray  # (n,)
-    f_after: FloatArray  # (n,)
-    saltation: FloatArray  # (n, n)
-    parameter_column: FloatArray  # (n, n_active)
-    t_z: FloatArray  # (n,) derivative of the instant
-    t_p: FloatArray  # (n_active,)
-    row: int
-    indicator: int
-
-    @property
-    def rate(self) -> float:
-        """h' = h_t + h_z f-: zero where the motion grazes."""
-        return float(self.h_t + self.h_z @ self.f_before)
-
-
-@dataclass(slots=True)
-class Touch:
-    """An indicator at (t, z) and along the flow of a mode: h, L_f h, L_f^2 h and gradients."""
-
-    h: float
-    h_z: FloatArray
-    h_t: float
-    h_p: FloatArray
-    L: float  # L_f h = h_t + h_u f
-    L_z: FloatArray
-    L_t: float
-    L_p: FloatArray
-    L2: float  # L_f^2 h
 
 
 class VariationalFlow:
@@ -176,12 +133,19 @@ class VariationalFlow:
         )  # fmt: skip
         return out
 
-    def jump(self, values: Any, k: int, t: float, z: Any, row: int = -1) -> Jump:
-        """Transition ``k`` at (t, z); ``row`` is the row of its condition that is zero there, -1: the nearest to it.
+    def jump(self, values: Any, k: int | Sequence[int], t: float, z: Any, row: int = -1) -> Jump:
+        """Transition ``k`` at (t, z), or several that are taken there one after the other.
 
-        For a transition at a given phase t must be the time since the orbit's beginning: dt/dp = (t / T) dT/dp.
+        ``row`` is the row of the (first) condition that is zero there, -1: the nearest to it. For a transition at a
+        given phase t must be the time since the orbit's beginning: dt/dp = (t / T) dT/dp.
         """
         from nonsmooth.kernels.legs import cross
+
+        if not isinstance(k, int | np.integer):
+            jumps: list[Jump] = []
+            for one in k:
+                jumps.append(self.jump(values, one, t, jumps[-1].z_after if jumps else z, -1 if jumps else row))
+            return chained(jumps)
 
         n, a = self.n, self.n_active
         source, target, n_rows, timed = self._jumps[k]

@@ -34,7 +34,7 @@ from numpy.typing import ArrayLike, NDArray
 from nonsmooth.results.labels import Labels, Quantity
 from nonsmooth.results.statuses import flag_attributes, status_attributes
 
-__all__ = ["response", "section_points", "sweep", "trajectory"]
+__all__ = ["derivatives_of_run", "response", "section_points", "sweep", "trajectory"]
 
 #: Trailing dims of each array a sweep may bring, after (direction, start, parameter).
 _SWEEP_ARRAYS: dict[str, tuple[str, ...]] = {
@@ -215,6 +215,43 @@ def section_points(
     }
     coords = {**_start_coords(starts), **_state_coords(d), **_parameter_coords(d)}
     return xr.Dataset(variables, coords, dict(attrs)).squeeze(list(squeeze))
+
+
+def derivatives_of_run(
+    labels: Labels, attrs: Mapping[str, str], parameters: Sequence[str], *, Phi: ArrayLike, P: ArrayLike,
+    end: ArrayLike, crossing_time: ArrayLike, crossing_transition: ArrayLike, saltation: ArrayLike,
+    log_det_saltation: ArrayLike, transversality: ArrayLike, log_det: float, divergence: float, trace: float,
+    status: int = 0,
+) -> xr.Dataset:  # fmt: skip
+    """The result of ``sensitivity``; the memory's names follow those of the states."""
+    d = labels
+    names = _strings([*d.states, *d.memory])
+    transitions = flag_attributes(d.transition_labels, dtype=np.int16)
+    jumps = np.asarray(crossing_transition, np.int16)
+    matrix = ("crossing", "state", "initial_state")
+    defect = 0.0 if log_det == trace else log_det - trace  # both may be minus infinity
+    variables: dict[str, Any] = {
+        "Phi": (("state", "initial_state"), _floats(Phi), {"long_name": "derivative of the end in the start"}),
+        "P": (("state", "parameter"), _floats(P), {"long_name": "derivative of the end in the parameters"}),
+        "end": ("state", _floats(end), {"long_name": "state at the end"}),
+        "crossing_time": ("crossing", _floats(crossing_time), {"long_name": "time of the crossing",
+                                                               "units": d.time_unit}),
+        "crossing_transition": ("crossing", jumps, {"long_name": "transition", **transitions}),
+        "saltation": (matrix, _floats(saltation), {"long_name": "saltation matrix"}),
+        "log_det_saltation": ("crossing", _floats(log_det_saltation), {"long_name": "log|det S|"}),
+        "transversality": ("crossing", _floats(transversality), {"long_name": "|h'| / (|h_z| |f|)"}),
+        "log_det": ((), log_det, {"long_name": "log|det Phi|"}),
+        "divergence": ((), divergence, {"long_name": "integral of div f"}),
+        "trace_defect": ((), defect, {"long_name": "log|det Phi| less what the trace identity demands"}),
+        "status": ((), np.int8(status), status_attributes()),
+    }  # fmt: skip
+    coords: dict[str, Any] = {
+        "state": ("state", names, {"long_name": "state, then memory"}),
+        "initial_state": ("initial_state", names, {"long_name": "state at the start, then memory"}),
+        "parameter": ("parameter", _strings(parameters) if parameters else np.array([], dtype=str)),
+        **_parameter_coords(d),
+    }
+    return xr.Dataset(variables, coords, dict(attrs))
 
 
 def _state_coords(d: Labels) -> dict[str, Any]:
