@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 __all__ = ["find_orbit"]
 
 RTOL = 1e-12  # of the runs from which orbits are read
+NOISE = 1e-11  # of the motion's size: beyond a boundary by less than this is on it
 FAR = 30.0  # how far from the motion, in units of its gap, the orbit may lie
 
 
@@ -124,9 +125,11 @@ def _polished(system: System, guesses: list[Guess], given: bool, unstable: bool)
         walk = Walk(shooting)
         path = walk.along(solved, shooting.split(solved.X)[1])
         clearance = walk.clearance(path, len(system.indicators))
-        orbit = orbit_of(shooting, solved, path, clearance)
+        noise = NOISE * float(guess.size.max())
+        virtual = bool((path.violation() < -noise).any())
+        orbit = orbit_of(shooting, solved, path, clearance, virtual)
         moved = float(np.abs((orbit.u - np.nan_to_num(guess.u)) / guess.size).max())
-        if orbit.virtual and path.touch > 1e-12 * float(np.abs(system.scale_vector()).max()):
+        if virtual:
             reasons.append(("virtual", f"the {name} orbit found passes through a boundary it should obey"))
         elif given or unstable or (orbit.stable and moved <= max(FAR * guess.gap, 1e-6)):
             return orbit

@@ -144,7 +144,7 @@ def stable_by(multipliers: NDArray[np.complex128], forced: bool, held: int = 0) 
     return bool(not len(multipliers) or np.abs(multipliers).max() < 1.0 - EDGE)
 
 
-def orbit_of(shooting: Shooting, solved: Solved, path: Path, clearance: FloatArray) -> Orbit:
+def orbit_of(shooting: Shooting, solved: Solved, path: Path, clearance: FloatArray, virtual: bool) -> Orbit:
     """The record of a solved orbit."""
     X = solved.X
     system = shooting.system.with_parameters(
@@ -161,6 +161,6 @@ def orbit_of(shooting: Shooting, solved: Solved, path: Path, clearance: FloatArr
         monodromy_matrix=M, floquet_multipliers=multipliers,
         stable=stable_by(multipliers, shooting.forced, len(shooting.free)),
         maximum=path.maximum.copy(), minimum=path.minimum.copy(),
-        clearance=dict(zip(system.indicators, map(float, clearance), strict=True)), virtual=not path.admissible,
+        clearance=dict(zip(system.indicators, map(float, clearance), strict=True)), virtual=virtual,
         reference=shooting.reference,
     )  # fmt: skip

@@ -12,11 +12,12 @@ if TYPE_CHECKING:
     from nonsmooth.continuation.shooting import Shooting, Solved
     from nonsmooth.system.traced import Traced
 
-__all__ = ["Path", "Walk"]
+__all__ = ["VIOLATIONS", "Path", "Walk"]
 
 FloatArray = NDArray[np.float64]
 ORDER = 20
 RTOL = 1e-15
+VIOLATIONS = ("touch", "short", "slow", "own", "others")
 
 
 @dataclass
@@ -34,18 +35,18 @@ class Path:
     others: FloatArray  # (m,) at each transition, the largest margin of the other transitions: 0 at a corner
     other: NDArray[np.int64]  # (m,) which one
     slope: FloatArray  # (m,) how fast the indicator that fires rises: 0 where the orbit only touches
-    shortest: float  # the shortest visit
+    tau: FloatArray  # (m + 1,) lengths of the visits; inf where it is fixed by the forcing
 
-    @property
-    def admissible(self) -> bool:
-        """Whether no boundary was crossed that the signature does not name."""
-        return bool(
-            self.touch <= 0.0
-            and self.shortest >= 0.0
-            and (self.slope >= 0.0).all()
-            and (self.own >= 0.0).all()
-            and (self.others <= 0.0).all()
-        )
+    def violation(self) -> FloatArray:
+        """Five numbers that are positive (or inf) on an orbit of the system; one turns negative beyond a boundary.
+
+        In order (``VIOLATIONS``): the nearest touch, the shortest visit, the slowest crossing, the other rows of the
+        conditions that fire, the conditions that do not.
+        """
+        return np.array([
+            -self.touch, self.tau.min(), self.slope.min(initial=np.inf), self.own.min(initial=np.inf),
+            -self.others.max(initial=-np.inf),
+        ])  # fmt: skip
 
 
 class Walk:
@@ -53,11 +54,13 @@ class Walk:
 
     def __init__(self, shooting: Shooting) -> None:
         from nonsmooth.flow.series_tables import pack_net
+        from nonsmooth.kernels.pointers import addresses
         from nonsmooth.system.generate import compile_model
 
         system = shooting.system
         traced: Traced = system.traced
         self.model = compile_model(traced)
+        self.functions = addresses(self.model.jet)
         self.first, self.outgoing, self.transitions, self.rows, at = pack_net(traced)
         n_t = len(self.transitions)
         n, m = len(traced.u), shooting.m + 1
@@ -84,6 +87,9 @@ class Walk:
             if k >= 0:
                 self.elsewhere[i, k] = False
         self.conditional = np.flatnonzero(self.fired_row[:-1] >= 0)
+        fixed = np.concatenate([[shooting.forced], self.fired_row[:-1] < 0, [shooting.forced]])
+        self.fixed = fixed[:-1] & fixed[1:] if m > 1 else np.array([True])  # visits whose length cannot vanish
+        self.inside = np.array([(i, self.fired[i]) for i in self.conditional], dtype=np.int64).reshape(-1, 2).T
 
     def along(self, solved: Solved, states: FloatArray) -> Path:
         """Walk along the visits of a solved orbit; ``states`` (m + 1, n_z) begin them."""
@@ -95,14 +101,13 @@ class Walk:
         which, slope = np.empty((m, n_t), dtype=np.int64), np.empty((m, 2))
         tau = np.diff(solved.times)
         follow(
-            self.model.jet, ORDER, RTOL, self.weight, self.lacking, self.first, self.outgoing, self.transitions,
+            self.functions, ORDER, RTOL, self.weight, self.lacking, self.first, self.outgoing, self.transitions,
             self.rows, solved.values, self.modes, solved.times[:-1], tau, np.ascontiguousarray(states), self.fired,
             self.fired_row, *self.scratch, extremes, inner, place, which, end, slope,
         )  # fmt: skip
         at = int(inner.argmax()) if n_t else 0
         touched = (at // n_t, at % n_t) if n_t else (0, 0)
-        inside = self.conditional
-        own = np.array([end[i, self.fired[i]] for i in inside])
+        own = end[self.inside[0], self.inside[1]]
         if n_t and m > 1:
             rest = np.where(self.elsewhere[:-1], end[:-1], -np.inf)
             other = rest.argmax(axis=1)
@@ -111,7 +116,7 @@ class Walk:
             other, others = np.zeros(m - 1, dtype=np.int64), np.full(m - 1, -np.inf)
         return Path(
             extremes[0], extremes[1], inner, place, which, float(inner[touched]) if n_t else -np.inf, touched,
-            own, others, other, slope[inside, 0], float(tau.min()),
+            own, others, other, slope[self.conditional, 0], np.where(self.fixed, np.inf, tau),
         )  # fmt: skip
 
     def clearance(self, path: Path, indicators: int) -> FloatArray:

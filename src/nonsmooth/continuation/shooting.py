@@ -255,6 +255,24 @@ class Shooting:
         J[r, ti] -= F[r] / tau
         J[r, tb] += F[r] / tau
 
+    def find_divided(self, X: FloatArray) -> None:
+        """Mark the exits that go through the surface of the entry: there a visit of no length solves the equations too."""
+        visits = self.signature.visits
+        times, z = self.split(X)
+        values = self.parameters(X)
+        for i in range(1, self.m):
+            k, row, at, _ = self.jumps[i]
+            k0, row0, at0, _ = self.jumps[i - 1]
+            if at is not None or at0 is not None or visits[i].mode == visits[i - 1].mode:
+                continue
+            entry = self.flow.jump(values, k0, float(times[i - 1]), z[i], row0)
+            leave = self.flow.jump(values, k, float(times[i - 1]), z[i], row)
+            a, b = entry.h_z, leave.h_z
+            size = float(np.sqrt((a @ a) * (b @ b)))
+            opposite = size > 0.0 and float(a @ b) < -(1.0 - 1e-12) * size
+            ratio = float(np.sqrt((b @ b) / (a @ a))) if size else 1.0
+            self.divided[i] = bool(opposite and abs(leave.h + ratio * entry.h) <= 1e-13 * np.abs(b * z[i]).max())
+
     def newton(self, X: FloatArray, scale: FloatArray, *, tolerance: float = 1e-12, most: int = 30) -> Solved | None:
         """Solve at fixed parameters; None where it does not converge."""
         X = X.copy()

@@ -13,6 +13,7 @@ from numba import types
 
 from .cache import device, inline, kernel
 from .codes import DIVERGED, NO_CONVERGENCE, OK
+from .pointers import function_at
 from .taylor import dense_states, step_length
 
 __all__ = ["follow"]
@@ -23,7 +24,7 @@ MOST_STEPS = 100_000
 
 _i, _f = types.int64, types.float64
 _f1, _f2, _i1, _i2 = _f[::1], _f[:, ::1], _i[::1], _i[:, ::1]
-_JET = types.FunctionType(types.void(_i, _i, _f, _f1, _f1, _f2, _f2))
+jet_at = function_at(types.FunctionType(types.void(_i, _i, _f, _f1, _f1, _f2, _f2)))
 
 
 @inline
@@ -69,18 +70,20 @@ def extremum(C, m, row, a, b, sign):
 
 @kernel(
     types.int64(
-        _JET, _i, _f, _f1, _i2, _i1, _i1, _i2, _i2, _f1, _i1, _f1, _f1, _f2, _i1, _i1,
+        _i1, _i, _f, _f1, _i2, _i1, _i1, _i2, _i2, _f1, _i1, _f1, _f1, _f2, _i1, _i1,
         _f2, _f2, _f1, _f1, _f1, _f2, _f2, _f2, _i2, _f2, _f2,
     )
 )  # fmt: skip
 def follow(
-    jet, order, rtol, weight, lacking, first, outgoing, transitions, rows, values, modes, t0, tau, z, fired, fired_row,
+    functions, order, rtol, weight, lacking, first, outgoing, transitions, rows, values, modes, t0, tau, z, fired, fired_row,
     C, W, u, q, scale, extremes, inner, place, which, end, slope,
 ):  # fmt: skip
     """Follow all visits of an orbit.
 
     Parameters
     ----------
+    functions
+        Address of the model's jet (``pointers.addresses``).
     first, outgoing, transitions, rows
         The net of transitions (``crossing``).
     modes, t0, tau, z : (m,), (m,), (m,), (m, n + n_memory)
@@ -96,6 +99,7 @@ def follow(
     slope : (m, 2), written
         Time derivative of the signed indicator that is zero at the end, just before it, and its value.
     """
+    jet = jet_at(functions[0])
     n, n_indicators, n_p = weight.shape[0], scale.shape[0], values.shape[0]
     log_rtol = ln(rtol)
     for i in range(n_p):

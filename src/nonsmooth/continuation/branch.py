@@ -1,0 +1,308 @@
+"""Marching along a branch: steps, what is met on the way, changes of signature, and how it ends."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.continuation.arclength import Curve, Point, chordal
+from nonsmooth.continuation.change import Change, changed, resumed
+from nonsmooth.continuation.detection import SMOOTH, Tests, locate
+from nonsmooth.continuation.grazing import Graze, graze
+from nonsmooth.continuation.path import VIOLATIONS
+from nonsmooth.errors import SystemDefinitionError
+
+if TYPE_CHECKING:
+    from nonsmooth.continuation.shooting import Shooting
+
+__all__ = ["ENDINGS", "March", "Row", "Special", "march"]
+
+FloatArray = NDArray[np.float64]
+
+#: How a branch can end, with the sentence for each.
+ENDINGS = {
+    "range": "The branch reached the edge of the range.",
+    "closed": "The branch came back to where it began.",
+    "points": "The largest number of points was reached; continue the branch with continue_orbit(branch).",
+    "no_convergence": (
+        "Newton's method did not converge, however small the step; the orbit may end in an event that is not known "
+        "here (a chatter, an infinite period)."
+    ),
+    "grazing": (
+        "The orbit touches a boundary and no orbit near it goes on: beyond this point the motion leaves for another "
+        "attractor."
+    ),
+    "corner": "The orbit meets the corner of two boundaries, and no orbit near it goes on.",
+    "physical": "Beyond this value the equations do not allow the parameter; the range was cut there.",
+}
+LEAST_STEP = 1e-9
+COSINE = 0.97  # of the angle between the tangents of neighbours
+SPREAD = 0.15  # chordal change of the multipliers between neighbours
+BESIDE = 1e-6  # along the branch: nearer to a change of signature than this is the change itself
+
+
+@dataclass
+class Row:
+    """One point of the branch with the curve it lies on."""
+
+    curve: Curve
+    point: Point
+
+
+@dataclass
+class Special:
+    """A special point: its kind, its place among the rows, and what belongs to its kind."""
+
+    kind: str
+    curve: Curve
+    point: Point
+    row: int = -1
+    indicator: int = -1
+    graze: Graze | None = None
+
+
+@dataclass
+class March:
+    """Rows in the order of the march, special points, and the ending."""
+
+    rows: list[Row] = field(default_factory=list)
+    special: list[Special] = field(default_factory=list)
+    ending: str = "points"
+    detail: str = ""
+
+    def add(self, curve: Curve, point: Point) -> None:
+        """Append a point."""
+        self.rows.append(Row(curve, point))
+
+    def mark(self, kind: str, curve: Curve, point: Point, **more: Any) -> None:
+        """Append a special point, and a row for it."""
+        self.rows.append(Row(curve, point))
+        self.special.append(Special(kind, curve, point, len(self.rows) - 1, **more))
+
+
+@dataclass
+class Limits:
+    """What bounds a march."""
+
+    low: float
+    high: float
+    largest: float  # step
+    points: int
+    closed: tuple[Curve, Point] | None = None
+
+
+def march(curve: Curve, point: Point, limits: Limits, first_step: float) -> March:
+    """Follow a branch from a point along its tangent until it ends; the first row is the point after it."""
+    found = March()
+    ds = first_step
+    tests = Tests(curve)
+    numbers, violation = tests.smooth(point), point.path.violation()
+    count = 0
+    while len(found.rows) < limits.points:
+        new = _stepped(curve, point, ds)
+        if new is None:
+            ds *= 0.5
+            if ds < LEAST_STEP:
+                found.ending = _reason(curve, point)
+                break
+            continue
+        cosine = float(new.tangent @ point.tangent)
+        spread = chordal(new.multipliers, point.multipliers)
+        if ds > 1e-6 and (cosine < COSINE or spread > SPREAD):
+            ds *= max(0.2, min(0.7, 0.7 * SPREAD / spread))
+            continue
+        numbers_new, violation_new = tests.smooth(new), new.path.violation()
+        # What was met on this step, in the order in which it was met
+        end = float(point.tangent @ (new.Y - point.Y))
+        stop, stop_point, reason = end, new, ""
+        value = float(new.X[-1])
+        if not limits.low <= value <= limits.high:
+            edge = limits.low if value < limits.low else limits.high
+            last = _at_edge(curve, point, new, edge)
+            if last is not None:
+                s = float(point.tangent @ (last.Y - point.Y))
+                stop, stop_point, reason = s, last, "range"
+                numbers_new, violation_new = tests.smooth(last), last.path.violation()
+            else:
+                ds *= 0.5
+                if ds < LEAST_STEP:
+                    found.ending = "no_convergence"
+                    break
+                continue
+        crossed = [kind for kind, was, now in zip(VIOLATIONS, violation, violation_new, strict=True)
+                   if now < 0.0 and was >= 0.0]  # fmt: skip
+        met: tuple[str, float, Point] | None = None
+        for kind in crossed:
+            there = locate(curve, point, new, tests.one(kind))
+            if there is not None and there[0] <= stop * (1 + 1e-12) and (met is None or there[0] < met[1] - 1e-9 * end):
+                met = (kind, *there)
+        if crossed and met is None and reason != "range":
+            ds *= 0.25
+            if ds < LEAST_STEP:
+                found.ending = "no_convergence"
+                break
+            continue
+        if met is not None:
+            stop, stop_point, reason = met[1], met[2], "change"
+            numbers_new = tests.smooth(stop_point)
+        for kind, s, special in _smooth_events(curve, point, new, tests, numbers, numbers_new, stop, reason):
+            del s
+            found.mark(kind, curve, special)
+        if reason == "range":
+            found.add(curve, stop_point)
+            found.ending = "range"
+            break
+        if reason == "change":
+            after = _change(found, curve, stop_point, met[0] if met else "")
+            if after is None:
+                break
+            curve, point, ds = after
+            ds = ds or 0.1 * limits.largest
+            tests = Tests(curve)
+            numbers, violation = tests.smooth(point), point.path.violation()
+            count = 0
+            found.add(curve, point)
+            continue
+        found.add(curve, new)
+        count += 1
+        if limits.closed is not None and _closed(limits.closed, curve, point, new):
+            found.ending = "closed"
+            break
+        easy = 1.0 + 0.8 * min(1.0, max(0.0, (cosine - COSINE) / (1 - COSINE))) * (new.iterations <= 4)
+        if spread > 0.3 * SPREAD:
+            easy = min(easy, SPREAD / max(spread, 1e-12) * 0.6)
+        if new.iterations >= 6:
+            easy = min(easy, 0.7)
+        ds = min(ds * easy, limits.largest)
+        point, numbers, violation = new, numbers_new, violation_new
+    return found
+
+
+def _stepped(curve: Curve, point: Point, ds: float) -> Point | None:
+    try:
+        new = curve.step(point, ds)
+    except SystemDefinitionError:
+        return None
+    if new is None or not np.isfinite(new.M).all():
+        return None
+    # Newton may have gone to another branch: then the point lies far from the predictor.
+    if np.abs(new.Y - point.Y - ds * point.tangent).max() > 0.5 * ds + 1e-12:
+        return None
+    return new
+
+
+def _at_edge(curve: Curve, a: Point, b: Point, edge: float) -> Point | None:
+    """The point at the edge of the range, between two points."""
+    x = (edge / curve.width - a.Y[-1]) / (b.Y[-1] - a.Y[-1])
+    point = curve.at_parameter(a.Y + x * (b.Y - a.Y), edge)
+    if point is None or np.abs(point.Y - a.Y).max() > 4 * np.abs(b.Y - a.Y).max():
+        return None
+    if float(point.tangent @ a.tangent) < 0:
+        point.tangent = -point.tangent
+    return point
+
+
+def _smooth_events(
+    curve: Curve, a: Point, b: Point, tests: Tests, before: FloatArray, after: FloatArray, stop: float, reason: str
+) -> list[tuple[str, float, Point]]:
+    """Folds, flips, tori and branch points before ``stop``, in their order."""
+    found = []
+    last = after if reason != "change" else tests.smooth(b)
+    for kind, was, now in zip(SMOOTH, before, last, strict=True):
+        if not was * now < 0.0:
+            continue
+        there = locate(curve, a, b, tests.one(kind)) if kind != "branch" else _branch_point(curve, a, b, tests)
+        # At a change of signature the parameter may turn too: that belongs to the change.
+        if there is None or there[0] > stop - (BESIDE if reason == "change" else 0.0):
+            continue
+        s, point = there
+        if kind == "neimark_sacker" and not _has_pair(point, tests):
+            continue
+        found.append((_name(kind, curve, point), s, point))
+    return sorted(found, key=lambda event: event[1])
+
+
+def _branch_point(curve: Curve, a: Point, b: Point, tests: Tests) -> tuple[float, Point] | None:
+    """A branch point: the bordered determinant itself, scaled, goes through zero."""
+    def determinant(point: Point) -> float:
+        matrix = np.vstack([point.solved.jacobian * curve.weights, point.tangent])
+        sign, size = np.linalg.slogdet(matrix)
+        return float(sign * np.exp(size - reference))
+
+    reference = 0.0
+    reference = float(np.linalg.slogdet(np.vstack([a.solved.jacobian * curve.weights, a.tangent]))[1])
+    return locate(curve, a, b, determinant)
+
+
+def _has_pair(point: Point, tests: Tests) -> bool:
+    mu = point.multipliers
+    near = mu[np.abs(np.abs(mu) - 1.0) < 1e-3]
+    return bool((np.abs(near.imag) > 1e-6).any())
+
+
+def _name(kind: str, curve: Curve, point: Point) -> str:
+    """A branch point on a symmetric orbit that breaks the symmetry is a pitchfork."""
+    if kind != "branch":
+        return kind
+    from nonsmooth.continuation.switching import breaks_symmetry
+
+    return "pitchfork" if breaks_symmetry(curve, point) else "branch_point"
+
+
+def _change(found: March, curve: Curve, point: Point, kind: str) -> tuple[Curve, Point, float] | None:
+    """Record a change of signature and begin anew behind it; None where the branch ends."""
+    active = curve.shooting.active
+    candidates: list[Change] = changed(curve, point, kind)
+    for change in candidates:
+        after = resumed(curve, point, change, active)
+        if after is None:
+            continue
+        fresh, first, ds = after
+        if change.kind == "grazing":
+            found.mark("grazing", curve, point, indicator=change.indicator,
+                       graze=graze(curve, point, first, change))  # fmt: skip
+        elif change.kind == "corner":
+            found.mark("corner", curve, point, indicator=change.indicator)
+        return fresh, first, ds
+    name = "grazing" if kind in ("touch", "slow", "short") else "corner"
+    indicator = candidates[0].indicator if candidates else _indicator(curve, point, kind)
+    found.mark(name, curve, point, indicator=indicator)
+    found.ending = name
+    return None
+
+
+def _indicator(curve: Curve, point: Point, kind: str) -> int:
+    """The indicator that an unexplained event is about (-1: not known)."""
+    if kind == "touch":
+        visit, k = point.path.touched
+        return int(curve.walk.rows[point.path.which[visit, k], 0])
+    return -1
+
+
+def _closed(begin: tuple[Curve, Point], curve: Curve, a: Point, b: Point) -> bool:
+    """Whether the branch has come back to its first point on the step from a to b."""
+    curve0, first = begin
+    if curve0.shooting.signature != curve.shooting.signature or len(first.Y) != len(b.Y):
+        return False
+    first_Y = first.X / curve.scale
+    step = b.Y - a.Y
+    x = float(step @ (first_Y - a.Y)) / float(step @ step)
+    near = float(np.abs(first_Y - a.Y - x * step).max())
+    return 0.0 < x <= 1.0 and near < 0.3 * float(np.abs(step).max()) and np.abs(step).max() < 0.2
+
+
+def _reason(curve: Curve, point: Point) -> str:
+    """Why no further point was found."""
+    system = curve.shooting.system
+    name = curve.shooting.active[0]
+    ahead = float(point.X[-1]) + 1e-6 * curve.width * float(np.sign(point.tangent[-1]))
+    try:
+        system.with_parameters({name: ahead})
+    except (SystemDefinitionError, ValueError):
+        return "physical"
+    return "no_convergence"
+
+

@@ -1,0 +1,83 @@
+"""Where branches cross: the other directions at a branch point, and orbits of twice the period at a flip."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.continuation.arclength import Curve
+from nonsmooth.continuation.shooting import Shooting
+
+if TYPE_CHECKING:
+    from nonsmooth.continuation.arclength import Point
+
+__all__ = ["breaks_symmetry", "doubled", "other_direction"]
+
+FloatArray = NDArray[np.float64]
+
+
+def doubled(shooting: Shooting, X: FloatArray) -> tuple[Shooting, FloatArray]:
+    """The same orbit gone round twice."""
+    n = shooting.period_number
+    times, states = shooting.split(X)
+    period = shooting.period(X)
+    signature = shooting.signature.repeated(2, n)
+    twice = Shooting(shooting.system, signature, 2 * n, shooting.active)
+    # The second round begins at the section within the last visit, which is not a crossing.
+    t2 = np.concatenate([times, times + period])
+    z2 = np.concatenate([states, states[1:]])
+    X2 = twice.join(t2, z2, 2 * period, X[shooting.size :])
+    twice.divided = [shooting.divided[i % shooting.m] for i in range(2 * shooting.m)] if shooting.m else []
+    if shooting.reference is not None:
+        twice.reference = shooting.reference
+    return twice, X2
+
+
+def other_direction(curve: Curve, X: FloatArray, along: FloatArray | None) -> FloatArray | None:
+    """A unit vector that the Jacobian at a branch point takes to zero, across the direction ``along`` already known.
+
+    ``along`` is None where only the null vectors are known: then the one with no component in the parameter.
+    """
+    solved = curve.shooting.evaluate(X)
+    _, _, right = np.linalg.svd(solved.jacobian * curve.weights)
+    plane = right[-2:]
+    if along is None:
+        a, b = plane
+        vector = a * b[-1] - b * a[-1]
+    else:
+        inside = plane @ along
+        vector = np.array([-inside[1], inside[0]]) @ plane
+    length = float(np.linalg.norm(vector))
+    return None if length < 1e-12 else vector / length
+
+
+def breaks_symmetry(curve: Curve, point: Point) -> bool:
+    """Whether an orbit at a branch point is its own mirror image under the system's declared symmetry."""
+    symmetry = curve.shooting.system.symmetry
+    if symmetry is None:
+        return False
+    system, shooting = curve.shooting.system, curve.shooting
+    from sympy import lambdify
+
+    traced = system.traced
+    image = lambdify([traced.t, list(traced.u), list(traced.p)], list(symmetry.map), "numpy")
+    # u(t) -> map(u(t + shift T)): compare the section point with the mapped state one shift later.
+    period = system.period_at(point.solved.values) or float(point.solved.times[-1])
+    state = _state_at(curve, point, symmetry.shift * period)
+    if state is None:
+        return False
+    mapped = np.array(image(0.0, list(state), list(point.solved.values)), dtype=float)
+    here = point.X[: len(traced.u)]
+    return bool(np.abs((mapped - here) / curve.size[: len(here)]).max() < 1e-6 and shooting.period_number % 2 == 1)
+
+
+def _state_at(curve: Curve, point: Point, t: float) -> FloatArray | None:
+    """The state at a time after the section."""
+    times, states = curve.shooting.split(point.X)
+    begins = np.concatenate([[0.0], times])
+    i = int(np.searchsorted(begins, t, side="right")) - 1
+    mode = curve.shooting.signature.visits[i].mode
+    legs = curve.shooting.flow.legs(point.solved.values, [mode], [begins[i]], [t - begins[i]], states[i][None, :])
+    return np.asarray(legs.z[0, : len(curve.shooting.system.states)])
