@@ -10,8 +10,8 @@ and so, compared at equal times,
 .. math:: \delta z^+ = R_z\,\delta z^- + R_p\,\delta p + (R_z f^- + R_t - f^+)\,\delta t
     = S\,\delta z^- + S_p\,\delta p.
 
-Where a transition happens at a phase of the forcing, :math:`\delta t` follows from the period alone. Transitions that
-are taken at the same instant have the :math:`\delta t` of the first: their maps are composed before the formula is used.
+Where a transition happens at a phase of the forcing, :math:`\delta t` follows from the period alone. Transitions
+taken at the same instant have the :math:`\delta t` of the first: their maps are composed before the formula is used.
 
 References
 ----------

@@ -7,15 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.errors import SolveError
 from nonsmooth.flow.arguments import check_system
 from nonsmooth.flow.engine import FloatArray, Log, State
 from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.saltation import Jump
-from nonsmooth.flow.simulate import run_length
+from nonsmooth.flow.simulate import check_complete, run_length
 from nonsmooth.flow.starts import first_state, plain_start
 from nonsmooth.flow.variational import Legs, VariationalFlow
-from nonsmooth.kernels import codes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -38,13 +36,17 @@ class Variation:
     jumps : list of Jump
         Between the legs; transitions at one instant are one.
     transitions : list of tuple of int
+    start : Jump or None
+        The transitions taken at the start because they held already: nothing moves in time there.
     Phi, P : array (n, n), (n, n_active)
         Derivatives of the end in the start and in the parameters, at fixed times.
     """
 
-    def __init__(self, flow: VariationalFlow, values: FloatArray, log: Log, first: tuple[int, FloatArray],
+    def __init__(self, flow: VariationalFlow, values: FloatArray, log: Log, start: tuple[int, FloatArray],
                  t_begin: float, t_end: float) -> None:  # fmt: skip
         traced, n_u = flow.traced, flow.n_u
+        first = int(log.sample_mode[0]), np.concatenate([np.nan_to_num(log.sample_u[0]), log.sample_memory[0]])
+        self.start = settled(flow, values, start, first, t_begin)
         self.modes, starts, self.times = [first[0]], [first[1]], [t_begin]
         self.transitions: list[tuple[int, ...]] = []
         before: list[FloatArray] = []
@@ -68,6 +70,8 @@ class Variation:
             flow.jump(values, chain, t, z) for chain, t, z in zip(self.transitions, self.times[1:], before, strict=True)
         ]
         self.Phi, self.P = self.legs.Phi[0], self.legs.P[0]
+        if self.start is not None:
+            self.Phi, self.P = self.Phi @ self.start.R_z, self.P + self.Phi @ self.start.R_p
         for i, jump in enumerate(self.jumps, start=1):
             self.Phi = self.legs.Phi[i] @ (jump.saltation @ self.Phi)
             self.P = self.legs.Phi[i] @ (jump.saltation @ self.P + jump.parameter_column) + self.legs.P[i]
@@ -75,13 +79,38 @@ class Variation:
     @property
     def log_determinant(self) -> float:
         """log\\|det Phi\\| from the determinants of the legs' matrices and of the saltation matrices."""
-        legs = np.linalg.slogdet(self.legs.Phi)[1].sum()
-        return float(legs + sum(jump.log_determinant for jump in self.jumps))
+        return float(np.linalg.slogdet(self.legs.Phi)[1].sum()) + self._of_jumps()
 
     @property
     def trace(self) -> float:
         """What it must be: the integral of div f, and log\\|det S\\| of every transition."""
-        return float(self.legs.divergence.sum() + sum(jump.log_determinant for jump in self.jumps))
+        return float(self.legs.divergence.sum()) + self._of_jumps()
+
+    def _of_jumps(self) -> float:
+        at_start = 0.0 if self.start is None else float(np.linalg.slogdet(self.start.R_z)[1])
+        return at_start + sum(jump.log_determinant for jump in self.jumps)
+
+
+def settled(
+    flow: VariationalFlow, values: FloatArray, start: tuple[int, FloatArray], first: tuple[int, FloatArray], t: float
+) -> Jump | None:
+    """The transitions that lead at once from the start's (mode, z) to that in which the run begins."""
+    if start[0] == first[0]:
+        return None
+    chains: list[tuple[int, ...]] = [()]
+    while chains:
+        chain = chains.pop(0)
+        mode = flow.traced.transitions[chain[-1]].target if chain else start[0]
+        visited = {start[0], *(flow.traced.transitions[k].target for k in chain)}
+        for k, jump in enumerate(flow.traced.transitions):
+            if jump.source != mode or jump.target in visited or jump.reset is not None or jump.at is not None:
+                continue
+            if jump.target == first[0]:
+                found = flow.jump(values, (*chain, k), t, start[1])
+                if np.array_equal(found.z_after, first[1]):
+                    return found
+            chains.append((*chain, k))
+    raise AssertionError("a run begins in a mode that no transitions lead to")
 
 
 def variation(
@@ -96,14 +125,10 @@ def variation(
     """
     engine = engine_for(system, method, None if _is_exact(system, method) else RTOL)
     values = system.parameter_vector()
+    start = int(state.counters[0]), np.concatenate([state.u, state.memory])
     log = engine.record(engine.prepare(values[None, :]), state, t_end, np.zeros(1))
-    if log.status not in (codes.OK, codes.NOT_GUARANTEED):
-        from nonsmooth.results.statuses import by_code
-
-        status = by_code(codes.NO_CONVERGENCE if log.status < 0 else log.status)
-        raise SolveError(status.sentence, time=float(state.clock[0]), status=status.name)
-    first = int(log.sample_mode[0]), np.concatenate([np.nan_to_num(log.sample_u[0]), log.sample_memory[0]])
-    return Variation(flow, values, log, first, 0.0, t_end), log
+    check_complete(log, system, state, system.period())
+    return Variation(flow, values, log, start, 0.0, t_end), log
 
 
 def _is_exact(system: System, method: str) -> bool:
@@ -143,7 +168,8 @@ def sensitivity(
         ``Phi(state, initial_state)``, ``P(state, parameter)``, ``end(state)``; over ``crossing``: ``crossing_time``,
         ``crossing_transition``, ``saltation``, ``log_det_saltation`` and ``transversality``
         \|h'\| / (\|h_z\| \|f\|); ``log_det`` = log\|det Phi\|, ``divergence`` (integral of div f over the run) and
-        ``trace_defect``, the difference that must be rounding: log\|det Phi\| - (divergence + sum of log\|det S\|).
+        ``trace_defect``, the difference that must be rounding: log\|det Phi\| - (divergence + sum of log\|det S\|),
+        0 where both are minus infinity (a matrix without full rank: sticking, memory that is written anew).
         The states are followed by the memory.
 
     Raises
@@ -160,8 +186,7 @@ def sensitivity(
     check_system(system, "sensitivity")
     names = (parameters,) if isinstance(parameters, str) else tuple(parameters)
     flow = VariationalFlow.of(system, names)
-    period = system.period()
-    unit, length = run_length(system, periods, duration, period, 0.0)
+    _, length = run_length(system, periods, duration, system.period(), 0.0)
     found, log = variation(system, flow, first_state(system, start, mode), length)
     parameter_part = found.P
     if periods is not None and names:

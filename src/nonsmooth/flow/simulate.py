@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from nonsmooth.system.system import System
 
-__all__ = ["run_length", "simulate"]
+__all__ = ["check_complete", "run_length", "simulate"]
 
 SAMPLES_PER_PERIOD = 256
 SAMPLES = 4096
@@ -99,9 +99,9 @@ def simulate(
     state = first_state(system, start, mode)
     tables = engine.prepare(system.parameter_vector()[None, :])
     if t_begin > 0:
-        _complete(engine.record(tables, state, t_begin, np.empty(0)), system, state, period)
+        check_complete(engine.record(tables, state, t_begin, np.empty(0)), system, state, period)
     log = engine.record(tables, state, t_end, instants)
-    _complete(log, system, state, period)
+    check_complete(log, system, state, period)
     options = {
         "periods": periods, "duration": duration, "start": plain_start(system, start), "mode": mode,
         "transient": transient, "samples": samples, "step": step,
@@ -145,7 +145,7 @@ def _instants(samples: Any, t_begin: float, t_end: float, period: float | None) 
     return np.minimum(instants, t_end)
 
 
-def _complete(log: Log, system: System, state: State, period: float | None) -> None:
+def check_complete(log: Log, system: System, state: State, period: float | None) -> None:
     """Raise for a run that stopped early, with the place where it did."""
     if log.status in (codes.OK, codes.NOT_GUARANTEED):
         return

@@ -100,7 +100,8 @@ class VariationalFlow:
             if name not in system.values:
                 from nonsmooth.system.names import unknown
 
-                raise ValueError(unknown(name, "a parameter", repr(system.name), system.values))
+                units = {key: parameter.unit for key, parameter in system.parameters.items()}
+                raise ValueError(unknown(name, "a parameter", repr(system.name), units))
         known = _flows.setdefault(system.traced, {})
         if names not in known:
             known[names] = cls(system.traced, names, system.scale_vector())
@@ -155,12 +156,10 @@ class VariationalFlow:
             period, gradient = self.period(values)
             timing = (t / period) * gradient
         out, result = np.empty(self._n_out), np.empty(self._n_result)
-        row = int(
-            cross(
-                self._functions, k, source, target, n_rows, row, t, _floats(z), values, timing,
-                self.scale, out, result, self._work(),
-            )  # fmt: skip
-        )
+        row = cross(
+            self._functions, k, source, target, n_rows, row, t, _floats(z), values, timing, self.scale, out, result,
+            self._work(),
+        )  # fmt: skip
         after_r = n + n * n + n + n * a
         at = after_r + row * (2 + n + a)
         if row >= 0:
@@ -205,6 +204,7 @@ class VariationalFlow:
         import sympy as sp
 
         p, period = self.traced.p, self.traced.period
+        assert period is not None
         return sp.lambdify(p, [period, *(period.diff(p[i]) for i in self.places)], modules="math")
 
     def _work(self) -> tuple[FloatArray, ...]:

@@ -179,7 +179,9 @@ def march_one(jet, mode, t0, tau, entries, kinds, n_u, u, q, total, work, guess)
 def march_legs(
     functions, entries, kinds, modes, t0, tau, z0, values, z, phi, p, f_begin, f_end, divergence, status, work
 ):
-    """``functions``: addresses of jet, field, switch. Legs one after the other: state at the end, dz/dz0, dz/dp, the field at both ends, integral of div f, status."""
+    """Legs one after the other: state at the end, dz/dz0, dz/dp, the field at both ends, integral of div f, status.
+
+    ``functions``: addresses of the jet, the field and the switch (see ``pointers``)."""
     jet, field = jet_at(functions[0]), field_at(functions[1])
     total, u, q = work[5], work[7], work[8]
     n_u, n_p, n = u.shape[0], values.shape[0], z0.shape[1]
