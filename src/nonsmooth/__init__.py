@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from nonsmooth import plot as plot
     from nonsmooth.analysis.response import frequency_response as frequency_response
     from nonsmooth.analysis.sweep import sweep as sweep
+    from nonsmooth.continuation.continue_orbit import continue_orbit as continue_orbit
+    from nonsmooth.continuation.find import find_orbit as find_orbit
+    from nonsmooth.continuation.orbit import Orbit as Orbit
+    from nonsmooth.continuation.special import special_points as special_points
     from nonsmooth.errors import DataFileError as DataFileError
     from nonsmooth.errors import SolveError as SolveError
     from nonsmooth.errors import SystemDefinitionError as SystemDefinitionError
@@ -50,6 +54,10 @@ _WHERE = {
     "random_starts": "flow.starts",
     "sweep": "analysis.sweep",
     "frequency_response": "analysis.response",
+    "find_orbit": "continuation.find",
+    "Orbit": "continuation.orbit",
+    "continue_orbit": "continuation.continue_orbit",
+    "special_points": "continuation.special",
     "load_recording": "experiment.load",
     "Recording": "experiment.recording",
     "identify": "identification.chain",

@@ -25,6 +25,7 @@ FloatArray = NDArray[np.float64]
 #: How a branch can end, with the sentence for each.
 ENDINGS = {
     "range": "The branch reached the edge of the range.",
+    "branching": "The branch begins where it leaves another one.",
     "closed": "The branch came back to where it began.",
     "points": "The largest number of points was reached; continue the branch with continue_orbit(branch).",
     "no_convergence": (

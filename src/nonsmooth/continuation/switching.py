@@ -13,7 +13,7 @@ from nonsmooth.continuation.shooting import Shooting
 if TYPE_CHECKING:
     from nonsmooth.continuation.arclength import Point
 
-__all__ = ["breaks_symmetry", "doubled", "other_direction"]
+__all__ = ["breaks_symmetry", "doubled", "emanating", "other_direction"]
 
 FloatArray = NDArray[np.float64]
 
@@ -81,3 +81,22 @@ def _state_at(curve: Curve, point: Point, t: float) -> FloatArray | None:
     mode = curve.shooting.signature.visits[i].mode
     legs = curve.shooting.flow.legs(point.solved.values, [mode], [begins[i]], [t - begins[i]], states[i][None, :])
     return np.asarray(legs.z[0, : len(curve.shooting.system.states)])
+
+
+def emanating(
+    curve: Curve, X: FloatArray, along: FloatArray, kind: str
+) -> list[tuple[Curve, FloatArray, FloatArray]]:
+    """Curve, common point and direction of each new half branch at a special point.
+
+    A flip has one (the orbit begun a round later is the same orbit); a pitchfork or a branch point two.
+    """
+    if kind == "flip":
+        twice, X2 = doubled(curve.shooting, X)
+        fresh = Curve(twice, curve.size, 2 * curve.period, curve.width)
+        # Across the branch gone round twice: the null vector without a change of the parameter.
+        direction = other_direction(fresh, X2, None)
+        return [] if direction is None else [(fresh, X2 / fresh.scale, direction)]
+    direction = other_direction(curve, X, along / np.linalg.norm(along))
+    if direction is None:
+        return []
+    return [(curve, X / curve.scale, direction), (curve, X / curve.scale, -direction)]

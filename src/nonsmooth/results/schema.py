@@ -16,6 +16,7 @@ How to call them (``n`` states, ``I`` indicators, ``O`` outputs)::
         # contacts_per_period, status (D,S,P), clearance (D,S,P,I), output_maximum, output_minimum (D,S,P,O).
         # squeeze: which of "direction", "start" become scalar (the argument was one string, one state).
     response(sweep_dataset, amplitude=(D,S,P,n), jumps={"value": (J,), "direction": (J,) of str, ...})
+    branch(d, attrs, parameter, values, arrays, marks, ...)     # one orbit per point, special points beside them
     section_points(d, attrs, section=(S, N, n), time=(S, N), mode=(S, N), status=(S,), starts=(S, n), squeeze=())
 
 Every dim carries its coordinate with unit and long name; all parameters are scalar coordinates (the swept
@@ -113,8 +114,8 @@ def trajectory(
     coords: dict[str, Any] = {
         "time": ("time", _floats(time), {"long_name": "time", **t_unit}),
         "segment": ("time", np.asarray(segment, np.int64), {"long_name": "number of crossings before this sample"}),
-        **_state_coords(d),
-        **_parameter_coords(d),
+        **state_coords(d),
+        **parameter_coords(d),
     }
     return xr.Dataset(variables, coords, dict(attrs))
 
@@ -155,8 +156,8 @@ def sweep(
         parameter: (parameter, _floats(values), _attributes(parameter, d.parameters[parameter])),
         "direction": ("direction", _strings(directions), {"long_name": "direction of the sweep"}),
         **_start_coords(starts),
-        **_state_coords(d),
-        **_parameter_coords(d, without=parameter),
+        **state_coords(d),
+        **parameter_coords(d, without=parameter),
     }
     if "clearance" in arrays:
         coords["indicator"] = ("indicator", _strings(d.indicators), {"long_name": "indicator"})
@@ -213,7 +214,7 @@ def section_points(
         "mode": (("start", "iterate"), np.asarray(mode, np.int16), {"long_name": "mode", **modes}),
         "status": ("start", np.asarray(status, np.int8), status_attributes()),
     }
-    coords = {**_start_coords(starts), **_state_coords(d), **_parameter_coords(d)}
+    coords = {**_start_coords(starts), **state_coords(d), **parameter_coords(d)}
     return xr.Dataset(variables, coords, dict(attrs)).squeeze(list(squeeze))
 
 
@@ -249,12 +250,96 @@ def derivatives_of_run(
         "state": ("state", names, {"long_name": "state, then memory"}),
         "initial_state": ("initial_state", names, {"long_name": "state at the start, then memory"}),
         "parameter": ("parameter", _strings(parameters) if parameters else np.array([], dtype=str)),
-        **_parameter_coords(d),
+        **parameter_coords(d),
     }
     return xr.Dataset(variables, coords, dict(attrs))
 
 
-def _state_coords(d: Labels) -> dict[str, Any]:
+#: Dims and long names of what a branch holds for every point, and for every special point.
+_BRANCH_ARRAYS: dict[str, tuple[tuple[str, ...], str]] = {
+    "section": (("state",), "state at the section"),
+    "maximum": (("state",), "largest value along the orbit"),
+    "minimum": (("state",), "smallest value along the orbit"),
+    "period": ((), "period"),
+    "floquet_multipliers": (("multiplier",), "Floquet multipliers"),
+    "stable": ((), "all multipliers inside the unit circle"),
+    "virtual": ((), "the path goes through a boundary that it should obey"),
+    "signature": ((), "signature"),
+    "mode": ((), "mode at the section"),
+    "crossings_per_period": ((), "transitions per forcing period (autonomous: once round)"),
+    "contacts_per_period": ((), "entries into contact per forcing period (autonomous: once round)"),
+    "clearance": (("indicator",), "least distance to a transition that does not happen"),
+    "layout": ((), "signature as it begins at the section (attribute layouts)"),
+    "unknowns": (("unknown",), "unknowns of multiple shooting: state at the section, instants and states of crossings"),
+    "tangent": (("unknown",), "direction of the branch"),
+}
+_MARKS: dict[str, tuple[str, tuple[str, ...], str]] = {
+    "kind": ("special_kind", (), "kind of the special point"),
+    "place": ("special_point", (), "its place among the points"),
+    "indicator": ("special_indicator", (), "indicator that is touched"),
+    "grazing": ("special_grazing", (), "what happens at the graze (Feigin)"),
+    "bounded": ("special_bounded", (), "multipliers stay bounded at the graze"),
+    "doubled": ("special_doubled", (), "an orbit of twice the period is born at the graze"),
+    "contact": ("special_contact_multipliers", ("multiplier",), "multipliers with the contact, in the limit"),
+    "determinants": (
+        "special_determinant", ("matrix",), "det(I - M-), det(I - M+), det(I + M-), det(I + M+) at the graze",
+    ),
+}  # fmt: skip
+
+
+def branch(
+    labels: Labels,
+    attrs: Mapping[str, Any],
+    parameter: str,
+    values: ArrayLike,
+    arrays: Mapping[str, ArrayLike],
+    marks: Mapping[str, Any],
+    *,
+    period_number: int,
+    signatures: Sequence[str],
+    endings: Sequence[str],
+    ended: Sequence[str],
+    sentences: Sequence[str],
+) -> xr.Dataset:
+    """The result of ``continue_orbit``: orbits over ``point`` in order along the branch, marks over ``special``.
+
+    ``signatures`` are the texts of the ids in ``arrays["signature"]``; ``ended`` the outcome at both ends, of
+    ``endings``, with their sentences.
+    """
+    d = labels
+    variables: dict[str, Any] = {}
+    for name, (dims, long_name) in _BRANCH_ARRAYS.items():
+        variables[name] = (("point", *dims), np.asarray(arrays[name]), {"long_name": long_name})
+    variables["period"][2]["units"] = d.time_unit
+    variables["mode"] = ("point", np.asarray(arrays["mode"], np.int16), {
+        "long_name": "mode at the section", **flag_attributes(d.modes, dtype=np.int16)})  # fmt: skip
+    variables["signature"] = ("point", np.asarray(arrays["signature"], np.int32), {
+        "long_name": "signature", **flag_attributes(signatures, dtype=np.int32)})  # fmt: skip
+    variables["layout"] = ("point", np.asarray(arrays["layout"], np.int32), variables["layout"][2])
+    variables["status"] = ("point", np.zeros(len(_floats(values)), np.int8), status_attributes())
+    for name, (stem, dims, long_name) in _MARKS.items():
+        column = marks[name]
+        array = _strings(column) if name in ("kind", "indicator", "grazing") else np.asarray(column)
+        variables[stem] = (("special", *dims), array, {"long_name": long_name})
+    variables["special_value"] = (
+        "special", _floats(values)[np.asarray(marks["place"], dtype=np.int64)],
+        _attributes(parameter, d.parameters[parameter]),
+    )  # fmt: skip
+    variables["period_number"] = ((), np.int64(period_number), {"long_name": "forcing periods (0: autonomous)"})
+    codes = np.array([list(endings).index(word) for word in ended], dtype=np.int8)
+    variables["ended"] = ("end", codes, {"long_name": "how the branch ends", **flag_attributes(endings)})
+    variables["ended_because"] = ("end", _strings(sentences), {"long_name": "sentence"})
+    coords: dict[str, Any] = {
+        parameter: ("point", _floats(values), _attributes(parameter, d.parameters[parameter])),
+        **state_coords(d),
+        **parameter_coords(d, without=parameter),
+        "indicator": ("indicator", _strings(d.indicators), {"long_name": "indicator"}),
+        "end": ("end", _strings(["first", "last"]), {"long_name": "end of the branch"}),
+    }
+    return xr.Dataset(variables, coords, dict(attrs))
+
+
+def state_coords(d: Labels) -> dict[str, Any]:
     """The states' names, with their units and symbols beside them (each state has its own)."""
     coords: dict[str, Any] = {
         "state": ("state", _strings(d.states), {"long_name": "state"}),
@@ -266,7 +351,7 @@ def _state_coords(d: Labels) -> dict[str, Any]:
     return coords
 
 
-def _parameter_coords(d: Labels, without: str = "") -> dict[str, Any]:
+def parameter_coords(d: Labels, without: str = "") -> dict[str, Any]:
     return {
         name: ((), np.float64(np.nan if q.value is None else q.value), _attributes(name, q))
         for name, q in d.parameters.items()
