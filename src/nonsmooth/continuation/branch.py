@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.continuation.arclength import Curve, Point, chordal
-from nonsmooth.continuation.change import Change, changed, resumed
+from nonsmooth.continuation.change import changed, resumed
 from nonsmooth.continuation.detection import SMOOTH, Tests, locate
 from nonsmooth.continuation.grazing import Graze, graze
 from nonsmooth.continuation.path import VIOLATIONS
@@ -42,6 +42,7 @@ ENDINGS = {
 LEAST_STEP = 1e-9
 COSINE = 0.97  # of the angle between the tangents of neighbours
 SPREAD = 0.15  # chordal change of the multipliers between neighbours
+EXPLAINS = ("short", "slow", "own", "touch", "others")
 BESIDE = 1e-6  # along the branch: nearer to a change of signature than this is the change itself
 
 
@@ -135,19 +136,15 @@ def march(curve: Curve, point: Point, limits: Limits, first_step: float) -> Marc
                 continue
         crossed = [kind for kind, was, now in zip(VIOLATIONS, violation, violation_new, strict=True)
                    if now < 0.0 and was >= 0.0]  # fmt: skip
-        met: tuple[str, float, Point] | None = None
-        for kind in crossed:
-            there = locate(curve, point, new, tests.one(kind))
-            if there is not None and there[0] <= stop * (1 + 1e-12) and (met is None or there[0] < met[1] - 1e-9 * end):
-                met = (kind, *there)
-        if crossed and met is None and reason != "range":
+        met = _first_met(curve, point, new, tests, crossed, stop)
+        if crossed and not met and reason != "range":
             ds *= 0.25
             if ds < LEAST_STEP:
                 found.ending = "no_convergence"
                 break
             continue
-        if met is not None:
-            stop, stop_point, reason = met[1], met[2], "change"
+        if met:
+            stop, stop_point, reason = met[0][1], met[0][2], "change"
             numbers_new = tests.smooth(stop_point)
         for kind, s, special in _smooth_events(curve, point, new, tests, numbers, numbers_new, stop, reason):
             del s
@@ -157,7 +154,7 @@ def march(curve: Curve, point: Point, limits: Limits, first_step: float) -> Marc
             found.ending = "range"
             break
         if reason == "change":
-            after = _change(found, curve, stop_point, met[0] if met else "")
+            after = _change(found, curve, met)
             if after is None:
                 break
             curve, point, ds = after
@@ -193,6 +190,26 @@ def _stepped(curve: Curve, point: Point, ds: float) -> Point | None:
     if np.abs(new.Y - point.Y - ds * point.tangent).max() > 0.5 * ds + 1e-12:
         return None
     return new
+
+
+def _first_met(
+    curve: Curve, a: Point, b: Point, tests: Tests, crossed: list[str], stop: float
+) -> list[tuple[str, float, Point]]:
+    """The first boundary on the step from a to b: all that is met there, what explains it best first.
+
+    Beyond the place where an impact or a short visit ends the path also goes through the boundary, and the other way
+    round: what vanishes explains what is touched.
+    """
+    located = []
+    for kind in crossed:
+        there = locate(curve, a, b, tests.one(kind))
+        if there is not None and there[0] <= stop * (1 + 1e-12):
+            located.append((kind, *there))
+    if not located:
+        return []
+    first = min(s for _, s, _ in located)
+    together = [event for event in located if event[1] <= first + BESIDE]
+    return sorted(together, key=lambda event: EXPLAINS.index(event[0]))
 
 
 def _at_edge(curve: Curve, a: Point, b: Point, edge: float) -> Point | None:
@@ -253,24 +270,26 @@ def _name(kind: str, curve: Curve, point: Point) -> str:
     return "pitchfork" if breaks_symmetry(curve, point) else "branch_point"
 
 
-def _change(found: March, curve: Curve, point: Point, kind: str) -> tuple[Curve, Point, float] | None:
+def _change(
+    found: March, curve: Curve, met: list[tuple[str, float, Point]]
+) -> tuple[Curve, Point, float] | None:
     """Record a change of signature and begin anew behind it; None where the branch ends."""
-    active = curve.shooting.active
-    candidates: list[Change] = changed(curve, point, kind)
-    for change in candidates:
-        after = resumed(curve, point, change, active)
-        if after is None:
-            continue
-        fresh, first, ds = after
-        if change.kind == "grazing":
-            found.mark("grazing", curve, point, indicator=change.indicator,
-                       graze=graze(curve, point, first, change))  # fmt: skip
-        elif change.kind == "corner":
-            found.mark("corner", curve, point, indicator=change.indicator)
-        return fresh, first, ds
+    for kind, _, point in met:
+        for change in changed(curve, point, kind):
+            after = resumed(curve, point, change, curve.shooting.active)
+            if after is None:
+                continue
+            fresh, first, ds = after
+            if change.kind == "grazing":
+                found.mark("grazing", curve, point, indicator=change.indicator,
+                           graze=graze(curve, point, first, change))  # fmt: skip
+            elif change.kind == "corner":
+                found.mark("corner", curve, point, indicator=change.indicator)
+            return fresh, first, ds
+    kind, _, point = met[0]
     name = "grazing" if kind in ("touch", "slow", "short") else "corner"
-    indicator = candidates[0].indicator if candidates else _indicator(curve, point, kind)
-    found.mark(name, curve, point, indicator=indicator)
+    known = [change.indicator for change in changed(curve, point, kind)]
+    found.mark(name, curve, point, indicator=known[0] if known else _indicator(curve, point, kind))
     found.ending = name
     return None
 

@@ -259,5 +259,5 @@ def _curve(
 
         shooting.reference = free_anchor(shooting, point.solved.values, states[0], curve.size)
     X = shooting.join(times, states, period, point.X[old.size :])
-    shooting.find_divided(X)
+    shooting.look_at_surfaces(X)
     return Curve(shooting, curve.size, curve.period, curve.width), X

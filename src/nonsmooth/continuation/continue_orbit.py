@@ -186,7 +186,7 @@ def _curve(
     X = shooting.join(
         orbit.crossing_times, np.vstack([section, orbit.crossing_states]), orbit.period, [system.values[name]]
     )
-    shooting.find_divided(X)
+    shooting.look_at_surfaces(X)
     return Curve(shooting, size, orbit.period, width), X
 
 
@@ -210,7 +210,7 @@ def _resume(
         from nonsmooth.continuation.anchor import free_anchor
 
         shooting.reference = free_anchor(shooting, shooting.parameters(point.X), point.X[: shooting.n], size)
-    shooting.find_divided(point.X)
+    shooting.look_at_surfaces(point.X)
     return Curve(shooting, size, point.period, width), point.X
 
 

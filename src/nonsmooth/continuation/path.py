@@ -57,7 +57,7 @@ class Walk:
         from nonsmooth.kernels.pointers import addresses
         from nonsmooth.system.generate import compile_model
 
-        system = shooting.system
+        self.shooting, system = shooting, shooting.system
         traced: Traced = system.traced
         self.model = compile_model(traced)
         self.functions = addresses(self.model.jet)
@@ -91,6 +91,11 @@ class Walk:
         self.fixed = fixed[:-1] & fixed[1:] if m > 1 else np.array([True])  # visits whose length cannot vanish
         self.inside = np.array([(i, self.fired[i]) for i in self.conditional], dtype=np.int64).reshape(-1, 2).T
 
+    @property
+    def alone(self) -> NDArray[np.bool_]:
+        """Over the conditional crossings: no corner to watch."""
+        return np.array(self.shooting.alone, dtype=bool)[self.conditional]
+
     def along(self, solved: Solved, states: FloatArray) -> Path:
         """Walk along the visits of a solved orbit; ``states`` (m + 1, n_z) begin them."""
         from nonsmooth.kernels.orbit_path import follow
@@ -107,7 +112,7 @@ class Walk:
         )  # fmt: skip
         at = int(inner.argmax()) if n_t else 0
         touched = (at // n_t, at % n_t) if n_t else (0, 0)
-        own = end[self.inside[0], self.inside[1]]
+        own = np.where(self.alone, np.inf, end[self.inside[0], self.inside[1]])
         if n_t and m > 1:
             rest = np.where(self.elsewhere[:-1], end[:-1], -np.inf)
             other = rest.argmax(axis=1)

@@ -89,6 +89,7 @@ class Shooting:
         # A state or a memory that nothing on the orbit ever sets is a free constant, not an unknown.
         self.free = self._constants()
         self.reference: tuple[FloatArray, FloatArray] | None = None  # autonomous, no crossings: (z_ref, f_ref)
+        self.alone = [False] * m  # crossings whose other rows vanish together with the one that fires
         self.divided = [False] * m  # exits whose equation is divided by the length of the visit
 
     def _constants(self) -> list[int]:
@@ -255,11 +256,26 @@ class Shooting:
         J[r, ti] -= F[r] / tau
         J[r, tb] += F[r] / tau
 
-    def find_divided(self, X: FloatArray) -> None:
-        """Mark the exits that go through the surface of the entry: there a visit of no length solves the equations too."""
+    def look_at_surfaces(self, X: FloatArray) -> None:
+        """Find surfaces that coincide, as those of a support without damper do.
+
+        Exits through the surface of the entry are divided: a visit of no length solves their equations too. Rows of one
+        condition that vanish together leave the crossing alone: they are no corner of it.
+        """
         visits = self.signature.visits
         times, z = self.split(X)
         values = self.parameters(X)
+        traced = self.system.traced
+        for i, (k, row, at, _) in enumerate(self.jumps):
+            n_rows = len(traced.transitions[k].rows)
+            if at is None and n_rows > 1:
+                found = [self.flow.jump(values, k, float(times[i]), z[i + 1], r) for r in range(n_rows)]
+                signs = [r.sign for r in traced.transitions[k].rows]
+                self.alone[i] = all(
+                    _coincide(signs[row] * found[row].h_z, signs[row] * found[row].h, signs[r] * one.h_z,
+                              signs[r] * one.h, z[i + 1])
+                    for r, one in enumerate(found) if r != row
+                )  # fmt: skip
         for i in range(1, self.m):
             k, row, at, _ = self.jumps[i]
             k0, row0, at0, _ = self.jumps[i - 1]
@@ -267,11 +283,7 @@ class Shooting:
                 continue
             entry = self.flow.jump(values, k0, float(times[i - 1]), z[i], row0)
             leave = self.flow.jump(values, k, float(times[i - 1]), z[i], row)
-            a, b = entry.h_z, leave.h_z
-            size = float(np.sqrt((a @ a) * (b @ b)))
-            opposite = size > 0.0 and float(a @ b) < -(1.0 - 1e-12) * size
-            ratio = float(np.sqrt((b @ b) / (a @ a))) if size else 1.0
-            self.divided[i] = bool(opposite and abs(leave.h + ratio * entry.h) <= 1e-13 * np.abs(b * z[i]).max())
+            self.divided[i] = _coincide(entry.h_z, entry.h, -leave.h_z, -leave.h, z[i])
 
     def newton(self, X: FloatArray, scale: FloatArray, *, tolerance: float = 1e-12, most: int = 30) -> Solved | None:
         """Solve at fixed parameters; None where it does not converge."""
@@ -316,3 +328,12 @@ class Shooting:
         return self.signature.visits[0].mode
 
 
+
+
+def _coincide(a: FloatArray, h: float, b: FloatArray, g: float, z: FloatArray) -> bool:
+    """Whether two indicators with gradients a, b and values h, g near z are one, but for a positive factor."""
+    size = float(np.sqrt((a @ a) * (b @ b)))
+    if size == 0.0 or float(a @ b) < (1.0 - 1e-12) * size:
+        return False
+    ratio = float(np.sqrt((b @ b) / (a @ a)))
+    return bool(abs(g - ratio * h) <= 1e-12 * (np.abs(b * z).max() + abs(g)))

@@ -29,7 +29,7 @@ def doubled(shooting: Shooting, X: FloatArray) -> tuple[Shooting, FloatArray]:
     t2 = np.concatenate([times, times + period])
     z2 = np.concatenate([states, states[1:]])
     X2 = twice.join(t2, z2, 2 * period, X[shooting.size :])
-    twice.divided = [shooting.divided[i % shooting.m] for i in range(2 * shooting.m)] if shooting.m else []
+    twice.divided, twice.alone = 2 * shooting.divided, 2 * shooting.alone
     if shooting.reference is not None:
         twice.reference = shooting.reference
     return twice, X2
