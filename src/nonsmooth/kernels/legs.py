@@ -196,7 +196,7 @@ def march_legs(
             q[n_p + i - n_u] = z0[leg, i]
             f_begin[leg, i], f_end[leg, i] = 0.0, 0.0
         field(mode, t0[leg], u, q, f_begin[leg])
-        if guess == inf:
+        if guess == inf or guess == 0.0:  # a leg of no length says nothing of the next
             guess = fabs(tau[leg])
         status[leg], divergence[leg], guess = march_one(
             jet, mode, t0[leg], tau[leg], entries, kinds, n_u, u, q, total, work, guess
