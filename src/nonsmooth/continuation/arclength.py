@@ -77,9 +77,13 @@ class Curve:
         return matrix
 
     def correct(
-        self, Y: FloatArray, border: FloatArray, level: float, *, tolerance: float = DONE, most: int = MOST
-    ) -> tuple[Solved, FloatArray, int] | None:
-        """Newton for F = 0 and border . Y = level, from Y; None where it does not converge."""
+        self, Y: FloatArray, border: FloatArray, level: float, *, tolerance: float = DONE, most: int = MOST,
+        singular: bool = False,
+    ) -> tuple[Solved, FloatArray, int] | None:  # fmt: skip
+        """Newton for F = 0 and border . Y = level, from Y; None where it does not converge.
+
+        ``singular`` takes the shortest step where the matrix has no inverse: at a crossing of branches.
+        """
         shooting = self.shooting
         right = np.empty(self.n)
         last = np.inf
@@ -88,7 +92,10 @@ class Curve:
             np.multiply(solved.residual, self.rows, out=right[:-1])
             right[-1] = border @ Y - level
             try:
-                step = np.linalg.solve(self._bordered(solved, border), right)
+                if singular:
+                    step = np.linalg.lstsq(self._bordered(solved, border), right, rcond=1e-7)[0]
+                else:
+                    step = np.linalg.solve(self._bordered(solved, border), right)
             except np.linalg.LinAlgError:
                 return None
             length = float(np.abs(step).max())
@@ -152,10 +159,18 @@ class Curve:
             a.Y * (1 + 2 * x) * (1 - x) ** 2 + a.tangent * (end * x * (1 - x) ** 2)
             + b.Y * x * x * (3 - 2 * x) - b.tangent * (slope * x * x * (1 - x))
         )  # fmt: skip
-        found = self.correct(Y, a.tangent, float(a.tangent @ a.Y) + s, tolerance=CLOSE, most=2 * MOST)
+        level = float(a.tangent @ a.Y) + s
+        found = self.correct(Y, a.tangent, level, tolerance=CLOSE, most=2 * MOST)
+        if found is None or np.abs(found[1] - Y).max() > 0.1 * abs(end):
+            found = self.correct(Y, a.tangent, level, tolerance=1e-10, most=2 * MOST, singular=True)
         if found is None:
             return None
-        return self.point(found[0], found[1], a.tangent, found[2])
+        point = self.point(found[0], found[1], a.tangent, found[2])
+        if point is not None and float(point.tangent @ a.tangent) < 0.5:
+            # At a crossing of branches any direction in their plane is null: keep that of the branch.
+            towards = (1 - x) * a.tangent + x * b.tangent
+            point.tangent = towards / np.linalg.norm(towards)
+        return point
 
     def at_parameter(self, Y: FloatArray, value: float) -> Point | None:
         """The point at a value of the parameter, by Newton from Y."""

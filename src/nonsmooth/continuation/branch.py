@@ -42,6 +42,7 @@ ENDINGS = {
 LEAST_STEP = 1e-9
 COSINE = 0.97  # of the angle between the tangents of neighbours
 SPREAD = 0.15  # chordal change of the multipliers between neighbours
+TURN = 1e-5  # along the branch: a fold nearer to a crossing of branches than this is that crossing
 EXPLAINS = ("short", "slow", "own", "touch", "others")
 BESIDE = 1e-6  # along the branch: nearer to a change of signature than this is the change itself
 
@@ -240,6 +241,9 @@ def _smooth_events(
         if kind == "neimark_sacker" and not _has_pair(point, tests):
             continue
         found.append((_name(kind, curve, point), s, point))
+    # A branch that crosses another one where the parameter turns is one event, not two.
+    crossings = [s for kind, s, _ in found if kind in ("pitchfork", "branch_point")]
+    found = [event for event in found if event[0] != "fold" or all(abs(event[1] - s) > TURN for s in crossings)]
     return sorted(found, key=lambda event: event[1])
 
 
