@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from nonsmooth.continuation.signature import Signature, Visit
 
 if TYPE_CHECKING:
-    from nonsmooth.continuation.shooting import Shooting
+    from nonsmooth.flow.variational import VariationalFlow
 
 __all__ = ["anchored", "free_anchor"]
 
@@ -18,18 +18,15 @@ FloatArray = NDArray[np.float64]
 
 
 def anchored(
-    shooting: Shooting, values: FloatArray, signature: Signature, times: FloatArray, states: FloatArray, period: float
+    flow: VariationalFlow, values: FloatArray, signature: Signature, times: FloatArray, states: FloatArray, period: float
 ) -> tuple[Signature, FloatArray, FloatArray]:
-    """The same orbit read from the middle of its longest visit (times of crossings, states at section and after them).
-
-    ``shooting`` lends its flow only.
-    """
+    """The same orbit read from the middle of its longest visit (times of crossings, states at section and after them)."""
     m = len(times)
     lengths = np.append(np.diff(times), times[0] + period - times[-1])  # of the visit after crossing i
     i = int(lengths.argmax())
     crossings = signature.crossings
     after = crossings[(i + 1) % m]
-    z = shooting.flow.legs(values, [after.mode], [0.0], [0.5 * lengths[i]], states[i + 1][None, :]).z
+    z = flow.legs(values, [after.mode], [0.0], [0.5 * lengths[i]], states[i + 1][None, :]).z
     order = [(i + 1 + j) % m for j in range(m)]
     begin = times[i] + 0.5 * lengths[i]
     moved = np.array([(times[j] - begin) % period for j in order])
@@ -38,8 +35,10 @@ def anchored(
     return Signature(visits), moved, np.concatenate([z, states[1:][order]])
 
 
-def free_anchor(shooting: Shooting, values: FloatArray, z: FloatArray, size: FloatArray) -> tuple[FloatArray, FloatArray]:
+def free_anchor(
+    flow: VariationalFlow, values: FloatArray, mode: int, z: FloatArray, size: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """(z_ref, f_ref) for an orbit without transitions: the plane through z across the flow, in scaled states."""
-    field = shooting.flow.legs(values, shooting.modes[:1], [0.0], [0.0], z[None, :]).f_begin[0]
+    field = flow.legs(values, [mode], [0.0], [0.0], z[None, :]).f_begin[0]
     weighted = field / size**2
     return z.copy(), weighted / max(float(np.abs(weighted * size).max()), 1e-300)

@@ -252,12 +252,14 @@ def _curve(
     if not old.forced and len(times):
         from nonsmooth.continuation.anchor import anchored
 
-        signature, times, states = anchored(old, point.solved.values, signature, times, states, float(period or 0.0))
+        signature, times, states = anchored(old.flow, point.solved.values, signature, times, states, float(period or 0.0))
     shooting = Shooting(system, signature, old.period_number, active)
     if not old.forced and not shooting.m:
         from nonsmooth.continuation.anchor import free_anchor
 
-        shooting.reference = free_anchor(shooting, point.solved.values, states[0], curve.size)
+        shooting.reference = free_anchor(
+            shooting.flow, point.solved.values, shooting.at_section, states[0], curve.size
+        )
     X = shooting.join(times, states, period, point.X[old.size :])
     shooting.look_at_surfaces(X)
     return Curve(shooting, curve.size, curve.period, curve.width), X

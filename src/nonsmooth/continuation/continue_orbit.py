@@ -182,7 +182,7 @@ def _curve(
     if not shooting.forced and not shooting.m:
         from nonsmooth.continuation.anchor import free_anchor
 
-        shooting.reference = free_anchor(shooting, shooting.values, section, size)
+        shooting.reference = free_anchor(shooting.flow, shooting.values, shooting.at_section, section, size)
     X = shooting.join(
         orbit.crossing_times, np.vstack([section, orbit.crossing_states]), orbit.period, [system.values[name]]
     )
@@ -209,7 +209,9 @@ def _resume(
     if not shooting.forced and not shooting.m:
         from nonsmooth.continuation.anchor import free_anchor
 
-        shooting.reference = free_anchor(shooting, shooting.parameters(point.X), point.X[: shooting.n], size)
+        shooting.reference = free_anchor(
+            shooting.flow, shooting.parameters(point.X), shooting.at_section, point.X[: shooting.n], size
+        )
     shooting.look_at_surfaces(point.X)
     return Curve(shooting, size, point.period, width), point.X
 

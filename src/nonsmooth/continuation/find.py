@@ -6,21 +6,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nonsmooth.continuation.anchor import free_anchor
 from nonsmooth.continuation.orbit import Orbit, orbit_of
 from nonsmooth.continuation.path import Walk
-from nonsmooth.continuation.settled import Guess, first_unknowns, forced_guesses, read, settle_forced
+from nonsmooth.continuation.settled import Guess, forced_guesses, settle_forced
 from nonsmooth.continuation.shooting import Shooting
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.arguments import check_system, whole_number
 from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.starts import first_state
-from nonsmooth.flow.variational import VariationalFlow
 from nonsmooth.kernels import codes
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["find_orbit"]
+__all__ = ["failed", "find_orbit"]
 
 RTOL = 1e-12  # of the runs from which orbits are read
 NOISE = 1e-11  # of the motion's size: beyond a boundary by less than this is on it
@@ -81,7 +81,7 @@ def find_orbit(
         keep = 2 * max(max_period, period_number or 1) + 2
         settled = settle_forced(system, engine, state, transient, keep)
         if settled.status not in (codes.OK, codes.NOT_GUARANTEED):
-            raise _failed(settled.status)
+            raise failed(settled.status)
         guesses = forced_guesses(system, settled, period_number, max_period)
     if not guesses:
         raise SolveError(
@@ -93,7 +93,8 @@ def find_orbit(
     return _polished(system, guesses, given=period_number is not None, unstable=transient == 0)
 
 
-def _failed(code: int) -> SolveError:
+def failed(code: int) -> SolveError:
+    """The error for a simulation that stopped with a kernel's code."""
     if code == codes.BEYOND_STOP:
         return SolveError(
             "the start lies beyond a stop: a transition with a reset holds there already; start on the admissible "
@@ -107,17 +108,15 @@ def _failed(code: int) -> SolveError:
 
 def _polished(system: System, guesses: list[Guess], given: bool, unstable: bool) -> Orbit:
     """Newton from each guess; the first orbit that is admissible, near, and stable (or asked for)."""
-    flow = VariationalFlow.of(system)
-    values = system.parameter_vector()
     reasons: list[tuple[str, str]] = []
     for guess in guesses:
-        signature = read(guess, system, lambda k, t, z: flow.jump(values, k, t, z).row)
-        shooting = Shooting(system, signature, guess.period_number)
-        X = first_unknowns(guess, shooting)
-        scale = unknowns_scale(shooting, guess.size, guess.period)
+        shooting = Shooting(system, guess.signature, guess.period_number)
+        X = shooting.join(guess.times, guess.states, guess.period)
+        size = np.concatenate([guess.size, np.ones(shooting.n - len(guess.size))])
+        scale = shooting.join(np.full(shooting.m, guess.period), np.tile(size, (shooting.m + 1, 1)), guess.period)
         name = f"period-{guess.period_number}" if guess.period_number else "closed"
         if not shooting.forced and not shooting.m:
-            shooting.reference = reference_at(shooting, X, scale)
+            shooting.reference = free_anchor(shooting.flow, shooting.values, guess.signature.visits[0].mode, X[: shooting.n], size)
         solved = shooting.newton(X, scale)
         if solved is None:
             reasons.append(("no_convergence", f"Newton's method did not converge to a {name} orbit"))
@@ -128,7 +127,7 @@ def _polished(system: System, guesses: list[Guess], given: bool, unstable: bool)
         noise = NOISE * float(guess.size.max())
         virtual = bool((path.violation() < -noise).any())
         orbit = orbit_of(shooting, solved, path, clearance, virtual)
-        moved = float(np.abs((orbit.u - np.nan_to_num(guess.u)) / guess.size).max())
+        moved = float(np.abs((orbit.u - guess.states[0, : len(orbit.u)]) / guess.size).max())
         if virtual:
             reasons.append(("virtual", f"the {name} orbit found passes through a boundary it should obey"))
         elif given or unstable or (orbit.stable and moved <= max(FAR * guess.gap, 1e-6)):
@@ -146,20 +145,3 @@ def _polished(system: System, guesses: list[Guess], given: bool, unstable: bool)
         "transient, or period_number= (then an unstable orbit is taken too)",
         status=status,
     )
-
-
-def unknowns_scale(shooting: Shooting, size: Any, period: float) -> Any:
-    """Sizes of the unknowns X (without parameters): of states, of memory, of times."""
-    extended = np.concatenate([size, np.ones(shooting.n - len(size))])
-    X = shooting.join(np.full(shooting.m, period), np.tile(extended, (shooting.m + 1, 1)), period,
-                      np.ones(shooting.n_active))  # fmt: skip
-    return X
-
-
-def reference_at(shooting: Shooting, X: Any, scale: Any) -> Any:
-    """The phase condition of an autonomous orbit without transitions: through z_0, across the flow."""
-    z = X[: shooting.n]
-    values = shooting.parameters(X)
-    field = shooting.flow.legs(values, shooting.modes[:1], [0.0], [0.0], z[None, :]).f_begin[0]
-    weighted = field / scale[: shooting.n] ** 2
-    return z.copy(), weighted / np.abs(weighted * scale[: shooting.n]).max()

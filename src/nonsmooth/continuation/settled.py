@@ -10,30 +10,30 @@ from numpy.typing import NDArray
 
 from nonsmooth.continuation.signature import Signature, Visit
 from nonsmooth.flow.engine import Chain, Log, SectionPlan, State
+from nonsmooth.flow.variational import VariationalFlow
 from nonsmooth.kernels import codes
 
 if TYPE_CHECKING:
-    from nonsmooth.continuation.shooting import Shooting
     from nonsmooth.flow.engine import Engine
     from nonsmooth.system.system import System
 
-__all__ = ["Guess", "forced_guesses", "read", "settle_forced"]
+__all__ = ["NEAR", "Guess", "forced_guesses", "settle_forced"]
 
 FloatArray = NDArray[np.float64]
+CHOICE = 8  # returning points tried for a given period number
 NEAR = 0.2  # of the motion's size: a return farther off than this is no candidate
 
 
 @dataclass
 class Guess:
-    """A stretch of motion that nearly closes: its beginning, its log over one round, and how far off it closes."""
+    """A stretch of motion that nearly closes, read as an orbit; ``gap`` tells how far off it closes (scaled)."""
 
     period_number: int  # 0: autonomous
     period: float
-    u: FloatArray
-    memory: FloatArray
-    mode: int
-    log: Log
-    gap: float  # scaled
+    signature: Signature
+    times: FloatArray  # of its crossings
+    states: FloatArray  # (m + 1, n_z): at the section and after the crossings
+    gap: float
     size: FloatArray  # (n_u,) half the range of each state
 
 
@@ -42,6 +42,7 @@ class Settled:
     """Section points after the transient."""
 
     points: FloatArray  # (keep, n_u)
+    modes: NDArray[np.int64]  # (keep,)
     size: FloatArray
     state: State
     status: int
@@ -56,50 +57,65 @@ def settle_forced(system: System, engine: Engine, state: State, transient: int, 
     tables = engine.prepare(system.parameter_vector()[None, :])
     engine.chain(tables, 0, 1, state, None, SectionPlan(), transient, keep, out)
     size = np.maximum(0.5 * (out.maximum[0] - out.minimum[0]), 1e-3 * system.scale_vector())
-    return Settled(out.section[0], size, state, int(out.status[0]), engine, tables)
+    return Settled(np.nan_to_num(out.section[0]), out.section_mode[0], size, state, int(out.status[0]), engine, tables)
 
 
 def forced_guesses(system: System, settled: Settled, period_number: int | None, most: int) -> list[Guess]:
-    """Candidates for the period number, the smallest first; each begins at the last section point."""
+    """Candidates for the period number, the smallest first, from the last section point.
+
+    For a given period number: from the section points that return nearest to themselves.
+    """
     points = settled.points / settled.size
-    period = float(system.period() or 0.0)
     guesses = []
-    numbers = range(1, most + 1) if period_number is None else [period_number]
-    for p in numbers:
-        if p >= len(points):
-            break
-        gap = float(np.abs(points[-1] - points[-1 - p]).max())
-        if period_number is None and gap > NEAR:
-            continue
-        state = settled.state.copy()
-        state.clock[:], state.settled = 0.0, True
-        u, memory, mode = state.u.copy(), state.memory.copy(), int(state.counters[0])
-        log = settled.engine.record(settled.tables, state, p * period, np.empty(0))
-        if log.status in (codes.OK, codes.NOT_GUARANTEED):
-            guesses.append(Guess(p, p * period, u, memory, mode, log, gap, settled.size))
+    if period_number is not None:
+        p = period_number
+        gaps = np.abs(points[p:] - points[:-p]).max(axis=1)
+        places = [int(i) for i in np.argsort(gaps, kind="stable")[:CHOICE]]
+        if len(settled.state.memory):  # the memory is known at the last point only
+            places = [len(gaps) - 1]
+        starts = [(p, i, float(gaps[i])) for i in places]
+    else:
+        last = len(points) - 1
+        gaps = np.array([np.abs(points[last] - points[last - p]).max() for p in range(1, most + 1)])
+        starts = [(p, last, float(gaps[p - 1])) for p in range(1, most + 1) if gaps[p - 1] <= NEAR]
+    for p, i, gap in starts:
+        guess = _read_round(system, settled, p, i, gap)
+        if guess is not None:
+            guesses.append(guess)
     return guesses
 
 
-def read(guess: Guess, system: System, rows: Any) -> Signature:
-    """The signature of a logged round; ``rows(k, t, z)`` tells which row of transition k is zero there."""
-    period = system.period()
+def _read_round(system: System, settled: Settled, p: int, i: int, gap: float) -> Guess | None:
+    """The motion over p forcing periods from section point i, as an orbit."""
+    state = settled.state.copy()
+    if i < len(settled.points) - 1:
+        state.u[:], state.counters[0] = settled.points[i], settled.modes[i]
+        state.counters[1:] = (-1, 0, 0)
+    state.clock[:], state.settled = 0.0, True
+    period = float(system.period() or 0.0)
+    start = np.concatenate([state.u, state.memory])
+    mode = int(state.counters[0])
+    log = settled.engine.record(settled.tables, state, p * period, np.empty(0))
+    if log.status not in (codes.OK, codes.NOT_GUARANTEED):
+        return None
+    states = np.concatenate([np.nan_to_num(log.u_after), log.memory_after], axis=1)
+    signature = _signature(system, log, start, mode)
+    return Guess(p, p * period, signature, log.crossing_time, np.vstack([start, states]), gap, settled.size)
+
+
+def _signature(system: System, log: Log, start: FloatArray, mode: int) -> Signature:
+    """The signature of a logged round; the row of each condition that became true last is the one that is zero."""
+    traced, flow, values = system.traced, VariationalFlow.of(system), system.parameter_vector()
+    period = float(system.period() or 1.0)
+    memory = start[len(traced.u) :]
     visits = []
-    memory = guess.memory
-    traced = system.traced
-    for i, k in enumerate(guess.log.crossing_transition):
-        jump, t = traced.transitions[k], float(guess.log.crossing_time[i])
+    for i, k in enumerate(log.crossing_transition):
+        jump, t = traced.transitions[k], float(log.crossing_time[i])
         if jump.at is not None:
-            visits.append(Visit(jump.source, int(k), -1, round(t / float(period or 1.0) - jump.at)))
+            visits.append(Visit(jump.source, int(k), -1, round(t / period - jump.at)))
         else:
-            z = np.concatenate([np.nan_to_num(guess.log.u_before[i]), memory])
-            visits.append(Visit(jump.source, int(k), rows(int(k), t, z)))
-        memory = guess.log.memory_after[i]
-    last = traced.transitions[guess.log.crossing_transition[-1]].target if visits else guess.mode
+            z = np.concatenate([np.nan_to_num(log.u_before[i]), memory])
+            visits.append(Visit(jump.source, int(k), flow.jump(values, int(k), t, z).row))
+        memory = log.memory_after[i]
+    last = traced.transitions[log.crossing_transition[-1]].target if visits else mode
     return Signature((*visits, Visit(int(last))))
-
-
-def first_unknowns(guess: Guess, shooting: Shooting) -> FloatArray:
-    """X of a logged round."""
-    start = np.concatenate([np.nan_to_num(guess.u), guess.memory])
-    after = np.concatenate([np.nan_to_num(guess.log.u_after), guess.log.memory_after], axis=1)
-    return shooting.join(guess.log.crossing_time, np.vstack([start, after]), guess.period)
