@@ -38,8 +38,7 @@ def branch_dataset(system: System, record: BranchRecord, options: dict[str, Any]
     """The branch as a Dataset with the dims ``point``, ``state``, ``multiplier``, ``special`` (and ``unknown``, ``end``)."""
     from nonsmooth.results.labels import labels_of
     from nonsmooth.results.provenance import provenance
-    from nonsmooth.results.schema import branch
-
+    
     traced = system.traced
     points, special = record.points, record.special
     layouts: dict[Signature, int] = {}

@@ -16,7 +16,6 @@ How to call them (``n`` states, ``I`` indicators, ``O`` outputs)::
         # contacts_per_period, status (D,S,P), clearance (D,S,P,I), output_maximum, output_minimum (D,S,P,O).
         # squeeze: which of "direction", "start" become scalar (the argument was one string, one state).
     response(sweep_dataset, amplitude=(D,S,P,n), jumps={"value": (J,), "direction": (J,) of str, ...})
-    branch(d, attrs, parameter, values, arrays, marks, ...)     # one orbit per point, special points beside them
     section_points(d, attrs, section=(S, N, n), time=(S, N), mode=(S, N), status=(S,), starts=(S, n), squeeze=())
 
 Every dim carries its coordinate with unit and long name; all parameters are scalar coordinates (the swept
@@ -35,7 +34,9 @@ from numpy.typing import ArrayLike, NDArray
 from nonsmooth.results.labels import Labels, Quantity
 from nonsmooth.results.statuses import flag_attributes, status_attributes
 
-__all__ = ["derivatives_of_run", "response", "section_points", "sweep", "trajectory"]
+__all__ = [
+    "parameter_coords", "quantity_attributes", "response", "section_points", "state_coords", "sweep", "trajectory",
+]  # fmt: skip
 
 #: Trailing dims of each array a sweep may bring, after (direction, start, parameter).
 _SWEEP_ARRAYS: dict[str, tuple[str, ...]] = {
@@ -110,7 +111,7 @@ def trajectory(
             continue
         table = _floats(columns)
         for i, (name, quantity) in enumerate(names.items()):
-            variables[name] = ("time", table[:, i], _attributes(name, quantity))
+            variables[name] = ("time", table[:, i], quantity_attributes(name, quantity))
     coords: dict[str, Any] = {
         "time": ("time", _floats(time), {"long_name": "time", **t_unit}),
         "segment": ("time", np.asarray(segment, np.int64), {"long_name": "number of crossings before this sample"}),
@@ -153,7 +154,7 @@ def sweep(
         else:
             variables[name] = (dims, _own(array), {"long_name": _LONG_NAMES[name]})
     coords: dict[str, Any] = {
-        parameter: (parameter, _floats(values), _attributes(parameter, d.parameters[parameter])),
+        parameter: (parameter, _floats(values), quantity_attributes(parameter, d.parameters[parameter])),
         "direction": ("direction", _strings(directions), {"long_name": "direction of the sweep"}),
         **_start_coords(starts),
         **state_coords(d),
@@ -218,127 +219,6 @@ def section_points(
     return xr.Dataset(variables, coords, dict(attrs)).squeeze(list(squeeze))
 
 
-def derivatives_of_run(
-    labels: Labels, attrs: Mapping[str, str], parameters: Sequence[str], *, Phi: ArrayLike, P: ArrayLike,
-    end: ArrayLike, crossing_time: ArrayLike, crossing_transition: ArrayLike, saltation: ArrayLike,
-    log_det_saltation: ArrayLike, transversality: ArrayLike, log_det: float, divergence: float, trace: float,
-    status: int = 0,
-) -> xr.Dataset:  # fmt: skip
-    """The result of ``sensitivity``; the memory's names follow those of the states."""
-    d = labels
-    names = _strings([*d.states, *d.memory])
-    transitions = flag_attributes(d.transition_labels, dtype=np.int16)
-    jumps = np.asarray(crossing_transition, np.int16)
-    matrix = ("crossing", "state", "initial_state")
-    defect = 0.0 if log_det == trace else log_det - trace  # both may be minus infinity
-    variables: dict[str, Any] = {
-        "Phi": (("state", "initial_state"), _floats(Phi), {"long_name": "derivative of the end in the start"}),
-        "P": (("state", "parameter"), _floats(P), {"long_name": "derivative of the end in the parameters"}),
-        "end": ("state", _floats(end), {"long_name": "state at the end"}),
-        "crossing_time": ("crossing", _floats(crossing_time), {"long_name": "time of the crossing",
-                                                               "units": d.time_unit}),
-        "crossing_transition": ("crossing", jumps, {"long_name": "transition", **transitions}),
-        "saltation": (matrix, _floats(saltation), {"long_name": "saltation matrix"}),
-        "log_det_saltation": ("crossing", _floats(log_det_saltation), {"long_name": "log|det S|"}),
-        "transversality": ("crossing", _floats(transversality), {"long_name": "|h'| / (|h_z| |f|)"}),
-        "log_det": ((), log_det, {"long_name": "log|det Phi|"}),
-        "divergence": ((), divergence, {"long_name": "integral of div f"}),
-        "trace_defect": ((), defect, {"long_name": "log|det Phi| less what the trace identity demands"}),
-        "status": ((), np.int8(status), status_attributes()),
-    }  # fmt: skip
-    coords: dict[str, Any] = {
-        "state": ("state", names, {"long_name": "state, then memory"}),
-        "initial_state": ("initial_state", names, {"long_name": "state at the start, then memory"}),
-        "parameter": ("parameter", _strings(parameters) if parameters else np.array([], dtype=str)),
-        **parameter_coords(d),
-    }
-    return xr.Dataset(variables, coords, dict(attrs))
-
-
-#: Dims and long names of what a branch holds for every point, and for every special point.
-_BRANCH_ARRAYS: dict[str, tuple[tuple[str, ...], str]] = {
-    "section": (("state",), "state at the section"),
-    "maximum": (("state",), "largest value along the orbit"),
-    "minimum": (("state",), "smallest value along the orbit"),
-    "period": ((), "period"),
-    "floquet_multipliers": (("multiplier",), "Floquet multipliers"),
-    "stable": ((), "all multipliers inside the unit circle"),
-    "virtual": ((), "the path goes through a boundary that it should obey"),
-    "signature": ((), "signature"),
-    "mode": ((), "mode at the section"),
-    "crossings_per_period": ((), "transitions per forcing period (autonomous: once round)"),
-    "contacts_per_period": ((), "entries into contact per forcing period (autonomous: once round)"),
-    "clearance": (("indicator",), "least distance to a transition that does not happen"),
-    "layout": ((), "signature as it begins at the section (attribute layouts)"),
-    "unknowns": (("unknown",), "unknowns of multiple shooting: state at the section, instants and states of crossings"),
-    "tangent": (("unknown",), "direction of the branch"),
-}
-_MARKS: dict[str, tuple[str, tuple[str, ...], str]] = {
-    "kind": ("special_kind", (), "kind of the special point"),
-    "place": ("special_point", (), "its place among the points"),
-    "indicator": ("special_indicator", (), "indicator that is touched"),
-    "grazing": ("special_grazing", (), "what happens at the graze (Feigin)"),
-    "bounded": ("special_bounded", (), "multipliers stay bounded at the graze"),
-    "doubled": ("special_doubled", (), "an orbit of twice the period is born at the graze"),
-    "contact": ("special_contact_multipliers", ("multiplier",), "multipliers with the contact, in the limit"),
-    "determinants": (
-        "special_determinant", ("matrix",), "det(I - M-), det(I - M+), det(I + M-), det(I + M+) at the graze",
-    ),
-}  # fmt: skip
-
-
-def branch(
-    labels: Labels,
-    attrs: Mapping[str, Any],
-    parameter: str,
-    values: ArrayLike,
-    arrays: Mapping[str, ArrayLike],
-    marks: Mapping[str, Any],
-    *,
-    period_number: int,
-    signatures: Sequence[str],
-    endings: Sequence[str],
-    ended: Sequence[str],
-    sentences: Sequence[str],
-) -> xr.Dataset:
-    """The result of ``continue_orbit``: orbits over ``point`` in order along the branch, marks over ``special``.
-
-    ``signatures`` are the texts of the ids in ``arrays["signature"]``; ``ended`` the outcome at both ends, of
-    ``endings``, with their sentences.
-    """
-    d = labels
-    variables: dict[str, Any] = {}
-    for name, (dims, long_name) in _BRANCH_ARRAYS.items():
-        variables[name] = (("point", *dims), np.asarray(arrays[name]), {"long_name": long_name})
-    variables["period"][2]["units"] = d.time_unit
-    variables["mode"] = ("point", np.asarray(arrays["mode"], np.int16), {
-        "long_name": "mode at the section", **flag_attributes(d.modes, dtype=np.int16)})  # fmt: skip
-    variables["signature"] = ("point", np.asarray(arrays["signature"], np.int32), {
-        "long_name": "signature", **flag_attributes(signatures, dtype=np.int32)})  # fmt: skip
-    variables["layout"] = ("point", np.asarray(arrays["layout"], np.int32), variables["layout"][2])
-    variables["status"] = ("point", np.zeros(len(_floats(values)), np.int8), status_attributes())
-    for name, (stem, dims, long_name) in _MARKS.items():
-        column = marks[name]
-        array = _strings(column) if name in ("kind", "indicator", "grazing") else np.asarray(column)
-        variables[stem] = (("special", *dims), array, {"long_name": long_name})
-    variables["special_value"] = (
-        "special", _floats(values)[np.asarray(marks["place"], dtype=np.int64)],
-        _attributes(parameter, d.parameters[parameter]),
-    )  # fmt: skip
-    variables["period_number"] = ((), np.int64(period_number), {"long_name": "forcing periods (0: autonomous)"})
-    codes = np.array([list(endings).index(word) for word in ended], dtype=np.int8)
-    variables["ended"] = ("end", codes, {"long_name": "how the branch ends", **flag_attributes(endings)})
-    variables["ended_because"] = ("end", _strings(sentences), {"long_name": "sentence"})
-    coords: dict[str, Any] = {
-        parameter: ("point", _floats(values), _attributes(parameter, d.parameters[parameter])),
-        **state_coords(d),
-        **parameter_coords(d, without=parameter),
-        "indicator": ("indicator", _strings(d.indicators), {"long_name": "indicator"}),
-        "end": ("end", _strings(["first", "last"]), {"long_name": "end of the branch"}),
-    }
-    return xr.Dataset(variables, coords, dict(attrs))
-
-
 def state_coords(d: Labels) -> dict[str, Any]:
     """The states' names, with their units and symbols beside them (each state has its own)."""
     coords: dict[str, Any] = {
@@ -353,7 +233,7 @@ def state_coords(d: Labels) -> dict[str, Any]:
 
 def parameter_coords(d: Labels, without: str = "") -> dict[str, Any]:
     return {
-        name: ((), np.float64(np.nan if q.value is None else q.value), _attributes(name, q))
+        name: ((), np.float64(np.nan if q.value is None else q.value), quantity_attributes(name, q))
         for name, q in d.parameters.items()
         if name != without
     }
@@ -367,7 +247,8 @@ def _start_coords(starts: ArrayLike) -> dict[str, Any]:
     }
 
 
-def _attributes(name: str, quantity: Quantity) -> dict[str, str]:
+def quantity_attributes(name: str, quantity: Quantity) -> dict[str, str]:
+    """Long name, unit and symbol of a quantity."""
     attributes = {"long_name": name, "units": quantity.unit}
     return attributes | ({"symbol": quantity.symbol} if quantity.symbol else {})
 
