@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -139,6 +139,8 @@ class Curve:
             return None
         M = solved.monodromy
         path = self.walk.along(solved, self.shooting.split(solved.X)[1])
+        if path is None:
+            return None
         return Point(Y, found[0], solved, M, self.shooting.multipliers(M), path, found[1], iterations)
 
     def step(self, point: Point, ds: float, *, tolerance: float = DONE) -> Point | None:
@@ -148,6 +150,17 @@ class Curve:
         if found is None:
             return None
         return self.point(found[0], found[1], point.tangent, found[2])
+
+    def anchored_anew(self, point: Point) -> Point:
+        """The same point with the phase condition of an orbit without transitions put through it."""
+        shooting, z = self.shooting, point.X[: self.shooting.n]
+        field = point.solved.legs.f_begin[0] / self.size**2
+        shooting.reference = z.copy(), field / max(float(np.abs(field * self.size).max()), 1e-300)
+        row = point.solved.jacobian[-1]
+        row[:] = 0.0
+        row[: shooting.n] = shooting.reference[1]
+        found = self.tangent(point.solved, point.tangent)
+        return point if found is None else replace(point, tangent=found[0], orientation=found[1])
 
     def between(self, a: Point, b: Point, s: float) -> Point | None:
         """The point at distance s from ``a`` towards ``b``, to the last digits."""

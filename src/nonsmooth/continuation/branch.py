@@ -28,6 +28,9 @@ ENDINGS = {
     "branching": "The branch begins where it leaves another one.",
     "closed": "The branch came back to where it began.",
     "points": "The largest number of points was reached; continue the branch with continue_orbit(branch).",
+    "equilibrium": (
+        "The cycle shrinks to an equilibrium, a Hopf bifurcation: continue_equilibrium finds it to the last digit."
+    ),
     "no_convergence": (
         "Newton's method did not converge, however small the step; the orbit may end in an event that is not known "
         "here (a chatter, an infinite period)."
@@ -42,6 +45,7 @@ ENDINGS = {
 LEAST_STEP = 1e-9
 COSINE = 0.97  # of the angle between the tangents of neighbours
 SPREAD = 0.15  # chordal change of the multipliers between neighbours
+SMALL = 2e-3  # of the first orbit's size: a cycle this small is about to vanish in a Hopf bifurcation
 TURN = 1e-5  # along the branch: a fold nearer to a crossing of branches than this is that crossing
 EXPLAINS = ("short", "slow", "own", "touch", "others")
 BESIDE = 1e-6  # along the branch: nearer to a change of signature than this is the change itself
@@ -167,7 +171,10 @@ def march(curve: Curve, point: Point, limits: Limits, first_step: float) -> Marc
             continue
         found.add(curve, new)
         count += 1
-        if limits.closed is not None and _closed(limits.closed, curve, point, new):
+        if _shrunk(curve, new):
+            found.ending = "equilibrium"
+            break
+        if limits.closed is not None and count > 2 and _closed(limits.closed, curve, point, new):
             found.ending = "closed"
             break
         easy = 1.0 + 0.8 * min(1.0, max(0.0, (cosine - COSINE) / (1 - COSINE))) * (new.iterations <= 4)
@@ -177,6 +184,8 @@ def march(curve: Curve, point: Point, limits: Limits, first_step: float) -> Marc
             easy = min(easy, 0.7)
         ds = min(ds * easy, limits.largest)
         point, numbers, violation = new, numbers_new, violation_new
+        if curve.shooting.reference is not None:
+            point = curve.anchored_anew(point)
     return found
 
 
@@ -211,6 +220,14 @@ def _first_met(
     first = min(s for _, s, _ in located)
     together = [event for event in located if event[1] <= first + BESIDE]
     return sorted(together, key=lambda event: EXPLAINS.index(event[0]))
+
+
+def _shrunk(curve: Curve, point: Point) -> bool:
+    """Whether an autonomous orbit has all but shrunk to an equilibrium."""
+    if curve.shooting.forced or curve.shooting.m:
+        return False
+    swing = (point.path.maximum - point.path.minimum) / curve.size[: len(point.path.maximum)]
+    return bool(swing.max() < SMALL)
 
 
 def _at_edge(curve: Curve, a: Point, b: Point, edge: float) -> Point | None:
@@ -315,7 +332,7 @@ def _closed(begin: tuple[Curve, Point], curve: Curve, a: Point, b: Point) -> boo
     step = b.Y - a.Y
     x = float(step @ (first_Y - a.Y)) / float(step @ step)
     near = float(np.abs(first_Y - a.Y - x * step).max())
-    return 0.0 < x <= 1.0 and near < 0.3 * float(np.abs(step).max()) and np.abs(step).max() < 0.2
+    return 1e-9 < x <= 1.0 and near < 0.3 * float(np.abs(step).max()) and np.abs(step).max() < 0.2
 
 
 def _reason(curve: Curve, point: Point) -> str:

@@ -36,6 +36,7 @@ def signature_from(data: Any) -> Signature:
 
 def branch_dataset(system: System, record: BranchRecord, options: dict[str, Any]) -> xr.Dataset:
     """The branch as a Dataset with the dims ``point``, ``state``, ``multiplier``, ``special`` (and ``unknown``, ``end``)."""
+    from nonsmooth.results.branches import branch
     from nonsmooth.results.labels import labels_of
     from nonsmooth.results.provenance import provenance
     

@@ -123,6 +123,9 @@ def _polished(system: System, guesses: list[Guess], given: bool, unstable: bool)
             continue
         walk = Walk(shooting)
         path = walk.along(solved, shooting.split(solved.X)[1])
+        if path is None:
+            reasons.append(("no_convergence", f"the {name} orbit found could not be followed"))
+            continue
         clearance = walk.clearance(path, len(system.indicators))
         noise = NOISE * float(guess.size.max())
         virtual = bool((path.violation() < -noise).any())

@@ -96,8 +96,8 @@ class Walk:
         """Over the conditional crossings: no corner to watch."""
         return np.array(self.shooting.alone, dtype=bool)[self.conditional]
 
-    def along(self, solved: Solved, states: FloatArray) -> Path:
-        """Walk along the visits of a solved orbit; ``states`` (m + 1, n_z) begin them."""
+    def along(self, solved: Solved, states: FloatArray) -> Path | None:
+        """Walk along the visits of a solved orbit; ``states`` (m + 1, n_z) begin them. None where the states grow without bound."""
         from nonsmooth.kernels.orbit_path import follow
 
         m, n_t = self.shape
@@ -105,11 +105,13 @@ class Walk:
         inner, place, end = np.empty((m, n_t)), np.empty((m, n_t)), np.empty((m, n_t))
         which, slope = np.empty((m, n_t), dtype=np.int64), np.empty((m, 2))
         tau = np.diff(solved.times)
-        follow(
+        status = follow(
             self.functions, ORDER, RTOL, self.weight, self.lacking, self.first, self.outgoing, self.transitions,
             self.rows, solved.values, self.modes, solved.times[:-1], tau, np.ascontiguousarray(states), self.fired,
             self.fired_row, *self.scratch, extremes, inner, place, which, end, slope,
         )  # fmt: skip
+        if status:
+            return None
         at = int(inner.argmax()) if n_t else 0
         touched = (at // n_t, at % n_t) if n_t else (0, 0)
         own = np.where(self.alone, np.inf, end[self.inside[0], self.inside[1]])

@@ -20,6 +20,7 @@ __all__ = ["follow"]
 
 PARTS = 8  # of a step of the series: an extremum shows as a change of the slope's sign over one part
 BISECTIONS = 60
+ROUNDING = 1e-13  # of an indicator's size
 MOST_STEPS = 100_000
 
 _i, _f = types.int64, types.float64
@@ -100,7 +101,7 @@ def follow(
         Time derivative of the signed indicator that is zero at the end, just before it, and its value.
     """
     jet = jet_at(functions[0])
-    n, n_indicators, n_p = weight.shape[0], scale.shape[0], values.shape[0]
+    n, n_p = weight.shape[0], values.shape[0]
     log_rtol = ln(rtol)
     for i in range(n_p):
         q[i] = values[i]
@@ -120,9 +121,8 @@ def follow(
             if left <= 0.0 and (steps > 0 or left < 0.0):
                 break
             jet(mode, order, t, u, q, C, W)
-            for i in range(n_indicators):
-                scale[i] = fabs(C[n + i, 0])
-            h = min(step_length(C, order, n, n_indicators, u, weight, scale, log_rtol), left)
+            # An indicator is zero where a visit begins: its size says nothing, the states decide alone.
+            h = min(step_length(C, order, n, 0, u, weight, scale, log_rtol), left)
             if not (h >= 0.0):
                 return DIVERGED
             steps += 1
@@ -163,7 +163,12 @@ def follow(
                             else:
                                 hi = c
                         v, _, row = margin(C, order, n, transitions, rows, k, lo, -1)
-                        if v > inner[leg, k]:
+                        size = fabs(C[n + rows[row, 0], 0])
+                        for p in range(1, order + 1):
+                            size = max(size, fabs(C[n + rows[row, 0], p]) * h**p)
+                        # A visit may begin where the indicator and its slope are zero: rounding is no maximum.
+                        begins = steps == 1 and a == 0.0 and fabs(v) <= ROUNDING * size
+                        if not begins and v > inner[leg, k]:
                             inner[leg, k], place[leg, k], which[leg, k] = v, t + lo, row
                     a, rising = b, s
             left -= h
