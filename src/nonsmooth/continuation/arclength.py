@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.continuation.path import Walk
+from nonsmooth.continuation.solve import determinant, solve
 
 if TYPE_CHECKING:
     from nonsmooth.continuation.path import Path
@@ -95,7 +96,7 @@ class Curve:
                 if singular:
                     step = np.linalg.lstsq(self._bordered(solved, border), right, rcond=1e-7)[0]
                 else:
-                    step = np.linalg.solve(self._bordered(solved, border), right)
+                    step = solve(self._bordered(solved, border), right)
             except np.linalg.LinAlgError:
                 return None
             length = float(np.abs(step).max())
@@ -116,7 +117,7 @@ class Curve:
         right = np.zeros(self.n)
         right[-1] = 1.0
         try:
-            t = np.linalg.solve(matrix, right)
+            t = solve(matrix, right)
         except np.linalg.LinAlgError:
             return None
         length = np.sqrt(t @ t)
@@ -124,7 +125,7 @@ class Curve:
             return None
         t /= length
         matrix[-1] = t
-        return t, float(np.linalg.slogdet(matrix)[0])
+        return t, determinant(matrix)[0]
 
     def null_vectors(self, solved: Solved, tolerance: float = 1e-7) -> FloatArray:
         """Orthonormal vectors (k, N + 1) that the scaled Jacobian takes to zero."""

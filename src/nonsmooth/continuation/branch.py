@@ -13,6 +13,7 @@ from nonsmooth.continuation.change import changed, resumed
 from nonsmooth.continuation.detection import SMOOTH, Tests, locate
 from nonsmooth.continuation.grazing import Graze, graze
 from nonsmooth.continuation.path import VIOLATIONS
+from nonsmooth.continuation.solve import determinant
 from nonsmooth.errors import SystemDefinitionError
 
 if TYPE_CHECKING:
@@ -45,6 +46,7 @@ ENDINGS = {
 LEAST_STEP = 1e-9
 COSINE = 0.97  # of the angle between the tangents of neighbours
 SPREAD = 0.15  # chordal change of the multipliers between neighbours
+NOTHING = 2e-2  # of the first orbit's size: a fold there is the cycle's birth
 SMALL = 2e-3  # of the first orbit's size: a cycle this small is about to vanish in a Hopf bifurcation
 TURN = 1e-5  # along the branch: a fold nearer to a crossing of branches than this is that crossing
 EXPLAINS = ("short", "slow", "own", "touch", "others")
@@ -105,6 +107,8 @@ def march(curve: Curve, point: Point, limits: Limits, first_step: float) -> Marc
     """Follow a branch from a point along its tangent until it ends; the first row is the point after it."""
     found = March()
     ds = first_step
+    if curve.shooting.reference is not None:
+        point = curve.anchored_anew(point)
     tests = Tests(curve)
     numbers, violation = tests.smooth(point), point.path.violation()
     count = 0
@@ -154,6 +158,10 @@ def march(curve: Curve, point: Point, limits: Limits, first_step: float) -> Marc
         for kind, s, special in _smooth_events(curve, point, new, tests, numbers, numbers_new, stop, reason):
             del s
             found.mark(kind, curve, special)
+            if kind in ("hopf", "flip_end"):
+                found.ending = "equilibrium" if kind == "hopf" else "branching"
+                found.special[-1].kind = "hopf" if kind == "hopf" else "flip"
+                return found
         if reason == "range":
             found.add(curve, stop_point)
             found.ending = "range"
@@ -224,10 +232,15 @@ def _first_met(
 
 def _shrunk(curve: Curve, point: Point) -> bool:
     """Whether an autonomous orbit has all but shrunk to an equilibrium."""
+    return _swing(curve, point) < SMALL
+
+
+def _swing(curve: Curve, point: Point) -> float:
+    """The range of an autonomous orbit without transitions, in units of the first one's; else 1."""
     if curve.shooting.forced or curve.shooting.m:
-        return False
+        return 1.0
     swing = (point.path.maximum - point.path.minimum) / curve.size[: len(point.path.maximum)]
-    return bool(swing.max() < SMALL)
+    return float(np.nanmax(swing))
 
 
 def _at_edge(curve: Curve, a: Point, b: Point, edge: float) -> Point | None:
@@ -259,21 +272,21 @@ def _smooth_events(
             continue
         found.append((_name(kind, curve, point), s, point))
     # A branch that crosses another one where the parameter turns is one event, not two.
-    crossings = [s for kind, s, _ in found if kind in ("pitchfork", "branch_point")]
+    crossings = [s for kind, s, _ in found if kind in ("pitchfork", "branch_point", "flip_end")]
     found = [event for event in found if event[0] != "fold" or all(abs(event[1] - s) > TURN for s in crossings)]
     return sorted(found, key=lambda event: event[1])
 
 
 def _branch_point(curve: Curve, a: Point, b: Point, tests: Tests) -> tuple[float, Point] | None:
     """A branch point: the bordered determinant itself, scaled, goes through zero."""
-    def determinant(point: Point) -> float:
+    def number(point: Point) -> float:
         matrix = np.vstack([point.solved.jacobian * curve.weights, point.tangent])
-        sign, size = np.linalg.slogdet(matrix)
+        sign, size = determinant(matrix)
         return float(sign * np.exp(size - reference))
 
     reference = 0.0
-    reference = float(np.linalg.slogdet(np.vstack([a.solved.jacobian * curve.weights, a.tangent]))[1])
-    return locate(curve, a, b, determinant)
+    reference = determinant(np.vstack([a.solved.jacobian * curve.weights, a.tangent]))[1]
+    return locate(curve, a, b, number)
 
 
 def _has_pair(point: Point, tests: Tests) -> bool:
@@ -283,11 +296,15 @@ def _has_pair(point: Point, tests: Tests) -> bool:
 
 
 def _name(kind: str, curve: Curve, point: Point) -> str:
-    """A branch point on a symmetric orbit that breaks the symmetry is a pitchfork."""
+    """What a crossing of branches is: the flip where a doubled orbit is born, a pitchfork where a symmetry breaks."""
+    if kind == "fold" and _swing(curve, point) < NOTHING:
+        return "hopf"
     if kind != "branch":
         return kind
-    from nonsmooth.continuation.switching import breaks_symmetry
+    from nonsmooth.continuation.switching import breaks_symmetry, is_doubled
 
+    if is_doubled(curve, point):
+        return "flip_end"
     return "pitchfork" if breaks_symmetry(curve, point) else "branch_point"
 
 

@@ -170,7 +170,7 @@ def _near(curve: Curve, X: FloatArray) -> Point | None:
 
 
 def _size(maximum: FloatArray, minimum: FloatArray, system: System) -> FloatArray:
-    half = np.maximum(0.5 * (maximum - minimum), 1e-3 * system.scale_vector())
+    half = np.maximum(np.nan_to_num(0.5 * (maximum - minimum)), 1e-3 * system.scale_vector())
     return np.concatenate([half, np.ones(len(system.memory))])
 
 

@@ -47,7 +47,7 @@ class Tests:
 
     def __init__(self, curve: Curve) -> None:
         shooting = curve.shooting
-        self.n, self.forced, self.free = shooting.n, shooting.forced, len(shooting.free)
+        self.n, self.forced = shooting.n, shooting.forced
         self.eye = np.eye(shooting.n)
 
     def smooth(self, point: Point) -> NDArray[np.float64]:
@@ -61,11 +61,10 @@ class Tests:
         return np.array([point.tangent[-1], point.orientation, flip, self.torus(point)])
 
     def torus(self, point: Point) -> float:
-        """prod (mu_i mu_j - 1) over pairs, without the multipliers that are 1 by nature; NaN where there is no pair."""
+        """prod (mu_i mu_j - 1) over pairs, without an autonomous orbit's own 1; NaN where there is no pair."""
         mu = point.multipliers
-        trivial = self.free + (0 if self.forced else 1)
-        if trivial:
-            mu = mu[np.argsort(np.abs(mu - 1.0), kind="stable")[trivial:]]
+        if not self.forced:
+            mu = mu[np.argsort(np.abs(mu - 1.0), kind="stable")[1:]]
         if len(mu) < 2:
             return np.nan
         if len(mu) == 2:

@@ -52,12 +52,14 @@ def graze(curve: Curve, point: Point, first: Point, change: Change) -> Graze | N
         visits, times, states = change.signature.visits, change.times, change.states
     product = _Product(shooting.flow, point.solved.values, visits, times, states, float(point.solved.times[-1]), change)
     M, M_far, M_near = product(0.0), product(ASIDE), product(0.5 * ASIDE)
+    for matrix in (M, M_far, M_near):
+        matrix[shooting.free], matrix[:, shooting.free] = 0.0, 0.0
     if not (np.isfinite(M).all() and np.isfinite(M_far).all() and np.isfinite(M_near).all()):
         return None
     bounded = bool(np.abs(M_near).max() < 1.5 * np.abs(M_far).max())
     M_plus = 2 * M_near - M_far if bounded else M_near
     one = np.eye(len(M))
-    if shooting.forced and not shooting.free:
+    if shooting.forced:
         same = bool(np.linalg.det(one - M) * np.linalg.det(one - M_plus) > 0)
     else:  # a multiplier 1 by nature makes det(I - M) vanish: the parameter's own turn tells the side
         same = float(point.tangent[-1]) * float(first.X[-1] - point.X[-1]) > 0.0

@@ -132,15 +132,10 @@ def _needs_tolerance(system: Any) -> bool:
     return engine_for(system).name != "exact"
 
 
-def stable_by(multipliers: NDArray[np.complex128], forced: bool, held: int = 0) -> bool:
-    """Whether all multipliers lie inside the unit circle.
-
-    ``held`` of them are exactly 1: constants that nothing on the orbit sets; an autonomous orbit has one more.
-    """
-    trivial = held + (0 if forced else 1)
-    if trivial:
-        nearest = np.argsort(np.abs(multipliers - 1.0), kind="stable")[trivial:]
-        multipliers = multipliers[nearest]
+def stable_by(multipliers: NDArray[np.complex128], forced: bool) -> bool:
+    """Whether all multipliers (of an autonomous orbit: all but its own 1) lie inside the unit circle."""
+    if not forced:
+        multipliers = multipliers[np.argsort(np.abs(multipliers - 1.0), kind="stable")[1:]]
     return bool(not len(multipliers) or np.abs(multipliers).max() < 1.0 - EDGE)
 
 
@@ -159,7 +154,7 @@ def orbit_of(shooting: Shooting, solved: Solved, path: Path, clearance: FloatArr
         memory=states[0, n_u:].copy(), period=float(solved.times[-1]), period_number=shooting.period_number,
         signature=shooting.signature, crossing_times=times.copy(), crossing_states=states[1:].copy(),
         monodromy_matrix=M, floquet_multipliers=multipliers,
-        stable=stable_by(multipliers, shooting.forced, len(shooting.free)),
+        stable=stable_by(multipliers, shooting.forced),
         maximum=path.maximum.copy(), minimum=path.minimum.copy(),
         clearance=dict(zip(system.indicators, map(float, clearance), strict=True)), virtual=virtual,
         reference=shooting.reference,

@@ -121,6 +121,7 @@ class Walk:
             others = rest[np.arange(m - 1), other]
         else:
             other, others = np.zeros(m - 1, dtype=np.int64), np.full(m - 1, -np.inf)
+        extremes[~np.isfinite(extremes)] = np.nan  # states that no visit has
         return Path(
             extremes[0], extremes[1], inner, place, which, float(inner[touched]) if n_t else -np.inf, touched,
             own, others, other, slope[self.conditional, 0], np.where(self.fixed, np.inf, tau),

@@ -73,7 +73,7 @@ def point_record(curve: Curve, point: Point) -> PointRecord:
     return PointRecord(
         float(point.X[-1]), shooting.signature, point.X, point.tangent * curve.scale, shooting.at_section,
         point.X[:n_u], path.maximum, path.minimum, float(point.solved.times[-1]), point.multipliers,
-        stable_by(point.multipliers, shooting.forced, len(shooting.free)),
+        stable_by(point.multipliers, shooting.forced),
         curve.walk.clearance(path, len(shooting.system.indicators)),
     )  # fmt: skip
 
@@ -99,8 +99,7 @@ def from_march(found: March, offset: int = 0) -> tuple[list[PointRecord], list[S
         record = special_record(one)
         if one.graze is not None:  # exactly at the graze: the multipliers of the side without contact
             points[one.row].multipliers = one.graze.multipliers_free
-            shooting = one.curve.shooting
-            points[one.row].stable = stable_by(one.graze.multipliers_free, shooting.forced, len(shooting.free))
+            points[one.row].stable = stable_by(one.graze.multipliers_free, one.curve.shooting.forced)
         record.place += offset
         special.append(record)
     return points, special

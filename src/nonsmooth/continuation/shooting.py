@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.continuation.signature import Signature
+from nonsmooth.continuation.solve import solve
 from nonsmooth.flow.variational import VariationalFlow
 
 if TYPE_CHECKING:
@@ -45,13 +46,17 @@ class Solved:
     legs: Legs
     jumps: list[Jump]
     values: FloatArray
+    free: list[int]
 
     @property
     def monodromy(self) -> FloatArray:
-        """Derivative of the return map (autonomous: with the trivial multiplier 1)."""
+        """Derivative of the return map (autonomous: with the trivial multiplier 1; zero for what is constant)."""
         M = self.legs.Phi[0]
         for i, jump in enumerate(self.jumps):
             M = self.legs.Phi[i + 1] @ (jump.saltation @ M)
+        if self.free:
+            M = M.copy()
+            M[self.free], M[:, self.free] = 0.0, 0.0
         return np.asarray(M)
 
 
@@ -211,7 +216,7 @@ class Shooting:
         if not self.forced:
             J[:n, size - 1] += legs.f_end[m]
             self._anchor(F, J, X, t, z[0])
-        return Solved(X, F, J, times, legs, jumps, values)
+        return Solved(X, F, J, times, legs, jumps, values, self.free)
 
     def _anchor(self, F: FloatArray, J: FloatArray, X: FloatArray, t: FloatArray, z0: FloatArray) -> None:
         """The phase condition of an autonomous orbit."""
@@ -295,7 +300,7 @@ class Shooting:
             if not np.isfinite(solved.residual).all():
                 return None
             try:
-                step = np.linalg.solve(solved.jacobian[:, :size] * scale[:size], -solved.residual)
+                step = solve(solved.jacobian[:, :size] * scale[:size], -solved.residual)
             except np.linalg.LinAlgError:
                 return None
             length = float(np.abs(step).max())

@@ -13,7 +13,7 @@ from nonsmooth.continuation.shooting import Shooting
 if TYPE_CHECKING:
     from nonsmooth.continuation.arclength import Point
 
-__all__ = ["breaks_symmetry", "doubled", "emanating", "other_direction"]
+__all__ = ["breaks_symmetry", "doubled", "emanating", "is_doubled", "other_direction"]
 
 FloatArray = NDArray[np.float64]
 
@@ -53,6 +53,20 @@ def other_direction(curve: Curve, X: FloatArray, along: FloatArray | None) -> Fl
     return None if length < 1e-12 else vector / length
 
 
+def is_doubled(curve: Curve, point: Point) -> bool:
+    """Whether an orbit is a shorter one gone round twice: where a doubled branch meets the flip it comes from."""
+    shooting = curve.shooting
+    visits, m = shooting.signature.visits, shooting.m
+    if m % 2 or (shooting.forced and shooting.period_number % 2):
+        return False
+    word = [(v.mode, v.transition, v.row) for v in visits[:-1]]
+    if word[: m // 2] != word[m // 2 :]:
+        return False
+    half = _state_at(curve, point, 0.5 * float(point.solved.times[-1]))
+    here = point.X[: len(half)]
+    return bool(np.abs((half - here) / curve.size[: len(half)]).max() < 1e-5)
+
+
 def breaks_symmetry(curve: Curve, point: Point) -> bool:
     """Whether an orbit at a branch point is its own mirror image under the system's declared symmetry."""
     symmetry = curve.shooting.system.symmetry
@@ -66,14 +80,12 @@ def breaks_symmetry(curve: Curve, point: Point) -> bool:
     # u(t) -> map(u(t + shift T)): compare the section point with the mapped state one shift later.
     period = system.period_at(point.solved.values) or float(point.solved.times[-1])
     state = _state_at(curve, point, symmetry.shift * period)
-    if state is None:
-        return False
     mapped = np.array(image(0.0, list(state), list(point.solved.values)), dtype=float)
     here = point.X[: len(traced.u)]
     return bool(np.abs((mapped - here) / curve.size[: len(here)]).max() < 1e-6 and shooting.period_number % 2 == 1)
 
 
-def _state_at(curve: Curve, point: Point, t: float) -> FloatArray | None:
+def _state_at(curve: Curve, point: Point, t: float) -> FloatArray:
     """The state at a time after the section."""
     times, states = curve.shooting.split(point.X)
     begins = np.concatenate([[0.0], times])
