@@ -14,6 +14,7 @@ from nonsmooth.continuation.detection import SMOOTH, Tests, locate
 from nonsmooth.continuation.grazing import Graze, graze
 from nonsmooth.continuation.path import VIOLATIONS
 from nonsmooth.continuation.solve import determinant
+from nonsmooth.continuation.switching import is_doubled
 from nonsmooth.errors import SystemDefinitionError
 
 if TYPE_CHECKING:
@@ -44,7 +45,7 @@ ENDINGS = {
     "physical": "Beyond this value the equations do not allow the parameter; the range was cut there.",
 }
 LEAST_STEP = 1e-9
-COSINE = 0.97  # of the angle between the tangents of neighbours
+COSINE = 0.98  # of the angle between the tangents of neighbours
 SPREAD = 0.15  # chordal change of the multipliers between neighbours
 NOTHING = 2e-2  # of the first orbit's size: a fold there is the cycle's birth
 SMALL = 2e-3  # of the first orbit's size: a cycle this small is about to vanish in a Hopf bifurcation
@@ -185,7 +186,10 @@ def march(curve: Curve, point: Point, limits: Limits, first_step: float) -> Marc
         if limits.closed is not None and count > 2 and _closed(limits.closed, curve, point, new):
             found.ending = "closed"
             break
-        easy = 1.0 + 0.8 * min(1.0, max(0.0, (cosine - COSINE) / (1 - COSINE))) * (new.iterations <= 4)
+        easy = 2.0 if new.iterations <= 3 else 1.3
+        bend = 1.0 - cosine
+        if bend > 0.3 * (1.0 - COSINE):
+            easy = min(easy, float(np.sqrt(0.5 * (1.0 - COSINE) / bend)))
         if spread > 0.3 * SPREAD:
             easy = min(easy, SPREAD / max(spread, 1e-12) * 0.6)
         if new.iterations >= 6:
@@ -301,7 +305,7 @@ def _name(kind: str, curve: Curve, point: Point) -> str:
         return "hopf"
     if kind != "branch":
         return kind
-    from nonsmooth.continuation.switching import breaks_symmetry, is_doubled
+    from nonsmooth.continuation.switching import breaks_symmetry
 
     if is_doubled(curve, point):
         return "flip_end"
@@ -323,6 +327,10 @@ def _change(
                            graze=graze(curve, point, first, change))  # fmt: skip
             elif change.kind == "corner":
                 found.mark("corner", curve, point, indicator=change.indicator)
+            if change.kind != "section" and is_doubled(fresh, first) and not is_doubled(curve, point):
+                # Beyond the graze at which a doubled orbit is born there is only the shorter one, gone round twice.
+                found.ending = "branching"
+                return None
             return fresh, first, ds
     kind, _, point = met[0]
     name = "grazing" if kind in ("touch", "slow", "short") else "corner"

@@ -42,7 +42,7 @@ def continue_orbit(
     parameter: str | None = None,
     range: tuple[float, float] | None = None,  # noqa: A002
     *,
-    step: float = 0.01,
+    step: float = 0.05,
     points: int = 2000,
 ) -> xr.Dataset:
     """Follow a periodic orbit in a parameter.
@@ -289,19 +289,32 @@ def _switched(start: xr.Dataset, name: str | None, given: Any, largest: float, m
     sentences = [_sentence(one, bounds, own, low) for one in marches]
     forward = from_march(marches[0])
     last = [point_record(*begun[0])]
+    origin = [_origin(*ways[0])]
+    mark = SpecialRecord(kind, 0)
     if len(begun) == 1:
-        points, special = joined(([], []), last, forward)
+        points, special = joined(([], []), [*origin, *last], forward)
         said = (f"The branch begins at the {kind}.", sentences[0])
         endings = ("branching", marches[0].ending)
     else:
         back = from_march(marches[1])
+        mark.place = len(back[0]) + 1
         middle = [point_record(*begun[1])]
         middle[0].tangent = -middle[0].tangent
-        points, special = joined(back, [*middle, *last], forward)
+        points, special = joined(back, [*middle, *origin, *last], forward)
         endings, said = (marches[1].ending, marches[0].ending), (sentences[1], sentences[0])
+    special = sorted([*special, mark], key=lambda one: one.place)
     record = BranchRecord(own, (low, high), number, points, special, endings, said)
     return branch_dataset(system, record, {"parameter": own, "range": (low, high), "step": largest, "points": most,
                                            "from": kind})  # fmt: skip
+
+
+def _origin(curve: Curve, Y: FloatArray, direction: FloatArray) -> PointRecord:
+    """The special point itself, as a point of the branch that leaves it."""
+    solved = curve.shooting.evaluate(Y * curve.scale)
+    path = curve.walk.along(solved, curve.shooting.split(solved.X)[1])
+    assert path is not None
+    M = solved.monodromy
+    return point_record(curve, Point(Y, direction, solved, M, curve.shooting.multipliers(M), path, 0.0, 0))
 
 
 def _special_row(start: xr.Dataset) -> tuple[System, str, str, PointRecord, int, Any]:

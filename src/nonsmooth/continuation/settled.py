@@ -21,6 +21,7 @@ __all__ = ["NEAR", "Guess", "forced_guesses", "settle_forced"]
 
 FloatArray = NDArray[np.float64]
 CHOICE = 6  # candidates tried: period numbers, or returning points for a given one
+CLOSED = 1e-8  # a return nearer than this has closed: the shortest such period comes first
 NEAR = 0.2  # of the motion's size: a return farther off than this is no candidate
 
 
@@ -79,7 +80,7 @@ def forced_guesses(system: System, settled: Settled, period_number: int | None, 
         gaps = np.array([np.abs(points[last] - points[last - p]).max() for p in range(1, most + 1)])
         starts = [(p, last, float(gaps[p - 1])) for p in range(1, most + 1) if gaps[p - 1] <= NEAR]
         # Chaos comes near its beginning again and again: the nearest few are tried.
-        starts = sorted(sorted(starts, key=lambda start: start[2])[:CHOICE])
+        starts = sorted(sorted(starts, key=lambda start: (max(start[2], CLOSED), start[0]))[:CHOICE])
     for p, i, gap in starts:
         guess = _read_round(system, settled, p, i, gap)
         if guess is not None:

@@ -64,7 +64,7 @@ def is_doubled(curve: Curve, point: Point) -> bool:
         return False
     half = _state_at(curve, point, 0.5 * float(point.solved.times[-1]))
     here = point.X[: len(half)]
-    return bool(np.abs((half - here) / curve.size[: len(half)]).max() < 1e-5)
+    return bool(np.abs((half - here) / curve.size[: len(half)]).max() < 1e-4)
 
 
 def breaks_symmetry(curve: Curve, point: Point) -> bool:
