@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from nonsmooth.continuation.detection import SMOOTH, Tests, locate
 from nonsmooth.continuation.grazing import Graze, graze
 from nonsmooth.continuation.path import VIOLATIONS
 from nonsmooth.continuation.solve import determinant
-from nonsmooth.continuation.switching import is_doubled
+from nonsmooth.continuation.switching import branch_point, is_doubled
 from nonsmooth.errors import SystemDefinitionError
 
 if TYPE_CHECKING:
@@ -290,7 +290,18 @@ def _branch_point(curve: Curve, a: Point, b: Point, tests: Tests) -> tuple[float
 
     reference = 0.0
     reference = determinant(np.vstack([a.solved.jacobian * curve.weights, a.tangent]))[1]
-    return locate(curve, a, b, number)
+    there = locate(curve, a, b, number)
+    if there is None:
+        return None
+    Y = branch_point(curve, there[1].Y)
+    if Y is None or np.abs(Y - there[1].Y).max() > np.abs(b.Y - a.Y).max():
+        return there
+    solved = curve.shooting.evaluate(Y * curve.scale)
+    point = curve.point(solved, Y, there[1].tangent)
+    if point is None:
+        return there
+    # Any direction in the plane of both branches is null here: keep that of the branch.
+    return float(a.tangent @ (Y - a.Y)), replace(point, tangent=there[1].tangent)
 
 
 def _has_pair(point: Point, tests: Tests) -> bool:

@@ -13,7 +13,7 @@ from nonsmooth.continuation.shooting import Shooting
 if TYPE_CHECKING:
     from nonsmooth.continuation.arclength import Point
 
-__all__ = ["breaks_symmetry", "doubled", "emanating", "is_doubled", "other_direction"]
+__all__ = ["branch_point", "breaks_symmetry", "doubled", "emanating", "is_doubled", "other_direction"]
 
 FloatArray = NDArray[np.float64]
 
@@ -51,6 +51,47 @@ def other_direction(curve: Curve, X: FloatArray, along: FloatArray | None) -> Fl
         vector = np.array([-inside[1], inside[0]]) @ plane
     length = float(np.linalg.norm(vector))
     return None if length < 1e-12 else vector / length
+
+
+def branch_point(curve: Curve, Y: FloatArray, *, tolerance: float = 1e-11, most: int = 12) -> FloatArray | None:
+    r"""The crossing of branches near Y, to the last digits (Moore's system, which is regular there).
+
+    .. math:: F(Y) + \beta \psi_0 = 0, \quad F_Y^T \psi = 0, \quad \psi_0 \cdot \psi = 1
+
+    in Y, psi and beta, with :math:`\beta = 0` at the solution; second derivatives by central differences.
+    """
+    shooting, n = curve.shooting, len(Y) - 1
+
+    def scaled(Z: FloatArray) -> tuple[FloatArray, FloatArray]:
+        solved = shooting.evaluate(Z * curve.scale)
+        return solved.residual * curve.rows, solved.jacobian * curve.weights
+
+    _, J = scaled(Y)
+    psi = np.linalg.svd(J)[0][:, -1]
+    first, beta, step = psi.copy(), 0.0, 1e-5
+    for _ in range(most):
+        F, J = scaled(Y)
+        second = np.empty((n + 1, n + 1))
+        for j in range(n + 1):
+            moved = np.zeros(n + 1)
+            moved[j] = step
+            second[:, j] = (scaled(Y + moved)[1] - scaled(Y - moved)[1]).T @ psi / (2 * step)
+        matrix = np.zeros((2 * n + 2, 2 * n + 2))
+        matrix[:n, : n + 1], matrix[:n, -1] = J, first
+        matrix[n : 2 * n + 1, : n + 1], matrix[n : 2 * n + 1, n + 1 : 2 * n + 1] = second, J.T
+        matrix[-1, n + 1 : 2 * n + 1] = first
+        right = np.concatenate([F + beta * first, J.T @ psi, [first @ psi - 1.0]])
+        try:
+            change = np.linalg.solve(matrix, right)
+        except np.linalg.LinAlgError:
+            return None
+        Y, psi, beta = Y - change[: n + 1], psi - change[n + 1 : 2 * n + 1], beta - change[-1]
+        size = float(np.abs(change[: n + 1]).max())
+        if not size < 0.1:
+            return None
+        if size < tolerance:
+            return Y if abs(beta) < 1e-8 else None
+    return None
 
 
 def is_doubled(curve: Curve, point: Point) -> bool:
