@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from nonsmooth import models as models
     from nonsmooth import plot as plot
+    from nonsmooth.analysis.lyapunov import lyapunov as lyapunov
     from nonsmooth.analysis.response import frequency_response as frequency_response
     from nonsmooth.analysis.sweep import sweep as sweep
     from nonsmooth.continuation.continue_orbit import continue_orbit as continue_orbit
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from nonsmooth.flow.poincare import poincare as poincare
     from nonsmooth.flow.sections import Poincare as Poincare
     from nonsmooth.flow.sections import Stroboscopic as Stroboscopic
+    from nonsmooth.flow.sensitivity import sensitivity as sensitivity
     from nonsmooth.flow.simulate import simulate as simulate
     from nonsmooth.flow.starts import random_starts as random_starts
     from nonsmooth.identification.chain import identify as identify
@@ -48,12 +50,14 @@ _WHERE = {
     "Band": "system.mode",
     "where": "system.scalar",
     "simulate": "flow.simulate",
+    "sensitivity": "flow.sensitivity",
     "poincare": "flow.poincare",
     "Stroboscopic": "flow.sections",
     "Poincare": "flow.sections",
     "random_starts": "flow.starts",
     "sweep": "analysis.sweep",
     "frequency_response": "analysis.response",
+    "lyapunov": "analysis.lyapunov",
     "find_orbit": "continuation.find",
     "Orbit": "continuation.orbit",
     "continue_orbit": "continuation.continue_orbit",

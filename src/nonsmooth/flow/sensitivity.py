@@ -194,7 +194,7 @@ def sensitivity(
         parameter_part = parameter_part + np.outer(found.legs.f_end[-1], periods * gradient)
     from nonsmooth.results.labels import labels_of
     from nonsmooth.results.provenance import provenance
-    from nonsmooth.results.schema import derivatives_of_run
+    from nonsmooth.results.variations import derivatives_of_run
 
     labels = labels_of(system)
     options = {

@@ -19,10 +19,14 @@ if TYPE_CHECKING:
 
     from nonsmooth.system.system import System
 
-__all__ = ["check_complete", "run_length", "simulate"]
+__all__ = ["BEYOND_STOP", "check_complete", "run_length", "simulate"]
 
 SAMPLES_PER_PERIOD = 256
 SAMPLES = 4096
+BEYOND_STOP = (
+    "the start lies beyond a stop: a transition with a reset holds there already; "
+    "start on the admissible side of its indicator"
+)
 
 
 def simulate(
@@ -152,11 +156,7 @@ def check_complete(log: Log, system: System, state: State, period: float | None)
     from nonsmooth.results.statuses import by_code
 
     if log.status == codes.BEYOND_STOP:
-        message = (
-            "the start lies beyond a stop: a transition with a reset holds there already; "
-            "start on the admissible side of its indicator"
-        )
-        name = "beyond_stop"
+        message, name = BEYOND_STOP, "beyond_stop"
     else:
         status = by_code(log.status)
         message, name = status.sentence, status.name

@@ -76,12 +76,12 @@ class VariationalFlow:
         self.n_u, self.n = len(traced.u), len(traced.u) + len(traced.m)
         self.n_active, self.n_p = len(active), len(traced.p)
         self.scale = np.concatenate([scale, np.ones(len(traced.m))])
-        self._functions = addresses(self.model.jet, self.model.field, self.model.switch)
+        self.functions = addresses(self.model.jet, self.model.field, self.model.switch)
         self._local = threading.local()
         self._touches: dict[tuple[int, int], Any] = {}
         rows = max([0, *(len(jump.rows) for jump in traced.transitions)])
         n, a = self.n, self.n_active
-        self._n_out = n + n * n + n + n * a + rows * (2 + n + a)
+        self.n_out = n + n * n + n + n * a + rows * (2 + n + a)
         self._n_result = 3 * n + n * n + n * a + a
         self._jumps = [(t.source, t.target, len(t.rows), t.at is not None) for t in traced.transitions]
         self._no_timing = np.zeros(a)
@@ -128,9 +128,9 @@ class VariationalFlow:
             np.empty((m, n)), np.empty(m), np.empty(m, dtype=np.int64),
         )  # fmt: skip
         march_legs(
-            self._functions, self.model.entries, self.model.kinds, modes, _floats(t0), _floats(tau),
+            self.functions, self.model.entries, self.model.kinds, modes, _floats(t0), _floats(tau),
             _floats(z0), _floats(values), out.z, out.Phi, out.P, out.f_begin, out.f_end, out.divergence, out.status,
-            self._work(),
+            self.scratch(),
         )  # fmt: skip
         return out
 
@@ -155,10 +155,10 @@ class VariationalFlow:
         if timed and a:
             period, gradient = self.period(values)
             timing = (t / period) * gradient
-        out, result = np.empty(self._n_out), np.empty(self._n_result)
+        out, result = np.empty(self.n_out), np.empty(self._n_result)
         row = cross(
-            self._functions, k, source, target, n_rows, row, t, _floats(z), values, timing, self.scale, out, result,
-            self._work(),
+            self.functions, k, source, target, n_rows, row, t, _floats(z), values, timing, self.scale, out, result,
+            self.scratch(),
         )  # fmt: skip
         after_r = n + n * n + n + n * a
         at = after_r + row * (2 + n + a)
@@ -207,7 +207,7 @@ class VariationalFlow:
         assert period is not None
         return sp.lambdify(p, [period, *(period.diff(p[i]) for i in self.places)], modules="math")
 
-    def _work(self) -> tuple[FloatArray, ...]:
+    def scratch(self) -> tuple[FloatArray, ...]:
         """The thread's scratch memory."""
         found: tuple[FloatArray, ...] | None = getattr(self._local, "work", None)
         if found is None:
