@@ -42,7 +42,7 @@ ENDINGS = {
         "attractor."
     ),
     "corner": "The orbit meets the corner of two boundaries, and no orbit near it goes on.",
-    "physical": "Beyond this value the equations do not allow the parameter; the range was cut there.",
+    "physical": "Beyond this value the equations do not allow the parameter: the range was cut there.",
 }
 LEAST_STEP = 1e-9
 COSINE = 0.98  # of the angle between the tangents of neighbours
@@ -76,12 +76,11 @@ class Special:
 
 @dataclass
 class March:
-    """Rows in the order of the march, special points, and the ending."""
+    """Rows in the order of the march, special points, and the ending (a key of ``ENDINGS``)."""
 
     rows: list[Row] = field(default_factory=list)
     special: list[Special] = field(default_factory=list)
     ending: str = "points"
-    detail: str = ""
 
     def add(self, curve: Curve, point: Point) -> None:
         """Append a point."""
@@ -145,7 +144,7 @@ def march(curve: Curve, point: Point, limits: Limits, first_step: float) -> Marc
                     break
                 continue
         crossed = [kind for kind, was, now in zip(VIOLATIONS, violation, violation_new, strict=True)
-                   if now < 0.0 and was >= 0.0]  # fmt: skip
+                   if now < 0.0 and (was >= 0.0 or not found.rows)]  # fmt: skip
         met = _first_met(curve, point, new, tests, crossed, stop)
         if crossed and not met and reason != "range":
             ds *= 0.25
@@ -156,8 +155,10 @@ def march(curve: Curve, point: Point, limits: Limits, first_step: float) -> Marc
         if met:
             stop, stop_point, reason = met[0][1], met[0][2], "change"
             numbers_new = tests.smooth(stop_point)
-        for kind, s, special in _smooth_events(curve, point, new, tests, numbers, numbers_new, stop, reason):
-            del s
+        for kind, _, special in _smooth_events(curve, point, new, tests, numbers, numbers_new, stop, reason):
+            if not limits.low <= float(special.X[-1]) <= limits.high:  # a fold just beyond the edge of the range
+                stop_point, reason = _edge_before_fold(curve, point, special, limits), "range"
+                break
             found.mark(kind, curve, special)
             if kind in ("hopf", "flip_end"):
                 found.ending = "equilibrium" if kind == "hopf" else "branching"
@@ -256,6 +257,12 @@ def _at_edge(curve: Curve, a: Point, b: Point, edge: float) -> Point | None:
     if float(point.tangent @ a.tangent) < 0:
         point.tangent = -point.tangent
     return point
+
+
+def _edge_before_fold(curve: Curve, point: Point, fold: Point, limits: Limits) -> Point:
+    """Where the branch leaves the range before it turns; the fold itself where they are too near to tell apart."""
+    edge = limits.low if float(fold.X[-1]) < limits.low else limits.high
+    return _at_edge(curve, point, fold, edge) or fold
 
 
 def _smooth_events(

@@ -24,7 +24,7 @@ __all__ = ["Change", "changed", "resumed"]
 
 FloatArray = NDArray[np.float64]
 COMMON = 1e-6  # scaled residual of the common orbit in the new equations
-STEPS = (1e-5, 1e-6, 1e-7, 1e-4, 1e-8)  # first steps after a change
+STEPS = (2e-6, 1e-6, 1e-7, 1e-5, 1e-4, 1e-8)  # first steps after a change
 
 
 @dataclass

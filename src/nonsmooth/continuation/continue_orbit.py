@@ -130,10 +130,10 @@ def _from_orbit(
     bounds = allowed_range(system, name, low, high)
     up, down = _both_ways(curve, first, bounds, largest, most)
     points, special = joined(from_march(down), [point_record(curve, first)], from_march(up))
+    sentences = (_sentence(down, bounds, name, (low, high)), _sentence(up, bounds, name, (low, high)))
     record = BranchRecord(
-        name, (low, high), orbit.period_number, points, special, (down.ending, up.ending),
-        (_sentence(down, bounds, name, low), _sentence(up, bounds, name, high)),
-    )  # fmt: skip
+        name, (low, high), orbit.period_number, points, special, (down.ending, up.ending), sentences
+    )
     return branch_dataset(system, record, {"parameter": name, "range": (low, high), "step": largest, "points": most})
 
 
@@ -190,14 +190,15 @@ def _curve(
     return Curve(shooting, size, orbit.period, width), X
 
 
-def _sentence(found: March, bounds: tuple[float, float], name: str, asked: float) -> str:
-    text = found.detail or ENDINGS[found.ending]
+def _sentence(found: March, bounds: tuple[float, float], name: str, asked: tuple[float, float]) -> str:
+    """How a march ended, in words; where the range was cut, that is the reason."""
     if found.ending == "range" and found.rows:
         value = float(found.rows[-1].point.X[-1])
-        at_edge = min(bounds, key=lambda edge: abs(edge - value))
-        if at_edge != asked and abs(at_edge - asked) > 1e-12 * abs(asked):
-            return f"{name} reached {value:.9g}. {text}"
-    return text
+        side = 0 if abs(value - bounds[0]) < abs(value - bounds[1]) else 1
+        if bounds[side] != asked[side]:
+            found.ending = "physical"
+            return f"{name} = {value:.6g}: {ENDINGS['physical']}"
+    return ENDINGS[found.ending]
 
 
 def _resume(
@@ -244,7 +245,8 @@ def _go_on(start: xr.Dataset, name: str | None, given: Any, largest: float, most
             continue
         more = march(curve, begin, Limits(*bounds, largest, most), min(FIRST, largest))
         ends[side] = from_march(more)
-        endings[side], sentences[side] = more.ending, _sentence(more, bounds, name, (low, high)[side])
+        sentences[side] = _sentence(more, bounds, name, (low, high))
+        endings[side] = more.ending
     middle = record.points
     n = len(ends[0][0])
     points, special = joined(ends[0], middle, ends[1])
@@ -286,7 +288,7 @@ def _switched(start: xr.Dataset, name: str | None, given: Any, largest: float, m
         raise SolveError(f"no other branch was found at this {kind}", status="no_convergence")
     marches = [march(fresh, first, Limits(*bounds, largest, most), min(FIRST, largest)) for fresh, first in begun]
     number = begun[0][0].shooting.period_number
-    sentences = [_sentence(one, bounds, own, low) for one in marches]
+    sentences = [_sentence(one, bounds, own, (low, high)) for one in marches]
     forward = from_march(marches[0])
     last = [point_record(*begun[0])]
     origin = [_origin(*ways[0])]

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 __all__ = ["SMOOTH", "Event", "Tests", "locate"]
 
+BEGUN = 1e-6
 SMOOTH = ("fold", "branch", "flip", "neimark_sacker")
 
 
@@ -86,6 +87,8 @@ def locate(curve: Curve, a: Point, b: Point, number: Callable[[Point], float]) -
     from scipy.optimize import brentq
 
     end = float(a.tangent @ (b.Y - a.Y))
+    if number(a) * number(b) > 0.0 and abs(number(a)) < BEGUN * abs(number(b)):
+        return 0.0, a  # the branch begins at the event itself
     found: dict[float, Point] = {}
 
     class _Lost(Exception):

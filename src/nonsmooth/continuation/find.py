@@ -9,7 +9,7 @@ import numpy as np
 from nonsmooth.continuation.anchor import free_anchor
 from nonsmooth.continuation.orbit import Orbit, orbit_of
 from nonsmooth.continuation.path import Walk
-from nonsmooth.continuation.settled import Guess, forced_guesses, settle_forced
+from nonsmooth.continuation.settled import CLOSED, Guess, forced_guesses, settle_forced, touching
 from nonsmooth.continuation.shooting import Shooting
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.arguments import check_system, whole_number
@@ -109,7 +109,7 @@ def failed(code: int) -> SolveError:
 def _polished(system: System, guesses: list[Guess], given: bool, unstable: bool) -> Orbit:
     """Newton from each guess; the first orbit that is admissible, near, and stable (or asked for)."""
     reasons: list[tuple[str, str]] = []
-    for guess in guesses:
+    for guess in [one for guess in guesses for one in (*touching(guess, system), guess)]:
         shooting = Shooting(system, guess.signature, guess.period_number)
         X = shooting.join(guess.times, guess.states, guess.period)
         size = np.concatenate([guess.size, np.ones(shooting.n - len(guess.size))])
@@ -139,9 +139,7 @@ def _polished(system: System, guesses: list[Guess], given: bool, unstable: bool)
             reasons.append(("not_periodic", f"the {name} orbit near the motion is unstable"))
         else:
             reasons.append(("no_convergence", f"Newton's method left the motion for a {name} orbit far from it"))
-    status = reasons[0][0]
-    if any(kind == "not_periodic" for kind, _ in reasons):
-        status = "not_periodic"
+    status = reasons[0][0] if guesses[0].gap <= CLOSED else "not_periodic"
     said = "; ".join(dict.fromkeys(text for _, text in reasons))
     raise SolveError(
         f"the motion settled on no periodic orbit that could be confirmed: {said}. Give another start, a longer "

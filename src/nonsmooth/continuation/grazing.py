@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 __all__ = ["Graze", "graze"]
 
 FloatArray = NDArray[np.float64]
-ASIDE = 1e-5  # of the period: the touch is looked at from this far before and behind
+ASIDE = 1e-6  # of the period: the touch is looked at from this far before and behind
 
 
 @dataclass
@@ -114,7 +114,13 @@ class _Product:
             rest, z = self._leg(mode, touch, end, z)
             # Phi of the last stretch before the touch belongs behind the impact, to the order of ``aside``.
             return rest @ there @ entry.saltation @ first, z
-        inside, z = self._leg(inserted[1].mode, touch - aside, touch + aside, entry.z_after)
-        leave = self.flow.jump(self.values, inserted[1].transition, touch + aside, z, inserted[1].row)
-        rest, z = self._leg(mode, touch + aside, end, leave.z_after)
+        # The way back is looked at where the touch is, unless that is a touch for it too (no damper).
+        inside, at_touch = self._leg(inserted[1].mode, touch - aside, touch, entry.z_after)
+        leave = self.flow.jump(self.values, inserted[1].transition, touch, at_touch, inserted[1].row)
+        leaves = touch
+        if abs(leave.rate) < abs(entry.rate):
+            inside, z = self._leg(inserted[1].mode, touch - aside, touch + aside, entry.z_after)
+            leaves = touch + aside
+            leave = self.flow.jump(self.values, inserted[1].transition, leaves, z, inserted[1].row)
+        rest, z = self._leg(mode, leaves, end, leave.z_after)
         return rest @ leave.saltation @ inside @ entry.saltation @ first, z

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,11 +17,12 @@ if TYPE_CHECKING:
     from nonsmooth.flow.engine import Engine
     from nonsmooth.system.system import System
 
-__all__ = ["NEAR", "Guess", "forced_guesses", "settle_forced"]
+__all__ = ["CLOSED", "NEAR", "Guess", "forced_guesses", "settle_forced", "touching"]
 
 FloatArray = NDArray[np.float64]
 CHOICE = 6  # candidates tried: period numbers, or returning points for a given one
 CLOSED = 1e-8  # a return nearer than this has closed: the shortest such period comes first
+TOUCH = 1e-6  # of the period, of the motion's size: a contact as short, an impact as weak as this may be a touch
 NEAR = 0.2  # of the motion's size: a return farther off than this is no candidate
 
 
@@ -36,6 +37,7 @@ class Guess:
     states: FloatArray  # (m + 1, n_z): at the section and after the crossings
     gap: float
     size: FloatArray  # (n_u,) half the range of each state
+    kicks: FloatArray = field(default_factory=lambda: np.full(1000, np.inf))  # change of state in each crossing, scaled
 
 
 @dataclass
@@ -103,7 +105,33 @@ def _read_round(system: System, settled: Settled, p: int, i: int, gap: float) ->
         return None
     states = np.concatenate([np.nan_to_num(log.u_after), log.memory_after], axis=1)
     signature = _signature(system, log, start, mode)
-    return Guess(p, p * period, signature, log.crossing_time, np.vstack([start, states]), gap, settled.size)
+    kicks = np.abs(np.nan_to_num(log.u_after - log.u_before) / settled.size).max(axis=1, initial=0.0)
+    return Guess(p, p * period, signature, log.crossing_time, np.vstack([start, states]), gap, settled.size, kicks)
+
+
+def touching(guess: Guess, system: System) -> list[Guess]:
+    """The same motion without contacts that are no more than a touch: an orbit at its grazing point, or none such."""
+    signature, times, states, kicks = guess.signature, guess.times, guess.states, guess.kicks
+    jumps = system.transitions
+    i = 0
+    while i < len(times):
+        visits = signature.visits
+        here = jumps[visits[i].transition]
+        if here.reset is not None and here.source == here.target and kicks[i] < TOUCH:
+            kicks = np.delete(kicks, i)
+            signature = signature.without(i, 1)
+            times, states = np.delete(times, i), np.delete(states, i + 1, axis=0)
+            continue
+        if i + 1 < len(times) and times[i + 1] - times[i] < TOUCH * guess.period:
+            if visits[i].mode == visits[i + 2].mode and visits[i + 1].row >= 0:
+                signature = signature.without(i, 2)
+                kicks = np.delete(kicks, [i, i + 1])
+                times, states = np.delete(times, [i, i + 1]), np.delete(states, [i + 1, i + 2], axis=0)
+                continue
+        i += 1
+    if len(times) == len(guess.times):
+        return []
+    return [replace(guess, signature=signature, times=times, states=states)]
 
 
 def _signature(system: System, log: Log, start: FloatArray, mode: int) -> Signature:
