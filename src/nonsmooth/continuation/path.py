@@ -91,11 +91,6 @@ class Walk:
         self.fixed = fixed[:-1] & fixed[1:] if m > 1 else np.array([True])  # visits whose length cannot vanish
         self.inside = np.array([(i, self.fired[i]) for i in self.conditional], dtype=np.int64).reshape(-1, 2).T
 
-    @property
-    def alone(self) -> NDArray[np.bool_]:
-        """Over the conditional crossings: no corner to watch."""
-        return np.array(self.shooting.alone, dtype=bool)[self.conditional]
-
     def along(self, solved: Solved, states: FloatArray) -> Path | None:
         """Walk along the visits of a solved orbit; ``states`` (m + 1, n_z) begin them. None where the states grow without bound."""
         from nonsmooth.kernels.orbit_path import follow
@@ -104,7 +99,7 @@ class Walk:
         extremes = np.empty((2, self.n))
         inner, place, end = np.empty((m, n_t)), np.empty((m, n_t)), np.empty((m, n_t))
         which, slope = np.empty((m, n_t), dtype=np.int64), np.empty((m, 2))
-        tau = np.diff(solved.times)
+        tau = solved.times[1:] - solved.times[:-1]
         status = follow(
             self.functions, ORDER, RTOL, self.weight, self.lacking, self.first, self.outgoing, self.transitions,
             self.rows, solved.values, self.modes, solved.times[:-1], tau, np.ascontiguousarray(states), self.fired,
@@ -114,7 +109,8 @@ class Walk:
             return None
         at = int(inner.argmax()) if n_t else 0
         touched = (at // n_t, at % n_t) if n_t else (0, 0)
-        own = np.where(self.alone, np.inf, end[self.inside[0], self.inside[1]])
+        own = end[self.inside[0], self.inside[1]]
+        own[np.array(self.shooting.alone, dtype=bool)[self.conditional]] = np.inf  # no corner to watch
         if n_t and m > 1:
             rest = np.where(self.elsewhere[:-1], end[:-1], -np.inf)
             other = rest.argmax(axis=1)

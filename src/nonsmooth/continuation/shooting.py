@@ -93,6 +93,8 @@ class Shooting:
         self.jumps = [(v.transition, v.row, traced.transitions[v.transition].at, v.turn) for v in signature.crossings]
         # A state or a memory that nothing on the orbit ever sets is a free constant, not an unknown.
         self.free = self._constants()
+        self._one = np.eye(n)
+        self._columns = self.z_at[:, None] + np.arange(n)
         self.reference: tuple[FloatArray, FloatArray] | None = None  # autonomous, no crossings: (z_ref, f_ref)
         self.alone = [False] * m  # crossings whose other rows vanish together with the one that fires
         self.divided = [False] * m  # exits whose equation is divided by the length of the visit
@@ -120,13 +122,13 @@ class Shooting:
 
     def split(self, X: FloatArray) -> tuple[FloatArray, FloatArray]:
         """(instants t_1 ... t_m, states z_0 ... z_m)."""
-        return X[self.t_at], X[self.z_at[:, None] + np.arange(self.n)]
+        return X[self.t_at], X[self._columns]
 
     def join(self, times: Any, states: Any, period: float | None, parameters: Any = ()) -> FloatArray:
         """X from instants, states after them, the period (autonomous) and the active parameters."""
         X = np.empty(self.size + self.n_active)
         X[self.t_at] = times
-        X[self.z_at[:, None] + np.arange(self.n)] = states
+        X[self._columns] = states
         if not self.forced:
             X[self.size - 1] = period
         X[self.size :] = parameters
@@ -158,7 +160,7 @@ class Shooting:
             T, dT, end = X[size - 1], None, X[size - 1]
         times = np.empty(m + 2)
         times[0], times[1:-1], times[-1] = 0.0, t, end
-        legs = self.flow.legs(values, self.modes, times[:-1], np.diff(times), z)
+        legs = self.flow.legs(values, self.modes, times[:-1], times[1:] - times[:-1], z)
         F, J = np.zeros(size), np.zeros((size, size + a))
         jumps = []
         pull = np.matmul(legs.Phi, legs.f_begin[:, :, None])[:, :, 0]
@@ -196,19 +198,19 @@ class Shooting:
             if a:
                 block[:, size:] -= jump.R_p
             zn = self.z_at[i + 1]
-            block[:, zn : zn + n] += np.eye(n)
+            block[:, zn : zn + n] += self._one
             J[r + 1 : r + 1 + n] = block
         # Closure
         F[:n] = legs.z[m] - z[0]
         zi = self.z_at[m]
         J[:n, zi : zi + n] += legs.Phi[m]
-        J[:n, :n] -= np.eye(n)
+        J[:n, :n] -= self._one
         if m:
             J[:n, self.t_at[-1]] -= pull[m]
         if a:
             J[:n, size:] = legs.P[m]
             if self.forced:
-                J[:n, size:] += np.outer(legs.f_end[m], self.period_number * dT)
+                J[:n, size:] += legs.f_end[m][:, None] * (self.period_number * dT)
         for j in self.free:
             F[j] = 0.0
             J[j] = 0.0
