@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from nonsmooth.analysis.lyapunov import lyapunov as lyapunov
     from nonsmooth.analysis.response import frequency_response as frequency_response
     from nonsmooth.analysis.sweep import sweep as sweep
+    from nonsmooth.continuation.continue_curve import continue_curve as continue_curve
     from nonsmooth.continuation.continue_orbit import continue_orbit as continue_orbit
     from nonsmooth.continuation.find import find_orbit as find_orbit
     from nonsmooth.continuation.orbit import Orbit as Orbit
@@ -61,6 +62,7 @@ _WHERE = {
     "find_orbit": "continuation.find",
     "Orbit": "continuation.orbit",
     "continue_orbit": "continuation.continue_orbit",
+    "continue_curve": "continuation.continue_curve",
     "special_points": "continuation.special",
     "load_recording": "experiment.load",
     "Recording": "experiment.recording",

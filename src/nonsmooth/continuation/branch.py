@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.continuation.arclength import Curve, Point, chordal
-from nonsmooth.continuation.change import changed, resumed
+from nonsmooth.continuation.change import changed, common_point, resumed
 from nonsmooth.continuation.detection import SMOOTH, Tests, locate
 from nonsmooth.continuation.grazing import Graze, graze
 from nonsmooth.continuation.path import VIOLATIONS
@@ -341,8 +341,10 @@ def _change(
                 continue
             fresh, first, ds = after
             if change.kind == "grazing":
-                found.mark("grazing", curve, point, indicator=change.indicator,
-                           graze=graze(curve, point, first, change))  # fmt: skip
+                judged = graze(curve, point, first, change)
+                # The point is kept as the orbit without the contact, whichever side the branch came from.
+                free = (curve, point) if change.gained else (fresh, common_point(curve, point, change) or first)
+                found.mark("grazing", *free, indicator=change.indicator, graze=judged)
             elif change.kind == "corner":
                 found.mark("corner", curve, point, indicator=change.indicator)
             if change.kind != "section" and is_doubled(fresh, first) and not is_doubled(curve, point):

@@ -20,7 +20,7 @@ from nonsmooth.continuation.signature import Signature, Visit
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["Change", "changed", "resumed"]
+__all__ = ["Change", "changed", "common_point", "resumed"]
 
 FloatArray = NDArray[np.float64]
 COMMON = 1e-6  # scaled residual of the common orbit in the new equations
@@ -207,6 +207,17 @@ def resumed(curve: Curve, point: Point, change: Change, active: tuple[str, ...])
             if first is not None and (first.path.violation() > 0.0).all():
                 return fresh, first, ds
     return None
+
+
+def common_point(curve: Curve, point: Point, change: Change) -> Point | None:
+    """The common orbit as a point of the new signature."""
+    new = _curve(curve, change, point, curve.shooting.active)
+    if new is None:
+        return None
+    fresh, X = new
+    solved = fresh.shooting.evaluate(X)
+    null = fresh.null_vectors(solved)
+    return fresh.point(solved, X / fresh.scale, null[-1]) if len(null) else None
 
 
 def _directions(null: FloatArray) -> list[FloatArray]:

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from nonsmooth.system.system import System
 
-__all__ = ["continue_orbit"]
+__all__ = ["continue_orbit", "size_of", "special_row"]
 
 FloatArray = NDArray[np.float64]
 Records = tuple[list[PointRecord], list[SpecialRecord]]
@@ -120,7 +120,7 @@ def _from_orbit(
     low, high = _limits(system, name, given, system.values.get(name))
     if orbit.virtual:
         raise ValueError("this orbit is virtual: its path goes through a boundary that it should obey")
-    size = _size(orbit.maximum, orbit.minimum, system)
+    size = size_of(orbit.maximum, orbit.minimum, system)
     curve, X = _curve(system, orbit.signature, orbit.period_number, name, orbit, size, high - low)
     first = curve.at_parameter(X / curve.scale, system.values[name]) or _near(curve, X)
     if first is None:
@@ -169,7 +169,8 @@ def _near(curve: Curve, X: FloatArray) -> Point | None:
     return None if found is None else curve.point(found[0], found[1], null[-1])
 
 
-def _size(maximum: FloatArray, minimum: FloatArray, system: System) -> FloatArray:
+def size_of(maximum: FloatArray, minimum: FloatArray, system: System) -> FloatArray:
+    """Half the range of each state, and 1 for the memory."""
     half = np.maximum(np.nan_to_num(0.5 * (maximum - minimum)), 1e-3 * system.scale_vector())
     return np.concatenate([half, np.ones(len(system.memory))])
 
@@ -206,7 +207,7 @@ def _resume(
 ) -> tuple[Curve, FloatArray]:
     """The curve through a recorded point."""
     shooting = Shooting(system, point.signature, record.period_number, (name,))
-    size = _size(point.maximum, point.minimum, system)
+    size = size_of(point.maximum, point.minimum, system)
     if not shooting.forced and not shooting.m:
         from nonsmooth.continuation.anchor import free_anchor
 
@@ -263,7 +264,7 @@ def _switched(start: xr.Dataset, name: str | None, given: Any, largest: float, m
     """The other branch through a special point."""
     from nonsmooth.continuation.switching import emanating
 
-    system, kind, own, point, period_number, asked = _special_row(start)
+    system, kind, own, point, period_number, asked = special_row(start, "continue_orbit")
     if name is not None and name != own:
         raise ValueError(f"this special point lies on a branch in {own!r}, not in {name!r}")
     low, high = _limits(system, own, asked if given is None else given, None)
@@ -319,18 +320,20 @@ def _origin(curve: Curve, Y: FloatArray, direction: FloatArray) -> PointRecord:
     return point_record(curve, Point(Y, direction, solved, M, curve.shooting.multipliers(M), path, 0.0, 0))
 
 
-def _special_row(start: xr.Dataset) -> tuple[System, str, str, PointRecord, int, Any]:
-    """One row of ``special_points`` as data."""
+def special_row(start: Any, verb: str) -> tuple[System, str, str, PointRecord, int, Any]:
+    """One row of ``special_points`` as data: system, kind, parameter, point, period number and the branch's range."""
     import json
 
     from nonsmooth.continuation.files import signature_from
     from nonsmooth.results.provenance import read_provenance
     from nonsmooth.system.system import System
 
+    if not hasattr(start, "data_vars") or "kind" not in start or "unknowns" not in start:
+        raise TypeError(f"{verb} takes one row of special_points, not {type(start).__name__}")
     if "special" in start.dims:
         if start.sizes["special"] != 1:
             raise ValueError(
-                f"continue_orbit takes one special point, not {start.sizes['special']}: choose it, "
+                f"{verb} takes one special point, not {start.sizes['special']}: choose it, "
                 "special_points(branch).isel(special=0)"
             )
         start = start.isel(special=0)

@@ -1,4 +1,4 @@
-"""Builder of the labelled result of ``continue_orbit``: a branch of orbits, with special points beside them."""
+"""Builders of the labelled results of continuation: a branch of orbits, a curve of special points."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from nonsmooth.results.labels import Labels
 from nonsmooth.results.schema import parameter_coords, quantity_attributes, state_coords
 from nonsmooth.results.statuses import flag_attributes, status_attributes
 
-__all__ = ["branch"]
+__all__ = ["branch", "curve"]
 
 #: Dims and long names of what a branch holds for every point, and for every special point.
 _BRANCH_ARRAYS: dict[str, tuple[tuple[str, ...], str]] = {
@@ -96,6 +96,44 @@ def branch(
         "indicator": ("indicator", _words(d.indicators), {"long_name": "indicator"}),
         "end": ("end", _words(["first", "last"]), {"long_name": "end of the branch"}),
     }
+    return xr.Dataset(variables, coords, dict(attrs))
+
+
+def curve(
+    labels: Labels,
+    attrs: Mapping[str, Any],
+    parameters: Mapping[str, ArrayLike],
+    arrays: Mapping[str, ArrayLike],
+    special: Sequence[tuple[str, int]],
+    *,
+    kind: str,
+    period_number: int,
+    signature: str,
+    endings: Mapping[str, str],
+    ended: Sequence[str],
+) -> xr.Dataset:
+    """The result of ``continue_curve``: two parameters over ``point``, points of codimension two over ``special``."""
+    d = labels
+    variables: dict[str, Any] = {
+        name: (("point", *_BRANCH_ARRAYS[name][0]), np.asarray(array), {"long_name": _BRANCH_ARRAYS[name][1]})
+        for name, array in arrays.items()
+    }
+    variables["period"][2]["units"] = d.time_unit
+    variables["kind"] = ((), kind, {"long_name": "kind of the special point that is followed"})
+    variables["period_number"] = ((), np.int64(period_number), {"long_name": "forcing periods (0: autonomous)"})
+    variables["signature"] = ((), signature, {"long_name": "signature"})
+    variables["special_kind"] = ("special", _words(name for name, _ in special), {"long_name": "codimension two"})
+    places = np.array([place for _, place in special], dtype=np.int64)
+    variables["special_point"] = ("special", places, {"long_name": "its place among the points"})
+    codes = np.array([list(endings).index(word) for word in ended], dtype=np.int8)
+    variables["ended"] = ("end", codes, {"long_name": "how the curve ends", **flag_attributes(list(endings))})
+    variables["ended_because"] = ("end", _words(endings[word] for word in ended), {"long_name": "sentence"})
+    coords: dict[str, Any] = {
+        name: ("point", np.array(values, dtype=np.float64), quantity_attributes(name, d.parameters[name]))
+        for name, values in parameters.items()
+    }
+    fixed = {name: value for name, value in parameter_coords(d).items() if name not in parameters}
+    coords |= {**state_coords(d), **fixed, "end": ("end", _words(["first", "last"]), {"long_name": "end"})}
     return xr.Dataset(variables, coords, dict(attrs))
 
 
