@@ -30,8 +30,8 @@ ENDS = {
     "closed": "The curve came back to where it began.",
     "points": "The largest number of points was reached.",
     "no_convergence": "Newton's method did not converge, however small the step.",
-    "grazing": "The orbit touches a further boundary: beyond this point its signature is another one.",
-    "corner": "The orbit's path leaves its signature here: a corner, or a contact that ends.",
+    "grazing": "A contact begins or ends here: beyond this point the orbit has another signature.",
+    "corner": "The orbit meets the corner of two boundaries: beyond this point it has another signature.",
 }
 FIRST, LEAST = 1e-3, 1e-8
 COSINE = 0.97
@@ -192,7 +192,14 @@ def _march(
             if now[i] < 0.0 <= safe[i]:
                 there = _root(locus, place, new, lambda p, i=i: _bounded(_violation(locus, p)[i]))
                 if there is not None:
-                    events.append((there[0], "grazing" if name == "touch" else "corner", there[1]))
+                    events.append((there[0], "corner" if name in ("own", "others") else "grazing", there[1]))
+        outside = any(not low <= float(new.X[-2 + i]) <= high for i, (low, high) in enumerate(box))
+        if not events and (outside or ((now < 0.0) & (safe >= 0.0)).any()):  # not located: nearer
+            ds *= 0.25
+            if ds < LEAST:
+                found.ending = "no_convergence"
+                break
+            continue
         stop = min((s for s, _, _ in events), default=np.inf)
         after = _tests(locus, new)
         for name, was in numbers.items():

@@ -32,7 +32,7 @@ FloatArray = NDArray[np.float64]
 KINDS = ("fold", "flip", "neimark_sacker", "grazing")
 STEP = 1e-6  # of central differences, in scaled unknowns
 MOST = 8
-DONE = 1e-9
+DONE = 1e-11
 CLOSE = 2e-12
 
 

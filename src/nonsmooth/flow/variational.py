@@ -15,9 +15,8 @@ from __future__ import annotations
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +30,6 @@ if TYPE_CHECKING:
 __all__ = ["Jump", "Legs", "Touch", "VariationalFlow"]
 
 FloatArray = NDArray[np.float64]
-_flows: WeakKeyDictionary[Any, dict[tuple[str, ...], VariationalFlow]] = WeakKeyDictionary()
 
 
 @dataclass(slots=True)
@@ -102,10 +100,7 @@ class VariationalFlow:
 
                 units = {key: parameter.unit for key, parameter in system.parameters.items()}
                 raise ValueError(unknown(name, "a parameter", repr(system.name), units))
-        known = _flows.setdefault(system.traced, {})
-        if names not in known:
-            known[names] = cls(system.traced, names, system.scale_vector())
-        return known[names]
+        return _flow(system.traced, names, tuple(system.scale_vector().tolist()))
 
     def legs(self, values: Any, modes: Any, t0: Any, tau: Any, z0: Any) -> Legs:
         """March legs, each in one mode, with derivatives; accurate to rounding.
@@ -225,3 +220,8 @@ class VariationalFlow:
 
 def _floats(x: Any) -> FloatArray:
     return np.ascontiguousarray(x, dtype=np.float64)
+
+
+@lru_cache(maxsize=128)
+def _flow(traced: Traced, names: tuple[str, ...], scale: tuple[float, ...]) -> VariationalFlow:
+    return VariationalFlow(traced, names, np.array(scale))

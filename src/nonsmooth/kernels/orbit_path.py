@@ -149,11 +149,11 @@ def follow(
                 if transitions[k, 3] == transitions[k, 2]:
                     continue  # at a time, not by a condition
                 a = 0.0
-                _, rising, _ = margin(C, order, n, transitions, rows, k, 0.0, -1)
+                begun, rising, _ = margin(C, order, n, transitions, rows, k, 0.0, -1)
                 for part in range(1, PARTS + 1):
                     b = h if part == PARTS else part * width
                     _, s, _ = margin(C, order, n, transitions, rows, k, b, -1)
-                    if rising > 0.0 and s < 0.0:
+                    if rising > 0.0 and s <= 0.0:
                         lo, hi = a, b
                         for _ in range(BISECTIONS):
                             c = 0.5 * (lo + hi)
@@ -167,7 +167,7 @@ def follow(
                         for p in range(1, order + 1):
                             size = max(size, fabs(C[n + rows[row, 0], p]) * h**p)
                         # A visit may begin where the indicator and its slope are zero: rounding is no maximum.
-                        begins = steps == 1 and a == 0.0 and fabs(v) <= ROUNDING * size
+                        begins = steps == 1 and a == 0.0 and max(fabs(v), fabs(begun)) <= ROUNDING * size
                         if not begins and v > inner[leg, k]:
                             inner[leg, k], place[leg, k], which[leg, k] = v, t + lo, row
                     a, rising = b, s
