@@ -228,3 +228,17 @@ def test_errors_at_the_door() -> None:
         ns.lyapunov(system, start=[{"x": 0.0}, {"x": 1.0}])
     with pytest.raises(TypeError, match="takes an ns.System"):
         ns.lyapunov("Lorenz")
+
+
+def test_results_are_saved_whole(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    """NetCDF keeps infinities, units and the input; a sweep and a single point."""
+    system = ns.models.discontinuous_support()
+    for k, found in enumerate((
+        ns.lyapunov(system, periods=64, transient=64),
+        ns.lyapunov(system.smoothed(1e-3), parameter="rho", values=[0.2, 0.3], periods=64, transient=64,
+                    progress=False),
+        ns.sensitivity(system.smoothed(1e-3), periods=1, parameters=("rho", "eta")),
+    )):  # fmt: skip
+        path = tmp_path / f"{k}.nc"
+        ns.save(found, path)
+        assert ns.load(path).identical(found)
