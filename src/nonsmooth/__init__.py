@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from nonsmooth.analysis.response import frequency_response as frequency_response
     from nonsmooth.analysis.sweep import sweep as sweep
     from nonsmooth.continuation.continue_curve import continue_curve as continue_curve
+    from nonsmooth.continuation.continue_equilibrium import continue_equilibrium as continue_equilibrium
     from nonsmooth.continuation.continue_orbit import continue_orbit as continue_orbit
     from nonsmooth.continuation.find import find_orbit as find_orbit
     from nonsmooth.continuation.orbit import Orbit as Orbit
@@ -63,6 +64,7 @@ _WHERE = {
     "Orbit": "continuation.orbit",
     "continue_orbit": "continuation.continue_orbit",
     "continue_curve": "continuation.continue_curve",
+    "continue_equilibrium": "continuation.continue_equilibrium",
     "special_points": "continuation.special",
     "load_recording": "experiment.load",
     "Recording": "experiment.recording",

@@ -52,7 +52,8 @@ def continue_orbit(
     start : Orbit, branch, or one row of ``special_points``
         An orbit is followed both ways from its parameter. A branch goes on at each end that stopped at the edge of its
         range (give a wider ``range``) or at the largest number of points. A flip gives the branch of twice the period,
-        a pitchfork or branch_point the other branch through it.
+        a pitchfork or branch_point the other branch through it, a Hopf point of ``continue_equilibrium`` the cycles that
+        are born there.
     parameter : str
         Name of the parameter; that of the branch where not given.
     range : (low, high)
@@ -89,6 +90,8 @@ def continue_orbit(
     if hasattr(start, "data_vars"):
         if "special_point" in start:
             return _go_on(start, parameter, range, largest, most)
+        if "kind" in start and "eigenvalues" in start:
+            return _born(start, parameter, range, largest, most)
         if "kind" in start and "unknowns" in start:
             return _switched(start, parameter, range, largest, most)
     raise TypeError(
@@ -307,6 +310,34 @@ def _switched(start: xr.Dataset, name: str | None, given: Any, largest: float, m
         endings, said = (marches[1].ending, marches[0].ending), (sentences[1], sentences[0])
     special = sorted([*special, mark], key=lambda one: one.place)
     record = BranchRecord(own, (low, high), number, points, special, endings, said)
+    return branch_dataset(system, record, {"parameter": own, "range": (low, high), "step": largest, "points": most,
+                                           "from": kind})  # fmt: skip
+
+
+def _born(start: xr.Dataset, name: str | None, given: Any, largest: float, most: int) -> xr.Dataset:
+    """The cycles that are born at a Hopf point."""
+    from nonsmooth.continuation.born import first_cycle, hopf_row
+
+    if "special" in start.dims:
+        if start.sizes["special"] != 1:
+            raise ValueError("continue_orbit takes one special point: choose it, special_points(branch).isel(special=0)")
+        start = start.isel(special=0)
+    kind = str(start["kind"].values)
+    if kind != "hopf":
+        raise ValueError(f"no cycle is born at a {kind}: that happens at a hopf point")
+    system, own, value, mode, u, asked = hopf_row(start)
+    if name is not None and name != own:
+        raise ValueError(f"this special point lies on a branch in {own!r}, not in {name!r}")
+    low, high = _limits(system, own, asked if given is None else given, value)
+    bounds = allowed_range(system, own, low, high)
+    begun = first_cycle(system, own, value, mode, u, high - low)
+    if begun is None:
+        raise SolveError("no cycle was found at this Hopf point", status="no_convergence")
+    curve, first = begun
+    found = march(curve, first, Limits(*bounds, largest, most), min(FIRST, largest))
+    sentences = ("The branch begins at the Hopf point.", _sentence(found, bounds, own, (low, high)))
+    points, special = joined(([], []), [point_record(curve, first)], from_march(found))
+    record = BranchRecord(own, (low, high), 0, points, special, ("branching", found.ending), sentences)
     return branch_dataset(system, record, {"parameter": own, "range": (low, high), "step": largest, "points": most,
                                            "from": kind})  # fmt: skip
 

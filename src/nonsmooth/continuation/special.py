@@ -22,7 +22,7 @@ def special_points(branch: Any) -> xr.Dataset:
     Parameters
     ----------
     branch : xarray.Dataset
-        A result of :func:`nonsmooth.continue_orbit`.
+        A result of :func:`nonsmooth.continue_orbit` or :func:`nonsmooth.continue_equilibrium`.
 
     Returns
     -------
@@ -45,6 +45,8 @@ def special_points(branch: Any) -> xr.Dataset:
     if "special_point" not in branch or "parameter" not in branch.attrs:
         raise ValueError("special_points takes a branch, a result of continue_orbit; this Dataset is another result")
     name = str(branch.attrs["parameter"])
+    if "eigenvalues" in branch:
+        return _of_equilibria(branch, name)
     places = branch["special_point"].values
     orbits = branch[list(_ORBIT)].isel(point=places).rename({"point": "special"})
     table = orbits.reset_coords(name)
@@ -59,3 +61,11 @@ def special_points(branch: Any) -> xr.Dataset:
     table["period_number"] = branch["period_number"]
     table.attrs = dict(branch.attrs)
     return table[["kind", name, *[key for key in table.data_vars if key not in ("kind", name)]]]
+
+
+def _of_equilibria(branch: xr.Dataset, name: str) -> xr.Dataset:
+    table = branch[["u", "eigenvalues", "stable", "mode"]].isel(point=branch["special_point"].values)
+    table = table.rename({"point": "special"}).reset_coords(name)
+    table["kind"], table["point"] = branch["special_kind"].variable, branch["special_point"].variable
+    table.attrs = dict(branch.attrs)
+    return table[["kind", name, "u", "eigenvalues", "stable", "mode", "point"]]

@@ -13,7 +13,7 @@ from nonsmooth.results.labels import Labels
 from nonsmooth.results.schema import parameter_coords, quantity_attributes, state_coords
 from nonsmooth.results.statuses import flag_attributes, status_attributes
 
-__all__ = ["branch", "curve"]
+__all__ = ["branch", "curve", "equilibria"]
 
 #: Dims and long names of what a branch holds for every point, and for every special point.
 _BRANCH_ARRAYS: dict[str, tuple[tuple[str, ...], str]] = {
@@ -134,6 +134,42 @@ def curve(
     }
     fixed = {name: value for name, value in parameter_coords(d).items() if name not in parameters}
     coords |= {**state_coords(d), **fixed, "end": ("end", _words(["first", "last"]), {"long_name": "end"})}
+    return xr.Dataset(variables, coords, dict(attrs))
+
+
+def equilibria(
+    labels: Labels,
+    attrs: Mapping[str, Any],
+    parameter: str,
+    values: ArrayLike,
+    arrays: Mapping[str, ArrayLike],
+    special: Sequence[tuple[str, int]],
+    *,
+    endings: Mapping[str, str],
+    ended: Sequence[str],
+) -> xr.Dataset:
+    """The result of ``continue_equilibrium``: equilibria over ``point``, marks over ``special``."""
+    d = labels
+    modes = flag_attributes(d.modes, dtype=np.int16)
+    places = np.array([place for _, place in special], dtype=np.int64)
+    codes = np.array([list(endings).index(word) for word in ended], dtype=np.int8)
+    variables: dict[str, Any] = {
+        "u": (("point", "state"), np.asarray(arrays["u"]), {"long_name": "equilibrium"}),
+        "eigenvalues": (("point", "eigenvalue"), np.asarray(arrays["eigenvalues"]), {"long_name": "eigenvalues"}),
+        "stable": ("point", np.asarray(arrays["stable"]), {"long_name": "all real parts negative"}),
+        "mode": ("point", np.asarray(arrays["mode"], np.int16), {"long_name": "mode", **modes}),
+        "special_kind": ("special", _words(kind for kind, _ in special), {"long_name": "kind of the special point"}),
+        "special_point": ("special", places, {"long_name": "its place among the points"}),
+        "ended": ("end", codes, {"long_name": "how the branch ends", **flag_attributes(list(endings))}),
+        "ended_because": ("end", _words(endings[word] for word in ended), {"long_name": "sentence"}),
+    }
+    coords: dict[str, Any] = {
+        parameter: (
+            "point", np.array(values, dtype=np.float64), quantity_attributes(parameter, d.parameters[parameter]),
+        ),
+        **state_coords(d), **parameter_coords(d, without=parameter),
+        "end": ("end", _words(["first", "last"]), {"long_name": "end of the branch"}),
+    }  # fmt: skip
     return xr.Dataset(variables, coords, dict(attrs))
 
 
