@@ -7,7 +7,7 @@ package enters, so what is found here can judge it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import mpmath as mp
 
@@ -22,7 +22,7 @@ def exact(p: Mapping[str, float]) -> dict[str, mp.mpf]:
     return {key: mp.mpf(float(value)) for key, value in {**TABLE_1, **p}.items()}
 
 
-def motion(p: Mapping[str, mp.mpf], contact: bool, t0: mp.mpf, u0: Pair):  # noqa: ANN201
+def motion(p: Mapping[str, mp.mpf], contact: bool, t0: mp.mpf, u0: Pair) -> Callable[[mp.mpf], Pair]:
     """t -> (x, v) in one mode from (t0, u0)."""
     m, stiffness, damping, offset = p["m"], 2 * p["k"], p["c"], mp.mpf(0)
     if contact:
@@ -54,12 +54,15 @@ def return_map(p: Mapping[str, mp.mpf], n: int, u: Pair, times: Sequence[float],
     t, at = mp.mpf(0), motion(p, contact, mp.mpf(0), u)
     for guess in times:
         if contact:
-            def surface(s: mp.mpf, at=at) -> mp.mpf:  # noqa: ANN001
+
+            def surface(s: mp.mpf, at: Callable[[mp.mpf], Pair] = at) -> mp.mpf:
                 x, v = at(s)
                 return p["k_s"] * (x - p["g"]) + p["c_s"] * v
         else:
-            def surface(s: mp.mpf, at=at) -> mp.mpf:  # noqa: ANN001
+
+            def surface(s: mp.mpf, at: Callable[[mp.mpf], Pair] = at) -> mp.mpf:
                 return at(s)[0] - p["g"]
+
         t = mp.findroot(surface, mp.mpf(guess), tol=mp.mpf(10) ** -60)
         contact = not contact
         at = motion(p, contact, t, at(t))

@@ -40,7 +40,7 @@ def stick_slip_with_impact() -> ns.System:
         return v, force(t, x, v, p)
 
     def slip(t: Any, u: Any, p: Any) -> Any:
-        s, x, v = u
+        _, x, v = u
         f = force(t, x, v, p)
         return -p.n - f / 5, v, p.n + 6 * f / 5
 

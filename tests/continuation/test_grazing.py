@@ -61,7 +61,7 @@ def distance(branch: xr.Dataset, row: xr.Dataset) -> np.ndarray:
 
 @pytest.mark.parametrize("side", ["lower", "upper"])
 def test_multipliers_just_past_the_graze(side: str) -> None:
-    """They tend to those of M- with S inserted, within 1e-2 at a depth of 1e-10 m, like the square root of the depth."""
+    """They tend to those of M- with S inserted: within 1e-2 at a depth of 1e-10 m, like the root of the depth."""
     rho, g, free, _, limits = SOFT["figure 9"]
     graze_at = known.grazing_frequencies(rho, g)[0 if side == "lower" else 1]
     free = free if side == "lower" else 6.5  # the contact is gained where this graze is met
@@ -96,9 +96,7 @@ def closed_limit(rho: float, g: float, omega: float) -> np.ndarray:
     a, w = c / (2 * m), np.sqrt(2 * k / m - (c / (2 * m)) ** 2)
     T = 2 * np.pi / omega
     cos, sin = np.cos(w * T), np.sin(w * T)
-    M = np.exp(-a * T) * np.array(
-        [[cos + a / w * sin, sin / w], [-(a * a + w * w) / w * sin, cos - a / w * sin]]
-    )
+    M = np.exp(-a * T) * np.array([[cos + a / w * sin, sin / w], [-(a * a + w * w) / w * sin, cos - a / w * sin]])
     # The eigenvalues of Phi2 S Phi1 are those of M S: the flow without contact commutes with itself.
     return np.linalg.eigvals(M @ np.array([[1.0, 0.0], [-c_s / m, 1.0]]))
 
@@ -131,7 +129,7 @@ def test_impact_oscillator_both_ways(omega: float, kind: str) -> None:
     # The impacting branch lies on the other side of A, or on the same one.
     impacts = free["contacts_per_period"].values > 0
     here = int(graze["point"])
-    beyond = [k for k in (here - 1, here + 1) if impacts[k]][0]
+    beyond = next(k for k in (here - 1, here + 1) if impacts[k])
     assert (float(free["A"][beyond]) > exact) == (kind == "persistence")
     # det M = e^2 exp(-c T) on every orbit with one impact per period.
     tame = impacts & (np.abs(free["floquet_multipliers"].values).max(axis=1) < 1e2)  # beside the graze digits are lost
@@ -142,5 +140,6 @@ def test_impact_oscillator_both_ways(omega: float, kind: str) -> None:
     k = int(np.flatnonzero(impacts)[len(np.flatnonzero(impacts)) // 2])
     start = free["section"].values[k]
     at = system.with_parameters(A=float(free["A"][k]))
-    back = ns.continue_orbit(ns.find_orbit(at, start=start, period_number=1, transient=0), "A", (0.1 * exact, 2 * exact))
+    orbit = ns.find_orbit(at, start=start, period_number=1, transient=0)
+    back = ns.continue_orbit(orbit, "A", (0.1 * exact, 2 * exact))
     assert [value for _, value in table(back)] == pytest.approx([value for _, value in table(free)], abs=1e-9)

@@ -18,9 +18,10 @@ FloatArray = NDArray[np.float64]
 
 
 def anchored(
-    flow: VariationalFlow, values: FloatArray, signature: Signature, times: FloatArray, states: FloatArray, period: float
-) -> tuple[Signature, FloatArray, FloatArray]:
-    """The same orbit read from the middle of its longest visit (times of crossings, states at section and after them)."""
+    flow: VariationalFlow, values: FloatArray, signature: Signature, times: FloatArray, states: FloatArray,
+    period: float,
+) -> tuple[Signature, FloatArray, FloatArray]:  # fmt: skip
+    """The same orbit read from the middle of its longest visit (times of crossings; states at section, after them)."""
     m = len(times)
     lengths = np.append(np.diff(times), times[0] + period - times[-1])  # of the visit after crossing i
     i = int(lengths.argmax())

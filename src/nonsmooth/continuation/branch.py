@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +16,6 @@ from nonsmooth.continuation.path import VIOLATIONS
 from nonsmooth.continuation.solve import determinant
 from nonsmooth.continuation.switching import branch_point, is_doubled
 from nonsmooth.errors import SystemDefinitionError
-
-if TYPE_CHECKING:
-    from nonsmooth.continuation.shooting import Shooting
 
 __all__ = ["ENDINGS", "March", "Row", "Special", "march"]
 
@@ -290,6 +287,7 @@ def _smooth_events(
 
 def _branch_point(curve: Curve, a: Point, b: Point, tests: Tests) -> tuple[float, Point] | None:
     """A branch point: the bordered determinant itself, scaled, goes through zero."""
+
     def number(point: Point) -> float:
         matrix = np.vstack([point.solved.jacobian * curve.weights, point.tangent])
         sign, size = determinant(matrix)
@@ -330,9 +328,7 @@ def _name(kind: str, curve: Curve, point: Point) -> str:
     return "pitchfork" if breaks_symmetry(curve, point) else "branch_point"
 
 
-def _change(
-    found: March, curve: Curve, met: list[tuple[str, float, Point]]
-) -> tuple[Curve, Point, float] | None:
+def _change(found: March, curve: Curve, met: list[tuple[str, float, Point]]) -> tuple[Curve, Point, float] | None:
     """Record a change of signature and begin anew behind it; None where the branch ends."""
     for kind, _, point in met:
         for change in changed(curve, point, kind):
@@ -390,5 +386,3 @@ def _reason(curve: Curve, point: Point) -> str:
     except (SystemDefinitionError, ValueError):
         return "physical"
     return "no_convergence"
-
-

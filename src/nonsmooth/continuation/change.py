@@ -104,7 +104,8 @@ def _shortened(curve: Curve, point: Point) -> list[Change]:
     if before.mode != after.mode:
         return []
     jump = traced.transitions[before.transition]
-    slope = point.path.slope[list(curve.walk.conditional).index(i - 1)] if before.row >= 0 else np.inf
+    at = curve.walk.conditional.tolist()
+    slope = point.path.slope[at.index(i - 1)] if before.row >= 0 else np.inf
     steepest = float(np.abs(point.path.slope).max())
     kind = "grazing" if slope < 1e-3 * max(steepest, 1e-300) or len(point.path.slope) < 3 else "corner"
     indicator = jump.rows[before.row].indicator if before.row >= 0 else -1
@@ -253,9 +254,7 @@ def _same_way(fresh: Curve, Y: FloatArray, curve: Curve, point: Point) -> tuple[
     return None if first is None else (fresh, first, 0.0)
 
 
-def _curve(
-    curve: Curve, change: Change, point: Point, active: tuple[str, ...]
-) -> tuple[Curve, FloatArray] | None:
+def _curve(curve: Curve, change: Change, point: Point, active: tuple[str, ...]) -> tuple[Curve, FloatArray] | None:
     old = curve.shooting
     system: System = old.system
     signature, times, states = change.signature, change.times, change.states
@@ -263,14 +262,13 @@ def _curve(
     if not old.forced and len(times):
         from nonsmooth.continuation.anchor import anchored
 
-        signature, times, states = anchored(old.flow, point.solved.values, signature, times, states, float(period or 0.0))
+        around = float(point.solved.times[-1])
+        signature, times, states = anchored(old.flow, point.solved.values, signature, times, states, around)
     shooting = Shooting(system, signature, old.period_number, active)
     if not old.forced and not shooting.m:
         from nonsmooth.continuation.anchor import free_anchor
 
-        shooting.reference = free_anchor(
-            shooting.flow, point.solved.values, shooting.at_section, states[0], curve.size
-        )
+        shooting.reference = free_anchor(shooting.flow, point.solved.values, shooting.at_section, states[0], curve.size)
     X = shooting.join(times, states, period, point.X[old.size :])
     shooting.look_at_surfaces(X)
     return Curve(shooting, curve.size, curve.period, curve.width), X

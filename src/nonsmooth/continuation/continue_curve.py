@@ -116,7 +116,9 @@ def continue_curve(
 
 def _box(system: System, ranges: Any) -> tuple[tuple[str, str], list[tuple[float, float]]]:
     if not isinstance(ranges, Mapping) or len(ranges) != 2:
-        raise ValueError(f'ranges names two parameters with their ends, {{"omega": (3, 7), "rho": (0.1, 0.3)}}; not {ranges!r}')
+        raise ValueError(
+            f'ranges names two parameters with their ends, {{"omega": (3, 7), "rho": (0.1, 0.3)}}; not {ranges!r}'
+        )
     box = []
     for name, ends in ranges.items():
         if name not in system.values:
@@ -164,9 +166,7 @@ def _violation(locus: Locus, place: Place) -> FloatArray:
     return path.violation()
 
 
-def _march(
-    locus: Locus, place: Place, box: Any, largest: float, most: int, begin: Place | None
-) -> _March:
+def _march(locus: Locus, place: Place, box: Any, largest: float, most: int, begin: Place | None) -> _March:
     found, ds = _March(), min(FIRST, largest)
     numbers, safe = _tests(locus, place), _violation(locus, place)
     while len(found.places) < most:
@@ -184,13 +184,13 @@ def _march(
             value = float(new.X[-2 + i])
             if not low <= value <= high:
                 edge = low if value < low else high
-                there = _root(locus, place, new, lambda p, i=i, edge=edge: float(p.X[-2 + i]) - edge)
+                there = _root(locus, place, new, _Edge(i, edge))
                 if there is not None:
                     events.append((there[0], "range", there[1]))
         now = _violation(locus, new)
         for i, name in enumerate(VIOLATIONS):
             if now[i] < 0.0 <= safe[i]:
-                there = _root(locus, place, new, lambda p, i=i: _bounded(_violation(locus, p)[i]))
+                there = _root(locus, place, new, _Leaving(locus, i))
                 if there is not None:
                     events.append((there[0], "corner" if name in ("own", "others") else "grazing", there[1]))
         outside = any(not low <= float(new.X[-2 + i]) <= high for i, (low, high) in enumerate(box))
@@ -204,13 +204,12 @@ def _march(
         after = _tests(locus, new)
         for name, was in numbers.items():
             if was * after[name] < 0.0:
-                there = _root(locus, place, new, lambda p, name=name: _tests(locus, p)[name])
+                there = _root(locus, place, new, _Second(locus, name))
                 if there is not None and there[0] < stop - BESIDE:
                     events.append((there[0], name, there[1]))
         # A cusp: both parameters turn round together.
         if float(place.tangent[-2:] @ new.tangent[-2:]) < 0.0:
-            towards = place.tangent[-2:].copy()
-            there = _root(locus, place, new, lambda p: float(p.tangent[-2:] @ towards))
+            there = _root(locus, place, new, _Turning(place))
             if there is not None and there[0] < stop - BESIDE:
                 events.append((there[0], "cusp" if locus.kind == "fold" else "turn", there[1]))
         ended = False
@@ -246,8 +245,47 @@ def _anchor_anew(locus: Locus, place: Place) -> None:
         place.tangent = found.tangent
 
 
-def _bounded(x: float) -> float:
-    return float(min(max(x, -1e3), 1e3))
+@dataclass
+class _Edge:
+    """A parameter's distance from the edge of its range."""
+
+    which: int
+    edge: float
+
+    def __call__(self, place: Place) -> float:
+        return float(place.X[-2 + self.which]) - self.edge
+
+
+@dataclass
+class _Leaving:
+    """How far the path is from leaving its signature in one of the ways of ``VIOLATIONS``."""
+
+    locus: Locus
+    way: int
+
+    def __call__(self, place: Place) -> float:
+        return float(np.clip(_violation(self.locus, place)[self.way], -1e3, 1e3))
+
+
+@dataclass
+class _Second:
+    """The number that vanishes at a point of codimension two."""
+
+    locus: Locus
+    name: str
+
+    def __call__(self, place: Place) -> float:
+        return _tests(self.locus, place)[self.name]
+
+
+@dataclass
+class _Turning:
+    """How the parameters move, against how they did."""
+
+    before: Place
+
+    def __call__(self, place: Place) -> float:
+        return float(place.tangent[-2:] @ self.before.tangent[-2:])
 
 
 def _root(locus: Locus, a: Place, b: Place, number: Callable[[Place], float]) -> tuple[float, Place] | None:

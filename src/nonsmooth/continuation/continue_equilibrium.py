@@ -43,7 +43,7 @@ class _March:
 def continue_equilibrium(
     system: System,
     parameter: str,
-    range: tuple[float, float],  # noqa: A002
+    range: tuple[float, float],
     *,
     start: Any = None,
     mode: str | None = None,
@@ -149,12 +149,12 @@ def _march(curve: Equilibria, rest: Rest, bounds: tuple[float, float], largest: 
         events: list[tuple[float, str, Rest]] = []
         for kind, was in before.items():
             if was * after[kind] < 0.0 or (np.isinf(was) and after[kind] < 0.0):
-                there = _root(curve, rest, new, ds, lambda r, kind=kind: float(np.clip(_numbers(r)[kind], -1e3, 1e3)))
+                there = _root(curve, rest, new, ds, _Number(kind))
                 if there is not None and (kind != "hopf" or _oscillates(there[1])):
                     events.append((there[0], kind, there[1]))
         edge = bounds[0] if new.value < bounds[0] else bounds[1]
         if not bounds[0] <= new.value <= bounds[1]:
-            there = _root(curve, rest, new, ds, lambda r, edge=edge: r.value - edge)
+            there = _root(curve, rest, new, ds, _Edge(edge))
             if there is not None:
                 events.append((there[0], "range", there[1]))
         folds = [s for s, kind, _ in events if kind == "branch_point"]
@@ -183,6 +183,26 @@ def _march(curve: Equilibria, rest: Rest, bounds: tuple[float, float], largest: 
     return found
 
 
+@dataclass
+class _Number:
+    """One of the numbers that are watched."""
+
+    kind: str
+
+    def __call__(self, rest: Rest) -> float:
+        return float(np.clip(_numbers(rest)[self.kind], -1e3, 1e3))
+
+
+@dataclass
+class _Edge:
+    """The parameter's distance from the edge of its range."""
+
+    edge: float
+
+    def __call__(self, rest: Rest) -> float:
+        return rest.value - self.edge
+
+
 def _oscillates(rest: Rest) -> bool:
     """Whether a pair +-i omega makes the sum of two eigenvalues vanish, and not two real ones."""
     nearest = rest.eigenvalues[np.argmin(np.abs(rest.eigenvalues.real))]
@@ -206,9 +226,7 @@ def _beyond(curve: Equilibria, rest: Rest) -> tuple[Equilibria, Rest] | None:
     return None
 
 
-def _root(
-    curve: Equilibria, a: Rest, b: Rest, ds: float, number: Callable[[Rest], float]
-) -> tuple[float, Rest] | None:
+def _root(curve: Equilibria, a: Rest, b: Rest, ds: float, number: Callable[[Rest], float]) -> tuple[float, Rest] | None:
     """The zero of ``number`` between two points of the branch."""
     from scipy.optimize import brentq
 
@@ -249,6 +267,5 @@ def _dataset(
         "stable": np.array([bool((rest.eigenvalues.real < 0).all()) for _, rest in rests]),
         "mode": np.array([curve.mode for curve, _ in rests]),
     }
-    return equilibria(
-        labels, attrs, parameter, np.array([rest.value for _, rest in rests]), arrays, special, endings=ENDS, ended=ended
-    )
+    values = np.array([rest.value for _, rest in rests])
+    return equilibria(labels, attrs, parameter, values, arrays, special, endings=ENDS, ended=ended)

@@ -40,7 +40,7 @@ AWAY = (1e-3, 3e-3, 3e-4, 1e-2, 1e-4)  # from a crossing of branches
 def continue_orbit(
     start: Any,
     parameter: str | None = None,
-    range: tuple[float, float] | None = None,  # noqa: A002
+    range: tuple[float, float] | None = None,
     *,
     step: float = 0.05,
     points: int = 2000,
@@ -50,10 +50,10 @@ def continue_orbit(
     Parameters
     ----------
     start : Orbit, branch, or one row of ``special_points``
-        An orbit is followed both ways from its parameter. A branch goes on at each end that stopped at the edge of its
-        range (give a wider ``range``) or at the largest number of points. A flip gives the branch of twice the period,
-        a pitchfork or branch_point the other branch through it, a Hopf point of ``continue_equilibrium`` the cycles that
-        are born there.
+        An orbit is followed both ways from its parameter. A branch goes on at each end that stopped at the edge of
+        its range (give a wider ``range``) or at the largest number of points. A flip gives the branch of twice the
+        period, a pitchfork or branch_point the other branch through it, a Hopf point of ``continue_equilibrium`` the
+        cycles that are born there.
     parameter : str
         Name of the parameter; that of the branch where not given.
     range : (low, high)
@@ -114,12 +114,12 @@ def _limits(system: System, name: Any, given: Any, here: float | None) -> tuple[
     return low, high
 
 
-def _from_orbit(
-    orbit: Orbit, name: str | None, given: Any, largest: float, most: int
-) -> xr.Dataset:
+def _from_orbit(orbit: Orbit, name: str | None, given: Any, largest: float, most: int) -> xr.Dataset:
     system = orbit.system
     if name is None or given is None:
-        raise ValueError('continue_orbit(orbit, parameter, range): say which parameter, and its range: "rho", (0.2, 0.5)')
+        raise ValueError(
+            'continue_orbit(orbit, parameter, range): say which parameter, and its range: "rho", (0.2, 0.5)'
+        )
     low, high = _limits(system, name, given, system.values.get(name))
     if orbit.virtual:
         raise ValueError("this orbit is virtual: its path goes through a boundary that it should obey")
@@ -134,9 +134,7 @@ def _from_orbit(
     up, down = _both_ways(curve, first, bounds, largest, most)
     points, special = joined(from_march(down), [point_record(curve, first)], from_march(up))
     sentences = (_sentence(down, bounds, name, (low, high)), _sentence(up, bounds, name, (low, high)))
-    record = BranchRecord(
-        name, (low, high), orbit.period_number, points, special, (down.ending, up.ending), sentences
-    )
+    record = BranchRecord(name, (low, high), orbit.period_number, points, special, (down.ending, up.ending), sentences)
     return branch_dataset(system, record, {"parameter": name, "range": (low, high), "step": largest, "points": most})
 
 
@@ -320,7 +318,9 @@ def _born(start: xr.Dataset, name: str | None, given: Any, largest: float, most:
 
     if "special" in start.dims:
         if start.sizes["special"] != 1:
-            raise ValueError("continue_orbit takes one special point: choose it, special_points(branch).isel(special=0)")
+            raise ValueError(
+                "continue_orbit takes one special point: choose it, special_points(branch).isel(special=0)"
+            )
         start = start.isel(special=0)
     kind = str(start["kind"].values)
     if kind != "hopf":

@@ -106,7 +106,7 @@ def locate(curve: Curve, a: Point, b: Point, number: Callable[[Point], float]) -
         return limited(number(point))
 
     try:
-        s, result = brentq(value, 0.0, end, xtol=1e-16, rtol=1e-15, maxiter=200, full_output=True)
+        s = brentq(value, 0.0, end, xtol=1e-16, rtol=1e-15, maxiter=200)
     except (_Lost, ValueError, RuntimeError):
         return None
     if s not in found:

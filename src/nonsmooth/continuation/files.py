@@ -35,11 +35,11 @@ def signature_from(data: Any) -> Signature:
 
 
 def branch_dataset(system: System, record: BranchRecord, options: dict[str, Any]) -> xr.Dataset:
-    """The branch as a Dataset with the dims ``point``, ``state``, ``multiplier``, ``special`` (and ``unknown``, ``end``)."""
+    """The branch as a Dataset with the dims ``point``, ``state``, ``multiplier``, ``special``, ``unknown``, ``end``."""
     from nonsmooth.results.branches import branch
     from nonsmooth.results.labels import labels_of
     from nonsmooth.results.provenance import provenance
-    
+
     traced = system.traced
     points, special = record.points, record.special
     layouts: dict[Signature, int] = {}

@@ -46,8 +46,8 @@ def find_orbit(
         Forcing periods once round. Given, the orbit may be unstable: Newton goes to whatever orbit of that period lies
         near the motion. Not given, the smallest period whose orbit is stable is taken.
     transient : int
-        Forcing periods to wait first (autonomous systems: rounds). 0 takes the start as it is, and an unstable orbit near
-        it too.
+        Forcing periods to wait first (autonomous systems: rounds). 0 takes the start as it is, and an unstable orbit
+        near it too.
     max_period : int
         The longest period looked for.
 
@@ -70,8 +70,8 @@ def find_orbit(
     if period_number is not None:
         period_number = whole_number(period_number, "period_number", 1)
     transient, max_period = whole_number(transient, "transient", 0), whole_number(max_period, "max_period", 1)
-    tolerance = {} if engine_for(system).name == "exact" else {"rtol": RTOL}
-    engine = engine_for(system, **tolerance)
+    exact = engine_for(system).name == "exact"
+    engine = engine_for(system, rtol=None if exact else RTOL)
     state = first_state(system, start)
     if system.period() is None:
         from nonsmooth.continuation.settled_autonomous import autonomous_guesses
@@ -86,7 +86,7 @@ def find_orbit(
     if not guesses:
         raise SolveError(
             f"no periodic motion was found: after {transient} forcing periods no return up to the period number "
-            f"{period_number or max_period} came near its beginning (chaotic, quasi-periodic, or a longer period). Give "
+            f"{period_number or max_period} came near its beginning (chaotic, quasi-periodic, a longer period). Give "
             "another start, a longer transient or max_period, or period_number= for an unstable orbit within it",
             status="not_periodic",
         )
@@ -109,14 +109,14 @@ def failed(code: int) -> SolveError:
 def _polished(system: System, guesses: list[Guess], given: bool, unstable: bool) -> Orbit:
     """Newton from each guess; the first orbit that is admissible, near, and stable (or asked for)."""
     reasons: list[tuple[str, str]] = []
-    for guess in [one for guess in guesses for one in (*touching(guess, system), guess)]:
+    for guess in [one for first in guesses for one in (*touching(first, system), first)]:
         shooting = Shooting(system, guess.signature, guess.period_number)
         X = shooting.join(guess.times, guess.states, guess.period)
         size = np.concatenate([guess.size, np.ones(shooting.n - len(guess.size))])
         scale = shooting.join(np.full(shooting.m, guess.period), np.tile(size, (shooting.m + 1, 1)), guess.period)
         name = f"period-{guess.period_number}" if guess.period_number else "closed"
         if not shooting.forced and not shooting.m:
-            shooting.reference = free_anchor(shooting.flow, shooting.values, guess.signature.visits[0].mode, X[: shooting.n], size)
+            shooting.reference = free_anchor(shooting.flow, shooting.values, shooting.at_section, X[: shooting.n], size)
         solved = shooting.newton(X, scale)
         if solved is None:
             reasons.append(("no_convergence", f"Newton's method did not converge to a {name} orbit"))

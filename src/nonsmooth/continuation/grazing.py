@@ -7,7 +7,8 @@ matrices of the contact put in at the touch, in the limit of a contact of no len
 
 Equal signs of det(I - M-) and det(I - M+): the orbit goes on (persistence). Unequal ones: both orbits lie on the same
 side and meet (a non-smooth fold). Unequal signs of det(I + M-) and det(I + M+): an orbit of twice the period is born
-at the graze. A rigid impact has f+ - R_z f- not zero at the touch, and a multiplier without bound; the signs still decide.
+at the graze. A rigid impact has f+ - R_z f- not zero at the touch and a multiplier without bound; the signs still
+decide.
 """
 
 from __future__ import annotations
@@ -83,7 +84,7 @@ class _Product:
     change: Change
 
     def __call__(self, aside: float) -> FloatArray:
-        """With ``aside`` > 0 the contact's saltation matrices are put in, looked at so far (in periods) from the touch."""
+        """With ``aside`` > 0 the contact's saltation matrices are put in, looked at so far from the touch (periods)."""
         M = np.eye(self.flow.n)
         begin = 0.0
         for i, visit in enumerate(self.visits):
@@ -102,7 +103,9 @@ class _Product:
         legs = self.flow.legs(self.values, [mode], [begin], [end - begin], z[None, :])
         return legs.Phi[0], legs.z[0]
 
-    def _through(self, mode: int, begin: float, end: float, z: FloatArray, aside: float) -> tuple[FloatArray, FloatArray]:
+    def _through(
+        self, mode: int, begin: float, end: float, z: FloatArray, aside: float
+    ) -> tuple[FloatArray, FloatArray]:
         """The visit that the contact interrupts: entered a little before the touch, left as long after it.
 
         An impact is looked at before the touch, where the indicator still rises; the motion goes on from the touch."""

@@ -135,7 +135,7 @@ class Locus:
         self, Y: FloatArray, border: FloatArray, level: float, *, tolerance: float = DONE, most: int = MOST,
         gradient: FloatArray | None = None,
     ) -> tuple[Solved, FloatArray, FloatArray, int] | None:  # fmt: skip
-        """Newton for F = 0, psi = 0 and border . Y = level; the gradient of psi is renewed where it converges slowly."""
+        """Newton for F = 0, psi = 0, border . Y = level; the gradient of psi is renewed where it converges slowly."""
         last = np.inf
         if gradient is None:
             gradient = self.gradient(Y)
@@ -159,9 +159,7 @@ class Locus:
             last = length
         return None
 
-    def place(
-        self, found: tuple[Solved, FloatArray, FloatArray, int], border: FloatArray
-    ) -> Place | None:
+    def place(self, found: tuple[Solved, FloatArray, FloatArray, int], border: FloatArray) -> Place | None:
         """A solved point with its tangent (along ``border``), multipliers and path."""
         solved, Y, _, iterations = found
         gradient = self.gradient(Y)
@@ -176,7 +174,7 @@ class Locus:
         if not np.isfinite(length) or path is None:
             return None
         M = solved.monodromy
-        return Place(Y, t / length, solved, M, self.shooting.multipliers(M), path, iterations)
+        return Place(Y, np.asarray(t / length, dtype=float), solved, M, self.shooting.multipliers(M), path, iterations)
 
     def first(self, X: FloatArray) -> Place | None:
         """The locus at a special point: the shortest correction, and a tangent of either sense."""
@@ -190,7 +188,7 @@ class Locus:
             if not (np.isfinite(matrix).all() and np.isfinite(right).all()):
                 return None
             step = np.linalg.lstsq(matrix, right, rcond=1e-12)[0]
-            Y = Y - step
+            Y = np.asarray(Y - step, dtype=float)
             if np.abs(step).max() < CLOSE:
                 break
         _, values, vectors = np.linalg.svd(matrix)

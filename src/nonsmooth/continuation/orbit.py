@@ -93,9 +93,9 @@ class Orbit:
         """The orbit once round, as a result of ``simulate``."""
         from nonsmooth.flow.simulate import simulate
 
-        exact = {"rtol": 1e-13} if _needs_tolerance(self.system) else {}
+        rtol = 1e-13 if _needs_tolerance(self.system) else None
         return simulate(
-            self.system, duration=self.period, start=self.u, mode=self.mode, samples=samples or 1025, **exact
+            self.system, duration=self.period, start=self.u, mode=self.mode, samples=samples or 1025, rtol=rtol
         )
 
     def __repr__(self) -> str:

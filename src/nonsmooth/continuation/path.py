@@ -80,7 +80,8 @@ class Walk:
         self.shape = (m, n_t)
         self.n = n
         conditions = np.array([a < 0 for a in at], dtype=bool)
-        self.armed = np.array([[self.transitions[k, 0] == mode for k in range(n_t)] for mode in self.modes]).reshape(m, n_t)
+        armed = [[self.transitions[k, 0] == mode for k in range(n_t)] for mode in self.modes]
+        self.armed = np.array(armed, dtype=bool).reshape(m, n_t)
         self.armed &= conditions[None, :]
         self.elsewhere = self.armed.copy()  # transitions that could fire at the end of a visit but do not
         for i, k in enumerate(self.fired):
@@ -92,7 +93,9 @@ class Walk:
         self.inside = np.array([(i, self.fired[i]) for i in self.conditional], dtype=np.int64).reshape(-1, 2).T
 
     def along(self, solved: Solved, states: FloatArray) -> Path | None:
-        """Walk along the visits of a solved orbit; ``states`` (m + 1, n_z) begin them. None where the states grow without bound."""
+        """Walk along the visits of a solved orbit; ``states`` (m + 1, n_z) begin them.
+
+        None where the states grow without bound."""
         from nonsmooth.kernels.orbit_path import follow
 
         m, n_t = self.shape
@@ -132,5 +135,3 @@ class Walk:
             if not found[i] <= distance:
                 found[i] = distance
         return found
-
-

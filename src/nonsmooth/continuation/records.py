@@ -84,7 +84,8 @@ def special_record(special: Special) -> SpecialRecord:
     g = special.graze
     if g is not None:
         one = np.eye(len(g.M_free))
-        record.grazing, record.bounded, record.doubled, record.contact = g.kind, g.bounded, g.doubled, g.multipliers_contact
+        record.grazing, record.bounded, record.doubled = g.kind, g.bounded, g.doubled
+        record.contact = g.multipliers_contact
         record.determinants = np.array(
             [np.linalg.det(one + sign * M) for sign in (-1.0, 1.0) for M in (g.M_free, g.M_contact)]
         )

@@ -122,12 +122,12 @@ def touching(guess: Guess, system: System) -> list[Guess]:
             signature = signature.without(i, 1)
             times, states = np.delete(times, i), np.delete(states, i + 1, axis=0)
             continue
-        if i + 1 < len(times) and times[i + 1] - times[i] < TOUCH * guess.period:
-            if visits[i].mode == visits[i + 2].mode and visits[i + 1].row >= 0:
-                signature = signature.without(i, 2)
-                kicks = np.delete(kicks, [i, i + 1])
-                times, states = np.delete(times, [i, i + 1]), np.delete(states, [i + 1, i + 2], axis=0)
-                continue
+        short = i + 1 < len(times) and times[i + 1] - times[i] < TOUCH * guess.period
+        if short and visits[i].mode == visits[i + 2].mode and visits[i + 1].row >= 0:
+            signature = signature.without(i, 2)
+            kicks = np.delete(kicks, [i, i + 1])
+            times, states = np.delete(times, [i, i + 1]), np.delete(states, [i + 1, i + 2], axis=0)
+            continue
         i += 1
     if len(times) == len(guess.times):
         return []

@@ -81,7 +81,7 @@ def _swing(log: Log, system: System) -> tuple[int, float, FloatArray]:
     return j, float(0.5 * (low[j] + high[j])), half
 
 
-def _passages(log: Log, instants: FloatArray, system: System) -> tuple[FloatArray, FloatArray]:
+def _passages(log: Log, instants: FloatArray, system: System) -> tuple[FloatArray, NDArray[np.intp]]:
     """Times (interpolated) and sample indices at which the level half way up is passed upwards, in the second half."""
     j, level, half = _swing(log, system)
     x = np.nan_to_num(log.sample_u[:, j]) - level
@@ -136,9 +136,7 @@ def _by_transitions(system: System, log: Log, most: int, given: int | None) -> l
     return guesses[given - 1 : given] if given else guesses
 
 
-def _by_level(
-    system: System, log: Log, instants: FloatArray, most: int, given: int | None
-) -> list[Guess]:
+def _by_level(system: System, log: Log, instants: FloatArray, most: int, given: int | None) -> list[Guess]:
     """Returns to the level half way up."""
     times, at = _passages(log, instants, system)
     size = _size(log, system)

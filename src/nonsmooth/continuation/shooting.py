@@ -74,9 +74,7 @@ class Shooting:
         Parameters that are unknowns.
     """
 
-    def __init__(
-        self, system: System, signature: Signature, period_number: int, active: tuple[str, ...] = ()
-    ) -> None:
+    def __init__(self, system: System, signature: Signature, period_number: int, active: tuple[str, ...] = ()) -> None:
         self.system, self.signature, self.period_number, self.active = system, signature, period_number, active
         traced = system.traced
         self.flow = VariationalFlow.of(system, active)
@@ -110,9 +108,8 @@ class Shooting:
                 jumps = [traced.transitions[v.transition] for v in signature.crossings]
                 resets = any(t.reset is not None and t.reset[j] != traced.u[j] for t in jumps)
                 dropped = any(traced.lacking[v.mode][j] for v in signature.visits)
-                if not (moved or resets or dropped):
-                    kept.append(j)
-                elif all(traced.lacking[v.mode][j] for v in signature.visits):
+                never = all(traced.lacking[v.mode][j] for v in signature.visits)
+                if never or not (moved or resets or dropped):
                     kept.append(j)
             elif not any(
                 index == j - n_u for v in signature.crossings for index, _ in traced.transitions[v.transition].writes
@@ -157,7 +154,7 @@ class Shooting:
             T, dT = self.flow.period(values)
             end = self.period_number * T
         else:
-            T, dT, end = X[size - 1], None, X[size - 1]
+            T, dT, end = float(X[size - 1]), np.zeros(a), float(X[size - 1])
         times = np.empty(m + 2)
         times[0], times[1:-1], times[-1] = 0.0, t, end
         legs = self.flow.legs(values, self.modes, times[:-1], times[1:] - times[:-1], z)
@@ -333,8 +330,6 @@ class Shooting:
     def at_section(self) -> int:
         """The mode at the section."""
         return self.signature.visits[0].mode
-
-
 
 
 def _coincide(a: FloatArray, h: float, b: FloatArray, g: float, z: FloatArray) -> bool:

@@ -136,9 +136,7 @@ def _state_at(curve: Curve, point: Point, t: float) -> FloatArray:
     return np.asarray(legs.z[0, : len(curve.shooting.system.states)])
 
 
-def emanating(
-    curve: Curve, X: FloatArray, along: FloatArray, kind: str
-) -> list[tuple[Curve, FloatArray, FloatArray]]:
+def emanating(curve: Curve, X: FloatArray, along: FloatArray, kind: str) -> list[tuple[Curve, FloatArray, FloatArray]]:
     """Curve, common point and direction of each new half branch at a special point.
 
     A flip has one (the orbit begun a round later is the same orbit); a pitchfork or a branch point two.

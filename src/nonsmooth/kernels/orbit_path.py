@@ -76,8 +76,8 @@ def extremum(C, m, row, a, b, sign):
     )
 )  # fmt: skip
 def follow(
-    functions, order, rtol, weight, lacking, first, outgoing, transitions, rows, values, modes, t0, tau, z, fired, fired_row,
-    C, W, u, q, scale, extremes, inner, place, which, end, slope,
+    functions, order, rtol, weight, lacking, first, outgoing, transitions, rows, values, modes, t0, tau, z, fired,
+    fired_row, C, W, u, q, scale, extremes, inner, place, which, end, slope,
 ):  # fmt: skip
     """Follow all visits of an orbit.
 

@@ -89,8 +89,9 @@ def branch(
     codes = np.array([list(endings).index(word) for word in ended], dtype=np.int8)
     variables["ended"] = ("end", codes, {"long_name": "how the branch ends", **flag_attributes(endings)})
     variables["ended_because"] = ("end", _words(sentences), {"long_name": "sentence"})
+    own = quantity_attributes(parameter, d.parameters[parameter])
     coords: dict[str, Any] = {
-        parameter: ("point", np.array(values, dtype=np.float64), quantity_attributes(parameter, d.parameters[parameter])),
+        parameter: ("point", np.array(values, dtype=np.float64), own),
         **state_coords(d),
         **parameter_coords(d, without=parameter),
         "indicator": ("indicator", _words(d.indicators), {"long_name": "indicator"}),
