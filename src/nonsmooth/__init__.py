@@ -12,8 +12,15 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from nonsmooth import models as models
     from nonsmooth import plot as plot
+    from nonsmooth.analysis.lyapunov import lyapunov as lyapunov
     from nonsmooth.analysis.response import frequency_response as frequency_response
     from nonsmooth.analysis.sweep import sweep as sweep
+    from nonsmooth.continuation.continue_curve import continue_curve as continue_curve
+    from nonsmooth.continuation.continue_equilibrium import continue_equilibrium as continue_equilibrium
+    from nonsmooth.continuation.continue_orbit import continue_orbit as continue_orbit
+    from nonsmooth.continuation.find import find_orbit as find_orbit
+    from nonsmooth.continuation.orbit import Orbit as Orbit
+    from nonsmooth.continuation.special import special_points as special_points
     from nonsmooth.errors import DataFileError as DataFileError
     from nonsmooth.errors import SolveError as SolveError
     from nonsmooth.errors import SystemDefinitionError as SystemDefinitionError
@@ -22,6 +29,7 @@ if TYPE_CHECKING:
     from nonsmooth.flow.poincare import poincare as poincare
     from nonsmooth.flow.sections import Poincare as Poincare
     from nonsmooth.flow.sections import Stroboscopic as Stroboscopic
+    from nonsmooth.flow.sensitivity import sensitivity as sensitivity
     from nonsmooth.flow.simulate import simulate as simulate
     from nonsmooth.flow.starts import random_starts as random_starts
     from nonsmooth.identification.chain import identify as identify
@@ -44,12 +52,20 @@ _WHERE = {
     "Band": "system.mode",
     "where": "system.scalar",
     "simulate": "flow.simulate",
+    "sensitivity": "flow.sensitivity",
     "poincare": "flow.poincare",
     "Stroboscopic": "flow.sections",
     "Poincare": "flow.sections",
     "random_starts": "flow.starts",
     "sweep": "analysis.sweep",
     "frequency_response": "analysis.response",
+    "lyapunov": "analysis.lyapunov",
+    "find_orbit": "continuation.find",
+    "Orbit": "continuation.orbit",
+    "continue_orbit": "continuation.continue_orbit",
+    "continue_curve": "continuation.continue_curve",
+    "continue_equilibrium": "continuation.continue_equilibrium",
+    "special_points": "continuation.special",
     "load_recording": "experiment.load",
     "Recording": "experiment.recording",
     "identify": "identification.chain",
