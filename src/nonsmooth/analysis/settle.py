@@ -63,7 +63,7 @@ class Attractors:
                 return Verdict(0, np.nan, result_status(out.status[i]))
             verdict = self._judge(i, state, out)
         if out.status[i] == codes.NOT_GUARANTEED and verdict.status == codes.OK:
-            return Verdict(verdict.period_number, verdict.residual, codes.NOT_GUARANTEED)
+            return replace(verdict, status=codes.NOT_GUARANTEED)
         return verdict
 
     def _chain(self, i: int, state: State, transient: int, keep: int, out: Chain) -> None:
