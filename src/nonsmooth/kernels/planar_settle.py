@@ -6,7 +6,8 @@ what sits on an unstable orbit is pushed off it. Here they are compiled, because
 motion itself. Beyond those rules, a point may stop before its transient ends once all that has been shown.
 
 Places of ``choice``: transient, keep, max_period, first look (0: none before the transient ends), further attempts,
-carried along (0 or 1), extremes wanted (0 or 1). ``norms``: tolerance of a return, then the least size of a motion in each state.
+carried along (0 or 1), extremes wanted (0 or 1). ``norms``: tolerance of a return, then the least size of a motion in
+each state.
 """
 
 from math import fabs, hypot, log, nan, sqrt
@@ -14,7 +15,7 @@ from math import fabs, hypot, log, nan, sqrt
 from numba import types
 
 from .cache import device, inline, kernel
-from .codes import BEYOND_STOP, DIVERGED, NOT_PERIODIC, OK, SLOW
+from .codes import BEYOND_STOP, NOT_PERIODIC, OK, SLOW
 from .planar_chain import chain
 
 _i, _f = types.int64, types.float64
@@ -178,7 +179,8 @@ def settle_many(
     """
     u, clock, counters, moved, moved_clock, moved_counters, images, returns = work
     period_number, status, residual, multipliers, crossings, contacts, maximum, minimum, last, mode, spent = results
-    transient, keep, max_period, look, attempts, carried = choice[0], choice[1], choice[2], choice[3], choice[4], choice[5]
+    transient, keep, max_period = choice[0], choice[1], choice[2]
+    look, attempts, carried = choice[3], choice[4], choice[5]
     last_plan = plan if choice[6] != 0 else quiet
     tolerance = norms[0]
     size = norms[3:5]
