@@ -7,14 +7,14 @@ rules of judgement are the same: a period number is granted with a certificate o
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.analysis.classify import TOLERANCE
+from nonsmooth.analysis.classify import TOLERANCE, Verdict
 from nonsmooth.analysis.settle import LEAST, LONGER, Attractors
 from nonsmooth.flow.engine import Chain, Engine, FloatArray, IntArray, SectionPlan, State
 from nonsmooth.flow.methods import RTOL
@@ -175,6 +175,35 @@ class Settler:
         found.multiplier[found.multiplier < 0.0] = np.nan
         return found
 
+    @property
+    def section_phase(self) -> float:
+        """Phase of the forcing at which the section stands; 0 where it is no phase."""
+        return self.plan.phase if self.plan.indicator < 0 else 0.0
+
+    def period(self, point: FloatArray) -> float:
+        """Period of the forcing at one parameter point (1, n_parameters); 1 where there is none."""
+        tables = self.engine.prepare(point)
+        found = float((tables.period if hasattr(tables, "period") else tables.periods)[0])
+        return found if found < np.inf else 1.0
+
+    def trace(
+        self, point: FloatArray, start: FloatArray, mode: int, transient: int, keep: int
+    ) -> tuple[FloatArray, FloatArray, int, float]:
+        """Section points of one run that begins on the section: points (keep, n), the last one, its mode, their time.
+
+        No points where the run failed."""
+        traced = self.system.traced
+        state, tables = State(start.copy(), self.system.memory_vector()), self.engine.prepare(point)
+        state.counters[0] = mode
+        period = float((tables.period if hasattr(tables, "period") else tables.periods)[0])
+        if self.plan.indicator < 0:
+            state.clock[0], state.clock[2] = self.plan.phase * period, period
+        out = Chain.empty(1, keep, len(traced.u), len(traced.indicators), len(traced.outputs))
+        self.engine.chain(tables, 0, 1, state, None, replace(self.plan, extremes=False), transient, keep, out)
+        if out.status[0] not in (codes.OK, codes.NOT_GUARANTEED):
+            return np.zeros((0, len(start))), start, mode, 0.0
+        return out.section[0], state.u, int(state.counters[0]), float(out.elapsed[0])
+
     def exponents(
         self, points: FloatArray, rows: Any, starts: FloatArray, modes: Any, n_returns: int
     ) -> tuple[FloatArray, FloatArray]:
@@ -245,7 +274,7 @@ class Settler:
         tables = self.engine.prepare(points)
         attractors = Attractors(
             self.engine, tables, self.plan, self.transient, self.keep, self.max_period, self.tolerance,
-            system.scale_vector(),
+            system.scale_vector(), LONGER[:attempts],
         )  # fmt: skip
         out = Chain.empty(len(points), self.keep, len(traced.u), len(traced.indicators), len(traced.outputs))
         found = Settled.empty(len(rows), len(traced.u))
@@ -263,10 +292,9 @@ class Settler:
 
             if state is None or not carried:
                 state = fresh()
-            verdict = attractors.settle(int(i), state, out, fresh)
+            verdict, found.returns[j] = self._settle(attractors, int(i), state, out, fresh)
             found.period_number[j], found.status[j] = verdict.period_number, verdict.status
             found.residual[j], found.multiplier[j] = verdict.residual, verdict.multiplier
-            found.returns[j] = self.transient + self.keep
             if not usable(verdict.status):
                 state = None
                 continue
@@ -281,6 +309,23 @@ class Settler:
             found.maximum[j], found.minimum[j] = out.maximum[i], out.minimum[i]
             found.last[j], found.mode[j] = state.u, state.counters[0]
         return found
+
+    def _settle(
+        self, attractors: Attractors, i: int, state: State, out: Chain, fresh: Callable[[], State]
+    ) -> tuple[Verdict, int]:
+        """Settle one job with looks before its transient ends: the verdict, and the returns run (without attempts)."""
+        used, todo = 0, FIRST_LOOK
+        while self.stop_early and used + todo < self.transient:
+            verdict = attractors.look(i, state, todo, out)
+            if verdict is None:
+                break
+            used += todo + self.keep
+            if verdict.status == codes.OK:
+                return verdict, used
+            todo = used if 2 * used + self.keep < self.transient else max(self.transient - used, 0)
+        rest = max(self.transient - used, 0)
+        verdict = replace(attractors, transient=rest).settle(i, state, out, fresh)
+        return verdict, used + rest + self.keep
 
 
 def _work(max_period: int) -> tuple[Any, ...]:
