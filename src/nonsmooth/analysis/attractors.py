@@ -7,8 +7,9 @@ rules of judgement are the same: a period number is granted with a certificate o
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from nonsmooth.analysis.classify import TOLERANCE, Verdict
 from nonsmooth.analysis.settle import LEAST, LONGER, Attractors
 from nonsmooth.flow.engine import Chain, Engine, FloatArray, IntArray, SectionPlan, State
-from nonsmooth.flow.methods import RTOL
+from nonsmooth.flow.methods import RTOL, engine_for
 from nonsmooth.flow.planar import DIVERGENCE, PlanarEngine
 from nonsmooth.flow.poincare import result_status
 from nonsmooth.kernels import codes
@@ -92,6 +93,8 @@ class Settler:
     stop_early: bool = True
     extremes: bool = True
     rtol: float | None = None
+    atol: Any = None
+    expert: Mapping[str, Any] = field(default_factory=dict)
     tolerance: float = field(init=False)
 
     def __post_init__(self) -> None:
@@ -99,6 +102,13 @@ class Settler:
         if self.engine.name != "exact":
             noise = max(TOLERANCE, 10.0 * (RTOL if self.rtol is None else self.rtol))
         object.__setattr__(self, "tolerance", noise)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Sent to another process as the system's text: what is compiled there comes from that machine's own cache."""
+        given = {item.name: getattr(self, item.name) for item in fields(self) if item.init}
+        options = {name: given.pop(name) for name in ("system", "engine")}
+        text, values = options["system"].to_text(), dict(options["system"].values)
+        return _remade, (text, values, options["engine"].name, given)
 
     @property
     def compiled(self) -> bool:
@@ -326,6 +336,24 @@ class Settler:
         rest = max(self.transient - used, 0)
         verdict = replace(attractors, transient=rest).settle(i, state, out, fresh)
         return verdict, used + rest + self.keep
+
+
+@lru_cache(maxsize=8)
+def _system_from(text: str) -> System:
+    """The same object for the same text: tracing takes longer than a chunk."""
+    from nonsmooth.system.system import System
+
+    return System.from_text(text)
+
+
+def _remade(text: str, values: Mapping[str, float], method: str, given: Mapping[str, Any]) -> Settler:
+    system = _system_from(text).with_parameters(values)
+    exact = method == "exact"
+    engine = engine_for(
+        system, "auto" if exact else method, None if exact else given["rtol"], None if exact else given["atol"],
+        **given["expert"],
+    )  # fmt: skip
+    return Settler(system, engine, **given)
 
 
 def _work(max_period: int) -> tuple[Any, ...]:

@@ -13,6 +13,8 @@ from nonsmooth.analysis.basins_attractors import Attractor, Patience, find_attra
 from nonsmooth.analysis.basins_matching import numbered
 from nonsmooth.analysis.basins_measures import share_errors, starts_needed
 from nonsmooth.analysis.basins_work import StartsWork, settled_from
+from nonsmooth.analysis.chart import described
+from nonsmooth.analysis.chart_work import CHUNK, STORED
 from nonsmooth.analysis.sweep import _values
 from nonsmooth.campaign.run import run
 from nonsmooth.flow.arguments import check_options, check_system, whole_number
@@ -46,6 +48,7 @@ def basin_fractions(
     threads: int | None = None,
     store: Any = None,
     client: Any = None,
+    any_cpu: bool = False,
     progress: bool = True,
     **expert: Any,
 ) -> xr.Dataset:
@@ -63,7 +66,7 @@ def basin_fractions(
         Lowest and highest value of each state at the start; states that are not named start at zero.
     seed : int
         Seed of the starts.
-    section, transient, keep, max_period, method, rtol, atol, threads, store, client, progress
+    section, transient, keep, max_period, method, rtol, atol, threads, store, client, any_cpu, progress
         See :func:`nonsmooth.basins`.
 
     Returns
@@ -94,9 +97,11 @@ def basin_fractions(
         "rtol": rtol, "atol": atol, **expert,
     }  # fmt: skip
     points = system.parameter_points({parameter: numbers})
+    chunk = CHUNK if store is None and client is None else STORED
+    work = StartsWork(settler, points, starts, chunk, described(system, "basin_fractions", options))
     columns = run(
-        StartsWork(settler, points, starts, options), threads=threads, progress=progress,
-        label=f"basins over {parameter}", store=store, client=client,
+        work, threads=threads, progress=progress, label=f"basins over {parameter}", store=store, client=client,
+        any_cpu=any_cpu,
     )  # fmt: skip
     runs = settled_from(columns)
     rising = [int(i) for i in np.argsort(numbers, kind="stable")]
@@ -150,8 +155,8 @@ def _dataset(
         "not_converged": (labels == -1).mean(axis=1), "diverged": (labels == -2).mean(axis=1),
         "n_starts_99": np.array([starts_needed(row) for row in fraction], dtype=np.int64),
     }  # fmt: skip
-    described = labels_of(system)
+    named = labels_of(system)
     return build(
-        described, provenance(described, "basin_fractions", options, method=method, seed=seed), parameter, numbers,
+        named, provenance(named, "basin_fractions", options, method=method, seed=seed), parameter, numbers,
         arrays,
     )  # fmt: skip

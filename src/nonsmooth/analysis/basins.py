@@ -18,6 +18,8 @@ from nonsmooth.analysis.basins_measures import (
     uncertain_part,
 )
 from nonsmooth.analysis.basins_work import StartsWork, settled_from
+from nonsmooth.analysis.chart import described
+from nonsmooth.analysis.chart_work import CHUNK, STORED
 from nonsmooth.campaign.run import run
 from nonsmooth.flow.arguments import check_options, check_system, float_array, real_number, whole_number
 from nonsmooth.flow.methods import engine_for
@@ -47,6 +49,7 @@ def basins(
     threads: int | None = None,
     store: Any = None,
     client: Any = None,
+    any_cpu: bool = False,
     progress: bool = True,
     **expert: Any,
 ) -> xr.Dataset:
@@ -74,6 +77,8 @@ def basins(
         A Zarr store for finished chunks; what is there already is not computed again.
     client : dask.distributed.Client, optional
         Computes the chunks on its workers.
+    any_cpu : bool
+        Go on with a store that was begun on another type of processor.
     progress : bool
         A bar on a terminal.
 
@@ -117,10 +122,12 @@ def basins(
         **expert,
     }  # fmt: skip
     point = system.parameter_vector()[None, :]
-    work = StartsWork(settler, point, starts, options)
+    chunk = CHUNK if store is None and client is None else STORED
+    work = StartsWork(settler, point, starts, chunk, described(system, "basins", options))
     columns = run(
-        work, threads=threads, progress=progress, label=f"basins over {x_name} and {y_name}", store=store, client=client
-    )
+        work, threads=threads, progress=progress, label=f"basins over {x_name} and {y_name}", store=store,
+        client=client, any_cpu=any_cpu,
+    )  # fmt: skip
     found, labels = by_share(*find_attractors(settler, point, settled_from(columns), Patience()))
     label = labels.reshape(len(x), len(y))
     from nonsmooth.results.global_schema import basins as build
@@ -133,9 +140,9 @@ def basins(
     shocks = [minimal_shock(label, x / scale[0], y / scale[1], item, k) for k, item in enumerate(inside)]
     entropy, boundary = basin_entropy(label)
     steps, parts = uncertain_part(label)
-    described = labels_of(system)
+    named = labels_of(system)
     return build(
-        described, provenance(described, "basins", options, method=settler.engine.name), values, label, found,
+        named, provenance(named, "basins", options, method=settler.engine.name), values, label, found,
         fixed={name: rest[names.index(name)] for name in names if name not in values},
         per_attractor={"fraction": fraction, "fraction_error": error, "minimal_shock": np.array(shocks)},
         measures={
@@ -157,8 +164,9 @@ def settler_of(
         whole_number(threads, "threads", 1)
     section, plan = section_plan(system, section)
     settler = Settler(
-        system, engine_for(system, method, rtol, atol, **expert), plan, transient, keep, max_period, rtol=rtol
-    )
+        system, engine_for(system, method, rtol, atol, **expert), plan, transient, keep, max_period, rtol=rtol,
+        atol=atol, expert=expert,
+    )  # fmt: skip
     settler.load()
     return section, settler
 

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from nonsmooth.analysis.attractors import Settled, Settler
+from nonsmooth.analysis.chart_work import CHUNK
 from nonsmooth.campaign.work import Column
 from nonsmooth.flow.engine import FloatArray
 
 __all__ = ["StartsWork", "settled_from"]
 
-CHUNK = 256
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,8 @@ class StartsWork:
     settler: Settler
     points: FloatArray
     starts: FloatArray
-    options: Mapping[str, Any] = field(default_factory=dict)
+    chunk: int = CHUNK
+    described: Mapping[str, Any] = field(default_factory=dict)
 
     def columns(self) -> dict[str, Column]:
         n = self.starts.shape[1]
@@ -35,13 +36,13 @@ class StartsWork:
         }
 
     def n_chunks(self) -> int:
-        return -(-len(self.points) * len(self.starts) // CHUNK)
+        return -(-len(self.points) * len(self.starts) // self.chunk)
 
     def bounds(self, chunk: int) -> tuple[int, int]:
-        return chunk * CHUNK, min((chunk + 1) * CHUNK, len(self.points) * len(self.starts))
+        return chunk * self.chunk, min((chunk + 1) * self.chunk, len(self.points) * len(self.starts))
 
     def describe(self) -> dict[str, Any]:
-        return dict(self.options)
+        return dict(self.described)
 
     def compute(self, chunk: int) -> dict[str, Any]:
         place = np.arange(*self.bounds(chunk))

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nonsmooth.analysis.attractors import Settler
-from nonsmooth.analysis.chart_work import ChartWork
+from nonsmooth.analysis.chart_work import CHUNK, STORED, ChartWork
 from nonsmooth.analysis.sweep import _values
 from nonsmooth.campaign.run import run
 from nonsmooth.flow.arguments import check_options, check_system, whole_number
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from nonsmooth.flow.engine import FloatArray
     from nonsmooth.system.system import System
 
-__all__ = ["chart"]
+__all__ = ["PlannedChart", "chart", "described", "plan_chart"]
 
 EXPONENT_RETURNS = 1000
 
@@ -47,6 +48,7 @@ def chart(
     threads: int | None = None,
     store: Any = None,
     client: Any = None,
+    any_cpu: bool = False,
     progress: bool = True,
     **expert: Any,
 ) -> xr.Dataset:
@@ -85,6 +87,8 @@ def chart(
         A Zarr store for finished chunks; what is there already is not computed again.
     client : dask.distributed.Client, optional
         Computes the chunks on its workers.
+    any_cpu : bool
+        Go on with a store that was begun on another type of processor.
     progress : bool
         A bar on a terminal.
 
@@ -106,47 +110,91 @@ def chart(
     With ``refine`` a coarse grid is computed, cells whose corners differ are halved down to single points, and so are
     those beside them where a point in between disagrees; see :mod:`nonsmooth.analysis.chart_refine`.
     """
-    check_system(system, "chart")
-    check_options(system, expert, chart)
-    values = _grid(system, grid)
-    transient, keep = whole_number(transient, "transient", 0), whole_number(keep, "keep", 2)
-    max_period = whole_number(max_period, "max_period", 1)
+    given = dict(locals())
+    for name in ("system", "grid", "threads", "store", "client", "any_cpu", "progress", "expert"):
+        del given[name]
+    planned = plan_chart(system, grid, campaign=store is not None or client is not None, **given, **expert)
     if threads is not None:
         threads = whole_number(threads, "threads", 1)
-    section, plan = section_plan(system, section)
-    along = _carry(values, carry)
-    starts = start_states(system, start)
-    n_exponent = EXPONENT_RETURNS if lyapunov is True else whole_number(int(lyapunov), "lyapunov", 0)
-    if 0 < n_exponent < 40:
-        raise ValueError(f"lyapunov = {lyapunov} returns are too few for an exponent; at least 40")
-    engine = engine_for(system, method, rtol, atol, **expert)
-    settler = Settler(system, engine, plan, transient, keep, max_period, bool(stop_early), bool(extremes), rtol)
-    settler.load()
-    options = {
-        "grid": values, "start": plain_start(system, start), "carry": None if carry is None else dict(carry),
-        "section": section, "transient": transient, "keep": keep, "max_period": max_period,
-        "stop_early": bool(stop_early), "extremes": bool(extremes), "lyapunov": n_exponent, "refine": refine,
-        "method": method, "rtol": rtol, "atol": atol, **expert,
-    }  # fmt: skip
-    axes, order = _axes(values, along)
-    work = ChartWork(settler, axes, starts, along is not None, n_exponent, options=options)
-    label = f"chart over {' and '.join(values)}"
+    work, label = planned.work, f"chart over {' and '.join(planned.values)}"
     if refine is not False:
         from nonsmooth.analysis.chart_refine import refined
 
+        if store is not None or client is not None:
+            raise ValueError("refine decides from its results what to compute next: it takes no store and no client")
         arrays = refined(work, refine, threads=threads, progress=progress, label=label)
     else:
-        flat = run(work, threads=threads, progress=progress, label=label, store=store, client=client)
-        arrays = {name: order(column) for name, column in flat.items()}
+        flat = run(
+            work, threads=threads, progress=progress, label=label, store=store, client=client, any_cpu=any_cpu
+        )
+        arrays = {name: planned.order(column) for name, column in flat.items()}
     from nonsmooth.results.global_schema import chart as build
     from nonsmooth.results.labels import labels_of
     from nonsmooth.results.provenance import provenance
 
     labels = labels_of(system)
     return build(
-        labels, provenance(labels, "chart", options, method=engine.name), values, arrays, starts=starts,
-        one_start=is_one_start(start) or len(starts) == 1,
+        labels, provenance(labels, "chart", planned.options, method=work.settler.engine.name), planned.values, arrays,
+        starts=work.starts, one_start=is_one_start(start) or len(work.starts) == 1,
     )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class PlannedChart:
+    """A chart's work, and how its flat columns become arrays over the grid."""
+
+    work: ChartWork
+    values: Mapping[str, FloatArray]
+    options: Mapping[str, Any]
+    order: Callable[[Any], Any]
+
+
+def plan_chart(
+    system: System, grid: Mapping[str, Any], *, start: Any = None, carry: Any = None, section: Any = None,
+    transient: Any = 500, keep: Any = 60, max_period: Any = 16, stop_early: bool = True, extremes: bool = True,
+    lyapunov: Any = False, refine: Any = False, method: str = "auto", rtol: Any = None, atol: Any = None,
+    campaign: bool = False, **expert: Any,
+) -> PlannedChart:  # fmt: skip
+    """Check the arguments of :func:`chart` and lay its work out, without computing anything."""
+    check_system(system, "chart")
+    check_options(system, expert, chart)
+    values = _grid(system, grid)
+    transient, keep = whole_number(transient, "transient", 0), whole_number(keep, "keep", 2)
+    max_period = whole_number(max_period, "max_period", 1)
+    section, plan = section_plan(system, section)
+    along = _carry(values, carry)
+    starts = start_states(system, start)
+    n_exponent = EXPONENT_RETURNS if lyapunov is True else whole_number(int(lyapunov), "lyapunov", 0)
+    if 0 < n_exponent < 40:
+        raise ValueError(f"lyapunov = {lyapunov} returns are too few for an exponent; at least 40")
+    extremes = bool(extremes) or len(starts) > 1  # attractors are told apart by them
+    engine = engine_for(system, method, rtol, atol, **expert)
+    settler = Settler(
+        system, engine, plan, transient, keep, max_period, bool(stop_early), extremes, rtol, atol, expert
+    )
+    settler.load()
+    options = {
+        "grid": values, "start": plain_start(system, start), "carry": None if carry is None else dict(carry),
+        "section": section, "transient": transient, "keep": keep, "max_period": max_period,
+        "stop_early": bool(stop_early), "extremes": extremes, "lyapunov": n_exponent, "refine": refine,
+        "method": method, "rtol": rtol, "atol": atol, **expert,
+    }  # fmt: skip
+    axes, order = _axes(values, along)
+    chunk = STORED if campaign else CHUNK
+    work = ChartWork(
+        settler, axes, starts, along is not None, n_exponent, chunk=chunk, described=described(system, "chart", options)
+    )
+    return PlannedChart(work, values, options, order)
+
+
+def described(system: System, verb: str, options: Mapping[str, Any]) -> dict[str, Any]:
+    """Everything that a work's outcome depends on, as plain data."""
+    from nonsmooth.results.provenance import options_as_data
+
+    return {
+        "verb": verb, "system": system.to_text(), "parameters": {k: float(v) for k, v in system.values.items()},
+        "options": options_as_data(options),
+    }  # fmt: skip
 
 
 def _grid(system: System, grid: Any) -> dict[str, FloatArray]:

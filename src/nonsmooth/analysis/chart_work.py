@@ -13,9 +13,10 @@ from nonsmooth.campaign.work import Column
 from nonsmooth.flow.engine import FloatArray, IntArray
 from nonsmooth.kernels import codes
 
-__all__ = ["CHUNK", "ChartWork", "attractors_among"]
+__all__ = ["CHUNK", "STORED", "ChartWork", "attractors_among"]
 
 CHUNK = 256  # runs of one chunk, at least: a tenth of a second
+STORED = 4096  # and of one that is kept in a store or sent to a cluster: a second
 SAME = 1e-6  # extremes that agree to this part of the motion's size belong to one attractor
 
 
@@ -39,7 +40,8 @@ class ChartWork:
     carried: bool = False
     lyapunov: int = 0
     where: IntArray | None = None
-    options: Mapping[str, Any] = field(default_factory=dict)
+    chunk: int = CHUNK
+    described: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def _shape(self) -> tuple[int, int]:
@@ -54,7 +56,7 @@ class ChartWork:
     @property
     def _step(self) -> int:
         row = self._shape[1]
-        least = max(1, CHUNK // len(self.starts))
+        least = max(1, self.chunk // len(self.starts))
         return -(-least // row) * row if self.carried else least
 
     def columns(self) -> dict[str, Column]:
@@ -79,7 +81,7 @@ class ChartWork:
         return chunk * self._step, min((chunk + 1) * self._step, self._size)
 
     def describe(self) -> dict[str, Any]:
-        return dict(self.options)
+        return dict(self.described)
 
     def compute(self, chunk: int) -> dict[str, Any]:
         """Every run of the places of one chunk."""
