@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import uuid
 from collections.abc import Callable, Iterable, Mapping
 from itertools import islice
 from pathlib import Path
@@ -25,6 +26,9 @@ def compute_chunk(work: Work, chunk: int, path: str | None, key: str) -> Mapping
     if path is None:
         return work.compute(chunk)
     store = ChunkStore(Path(path), key)
+    if store.has(chunk):  # computed meanwhile for a client that is gone
+        return None
+    store.note_start(chunk)
     began = time.perf_counter()
     store.write(work, chunk, work.compute(chunk), time.perf_counter() - began)
     return None
@@ -53,12 +57,13 @@ def on_cluster(
     except ImportError as error:
         raise ImportError(MISSING) from error
     path, key = (None, "") if store is None else (str(store.path.resolve()), store.key)
+    family = key[:16] or uuid.uuid4().hex[:16]  # the same names for the same work, whichever client sends it
     order = iter(chunks)
     attempts: dict[int, int] = {}
 
     def send(chunk: int) -> Any:
         attempts[chunk] = attempts.get(chunk, 0) + 1
-        name = f"nonsmooth-{key[:12] or id(work)}-{chunk}-{attempts[chunk]}"
+        name = f"nonsmooth-{family}-{chunk}" + (f"-{attempts[chunk]}" if attempts[chunk] > 1 else "")
         return client.submit(compute_chunk, work, chunk, path, key, key=name, pure=False)
 
     threads = max(sum(client.nthreads().values()), 1)

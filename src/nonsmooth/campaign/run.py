@@ -77,6 +77,7 @@ class _Kept:
         self.describe = work.describe
 
     def compute(self, chunk: int) -> Mapping[str, NDArray[Any]]:
+        self.keeper.note_start(chunk)
         began = time.perf_counter()
         arrays = self.work.compute(chunk)
         self.keeper.write(self.work, chunk, arrays, time.perf_counter() - began)

@@ -5,6 +5,7 @@
     chart.zarr/              a Zarr group; the attribute ``nonsmooth_campaign`` says what the work is
         results/             one array per column, one file per chunk (Zstandard, one thread, fixed level)
         run/000017.json      chunk 17 is done: its key and the hash of its content, by whom, when, how long
+        run/started.log      which chunks were begun: one begun twice was lost with its worker
 
 A chunk's key is a hash of the model, the parameters, the options, the kernels' source, and the chunk's place. Its
 mark is written after its arrays, so that a chunk cut short counts as missing. Arrays hold results only: facts about
@@ -50,6 +51,17 @@ class ChunkStore:
     def done(self) -> set[int]:
         """Chunks that are there, whole."""
         return {mark["chunk"] for mark in _marks(self.path) if mark["key"] == self._key(mark["chunk"])}
+
+    def has(self, chunk: int) -> bool:
+        """Whether a chunk is there, whole."""
+        mark = _mark(self.path / "run" / f"{chunk:06d}.json")
+        return mark is not None and mark["key"] == self._key(chunk)
+
+    def note_start(self, chunk: int) -> None:
+        """Write into the log that the work on a chunk begins: what was begun more often than once was lost before."""
+        line = json.dumps({"chunk": chunk, "host": socket.gethostname(), "process": os.getpid(), "began": time.time()})
+        with _told(self.path), open(self.path / "run" / "started.log", "a", encoding="utf-8") as log:
+            log.write(line + "\n")
 
     def write(self, work: Work, chunk: int, arrays: Mapping[str, NDArray[Any]], seconds: float) -> None:
         """Keep a chunk: its arrays first, then the mark that it is done.
@@ -164,6 +176,8 @@ def describe_store(path: str | os.PathLike[str]) -> dict[str, Any]:
     marks = list(_marks(target))
     record["done"] = len({mark["chunk"] for mark in marks})
     record["seconds"] = sum(mark["seconds"] for mark in marks)
+    log = target / "run" / "started.log"
+    record["started"] = len(log.read_text(encoding="utf-8").splitlines()) if log.exists() else record["done"]
     return record
 
 
@@ -236,12 +250,18 @@ def _results(path: Path, mode: Any) -> Any:
 
 def _marks(path: Path) -> Iterator[dict[str, Any]]:
     for file in sorted((path / "run").glob("*.json")):
-        try:
-            mark = json.loads(file.read_text(encoding="utf-8"))
-        except (OSError, ValueError):
-            continue  # cut short by a crash of the machine: the chunk is computed again
-        if isinstance(mark, dict) and {"chunk", "key", "seconds"} <= set(mark):
+        mark = _mark(file)
+        if mark is not None:
             yield mark
+
+
+def _mark(file: Path) -> dict[str, Any] | None:
+    """A mark; None where there is none, or it was cut short by a crash of the machine."""
+    try:
+        mark = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return mark if isinstance(mark, dict) and {"chunk", "key", "seconds"} <= set(mark) else None
 
 
 def _write_whole(path: Path, data: bytes) -> None:
