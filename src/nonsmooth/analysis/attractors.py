@@ -59,10 +59,18 @@ class Settled:
 
     @classmethod
     def empty(cls, jobs: int, n: int) -> Settled:
-        whole = [np.zeros(jobs, dtype=np.int64) for _ in range(4)]
-        one = [np.full(jobs, np.nan) for _ in range(4)]
-        states = [np.full((jobs, n), np.nan) for _ in range(3)]
-        return cls(whole[0], whole[1], *one, *states, whole[2], whole[3])
+        def whole() -> IntArray:
+            return np.zeros(jobs, dtype=np.int64)
+
+        def one() -> FloatArray:
+            return np.full(jobs, np.nan)
+
+        def state() -> FloatArray:
+            return np.full((jobs, n), np.nan)
+
+        return cls(
+            whole(), whole(), one(), one(), one(), one(), state(), state(), state(), whole(), whole()
+        )  # fmt: skip
 
     @classmethod
     def joined(cls, parts: Sequence[Settled]) -> Settled:
@@ -170,7 +178,7 @@ class Settler:
         choice = np.array(
             [self.transient, self.keep, self.max_period, look, attempts, carried, self.extremes], dtype=np.int64
         )
-        norms = np.concatenate([[self.tolerance], LEAST * self.system.scale_vector(), np.zeros(2)])
+        norms = np.concatenate([[self.tolerance], self.least, np.zeros(2)])
         plan, quiet = (np.array([-1, 1, -1, 1, 1, extremes], dtype=np.int64) for extremes in (1, 0))
         work = _work(self.max_period)
         found = Settled.empty(len(rows), 2)
@@ -184,6 +192,11 @@ class Settler:
         found.residual[failed] = np.nan
         found.multiplier[found.multiplier < 0.0] = np.nan
         return found
+
+    @property
+    def least(self) -> FloatArray:
+        """The least size of a motion in each state: what is smaller has come to rest."""
+        return LEAST * self.system.scale_vector()
 
     @property
     def section_phase(self) -> float:
@@ -252,7 +265,7 @@ class Settler:
         if self.plan.indicator < 0:
             state.clock[0], state.clock[2] = self.plan.phase * period, period
         offset = np.full(len(start), 1e-6) * scale
-        first = np.linalg.norm(offset / scale)
+        first = float(np.linalg.norm(offset / scale))
         batch = n_returns // 10
         logs, times = [], []
         for _ in range(batch // 4 + 10 * batch):

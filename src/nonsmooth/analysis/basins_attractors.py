@@ -58,12 +58,13 @@ class Attractor:
     multiplier: float
     exponent: float
     exponent_error: float
+    least: FloatArray  # (n,): a motion smaller than this is one that has come to rest
     tree: Any = field(default=None, repr=False, compare=False)
 
     @property
     def size(self) -> FloatArray:
-        """Half the range of each state on it."""
-        return np.maximum(0.5 * (self.maximum - self.minimum), 1e-300)
+        """Half the range of each state on it, and no less than a small part of the states' scales."""
+        return np.maximum(0.5 * (self.maximum - self.minimum), self.least)
 
 
 def find_attractors(
@@ -138,7 +139,7 @@ def _label_cycles(
 
 def _same_cycle(attractor: Attractor, period: IntArray, extremes: FloatArray) -> Any:
     own = np.concatenate([attractor.maximum, attractor.minimum])
-    slack = SAME * np.concatenate([attractor.size, attractor.size]) + 1e-300
+    slack = SAME * np.concatenate([attractor.size, attractor.size])
     # a cycle that is approached slowly is known less well
     return (period == attractor.period_number) & (np.abs(extremes - own) <= 10 * slack).all(axis=1)
 
@@ -150,7 +151,7 @@ def _cycle(settler: Settler, point: FloatArray, run: Settled) -> Attractor:
     multiplier = float(run.multiplier[0])
     with np.errstate(divide="ignore"):
         exponent = float(np.log(multiplier) / elapsed) if multiplier >= 0.0 else np.nan
-    return Attractor(p, points, mode, run.maximum[0], run.minimum[0], multiplier, exponent, 0.0)
+    return Attractor(p, points, mode, run.maximum[0], run.minimum[0], multiplier, exponent, 0.0, settler.least)
 
 
 def _join(
@@ -221,7 +222,7 @@ def _candidate(
     if np.isin(keys[half:], keys[:half]).mean() < MOSTLY or np.isin(keys[:half], keys[half:]).mean() < MOSTLY:
         return None
     exponents, errors = settler.exponents(point, [0], last[None], [mode], patience.exponent)
-    size = np.maximum(0.5 * (checked.maximum[0] - checked.minimum[0]), 1e-300)
+    size = np.maximum(0.5 * (checked.maximum[0] - checked.minimum[0]), settler.least)
     period = 0
     if exponents[0] < -3.0 * errors[0] - LEAST_EXPONENT / settler.period(point):
         period = _long_period(points, size)
@@ -231,5 +232,5 @@ def _candidate(
         half = 0
     return Attractor(
         period, points[half:], mode, checked.maximum[0], checked.minimum[0], np.nan, float(exponents[0]),
-        float(errors[0]), cKDTree(points / size),
+        float(errors[0]), settler.least, cKDTree(points / size),
     )  # fmt: skip

@@ -113,7 +113,7 @@ class ChartWork:
             name: arrays[name].reshape(n_places, *item.shape) for name, item in self.columns().items() if name in arrays
         }
         if n_starts > 1:
-            kept["n_attractors"] = attractors_among(found, n_places, n_starts)
+            kept["n_attractors"] = attractors_among(found, n_places, n_starts, self.settler.least)
         return kept
 
     def _along_rows(self, points: FloatArray, n_starts: int) -> Settled:
@@ -129,7 +129,7 @@ class ChartWork:
         return joined[order.transpose(0, 2, 1).ravel()]
 
 
-def attractors_among(found: Settled, n_places: int, n_starts: int) -> IntArray:
+def attractors_among(found: Settled, n_places: int, n_starts: int, least: FloatArray) -> IntArray:
     """Distinct attractors among the starts of each place: by period number and extremes; what has no period is one.
 
     A cycle's extremes do not depend on where in the cycle a run ended. What is still settling, or failed, is none.
@@ -137,13 +137,13 @@ def attractors_among(found: Settled, n_places: int, n_starts: int) -> IntArray:
     period = found.period_number.reshape(n_places, n_starts)
     wandering = found.status.reshape(n_places, n_starts) == codes.NOT_PERIODIC
     extremes = np.concatenate([found.maximum, found.minimum], axis=1).reshape(n_places, n_starts, -1)
-    size = np.abs(found.maximum - found.minimum).reshape(n_places, n_starts, -1)
+    size = np.maximum(found.maximum - found.minimum, least).reshape(n_places, n_starts, -1)
     size = np.concatenate([size, size], axis=2)
     count = wandering.any(axis=1).astype(np.int64)
     for k in range(n_starts):
         new = period[:, k] > 0
         for j in range(k):
-            near = np.abs(extremes[:, k] - extremes[:, j]) <= SAME * np.maximum(size[:, k], 1e-300)
+            near = np.abs(extremes[:, k] - extremes[:, j]) <= SAME * size[:, k]
             new &= ~((period[:, j] == period[:, k]) & near.all(axis=1))
         count += new
     return count

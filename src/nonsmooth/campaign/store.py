@@ -221,6 +221,7 @@ def _described(work: Work) -> dict[str, Any]:
 def _make(target: Path, work: Work, described: Mapping[str, Any], key: str) -> None:
     """A whole empty store, or none."""
     import zarr
+    from zarr.codecs import ZstdCodec
 
     with _told(target), tempfile.TemporaryDirectory(prefix=f".{target.name}-", dir=target.parent) as folder:
         fresh = Path(folder) / "new.zarr"
@@ -231,7 +232,7 @@ def _make(target: Path, work: Work, described: Mapping[str, Any], key: str) -> N
         for name, item in work.columns().items():
             results.create_array(
                 name, shape=(places, *item.shape), chunks=(last - first, *item.shape), dtype=item.dtype,
-                compressors=zarr.codecs.ZstdCodec(level=LEVEL), config={"write_empty_chunks": True},
+                compressors=ZstdCodec(level=LEVEL), config={"write_empty_chunks": True},
             )  # fmt: skip
         (fresh / "run").mkdir()
         try:
