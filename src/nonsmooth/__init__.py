@@ -12,9 +12,14 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from nonsmooth import models as models
     from nonsmooth import plot as plot
+    from nonsmooth.analysis.basin_fractions import basin_fractions as basin_fractions
+    from nonsmooth.analysis.basins import basins as basins
+    from nonsmooth.analysis.chart import chart as chart
+    from nonsmooth.analysis.correlation_dimension import correlation_dimension as correlation_dimension
     from nonsmooth.analysis.lyapunov import lyapunov as lyapunov
     from nonsmooth.analysis.response import frequency_response as frequency_response
     from nonsmooth.analysis.sweep import sweep as sweep
+    from nonsmooth.analysis.zero_one_test import zero_one_test as zero_one_test
     from nonsmooth.continuation.continue_curve import continue_curve as continue_curve
     from nonsmooth.continuation.continue_equilibrium import continue_equilibrium as continue_equilibrium
     from nonsmooth.continuation.continue_orbit import continue_orbit as continue_orbit
@@ -60,6 +65,11 @@ _WHERE = {
     "sweep": "analysis.sweep",
     "frequency_response": "analysis.response",
     "lyapunov": "analysis.lyapunov",
+    "correlation_dimension": "analysis.correlation_dimension",
+    "zero_one_test": "analysis.zero_one_test",
+    "basins": "analysis.basins",
+    "basin_fractions": "analysis.basin_fractions",
+    "chart": "analysis.chart",
     "find_orbit": "continuation.find",
     "Orbit": "continuation.orbit",
     "continue_orbit": "continuation.continue_orbit",

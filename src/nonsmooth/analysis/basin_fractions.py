@@ -15,7 +15,7 @@ from nonsmooth.analysis.basins_measures import share_errors, starts_needed
 from nonsmooth.analysis.basins_work import StartsWork, settled_from
 from nonsmooth.analysis.chart import described
 from nonsmooth.analysis.chart_work import CHUNK, STORED
-from nonsmooth.analysis.sweep import _values
+from nonsmooth.analysis.sweep import swept_values
 from nonsmooth.campaign.run import run
 from nonsmooth.flow.arguments import check_options, check_system, whole_number
 from nonsmooth.flow.sections import Poincare, Stroboscopic
@@ -85,7 +85,7 @@ def basin_fractions(
     """
     check_system(system, "basin_fractions")
     check_options(system, expert, basin_fractions)
-    numbers = _values(system, parameter, values)
+    numbers = swept_values(system, parameter, values)
     n_starts = whole_number(n_starts, "n_starts", 1)
     starts = start_states(system, _starts(system, box, n_starts, seed))
     section, settler = settler_of(

@@ -10,7 +10,7 @@ import numpy as np
 
 from nonsmooth.analysis.attractors import Settler
 from nonsmooth.analysis.chart_work import CHUNK, STORED, ChartWork
-from nonsmooth.analysis.sweep import _values
+from nonsmooth.analysis.sweep import swept_values
 from nonsmooth.campaign.run import run
 from nonsmooth.flow.arguments import check_options, check_system, whole_number
 from nonsmooth.flow.methods import engine_for
@@ -201,7 +201,7 @@ def _grid(system: System, grid: Any) -> dict[str, FloatArray]:
     if not isinstance(grid, Mapping) or len(grid) != 2:
         given = list(grid) if isinstance(grid, Mapping) else grid
         raise ValueError(f'grid must name two parameters, {{"omega": values, "rho": values}}; given: {given!r}')
-    return {str(name): _values(system, name, values) for name, values in grid.items()}
+    return {str(name): swept_values(system, name, values) for name, values in grid.items()}
 
 
 def _carry(values: Mapping[str, FloatArray], carry: Any) -> tuple[str, str] | None:

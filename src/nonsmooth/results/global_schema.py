@@ -16,7 +16,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from nonsmooth.results.labels import Labels
-from nonsmooth.results.schema import _attributes, _floats, _parameter_coords, _start_coords, _state_coords
+from nonsmooth.results.schema import quantity_attributes, _floats, parameter_coords, _start_coords, state_coords
 from nonsmooth.results.statuses import status_attributes
 
 __all__ = ["attractor_variables", "basins", "chart"]
@@ -74,10 +74,10 @@ def chart(
         else:
             attributes = {"long_name": _LONG_NAMES[name]}
         variables[name] = (dims, array, attributes)
-    coords: dict[str, Any] = _parameter_coords(labels)
+    coords: dict[str, Any] = parameter_coords(labels)
     for name, values in grid.items():
-        coords[name] = (name, _floats(values), _attributes(name, labels.parameters[name]))
-    coords |= _state_coords(labels)
+        coords[name] = (name, _floats(values), quantity_attributes(name, labels.parameters[name]))
+    coords |= state_coords(labels)
     result = xr.Dataset(variables, coords | _start_coords(starts), dict(attrs))
     return result.squeeze("start") if one_start else result
 
@@ -103,11 +103,11 @@ def basins(
     for name, value in measures.items():
         variables[name] = ((), value, {"long_name": _LONG_NAMES[name]})
     variables["uncertain"] = ("distance", uncertain[1], {"long_name": _LONG_NAMES["uncertain"]})
-    coords: dict[str, Any] = _parameter_coords(labels) | _state_coords(labels)
+    coords: dict[str, Any] = parameter_coords(labels) | state_coords(labels)
     for name, values in grid.items():
-        coords[name] = (name, _floats(values), _attributes(name, labels.states[name]))
+        coords[name] = (name, _floats(values), quantity_attributes(name, labels.states[name]))
     for name, value in fixed.items():
-        coords[name] = ((), float(value), _attributes(name, labels.states[name]))
+        coords[name] = ((), float(value), quantity_attributes(name, labels.states[name]))
     coords["distance"] = ("distance", uncertain[0], {"long_name": "distance in grid steps"})
     coords["attractor"] = ("attractor", np.arange(len(attractors)), {"long_name": "attractor"})
     return xr.Dataset(variables, coords, dict(attrs))
@@ -172,7 +172,7 @@ def basin_fractions(
         variables[name] = (dims, array, {"long_name": _LONG_NAMES[name]})
     variables["period_number"][2]["long_name"] = "period number (0: no cycle, -1: not there)"
     variables["lyapunov"][2]["units"] = f"1/{labels.time_unit}"
-    coords: dict[str, Any] = _parameter_coords(labels, without=parameter) | _state_coords(labels)
-    coords[parameter] = (parameter, _floats(values), _attributes(parameter, labels.parameters[parameter]))
+    coords: dict[str, Any] = parameter_coords(labels, without=parameter) | state_coords(labels)
+    coords[parameter] = (parameter, _floats(values), quantity_attributes(parameter, labels.parameters[parameter]))
     coords["attractor"] = ("attractor", np.arange(np.shape(arrays["fraction"])[1]), {"long_name": "attractor"})
     return xr.Dataset(variables, coords, dict(attrs))
