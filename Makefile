@@ -11,7 +11,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 PYTEST_ARGS ?= -n auto --dist loadfile
 
 .DEFAULT_GOAL := help
-.PHONY: help reproduce test fuzz coverage rig-against-model check bench docs clean distclean
+.PHONY: help reproduce test slow fuzz coverage rig-against-model check bench docs clean distclean
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 26
@@ -21,6 +21,9 @@ reproduce: $(VENV)/.installed-run  ## reproduce Savi et al. (2007): figures, dat
 
 test: $(VENV)/.installed-test  ## run the tests
 	$(BIN)/python -m pytest $(PYTEST_ARGS)
+
+slow: $(VENV)/.installed-test  ## run the long campaigns that `make test` leaves out
+	$(BIN)/python -m pytest -m slow -s
 
 fuzz: $(VENV)/.installed-test  ## read 100 000 damaged recordings with every reader
 	NONSMOOTH_FUZZ=1 $(BIN)/python -m pytest -m slow tests/experiment/test_fuzz.py -s
