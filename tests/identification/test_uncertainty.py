@@ -5,6 +5,7 @@ import pytest
 
 from nonsmooth.identification.finding import Estimate
 from nonsmooth.identification.lines import york
+from nonsmooth.identification.profiles import profile_likelihood, profile_of
 from nonsmooth.identification.uncertainty import (
     bootstrap,
     correlated,
@@ -12,7 +13,6 @@ from nonsmooth.identification.uncertainty import (
     coverage_factor,
     factor_interval,
     interval,
-    profile_likelihood,
     uniform,
 )
 
@@ -52,6 +52,12 @@ def test_correlation_of_an_autoregressive_series():
 def test_profile_of_a_parabola_gives_the_normal_interval():
     profile = profile_likelihood(lambda p: (p - [1.0, 2.0]) / [0.1, 0.2], [1.0, 2.0], 0, np.linspace(0.5, 1.5, 101))
     assert (profile.low, profile.high) == pytest.approx((1 - 0.19600, 1 + 0.19600), abs=1e-3)
+
+
+def test_a_profile_that_does_not_rise_has_no_limit():
+    value = np.linspace(0.1, 3, 59)
+    profile = profile_of(value, np.minimum(40 * (value - 1) ** 2, np.where(value > 1, 2.0, np.inf)), 1.0)
+    assert np.isnan(profile.high) and profile.low == pytest.approx(1 - np.sqrt(3.8415 / 40), abs=0.01)
 
 
 def test_bootstrap_of_a_mean():

@@ -10,7 +10,7 @@ import xarray as xr
 
 import nonsmooth as ns
 from nonsmooth.identification.finding import Estimate, Finding
-from nonsmooth.studies.savi2007 import claims_rig
+from nonsmooth.studies.savi2007 import claims_rig, claims_rig_response
 from nonsmooth.studies.savi2007.findings import Number, found_in, kept, the_finding
 from nonsmooth.studies.savi2007.flows import Settings
 from nonsmooth.studies.savi2007.measure import Interval, measured_jumps, measured_periods
@@ -46,16 +46,16 @@ def test_jumps_and_periods_of_a_response_made_by_hand() -> None:
 
 def test_the_cells_of_figure_9_are_those_of_the_response() -> None:
     data = {"fig09_rig": _response({"up": 5.86, "down": 5.26})}
-    region, rising = claims_rig.f9a(data)
+    region, rising = claims_rig_response.f9a(data)
     assert region == Cell("period 2 from 3.600 to 4.000 rad/s (9 runs)", "agrees")  # 3.63 lies within
     assert rising.verdict == "agrees"  # 5.88 lies in the step 5.85 ... 5.90
-    falling, closed, again = claims_rig.f9b(data)
+    falling, closed, again = claims_rig_response.f9b(data)
     assert falling.verdict == "agrees"  # 5.29 in 5.25 ... 5.30, by its rounding
     assert closed.verdict.startswith("differs by 2.2")  # 5.275 against grazing at 5.15986
     assert again.verdict == "agrees"
-    (between,) = claims_rig.f9c(data)
+    (between,) = claims_rig_response.f9c(data)
     assert between.verdict == "agrees in part"
-    assert "not found" in claims_rig.f9a({"fig09_rig": _response({"up": 9.0, "down": 9.0})})[1].text
+    assert "not found" in claims_rig_response.f9a({"fig09_rig": _response({"up": 9.0, "down": 9.0})})[1].text
 
 
 def _steady(numbers: dict[str, int]) -> dict[str, xr.Dataset]:
@@ -123,6 +123,6 @@ def test_what_is_not_there_is_said() -> None:
 
 def test_single_runs_with_period_two_make_no_range() -> None:
     data = {"fig10_rig": _response({"up": 5.81, "down": 5.16}, doubled=(3.6, 3.6))}
-    cell = claims_rig.f10(data)[2]
+    cell = claims_rig_response.f10(data)[2]
     assert (cell.text, cell.verdict) == ("2 of 140 runs with period 2, no two neighbours", "agrees")
-    assert claims_rig.f10({"fig10_rig": _response({"up": 5.81, "down": 5.16})})[2].verdict == "differs"
+    assert claims_rig_response.f10({"fig10_rig": _response({"up": 5.81, "down": 5.16})})[2].verdict == "differs"

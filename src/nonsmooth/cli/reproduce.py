@@ -17,7 +17,8 @@ def add(commands: Any) -> None:
     parser = commands.add_parser(
         "reproduce",
         help="reproduce a published study",
-        description="Compute the figures, the data and the report of a published study.",
+        description="Compute the figures, the data and the report of a published study. What its authors measured is "
+        "measured on a virtual rig: synthetic, and labelled so.",
     )
     parser.add_argument("study", help="the study, for example savi2007")
     parser.add_argument(

@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.identification.finding import Estimate
 from nonsmooth.identification.uncertainty import uniform
 
 __all__ = ["LAWS", "UNKNOWNS", "Adjusted", "Observation", "adjust"]
@@ -81,6 +82,12 @@ class Adjusted:
 
     def __getitem__(self, name: str) -> float:
         return float(self.values[self.names.index(name)])
+
+    def estimate(self, name: str) -> Estimate:
+        """An unknown with its standard uncertainty; the support's damping is known to a factor."""
+        i = self.names.index(name)
+        error = float(np.sqrt(self.covariance[i, i]))
+        return Estimate(self[name], error, UNKNOWNS[name], logarithmic=name == "c_s")
 
 
 def adjust(observations: list[Observation], *, gain_limit: float) -> Adjusted:

@@ -14,21 +14,22 @@ from numpy.typing import NDArray
 from nonsmooth.errors import SolveError
 from nonsmooth.experiment.recording import RecordingWarning
 from nonsmooth.experiment.session import Quantity, Session
-from nonsmooth.identification.adjustment import UNKNOWNS, Adjusted, Observation, adjust
+from nonsmooth.identification.adjustment import Adjusted, Observation, adjust
 from nonsmooth.identification.calibrations import crank_force, voltage_frequency
 from nonsmooth.identification.contact_findings import contact_finding, one_contact
 from nonsmooth.identification.damping import amplitude_fit
 from nonsmooth.identification.decay_damping import decay_damping
 from nonsmooth.identification.evidence import Evidence, Run, gather
-from nonsmooth.identification.finding import Estimate, Finding
+from nonsmooth.identification.finding import Finding
 from nonsmooth.identification.free_decay import DecayFit, free_decay
 from nonsmooth.identification.grazing import grazing_gap
 from nonsmooth.identification.half_power import half_power
+from nonsmooth.identification.joining import joined
 from nonsmooth.identification.multiple_shooting import ContactFit, shoot_contacts
 from nonsmooth.identification.natural_frequency import natural_frequency
 from nonsmooth.identification.parameter_set import ParameterSet
 from nonsmooth.identification.receptance import receptance_fit
-from nonsmooth.identification.referral import Referred, refer
+from nonsmooth.identification.referral import refer
 from nonsmooth.identification.statements import agreement, for_model, identifiability
 from nonsmooth.identification.steady import Steady, steady
 from nonsmooth.identification.stiffness import stiffness
@@ -37,8 +38,6 @@ from nonsmooth.identification.support_damping import support_damping
 __all__ = ["identify"]
 
 FloatArray = NDArray[np.float64]
-_PARAMETERS = ("m", "k", "k_s", "c", "c_s")
-_BESIDE = ("friction", "gain")
 
 
 def identify(
@@ -105,7 +104,10 @@ def identify(
     if contacts is not None and decay is not None:
         gap = refer(chain.evidence, decay, contacts, adjusted, seen, crank_length)
         chain.findings.append(gap.finding(contacts, grazing))
-    found = _joined(adjusted, gap, chain, identifiability(adjusted, contacts, single))
+    found = joined(
+        adjusted, gap, findings=chain.findings, identifiability=identifiability(adjusted, contacts, single),
+        notes=[*agreement(adjusted, chain.evidence), *chain.notes], synthetic=chain.evidence.synthetic,
+    )  # fmt: skip
     return found if model is None else for_model(found, model)
 
 
@@ -224,7 +226,7 @@ class _Chain:
         if runs := self.runs("voltage"):
             self.beside("voltage calibration (Fig. 8a)", lambda: voltage_frequency(runs))
         if held := self.runs("crank"):
-            k = _estimate(adjusted, "k") if "k" in adjusted.names else None
+            k = adjusted.estimate("k") if "k" in adjusted.names else None
             self.beside("crank calibration (Fig. 8b)", lambda: crank_force(held, gain_limit=self.gain_limit, k=k))
 
     def graze(self, decay: DecayFit | None) -> Finding | None:
@@ -258,39 +260,3 @@ class _Chain:
         return found, self.beside(
             "c_s from one contact", lambda: one_contact(found, m, resolution=resolution, kappa_error=error)
         )
-
-
-def _estimate(adjusted: Adjusted, name: str) -> Estimate:
-    i = adjusted.names.index(name)
-    error = float(np.sqrt(adjusted.covariance[i, i]))
-    return Estimate(adjusted[name], error, UNKNOWNS[name], logarithmic=name == "c_s")
-
-
-def _joined(adjusted: Adjusted, gap: Referred | None, chain: _Chain, said: Mapping[str, str]) -> ParameterSet:
-    """The model's parameters, then what is beside them, with one covariance by their rows over the unknowns."""
-    size, names = len(adjusted.names), adjusted.names
-    unit = np.eye(size)
-    rows = {name: (_estimate(adjusted, name), unit[names.index(name)]) for name in names}
-    if {"m", "k"} <= set(names):
-        omega, row = float(np.sqrt(2 * adjusted["k"] / adjusted["m"])), np.zeros(size)
-        row[names.index("k")], row[names.index("m")] = omega / (2 * adjusted["k"]), -omega / (2 * adjusted["m"])
-        error = float(np.sqrt(row @ adjusted.covariance @ row))
-        rows["omega_0"] = (Estimate(omega, error, "rad/s"), row)
-    inner = [name for name in _PARAMETERS if name in rows]
-    outer = [name for name in (*_BESIDE, "omega_0") if name in rows]
-    jacobian = np.array([rows[name][1] for name in inner + outer]).reshape(-1, size)
-    estimates = {name: rows[name][0] for name in inner}
-    extra = {name: rows[name][0] for name in outer}
-    covariance = jacobian @ adjusted.covariance @ jacobian.T
-    if gap is not None:
-        n = len(inner)
-        cross = gap.cross @ jacobian.T
-        stacked = np.block([[covariance, cross.T], [cross, gap.covariance]])
-        order = [*range(n), len(covariance), *range(n, len(covariance)), len(covariance) + 1, len(covariance) + 2]
-        covariance = stacked[np.ix_(order, order)]
-        estimates["g"] = gap.gap
-        extra |= {"gap_at_rest": gap.at_rest, "mean_shift": gap.shift}
-    return ParameterSet(
-        estimates, covariance, extra=extra, findings=chain.findings, identifiability=said,
-        notes=[*agreement(adjusted, chain.evidence), *chain.notes], synthetic=chain.evidence.synthetic,
-    )  # fmt: skip

@@ -17,8 +17,9 @@ from nonsmooth.errors import SolveError
 from nonsmooth.experiment.session import Quantity
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.multiple_shooting import ContactFit
+from nonsmooth.identification.profiles import Profile, profile_of
 from nonsmooth.identification.shooting import ShootingFit, shoot
-from nonsmooth.identification.uncertainty import coverage_factor, crossed
+from nonsmooth.identification.uncertainty import coverage_factor
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -110,8 +111,9 @@ def one_contact(found: ContactFit, mass: float, *, resolution: float, kappa_erro
     kept = np.isfinite(cost)
     values, cost = values[kept], (cost[kept] - np.min(cost[kept])) / max(found.fit.reduced, 1.0)
     top = int(np.argmin(cost))
-    low, high = mass * crossed(values[top::-1], cost[top::-1]), mass * crossed(values[top:], cost[top:])
-    best, bounded = mass * float(values[top]), bool(np.isfinite(low) and np.isfinite(high))
+    profile = profile_of(values * mass, cost, mass * float(values[top]))
+    best, low, high = profile.best, profile.low, profile.high
+    bounded = bool(np.isfinite(low) and np.isfinite(high))
     error = best * float(np.log(high / low)) / (2 * coverage_factor()) if bounded else mass * width
     return Finding(
         "c_s_one_contact", Estimate(best, error, "N s/m", logarithmic=True),
@@ -121,7 +123,7 @@ def one_contact(found: ContactFit, mass: float, *, resolution: float, kappa_erro
             (f"95 % limits {low:.3g} to {high:.3g} N s/m" if bounded else "the profile does not bound it on both sides")
             + f"; the piece is the median one of {len(order)}",
         ),
-        data=_profile(values * mass, cost, best, low, high, found), plot="profile",
+        data=_profile(profile, found), plot="profile",
     )  # fmt: skip
 
 
@@ -197,14 +199,15 @@ def _data(found: ContactFit, resolution: float) -> xr.Dataset:
     )  # fmt: skip
 
 
-def _profile(
-    value: FloatArray, cost: FloatArray, best: float, low: float, high: float, found: ContactFit
-) -> xr.Dataset:
+def _profile(profile: Profile, found: ContactFit) -> xr.Dataset:
     import xarray as xr
 
     return xr.Dataset(
-        {"cost": ("value", cost), "best": ((), best), "low": ((), low), "high": ((), high)},
-        {"value": ("value", value, {"units": "N s/m"})},
+        {
+            "cost": ("value", profile.cost), "best": ((), profile.best), "low": ((), profile.low),
+            "high": ((), profile.high),
+        },
+        {"value": ("value", profile.values, {"units": "N s/m"})},
         {
             "parameter": "c_s", "units": "N s/m",
             "synthetic": "yes" if any(run.synthetic for run in found.runs) else "no",

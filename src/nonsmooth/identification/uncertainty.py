@@ -9,14 +9,13 @@ References: JCGM 100:2008 (GUM), 4.3.7 for limits without a distribution, 5.2.2 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
-    "Profile", "bootstrap", "correlated", "correlation_times", "coverage_factor", "crossed", "factor_interval",
-    "interval",    "profile_likelihood", "uniform",
+    "bootstrap", "correlated", "correlation_times", "coverage_factor", "factor_interval", "interval", "uniform",
 ]  # fmt: skip
 
 FloatArray = NDArray[np.float64]
@@ -166,86 +165,6 @@ def correlated(jacobian: Any, residuals: Any, pieces: Sequence[int] | None = Non
     found = sandwich * np.outer(raise_by, raise_by)
     result: FloatArray = found / np.outer(scale, scale)
     return result
-
-
-class Profile(NamedTuple):
-    """A parameter's profile likelihood: its values, the rise of chi^2 above its least, and the 95 % limits.
-
-    A limit is NaN where chi^2 does not rise to 3.84 within the values: the data do not bound the parameter there.
-    """
-
-    values: FloatArray
-    cost: FloatArray
-    best: float
-    low: float
-    high: float
-
-
-def profile_likelihood(
-    residual: Callable[[FloatArray], FloatArray],
-    start: Any,
-    which: int,
-    values: Any,
-    *,
-    level: float = 0.95,
-    scale: float = 1.0,
-) -> Profile:
-    """Fit again with one parameter held at each value: what the data say of it, without assuming a parabola.
-
-    Parameters
-    ----------
-    residual : callable
-        Weighted residuals (n,) of a vector of parameters.
-    start : array (p,)
-        The best fit.
-    which : int
-        Index of the parameter that is held.
-    values : array (m,)
-        Where it is held, in rising order, on both sides of the best.
-    level : float
-        Probability of the interval.
-    scale : float
-        Variance of one weighted residual: 1 where the weights are right, else (with their correlation) above 1.
-    """
-    from scipy.optimize import least_squares
-    from scipy.stats import chi2
-
-    best = np.asarray(start, dtype=np.float64)
-    grid = np.asarray(values, dtype=np.float64)
-    if grid.ndim != 1 or len(grid) < 3 or np.any(np.diff(grid) <= 0):
-        raise ValueError("values must be at least three, in rising order")
-    cost = np.empty(len(grid))
-    others = [i for i in range(len(best)) if i != which]
-    middle = int(np.argmin(np.abs(grid - best[which])))
-    sizes = np.where(best != 0, np.abs(best), 1.0)
-    for order in (range(middle, len(grid)), range(middle - 1, -1, -1)):
-        now = best.copy()
-        for i in order:
-            now[which] = grid[i]
-            if others:
-
-                def free(part: FloatArray, full: FloatArray = now) -> FloatArray:
-                    trial = full.copy()
-                    trial[others] = part
-                    return residual(trial)
-
-                now[others] = least_squares(free, now[others], x_scale=sizes[others]).x
-            cost[i] = float(np.sum(residual(now) ** 2))
-    least = min(float(cost.min()), float(np.sum(residual(best) ** 2)))
-    rise = (cost - least) / scale
-    bound = float(chi2.ppf(level, 1))
-    low, high = crossed(grid[middle::-1], rise[middle::-1], bound), crossed(grid[middle:], rise[middle:], bound)
-    return Profile(grid, rise, float(best[which]), low, high)
-
-
-def crossed(values: FloatArray, rise: FloatArray, bound: float = 3.841) -> float:
-    """Where the rise of chi^2, from the best value on, passes the bound; NaN where it does not."""
-    over = np.flatnonzero(rise > bound)
-    if len(over) == 0 or over[0] == 0:
-        return float("nan")
-    i = int(over[0])
-    part = (bound - rise[i - 1]) / (rise[i] - rise[i - 1])
-    return float(values[i - 1] + part * (values[i] - values[i - 1]))
 
 
 def bootstrap(

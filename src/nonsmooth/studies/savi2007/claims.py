@@ -10,6 +10,7 @@ from nonsmooth.studies.savi2007 import claims_model as model
 from nonsmooth.studies.savi2007 import claims_parameters as parameters
 from nonsmooth.studies.savi2007 import claims_response as response
 from nonsmooth.studies.savi2007 import claims_rig as rig
+from nonsmooth.studies.savi2007 import claims_rig_response as rig_response
 from nonsmooth.studies.savi2007.rows import Cell, Data, Row
 
 __all__ = ["CLAIMS", "Claim", "Row", "measure_claims"]
@@ -54,11 +55,12 @@ CLAIMS = (
     Claim("P6", ("fig08",), parameters.p6),
     Claim("P7", ("fig08",), parameters.p7),
     Claim("P8", ("table1",), parameters.p8),
-    Claim("F9a", ("fig09", "fig09_rig"), response.f9a, rig.f9a),
-    Claim("F9b", ("fig09", "fig09_rig"), response.f9b, rig.f9b),
-    Claim("F9c", ("fig09", "fig09_rig"), response.f9c, rig.f9c),
-    Claim("F10", ("fig10", "fig10_rig"), response.f10, rig.f10),
-    Claim("F10", ("fig09", "fig09_rig", "fig10"), response.grazing_behind_both, rig.grazing_behind_both),
+    Claim("F9a", ("fig09", "fig09_rig"), response.f9a, rig_response.f9a),
+    Claim("F9b", ("fig09", "fig09_rig"), response.f9b, rig_response.f9b),
+    Claim("F9c", ("fig09", "fig09_rig"), response.f9c, rig_response.f9c),
+    Claim("F10", ("fig10", "fig10_rig"), response.f10, rig_response.f10),
+    Claim("F10", ("fig09", "fig09_rig", "fig10"), response.grazing_behind_both,
+          rig_response.grazing_behind_both),
     Claim("F11", ("fig11", "fig11_rig"), diagrams.f11, rig.f11),
     Claim("F12", ("fig12", "fig12_rig"), diagrams.f12, rig.f12),
     Claim("F13", ("fig13", "fig13_rig"), diagrams.f13, rig.f13),
@@ -70,7 +72,7 @@ CLAIMS = (
     Claim("F18", ("fig18", "fig18_rig"), diagrams.f18, rig.f18),
     Claim("C1", ("fig09_rig", "fig10_rig", "fig11_rig", "fig16", "fig09", "fig10", "fig11", "fig15"), model.c1, rig.c1),
     Claim("C1", ("eta",), model.c1_other_systems, _model(1)),
-)
+)  # fmt: skip
 
 
 def measure_claims(data: Data) -> tuple[Row, ...]:

@@ -53,12 +53,15 @@ def _draw(printed: Mapping[str, float]) -> Callable[[Mapping[str, xr.Dataset]], 
             canvas = sheet(0.72 * plot.PAGE, 0.52 * plot.PAGE)
             ax = canvas.subplots()
             comparison_response(data["compared"], ax)
+            for text in ax.texts:  # the differences of two jumps at one place, one above the other
+                if text.get_color() == plot.COLORS["second"]:
+                    text.set_position((0, 14))
             for i, value in enumerate(printed.values()):
                 ax.plot(
                     value, 1.0, "v", transform=ax.get_xaxis_transform(), color="black", markersize=4, clip_on=False,
                     label="printed in the paper" if i == 0 else None, linestyle="none",
                 )  # fmt: skip
-            ax.legend(loc="lower left", bbox_to_anchor=(0.0, 0.1), handlelength=1.6)
+            ax.legend(loc="lower left", bbox_to_anchor=(0.0, 0.12), handlelength=1.6)
         return canvas
 
     return draw
