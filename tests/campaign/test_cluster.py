@@ -85,11 +85,13 @@ def disturbed(client, path: Path, chunks: int, seconds: float, kills: int, clien
         for life in range(client_kills + 1):
             process = subprocess.Popen([sys.executable, "-c", program])
             if life < client_kills:
-                time.sleep(max(chunks * seconds / 3 / (client_kills + 2), 4.0))
+                wanted = (life + 1) * chunks // (client_kills + 2)
+                while len(list((path / "run").glob("*.json"))) < wanted and process.poll() is None:
+                    time.sleep(0.2)
                 process.kill()
                 process.wait()
             else:
-                assert process.wait(timeout=600) == 0
+                assert process.wait(timeout=1200) == 0
     finally:
         stop.set()
         thread.join()
@@ -101,8 +103,9 @@ def disturbed(client, path: Path, chunks: int, seconds: float, kills: int, clien
 def test_killed_workers_and_clients_change_nothing(
     three_workers, tmp_path: Path, chunks: int, seconds: float, kills: int, client_kills: int
 ) -> None:
-    if os.environ.get("NONSMOOTH_FAULTS"):
-        chunks, seconds, kills, client_kills = 400, 1.0, 30, 2
+    if "NONSMOOTH_FAULTS" in os.environ:  # for example 400,1.0,30,2
+        words = os.environ["NONSMOOTH_FAULTS"].split(",")
+        chunks, seconds, kills, client_kills = int(words[0]), float(words[1]), int(words[2]), int(words[3])
     path = tmp_path / "disturbed.zarr"
     made = disturbed(three_workers, path, chunks, seconds, kills, client_kills)
     assert made >= kills // 2

@@ -57,7 +57,7 @@ def on_cluster(
     except ImportError as error:
         raise ImportError(MISSING) from error
     path, key = (None, "") if store is None else (str(store.path.resolve()), store.key)
-    family = key[:16] or uuid.uuid4().hex[:16]  # the same names for the same work, whichever client sends it
+    family = uuid.uuid4().hex[:16]  # never the names of a client that is gone: its tasks may be half forgotten
     order = iter(chunks)
     attempts: dict[int, int] = {}
 
@@ -75,7 +75,8 @@ def on_cluster(
         for future in queue:
             chunk = pending.pop(future)
             try:
-                arrays = future.result()
+                # With a store there is nothing to fetch, and a worker that dies after its chunk was kept loses nothing.
+                arrays = None if store is not None and future.status == "finished" else future.result()
             except KilledWorker:
                 if attempts[chunk] >= ATTEMPTS:
                     raise

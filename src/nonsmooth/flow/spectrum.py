@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 __all__ = ["Frame", "Growth", "frame_for"]
 
 CHUNK = 250  # units of time recorded at once
+APART = 1e3  # times the engine's tolerance: what a piece may end away from the record
+DENSEST = 4096  # samples per unit of time
 
 
 @dataclass
@@ -91,6 +93,7 @@ class _RecordedFrame(Frame):
     ) -> None:
         self.engine, self.tables, self.flow, self.values = engine, tables, flow, values
         self.period, self.timed = period, timed
+        self.density = 1
         self.active = np.zeros(flow.n, dtype=bool)
         self.Q = np.zeros((flow.n, 0))
         traced = flow.traced
@@ -109,39 +112,59 @@ class _RecordedFrame(Frame):
         return total
 
     def _chunk(self, state: State, count: int, unit: float, total: Growth, done: int) -> None:
-        """Record and follow ``count`` units, into the rows of ``total`` from ``done`` on."""
+        """Record and follow ``count`` units, into the rows of ``total`` from ``done`` on.
+
+        A piece is marched from its recorded beginning, so in chaos it parts from the record; the frame would then go on
+        along another motion. Where a piece ends too far away the stretch is done again with more samples."""
         # Times count from here, by whole periods, so that no digits are lost in long runs.
         state.clock[1] = 0.0
         if self.period is None and not self.timed:
             state.clock[0] = 0.0
-        instants: FloatArray = float(state.clock[0]) + unit * np.arange(count + 1, dtype=np.float64)
-        log = self.engine.record(self.tables, state, float(instants[-1]), instants[:-1])
-        if log.status == codes.NOT_GUARANTEED:
-            total.status = codes.NOT_GUARANTEED
-        elif log.status != codes.OK:
+        at_start, Q, active = state.copy(), self.Q.copy(), self.active
+        limit = APART * float(getattr(self.engine, "rtol", 1e-9))
+        while True:
+            log, apart, growth, sums, status = self._follow(state, count, unit)
+            if log.status not in (codes.OK, codes.NOT_GUARANTEED) or apart <= limit or self.density >= DENSEST:
+                break
+            self.density *= 4
+            state.u[:], state.memory[:], state.clock[:] = at_start.u, at_start.memory, at_start.clock
+            state.counters[:], state.settled = at_start.counters, at_start.settled
+            self.Q, self.active = Q.copy(), active
+        if log.status not in (codes.OK, codes.NOT_GUARANTEED):
             total.status = log.status
             return
-        self._widen(log)
-        pieces = _pieces(self.flow.traced, log, instants)
-        n = self.flow.n
-        columns = self.Q.shape[1]
-        growth = np.zeros((count, columns))
-        divergence, determinant = np.zeros(count), np.zeros(count)
-        rates = np.ones(1 + 3 * n)
+        total.logarithms[done : done + count, : growth.shape[1]] += growth
+        total.divergence += sums[0]
+        total.determinants += sums[1]
+        total.nearest = min(total.nearest, sums[2])
+        if status != codes.OK or log.status != codes.OK:
+            total.status = status if status != codes.OK else log.status
+
+    def _follow(
+        self, state: State, count: int, unit: float
+    ) -> tuple[Log, float, FloatArray, tuple[float, float, float], int]:
+        """One attempt: (record, distance from it, logarithms, (divergence, determinants, nearest), status)."""
         from nonsmooth.kernels.spectrum import grow
 
-        flow = self.flow
+        density, n, flow = self.density, self.flow.n, self.flow
+        steps = np.arange(count * density + 1, dtype=np.float64)
+        instants: FloatArray = float(state.clock[0]) + unit * (steps / density)
+        log = self.engine.record(self.tables, state, float(instants[-1]), instants[:-1])
+        if log.status not in (codes.OK, codes.NOT_GUARANTEED):
+            return log, 0.0, np.zeros((count, 0)), (0.0, 0.0, 1.0), codes.OK
+        self._widen(log)
+        columns = self.Q.shape[1]
+        growth, rates = np.zeros((count, columns)), np.ones(2 + 3 * n)
+        divergence, determinant = np.zeros(count), np.zeros(count)
+        rates[1] = 0.0
         status = grow(
-            flow.functions, flow.model.entries, flow.model.kinds, self._transitions, *pieces, self.values, flow.scale,
-            self.Q, np.zeros((n, columns)), np.zeros((n, n)), np.zeros((n, n)), growth, divergence, determinant,
-            np.zeros(flow.n_out), rates, flow.scratch(),
+            flow.functions, flow.model.entries, flow.model.kinds, self._transitions,
+            *_pieces(flow.traced, log, instants, density), self.values, flow.scale, self.Q, np.zeros((n, columns)),
+            np.zeros((n, n)), np.zeros((n, n)), growth, divergence, determinant, np.zeros(flow.n_out), rates,
+            flow.scratch(),
         )  # fmt: skip
-        total.logarithms[done : done + count, :columns] += growth
-        total.divergence += float(divergence.sum())
-        total.determinants += float(determinant.sum())
-        total.nearest = min(total.nearest, float(rates[0]))
-        if status != codes.OK:
-            total.status = int(status)
+        sums = float(divergence.sum()), float(determinant.sum()), float(rates[0])
+        return log, float(rates[1]), growth, sums, int(status)
 
     def _widen(self, log: Log) -> None:
         """Directions for the states of the modes now visited, and for the memory now written."""
@@ -159,7 +182,7 @@ class _RecordedFrame(Frame):
             self.active = now
 
 
-def _pieces(traced: Traced, log: Log, instants: FloatArray) -> tuple[Any, ...]:
+def _pieces(traced: Traced, log: Log, instants: FloatArray, density: int) -> tuple[Any, ...]:
     """Smooth pieces between samples and crossings: modes, t0, tau, z0, unit, first_jump, jumps, before.
 
     A sample at the instant of a crossing is left out; transitions at one instant (a chain) form a group."""
@@ -184,7 +207,7 @@ def _pieces(traced: Traced, log: Log, instants: FloatArray) -> tuple[Any, ...]:
     return (
         np.concatenate([log.sample_mode[kept], target[ends - 1]])[order].astype(np.int64), t0,
         np.diff(np.append(t0, instants[-1])), np.nan_to_num(np.vstack([sampled, after[ends - 1]])[order]),
-        unit.astype(np.int64), np.concatenate([[0], np.cumsum(count)]).astype(np.int64),
+        (unit // density).astype(np.int64), np.concatenate([[0], np.cumsum(count)]).astype(np.int64),
         log.crossing_transition.astype(np.int64), np.nan_to_num(at_end),
     )  # fmt: skip
 

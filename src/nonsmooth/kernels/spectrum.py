@@ -161,7 +161,8 @@ def grow(
     Piece m runs in ``modes[m]`` from ``z0[m]`` at ``t0[m]`` for ``tau[m]``; at its end stand the transitions
     ``jumps[first_jump[m] : first_jump[m + 1]]``, the first of them taken from the state ``before[m]``. ``growth``,
     ``divergence`` and ``determinant`` (log|det S|) are summed in the rows ``unit[m]``. ``transitions``: source, target,
-    number of rows. ``rates``: the least |h'| / (|h_z| |f|), and scratch (6 n)."""
+    number of rows. ``rates``: the least |h'| / (|h_z| |f|), the largest distance between the end of a piece and the
+    record (relative to the state and its scale), and scratch (3 n)."""
     jet, field, switch = jet_at(functions[0]), field_at(functions[1]), switch_at(functions[2])
     u, q = work[7], work[8]
     n, n_u, n_p, columns = z0.shape[1], u.shape[0], values.shape[0], Q.shape[1]
@@ -183,10 +184,15 @@ def grow(
         if status != OK:
             return status
         divergence[row] += part
+        crossed = first_jump[m + 1] > first_jump[m]
+        if crossed or m + 1 < modes.shape[0]:
+            recorded = before[m] if crossed else z0[m + 1]
+            for i in range(n_u):
+                rates[1] = max(rates[1], fabs(u[i] - recorded[i]) / (fabs(recorded[i]) + scale[i]))
         if first_jump[m + 1] == first_jump[m]:
             continue
         t = t0[m] + tau[m]
-        f_minus, f_plus, t_z = rates[1 : 1 + n], rates[1 + n : 1 + 2 * n], rates[1 + 2 * n : 1 + 3 * n]
+        f_minus, f_plus, t_z = rates[2 : 2 + n], rates[2 + n : 2 + 2 * n], rates[2 + 2 * n : 2 + 3 * n]
         for i in range(n):
             f_minus[i], f_plus[i] = 0.0, 0.0
             if i < n_u:
