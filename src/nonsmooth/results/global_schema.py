@@ -16,7 +16,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from nonsmooth.results.labels import Labels
-from nonsmooth.results.schema import quantity_attributes, _floats, parameter_coords, _start_coords, state_coords
+from nonsmooth.results.schema import _floats, _start_coords, parameter_coords, quantity_attributes, state_coords
 from nonsmooth.results.statuses import status_attributes
 
 __all__ = ["attractor_variables", "basins", "chart"]
