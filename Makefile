@@ -22,7 +22,7 @@ reproduce: $(VENV)/.installed-run  ## reproduce Savi et al. (2007): figures, dat
 test: $(VENV)/.installed-test  ## run the tests
 	$(BIN)/python -m pytest $(PYTEST_ARGS)
 
-slow: $(VENV)/.installed-test  ## run the long campaigns that `make test` leaves out
+slow: $(VENV)/.installed-test $(VENV)/.installed-cluster  ## run the long campaigns that `make test` leaves out
 	$(BIN)/python -m pytest -m slow -s
 
 fuzz: $(VENV)/.installed-test  ## read 100 000 damaged recordings with every reader
