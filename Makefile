@@ -11,10 +11,10 @@ export OPENBLAS_NUM_THREADS ?= 1
 PYTEST_ARGS ?= -n auto --dist loadfile
 
 .DEFAULT_GOAL := help
-.PHONY: help reproduce test fuzz coverage check bench docs clean distclean
+.PHONY: help reproduce test slow fuzz coverage rig-against-model check bench docs clean distclean
 
 help:  ## list the targets
-	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 18
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 26
 
 reproduce: $(VENV)/.installed-run  ## reproduce Savi et al. (2007): figures, data and report in out/savi2007
 	$(BIN)/nonsmooth reproduce savi2007 --out $(OUT)
@@ -22,11 +22,17 @@ reproduce: $(VENV)/.installed-run  ## reproduce Savi et al. (2007): figures, dat
 test: $(VENV)/.installed-test  ## run the tests
 	$(BIN)/python -m pytest $(PYTEST_ARGS)
 
+slow: $(VENV)/.installed-test $(VENV)/.installed-cluster  ## run the long campaigns that `make test` leaves out
+	$(BIN)/python -m pytest -m slow -s
+
 fuzz: $(VENV)/.installed-test  ## read 100 000 damaged recordings with every reader
 	NONSMOOTH_FUZZ=1 $(BIN)/python -m pytest -m slow tests/experiment/test_fuzz.py -s
 
 coverage: $(VENV)/.installed-run  ## identify 40 virtual rigs; writes docs/measured_coverage.md
 	$(BIN)/python -m nonsmooth.identification.coverage --seeds 0-39 --out docs/measured_coverage.md
+
+rig-against-model: $(VENV)/.installed-run  ## lay virtual rigs over the model; writes docs/measured_rig_against_model.md
+	$(BIN)/python -m nonsmooth.identification.compare.rig_against_model --seeds 2 3 --out docs/measured_rig_against_model.md
 
 check: $(VENV)/.installed-dev  ## ruff, mypy, import-linter, codespell
 	$(BIN)/ruff check .

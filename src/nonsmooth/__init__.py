@@ -12,8 +12,20 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from nonsmooth import models as models
     from nonsmooth import plot as plot
+    from nonsmooth.analysis.basin_fractions import basin_fractions as basin_fractions
+    from nonsmooth.analysis.basins import basins as basins
+    from nonsmooth.analysis.chart import chart as chart
+    from nonsmooth.analysis.correlation_dimension import correlation_dimension as correlation_dimension
+    from nonsmooth.analysis.lyapunov import lyapunov as lyapunov
     from nonsmooth.analysis.response import frequency_response as frequency_response
     from nonsmooth.analysis.sweep import sweep as sweep
+    from nonsmooth.analysis.zero_one_test import zero_one_test as zero_one_test
+    from nonsmooth.continuation.continue_curve import continue_curve as continue_curve
+    from nonsmooth.continuation.continue_equilibrium import continue_equilibrium as continue_equilibrium
+    from nonsmooth.continuation.continue_orbit import continue_orbit as continue_orbit
+    from nonsmooth.continuation.find import find_orbit as find_orbit
+    from nonsmooth.continuation.orbit import Orbit as Orbit
+    from nonsmooth.continuation.special import special_points as special_points
     from nonsmooth.errors import DataFileError as DataFileError
     from nonsmooth.errors import SolveError as SolveError
     from nonsmooth.errors import SystemDefinitionError as SystemDefinitionError
@@ -22,6 +34,7 @@ if TYPE_CHECKING:
     from nonsmooth.flow.poincare import poincare as poincare
     from nonsmooth.flow.sections import Poincare as Poincare
     from nonsmooth.flow.sections import Stroboscopic as Stroboscopic
+    from nonsmooth.flow.sensitivity import sensitivity as sensitivity
     from nonsmooth.flow.simulate import simulate as simulate
     from nonsmooth.flow.starts import random_starts as random_starts
     from nonsmooth.identification.chain import identify as identify
@@ -44,12 +57,25 @@ _WHERE = {
     "Band": "system.mode",
     "where": "system.scalar",
     "simulate": "flow.simulate",
+    "sensitivity": "flow.sensitivity",
     "poincare": "flow.poincare",
     "Stroboscopic": "flow.sections",
     "Poincare": "flow.sections",
     "random_starts": "flow.starts",
     "sweep": "analysis.sweep",
     "frequency_response": "analysis.response",
+    "lyapunov": "analysis.lyapunov",
+    "correlation_dimension": "analysis.correlation_dimension",
+    "zero_one_test": "analysis.zero_one_test",
+    "basins": "analysis.basins",
+    "basin_fractions": "analysis.basin_fractions",
+    "chart": "analysis.chart",
+    "find_orbit": "continuation.find",
+    "Orbit": "continuation.orbit",
+    "continue_orbit": "continuation.continue_orbit",
+    "continue_curve": "continuation.continue_curve",
+    "continue_equilibrium": "continuation.continue_equilibrium",
+    "special_points": "continuation.special",
     "load_recording": "experiment.load",
     "Recording": "experiment.recording",
     "identify": "identification.chain",

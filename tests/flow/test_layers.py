@@ -176,7 +176,7 @@ def test_a_base_that_never_vanishes_is_watched_with_what_moves_it() -> None:
 def test_systems_without_such_terms_run_as_they_stand() -> None:
     for system in (ns.models.discontinuous_support().smoothed(eta=1e-5), ns.models.relief_valve()):
         found = layers(system.traced)
-        assert found.model is system.traced and not found.checked
+        assert found.model == system.traced and not found.checked
 
 
 class Counting(SeriesEngine):

@@ -291,3 +291,17 @@ def test_an_impact_that_meets_the_end_of_a_step_every_period_is_no_chatter():
     gaps = np.diff(run["crossing_time"].values[-40:])
     assert len(gaps) == 39
     assert gaps == pytest.approx(2.0 * np.pi, abs=1e-8)  # one impact in each period of the forcing (omega = 1)
+
+
+def test_a_step_never_passes_two_ends_of_a_period() -> None:
+    """A slow mode, its own step far longer than the period, and then a transition at a quarter of a period."""
+    system = ns.System(
+        states=["x", "y"], parameters={"a": 0.3}, period=1.0,
+        modes={"waiting": lambda t, u, p: (p.a * u.x, -p.a * u.y), "ready": lambda t, u, p: (p.a * u.x, -p.a * u.y)},
+        indicators={"level": lambda t, u, p: u.x - 5.0},
+        transitions=[ns.Transition("waiting", "ready", when="level > 0"),
+                     ns.Transition("ready", "waiting", at=0.25, reset=lambda t, u, p: (u.x / 5.0, u.y + 0.0))],
+    )  # fmt: skip
+    run = ns.simulate(system, periods=7, start={"x": 1.0, "y": 1.0}, method="exact")
+    assert np.abs(run.crossing_time.values - [np.log(5.0) / 0.3, 6.25]).max() < 1e-12
+    assert abs(run.u_before.values[1, 0] - np.exp(0.3 * 6.25)) < 1e-12

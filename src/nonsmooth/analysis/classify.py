@@ -29,12 +29,15 @@ APART = 10.0  # how much farther a shorter period must be than the orbit is unce
 
 @dataclass(frozen=True)
 class Verdict:
-    """Period number (0: none), the scaled return it rests on, status, and whether the orbit is certainly unstable."""
+    """Period number (0: none), the scaled return it rests on, status, and whether the orbit is certainly unstable.
+
+    ``multiplier`` is the largest modulus of the multipliers (NaN: not looked at, or unknown)."""
 
     period_number: int
     residual: float
     status: int
     unstable: bool = False
+    multiplier: float = np.nan
 
 
 def residuals(points: FloatArray, size: FloatArray, max_period: int) -> FloatArray:
@@ -89,9 +92,9 @@ def judge(
     residual = float(returns[p - 1])
     mu = multiplier(p)
     if not mu < 1.0 - MARGIN:
-        return Verdict(0, residual, codes.SLOW, unstable=bool(mu > 1.0 + MARGIN))
+        return Verdict(0, residual, codes.SLOW, unstable=bool(mu > 1.0 + MARGIN), multiplier=mu)
     away = residual / (1.0 - mu)
     shorter = [returns[d - 1] for d in range(1, p) if p % d == 0]
     if any(one <= APART * away for one in shorter):
-        return Verdict(0, residual, codes.SLOW)
-    return Verdict(p, residual, codes.OK)
+        return Verdict(0, residual, codes.SLOW, multiplier=mu)
+    return Verdict(p, residual, codes.OK, multiplier=mu)

@@ -38,6 +38,7 @@ class Attractors:
     max_period: int
     tolerance: float
     scale: FloatArray
+    longer: tuple[int, ...] = LONGER
 
     def settle(self, i: int, state: State, out: Chain, fresh: Callable[[], State]) -> Verdict:
         """Run point i on from ``state`` (left where the run ends) and judge it; ``fresh`` makes a start."""
@@ -50,7 +51,7 @@ class Attractors:
         if out.status[i] in FAILED:
             return Verdict(0, np.nan, result_status(out.status[i]))
         verdict = self._judge(i, state, out)
-        for factor in LONGER:
+        for factor in self.longer:
             if verdict.status != codes.SLOW:
                 break
             if verdict.unstable:
@@ -63,8 +64,14 @@ class Attractors:
                 return Verdict(0, np.nan, result_status(out.status[i]))
             verdict = self._judge(i, state, out)
         if out.status[i] == codes.NOT_GUARANTEED and verdict.status == codes.OK:
-            return Verdict(verdict.period_number, verdict.residual, codes.NOT_GUARANTEED)
+            return replace(verdict, status=codes.NOT_GUARANTEED)
         return verdict
+
+    def look(self, i: int, state: State, transient: int, out: Chain) -> Verdict | None:
+        """Judge point i after ``transient`` returns more, once; None where the run failed."""
+        state.settled = False
+        self._chain(i, state, transient, self.keep, out)
+        return None if out.status[i] in FAILED else self._judge(i, state, out)
 
     def _chain(self, i: int, state: State, transient: int, keep: int, out: Chain) -> None:
         self.engine.chain(self.tables, i, i + 1, state, None, self.plan, transient, keep, out)

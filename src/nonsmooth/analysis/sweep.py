@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from nonsmooth.system.system import System
 
-__all__ = ["sweep"]
+__all__ = ["DIRECTIONS", "sweep", "swept_values"]
 
 DIRECTIONS: dict[str | None, tuple[str, ...]] = {
     "up": ("up",), "down": ("down",), "both": ("up", "down"), None: ("none",),
@@ -98,7 +98,7 @@ def sweep(
     """
     check_system(system, "sweep")
     check_options(system, expert, sweep)
-    numbers = _values(system, parameter, values)
+    numbers = swept_values(system, parameter, values)
     directions = _directions(direction)
     transient, keep = whole_number(transient, "transient", 0), whole_number(keep, "keep", 2)
     max_period = whole_number(max_period, "max_period", 1)
@@ -164,7 +164,7 @@ class Report:
         self.stop = threading.Event()
 
 
-def _values(system: System, parameter: str, values: Any) -> FloatArray:
+def swept_values(system: System, parameter: str, values: Any) -> FloatArray:
     if parameter not in system.values:
         system.with_parameters({parameter: 0.0})  # raises with the names there are
     numbers = float_array(values, f"values of {parameter!r}")

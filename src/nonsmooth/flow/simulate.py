@@ -19,10 +19,14 @@ if TYPE_CHECKING:
 
     from nonsmooth.system.system import System
 
-__all__ = ["simulate"]
+__all__ = ["BEYOND_STOP", "check_complete", "run_length", "simulate"]
 
 SAMPLES_PER_PERIOD = 256
 SAMPLES = 4096
+BEYOND_STOP = (
+    "the start lies beyond a stop: a transition with a reset holds there already; "
+    "start on the admissible side of its indicator"
+)
 
 
 def simulate(
@@ -83,7 +87,7 @@ def simulate(
     check_system(system, "simulate")
     check_options(system, expert, simulate)
     period = system.period()
-    unit, length = _length(system, periods, duration, period, transient)
+    unit, length = run_length(system, periods, duration, period, transient)
     if not is_one_start(start):
         raise ValueError("simulate marches one trajectory: give one start; sweep and poincare take several")
     t_begin, t_end = transient * unit, transient * unit + length
@@ -99,9 +103,9 @@ def simulate(
     state = first_state(system, start, mode)
     tables = engine.prepare(system.parameter_vector()[None, :])
     if t_begin > 0:
-        _complete(engine.record(tables, state, t_begin, np.empty(0)), system, state, period)
+        check_complete(engine.record(tables, state, t_begin, np.empty(0)), system, state, period)
     log = engine.record(tables, state, t_end, instants)
-    _complete(log, system, state, period)
+    check_complete(log, system, state, period)
     options = {
         "periods": periods, "duration": duration, "start": plain_start(system, start), "mode": mode,
         "transient": transient, "samples": samples, "step": step,
@@ -111,7 +115,7 @@ def simulate(
     return _dataset(system, traced, engine.name, options, log, instants, period)
 
 
-def _length(
+def run_length(
     system: System, periods: float | None, duration: float | None, period: float | None, transient: float
 ) -> tuple[float, float]:
     """The unit of the length (the period, or 1) and the length in time."""
@@ -145,18 +149,14 @@ def _instants(samples: Any, t_begin: float, t_end: float, period: float | None) 
     return np.minimum(instants, t_end)
 
 
-def _complete(log: Log, system: System, state: State, period: float | None) -> None:
+def check_complete(log: Log, system: System, state: State, period: float | None) -> None:
     """Raise for a run that stopped early, with the place where it did."""
     if log.status in (codes.OK, codes.NOT_GUARANTEED):
         return
     from nonsmooth.results.statuses import by_code
 
     if log.status == codes.BEYOND_STOP:
-        message = (
-            "the start lies beyond a stop: a transition with a reset holds there already; "
-            "start on the admissible side of its indicator"
-        )
-        name = "beyond_stop"
+        message, name = BEYOND_STOP, "beyond_stop"
     else:
         status = by_code(log.status)
         message, name = status.sentence, status.name

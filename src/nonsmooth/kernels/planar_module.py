@@ -13,7 +13,7 @@ from types import ModuleType
 
 from nonsmooth.kernels.cache import load_module
 
-__all__ = ["planar_module"]
+__all__ = ["planar_module", "settle_module"]
 
 PARTS = (
     "planar_tables", "planar_polynomial", "planar_search", "planar_march", "planar_extremes", "planar_layout",
@@ -30,3 +30,13 @@ def planar_module(harmonics: int) -> ModuleType:
     text = re.sub(r"^from \.(\w+) import", r"from nonsmooth.kernels.\1 import", text, flags=re.MULTILINE)
     text = re.sub(r"^HARMONICS = 1$", f"HARMONICS = {harmonics}", text, flags=re.MULTILINE)
     return load_module(text, f"planar_{harmonics}")
+
+
+@cache
+def settle_module(harmonics: int) -> ModuleType:
+    """The module with ``settle_many`` over the planar kernels for that number of harmonics."""
+    below = planar_module(harmonics).__name__
+    text = (Path(__file__).parent / "planar_settle.py").read_text(encoding="utf-8")
+    text = re.sub(r"^from \.planar_\w+ import", f"from {below} import", text, flags=re.MULTILINE)
+    text = re.sub(r"^from \.(\w+) import", r"from nonsmooth.kernels.\1 import", text, flags=re.MULTILINE)
+    return load_module(text, f"planar_settle_{harmonics}")

@@ -75,6 +75,8 @@ def fill_mode(i, mode, A, b, c, s, rates, period, field, info):
         step = period / 8.0
     else:
         step = FREE_STEP
+    if period < 1e300:  # at most one end of a period on a step, also where nothing but transitions depends on time
+        step = min(step, 0.3 * period)
     det = a00 * a11 - a01 * a10
     info[mode, 0] = step
     info[mode, 1] = step / NODES

@@ -4,8 +4,11 @@ Those of identified parameters stand in ``plot.identification``. Matplotlib is l
 """
 
 from nonsmooth.plot import identification
+from nonsmooth.plot.basin_fractions import basin_fractions
+from nonsmooth.plot.basins import basins
 from nonsmooth.plot.bifurcation import bifurcation
 from nonsmooth.plot.branch import branch
+from nonsmooth.plot.chart import chart
 from nonsmooth.plot.comparison_diagram import comparison_diagram
 from nonsmooth.plot.comparison_motion import (
     comparison_distances,
@@ -26,8 +29,11 @@ __all__ = [
     "COLORS",
     "COLUMN",
     "PAGE",
+    "basin_fractions",
+    "basins",
     "bifurcation",
     "branch",
+    "chart",
     "comparison_diagram",
     "comparison_distances",
     "comparison_phase_portrait",

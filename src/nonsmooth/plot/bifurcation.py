@@ -82,11 +82,13 @@ def _sorted_out(
     over: tuple[xr.Dataset | Axes | None, ...], ax: Axes | None, parameter: str
 ) -> tuple[Axes | None, list[xr.Dataset]]:
     """Axes given in place of a branch, and the branches, which must be over the same parameter."""
+    import xarray as xr
+
     branches: list[xr.Dataset] = []
     for one in over:
         if one is None:
             continue
-        if not hasattr(one, "data_vars"):
+        if not isinstance(one, xr.Dataset):
             ax = one
             continue
         of = one.attrs.get("parameter")

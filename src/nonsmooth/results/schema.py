@@ -35,7 +35,9 @@ from numpy.typing import ArrayLike, NDArray
 from nonsmooth.results.labels import Labels, Quantity
 from nonsmooth.results.statuses import flag_attributes, status_attributes
 
-__all__ = ["response", "section_points", "sweep", "trajectory"]
+__all__ = [
+    "parameter_coords", "quantity_attributes", "response", "section_points", "state_coords", "sweep", "trajectory",
+]  # fmt: skip
 
 #: Trailing dims of each array a sweep may bring, after (direction, start, parameter).
 _SWEEP_ARRAYS: dict[str, tuple[str, ...]] = {
@@ -110,12 +112,12 @@ def trajectory(
             continue
         table = _floats(columns)
         for i, (name, quantity) in enumerate(names.items()):
-            variables[name] = ("time", table[:, i], _attributes(name, quantity))
+            variables[name] = ("time", table[:, i], quantity_attributes(name, quantity))
     coords: dict[str, Any] = {
         "time": ("time", _floats(time), {"long_name": "time", **t_unit}),
         "segment": ("time", np.asarray(segment, np.int64), {"long_name": "number of crossings before this sample"}),
-        **_state_coords(d),
-        **_parameter_coords(d),
+        **state_coords(d),
+        **parameter_coords(d),
     }
     return xr.Dataset(variables, coords, dict(attrs))
 
@@ -153,11 +155,11 @@ def sweep(
         else:
             variables[name] = (dims, _own(array), {"long_name": _LONG_NAMES[name]})
     coords: dict[str, Any] = {
-        parameter: (parameter, _floats(values), _attributes(parameter, d.parameters[parameter])),
+        parameter: (parameter, _floats(values), quantity_attributes(parameter, d.parameters[parameter])),
         "direction": ("direction", _strings(directions), {"long_name": "direction of the sweep"}),
         **_start_coords(starts),
-        **_state_coords(d),
-        **_parameter_coords(d, without=parameter),
+        **state_coords(d),
+        **parameter_coords(d, without=parameter),
     }
     if "clearance" in arrays:
         coords["indicator"] = ("indicator", _strings(d.indicators), {"long_name": "indicator"})
@@ -214,7 +216,7 @@ def section_points(
         "mode": (("start", "iterate"), np.asarray(mode, np.int16), {"long_name": "mode", **modes}),
         "status": ("start", np.asarray(status, np.int8), status_attributes()),
     }
-    coords = {**_start_coords(starts), **_state_coords(d), **_parameter_coords(d)}
+    coords = {**_start_coords(starts), **state_coords(d), **parameter_coords(d)}
     return xr.Dataset(variables, coords, dict(attrs)).squeeze(list(squeeze))
 
 
@@ -224,7 +226,7 @@ def _state_index(names: tuple[str, ...]) -> xr.IndexVariable:
     return xr.IndexVariable("state", _strings(names), {"long_name": "state"})
 
 
-def _state_coords(d: Labels) -> dict[str, Any]:
+def state_coords(d: Labels) -> dict[str, Any]:
     """The states' names, with their units and symbols beside them (each state has its own)."""
     coords: dict[str, Any] = {
         "state": _state_index(tuple(d.states)),
@@ -236,9 +238,9 @@ def _state_coords(d: Labels) -> dict[str, Any]:
     return coords
 
 
-def _parameter_coords(d: Labels, without: str = "") -> dict[str, Any]:
+def parameter_coords(d: Labels, without: str = "") -> dict[str, Any]:
     return {
-        name: ((), np.float64(np.nan if q.value is None else q.value), _attributes(name, q))
+        name: ((), np.float64(np.nan if q.value is None else q.value), quantity_attributes(name, q))
         for name, q in d.parameters.items()
         if name != without
     }
@@ -252,7 +254,8 @@ def _start_coords(starts: ArrayLike) -> dict[str, Any]:
     }
 
 
-def _attributes(name: str, quantity: Quantity) -> dict[str, str]:
+def quantity_attributes(name: str, quantity: Quantity) -> dict[str, str]:
+    """Long name, unit and symbol of a quantity."""
     attributes = {"long_name": name, "units": quantity.unit}
     return attributes | ({"symbol": quantity.symbol} if quantity.symbol else {})
 

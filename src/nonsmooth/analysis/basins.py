@@ -1,0 +1,213 @@
+"""``basins``: which start leads to which attractor; the attractors are found, not given."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.analysis.attractors import Settler
+from nonsmooth.analysis.basins_attractors import Attractor, Patience, find_attractors
+from nonsmooth.analysis.basins_measures import (
+    basin_entropy,
+    boundary_dimension,
+    minimal_shock,
+    share_errors,
+    starts_needed,
+    uncertain_part,
+)
+from nonsmooth.analysis.basins_work import StartsWork, settled_from
+from nonsmooth.analysis.chart import described
+from nonsmooth.analysis.chart_work import CHUNK, STORED
+from nonsmooth.campaign.run import run
+from nonsmooth.flow.arguments import check_options, check_system, float_array, real_number, whole_number
+from nonsmooth.flow.methods import engine_for
+from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from nonsmooth.flow.engine import FloatArray, IntArray
+    from nonsmooth.system.system import System
+
+__all__ = ["basins", "by_share", "settler_of"]
+
+
+def basins(
+    system: System,
+    grid: Mapping[str, Any],
+    *,
+    fixed: Mapping[str, float] | None = None,
+    section: Stroboscopic | Poincare | None = None,
+    transient: int = 500,
+    keep: int = 60,
+    max_period: int = 16,
+    method: str = "auto",
+    rtol: float | None = None,
+    atol: Any = None,
+    threads: int | None = None,
+    store: Any = None,
+    client: Any = None,
+    any_cpu: bool = False,
+    progress: bool = True,
+    **expert: Any,
+) -> xr.Dataset:
+    """Attractors and their basins on a plane of starts.
+
+    Parameters
+    ----------
+    system : System
+    grid : mapping
+        Two states and the values from which runs start: ``{"x": (A,), "v": (B,)}``.
+    fixed : mapping, optional
+        Values of the other states at the start; zero where not given.
+    section : Stroboscopic or Poincare, optional
+        ``Stroboscopic(0)`` where the system has a period. With another phase the runs start at that phase.
+    transient, keep : int
+        Section returns passed over, then judged; a run ends earlier where its cycle is certain, and is followed for
+        20 000 returns and more where it has no period.
+    max_period : int
+        Longest period number looked for.
+    method, rtol, atol
+        See :func:`nonsmooth.flow.methods.engine_for`.
+    threads : int, optional
+        Threads for independent work; the result does not depend on it. Default: one per core.
+    store : path, optional
+        A Zarr store for finished chunks; what is there already is not computed again.
+    client : dask.distributed.Client, optional
+        Computes the chunks on its workers.
+    any_cpu : bool
+        Go on with a store that was begun on another type of processor.
+    progress : bool
+        A bar on a terminal.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``label`` over the two states: the attractor's number, in the order of falling share; -1 not converged, -2
+        diverged. Over ``attractor``: ``period_number`` (0: no cycle), ``fraction`` of the starts with its binomial
+        ``fraction_error``, ``lyapunov``, ``multiplier``, ``maximum``, ``minimum``, a point on the ``section``, and
+        ``minimal_shock``: the least jump of the state, in units of the states' scales, that leads from the section
+        to another basin. ``section_points`` holds the attractors' points one after the other, with ``point_attractor``.
+        Of the picture: ``entropy``, ``boundary_entropy``, ``boundary_dimension``, ``uncertain`` over ``distance``,
+        and ``n_starts_99``, the number of random starts that meet every one of these attractors with 99 %.
+
+    Raises
+    ------
+    ValueError, TypeError
+        Arguments that do not fit. A run that fails keeps the label -1 or -2.
+
+    Notes
+    -----
+    A cycle counts with a certificate only (:mod:`nonsmooth.analysis.classify`); motion without a period only where a
+    run of 20 000 returns neither settles nor leaves the places it has visited
+    (:mod:`nonsmooth.analysis.basins_attractors`).
+    """
+    check_system(system, "basins")
+    check_options(system, expert, basins)
+    values = _plane(system, grid)
+    rest = _fixed(system, values, fixed)
+    section, settler = settler_of(
+        system, section, transient, keep, max_period, method, rtol, atol, expert, threads=threads
+    )
+    names = list(system.states)
+    (x_name, x), (y_name, y) = values.items()
+    starts = np.tile(rest, (len(x) * len(y), 1))
+    starts[:, names.index(x_name)] = np.repeat(x, len(y))
+    starts[:, names.index(y_name)] = np.tile(y, len(x))
+    options = {
+        "grid": values, "fixed": None if fixed is None else dict(fixed), "section": section,
+        "transient": transient, "keep": keep, "max_period": max_period, "method": method, "rtol": rtol, "atol": atol,
+        **expert,
+    }  # fmt: skip
+    point = system.parameter_vector()[None, :]
+    chunk = CHUNK if store is None and client is None else STORED
+    work = StartsWork(settler, point, starts, chunk, described(system, "basins", options))
+    columns = run(
+        work, threads=threads, progress=progress, label=f"basins over {x_name} and {y_name}", store=store,
+        client=client, any_cpu=any_cpu,
+    )  # fmt: skip
+    found, labels = by_share(*find_attractors(settler, point, settled_from(columns), Patience()))
+    label = labels.reshape(len(x), len(y))
+    from nonsmooth.results.global_schema import basins as build
+    from nonsmooth.results.labels import labels_of
+    from nonsmooth.results.provenance import provenance
+
+    fraction, error = share_errors([np.sum(labels == k) for k in range(len(found))], labels.size)
+    scale = system.scale_vector()[[names.index(x_name), names.index(y_name)]]
+    inside = [item.points[:, [names.index(x_name), names.index(y_name)]] / scale for item in found]
+    shocks = [minimal_shock(label, x / scale[0], y / scale[1], item, k) for k, item in enumerate(inside)]
+    entropy, boundary = basin_entropy(label)
+    steps, parts = uncertain_part(label)
+    named = labels_of(system)
+    return build(
+        named, provenance(named, "basins", options, method=settler.engine.name), values, label, found,
+        fixed={name: rest[names.index(name)] for name in names if name not in values},
+        per_attractor={"fraction": fraction, "fraction_error": error, "minimal_shock": np.array(shocks)},
+        measures={
+            "entropy": entropy, "boundary_entropy": boundary, "boundary_dimension": boundary_dimension(label),
+            "n_starts_99": starts_needed(fraction),
+        },
+        uncertain=(steps, parts),
+    )  # fmt: skip
+
+
+def settler_of(
+    system: System, section: Any, transient: Any, keep: Any, max_period: Any, method: str, rtol: Any, atol: Any,
+    expert: Mapping[str, Any], *, threads: Any = None,
+) -> tuple[Any, Settler]:  # fmt: skip
+    """Check the options that basins share, and the settler they describe."""
+    transient, keep = whole_number(transient, "transient", 0), whole_number(keep, "keep", 2)
+    max_period = whole_number(max_period, "max_period", 1)
+    if threads is not None:
+        whole_number(threads, "threads", 1)
+    section, plan = section_plan(system, section)
+    settler = Settler(
+        system, engine_for(system, method, rtol, atol, **expert), plan, transient, keep, max_period, rtol=rtol,
+        atol=atol, expert=expert,
+    )  # fmt: skip
+    settler.load()
+    return section, settler
+
+
+def by_share(found: list[Attractor], labels: IntArray) -> tuple[list[Attractor], IntArray]:
+    """The same with the most common attractor first; those that no run ended on are left out."""
+    count = np.array([np.sum(labels == k) for k in range(len(found))], dtype=np.int64)
+    order = [int(k) for k in np.argsort(-count, kind="stable") if count[k]]
+    new = np.full(len(found) + 2, -1, dtype=np.int64)
+    new[order] = np.arange(len(order))
+    new[-1], new[-2] = -1, -2
+    return [found[k] for k in order], new[labels]
+
+
+def _plane(system: System, grid: Any) -> dict[str, FloatArray]:
+    from nonsmooth.system.names import unknown
+
+    names = dict(system.states)
+    if not isinstance(grid, Mapping) or len(grid) != 2:
+        given = list(grid) if isinstance(grid, Mapping) else grid
+        raise ValueError(f"grid must name two of the states {list(names)} with their values; given: {given!r}")
+    values = {}
+    for name, numbers in grid.items():
+        if name not in names:
+            raise ValueError(unknown(name, "a state", repr(system.name), names))
+        axis = float_array(numbers, f"values of {name!r}")
+        if axis.ndim != 1 or not len(axis) or not np.isfinite(axis).all() or (np.diff(axis) <= 0).any():
+            raise ValueError(f"values of {name!r} must be a rising list of finite numbers")
+        values[str(name)] = axis
+    return values
+
+
+def _fixed(system: System, values: Mapping[str, Any], fixed: Any) -> FloatArray:
+    from nonsmooth.system.names import unknown
+
+    names = list(system.states)
+    rest = np.zeros(len(names))
+    for name, value in (fixed or {}).items():
+        if name not in names:
+            raise ValueError(unknown(name, "a state", repr(system.name), dict(system.states)))
+        if name in values:
+            raise ValueError(f"state {name!r} is in the grid and in fixed; give it once")
+        rest[names.index(name)] = real_number(value, f"fixed {name!r}")
+    return rest

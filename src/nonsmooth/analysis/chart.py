@@ -1,0 +1,235 @@
+"""``chart``: long-time behaviour over a plane of two parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.analysis.attractors import Settler
+from nonsmooth.analysis.chart_work import CHUNK, STORED, ChartWork
+from nonsmooth.analysis.sweep import swept_values
+from nonsmooth.campaign.run import run
+from nonsmooth.flow.arguments import check_options, check_system, whole_number
+from nonsmooth.flow.methods import engine_for
+from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
+from nonsmooth.flow.starts import is_one_start, plain_start, start_states
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from nonsmooth.flow.engine import FloatArray
+    from nonsmooth.system.system import System
+
+__all__ = ["PlannedChart", "chart", "described", "plan_chart"]
+
+EXPONENT_RETURNS = 1000
+
+
+def chart(
+    system: System,
+    grid: Mapping[str, Any],
+    *,
+    start: Any = None,
+    carry: Mapping[str, str] | None = None,
+    section: Stroboscopic | Poincare | None = None,
+    transient: int = 500,
+    keep: int = 60,
+    max_period: int = 16,
+    stop_early: bool = True,
+    extremes: bool = True,
+    lyapunov: bool | int = False,
+    refine: bool | float = False,
+    method: str = "auto",
+    rtol: float | None = None,
+    atol: Any = None,
+    threads: int | None = None,
+    store: Any = None,
+    client: Any = None,
+    any_cpu: bool = False,
+    progress: bool = True,
+    **expert: Any,
+) -> xr.Dataset:
+    """Period numbers, contacts and extremes over a plane of two parameters.
+
+    Parameters
+    ----------
+    system : System
+    grid : mapping
+        Two parameters and their values: ``{"omega": (A,), "rho": (B,)}``.
+    start : state or list of states, optional
+        Every point begins there; zeros where not given. Several starts add the dim ``start`` and ``n_attractors``.
+    carry : mapping, optional
+        ``{"rho": "up"}`` or ``{"rho": "down"}``: along this parameter the state is carried from point to point.
+    section : Stroboscopic or Poincare, optional
+        ``Stroboscopic(0)`` where the system has a period.
+    transient, keep : int
+        Section returns passed over, then judged. A point that is still settling gets up to eight transients.
+    max_period : int
+        Longest period number looked for.
+    stop_early : bool
+        A point ends as soon as its period number is certain (a small return, and multipliers inside the unit circle)
+        instead of at the end of its transient. Labels are the same, but for chaotic transients that end about then.
+    extremes : bool
+        Whether ``maximum`` and ``minimum`` are wanted.
+    lyapunov : bool or int
+        Largest exponent, from two neighbours over 1000 (or this many) returns.
+    refine : bool or float
+        Compute points near boundaries only and infer the rest; a number is the largest part of the points to compute.
+        See Notes.
+    method, rtol, atol
+        See :func:`nonsmooth.flow.methods.engine_for`.
+    threads : int, optional
+        Threads for independent work; the result does not depend on it. Default: one per core.
+    store : path, optional
+        A Zarr store for finished chunks; what is there already is not computed again.
+    client : dask.distributed.Client, optional
+        Computes the chunks on its workers.
+    any_cpu : bool
+        Go on with a store that was begun on another type of processor.
+    progress : bool
+        A bar on a terminal.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over the two parameters: ``period_number`` (0: none found), ``crossings_per_period``,
+        ``contacts_per_period``, ``maximum``, ``minimum``, ``status``, and where asked for ``lyapunov`` (per unit
+        time) with ``lyapunov_error``, ``n_attractors``, ``confidence`` and ``computed``.
+
+    Raises
+    ------
+    ValueError, TypeError
+        Arguments that do not fit. A point that fails keeps its status; the others are whole.
+
+    Notes
+    -----
+    No section points are stored: a chart of N points takes about 24 bytes per point without extremes.
+    With ``refine`` a coarse grid is computed, cells whose corners differ are halved down to single points, and so are
+    those beside them where a point in between disagrees; see :mod:`nonsmooth.analysis.chart_refine`.
+    """
+    given = dict(locals())
+    for name in ("system", "grid", "threads", "store", "client", "any_cpu", "progress", "expert"):
+        del given[name]
+    planned = plan_chart(system, grid, campaign=store is not None or client is not None, **given, **expert)
+    if threads is not None:
+        threads = whole_number(threads, "threads", 1)
+    work, label = planned.work, f"chart over {' and '.join(planned.values)}"
+    if refine is not False:
+        from nonsmooth.analysis.chart_refine import refined
+
+        if store is not None or client is not None:
+            raise ValueError("refine decides from its results what to compute next: it takes no store and no client")
+        arrays = refined(work, refine, threads=threads, progress=progress, label=label)
+    else:
+        flat = run(
+            work, threads=threads, progress=progress, label=label, store=store, client=client, any_cpu=any_cpu
+        )
+        arrays = {name: planned.order(column) for name, column in flat.items()}
+    from nonsmooth.results.global_schema import chart as build
+    from nonsmooth.results.labels import labels_of
+    from nonsmooth.results.provenance import provenance
+
+    labels = labels_of(system)
+    return build(
+        labels, provenance(labels, "chart", planned.options, method=work.settler.engine.name), planned.values, arrays,
+        starts=work.starts, one_start=is_one_start(start) or len(work.starts) == 1,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class PlannedChart:
+    """A chart's work, and how its flat columns become arrays over the grid."""
+
+    work: ChartWork
+    values: Mapping[str, FloatArray]
+    options: Mapping[str, Any]
+    order: Callable[[Any], Any]
+
+
+def plan_chart(
+    system: System, grid: Mapping[str, Any], *, start: Any = None, carry: Any = None, section: Any = None,
+    transient: Any = 500, keep: Any = 60, max_period: Any = 16, stop_early: bool = True, extremes: bool = True,
+    lyapunov: Any = False, refine: Any = False, method: str = "auto", rtol: Any = None, atol: Any = None,
+    campaign: bool = False, **expert: Any,
+) -> PlannedChart:  # fmt: skip
+    """Check the arguments of :func:`chart` and lay its work out, without computing anything."""
+    check_system(system, "chart")
+    check_options(system, expert, chart)
+    values = _grid(system, grid)
+    transient, keep = whole_number(transient, "transient", 0), whole_number(keep, "keep", 2)
+    max_period = whole_number(max_period, "max_period", 1)
+    section, plan = section_plan(system, section)
+    along = _carry(values, carry)
+    starts = start_states(system, start)
+    n_exponent = EXPONENT_RETURNS if lyapunov is True else whole_number(int(lyapunov), "lyapunov", 0)
+    if 0 < n_exponent < 40:
+        raise ValueError(f"lyapunov = {lyapunov} returns are too few for an exponent; at least 40")
+    extremes = bool(extremes) or len(starts) > 1  # attractors are told apart by them
+    engine = engine_for(system, method, rtol, atol, **expert)
+    settler = Settler(
+        system, engine, plan, transient, keep, max_period, bool(stop_early), extremes, rtol, atol, expert
+    )
+    settler.load()
+    options = {
+        "grid": values, "start": plain_start(system, start), "carry": None if carry is None else dict(carry),
+        "section": section, "transient": transient, "keep": keep, "max_period": max_period,
+        "stop_early": bool(stop_early), "extremes": extremes, "lyapunov": n_exponent, "refine": refine,
+        "method": method, "rtol": rtol, "atol": atol, **expert,
+    }  # fmt: skip
+    axes, order = _axes(values, along)
+    chunk = STORED if campaign else CHUNK
+    work = ChartWork(
+        settler, axes, starts, along is not None, n_exponent, chunk=chunk, described=described(system, "chart", options)
+    )
+    return PlannedChart(work, values, options, order)
+
+
+def described(system: System, verb: str, options: Mapping[str, Any]) -> dict[str, Any]:
+    """Everything that a work's outcome depends on, as plain data."""
+    from nonsmooth.results.provenance import options_as_data
+
+    return {
+        "verb": verb, "system": system.to_text(), "parameters": {k: float(v) for k, v in system.values.items()},
+        "options": options_as_data(options),
+    }  # fmt: skip
+
+
+def _grid(system: System, grid: Any) -> dict[str, FloatArray]:
+    if not isinstance(grid, Mapping) or len(grid) != 2:
+        given = list(grid) if isinstance(grid, Mapping) else grid
+        raise ValueError(f'grid must name two parameters, {{"omega": values, "rho": values}}; given: {given!r}')
+    return {str(name): swept_values(system, name, values) for name, values in grid.items()}
+
+
+def _carry(values: Mapping[str, FloatArray], carry: Any) -> tuple[str, str] | None:
+    if carry is None:
+        return None
+    form = f'carry={{"{next(iter(values))}": "up"}} (or "down")'
+    if not isinstance(carry, Mapping) or len(carry) != 1:
+        raise ValueError(f"carry = {carry!r}: the state is carried along one parameter; write {form}")
+    ((name, direction),) = carry.items()
+    if name not in values or direction not in ("up", "down"):
+        raise ValueError(f"carry = {carry!r}: allowed are the grid's parameters {list(values)}; write {form}")
+    return name, direction
+
+
+def _axes(values: Mapping[str, FloatArray], along: tuple[str, str] | None) -> tuple[dict[str, FloatArray], Any]:
+    """The plane in the order in which it is computed, and how a flat column of it becomes an array over the grid."""
+    names = list(values)
+    shape = tuple(len(values[name]) for name in names)
+    if along is None:
+        return dict(values), lambda column: column.reshape(*shape, *column.shape[1:])
+    inner = along[0]
+    outer = next(name for name in names if name != inner)
+    met = np.argsort(values[inner], kind="stable")
+    met = met[::-1] if along[1] == "down" else met
+    back = np.argsort(met, kind="stable")
+
+    def order(column: Any) -> Any:
+        table = column.reshape(len(values[outer]), len(met), *column.shape[1:])[:, back]
+        return table if names[0] == outer else np.swapaxes(table, 0, 1)
+
+    return {outer: values[outer], inner: values[inner][met]}, order

@@ -1,0 +1,149 @@
+"""The points of a chart as chunks of work."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from nonsmooth.analysis.attractors import Settled, Settler, usable
+from nonsmooth.campaign.work import Column
+from nonsmooth.flow.engine import FloatArray, IntArray
+from nonsmooth.kernels import codes
+
+__all__ = ["CHUNK", "STORED", "ChartWork", "attractors_among"]
+
+CHUNK = 256  # runs of one chunk, at least: a tenth of a second
+STORED = 4096  # and of one that is kept in a store or sent to a cluster: a second
+SAME = 1e-6  # extremes that agree to this part of the motion's size belong to one attractor
+
+
+@dataclass(frozen=True)
+class ChartWork:
+    """Points of a plane of two parameters, in rows along the second one (``carried``: runs go along these rows).
+
+    Parameters
+    ----------
+    grid : mapping
+        The two parameters' values, the rows' one last, in the order in which a carried state meets them.
+    where : array of int, optional
+        Flat places in the plane, where not all are wanted.
+    lyapunov : int
+        Returns over which the exponent is measured; 0: not wanted.
+    """
+
+    settler: Settler
+    grid: Mapping[str, FloatArray]
+    starts: FloatArray  # (S, n)
+    carried: bool = False
+    lyapunov: int = 0
+    where: IntArray | None = None
+    chunk: int = CHUNK
+    described: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def _shape(self) -> tuple[int, int]:
+        first, second = (len(values) for values in self.grid.values())
+        return first, second
+
+    @property
+    def _size(self) -> int:
+        first, second = self._shape
+        return first * second if self.where is None else len(self.where)
+
+    @property
+    def _step(self) -> int:
+        row = self._shape[1]
+        least = max(1, self.chunk // len(self.starts))
+        return -(-least // row) * row if self.carried else least
+
+    def columns(self) -> dict[str, Column]:
+        many = () if len(self.starts) == 1 else (len(self.starts),)
+        n = self.starts.shape[1]
+        found = {
+            "period_number": Column("i2", many), "status": Column("i1", many),
+            "crossings_per_period": Column("f8", many), "contacts_per_period": Column("f8", many),
+        }  # fmt: skip
+        if self.settler.extremes:
+            found |= {"maximum": Column("f8", (*many, n)), "minimum": Column("f8", (*many, n))}
+        if self.lyapunov:
+            found |= {"lyapunov": Column("f8", many), "lyapunov_error": Column("f8", many)}
+        if many:
+            found["n_attractors"] = Column("i2")
+        return found
+
+    def n_chunks(self) -> int:
+        return -(-self._size // self._step)
+
+    def bounds(self, chunk: int) -> tuple[int, int]:
+        return chunk * self._step, min((chunk + 1) * self._step, self._size)
+
+    def describe(self) -> dict[str, Any]:
+        return dict(self.described)
+
+    def compute(self, chunk: int) -> dict[str, Any]:
+        """Every run of the places of one chunk."""
+        first, last = self.bounds(chunk)
+        places = np.arange(first, last) if self.where is None else self.where[first:last]
+        row, column = np.divmod(places, self._shape[1])
+        (a, values_a), (b, values_b) = self.grid.items()
+        points = self.settler.system.parameter_points({a: values_a[row], b: values_b[column]})
+        n_places, n_starts = len(places), len(self.starts)
+        if self.carried:
+            found = self._along_rows(points, n_starts)
+        else:
+            rows = np.repeat(np.arange(n_places), n_starts)
+            found = self.settler.run(points, rows, np.tile(self.starts, (n_places, 1)))
+        arrays = {
+            "period_number": found.period_number, "status": found.status,
+            "crossings_per_period": found.crossings, "contacts_per_period": found.contacts,
+            "maximum": found.maximum, "minimum": found.minimum,
+        }  # fmt: skip
+        if self.lyapunov:
+            good = np.flatnonzero(usable(found.status))
+            exponent, error = np.full(len(found.status), np.nan), np.full(len(found.status), np.nan)
+            rows = np.repeat(np.arange(n_places), n_starts)[good]
+            exponent[good], error[good] = self.settler.exponents(
+                points, rows, found.last[good], found.mode[good], self.lyapunov
+            )
+            arrays |= {"lyapunov": exponent, "lyapunov_error": error}
+        kept = {
+            name: arrays[name].reshape(n_places, *item.shape) for name, item in self.columns().items() if name in arrays
+        }
+        if n_starts > 1:
+            kept["n_attractors"] = attractors_among(found, n_places, n_starts, self.settler.least)
+        return kept
+
+    def _along_rows(self, points: FloatArray, n_starts: int) -> Settled:
+        """Each row from each start, the state carried along it; in the order (place, start)."""
+        length = self._shape[1]
+        parts = []
+        for first in range(0, len(points), length):
+            rows = np.arange(first, first + length)
+            for start in self.starts:
+                parts.append(self.settler.run(points, rows, np.tile(start, (length, 1)), carried=True))
+        joined = Settled.joined(parts)
+        order = np.arange(len(points) * n_starts).reshape(-1, n_starts, length)
+        return joined[order.transpose(0, 2, 1).ravel()]
+
+
+def attractors_among(found: Settled, n_places: int, n_starts: int, least: FloatArray) -> IntArray:
+    """Distinct attractors among the starts of each place: by period number and extremes; what has no period is one.
+
+    A cycle's extremes do not depend on where in the cycle a run ended. What is still settling, or failed, is none.
+    """
+    period = found.period_number.reshape(n_places, n_starts)
+    wandering = found.status.reshape(n_places, n_starts) == codes.NOT_PERIODIC
+    extremes = np.concatenate([found.maximum, found.minimum], axis=1).reshape(n_places, n_starts, -1)
+    size = np.maximum(found.maximum - found.minimum, least).reshape(n_places, n_starts, -1)
+    size = np.concatenate([size, size], axis=2)
+    count = wandering.any(axis=1).astype(np.int64)
+    for k in range(n_starts):
+        new = period[:, k] > 0
+        for j in range(k):
+            near = np.abs(extremes[:, k] - extremes[:, j]) <= SAME * size[:, k]
+            new &= ~((period[:, j] == period[:, k]) & near.all(axis=1))
+        count += new
+    return count

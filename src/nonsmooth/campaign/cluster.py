@@ -1,0 +1,95 @@
+"""Chunks on the workers of a Dask cluster. Workers may die: a chunk that was lost with one is sent again."""
+
+from __future__ import annotations
+
+import time
+import uuid
+from collections.abc import Callable, Iterable, Mapping
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+
+from nonsmooth.campaign.store import ChunkStore
+from nonsmooth.campaign.work import Work
+
+__all__ = ["MISSING", "compute_chunk", "on_cluster"]
+
+MISSING = 'client= needs Dask distributed: python -m pip install "nonsmooth[cluster]"'
+AHEAD = 2  # chunks that wait at each thread of the cluster
+ATTEMPTS = 10  # times that a chunk is sent again after its workers died
+
+
+def compute_chunk(work: Work, chunk: int, path: str | None, key: str) -> Mapping[str, NDArray[Any]] | None:
+    """What a worker does: one chunk, into the store where there is one."""
+    if path is None:
+        return work.compute(chunk)
+    store = ChunkStore(Path(path), key)
+    if store.has(chunk):  # computed meanwhile for a client that is gone
+        return None
+    store.note_start(chunk)
+    began = time.perf_counter()
+    store.write(work, chunk, work.compute(chunk), time.perf_counter() - began)
+    return None
+
+
+def on_cluster(
+    work: Work,
+    chunks: Iterable[int],
+    done: Callable[[int, Mapping[str, NDArray[Any]] | None], None],
+    client: Any,
+    store: ChunkStore | None,
+) -> None:
+    """Send chunks to the workers and call ``done(chunk, arrays or None)`` for each that has come back.
+
+    With a store the workers write, and only the news comes back. Few chunks are on their way at any time, so that
+    the scheduler's memory does not grow with their number.
+
+    Raises
+    ------
+    ImportError
+        Without Dask distributed.
+    """
+    try:
+        from distributed import as_completed
+        from distributed.scheduler import KilledWorker
+    except ImportError as error:
+        raise ImportError(MISSING) from error
+    path, key = (None, "") if store is None else (str(store.path.resolve()), store.key)
+    family = uuid.uuid4().hex[:16]  # never the names of a client that is gone: its tasks may be half forgotten
+    order = iter(chunks)
+    attempts: dict[int, int] = {}
+
+    def send(chunk: int) -> Any:
+        attempts[chunk] = attempts.get(chunk, 0) + 1
+        name = f"nonsmooth-{family}-{chunk}" + (f"-{attempts[chunk]}" if attempts[chunk] > 1 else "")
+        return client.submit(compute_chunk, work, chunk, path, key, key=name, pure=False)
+
+    threads = max(sum(client.nthreads().values()), 1)
+    pending = {send(chunk): chunk for chunk in islice(order, AHEAD * threads)}
+    if not pending:
+        return
+    queue = as_completed(list(pending))
+    try:
+        for future in queue:
+            chunk = pending.pop(future)
+            try:
+                # With a store there is nothing to fetch, and a worker that dies after its chunk was kept loses nothing.
+                arrays = None if store is not None and future.status == "finished" else future.result()
+            except KilledWorker:
+                if attempts[chunk] >= ATTEMPTS:
+                    raise
+                again = send(chunk)
+                pending[again] = chunk
+                queue.add(again)
+                continue
+            done(chunk, arrays)
+            future.release()
+            for following in islice(order, 1):
+                new = send(following)
+                pending[new] = following
+                queue.add(new)
+    except BaseException:
+        client.cancel(list(pending))
+        raise

@@ -1,0 +1,84 @@
+"""All chunks of a work, from wherever they are to be had: a store, this process, a cluster."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from typing import Any
+
+from numpy.typing import NDArray
+
+from nonsmooth.campaign.threads import on_threads
+from nonsmooth.campaign.work import Work, empty_columns
+from nonsmooth.results.progress import progress as progress_bar
+
+__all__ = ["run"]
+
+
+def run(
+    work: Work, *, threads: int | None = None, progress: bool = True, label: str = "", store: Any = None,
+    client: Any = None, any_cpu: bool = False,
+) -> dict[str, NDArray[Any]]:  # fmt: skip
+    """Compute every chunk of ``work`` that is not in the store yet, and return its columns over all places.
+
+    Parameters
+    ----------
+    threads : int, optional
+        Threads of this process; one per core where not given. The result does not depend on it.
+    progress : bool
+        A bar on a terminal.
+    store : path, optional
+        A Zarr store (see :mod:`nonsmooth.campaign.store`).
+    client : dask.distributed.Client, optional
+        Chunks are computed by its workers, which must see the same store under the same path.
+    any_cpu : bool
+        See :func:`nonsmooth.campaign.store.open_store`.
+    """
+    keeper = None
+    if store is not None:
+        from nonsmooth.campaign.store import open_store
+
+        keeper = open_store(store, work, any_cpu=any_cpu)
+    there = set() if keeper is None else keeper.done()
+    missing = [chunk for chunk in range(work.n_chunks()) if chunk not in there]
+    columns = empty_columns(work) if keeper is None else {}
+    size = work.bounds(work.n_chunks() - 1)[1]
+    with progress_bar(size, label, progress) as advance:
+        for chunk in there:
+            advance(_places(work, chunk))
+
+        def keep(chunk: int, arrays: Mapping[str, NDArray[Any]] | None) -> None:
+            first, last = work.bounds(chunk)
+            if keeper is None and arrays is not None:
+                for name, values in arrays.items():
+                    columns[name][first:last] = values
+            advance(last - first)
+
+        if client is not None:
+            from nonsmooth.campaign.cluster import on_cluster
+
+            on_cluster(work, missing, keep, client, keeper)
+        else:
+            on_threads(_Kept(work, keeper) if keeper else work, missing, keep, threads)
+    return columns if keeper is None else keeper.read(work)
+
+
+def _places(work: Work, chunk: int) -> int:
+    first, last = work.bounds(chunk)
+    return last - first
+
+
+class _Kept:
+    """A work whose chunks go into a store as soon as they are computed, in the thread that computed them."""
+
+    def __init__(self, work: Work, keeper: Any) -> None:
+        self.work, self.keeper = work, keeper
+        self.columns, self.n_chunks, self.bounds = work.columns, work.n_chunks, work.bounds
+        self.describe = work.describe
+
+    def compute(self, chunk: int) -> Mapping[str, NDArray[Any]]:
+        self.keeper.note_start(chunk)
+        began = time.perf_counter()
+        arrays = self.work.compute(chunk)
+        self.keeper.write(self.work, chunk, arrays, time.perf_counter() - began)
+        return arrays

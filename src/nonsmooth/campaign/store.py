@@ -1,0 +1,305 @@
+"""A Zarr store for the chunks of one work: written chunk by chunk, whole or not at all, and gone on with later.
+
+::
+
+    chart.zarr/              a Zarr group; the attribute ``nonsmooth_campaign`` says what the work is
+        results/             one array per column, one file per chunk (Zstandard, one thread, fixed level)
+        run/000017.json      chunk 17 is done: its key and the hash of its content, by whom, when, how long
+        run/started.log      which chunks were begun: one begun twice was lost with its worker
+
+A chunk's key is a hash of the model, the parameters, the options, the kernels' source, and the chunk's place. Its
+mark is written after its arrays, so that a chunk cut short counts as missing. Arrays hold results only: facts about
+the run (which machine, how long) stay in ``run``, so that equal work gives equal files.
+"""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import json
+import os
+import platform
+import socket
+import tempfile
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.campaign.work import Work
+from nonsmooth.errors import DataFileError
+
+__all__ = ["ChunkStore", "cpu_type", "describe_store", "open_store"]
+
+ATTRIBUTE = "nonsmooth_campaign"
+LEVEL = 3  # of the compression
+
+
+@dataclass(frozen=True)
+class ChunkStore:
+    """A store that belongs to one work."""
+
+    path: Path
+    key: str
+
+    def done(self) -> set[int]:
+        """Chunks that are there, whole."""
+        return {mark["chunk"] for mark in _marks(self.path) if mark["key"] == self._key(mark["chunk"])}
+
+    def has(self, chunk: int) -> bool:
+        """Whether a chunk is there, whole."""
+        mark = _mark(self.path / "run" / f"{chunk:06d}.json")
+        return mark is not None and mark["key"] == self._key(chunk)
+
+    def note_start(self, chunk: int) -> None:
+        """Write into the log that the work on a chunk begins: what was begun more often than once was lost before."""
+        line = json.dumps({"chunk": chunk, "host": socket.gethostname(), "process": os.getpid(), "began": time.time()})
+        with _told(self.path), open(self.path / "run" / "started.log", "a", encoding="utf-8") as log:
+            log.write(line + "\n")
+
+    def write(self, work: Work, chunk: int, arrays: Mapping[str, NDArray[Any]], seconds: float) -> None:
+        """Keep a chunk: its arrays first, then the mark that it is done.
+
+        Raises
+        ------
+        DataFileError
+            The disk is full, or may not be written; what was there before is whole.
+        """
+        first, last = work.bounds(chunk)
+        with _told(self.path):
+            group = _results(self.path, "r+")
+            kept = {name: np.ascontiguousarray(arrays[name], item.dtype) for name, item in work.columns().items()}
+            for name, values in kept.items():
+                group[name][first:last] = values
+            mark = {
+                "chunk": chunk, "key": self._key(chunk), "content": _content(kept), "cpu": cpu_type(),
+                "host": socket.gethostname(), "process": os.getpid(), "seconds": round(seconds, 4),
+                "ended": time.time(),
+            }  # fmt: skip
+            _write_whole(self.path / "run" / f"{chunk:06d}.json", json.dumps(mark).encode())
+
+    def read(self, work: Work) -> dict[str, NDArray[Any]]:
+        """All columns, over all places.
+
+        Raises
+        ------
+        DataFileError
+            A chunk that is marked as done is damaged; its mark is taken away, so that the next run computes it again.
+        """
+        group = _results(self.path, "r")
+        try:
+            columns = {name: np.asarray(array[...]) for name, array in group.arrays()}
+        except Exception:  # damaged bytes come up as almost anything from the codecs
+            columns = {}
+        damaged = [mark["chunk"] for mark in _marks(self.path) if not self._is_whole(work, mark, columns)]
+        if damaged:
+            for chunk in damaged:
+                (self.path / "run" / f"{chunk:06d}.json").unlink(missing_ok=True)
+            some = ", ".join(map(str, damaged[:5]))
+            raise DataFileError(
+                f"{self.path}: {len(damaged)} chunks are damaged ({some}); run it again, they will be computed anew"
+            )
+        return columns
+
+    def _is_whole(self, work: Work, mark: Mapping[str, Any], columns: Mapping[str, NDArray[Any]]) -> bool:
+        """Whether a chunk's arrays are those that were written."""
+        first, last = work.bounds(mark["chunk"])
+        try:
+            group = columns or _results(self.path, "r")
+            digest = _content({name: np.asarray(group[name][first:last]) for name in work.columns()})
+        except Exception:
+            return False
+        return bool(digest == mark.get("content"))
+
+    def _key(self, chunk: int) -> str:
+        return hashlib.sha256(f"{self.key}:{chunk}".encode()).hexdigest()
+
+
+def open_store(path: str | os.PathLike[str], work: Work, *, any_cpu: bool = False) -> ChunkStore:
+    """The store at ``path`` for this work; it is made where there is none.
+
+    Parameters
+    ----------
+    any_cpu : bool
+        Go on with a store that was begun on another type of processor: its numbers may differ in the last digits.
+
+    Raises
+    ------
+    ValueError
+        A name that does not end in .zarr.
+    DataFileError
+        The store of another work, or of another type of processor; something else that stands there; a folder that
+        does not exist or may not be written. Nothing is changed then.
+    """
+    target = Path(path)
+    if target.suffix != ".zarr":
+        raise ValueError(f"{target}: the name of a store must end in .zarr")
+    described = _described(work)
+    key = hashlib.sha256(json.dumps(described, sort_keys=True).encode()).hexdigest()
+    if not target.exists():
+        if not target.parent.is_dir():
+            raise DataFileError(f"{target}: the folder {target.parent} does not exist; create it first")
+        _make(target, work, described, key)
+    record = describe_store(target)
+    if record["key"] != key:
+        why = _difference(record, described)
+        raise DataFileError(f"{target}: is the store of another work: {why}; give another name")
+    if record["cpu"] != cpu_type() and not any_cpu:
+        raise DataFileError(
+            f"{target}: was begun on a processor of type {record['cpu']!r}, this is {cpu_type()!r}; results may "
+            "differ in the last digits. Go on with any_cpu=True, or begin another store"
+        )
+    return ChunkStore(target, key)
+
+
+def describe_store(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """What a store is of, and how far it is: ``verb``, ``system``, ``options``, ``chunks``, ``done``, ``seconds``.
+
+    Raises
+    ------
+    DataFileError
+        Not a store of chunks.
+    """
+    import zarr
+
+    target = Path(path)
+    try:
+        record: dict[str, Any] = dict(json.loads(str(zarr.open_group(target, mode="r").attrs[ATTRIBUTE])))
+    except Exception as error:
+        raise DataFileError(f"{target}: is not a store of chunks ({error})") from error
+    marks = list(_marks(target))
+    record["done"] = len({mark["chunk"] for mark in marks})
+    record["seconds"] = sum(mark["seconds"] for mark in marks)
+    log = target / "run" / "started.log"
+    record["started"] = len(log.read_text(encoding="utf-8").splitlines()) if log.exists() else record["done"]
+    return record
+
+
+def _content(arrays: Mapping[str, NDArray[Any]]) -> str:
+    digest = hashlib.sha256()
+    for name in sorted(arrays):
+        digest.update(name.encode() + np.ascontiguousarray(arrays[name]).tobytes())
+    return digest.hexdigest()
+
+
+@cache
+def cpu_type() -> str:
+    """The processor as the compiler sees it: its name and instruction sets decide the last digits."""
+    from llvmlite import binding
+
+    features = binding.get_host_cpu_features().flatten()
+    return f"{platform.machine()} {binding.get_host_cpu_name()} {hashlib.sha256(features.encode()).hexdigest()[:8]}"
+
+
+@cache
+def _kernel_version() -> str:
+    """Hash of everything compiled: a store of older kernels is another work."""
+    import numba
+
+    import nonsmooth.kernels as room
+
+    digest = hashlib.sha256(numba.__version__.encode())
+    for file in sorted(Path(str(room.__file__)).parent.glob("*.py")):
+        digest.update(file.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _described(work: Work) -> dict[str, Any]:
+    columns = {name: [item.dtype, list(item.shape)] for name, item in work.columns().items()}
+    return {
+        **work.describe(), "columns": columns, "chunks": work.n_chunks(), "places": work.bounds(work.n_chunks() - 1)[1],
+        "kernels": _kernel_version(),
+    }  # fmt: skip
+
+
+def _make(target: Path, work: Work, described: Mapping[str, Any], key: str) -> None:
+    """A whole empty store, or none."""
+    import zarr
+    from zarr.codecs import ZstdCodec
+
+    with _told(target), tempfile.TemporaryDirectory(prefix=f".{target.name}-", dir=target.parent) as folder:
+        fresh = Path(folder) / "new.zarr"
+        root = zarr.open_group(fresh, mode="w", zarr_format=3)
+        root.attrs[ATTRIBUTE] = json.dumps({**described, "key": key, "cpu": cpu_type(), "made": time.time()})
+        results = root.create_group("results")
+        places, (first, last) = described["places"], work.bounds(0)
+        for name, item in work.columns().items():
+            results.create_array(
+                name, shape=(places, *item.shape), chunks=(last - first, *item.shape), dtype=item.dtype,
+                compressors=ZstdCodec(level=LEVEL), config={"write_empty_chunks": True},
+            )  # fmt: skip
+        (fresh / "run").mkdir()
+        try:
+            os.replace(fresh, target)
+        except OSError:
+            if not target.is_dir():  # else another process was faster
+                raise
+
+
+def _results(path: Path, mode: Any) -> Any:
+    import zarr
+
+    with zarr.config.set({"array.write_empty_chunks": True, "threading.max_workers": 1}):
+        return zarr.open_group(path / "results", mode=mode)
+
+
+def _marks(path: Path) -> Iterator[dict[str, Any]]:
+    for file in sorted((path / "run").glob("*.json")):
+        mark = _mark(file)
+        if mark is not None:
+            yield mark
+
+
+def _mark(file: Path) -> dict[str, Any] | None:
+    """A mark; None where there is none, or it was cut short by a crash of the machine."""
+    try:
+        mark = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return mark if isinstance(mark, dict) and {"chunk", "key", "seconds"} <= set(mark) else None
+
+
+def _write_whole(path: Path, data: bytes) -> None:
+    """Another process sees the whole file or none."""
+    handle, unfinished = tempfile.mkstemp(prefix=f".{path.name}-", dir=path.parent)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+        os.replace(unfinished, path)
+    except BaseException:
+        Path(unfinished).unlink(missing_ok=True)
+        raise
+
+
+def _difference(record: Mapping[str, Any], described: Mapping[str, Any]) -> str:
+    keys = [name for name in described if record.get(name) != described[name]]
+    if keys == ["kernels"]:
+        return "it was computed by another version of the package"
+    for name in keys:
+        a, b = record.get(name), described[name]
+        if isinstance(a, dict) and isinstance(b, dict):
+            inner = [one for one in {**a, **b} if a.get(one) != b.get(one)]
+            return f"its {name} differ in {', '.join(map(str, inner[:4]))}"
+    return f"it differs in {', '.join(keys)}"
+
+
+@contextmanager
+def _told(path: Path) -> Iterator[None]:
+    """Trouble with the disk as one sentence."""
+    try:
+        yield
+    except OSError as error:
+        why = {
+            errno.ENOSPC: "the disk is full", errno.EDQUOT: "the quota of the disk is used up",
+            errno.EROFS: "the disk is read-only", errno.EACCES: "it may not be written",
+            errno.EPERM: "it may not be written",
+        }.get(error.errno or 0)  # fmt: skip
+        if why is None:
+            raise
+        raise DataFileError(f"{path}: {why} ({error}); finished chunks are whole, run it again to go on") from error

@@ -1,0 +1,45 @@
+"""Where the section of an autonomous orbit lies: in the middle of its longest visit."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.continuation.signature import Signature, Visit
+
+if TYPE_CHECKING:
+    from nonsmooth.flow.variational import VariationalFlow
+
+__all__ = ["anchored", "free_anchor"]
+
+FloatArray = NDArray[np.float64]
+
+
+def anchored(
+    flow: VariationalFlow, values: FloatArray, signature: Signature, times: FloatArray, states: FloatArray,
+    period: float,
+) -> tuple[Signature, FloatArray, FloatArray]:  # fmt: skip
+    """The same orbit read from the middle of its longest visit (times of crossings; states at section, after them)."""
+    m = len(times)
+    lengths = np.append(np.diff(times), times[0] + period - times[-1])  # of the visit after crossing i
+    i = int(lengths.argmax())
+    crossings = signature.crossings
+    after = crossings[(i + 1) % m]
+    z = flow.legs(values, [after.mode], [0.0], [0.5 * lengths[i]], states[i + 1][None, :]).z
+    order = [(i + 1 + j) % m for j in range(m)]
+    begin = times[i] + 0.5 * lengths[i]
+    moved = np.array([(times[j] - begin) % period for j in order])
+    moved[-1] = period - 0.5 * lengths[i]
+    visits = (*(crossings[j] for j in order), Visit(after.mode))
+    return Signature(visits), moved, np.concatenate([z, states[1:][order]])
+
+
+def free_anchor(
+    flow: VariationalFlow, values: FloatArray, mode: int, z: FloatArray, size: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """(z_ref, f_ref) for an orbit without transitions: the plane through z across the flow, in scaled states."""
+    field = flow.legs(values, [mode], [0.0], [0.0], z[None, :]).f_begin[0]
+    weighted = field / size**2
+    return z.copy(), weighted / max(float(np.abs(weighted * size).max()), 1e-300)

@@ -1,0 +1,207 @@
+"""Pseudo-arclength continuation of orbits with one signature, in scaled unknowns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.continuation.path import Walk
+from nonsmooth.continuation.solve import determinant, solve
+
+if TYPE_CHECKING:
+    from nonsmooth.continuation.path import Path
+    from nonsmooth.continuation.shooting import Shooting, Solved
+
+__all__ = ["Curve", "Point", "chordal"]
+
+FloatArray = NDArray[np.float64]
+MOST = 8  # Newton iterations
+DONE = 1e-9  # a step this small is followed by one of its square
+CLOSE = 1e-12  # where multipliers are wanted to the last digits
+
+
+@dataclass
+class Point:
+    """A solved point of a curve."""
+
+    Y: FloatArray  # X / scale
+    tangent: FloatArray  # unit length, in scaled unknowns
+    solved: Solved
+    M: FloatArray
+    multipliers: NDArray[np.complex128]
+    path: Path
+    orientation: float  # sign of the bordered determinant
+    iterations: int
+
+    @property
+    def X(self) -> FloatArray:
+        """The unknowns."""
+        return self.solved.X
+
+
+class Curve:
+    """Orbits of one signature with one active parameter.
+
+    Parameters
+    ----------
+    shooting : Shooting
+        With one active parameter.
+    size : array (n_z,)
+        Sizes of the states (and memory).
+    period : float
+        Size of the times.
+    width : float
+        Size of the parameter: the width of its range.
+    """
+
+    def __init__(self, shooting: Shooting, size: FloatArray, period: float, width: float) -> None:
+        self.shooting, self.walk = shooting, Walk(shooting)
+        m = shooting.m
+        self.size, self.period, self.width = size, period, width
+        scale = shooting.join(np.full(m, period), np.tile(size, (m + 1, 1)), period, [width])
+        # The length of a curve should not depend on how many visits an orbit is cut into.
+        scale[: shooting.size] *= np.sqrt(m + 1)
+        self.scale = scale
+        rows = 1.0 / scale[: shooting.size]
+        self.weights = rows[:, None] * scale[None, :]
+        self.rows = rows
+        self.n = shooting.size + 1
+        self._matrix = np.zeros((self.n, self.n))
+
+    def _bordered(self, solved: Solved, border: FloatArray) -> FloatArray:
+        matrix = self._matrix
+        np.multiply(solved.jacobian, self.weights, out=matrix[:-1])
+        matrix[-1] = border
+        return matrix
+
+    def correct(
+        self, Y: FloatArray, border: FloatArray, level: float, *, tolerance: float = DONE, most: int = MOST,
+        singular: bool = False,
+    ) -> tuple[Solved, FloatArray, int] | None:  # fmt: skip
+        """Newton for F = 0 and border . Y = level, from Y; None where it does not converge.
+
+        ``singular`` takes the shortest step where the matrix has no inverse: at a crossing of branches.
+        """
+        shooting = self.shooting
+        right = np.empty(self.n)
+        last = np.inf
+        for i in range(most):
+            solved = shooting.evaluate(Y * self.scale)
+            np.multiply(solved.residual, self.rows, out=right[:-1])
+            right[-1] = border @ Y - level
+            try:
+                if singular:
+                    step = np.linalg.lstsq(self._bordered(solved, border), right, rcond=1e-7)[0]
+                else:
+                    step = solve(self._bordered(solved, border), right)
+            except np.linalg.LinAlgError:
+                return None
+            length = float(np.abs(step).max())
+            if not length < 1e3 or (i > 1 and length > 2.0 * last and length > 1e-10):
+                return None
+            if length < tolerance or (i > 3 and length < 1e-10):
+                if length > 1e-14:  # the last evaluation serves; its error is the square of this step
+                    Y = Y - step
+                    solved.X = Y * self.scale
+                return solved, Y, i
+            Y = Y - step
+            last = length
+        return None
+
+    def tangent(self, solved: Solved, border: FloatArray) -> tuple[FloatArray, float] | None:
+        """Unit tangent with a positive component along ``border``, and the sign of the bordered determinant."""
+        matrix = self._bordered(solved, border)
+        right = np.zeros(self.n)
+        right[-1] = 1.0
+        try:
+            t = solve(matrix, right)
+        except np.linalg.LinAlgError:
+            return None
+        length = np.sqrt(t @ t)
+        if not np.isfinite(length):
+            return None
+        t /= length
+        matrix[-1] = t
+        return t, determinant(matrix)[0]
+
+    def null_vectors(self, solved: Solved, tolerance: float = 1e-7) -> FloatArray:
+        """Orthonormal vectors (k, N + 1) that the scaled Jacobian takes to zero."""
+        _, values, right = np.linalg.svd(solved.jacobian * self.weights)
+        rank = int((values > tolerance * values[0]).sum())
+        return np.asarray(right[rank:])
+
+    def point(self, solved: Solved, Y: FloatArray, border: FloatArray, iterations: int = 0) -> Point | None:
+        """A solved point with its tangent, multipliers and path."""
+        found = self.tangent(solved, border)
+        if found is None:
+            return None
+        M = solved.monodromy
+        path = self.walk.along(solved, self.shooting.split(solved.X)[1])
+        if path is None:
+            return None
+        return Point(Y, found[0], solved, M, self.shooting.multipliers(M), path, found[1], iterations)
+
+    def step(self, point: Point, ds: float, *, tolerance: float = DONE) -> Point | None:
+        """The point at distance ds along the tangent."""
+        Y = point.Y + ds * point.tangent
+        found = self.correct(Y, point.tangent, float(point.tangent @ Y), tolerance=tolerance)
+        if found is None:
+            return None
+        return self.point(found[0], found[1], point.tangent, found[2])
+
+    def anchored_anew(self, point: Point) -> Point:
+        """The same point with the phase condition of an orbit without transitions put through it."""
+        shooting, z = self.shooting, point.X[: self.shooting.n]
+        field = point.solved.legs.f_begin[0] / self.size**2
+        shooting.reference = z.copy(), field / max(float(np.abs(field * self.size).max()), 1e-300)
+        row = point.solved.jacobian[-1]
+        row[:] = 0.0
+        row[: shooting.n] = shooting.reference[1]
+        found = self.tangent(point.solved, point.tangent)
+        return point if found is None else replace(point, tangent=found[0], orientation=found[1])
+
+    def between(self, a: Point, b: Point, s: float) -> Point | None:
+        """The point at distance s from ``a`` towards ``b``, to the last digits."""
+        end = float(a.tangent @ (b.Y - a.Y))
+        x = s / end
+        # Hermite's cubic through both points and tangents.
+        slope = end / max(float(a.tangent @ b.tangent), 1e-3)
+        Y = (
+            a.Y * (1 + 2 * x) * (1 - x) ** 2 + a.tangent * (end * x * (1 - x) ** 2)
+            + b.Y * x * x * (3 - 2 * x) - b.tangent * (slope * x * x * (1 - x))
+        )  # fmt: skip
+        level = float(a.tangent @ a.Y) + s
+        found = self.correct(Y, a.tangent, level, tolerance=CLOSE, most=2 * MOST)
+        if found is None or np.abs(found[1] - Y).max() > 0.1 * abs(end):
+            found = self.correct(Y, a.tangent, level, tolerance=1e-10, most=2 * MOST, singular=True)
+        if found is None:
+            return None
+        point = self.point(found[0], found[1], a.tangent, found[2])
+        if point is not None and float(point.tangent @ a.tangent) < 0.5:
+            # At a crossing of branches any direction in their plane is null: keep that of the branch.
+            towards = (1 - x) * a.tangent + x * b.tangent
+            point.tangent = towards / np.linalg.norm(towards)
+        return point
+
+    def at_parameter(self, Y: FloatArray, value: float) -> Point | None:
+        """The point at a value of the parameter, by Newton from Y."""
+        border = np.zeros(self.n)
+        border[-1] = 1.0
+        Y = Y.copy()
+        Y[-1] = value / self.width
+        found = self.correct(Y, border, value / self.width, tolerance=CLOSE, most=2 * MOST)
+        if found is None:
+            return None
+        solved, Y, iterations = found
+        null = self.null_vectors(solved)
+        if not len(null):
+            return None
+        return self.point(solved, Y, null[-1], iterations)
+
+
+def chordal(a: NDArray[np.complex128], b: NDArray[np.complex128]) -> float:
+    """Largest distance of multipliers on the Riemann sphere, matched in order of modulus."""
+    return float((np.abs(a - b) / np.sqrt((1 + np.abs(a) ** 2) * (1 + np.abs(b) ** 2))).max())

@@ -1,0 +1,69 @@
+"""The cycles that are born at a Hopf point."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.continuation.anchor import free_anchor
+from nonsmooth.continuation.arclength import Curve, Point
+from nonsmooth.continuation.equilibrium import Equilibria
+from nonsmooth.continuation.shooting import Shooting
+from nonsmooth.continuation.signature import Signature, Visit
+from nonsmooth.system.system import System
+
+__all__ = ["first_cycle", "hopf_row"]
+
+FloatArray = NDArray[np.float64]
+SMALL = 1e-2  # amplitude of the first cycle, in units of the states' scales
+
+
+def hopf_row(start: Any) -> tuple[System, str, float, int, FloatArray, tuple[float, float]]:
+    """System, parameter, its value, mode, equilibrium and range of one Hopf point of ``continue_equilibrium``."""
+    from nonsmooth.results.provenance import read_provenance
+
+    source = read_provenance(start)
+    system = System.from_text(source["system"]["text"]).with_parameters(source["system"]["parameters"])
+    name = str(start.attrs["parameter"])
+    value = float(start[name])
+    low, high = source["options"]["range"]
+    return system.with_parameters({name: value}), name, value, int(start["mode"]), start["u"].values, (low, high)
+
+
+def first_cycle(
+    system: System, name: str, value: float, mode: int, u: FloatArray, width: float
+) -> tuple[Curve, Point] | None:
+    r"""A small cycle :math:`u + \epsilon \, \mathrm{Re}(q e^{i \omega t})`, corrected to an orbit."""
+    equilibria = Equilibria(system, mode, name, width)
+    rest = equilibria.at(u, value)
+    if rest is None:
+        return None
+    eigenvalues, vectors = np.linalg.eig(rest.jacobian)
+    i = int(np.argmin(np.abs(eigenvalues.real) + 1e3 * (np.abs(eigenvalues.imag) < 1e-9)))
+    omega, q = abs(float(eigenvalues[i].imag)), vectors[:, i]
+    scale = np.concatenate([system.scale_vector(), np.ones(len(system.memory))])
+    own = np.zeros(len(scale), dtype=complex)
+    own[equilibria.own] = q
+    own /= np.abs(own / scale).max()
+    # Begun where its real part is largest, so that the section lies across the flow.
+    own *= np.exp(-1j * np.angle(np.sum(own**2 / scale**2)) / 2)
+    shooting = Shooting(system, Signature((Visit(mode),)), 0, (name,))
+    rested = np.concatenate([rest.u, system.memory_vector()])
+    period = 2 * np.pi / omega
+    curve = Curve(shooting, scale, period, width)
+    for amplitude in (SMALL, 0.3 * SMALL, 3 * SMALL):
+        z = rested + amplitude * own.real
+        shooting.reference = free_anchor(shooting.flow, shooting.values, mode, z, scale)
+        Y = shooting.join(np.empty(0), z[None, :], period, [value]) / curve.scale
+        border = np.zeros(curve.n)
+        border[: shooting.n] = own.real / scale
+        border /= np.linalg.norm(border)
+        found = curve.correct(Y, border, float(border @ Y), most=20)
+        if found is None:
+            continue
+        point = curve.point(found[0], found[1], border)
+        if point is not None and np.nanmax(point.path.maximum - point.path.minimum) > 0:
+            return curve, point
+    return None

@@ -1,0 +1,274 @@
+"""Where a path leaves its signature: which signature comes next, and its first unknowns.
+
+At the boundary itself one orbit satisfies the equations of both signatures: a visit of no length, or an impact of no
+speed, is put in or taken out. From that common point the branch goes on along the new equations' own null vector, on
+the side where the path is admissible.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.continuation.arclength import Curve, Point
+from nonsmooth.continuation.shooting import Shooting
+from nonsmooth.continuation.signature import Signature, Visit
+
+if TYPE_CHECKING:
+    from nonsmooth.system.system import System
+
+__all__ = ["Change", "changed", "common_point", "resumed"]
+
+FloatArray = NDArray[np.float64]
+COMMON = 1e-6  # scaled residual of the common orbit in the new equations
+STEPS = (2e-6, 1e-6, 1e-7, 1e-5, 1e-4, 1e-8)  # first steps after a change
+
+
+@dataclass
+class Change:
+    """The common orbit in the new signature."""
+
+    kind: str  # grazing, corner, or section (no bifurcation: a crossing passes through the section)
+    signature: Signature
+    times: FloatArray
+    states: FloatArray
+    indicator: int = -1
+    gained: bool = False
+    place: int = -1  # the visit, in the signature without the contact, in which the contact stands
+    inserted: tuple[Visit, ...] = ()
+    touch: float = 0.0  # when
+
+
+def changed(curve: Curve, point: Point, kind: str) -> list[Change]:
+    """What may come after the event ``kind`` at a located point; the likeliest first, none where nothing is known."""
+    if kind == "touch":
+        return _touched(curve, point)
+    if kind == "short":
+        return _shortened(curve, point)
+    if kind == "slow":
+        return _slowed(curve, point)
+    if kind == "own":
+        return _other_row(curve, point)
+    return []
+
+
+def _parts(curve: Curve, point: Point) -> tuple[tuple[Visit, ...], FloatArray, FloatArray]:
+    times, states = curve.shooting.split(point.X)
+    return curve.shooting.signature.visits, times, states
+
+
+def _touched(curve: Curve, point: Point) -> list[Change]:
+    """A transition that has only been touched: put it in, and if it leads to another mode the way back too."""
+    visits, times, states = _parts(curve, point)
+    path, flow, values = point.path, curve.shooting.flow, point.solved.values
+    place, k = path.touched
+    traced = curve.shooting.system.traced
+    jump = traced.transitions[k]
+    row = int(path.which[place, k] - curve.walk.transitions[k, 2])
+    t = float(path.place[place, k])
+    begin = float(point.solved.times[place])
+    z = flow.legs(values, [visits[place].mode], [begin], [t - begin], states[place][None, :]).z[0]
+    entry = flow.jump(values, k, t, z, row)
+    indicator = jump.rows[row].indicator
+
+    def change(new: list[Visit], after: list[FloatArray]) -> Change:
+        signature = curve.shooting.signature.with_inserted(place, new)
+        t_new = np.concatenate([times[:place], np.full(len(new), t), times[place:]])
+        z_new = np.concatenate([states[: place + 1], np.array(after), states[place + 1 :]])
+        return Change("grazing", signature, t_new, z_new, indicator, True, place, tuple(new), t)
+
+    first = Visit(jump.source, k, row)
+    if jump.target == jump.source:
+        return [change([first], [entry.z_after])]
+    found = []
+    for k_back, back in enumerate(traced.transitions):
+        if back.source != jump.target or back.target != jump.source:
+            continue
+        for r in range(len(back.rows)):
+            leave = flow.jump(values, k_back, t, entry.z_after, r)
+            found.append(change([first, Visit(jump.target, k_back, r)], [entry.z_after, leave.z_after]))
+    return found
+
+
+def _shortened(curve: Curve, point: Point) -> list[Change]:
+    """A visit that has shrunk to nothing: take it out."""
+    visits, times, states = _parts(curve, point)
+    i = int(point.path.tau.argmin())
+    traced = curve.shooting.system.traced
+    if i in (0, len(visits) - 1):
+        return [_rotated(curve, point, i == 0)] if curve.shooting.forced else []
+    before, here, after = visits[i - 1], visits[i], visits[i + 1]
+    if before.mode != after.mode:
+        return []
+    jump = traced.transitions[before.transition]
+    at = curve.walk.conditional.tolist()
+    slope = point.path.slope[at.index(i - 1)] if before.row >= 0 else np.inf
+    steepest = float(np.abs(point.path.slope).max())
+    kind = "grazing" if slope < 1e-3 * max(steepest, 1e-300) or len(point.path.slope) < 3 else "corner"
+    indicator = jump.rows[before.row].indicator if before.row >= 0 else -1
+    signature = curve.shooting.signature.without(i - 1, 2)
+    return [
+        Change(
+            kind, signature, np.delete(times, [i - 1, i]), np.delete(states, [i, i + 1], axis=0), indicator,
+            False, i - 1, (before, here), float(times[i]),
+        )
+    ]  # fmt: skip
+
+
+def _rotated(curve: Curve, point: Point, first: bool) -> Change:
+    """A crossing has reached the section: it is now the last of the round in place of the first, or the reverse."""
+    visits, times, states = _parts(curve, point)
+    shooting, values = curve.shooting, point.solved.values
+    end = float(point.solved.times[-1])
+    if first:
+        order = [*visits[1:-1], Visit(visits[-1].mode, visits[0].transition, visits[0].row)]
+        z0 = shooting.flow.legs(values, [visits[1].mode], times[:1], -times[:1], states[1][None, :]).z
+        moved = np.concatenate([times[1:], times[:1] + end])
+        after = np.concatenate([z0, states[2:], states[1:2]])
+        mode = visits[1].mode
+    else:
+        order = [Visit(visits[-2].mode, visits[-2].transition, visits[-2].row), *visits[:-2]]
+        moved = np.concatenate([times[-1:] - end, times[:-1]])
+        before = visits[-2].mode
+        # The state at the section lies before that crossing now.
+        z_before = point.solved.legs.z[-2]
+        z0 = shooting.flow.legs(values, [before], times[-1:], end - times[-1:], z_before[None, :]).z
+        after = np.concatenate([z0, states[-1:], states[1:-1]])
+        mode = before
+    turns = shooting.period_number
+    fixed = []
+    for visit in order:
+        if visit.row < 0 and visit.transition >= 0:
+            visit = Visit(visit.mode, visit.transition, -1, visit.turn % max(turns, 1))
+        fixed.append(visit)
+    return Change("section", Signature((*fixed, Visit(mode))), moved, after)
+
+
+def _slowed(curve: Curve, point: Point) -> list[Change]:
+    """A crossing that has become a touch: an impact of no speed is taken out."""
+    visits, times, states = _parts(curve, point)
+    i = int(curve.walk.conditional[int(point.path.slope.argmin())])
+    visit = visits[i]
+    jump = curve.shooting.system.traced.transitions[visit.transition]
+    if jump.target != jump.source:
+        return []
+    signature = curve.shooting.signature.without(i, 1)
+    return [
+        Change(
+            "grazing", signature, np.delete(times, i), np.delete(states, i + 1, axis=0),
+            jump.rows[visit.row].indicator, False, i, (visit,), float(times[i]),
+        )
+    ]  # fmt: skip
+
+
+def _other_row(curve: Curve, point: Point) -> list[Change]:
+    """A corner of a condition: from here on another of its rows is the last to become true."""
+    visits, times, states = _parts(curve, point)
+    i = int(curve.walk.conditional[int(point.path.own.argmin())])
+    visit = visits[i]
+    jump = curve.shooting.system.traced.transitions[visit.transition]
+    z, t = point.solved.legs.z[i], float(times[i])
+    found = []
+    for r, row in enumerate(jump.rows):
+        if r != visit.row:
+            h = curve.shooting.flow.jump(point.solved.values, visit.transition, t, z, r).h
+            found.append((abs(h), r, row.indicator))
+    if not found:
+        return []
+    _, r, indicator = min(found)
+    new = (*visits[:i], Visit(visit.mode, visit.transition, r), *visits[i + 1 :])
+    return [Change("corner", Signature(new), times, states, indicator)]
+
+
+def resumed(curve: Curve, point: Point, change: Change, active: tuple[str, ...]) -> tuple[Curve, Point, float] | None:
+    """The curve of the new signature, its first admissible point, and the step that led there."""
+    new = _curve(curve, change, point, active)
+    if new is None:
+        return None
+    fresh, X = new
+    Y = X / fresh.scale
+    border = np.zeros(fresh.n)
+    border[-1] = 1.0
+    solved = fresh.shooting.evaluate(X)
+    if not np.isfinite(solved.residual).all() or np.abs(solved.residual * fresh.rows).max() > COMMON:
+        return None
+    if change.kind == "section":
+        return _same_way(fresh, Y, curve, point)
+    null = fresh.null_vectors(solved)
+    for ds in STEPS:
+        for direction in _directions(null):
+            guess = Y + ds * direction
+            found = fresh.correct(guess, direction, float(direction @ guess))
+            if found is None:
+                continue
+            first = fresh.point(found[0], found[1], direction)
+            if first is not None and (first.path.violation() > 0.0).all():
+                return fresh, first, ds
+    return None
+
+
+def common_point(curve: Curve, point: Point, change: Change) -> Point | None:
+    """The common orbit as a point of the new signature."""
+    new = _curve(curve, change, point, curve.shooting.active)
+    if new is None:
+        return None
+    fresh, X = new
+    solved = fresh.shooting.evaluate(X)
+    null = fresh.null_vectors(solved)
+    return fresh.point(solved, X / fresh.scale, null[-1]) if len(null) else None
+
+
+def _directions(null: FloatArray) -> list[FloatArray]:
+    """Both ways along each null vector."""
+    return [sign * vector for vector in null for sign in (1.0, -1.0)]
+
+
+def _same_way(fresh: Curve, Y: FloatArray, curve: Curve, point: Point) -> tuple[Curve, Point, float] | None:
+    """Go on in the same direction: the parameter's, or that of the state at the section near a fold."""
+    border = np.zeros(fresh.n)
+    border[-1] = 1.0
+    found = fresh.correct(Y, border, float(Y[-1]))
+    null = None
+    if found is None:
+        solved = fresh.shooting.evaluate(Y * fresh.scale)
+        null = fresh.null_vectors(solved)
+        if len(null) != 1:
+            return None
+        found = fresh.correct(Y, null[0], float(null[0] @ Y))
+        if found is None:
+            return None
+    null = fresh.null_vectors(found[0])
+    if not len(null):
+        return None
+    tangent = null[-1]
+    old = point.tangent
+    # The tangents of both live in different unknowns; the parameter and the later instants are common to them.
+    if abs(old[-1]) > 1e-3:
+        tangent = tangent * np.sign(tangent[-1] * old[-1])
+    else:
+        tangent = tangent * np.sign(float(tangent[: fresh.shooting.n] @ old[: fresh.shooting.n]) or 1.0)
+    first = fresh.point(found[0], found[1], tangent)
+    return None if first is None else (fresh, first, 0.0)
+
+
+def _curve(curve: Curve, change: Change, point: Point, active: tuple[str, ...]) -> tuple[Curve, FloatArray] | None:
+    old = curve.shooting
+    system: System = old.system
+    signature, times, states = change.signature, change.times, change.states
+    period = None if old.forced else float(point.solved.times[-1])
+    if not old.forced and len(times):
+        from nonsmooth.continuation.anchor import anchored
+
+        around = float(point.solved.times[-1])
+        signature, times, states = anchored(old.flow, point.solved.values, signature, times, states, around)
+    shooting = Shooting(system, signature, old.period_number, active)
+    if not old.forced and not shooting.m:
+        from nonsmooth.continuation.anchor import free_anchor
+
+        shooting.reference = free_anchor(shooting.flow, point.solved.values, shooting.at_section, states[0], curve.size)
+    X = shooting.join(times, states, period, point.X[old.size :])
+    shooting.look_at_surfaces(X)
+    return Curve(shooting, curve.size, curve.period, curve.width), X

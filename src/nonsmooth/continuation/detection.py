@@ -1,0 +1,122 @@
+r"""What is looked for along a branch, and its exact location.
+
+fold
+    the parameter turns: the tangent's last component vanishes;
+pitchfork, branch_point
+    another branch crosses: the bordered determinant changes sign;
+flip
+    det(M + I) = 0;
+neimark_sacker
+    :math:`\prod_{i<j} (\mu_i \mu_j - 1) = 0` with a complex pair;
+and the five ways in which a path can leave its signature (``path.VIOLATIONS``).
+
+Each is a number along the branch that changes its sign; the root is bracketed by two points and found by Brent's
+method, every trial being an orbit corrected to rounding.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.continuation.path import VIOLATIONS
+
+if TYPE_CHECKING:
+    from nonsmooth.continuation.arclength import Curve, Point
+
+__all__ = ["SMOOTH", "Event", "Tests", "locate"]
+
+BEGUN = 1e-6
+SMOOTH = ("fold", "branch", "flip", "neimark_sacker")
+
+
+@dataclass
+class Event:
+    """A located event at distance ``s`` from the first of two points."""
+
+    kind: str
+    s: float
+    point: Point
+
+
+class Tests:
+    """The numbers at each point of a curve whose signs are watched."""
+
+    def __init__(self, curve: Curve) -> None:
+        shooting = curve.shooting
+        self.n, self.forced = shooting.n, shooting.forced
+        self.eye = np.eye(shooting.n)
+
+    def smooth(self, point: Point) -> NDArray[np.float64]:
+        """fold, branch, flip, neimark_sacker."""
+        M = point.M
+        if M.shape == (2, 2):
+            det = M[0, 0] * M[1, 1] - M[0, 1] * M[1, 0]
+            flip = 1.0 + M[0, 0] + M[1, 1] + det
+        else:
+            flip = np.linalg.det(M + self.eye)
+        return np.array([point.tangent[-1], point.orientation, flip, self.torus(point)])
+
+    def torus(self, point: Point) -> float:
+        """prod (mu_i mu_j - 1) over pairs, without an autonomous orbit's own 1; NaN where there is no pair."""
+        mu = point.multipliers
+        if not self.forced:
+            mu = mu[np.argsort(np.abs(mu - 1.0), kind="stable")[1:]]
+        if len(mu) < 2:
+            return np.nan
+        if len(mu) == 2:
+            return float((mu[0] * mu[1]).real) - 1.0
+        i, j = np.triu_indices(len(mu), 1)
+        return float(np.prod(mu[i] * mu[j] - 1.0).real)
+
+    def one(self, kind: str) -> Callable[[Point], float]:
+        """The number of one kind."""
+        if kind in SMOOTH:
+            place = SMOOTH.index(kind)
+            return lambda point: float(self.smooth(point)[place])
+        place = VIOLATIONS.index(kind)
+        return lambda point: float(point.path.violation()[place])
+
+
+def locate(curve: Curve, a: Point, b: Point, number: Callable[[Point], float]) -> tuple[float, Point] | None:
+    """The zero of ``number`` between two points of a curve: its distance from ``a``, and the point."""
+    from scipy.optimize import brentq
+
+    end = float(a.tangent @ (b.Y - a.Y))
+    if number(a) * number(b) > 0.0 and abs(number(a)) < BEGUN * abs(number(b)):
+        return 0.0, a  # the branch begins at the event itself
+    found: dict[float, Point] = {}
+
+    class _Lost(Exception):
+        pass
+
+    def value(s: float) -> float:
+        if s == 0.0:
+            return limited(number(a))
+        if s == end:
+            return limited(number(b))
+        point = curve.between(a, b, s)
+        if point is None:
+            raise _Lost
+        found[s] = point
+        return limited(number(point))
+
+    try:
+        s = brentq(value, 0.0, end, xtol=1e-16, rtol=1e-15, maxiter=200)
+    except (_Lost, ValueError, RuntimeError):
+        return None
+    if s not in found:
+        point = a if s == 0.0 else b if s == end else curve.between(a, b, s)
+        if point is None:
+            return None
+        found[s] = point
+    return float(s), found[s]
+
+
+def limited(x: float) -> float:
+    """Brent's method needs finite numbers; where nothing comes near, any positive one will do."""
+    return float(min(max(x, -1e3), 1e3)) if x == x else 1.0

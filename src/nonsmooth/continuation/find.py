@@ -1,0 +1,148 @@
+"""``find_orbit``: the periodic orbit that a simulation settles on."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.continuation.anchor import free_anchor
+from nonsmooth.continuation.orbit import Orbit, orbit_of
+from nonsmooth.continuation.path import Walk
+from nonsmooth.continuation.settled import CLOSED, Guess, forced_guesses, settle_forced, touching
+from nonsmooth.continuation.shooting import Shooting
+from nonsmooth.errors import SolveError
+from nonsmooth.flow.arguments import check_system, whole_number
+from nonsmooth.flow.methods import engine_for
+from nonsmooth.flow.starts import first_state
+from nonsmooth.kernels import codes
+
+if TYPE_CHECKING:
+    from nonsmooth.system.system import System
+
+__all__ = ["failed", "find_orbit"]
+
+RTOL = 1e-12  # of the runs from which orbits are read
+NOISE = 1e-11  # of the motion's size: beyond a boundary by less than this is on it
+FAR = 30.0  # how far from the motion, in units of its gap, the orbit may lie
+
+
+def find_orbit(
+    system: System,
+    *,
+    start: Any = None,
+    period_number: int | None = None,
+    transient: int = 500,
+    max_period: int = 32,
+) -> Orbit:
+    """Find a periodic orbit from a simulation: period, signature and phases are read off it, Newton does the rest.
+
+    Parameters
+    ----------
+    system : System
+    start : state, or a result of ``simulate``, optional
+        Where the simulation starts; zeros where not given.
+    period_number : int, optional
+        Forcing periods once round. Given, the orbit may be unstable: Newton goes to whatever orbit of that period lies
+        near the motion. Not given, the smallest period whose orbit is stable is taken.
+    transient : int
+        Forcing periods to wait first (autonomous systems: rounds). 0 takes the start as it is, and an unstable orbit
+        near it too.
+    max_period : int
+        The longest period looked for.
+
+    Returns
+    -------
+    Orbit
+        With Floquet multipliers, signature, clearances and its system.
+
+    Raises
+    ------
+    SolveError
+        The motion is not periodic (``not_periodic``), Newton's method did not converge (``no_convergence``), or the
+        simulation failed; the message says what to do.
+    ValueError, TypeError
+        Arguments that do not fit.
+    """
+    check_system(system, "find_orbit")
+    if system.explicit_time:
+        raise ValueError(f"{system.name!r} depends on time without a period: it has no periodic orbits")
+    if period_number is not None:
+        period_number = whole_number(period_number, "period_number", 1)
+    transient, max_period = whole_number(transient, "transient", 0), whole_number(max_period, "max_period", 1)
+    exact = engine_for(system).name == "exact"
+    engine = engine_for(system, rtol=None if exact else RTOL)
+    state = first_state(system, start)
+    if system.period() is None:
+        from nonsmooth.continuation.settled_autonomous import autonomous_guesses
+
+        guesses = autonomous_guesses(system, engine, state, transient, max_period, period_number)
+    else:
+        keep = 2 * max(max_period, period_number or 1) + 2
+        settled = settle_forced(system, engine, state, transient, keep)
+        if settled.status not in (codes.OK, codes.NOT_GUARANTEED):
+            raise failed(settled.status)
+        guesses = forced_guesses(system, settled, period_number, max_period)
+    if not guesses:
+        raise SolveError(
+            f"no periodic motion was found: after {transient} forcing periods no return up to the period number "
+            f"{period_number or max_period} came near its beginning (chaotic, quasi-periodic, a longer period). Give "
+            "another start, a longer transient or max_period, or period_number= for an unstable orbit within it",
+            status="not_periodic",
+        )
+    return _polished(system, guesses, given=period_number is not None, unstable=transient == 0)
+
+
+def failed(code: int) -> SolveError:
+    """The error for a simulation that stopped with a kernel's code."""
+    if code == codes.BEYOND_STOP:
+        return SolveError(
+            "the start lies beyond a stop: a transition with a reset holds there already; start on the admissible "
+            "side of its indicator", status="beyond_stop",
+        )  # fmt: skip
+    from nonsmooth.results.statuses import by_code
+
+    status = by_code(code)
+    return SolveError(status.sentence, status=status.name)
+
+
+def _polished(system: System, guesses: list[Guess], given: bool, unstable: bool) -> Orbit:
+    """Newton from each guess; the first orbit that is admissible, near, and stable (or asked for)."""
+    reasons: list[tuple[str, str]] = []
+    for guess in [one for first in guesses for one in (*touching(first, system), first)]:
+        shooting = Shooting(system, guess.signature, guess.period_number)
+        X = shooting.join(guess.times, guess.states, guess.period)
+        size = np.concatenate([guess.size, np.ones(shooting.n - len(guess.size))])
+        scale = shooting.join(np.full(shooting.m, guess.period), np.tile(size, (shooting.m + 1, 1)), guess.period)
+        name = f"period-{guess.period_number}" if guess.period_number else "closed"
+        if not shooting.forced and not shooting.m:
+            shooting.reference = free_anchor(shooting.flow, shooting.values, shooting.at_section, X[: shooting.n], size)
+        solved = shooting.newton(X, scale)
+        if solved is None:
+            reasons.append(("no_convergence", f"Newton's method did not converge to a {name} orbit"))
+            continue
+        walk = Walk(shooting)
+        path = walk.along(solved, shooting.split(solved.X)[1])
+        if path is None:
+            reasons.append(("no_convergence", f"the {name} orbit found could not be followed"))
+            continue
+        clearance = walk.clearance(path, len(system.indicators))
+        noise = NOISE * float(guess.size.max())
+        virtual = bool((path.violation() < -noise).any())
+        orbit = orbit_of(shooting, solved, path, clearance, virtual)
+        moved = float(np.abs((orbit.u - guess.states[0, : len(orbit.u)]) / guess.size).max())
+        if virtual:
+            reasons.append(("virtual", f"the {name} orbit found passes through a boundary it should obey"))
+        elif given or unstable or (orbit.stable and moved <= max(FAR * guess.gap, 1e-6)):
+            return orbit
+        elif not orbit.stable:
+            reasons.append(("not_periodic", f"the {name} orbit near the motion is unstable"))
+        else:
+            reasons.append(("no_convergence", f"Newton's method left the motion for a {name} orbit far from it"))
+    status = reasons[0][0] if guesses[0].gap <= CLOSED else "not_periodic"
+    said = "; ".join(dict.fromkeys(text for _, text in reasons))
+    raise SolveError(
+        f"the motion settled on no periodic orbit that could be confirmed: {said}. Give another start, a longer "
+        "transient, or period_number= (then an unstable orbit is taken too)",
+        status=status,
+    )

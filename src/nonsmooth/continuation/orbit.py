@@ -1,0 +1,161 @@
+"""``Orbit``: one periodic orbit with its signature and multipliers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.continuation.signature import Signature
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from nonsmooth.continuation.path import Path
+    from nonsmooth.continuation.shooting import Shooting, Solved
+    from nonsmooth.system.system import System
+
+__all__ = ["Orbit", "orbit_of", "stable_by"]
+
+FloatArray = NDArray[np.float64]
+EDGE = 1e-9  # a modulus within this of 1 counts as neither
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Orbit:
+    """A periodic orbit, found by :func:`nonsmooth.find_orbit`.
+
+    Attributes
+    ----------
+    system : System
+        At the parameters of the orbit.
+    u : array (n,)
+        The state at the section: phase 0 of the forcing; of an autonomous system the middle of the first visit.
+    mode : str
+        The mode there.
+    memory : array (n_memory,)
+    period : float
+    period_number : int
+        Forcing periods once round; 0 where the system is autonomous.
+    signature : Signature
+        Modes visited and transitions taken, in order from the section.
+    crossing_times : array (n_crossings,)
+        Instants of the transitions after the section.
+    crossing_states : array (n_crossings, n + n_memory)
+        States (and memory) just after them.
+    monodromy_matrix : array (n, n)
+        Derivative of the return map, through every transition (with its saltation matrix); rows and columns of the
+        memory follow those of the states.
+    floquet_multipliers : array (n,), complex
+        Its eigenvalues, largest modulus first; that of an autonomous orbit's own direction, 1, is among them.
+    stable : bool
+        All multipliers (but that one) lie inside the unit circle.
+    maximum, minimum : array (n,)
+        Extremes of the states.
+    clearance : mapping of indicator to float
+        Least distance to a transition that does not happen; NaN where none comes near.
+    virtual : bool
+        Whether the path goes through a boundary it should have obeyed: no orbit of the system then.
+    """
+
+    system: System
+    u: FloatArray
+    mode: str
+    memory: FloatArray
+    period: float
+    period_number: int
+    signature: Signature
+    crossing_times: FloatArray
+    crossing_states: FloatArray
+    monodromy_matrix: FloatArray
+    floquet_multipliers: NDArray[np.complex128]
+    stable: bool
+    maximum: FloatArray
+    minimum: FloatArray
+    clearance: dict[str, float]
+    virtual: bool = False
+    reference: tuple[FloatArray, FloatArray] | None = field(default=None)
+
+    @property
+    def crossings_per_period(self) -> float:
+        """Transitions per forcing period (autonomous: once round)."""
+        return len(self.signature.crossings) / max(self.period_number, 1)
+
+    @property
+    def contacts_per_period(self) -> float:
+        """Entries into contact per forcing period (autonomous: once round)."""
+        jumps = self.system.transitions
+        return sum(jumps[v.transition].contact for v in self.signature.crossings) / max(self.period_number, 1)
+
+    def trajectory(self, samples: int | None = None) -> xr.Dataset:
+        """The orbit once round, as a result of ``simulate``."""
+        from nonsmooth.flow.simulate import simulate
+
+        rtol = 1e-13 if _needs_tolerance(self.system) else None
+        return simulate(
+            self.system, duration=self.period, start=self.u, mode=self.mode, samples=samples or 1025, rtol=rtol
+        )
+
+    def __repr__(self) -> str:
+        name = f"period-{self.period_number}" if self.period_number else "autonomous"
+        words = "stable" if self.stable else "unstable"
+        if self.virtual:
+            words = "virtual"
+        numbers = ", ".join(f"{mu:.6g}" for mu in self.floquet_multipliers)
+        state = ", ".join(f"{k} = {v:.9g}" for k, v in zip(self.system.states, self.u, strict=True))
+        return (
+            f"<Orbit of {self.system.name!r}: {name}, {words}, period {self.period:.9g}\n"
+            f"  section: {state} (mode {self.mode!r})\n"
+            f"  multipliers: {numbers}\n"
+            f"  signature: {self.signature.text(self.system.traced)}>"
+        )
+
+    def to_dataset(self) -> xr.Dataset:
+        """The orbit as a Dataset that can be saved; ``from_dataset`` reads it back."""
+        from nonsmooth.continuation.files import orbit_dataset
+
+        return orbit_dataset(self)
+
+    @classmethod
+    def from_dataset(cls, dataset: xr.Dataset) -> Orbit:
+        """Read `to_dataset` back, from memory or from a file."""
+        from nonsmooth.continuation.files import read_orbit
+
+        return read_orbit(dataset)
+
+
+def _needs_tolerance(system: Any) -> bool:
+    from nonsmooth.flow.methods import engine_for
+
+    return engine_for(system).name != "exact"
+
+
+def stable_by(multipliers: NDArray[np.complex128], forced: bool) -> bool:
+    """Whether all multipliers (of an autonomous orbit: all but its own 1) lie inside the unit circle."""
+    if not forced:
+        multipliers = multipliers[np.argsort(np.abs(multipliers - 1.0), kind="stable")[1:]]
+    return bool(not len(multipliers) or np.abs(multipliers).max() < 1.0 - EDGE)
+
+
+def orbit_of(shooting: Shooting, solved: Solved, path: Path, clearance: FloatArray, virtual: bool) -> Orbit:
+    """The record of a solved orbit."""
+    X = solved.X
+    system = shooting.system.with_parameters(
+        dict(zip(shooting.system.values, map(float, solved.values), strict=True))
+    ) if shooting.n_active else shooting.system  # fmt: skip
+    times, states = shooting.split(X)
+    n_u = len(system.states)
+    M = solved.monodromy
+    multipliers = shooting.multipliers(M)
+    return Orbit(
+        system=system, u=states[0, :n_u].copy(), mode=system.modes[shooting.at_section],
+        memory=states[0, n_u:].copy(), period=float(solved.times[-1]), period_number=shooting.period_number,
+        signature=shooting.signature, crossing_times=times.copy(), crossing_states=states[1:].copy(),
+        monodromy_matrix=M, floquet_multipliers=multipliers,
+        stable=stable_by(multipliers, shooting.forced),
+        maximum=path.maximum.copy(), minimum=path.minimum.copy(),
+        clearance=dict(zip(system.indicators, map(float, clearance), strict=True)), virtual=virtual,
+        reference=shooting.reference,
+    )  # fmt: skip

@@ -1,0 +1,152 @@
+"""From a simulation to a first guess: let the motion settle, find its period, read off its signature."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.continuation.signature import Signature, Visit
+from nonsmooth.flow.engine import Chain, Log, SectionPlan, State
+from nonsmooth.flow.variational import VariationalFlow
+from nonsmooth.kernels import codes
+
+if TYPE_CHECKING:
+    from nonsmooth.flow.engine import Engine
+    from nonsmooth.system.system import System
+
+__all__ = ["CLOSED", "NEAR", "Guess", "forced_guesses", "settle_forced", "touching"]
+
+FloatArray = NDArray[np.float64]
+CHOICE = 6  # candidates tried: period numbers, or returning points for a given one
+CLOSED = 1e-8  # a return nearer than this has closed: the shortest such period comes first
+TOUCH = 1e-6  # of the period, of the motion's size: a contact as short, an impact as weak as this may be a touch
+NEAR = 0.2  # of the motion's size: a return farther off than this is no candidate
+
+
+@dataclass
+class Guess:
+    """A stretch of motion that nearly closes, read as an orbit; ``gap`` tells how far off it closes (scaled)."""
+
+    period_number: int  # 0: autonomous
+    period: float
+    signature: Signature
+    times: FloatArray  # of its crossings
+    states: FloatArray  # (m + 1, n_z): at the section and after the crossings
+    gap: float
+    size: FloatArray  # (n_u,) half the range of each state
+    kicks: FloatArray = field(default_factory=lambda: np.full(1000, np.inf))  # change of state in each crossing, scaled
+
+
+@dataclass
+class Settled:
+    """Section points after the transient."""
+
+    points: FloatArray  # (keep, n_u)
+    modes: NDArray[np.int64]  # (keep,)
+    size: FloatArray
+    state: State
+    status: int
+    engine: Engine
+    tables: Any
+
+
+def settle_forced(system: System, engine: Engine, state: State, transient: int, keep: int) -> Settled:
+    """Run a forced system through a transient and keep the section points after it."""
+    traced = system.traced
+    out = Chain.empty(1, keep, len(traced.u), len(traced.indicators), len(traced.outputs))
+    tables = engine.prepare(system.parameter_vector()[None, :])
+    engine.chain(tables, 0, 1, state, None, SectionPlan(), transient, keep, out)
+    size = np.maximum(0.5 * (out.maximum[0] - out.minimum[0]), 1e-3 * system.scale_vector())
+    return Settled(np.nan_to_num(out.section[0]), out.section_mode[0], size, state, int(out.status[0]), engine, tables)
+
+
+def forced_guesses(system: System, settled: Settled, period_number: int | None, most: int) -> list[Guess]:
+    """Candidates for the period number, the smallest first, from the last section point.
+
+    For a given period number: from the section points that return nearest to themselves.
+    """
+    points = settled.points / settled.size
+    guesses = []
+    if period_number is not None:
+        p = period_number
+        gaps = np.abs(points[p:] - points[:-p]).max(axis=1)
+        places = [int(i) for i in np.argsort(gaps, kind="stable")[:CHOICE]]
+        if len(settled.state.memory):  # the memory is known at the last point only
+            places = [len(gaps) - 1]
+        starts = [(p, i, float(gaps[i])) for i in places]
+    else:
+        last = len(points) - 1
+        gaps = np.array([np.abs(points[last] - points[last - p]).max() for p in range(1, most + 1)])
+        starts = [(p, last, float(gaps[p - 1])) for p in range(1, most + 1) if gaps[p - 1] <= NEAR]
+        # Chaos comes near its beginning again and again: the nearest few are tried.
+        starts = sorted(sorted(starts, key=lambda start: (max(start[2], CLOSED), start[0]))[:CHOICE])
+    for p, i, gap in starts:
+        guess = _read_round(system, settled, p, i, gap)
+        if guess is not None:
+            guesses.append(guess)
+    return guesses
+
+
+def _read_round(system: System, settled: Settled, p: int, i: int, gap: float) -> Guess | None:
+    """The motion over p forcing periods from section point i, as an orbit."""
+    state = settled.state.copy()
+    if i < len(settled.points) - 1:
+        state.u[:], state.counters[0] = settled.points[i], settled.modes[i]
+        state.counters[1:] = (-1, 0, 0)
+    state.clock[:], state.settled = 0.0, True
+    period = float(system.period() or 0.0)
+    start = np.concatenate([state.u, state.memory])
+    mode = int(state.counters[0])
+    log = settled.engine.record(settled.tables, state, p * period, np.empty(0))
+    if log.status not in (codes.OK, codes.NOT_GUARANTEED):
+        return None
+    states = np.concatenate([np.nan_to_num(log.u_after), log.memory_after], axis=1)
+    signature = _signature(system, log, start, mode)
+    kicks = np.abs(np.nan_to_num(log.u_after - log.u_before) / settled.size).max(axis=1, initial=0.0)
+    return Guess(p, p * period, signature, log.crossing_time, np.vstack([start, states]), gap, settled.size, kicks)
+
+
+def touching(guess: Guess, system: System) -> list[Guess]:
+    """The same motion without contacts that are no more than a touch: an orbit at its grazing point, or none such."""
+    signature, times, states, kicks = guess.signature, guess.times, guess.states, guess.kicks
+    jumps = system.transitions
+    i = 0
+    while i < len(times):
+        visits = signature.visits
+        here = jumps[visits[i].transition]
+        if here.reset is not None and here.source == here.target and kicks[i] < TOUCH:
+            kicks = np.delete(kicks, i)
+            signature = signature.without(i, 1)
+            times, states = np.delete(times, i), np.delete(states, i + 1, axis=0)
+            continue
+        short = i + 1 < len(times) and times[i + 1] - times[i] < TOUCH * guess.period
+        if short and visits[i].mode == visits[i + 2].mode and visits[i + 1].row >= 0:
+            signature = signature.without(i, 2)
+            kicks = np.delete(kicks, [i, i + 1])
+            times, states = np.delete(times, [i, i + 1]), np.delete(states, [i + 1, i + 2], axis=0)
+            continue
+        i += 1
+    if len(times) == len(guess.times):
+        return []
+    return [replace(guess, signature=signature, times=times, states=states)]
+
+
+def _signature(system: System, log: Log, start: FloatArray, mode: int) -> Signature:
+    """The signature of a logged round; the row of each condition that became true last is the one that is zero."""
+    traced, flow, values = system.traced, VariationalFlow.of(system), system.parameter_vector()
+    period = float(system.period() or 1.0)
+    memory = start[len(traced.u) :]
+    visits = []
+    for i, k in enumerate(log.crossing_transition):
+        jump, t = traced.transitions[k], float(log.crossing_time[i])
+        if jump.at is not None:
+            visits.append(Visit(jump.source, int(k), -1, round(t / period - jump.at)))
+        else:
+            z = np.concatenate([np.nan_to_num(log.u_before[i]), memory])
+            visits.append(Visit(jump.source, int(k), flow.jump(values, int(k), t, z).row))
+        memory = log.memory_after[i]
+    last = traced.transitions[log.crossing_transition[-1]].target if visits else mode
+    return Signature((*visits, Visit(int(last))))

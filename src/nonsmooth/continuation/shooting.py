@@ -1,0 +1,341 @@
+r"""Multiple shooting: one leg per visit of a mode, one Newton system for the whole orbit.
+
+The unknowns are the state at the section, the instant of every transition and the state after it (an autonomous
+orbit: the period too), and the active parameters:
+
+.. math::
+
+    X = (z_0;\ t_1, z_1;\ \dots;\ t_m, z_m;\ [T];\ p)
+
+    h_i(t_i, z_i^-) = 0, \quad z_i = R_i(t_i, z_i^-), \quad z_i^- = \varphi(t_i - t_{i-1}; t_{i-1}, z_{i-1}),
+    \quad z_0 = \varphi(T - t_m; t_m, z_m)
+
+An autonomous orbit is anchored so that its section lies in the middle of a visit, t_1 = T - t_m (no transitions: by
+f_ref (z_0 - z_ref) = 0).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.continuation.signature import Signature
+from nonsmooth.continuation.solve import solve
+from nonsmooth.flow.variational import VariationalFlow
+
+if TYPE_CHECKING:
+    from nonsmooth.flow.variational import Jump, Legs
+    from nonsmooth.system.system import System
+
+__all__ = ["Shooting", "Solved"]
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass
+class Solved:
+    """The equations at one X: residual, Jacobian, and what it was made of."""
+
+    X: FloatArray
+    residual: FloatArray
+    jacobian: FloatArray  # (N, N + n_active)
+    times: FloatArray  # (m + 2,): 0, the instants, the end
+    legs: Legs
+    jumps: list[Jump]
+    values: FloatArray
+    free: list[int]
+
+    @property
+    def monodromy(self) -> FloatArray:
+        """Derivative of the return map (autonomous: with the trivial multiplier 1; zero for what is constant)."""
+        M = self.legs.Phi[0]
+        for i, jump in enumerate(self.jumps):
+            M = self.legs.Phi[i + 1] @ (jump.saltation @ M)
+        if self.free:
+            M = M.copy()
+            M[self.free], M[:, self.free] = 0.0, 0.0
+        return np.asarray(M)
+
+
+class Shooting:
+    """The equations of orbits with one signature.
+
+    Parameters
+    ----------
+    system : System
+        Its parameters' values are those that are not active.
+    signature : Signature
+    period_number : int
+        Forcing periods (0: the system is autonomous).
+    active : tuple of str
+        Parameters that are unknowns.
+    """
+
+    def __init__(self, system: System, signature: Signature, period_number: int, active: tuple[str, ...] = ()) -> None:
+        self.system, self.signature, self.period_number, self.active = system, signature, period_number, active
+        traced = system.traced
+        self.flow = VariationalFlow.of(system, active)
+        n, m, a = self.flow.n, len(signature.crossings), len(active)
+        self.n, self.m, self.n_active = n, m, a
+        self.forced = period_number > 0
+        self.modes = np.array([v.mode for v in signature.visits], dtype=np.int64)
+        self.values = system.parameter_vector()
+        names = list(system.values)
+        self.places = np.array([names.index(name) for name in active], dtype=np.int64)
+        self.size = n + m * (n + 1) + (0 if self.forced else 1)
+        self.t_at = n + np.arange(m) * (n + 1)  # places of t_1 ... t_m in X
+        self.z_at = np.concatenate([[0], self.t_at + 1])  # of z_0 ... z_m
+        self.jumps = [(v.transition, v.row, traced.transitions[v.transition].at, v.turn) for v in signature.crossings]
+        # A state or a memory that nothing on the orbit ever sets is a free constant, not an unknown.
+        self.free = self._constants()
+        self._one = np.eye(n)
+        self._columns = self.z_at[:, None] + np.arange(n)
+        self.reference: tuple[FloatArray, FloatArray] | None = None  # autonomous, no crossings: (z_ref, f_ref)
+        self.alone = [False] * m  # crossings whose other rows vanish together with the one that fires
+        self.divided = [False] * m  # exits whose equation is divided by the length of the visit
+
+    def _constants(self) -> list[int]:
+        """Components of z that no visit moves and no transition sets."""
+        traced, signature = self.system.traced, self.signature
+        n_u = len(traced.u)
+        kept = []
+        for j in range(self.n):
+            if j < n_u:
+                moved = any(traced.fields[v.mode][j] != 0 for v in signature.visits)
+                jumps = [traced.transitions[v.transition] for v in signature.crossings]
+                resets = any(t.reset is not None and t.reset[j] != traced.u[j] for t in jumps)
+                dropped = any(traced.lacking[v.mode][j] for v in signature.visits)
+                never = all(traced.lacking[v.mode][j] for v in signature.visits)
+                if never or not (moved or resets or dropped):
+                    kept.append(j)
+            elif not any(
+                index == j - n_u for v in signature.crossings for index, _ in traced.transitions[v.transition].writes
+            ):
+                kept.append(j)
+        return kept
+
+    def split(self, X: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(instants t_1 ... t_m, states z_0 ... z_m)."""
+        return X[self.t_at], X[self._columns]
+
+    def join(self, times: Any, states: Any, period: float | None, parameters: Any = ()) -> FloatArray:
+        """X from instants, states after them, the period (autonomous) and the active parameters."""
+        X = np.empty(self.size + self.n_active)
+        X[self.t_at] = times
+        X[self._columns] = states
+        if not self.forced:
+            X[self.size - 1] = period
+        X[self.size :] = parameters
+        return X
+
+    def parameters(self, X: FloatArray) -> FloatArray:
+        """All parameters' values at X."""
+        if not self.n_active:
+            return self.values
+        values = self.values.copy()
+        values[self.places] = X[self.size :]
+        return values
+
+    def period(self, X: FloatArray) -> float:
+        """The time once round."""
+        if not self.forced:
+            return float(X[self.size - 1])
+        return self.period_number * self.flow.period(self.parameters(X))[0]
+
+    def evaluate(self, X: FloatArray) -> Solved:
+        """Residual and Jacobian at X."""
+        n, m, a, size = self.n, self.m, self.n_active, self.size
+        values = self.parameters(X)
+        t, z = self.split(X)
+        if self.forced:
+            T, dT = self.flow.period(values)
+            end = self.period_number * T
+        else:
+            T, dT, end = float(X[size - 1]), np.zeros(a), float(X[size - 1])
+        times = np.empty(m + 2)
+        times[0], times[1:-1], times[-1] = 0.0, t, end
+        legs = self.flow.legs(values, self.modes, times[:-1], times[1:] - times[:-1], z)
+        F, J = np.zeros(size), np.zeros((size, size + a))
+        jumps = []
+        pull = np.matmul(legs.Phi, legs.f_begin[:, :, None])[:, :, 0]
+        for i in range(m):
+            k, row, at, turn = self.jumps[i]
+            before = legs.z[i]
+            jump = self.flow.jump(values, k, float(t[i]), before, row)
+            jumps.append(jump)
+            D = np.zeros((n, size + a))  # derivative of the state before the transition
+            zi = self.z_at[i]
+            D[:, zi : zi + n] = legs.Phi[i]
+            if i:
+                D[:, self.t_at[i - 1]] = -pull[i]
+            ti = self.t_at[i]
+            D[:, ti] = legs.f_end[i]
+            if a:
+                D[:, size:] = legs.P[i]
+            r = ti
+            if at is None:
+                F[r] = jump.h
+                J[r] = jump.h_z @ D
+                J[r, ti] += jump.h_t
+                if a:
+                    J[r, size:] += jump.h_p
+                if self.divided[i]:
+                    self._divide(i, F, J, r, values, times, z)
+            else:
+                F[r] = t[i] - (turn + at) * T
+                J[r, ti] = 1.0
+                if a:
+                    J[r, size:] = -(turn + at) * dT
+            F[r + 1 : r + 1 + n] = z[i + 1] - jump.z_after
+            block = -(jump.R_z @ D)
+            block[:, ti] -= jump.R_t
+            if a:
+                block[:, size:] -= jump.R_p
+            zn = self.z_at[i + 1]
+            block[:, zn : zn + n] += self._one
+            J[r + 1 : r + 1 + n] = block
+        # Closure
+        F[:n] = legs.z[m] - z[0]
+        zi = self.z_at[m]
+        J[:n, zi : zi + n] += legs.Phi[m]
+        J[:n, :n] -= self._one
+        if m:
+            J[:n, self.t_at[-1]] -= pull[m]
+        if a:
+            J[:n, size:] = legs.P[m]
+            if self.forced:
+                J[:n, size:] += legs.f_end[m][:, None] * (self.period_number * dT)
+        for j in self.free:
+            F[j] = 0.0
+            J[j] = 0.0
+            J[j, j] = 1.0
+        if not self.forced:
+            J[:n, size - 1] += legs.f_end[m]
+            self._anchor(F, J, X, t, z[0])
+        return Solved(X, F, J, times, legs, jumps, values, self.free)
+
+    def _anchor(self, F: FloatArray, J: FloatArray, X: FloatArray, t: FloatArray, z0: FloatArray) -> None:
+        """The phase condition of an autonomous orbit."""
+        last = self.size - 1
+        if self.m:
+            F[last] = t[0] + t[-1] - X[last]
+            J[last, self.t_at[0]] += 1.0
+            J[last, self.t_at[-1]] += 1.0
+            J[last, last] = -1.0
+            return
+        assert self.reference is not None
+        z_ref, f_ref = self.reference
+        F[last] = f_ref @ (z0 - z_ref)
+        J[last, : self.n] = f_ref
+
+    def _divide(
+        self, i: int, F: FloatArray, J: FloatArray, r: int, values: FloatArray, times: FloatArray, z: FloatArray
+    ) -> None:
+        """Divide the equation of an exit through the surface of the entry by the length of the visit.
+
+        h(end) / tau = (h(end) - h(begin)) / tau, with h(begin) = 0 by the entry's own equation: the root tau = 0, where
+        the visit has not begun, is taken out. For a short visit it is the series L_f h + tau L_f^2 h / 2.
+        """
+        k, row, _, _ = self.jumps[i]
+        indicator = self.system.traced.transitions[k].rows[row].indicator
+        mode, t0, tau = int(self.modes[i]), float(times[i]), float(times[i + 1] - times[i])
+        touch = self.flow.indicator(values, indicator, mode, t0, z[i])
+        ti, tb, zb = self.t_at[i], self.t_at[i - 1], self.z_at[i]
+        if abs(tau) < 1e-6 * (times[-1] or 1.0):
+            F[r] = touch.L + 0.5 * tau * touch.L2
+            J[r] = 0.0
+            J[r, zb : zb + self.n] = touch.L_z
+            J[r, tb] = touch.L_t - 0.5 * touch.L2
+            J[r, ti] = 0.5 * touch.L2
+            J[r, self.size :] = touch.L_p
+            return
+        F[r] = (F[r] - touch.h) / tau
+        J[r, zb : zb + self.n] -= touch.h_z
+        J[r, tb] -= touch.h_t
+        J[r, self.size :] -= touch.h_p
+        J[r] /= tau
+        J[r, ti] -= F[r] / tau
+        J[r, tb] += F[r] / tau
+
+    def look_at_surfaces(self, X: FloatArray) -> None:
+        """Find surfaces that coincide, as those of a support without damper do.
+
+        Exits through the surface of the entry are divided: a visit of no length solves their equations too. Rows of one
+        condition that vanish together leave the crossing alone: they are no corner of it.
+        """
+        visits = self.signature.visits
+        times, z = self.split(X)
+        values = self.parameters(X)
+        traced = self.system.traced
+        for i, (k, row, at, _) in enumerate(self.jumps):
+            n_rows = len(traced.transitions[k].rows)
+            if at is None and n_rows > 1:
+                found = [self.flow.jump(values, k, float(times[i]), z[i + 1], r) for r in range(n_rows)]
+                signs = [r.sign for r in traced.transitions[k].rows]
+                self.alone[i] = all(
+                    _coincide(signs[row] * found[row].h_z, signs[row] * found[row].h, signs[r] * one.h_z,
+                              signs[r] * one.h, z[i + 1])
+                    for r, one in enumerate(found) if r != row
+                )  # fmt: skip
+        for i in range(1, self.m):
+            k, row, at, _ = self.jumps[i]
+            k0, row0, at0, _ = self.jumps[i - 1]
+            if at is not None or at0 is not None or visits[i].mode == visits[i - 1].mode:
+                continue
+            entry = self.flow.jump(values, k0, float(times[i - 1]), z[i], row0)
+            leave = self.flow.jump(values, k, float(times[i - 1]), z[i], row)
+            self.divided[i] = _coincide(entry.h_z, entry.h, -leave.h_z, -leave.h, z[i])
+
+    def newton(self, X: FloatArray, scale: FloatArray, *, tolerance: float = 1e-12, most: int = 30) -> Solved | None:
+        """Solve at fixed parameters; None where it does not converge."""
+        X = X.copy()
+        size = self.size
+        last = np.inf
+        for i in range(most):
+            solved = self.evaluate(X)
+            if not np.isfinite(solved.residual).all():
+                return None
+            try:
+                step = solve(solved.jacobian[:, :size] * scale[:size], -solved.residual)
+            except np.linalg.LinAlgError:
+                return None
+            length = float(np.abs(step).max())
+            if not np.isfinite(length):
+                return None
+            if length < tolerance or (i > 3 and length < 1e-9 and length > 0.5 * last):
+                return solved
+            if length > 0.5:
+                step *= 0.5 / length
+            X[:size] += scale[:size] * step
+            last = length
+        return None
+
+    def multipliers(self, M: FloatArray) -> NDArray[np.complex128]:
+        """Eigenvalues of the monodromy matrix, largest modulus first."""
+        if M.shape == (2, 2):
+            half, det = 0.5 * (M[0, 0] + M[1, 1]), M[0, 0] * M[1, 1] - M[0, 1] * M[1, 0]
+            root = np.sqrt(complex(0.25 * (M[0, 0] - M[1, 1]) ** 2 + M[0, 1] * M[1, 0]))
+            if root.imag:
+                return np.array([half + root, half - root])
+            first = half + (root.real if half >= 0 else -root.real)
+            other = det / first if first else 0.0
+            return np.array([first, other], dtype=complex)
+        found = np.linalg.eigvals(M).astype(complex)
+        return found[np.argsort(-np.abs(found), kind="stable")]
+
+    @property
+    def at_section(self) -> int:
+        """The mode at the section."""
+        return self.signature.visits[0].mode
+
+
+def _coincide(a: FloatArray, h: float, b: FloatArray, g: float, z: FloatArray) -> bool:
+    """Whether two indicators with gradients a, b and values h, g near z are one, but for a positive factor."""
+    size = float(np.sqrt((a @ a) * (b @ b)))
+    if size == 0.0 or float(a @ b) < (1.0 - 1e-12) * size:
+        return False
+    ratio = float(np.sqrt((b @ b) / (a @ a)))
+    return bool(abs(g - ratio * h) <= 1e-12 * (np.abs(b * z).max() + abs(g)))

@@ -1,0 +1,214 @@
+"""``sensitivity``: how a whole run, through all its transitions, answers to its start and to parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.flow.arguments import check_system
+from nonsmooth.flow.engine import FloatArray, Log, State
+from nonsmooth.flow.methods import engine_for
+from nonsmooth.flow.saltation import Jump
+from nonsmooth.flow.simulate import check_complete, run_length
+from nonsmooth.flow.starts import first_state, plain_start
+from nonsmooth.flow.variational import Legs, VariationalFlow
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from nonsmooth.system.system import System
+
+__all__ = ["Variation", "sensitivity", "variation"]
+
+RTOL = 1e-15
+
+
+class Variation:
+    """One run taken apart: its legs, the jumps between them, and their products.
+
+    Attributes
+    ----------
+    modes : list of int, times : list of float
+        Mode and beginning of each leg.
+    legs : Legs
+    jumps : list of Jump
+        Between the legs; transitions at one instant are one.
+    transitions : list of tuple of int
+    start : Jump or None
+        The transitions taken at the start because they held already: nothing moves in time there.
+    Phi, P : array (n, n), (n, n_active)
+        Derivatives of the end in the start and in the parameters, at fixed times.
+    """
+
+    def __init__(self, flow: VariationalFlow, values: FloatArray, log: Log, start: tuple[int, FloatArray],
+                 t_begin: float, t_end: float) -> None:  # fmt: skip
+        traced, n_u = flow.traced, flow.n_u
+        first = int(log.sample_mode[0]), np.concatenate([np.nan_to_num(log.sample_u[0]), log.sample_memory[0]])
+        self.start = settled(flow, values, start, first, t_begin)
+        self.modes, starts, self.times = [first[0]], [first[1]], [t_begin]
+        self.transitions: list[tuple[int, ...]] = []
+        before: list[FloatArray] = []
+        memory = first[1][n_u:]
+        for i, t in enumerate(log.crossing_time):
+            k = int(log.crossing_transition[i])
+            after = np.concatenate([np.nan_to_num(log.u_after[i]), log.memory_after[i]])
+            if self.transitions and t == self.times[-1]:  # a chain at one instant
+                self.transitions[-1] += (k,)
+                self.modes[-1], starts[-1] = traced.transitions[k].target, after
+            else:
+                self.transitions.append((k,))
+                before.append(np.concatenate([np.nan_to_num(log.u_before[i]), memory]))
+                self.modes.append(traced.transitions[k].target)
+                starts.append(after)
+                self.times.append(float(t))
+            memory = log.memory_after[i]
+        taus = np.diff([*self.times, t_end])
+        self.legs: Legs = flow.legs(values, self.modes, self.times, taus, starts)
+        self.jumps: list[Jump] = [
+            flow.jump(values, chain, t, z) for chain, t, z in zip(self.transitions, self.times[1:], before, strict=True)
+        ]
+        self.Phi, self.P = self.legs.Phi[0], self.legs.P[0]
+        if self.start is not None:
+            self.Phi, self.P = self.Phi @ self.start.R_z, self.P + self.Phi @ self.start.R_p
+        for i, jump in enumerate(self.jumps, start=1):
+            self.Phi = self.legs.Phi[i] @ (jump.saltation @ self.Phi)
+            self.P = self.legs.Phi[i] @ (jump.saltation @ self.P + jump.parameter_column) + self.legs.P[i]
+
+    @property
+    def log_determinant(self) -> float:
+        """log\\|det Phi\\| from the determinants of the legs' matrices and of the saltation matrices."""
+        return float(np.linalg.slogdet(self.legs.Phi)[1].sum()) + self._of_jumps()
+
+    @property
+    def trace(self) -> float:
+        """What it must be: the integral of div f, and log\\|det S\\| of every transition."""
+        return float(self.legs.divergence.sum()) + self._of_jumps()
+
+    def _of_jumps(self) -> float:
+        at_start = 0.0 if self.start is None else float(np.linalg.slogdet(self.start.R_z)[1])
+        return at_start + sum(jump.log_determinant for jump in self.jumps)
+
+
+def settled(
+    flow: VariationalFlow, values: FloatArray, start: tuple[int, FloatArray], first: tuple[int, FloatArray], t: float
+) -> Jump | None:
+    """The transitions that lead at once from the start's (mode, z) to that in which the run begins."""
+    if start[0] == first[0]:
+        return None
+    chains: list[tuple[int, ...]] = [()]
+    while chains:
+        chain = chains.pop(0)
+        mode = flow.traced.transitions[chain[-1]].target if chain else start[0]
+        visited = {start[0], *(flow.traced.transitions[k].target for k in chain)}
+        for k, jump in enumerate(flow.traced.transitions):
+            if jump.source != mode or jump.target in visited or jump.reset is not None or jump.at is not None:
+                continue
+            if jump.target == first[0]:
+                found = flow.jump(values, (*chain, k), t, start[1])
+                if np.array_equal(found.z_after, first[1]):
+                    return found
+            chains.append((*chain, k))
+    raise AssertionError("a run begins in a mode that no transitions lead to")
+
+
+def variation(
+    system: System, flow: VariationalFlow, state: State, t_end: float, method: str = "auto"
+) -> tuple[Variation, Log]:
+    """Run from ``state`` (t = 0) to ``t_end`` and take the run apart.
+
+    Raises
+    ------
+    SolveError
+        The run could not be completed.
+    """
+    engine = engine_for(system, method, None if _is_exact(system, method) else RTOL)
+    values = system.parameter_vector()
+    start = int(state.counters[0]), np.concatenate([state.u, state.memory])
+    log = engine.record(engine.prepare(values[None, :]), state, t_end, np.zeros(1))
+    check_complete(log, system, state, system.period())
+    return Variation(flow, values, log, start, 0.0, t_end), log
+
+
+def _is_exact(system: System, method: str) -> bool:
+    from nonsmooth.system.linear import linear_form
+
+    return method != "taylor" and not system.is_smoothed and linear_form(system.traced) is not None
+
+
+def sensitivity(
+    system: System,
+    *,
+    periods: float | None = None,
+    duration: float | None = None,
+    start: Any = None,
+    mode: str | None = None,
+    parameters: Sequence[str] = (),
+) -> xr.Dataset:
+    r"""Derivatives of a run's end in its start and in parameters, through every transition.
+
+    .. math:: \Phi = \frac{\partial z(t)}{\partial z(0)}, \qquad P = \frac{\partial z(t)}{\partial p},
+        \qquad z = (u, \text{memory})
+
+    Parameters
+    ----------
+    system : System
+    periods, duration : float
+        Length of the run, one of the two. After ``periods`` the end is taken at fixed phase, so that P has the part
+        that comes from dT/dp; after a ``duration``, at fixed time.
+    start, mode
+        As in :func:`nonsmooth.simulate`.
+    parameters : sequence of str
+        Parameters in which to differentiate.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``Phi(state, initial_state)``, ``P(state, parameter)``, ``end(state)``; over ``crossing``: ``crossing_time``,
+        ``crossing_transition``, ``saltation``, ``log_det_saltation`` and ``transversality``
+        \|h'\| / (\|h_z\| \|f\|); ``log_det`` = log\|det Phi\|, ``divergence`` (integral of div f over the run) and
+        ``trace_defect``, the difference that must be rounding: log\|det Phi\| - (divergence + sum of log\|det S\|),
+        0 where both are minus infinity (a matrix without full rank: sticking, memory that is written anew).
+        The states are followed by the memory.
+
+    Raises
+    ------
+    ValueError, TypeError
+        Arguments that do not fit.
+    SolveError
+        The run could not be completed.
+
+    Notes
+    -----
+    Transitions taken at the same instant stand as one crossing, with the last one's number.
+    """
+    check_system(system, "sensitivity")
+    names = (parameters,) if isinstance(parameters, str) else tuple(parameters)
+    flow = VariationalFlow.of(system, names)
+    _, length = run_length(system, periods, duration, system.period(), 0.0)
+    found, log = variation(system, flow, first_state(system, start, mode), length)
+    parameter_part = found.P
+    if periods is not None and names:
+        _, gradient = flow.period(system.parameter_vector())
+        parameter_part = parameter_part + np.outer(found.legs.f_end[-1], periods * gradient)
+    from nonsmooth.results.labels import labels_of
+    from nonsmooth.results.provenance import provenance
+    from nonsmooth.results.variations import derivatives_of_run
+
+    labels = labels_of(system)
+    options = {
+        "periods": periods, "duration": duration, "start": plain_start(system, start), "mode": mode,
+        "parameters": list(names),
+    }  # fmt: skip
+    n = flow.n
+    return derivatives_of_run(
+        labels, provenance(labels, "sensitivity", options, method="variational"), names,
+        Phi=found.Phi, P=parameter_part, end=found.legs.z[-1], crossing_time=found.times[1:],
+        crossing_transition=[chain[-1] for chain in found.transitions],
+        saltation=np.array([jump.saltation for jump in found.jumps]).reshape(-1, n, n),
+        log_det_saltation=[jump.log_determinant for jump in found.jumps],
+        transversality=[jump.transversality for jump in found.jumps],
+        log_det=found.log_determinant, divergence=float(found.legs.divergence.sum()), trace=found.trace,
+        status=log.status,
+    )  # fmt: skip

@@ -1,0 +1,227 @@
+r"""The variational flow: smooth legs and transitions, each with its derivatives in state and parameters.
+
+The extended state is z = (u, memory). A leg is motion in one mode for a given duration, transitions ignored:
+:math:`z(t_0 + \tau)`, :math:`\Phi = \partial z / \partial z_0`, :math:`P = \partial z / \partial p`, from
+:math:`\dot\Phi = f_z \Phi` and :math:`\dot P = f_z P + f_p`. A transition at (t, z) has the saltation matrix
+
+.. math:: S = R_z + \frac{(f^+ - R_z f^- - R_t)\, h_z}{h_t + h_z f^-}
+
+and, with :math:`h_p` in place of :math:`h_z` and :math:`R_p` in place of :math:`R_z`, a column for each parameter.
+A motion's derivative is the product of those of its legs and transitions.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.flow.saltation import Jump, Touch, chained
+
+if TYPE_CHECKING:
+    from nonsmooth.system.system import System
+    from nonsmooth.system.traced import Traced
+
+__all__ = ["Jump", "Legs", "Touch", "VariationalFlow"]
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(slots=True)
+class Legs:
+    """Ends and derivatives of m legs."""
+
+    z: FloatArray  # (m, n)
+    Phi: FloatArray  # (m, n, n)
+    P: FloatArray  # (m, n, n_active), at fixed t0 and tau
+    f_begin: FloatArray  # (m, n)
+    f_end: FloatArray  # (m, n) = dz/dtau
+    divergence: FloatArray  # (m,) integral of div f = log det Phi
+    status: NDArray[np.int64]  # (m,) 0, DIVERGED or NO_CONVERGENCE
+
+    def start_time(self) -> FloatArray:
+        """dz/dt0 at fixed tau (m, n): f_end - Phi f_begin."""
+        return np.asarray(self.f_end - np.einsum("mij,mj->mi", self.Phi, self.f_begin))
+
+
+class VariationalFlow:
+    """Legs and jumps of one system's equations, with derivatives in the ``active`` parameters.
+
+    Made by :meth:`of`; it holds no parameter values, and threads may share it.
+
+    Attributes
+    ----------
+    n : int
+        Size of the extended state z = (u, memory).
+    n_active : int
+        Number of active parameters.
+    active : tuple of str
+        Their names.
+    """
+
+    def __init__(self, traced: Traced, active: tuple[str, ...], scale: FloatArray) -> None:
+        from nonsmooth.kernels.pointers import addresses
+        from nonsmooth.system.variations import variational_model
+
+        self.traced, self.active = traced, active
+        self.places = tuple(traced.parameter_names.index(name) for name in active)
+        self.model = variational_model(traced, self.places)
+        self.n_u, self.n = len(traced.u), len(traced.u) + len(traced.m)
+        self.n_active, self.n_p = len(active), len(traced.p)
+        self.scale = np.concatenate([scale, np.ones(len(traced.m))])
+        self.functions = addresses(self.model.jet, self.model.field, self.model.switch)
+        self._local = threading.local()
+        self._touches: dict[tuple[int, int], Any] = {}
+        rows = max([0, *(len(jump.rows) for jump in traced.transitions)])
+        n, a = self.n, self.n_active
+        self.n_out = n + n * n + n + n * a + rows * (2 + n + a)
+        self._n_result = 3 * n + n * n + n * a + a
+        self._jumps = [(t.source, t.target, len(t.rows), t.at is not None) for t in traced.transitions]
+        self._no_timing = np.zeros(a)
+
+    @classmethod
+    def of(cls, system: System, active: Sequence[str] = ()) -> VariationalFlow:
+        """The flow of a system's equations; made once for the same equations and names.
+
+        Raises
+        ------
+        ValueError
+            A name that is not a parameter of the system.
+        """
+        names = (active,) if isinstance(active, str) else tuple(active)
+        for name in names:
+            if name not in system.values:
+                from nonsmooth.system.names import unknown
+
+                units = {key: parameter.unit for key, parameter in system.parameters.items()}
+                raise ValueError(unknown(name, "a parameter", repr(system.name), units))
+        return _flow(system.traced, names, tuple(system.scale_vector().tolist()))
+
+    def legs(self, values: Any, modes: Any, t0: Any, tau: Any, z0: Any) -> Legs:
+        """March legs, each in one mode, with derivatives; accurate to rounding.
+
+        Parameters
+        ----------
+        values : array (n_p,)
+            Parameters, in the system's order.
+        modes : array (m,) of int
+        t0, tau : array (m,)
+            Beginning (forced systems: within the orbit, not a large absolute time) and duration, of either sign.
+        z0 : array (m, n)
+        """
+        from nonsmooth.kernels.legs import march_legs
+
+        modes = np.ascontiguousarray(modes, dtype=np.int64)
+        m, n = len(modes), self.n
+        out = Legs(
+            np.empty((m, n)), np.empty((m, n, n)), np.empty((m, n, self.n_active)), np.empty((m, n)),
+            np.empty((m, n)), np.empty(m), np.empty(m, dtype=np.int64),
+        )  # fmt: skip
+        march_legs(
+            self.functions, self.model.entries, self.model.kinds, modes, _floats(t0), _floats(tau),
+            _floats(z0), _floats(values), out.z, out.Phi, out.P, out.f_begin, out.f_end, out.divergence, out.status,
+            self.scratch(),
+        )  # fmt: skip
+        return out
+
+    def jump(self, values: Any, k: int | Sequence[int], t: float, z: Any, row: int = -1) -> Jump:
+        """Transition ``k`` at (t, z), or several that are taken there one after the other.
+
+        ``row`` is the row of the (first) condition that is zero there, -1: the nearest to it. For a transition at a
+        given phase t must be the time since the orbit's beginning: dt/dp = (t / T) dT/dp.
+        """
+        from nonsmooth.kernels.legs import cross
+
+        if not isinstance(k, int | np.integer):
+            jumps: list[Jump] = []
+            for one in k:
+                jumps.append(self.jump(values, one, t, jumps[-1].z_after if jumps else z, -1 if jumps else row))
+            return chained(jumps)
+
+        n, a = self.n, self.n_active
+        source, target, n_rows, timed = self._jumps[k]
+        values = _floats(values)
+        timing = self._no_timing
+        if timed and a:
+            period, gradient = self.period(values)
+            timing = (t / period) * gradient
+        out, result = np.empty(self.n_out), np.empty(self._n_result)
+        row = cross(
+            self.functions, k, source, target, n_rows, row, t, _floats(z), values, timing, self.scale, out, result,
+            self.scratch(),
+        )  # fmt: skip
+        after_r = n + n * n + n + n * a
+        at = after_r + row * (2 + n + a)
+        if row >= 0:
+            h, h_z, h_t, h_p = out[at], out[at + 1 : at + 1 + n], out[at + 1 + n], out[at + 2 + n : at + 2 + n + a]
+        else:
+            h, h_z, h_t, h_p = 0.0, np.zeros(n), 0.0, np.zeros(a)
+        s, p = 2 * n, 2 * n + n * n
+        t_z = p + n * a
+        return Jump(
+            out[:n], out[n : n + n * n].reshape(n, n), out[n + n * n : 2 * n + n * n],
+            out[2 * n + n * n : after_r].reshape(n, a), float(h), h_z, float(h_t), h_p,
+            result[:n], result[n:s], result[s:p].reshape(n, n), result[p:t_z].reshape(n, a),
+            result[t_z : t_z + n], result[t_z + n : t_z + n + a],
+            row, self.traced.transitions[k].rows[row].indicator if row >= 0 else -1,
+        )  # fmt: skip
+
+    def indicator(self, values: Any, i: int, mode: int, t: float, z: Any) -> Touch:
+        """Indicator ``i`` at (t, z) with its first two derivatives along the flow of ``mode``, and gradients."""
+        if (i, mode) not in self._touches:
+            from nonsmooth.system.variations import touch_function
+
+            self._touches[i, mode] = touch_function(self.traced, self.places, i, mode)
+        numbers = np.asarray(z, dtype=float).tolist()
+        n, a, n_u = self.n, self.n_active, self.n_u
+        found = self._touches[i, mode](float(t), numbers[:n_u], [*np.asarray(values).tolist(), *numbers[n_u:]])
+        g = np.array(found)
+        s = n + a + 2  # h, h_z, h_t, h_p
+        return Touch(
+            found[0], g[1 : 1 + n], found[1 + n], g[2 + n : s],
+            found[s], g[s + 1 : s + 1 + n], found[s + 1 + n], g[s + 2 + n : 2 * s], found[2 * s],
+        )  # fmt: skip
+
+    def period(self, values: Any) -> tuple[float, FloatArray]:
+        """Forcing period T and dT/dp (n_active,); infinite and zeros where there is none."""
+        if self.traced.period is None:
+            return np.inf, self._no_timing
+        numbers = self._period(*np.asarray(values, dtype=float).tolist())
+        return float(numbers[0]), np.array(numbers[1:], dtype=float)
+
+    @cached_property
+    def _period(self) -> Any:
+        import sympy as sp
+
+        p, period = self.traced.p, self.traced.period
+        assert period is not None
+        return sp.lambdify(p, [period, *(period.diff(p[i]) for i in self.places)], modules="math")
+
+    def scratch(self) -> tuple[FloatArray, ...]:
+        """The thread's scratch memory."""
+        found: tuple[FloatArray, ...] | None = getattr(self._local, "work", None)
+        if found is None:
+            from nonsmooth.kernels.legs import ORDER
+
+            columns, width = self.n + self.n_active, ORDER + 1
+            found = self._local.work = (
+                np.zeros((self.n_u + len(self.model.entries), width)), np.zeros((self.model.n_scratch, width)),
+                np.zeros((self.n_u, columns, width)), np.zeros((self.n_u, columns)), np.zeros((self.n_u, columns)),
+                np.zeros((self.n_u, columns)), np.zeros(width), np.zeros(self.n_u),
+                np.zeros(self.n_p + len(self.traced.m)),
+            )  # fmt: skip
+        return found
+
+
+def _floats(x: Any) -> FloatArray:
+    return np.ascontiguousarray(x, dtype=np.float64)
+
+
+@lru_cache(maxsize=128)
+def _flow(traced: Traced, names: tuple[str, ...], scale: tuple[float, ...]) -> VariationalFlow:
+    return VariationalFlow(traced, names, np.array(scale))

@@ -1,0 +1,178 @@
+"""Builders of the labelled results of continuation: a branch of orbits, a curve of special points."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+
+from nonsmooth.results.labels import Labels
+from nonsmooth.results.schema import parameter_coords, quantity_attributes, state_coords
+from nonsmooth.results.statuses import flag_attributes, status_attributes
+
+__all__ = ["branch", "curve", "equilibria"]
+
+#: Dims and long names of what a branch holds for every point, and for every special point.
+_BRANCH_ARRAYS: dict[str, tuple[tuple[str, ...], str]] = {
+    "section": (("state",), "state at the section"),
+    "maximum": (("state",), "largest value along the orbit"),
+    "minimum": (("state",), "smallest value along the orbit"),
+    "period": ((), "period"),
+    "floquet_multipliers": (("multiplier",), "Floquet multipliers"),
+    "stable": ((), "all multipliers inside the unit circle"),
+    "virtual": ((), "the path goes through a boundary that it should obey"),
+    "signature": ((), "signature"),
+    "mode": ((), "mode at the section"),
+    "crossings_per_period": ((), "transitions per forcing period (autonomous: once round)"),
+    "contacts_per_period": ((), "entries into contact per forcing period (autonomous: once round)"),
+    "clearance": (("indicator",), "least distance to a transition that does not happen"),
+    "layout": ((), "signature as it begins at the section (attribute layouts)"),
+    "unknowns": (("unknown",), "unknowns of multiple shooting: state at the section, instants and states of crossings"),
+    "tangent": (("unknown",), "direction of the branch"),
+}
+_MARKS: dict[str, tuple[str, tuple[str, ...], str]] = {
+    "kind": ("special_kind", (), "kind of the special point"),
+    "place": ("special_point", (), "its place among the points"),
+    "indicator": ("special_indicator", (), "indicator that is touched"),
+    "grazing": ("special_grazing", (), "what happens at the graze (Feigin)"),
+    "bounded": ("special_bounded", (), "multipliers stay bounded at the graze"),
+    "doubled": ("special_doubled", (), "an orbit of twice the period is born at the graze"),
+    "contact": ("special_contact_multipliers", ("multiplier",), "multipliers with the contact, in the limit"),
+    "determinants": (
+        "special_determinant", ("matrix",), "det(I - M-), det(I - M+), det(I + M-), det(I + M+) at the graze",
+    ),
+}  # fmt: skip
+
+
+def branch(
+    labels: Labels,
+    attrs: Mapping[str, Any],
+    parameter: str,
+    values: ArrayLike,
+    arrays: Mapping[str, ArrayLike],
+    marks: Mapping[str, Any],
+    *,
+    period_number: int,
+    signatures: Sequence[str],
+    endings: Sequence[str],
+    ended: Sequence[str],
+    sentences: Sequence[str],
+) -> xr.Dataset:
+    """The result of ``continue_orbit``: orbits over ``point`` in order along the branch, marks over ``special``.
+
+    ``signatures`` are the texts of the ids in ``arrays["signature"]``; ``ended`` the outcome at both ends, of
+    ``endings``, with their sentences.
+    """
+    d = labels
+    variables: dict[str, Any] = {}
+    for name, (dims, long_name) in _BRANCH_ARRAYS.items():
+        variables[name] = (("point", *dims), np.asarray(arrays[name]), {"long_name": long_name})
+    variables["period"][2]["units"] = d.time_unit
+    variables["mode"] = ("point", np.asarray(arrays["mode"], np.int16), {
+        "long_name": "mode at the section", **flag_attributes(d.modes, dtype=np.int16)})  # fmt: skip
+    variables["signature"] = ("point", np.asarray(arrays["signature"], np.int32), {
+        "long_name": "signature", **flag_attributes(signatures, dtype=np.int32)})  # fmt: skip
+    variables["layout"] = ("point", np.asarray(arrays["layout"], np.int32), variables["layout"][2])
+    variables["status"] = ("point", np.zeros(len(np.array(values, dtype=np.float64)), np.int8), status_attributes())
+    for name, (stem, dims, long_name) in _MARKS.items():
+        column = marks[name]
+        array = _words(column) if name in ("kind", "indicator", "grazing") else np.asarray(column)
+        variables[stem] = (("special", *dims), array, {"long_name": long_name})
+    variables["special_value"] = (
+        "special", np.array(values, dtype=np.float64)[np.asarray(marks["place"], dtype=np.int64)],
+        quantity_attributes(parameter, d.parameters[parameter]),
+    )  # fmt: skip
+    variables["period_number"] = ((), np.int64(period_number), {"long_name": "forcing periods (0: autonomous)"})
+    codes = np.array([list(endings).index(word) for word in ended], dtype=np.int8)
+    variables["ended"] = ("end", codes, {"long_name": "how the branch ends", **flag_attributes(endings)})
+    variables["ended_because"] = ("end", _words(sentences), {"long_name": "sentence"})
+    own = quantity_attributes(parameter, d.parameters[parameter])
+    coords: dict[str, Any] = {
+        parameter: ("point", np.array(values, dtype=np.float64), own),
+        **state_coords(d),
+        **parameter_coords(d, without=parameter),
+        "indicator": ("indicator", _words(d.indicators), {"long_name": "indicator"}),
+        "end": ("end", _words(["first", "last"]), {"long_name": "end of the branch"}),
+    }
+    return xr.Dataset(variables, coords, dict(attrs))
+
+
+def curve(
+    labels: Labels,
+    attrs: Mapping[str, Any],
+    parameters: Mapping[str, ArrayLike],
+    arrays: Mapping[str, ArrayLike],
+    special: Sequence[tuple[str, int]],
+    *,
+    kind: str,
+    period_number: int,
+    signature: str,
+    endings: Mapping[str, str],
+    ended: Sequence[str],
+) -> xr.Dataset:
+    """The result of ``continue_curve``: two parameters over ``point``, points of codimension two over ``special``."""
+    d = labels
+    variables: dict[str, Any] = {
+        name: (("point", *_BRANCH_ARRAYS[name][0]), np.asarray(array), {"long_name": _BRANCH_ARRAYS[name][1]})
+        for name, array in arrays.items()
+    }
+    variables["period"][2]["units"] = d.time_unit
+    variables["kind"] = ((), kind, {"long_name": "kind of the special point that is followed"})
+    variables["period_number"] = ((), np.int64(period_number), {"long_name": "forcing periods (0: autonomous)"})
+    variables["signature"] = ((), signature, {"long_name": "signature"})
+    variables["special_kind"] = ("special", _words(name for name, _ in special), {"long_name": "codimension two"})
+    places = np.array([place for _, place in special], dtype=np.int64)
+    variables["special_point"] = ("special", places, {"long_name": "its place among the points"})
+    codes = np.array([list(endings).index(word) for word in ended], dtype=np.int8)
+    variables["ended"] = ("end", codes, {"long_name": "how the curve ends", **flag_attributes(list(endings))})
+    variables["ended_because"] = ("end", _words(endings[word] for word in ended), {"long_name": "sentence"})
+    coords: dict[str, Any] = {
+        name: ("point", np.array(values, dtype=np.float64), quantity_attributes(name, d.parameters[name]))
+        for name, values in parameters.items()
+    }
+    fixed = {name: value for name, value in parameter_coords(d).items() if name not in parameters}
+    coords |= {**state_coords(d), **fixed, "end": ("end", _words(["first", "last"]), {"long_name": "end"})}
+    return xr.Dataset(variables, coords, dict(attrs))
+
+
+def equilibria(
+    labels: Labels,
+    attrs: Mapping[str, Any],
+    parameter: str,
+    values: ArrayLike,
+    arrays: Mapping[str, ArrayLike],
+    special: Sequence[tuple[str, int]],
+    *,
+    endings: Mapping[str, str],
+    ended: Sequence[str],
+) -> xr.Dataset:
+    """The result of ``continue_equilibrium``: equilibria over ``point``, marks over ``special``."""
+    d = labels
+    modes = flag_attributes(d.modes, dtype=np.int16)
+    places = np.array([place for _, place in special], dtype=np.int64)
+    codes = np.array([list(endings).index(word) for word in ended], dtype=np.int8)
+    variables: dict[str, Any] = {
+        "u": (("point", "state"), np.asarray(arrays["u"]), {"long_name": "equilibrium"}),
+        "eigenvalues": (("point", "eigenvalue"), np.asarray(arrays["eigenvalues"]), {"long_name": "eigenvalues"}),
+        "stable": ("point", np.asarray(arrays["stable"]), {"long_name": "all real parts negative"}),
+        "mode": ("point", np.asarray(arrays["mode"], np.int16), {"long_name": "mode", **modes}),
+        "special_kind": ("special", _words(kind for kind, _ in special), {"long_name": "kind of the special point"}),
+        "special_point": ("special", places, {"long_name": "its place among the points"}),
+        "ended": ("end", codes, {"long_name": "how the branch ends", **flag_attributes(list(endings))}),
+        "ended_because": ("end", _words(endings[word] for word in ended), {"long_name": "sentence"}),
+    }
+    coords: dict[str, Any] = {
+        parameter: (
+            "point", np.array(values, dtype=np.float64), quantity_attributes(parameter, d.parameters[parameter]),
+        ),
+        **state_coords(d), **parameter_coords(d, without=parameter),
+        "end": ("end", _words(["first", "last"]), {"long_name": "end of the branch"}),
+    }  # fmt: skip
+    return xr.Dataset(variables, coords, dict(attrs))
+
+
+def _words(words: Any) -> np.ndarray:
+    return np.array(list(words), dtype=str)

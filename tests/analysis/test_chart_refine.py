@@ -1,0 +1,69 @@
+"""Charts refined along boundaries against the uniform grid: the same labels from a part of the points."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy import ndimage
+
+import nonsmooth as ns
+from nonsmooth.analysis.chart import chart
+from nonsmooth.analysis.chart_refine import labels_of_points
+
+FIGURE_9 = {"g": 0.02}, {"omega": (3.0, 7.0), "rho": (0.1, 0.3)}
+GAP = {"omega": 11.15}, {"g": (-0.0015, 0.002), "rho": (0.2, 0.5)}
+
+
+def pair(case, n: int, part: float) -> tuple[xr.Dataset, np.ndarray, np.ndarray]:
+    parameters, ranges = case
+    system = ns.models.discontinuous_support(**parameters)
+    grid = {name: np.linspace(*ends, n) for name, ends in ranges.items()}
+    coarse = chart(system, grid, refine=part, extremes=False, progress=False)
+    whole = chart(system, grid, extremes=False, progress=False)
+    return coarse, labels_of_points(coarse), labels_of_points(whole)
+
+
+def agree(case, n: int, part: float, least: float) -> None:
+    refined, found, truth = pair(case, n, part)
+    computed = refined["computed"].values == 1
+    assert computed.mean() <= part
+    assert (found == truth)[computed].all()
+    assert (found == truth).mean() >= least
+    sure = refined["confidence"].values >= 0.95
+    assert (found == truth)[sure].mean() >= 0.95
+    assert sure.mean() > 0.9
+    for label in np.unique(truth):
+        islands, count = ndimage.label(truth == label, np.ones((3, 3)))
+        for k in range(1, count + 1):
+            island = islands == k
+            if island.sum() > 30:
+                assert (found[island] == label).mean() > 0.5
+
+
+@pytest.mark.parametrize(("case", "n", "part", "least"), [(FIGURE_9, 128, 0.15, 0.999), (GAP, 96, 0.4, 0.98)])
+def test_the_same_picture_from_a_part_of_the_points(case, n, part, least) -> None:
+    agree(case, n, part, least)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("case", "part", "least"), [(FIGURE_9, 0.05, 0.999), (GAP, 0.25, 0.99)])
+def test_the_same_picture_at_512(case, part, least) -> None:
+    agree(case, 512, part, least)
+
+
+def test_refinement_does_not_depend_on_threads() -> None:
+    system = ns.models.discontinuous_support(**FIGURE_9[0])
+    grid = {name: np.linspace(*ends, 50) for name, ends in FIGURE_9[1].items()}
+    one, two = (chart(system, grid, refine=True, threads=n, progress=False) for n in (1, 2))
+    assert one.identical(two)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [({"refine": 1.5}, "at most 1"), ({"carry": {"rho": "up"}}, "stand alone"), ({"start": [[0, 0], [1, 0]]}, "alone")],
+)
+def test_refinement_refuses_what_it_cannot_do(options, message) -> None:
+    system = ns.models.discontinuous_support()
+    with pytest.raises(ValueError, match=message):
+        chart(system, {"omega": [3.0, 4.0], "rho": [0.1, 0.2]}, **{"refine": True, **options}, progress=False)

@@ -1,0 +1,91 @@
+"""Correlation dimensions of sets whose dimension is a closed form, and of an attractor with a published one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+from nonsmooth.analysis.correlation_dimension import correlation_dimension
+
+RNG = np.random.default_rng(5)
+
+
+def cantor(n: int, ratio: float = 1 / 3, digits: int = 30) -> np.ndarray:
+    """Random points of the Cantor set with two parts of this ratio: dimension log 2 / log(1 / ratio)."""
+    return (RNG.integers(0, 2, (n, digits)) * (1 - ratio) * ratio ** np.arange(digits)).sum(axis=1)
+
+
+def henon(n: int) -> np.ndarray:
+    points = np.empty((n, 2))
+    x, y = 0.1, 0.1
+    for i in range(-100, n):
+        x, y = 1 - 1.4 * x * x + y, 0.3 * x
+        points[max(i, 0)] = x, y
+    return points
+
+
+@pytest.mark.parametrize("ratio", [1 / 3, 0.2, 0.45])
+def test_cantor_sets(ratio: float) -> None:
+    found = correlation_dimension(cantor(8000, ratio), window=0, scale=[1.0], range=(ratio**7, ratio))
+    assert abs(float(found.dimension) - np.log(2) / np.log(1 / ratio)) < 0.02
+    assert abs(float(found.decades) - 6 * np.log10(1 / ratio)) < 1e-12
+
+
+def test_a_product_of_cantor_sets_and_smooth_sets() -> None:
+    product = correlation_dimension(np.stack([cantor(12000), cantor(12000)], axis=1), window=0)
+    assert abs(float(product.dimension) - 2 * np.log(2) / np.log(3)) < 0.06
+    angle = RNG.uniform(0, 2 * np.pi, 5000)
+    circle = correlation_dimension(np.stack([np.cos(angle), 1e3 * np.sin(angle)], axis=1), window=0)
+    assert abs(float(circle.dimension) - 1) < 0.02 and circle.scaling == 1
+    square = correlation_dimension(RNG.uniform(0, 1, (10000, 2)), window=0)
+    assert abs(float(square.dimension) - 2) < 0.05 and square.scaling == 1
+
+
+def test_henon() -> None:
+    """Grassberger and Procaccia (1983), Table 1: 1.21 +- 0.01 for a = 1.4, b = 0.3."""
+    found = correlation_dimension(henon(15000))
+    assert abs(float(found.dimension) - 1.21) < 0.03
+    assert found.scaling == 1 and found.decades > 1.0 and found.slope_spread < 0.1
+
+
+def test_the_same_pairs_as_by_hand() -> None:
+    """Counts of the tree against all distances, with a window in time."""
+    x = henon(400)
+    found = correlation_dimension(x, window=3, scale=[1.0, 1.0])
+    distance = np.abs(x[:, None] - x[None]).max(axis=2)
+    i, j = np.triu_indices(400, 4)
+    wanted = (distance[i, j][None, :] <= found.radius.values[:, None]).sum(axis=1)
+    assert np.array_equal(found.n_pairs.values, wanted)
+    assert abs(found.correlation_sum.values[-1] - 1.0) < 1e-12
+
+
+def test_the_range_found_is_that_of_the_slope() -> None:
+    """A strip looks like a line from afar and like a plane from near: the range found does not span its thickness."""
+    thickness = 3e-2
+    x = np.stack([RNG.uniform(0, 1, 6000), thickness * RNG.uniform(0, 1, 6000)], axis=1)
+    near = correlation_dimension(x, window=0, scale=[1.0, 1.0])
+    assert near.scaling == 1 and near.range_high < thickness and abs(float(near.dimension) - 2) < 0.1
+    far = correlation_dimension(x, window=0, scale=[1.0, 1.0], range=(0.09, 0.3))
+    assert abs(float(far.dimension) - 1) < 0.2 and far.scaling == 0 and far.decades < 0.6
+
+
+def test_a_section_of_the_papers_oscillator() -> None:
+    """The chaotic attractor of Fig. 13: between 1 and the Kaplan-Yorke dimension, as conjectured."""
+    system = ns.models.discontinuous_support().with_parameters(rho=0.33, g=0.0018, omega=11.15)
+    found = correlation_dimension(ns.poincare(system, n=10000, transient=500))
+    kaplan_yorke = float(ns.lyapunov(system, periods=10000).kaplan_yorke)
+    assert 1.0 < float(found.dimension) < kaplan_yorke + 0.05
+
+
+def test_errors_at_the_door() -> None:
+    with pytest.raises(ValueError, match="N >= 200"):
+        correlation_dimension(np.zeros((10, 2)))
+    with pytest.raises(ValueError, match="are the same"):
+        correlation_dimension(np.zeros((500, 2)))
+    with pytest.raises(ValueError, match="must be finite"):
+        correlation_dimension(np.full((500, 2), np.nan))
+    with pytest.raises(ValueError, match=r"section\(iterate, state\)"):
+        correlation_dimension(ns.simulate(ns.models.discontinuous_support(), periods=1))
+    with pytest.raises(ValueError, match="must rise"):
+        correlation_dimension(henon(300), range=(0.5, 0.1))

@@ -1,0 +1,249 @@
+"""Lyapunov spectra: closed forms, multipliers of stable orbits, a published attractor; the trace identity always."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+from nonsmooth.analysis.lyapunov import kaplan_yorke
+
+DEFECT = 1e-10
+
+
+def spectrum(system, **options):  # type: ignore[no-untyped-def]
+    """``ns.lyapunov``, with the trace identity asserted for every spectrum computed here."""
+    found = ns.lyapunov(system, progress=False, **options)
+    whole = np.isfinite(found.trace_defect.values)
+    assert whole.any() and (np.abs(found.trace_defect.values[whole]) < DEFECT).all()
+    return found
+
+
+def multipliers(system, period_number, transient=2000):  # type: ignore[no-untyped-def]
+    """Of the return map at the attractor, by central differences of the exact flow."""
+    last = ns.poincare(system, n=1, transient=transient).section.values[-1]
+
+    def image(u):  # type: ignore[no-untyped-def]
+        return ns.poincare(system, n=period_number, start=u).section.values[-1]
+
+    assert np.abs(image(last) - last).max() < 1e-11 * np.abs(last).max() + 1e-13
+    steps = 1e-5 * np.abs(last).max() * np.eye(len(last))
+    matrix = np.stack([(image(last + h) - image(last - h)) / (2 * h.max()) for h in steps], axis=1)
+    return np.sort(np.abs(np.linalg.eigvals(matrix)))[::-1]
+
+
+def folded(expansion: float, contraction: float, reset: float = 0.0) -> ns.System:
+    """A tent map as a flow: x grows by mu in a period; what is beyond mu / 2 at its end is folded back; y shrinks."""
+
+    def grow(t, u, p):  # type: ignore[no-untyped-def]
+        return np.log(p.mu) * u.x, -p.b * u.y
+
+    def fold(t, u, p):  # type: ignore[no-untyped-def]
+        return p.mu - u.x, u.y + p.r * u.x
+
+    return ns.System(
+        states=["x", "y"], parameters={"mu": expansion, "b": contraction, "r": reset}, period=1.0,
+        modes={"low": grow, "high": grow}, indicators={"middle": lambda t, u, p: u.x - p.mu / 2},
+        transitions=[ns.Transition("low", "high", when="middle > 0"),
+                     ns.Transition("high", "low", at=0.999, reset=fold)],
+    )  # fmt: skip
+
+
+def test_a_tent_map_as_a_flow_has_its_logarithms() -> None:
+    """Every orbit has the exponents log mu and -b: the first grows alike on both sides of the fold."""
+    mu, b = 1.9, 0.7
+    found = spectrum(folded(mu, b), periods=3000, start={"x": 0.3, "y": 0.1})
+    assert np.abs(found.exponents.values - [np.log(mu), -b]).max() < 1e-12
+    assert found.status == 0 and found.exponents.attrs["units"] == "1"
+    assert abs(float(found.kaplan_yorke) - (1 + np.log(mu) / b)) < 1e-12
+    assert found.standard_error.values.max() < 1e-12
+    # With a shear in the fold the frame turns to and fro: the same limit, approached like 1/t.
+    sheared = spectrum(folded(mu, b, 0.3), periods=3000, start={"x": 0.3, "y": 0.1})
+    assert np.abs(sheared.exponents.values - [np.log(mu), -b]).max() < 1e-4
+
+
+def test_what_a_saltation_matrix_adds_is_counted() -> None:
+    """Constant fields: a crossing stretches by f+ / f-, a pulse by k. The exponent is the count of both."""
+    k, low, high, edge = 1.6, 1.0, 2.5, 1.4
+
+    def pulse(t, u, p):  # type: ignore[no-untyped-def]
+        return p.k * (u.x - 1.0), u.y
+
+    def fold(t, u, p):  # type: ignore[no-untyped-def]
+        return 1.0 - (u.x - p.edge) / 1.5, u.y
+
+    system = ns.System(
+        states=["x", "y"], parameters={"k": k, "low": low, "high": high, "edge": edge}, period=1.0,
+        modes={"slow": lambda t, u, p: (p.low + 0 * u.x, -u.y), "fast": lambda t, u, p: (p.high + 0 * u.x, -u.y)},
+        indicators={"middle": lambda t, u, p: u.x - p.edge},
+        transitions=[ns.Transition("slow", "fast", when="middle > 0"),
+                     ns.Transition("slow", "slow", at=0.999, reset=pulse),
+                     ns.Transition("fast", "slow", at=0.999, reset=fold)],
+    )  # fmt: skip
+    run = ns.simulate(system, periods=40, start={"x": 0.1, "y": 1.0})
+    names = run.crossing_transition.attrs["flag_meanings"].split()
+    counts = np.bincount(run.crossing_transition.values, minlength=3)
+    assert names == ["slow_to_fast", "slow_to_slow", "fast_to_slow"] and counts.min() > 5
+    found = spectrum(system, periods=40, transient=0, start={"x": 0.1, "y": 1.0})
+    wanted = (counts[0] * np.log(high / low) + counts[1] * np.log(k) + counts[2] * np.log(1 / 1.5)) / 40
+    assert np.abs(np.sort(found.exponents.values) - np.sort([wanted, -1.0])).max() < 1e-11
+
+
+def test_one_impact_per_period() -> None:
+    """Test problem A: complex multipliers of modulus e exp(-c T / 2), so two equal exponents (1/t), and their sum."""
+    system = ns.models.impact_oscillator().with_parameters(A=1.0)
+    v, period = system.values, system.period()
+    wanted = np.log(v["e"]) / period - v["c"] / 2
+    found = spectrum(system, periods=5000)
+    assert abs(float(found.exponents.sum()) - 2 * wanted) < 1e-12
+    assert np.abs(found.exponents.values - wanted).max() < 2e-3
+    assert float(found.kaplan_yorke) == 0.0
+
+
+@pytest.mark.parametrize("rho", [0.25, 0.30, 0.35, 0.46])
+def test_exponents_of_a_stable_orbit_are_those_of_its_multipliers(rho: float) -> None:
+    """Periods 4, 2, 2 and 1 of the paper's oscillator."""
+    system = ns.models.discontinuous_support().with_parameters(rho=rho, omega=3.69, g=-0.0045)
+    swept = ns.sweep(system, "rho", [rho], transient=2000, progress=False)
+    period_number = int(swept.period_number.values.squeeze())
+    assert period_number == {0.25: 4, 0.30: 2, 0.35: 2, 0.46: 1}[rho]
+    wanted = np.log(multipliers(system, period_number)) / (period_number * system.period())
+    found = spectrum(system, periods=64 * period_number, transient=2000)
+    assert np.abs(found.exponents.values - wanted).max() < 1e-6 and abs(wanted[0] - wanted[1]) > 0.1
+    assert found.standard_error.values.max() < 1e-9
+
+
+def test_both_ways_to_a_spectrum_agree() -> None:
+    """The planar kernel, and Taylor series with frames that follow a record, on a chaotic run too short to part."""
+    system = ns.models.discontinuous_support().with_parameters(rho=0.33, g=0.0018, omega=11.15)
+    options = {"periods": 32, "transient": 10, "start": {"x": 0.0011, "v": 0.01}}
+    exact = spectrum(system, **options)
+    taylor = spectrum(system, method="taylor", rtol=1e-15, **options)
+    assert np.abs(exact.exponents.values - taylor.exponents.values).max() < 1e-6
+    assert np.abs(exact.running.values[:8] - taylor.running.values[:8]).max() < 1e-9
+    assert abs(float(exact.nearest_graze) - float(taylor.nearest_graze)) < 1e-5
+
+
+@pytest.mark.parametrize("pieces", [4096, 64])
+def test_lorenz(pieces: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Published: 0.9056, 0, -14.5723 (Sprott 2003); the sum -(sigma + 1 + b) is exact. Here within the stated error.
+
+    Also where the record has so few samples that a motion begun at one has forgotten it before the next."""
+    monkeypatch.setattr("nonsmooth.analysis.lyapunov.UNITS", pieces)
+    system = ns.System(
+        states=["x", "y", "z"], parameters={"s": 10.0, "r": 28.0, "b": 8 / 3},
+        modes={"all": lambda t, u, p: (p.s * (u.y - u.x), u.x * (p.r - u.z) - u.y, u.x * u.y - p.b * u.z)},
+    )  # fmt: skip
+    found = spectrum(system, duration=4000, start=[1.0, 1.0, 20.0])
+    error = found.standard_error.values
+    assert error[0] < 5e-3 and error[1] < 2e-3
+    assert (np.abs(found.exponents.values - [0.9056, 0.0, -14.5723]) < 4 * error + 1e-4).all()
+    assert abs(float(found.exponents[1])) < 1e-3
+    assert abs(float(found.exponents.sum()) + 10.0 + 1.0 + 8 / 3) < 1e-10
+    assert abs(float(found.kaplan_yorke) - 2.062) < 2e-3  # Sprott: 2.062
+
+
+def test_an_autonomous_cycle_with_impacts_has_a_zero_exponent() -> None:
+    """Test problem E at q = 5: impacts on the seat, three states, one exponent zero."""
+    found = spectrum(ns.models.relief_valve().with_parameters(q=5.0), duration=2000.0, transient=200.0,
+                     start={"y1": 1.0, "y3": 5.0})  # fmt: skip
+    error = found.standard_error.values
+    assert np.abs(found.exponents.values).min() < 5e-3
+    assert found.exponents.values[2] < -0.5 and np.isfinite(error).all()
+
+
+def test_sticking_loses_a_direction() -> None:
+    """Test problem K: multipliers 1 and 0, so the exponents 0 and minus infinity; the defect is 0."""
+
+    def slip(t, u, p):  # type: ignore[no-untyped-def]
+        return u.v, -u.x + p.F / (1 + p.d * (p.b - u.v))
+
+    system = ns.System(
+        states=["x", "v"], parameters={"F": 1.0, "d": 3.0, "b": 0.2},
+        modes={"slip": slip, "stick": lambda t, u, p: (p.b, 0.0 * u.v)},
+        indicators={"relative": lambda t, u, p: u.v - p.b, "pull": lambda t, u, p: u.x - p.F},
+        transitions=[ns.Transition("slip", "stick", when="relative > 0", reset=lambda t, u, p: (u.x, p.b)),
+                     ns.Transition("stick", "slip", when="pull > 0")],
+    )  # fmt: skip
+    found = spectrum(system, duration=1200.0, start={"x": 0.0, "v": 0.0})
+    assert found.exponents.values[1] == -np.inf and abs(found.exponents.values[0]) < 1e-3
+    assert found.trace_defect == 0.0 and found.kaplan_yorke == 1.0
+
+
+def test_the_smoothed_switch_has_three_exponents() -> None:
+    """The memory v_a is written anew at every entry: minus infinity. The others tend to those of the sharp system."""
+    system = ns.models.discontinuous_support().with_parameters(rho=0.46)
+    sharp = spectrum(system, periods=200, transient=300)
+    errors = []
+    for eta in (2e-4, 1e-4, 5e-5):
+        smooth = spectrum(system.smoothed(eta), periods=200, transient=300)
+        assert smooth.exponents.values[2] == -np.inf and smooth.trace_defect == 0.0
+        errors.append(float(np.abs(smooth.exponents.values[:2] - sharp.exponents.values).max()))
+    assert errors[0] < 2e-2 and errors[1] < 0.5 * errors[0] and errors[2] < 0.5 * errors[1]
+    # Below the gap the memory is never written: it is no state then.
+    quiet = spectrum(system.with_parameters(g=0.2).smoothed(1e-4), periods=64, transient=64)
+    assert np.isnan(quiet.exponents.values[2])
+    assert abs(float(quiet.exponents[:2].sum()) + system.values["c"] / system.values["m"]) < 1e-10
+
+
+def test_a_sweep_is_its_points() -> None:
+    """Carried along, down and up; on a single attractor each point is what it is alone."""
+    system = ns.models.discontinuous_support()
+    values = [0.20, 0.22, 0.21]
+    swept = spectrum(system, parameter="rho", values=values, direction="down", periods=500, transient=500)
+    assert swept.exponents.dims == ("rho", "exponent") and list(swept.rho.values) == values
+    assert (swept.status == 0).all() and swept.running.shape == (3, 32, 2)
+    alone = spectrum(system.with_parameters(rho=0.22), periods=500, transient=500)
+    assert np.abs(swept.exponents.values[1].sum() - alone.exponents.values.sum()) < 1e-10
+
+
+def test_a_point_that_fails_keeps_its_status() -> None:
+    system = ns.System(
+        states=["x"], parameters={"a": -1.0}, modes={"all": lambda t, u, p: (p.a * u.x + np.cos(t),)},
+    )  # fmt: skip
+    found = spectrum(system, parameter="a", values=[-1.0, 5.0, -2.0], periods=64, transient=64, direction=None)
+    assert list(found.status.values) == [0, 3, 0] and np.isnan(found.exponents.values[1]).all()
+    assert np.abs(found.exponents.values[[0, 2], 0] - [-1.0, -2.0]).max() < 1e-12
+    with pytest.raises(ns.SolveError, match="grew beyond"):
+        ns.lyapunov(system.with_parameters(a=5.0), periods=64)
+
+
+def test_kaplan_yorke_dimension() -> None:
+    assert kaplan_yorke(np.array([0.5, -1.0])) == 1.5
+    assert kaplan_yorke(np.array([-0.1, -1.0])) == 0.0
+    assert kaplan_yorke(np.array([0.5, -0.2])) == 2.0
+    assert kaplan_yorke(np.array([0.9056, 1e-4, -14.5723]), zero=1e-3) == 2 + 0.9056 / 14.5723
+    assert kaplan_yorke(np.array([0.3, 0.1, -np.inf])) == 2.0
+    assert kaplan_yorke(np.array([-1e-5, -0.3]), zero=1e-4) == 1.0
+
+
+def test_errors_at_the_door() -> None:
+    system = ns.models.discontinuous_support()
+    with pytest.raises(ValueError, match="belong together"):
+        ns.lyapunov(system, parameter="rho")
+    with pytest.raises(ValueError, match="`gap` is not a parameter"):
+        ns.lyapunov(system, parameter="gap", values=[0.1])
+    with pytest.raises(ValueError, match="direction = 'both'"):
+        ns.lyapunov(system, parameter="rho", values=[0.1], direction="both")
+    with pytest.raises(ValueError, match="no forcing period"):
+        ns.lyapunov(ns.models.relief_valve())
+    with pytest.raises(ValueError, match="once"):
+        ns.lyapunov(system, periods=10, duration=3.0)
+    with pytest.raises(ValueError, match="one start"):
+        ns.lyapunov(system, start=[{"x": 0.0}, {"x": 1.0}])
+    with pytest.raises(TypeError, match="takes an ns.System"):
+        ns.lyapunov("Lorenz")
+
+
+def test_results_are_saved_whole(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    """NetCDF keeps infinities, units and the input; a sweep and a single point."""
+    system = ns.models.discontinuous_support()
+    for k, found in enumerate((
+        ns.lyapunov(system, periods=64, transient=64),
+        ns.lyapunov(system.smoothed(1e-3), parameter="rho", values=[0.2, 0.3], periods=64, transient=64,
+                    progress=False),
+        ns.sensitivity(system.smoothed(1e-3), periods=1, parameters=("rho", "eta")),
+    )):  # fmt: skip
+        path = tmp_path / f"{k}.nc"
+        ns.save(found, path)
+        assert ns.load(path).identical(found)

@@ -1,0 +1,121 @@
+"""A cluster whose workers and client are killed: the store is bit for bit that of an undisturbed run."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+from simple_work import Squares, hashes, right
+
+from nonsmooth.campaign import cluster
+from nonsmooth.campaign.run import run
+from nonsmooth.campaign.store import describe_store
+
+QUIET = {"progress": False}
+HERE = Path(__file__).parent
+CAMPAIGN = """
+import sys
+sys.path.insert(0, {here!r})
+from distributed import Client
+from simple_work import Squares
+from nonsmooth.campaign.run import run
+with Client({address!r}) as client:
+    client.run(sys.path.insert, 0, {here!r})
+    run(Squares(size={size}, step=7, seconds={seconds}), store={store!r}, client=client, progress=False)
+"""
+
+
+def test_without_dask_the_message_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(ImportError, match="cluster"):
+        cluster.on_cluster(Squares(), [0], print, None, None)
+
+
+@pytest.fixture
+def three_workers():
+    distributed = pytest.importorskip("distributed")
+    with (
+        distributed.LocalCluster(
+            n_workers=3, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
+        ) as found,
+        distributed.Client(found) as client,
+    ):
+        client.run(sys.path.insert, 0, str(HERE))
+        yield client
+
+
+def test_a_cluster_computes_the_same(three_workers, tmp_path: Path) -> None:
+    work = Squares()
+    assert right(run(work, client=three_workers, **QUIET), work)
+    assert right(run(work, client=three_workers, store=tmp_path / "far.zarr", **QUIET), work)
+    run(work, threads=1, store=tmp_path / "here.zarr", **QUIET)
+    assert hashes(tmp_path / "far.zarr") == hashes(tmp_path / "here.zarr")
+
+
+def disturbed(client, path: Path, chunks: int, seconds: float, kills: int, client_kills: int) -> int:
+    """Run a campaign in a process of its own while workers and that process are killed. Returns the kills made."""
+    program = CAMPAIGN.format(
+        here=str(HERE), address=client.scheduler.address, size=7 * chunks, seconds=seconds, store=str(path)
+    )
+    made, rng, stop = [0], random.Random(5), threading.Event()
+
+    def killer() -> None:
+        span = chunks * seconds / 3
+        while made[0] < kills and not stop.is_set():
+            time.sleep(rng.uniform(0.3, 1.7) * span / kills)
+            busy = [name for name, tasks in client.processing().items() if tasks]
+            if busy:
+                pids = client.run(os.getpid)
+                victim = rng.choice([name for name in busy if name in pids] or [None])
+                if victim:
+                    os.kill(pids[victim], signal.SIGKILL)
+                    made[0] += 1
+
+    thread = threading.Thread(target=killer)
+    thread.start()
+    try:
+        for life in range(client_kills + 1):
+            process = subprocess.Popen([sys.executable, "-c", program])
+            if life < client_kills:
+                wanted = (life + 1) * chunks // (client_kills + 2)
+                while len(list((path / "run").glob("*.json"))) < wanted and process.poll() is None:
+                    time.sleep(0.2)
+                process.kill()
+                process.wait()
+            else:
+                assert process.wait(timeout=1200) == 0
+    finally:
+        stop.set()
+        thread.join()
+    return made[0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("chunks", "seconds", "kills", "client_kills"), [(60, 0.5, 4, 1)])
+def test_killed_workers_and_clients_change_nothing(
+    three_workers, tmp_path: Path, chunks: int, seconds: float, kills: int, client_kills: int
+) -> None:
+    if "NONSMOOTH_FAULTS" in os.environ:  # for example 400,1.0,30,2
+        words = os.environ["NONSMOOTH_FAULTS"].split(",")
+        chunks, seconds, kills, client_kills = int(words[0]), float(words[1]), int(words[2]), int(words[3])
+    path = tmp_path / "disturbed.zarr"
+    made = disturbed(three_workers, path, chunks, seconds, kills, client_kills)
+    assert made >= kills // 2
+    calm = tmp_path / "calm.zarr"
+    run(Squares(size=7 * chunks), threads=1, store=calm, **QUIET)
+    assert hashes(path) == hashes(calm)
+    found = describe_store(path)
+    assert found["done"] == found["chunks"] == chunks
+    print(f"{made} workers and {client_kills} clients killed, {found['started'] - chunks} chunks begun again")
+    assert found["started"] - chunks <= made + 3 * client_kills  # three workers were busy when a client went
+    for file in (path / "run").glob("*.json"):
+        other = json.loads((calm / "run" / file.name).read_text())
+        assert json.loads(file.read_text())["content"] == other["content"]

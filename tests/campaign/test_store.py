@@ -1,0 +1,151 @@
+"""Stores of chunks: resumed, whole, of one work only; threads; the plan."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from simple_work import Squares, hashes, right
+
+import nonsmooth as ns
+from nonsmooth.analysis.basins import basins
+from nonsmooth.analysis.chart import chart, plan_chart
+from nonsmooth.campaign import store as stores
+from nonsmooth.campaign.plan import plan
+from nonsmooth.campaign.run import run
+from nonsmooth.campaign.store import describe_store, open_store
+from nonsmooth.errors import DataFileError
+
+QUIET = {"progress": False}
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_every_chunk_once(threads: int) -> None:
+    for size in (1, 6, 7, 8, 100):
+        work = Squares(size)
+        assert right(run(work, threads=threads, **QUIET), work)
+
+
+def test_a_store_holds_the_same_and_is_gone_on_with(tmp_path: Path) -> None:
+    work, path = Squares(), tmp_path / "squares.zarr"
+    with pytest.raises(RuntimeError, match="chunk 9"):
+        run(Squares(fails_at=9), threads=1, store=path, **QUIET)
+    assert describe_store(path)["done"] == 9
+    marks = {file: file.read_bytes() for file in (path / "run").glob("*.json")}
+    assert right(run(work, threads=2, store=path, **QUIET), work)
+    assert describe_store(path)["done"] == describe_store(path)["chunks"] == 15
+    assert all(file.read_bytes() == data for file, data in marks.items())  # what was there was not computed again
+    assert right(run(Squares(fails_at=3), store=path, **QUIET), work)  # nothing is computed any more
+    other = tmp_path / "other.zarr"
+    run(work, threads=1, store=other, **QUIET)
+    assert hashes(path) == hashes(other) and len(hashes(path)) > 30
+
+
+def test_a_chunk_cut_short_is_computed_again(tmp_path: Path) -> None:
+    work, path = Squares(), tmp_path / "squares.zarr"
+    run(work, store=path, **QUIET)
+    whole = hashes(path)
+    (path / "run" / "000004.json").write_text('{"chunk": 4, "ke')  # a mark cut short
+    (path / "run" / "000005.json").unlink()
+    (path / "results" / "square" / "c" / "0").write_bytes(b"torn")
+    first = json.loads((path / "run" / "000000.json").read_text())
+    (path / "run" / "000000.json").unlink()
+    assert describe_store(path)["done"] == 12
+    assert right(run(work, store=path, **QUIET), work)
+    assert hashes(path) == whole
+    assert json.loads((path / "run" / "000000.json").read_text())["content"] == first["content"]
+    (path / "results" / "pair" / "c" / "3" / "0").write_bytes(b"rotten")  # after it was marked as done
+    with pytest.raises(DataFileError, match="1 chunks are damaged .3."):
+        run(work, store=path, **QUIET)
+    assert right(run(work, store=path, **QUIET), work)
+
+
+def test_the_store_of_another_work_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "squares.zarr"
+    run(Squares(), store=path, **QUIET)
+    before = hashes(path)
+    for other, message in (
+        (Squares(name="cubes"), "another work: it differs in system"),
+        (Squares(size=101), "options differ in size"),
+        (Squares(step=8), "differs in chunks"),
+    ):
+        with pytest.raises(DataFileError, match=message):
+            run(other, store=path, **QUIET)
+    with monkeypatch.context() as patched:
+        patched.setattr(stores, "cpu_type", lambda: "another")
+        with pytest.raises(DataFileError, match="any_cpu=True"):
+            run(Squares(), store=path, **QUIET)
+        assert right(run(Squares(), store=path, any_cpu=True, **QUIET), Squares())
+    with monkeypatch.context() as patched:
+        patched.setattr(stores, "_kernel_version", lambda: "older")
+        with pytest.raises(DataFileError, match="another version"):
+            run(Squares(), store=path, **QUIET)
+    assert hashes(path) == before
+
+
+def test_places_that_cannot_be_a_store(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"\.zarr"):
+        run(Squares(), store=tmp_path / "squares.nc", **QUIET)
+    with pytest.raises(DataFileError, match="does not exist"):
+        run(Squares(), store=tmp_path / "no" / "squares.zarr", **QUIET)
+    (tmp_path / "taken.zarr").mkdir()
+    (tmp_path / "taken.zarr" / "file").write_text("mine")
+    with pytest.raises(DataFileError, match="not a store"):
+        run(Squares(), store=tmp_path / "taken.zarr", **QUIET)
+    assert (tmp_path / "taken.zarr" / "file").read_text() == "mine"
+
+
+@pytest.mark.parametrize(("number", "words"), [(errno.ENOSPC, "disk is full"), (errno.EROFS, "read-only")])
+def test_trouble_with_the_disk_is_one_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int, words: str
+) -> None:
+    work, path = Squares(), tmp_path / "squares.zarr"
+    store = open_store(path, work)
+    store.write(work, 0, work.compute(0), 0.0)
+    with monkeypatch.context() as patched:
+
+        def refuse(*_: object) -> None:
+            raise OSError(number, os.strerror(number))
+
+        patched.setattr(stores, "_write_whole", refuse)
+        with pytest.raises(DataFileError, match=words):
+            store.write(work, 1, work.compute(1), 0.0)
+    assert store.done() == {0}
+    assert right(run(work, store=path, **QUIET), work)
+
+
+def test_charts_and_basins_in_a_store(tmp_path: Path) -> None:
+    system = ns.models.discontinuous_support(g=0.02, rho=0.14, omega=5.5)
+    grid = {"omega": np.linspace(3, 7, 30), "rho": np.linspace(0.1, 0.3, 20)}
+    plain = chart(system, grid, **QUIET)
+    assert chart(system, grid, store=tmp_path / "chart.zarr", **QUIET).identical(plain)
+    assert chart(system, grid, store=tmp_path / "chart.zarr", **QUIET).identical(plain)
+    with pytest.raises(DataFileError, match="parameters differ in g"):
+        chart(system.with_parameters(g=0.01), grid, store=tmp_path / "chart.zarr", **QUIET)
+    plane = {"x": np.linspace(-0.04, 0.02, 20), "v": np.linspace(-0.2, 0.2, 20)}
+    assert basins(system, plane, store=tmp_path / "b.zarr", **QUIET).identical(basins(system, plane, **QUIET))
+
+
+def test_a_chunk_in_another_process_is_the_same() -> None:
+    """A settler travels as the system's text; what comes back has the same bits."""
+    import pickle
+
+    work = plan_chart(
+        ns.models.discontinuous_support(g=0.02), {"omega": np.linspace(3, 7, 12), "rho": np.linspace(0.1, 0.3, 9)}
+    ).work
+    there = pickle.loads(pickle.dumps(work)).compute(0)
+    for name, values in work.compute(0).items():
+        np.testing.assert_array_equal(values, there[name])
+
+
+def test_the_plan_of_a_work_whose_cost_is_known() -> None:
+    """Bytes are exact; the time is that of the sampled chunks scaled up."""
+    found = plan(Squares(size=7000, step=70), seconds=0.05)
+    assert (found.places, found.chunks, found.result_bytes) == (7000, 100, 7000 * 16)
+    assert 8 <= found.sampled <= 100
+    assert found.seconds(4) == pytest.approx(found.core_seconds / 4)
+    assert "7000 points in 100 chunks" in found.text(8) and "8 cores" in found.text(8)

@@ -1,0 +1,145 @@
+"""Grazing followed in both directions, on the soft support and at a rigid stop."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import reference_values as known
+import xarray as xr
+
+import nonsmooth as ns
+
+support = ns.models.discontinuous_support
+
+#: rho, g, an omega without contact and one with contact on the period-1 branch, and the range.
+SOFT = {
+    "figure 9": (0.14, 0.02, 3.3, 4.5, (3.0, 7.0)),
+    "figure 10": (0.16, 0.0145, 2.2, 5.0, (2.0, 8.0)),
+    "figure 17": (0.23, 0.0036, 10.9, 9.0, (7.5, 11.0)),
+}
+
+
+def table(branch: xr.Dataset) -> list[tuple[str, float]]:
+    special = ns.special_points(branch)
+    name = branch.attrs["parameter"]
+    return sorted((str(k), float(v)) for k, v in zip(special["kind"].values, special[name].values, strict=True))
+
+
+def from_both_sides(figure: str, **more: float) -> tuple[xr.Dataset, xr.Dataset]:
+    rho, g, free, contact, limits = SOFT[figure]
+    system = support(rho=rho, g=g, **more)
+    one = ns.find_orbit(system.with_parameters(omega=free), period_number=1)
+    other = ns.find_orbit(system.with_parameters(omega=contact), period_number=1)
+    assert not one.signature.crossings and other.contacts_per_period == 1
+    return ns.continue_orbit(one, "omega", limits), ns.continue_orbit(other, "omega", limits)
+
+
+@pytest.mark.parametrize("figure", SOFT)
+@pytest.mark.parametrize("c_s", [0.6, 0.0])
+def test_both_directions_agree(figure: str, c_s: float) -> None:
+    """A contact gained or lost: special points to 1e-9, branch points to 1e-8 at equal parameters."""
+    one, other = from_both_sides(figure, c_s=c_s)
+    a, b = table(one), table(other)
+    assert [kind for kind, _ in a] == [kind for kind, _ in b]
+    assert [value for _, value in a] == pytest.approx([value for _, value in b], abs=1e-9)
+    # Orbits at equal parameters: those of one branch solved again from the other's points.
+    for i in np.linspace(1, other.sizes["point"] - 2, 12).astype(int):
+        row = other.isel(point=int(i))
+        system = support(rho=float(row["rho"]), g=float(row["g"]), c_s=c_s, omega=float(row["omega"]))
+        near = one.isel(point=int(np.argmin(distance(one, row))))
+        if not abs(float(near["omega"]) - float(row["omega"])) < 0.2:
+            continue
+        start = dict(zip(system.states, row["section"].values, strict=True))
+        orbit = ns.find_orbit(system, start=start, period_number=1, transient=0)
+        assert orbit.u == pytest.approx(row["section"].values, abs=1e-8)
+
+
+def distance(branch: xr.Dataset, row: xr.Dataset) -> np.ndarray:
+    gaps = (branch["section"].values - row["section"].values) / [1e-3, 1e-2]
+    return np.hypot(np.linalg.norm(gaps, axis=1), (branch["omega"].values - float(row["omega"])) * 10)
+
+
+@pytest.mark.parametrize("side", ["lower", "upper"])
+def test_multipliers_just_past_the_graze(side: str) -> None:
+    """They tend to those of M- with S inserted: within 1e-2 at a depth of 1e-10 m, like the root of the depth."""
+    rho, g, free, _, limits = SOFT["figure 9"]
+    graze_at = known.grazing_frequencies(rho, g)[0 if side == "lower" else 1]
+    free = free if side == "lower" else 6.5  # the contact is gained where this graze is met
+    branch = ns.continue_orbit(ns.find_orbit(support(rho=rho, g=g, omega=free)), "omega", limits, step=0.02)
+    special = ns.special_points(branch)
+    i = int(np.flatnonzero(np.abs(special["omega"].values - graze_at) < 1e-9)[0])
+    row = special.isel(special=i)
+    limit = closed_limit(rho, g, graze_at)
+    found = row["contact_multipliers"].values
+    assert sorted_by_imag(found) == pytest.approx(sorted_by_imag(limit), abs=1e-7)
+    # Points of the branch in contact next to the graze, by depth.
+    contact = branch["contacts_per_period"].values == 1
+    depth = branch["maximum"].sel(state="x").values - g
+    order = [int(k) for k in np.flatnonzero(contact & (depth > 0) & (depth < 3e-8))]
+    near = [k for k in order if abs(float(branch["omega"][k]) - graze_at) < 1e-3]
+    errors = np.array([np.abs(sorted_by_imag(branch["floquet_multipliers"].values[k]) - sorted_by_imag(limit)).max()
+                       for k in near])  # fmt: skip
+    depths = depth[near]
+    shallow = depths < 1.2e-10
+    assert shallow.any() and errors[shallow].max() < 1e-2
+    rates = errors / np.sqrt(depths)
+    assert rates.max() < 3 * rates.min()
+
+
+def sorted_by_imag(mu: np.ndarray) -> np.ndarray:
+    return mu[np.argsort(mu.imag)]
+
+
+def closed_limit(rho: float, g: float, omega: float) -> np.ndarray:
+    """M- and S of the paper's oscillator in closed form: S = [[1, 0], [-c_s / m, 1]] put in at the touch."""
+    m, k, c, c_s = (known.TABLE_1[key] for key in ("m", "k", "c", "c_s"))
+    a, w = c / (2 * m), np.sqrt(2 * k / m - (c / (2 * m)) ** 2)
+    T = 2 * np.pi / omega
+    cos, sin = np.cos(w * T), np.sin(w * T)
+    M = np.exp(-a * T) * np.array([[cos + a / w * sin, sin / w], [-(a * a + w * w) / w * sin, cos - a / w * sin]])
+    # The eigenvalues of Phi2 S Phi1 are those of M S: the flow without contact commutes with itself.
+    return np.linalg.eigvals(M @ np.array([[1.0, 0.0], [-c_s / m, 1.0]]))
+
+
+def test_jump_of_the_multipliers_is_proportional_to_the_damper() -> None:
+    """c_s = 0: continuous at the graze. As c_s -> 0 the jump of the trace is c_s times a constant."""
+    rho, g, free, _, limits = SOFT["figure 9"]
+    jumps = {}
+    for c_s in (0.0, 0.02, 0.04, 0.08):
+        system = support(rho=rho, g=g, omega=free, c_s=c_s)
+        special = ns.special_points(ns.continue_orbit(ns.find_orbit(system), "omega", (limits[0], 3.7)))
+        row = special.isel(special=int(np.flatnonzero(special["kind"].values == "grazing")[0]))
+        jumps[c_s] = (row["contact_multipliers"].sum() - row["floquet_multipliers"].sum()).values.real
+    assert abs(jumps[0.0]) < 1e-6
+    assert [jumps[c_s] / c_s for c_s in (0.02, 0.04)] == pytest.approx([jumps[0.08] / 0.08] * 2, rel=1e-4)
+
+
+@pytest.mark.parametrize(("omega", "kind"), [(0.8, "persistence"), (1.3, "non_smooth_fold")])
+def test_impact_oscillator_both_ways(omega: float, kind: str) -> None:
+    """Rigid stop, det S = e^2: the multiplier has no bound at the graze, and the sign of det(I - M+) decides."""
+    system = ns.models.impact_oscillator(omega=omega)
+    exact = float(np.hypot(1 - omega**2, 0.1 * omega))
+    free = ns.continue_orbit(ns.find_orbit(system.with_parameters(A=0.5 * exact)), "A", (0.1 * exact, 2 * exact))
+    special = ns.special_points(free)
+    graze = special.isel(special=int(np.flatnonzero(special["kind"].values == "grazing")[0]))
+    assert float(graze["A"]) == pytest.approx(exact, abs=1e-12)
+    assert str(graze["grazing"].values) == kind and not bool(graze["bounded"])
+    minus, plus = graze["determinant"].values[:2]
+    assert (minus * plus > 0) == (kind == "persistence")
+    # The impacting branch lies on the other side of A, or on the same one.
+    impacts = free["contacts_per_period"].values > 0
+    here = int(graze["point"])
+    beyond = next(k for k in (here - 1, here + 1) if impacts[k])
+    assert (float(free["A"][beyond]) > exact) == (kind == "persistence")
+    # det M = e^2 exp(-c T) on every orbit with one impact per period.
+    tame = impacts & (np.abs(free["floquet_multipliers"].values).max(axis=1) < 1e2)  # beside the graze digits are lost
+    product = np.prod(free["floquet_multipliers"].values[tame], axis=1)
+    T = 2 * np.pi / omega
+    assert tame.sum() > 10 and np.allclose(product, 0.64 * np.exp(-0.1 * T), rtol=1e-10)
+    # And back: begun with an impact.
+    k = int(np.flatnonzero(impacts)[len(np.flatnonzero(impacts)) // 2])
+    start = free["section"].values[k]
+    at = system.with_parameters(A=float(free["A"][k]))
+    orbit = ns.find_orbit(at, start=start, period_number=1, transient=0)
+    back = ns.continue_orbit(orbit, "A", (0.1 * exact, 2 * exact))
+    assert [value for _, value in table(back)] == pytest.approx([value for _, value in table(free)], abs=1e-9)

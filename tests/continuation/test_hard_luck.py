@@ -1,0 +1,111 @@
+"""What cannot succeed ends with a status and a sentence: no traceback from Newton, no silent half branch."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import reference_values as known
+
+import nonsmooth as ns
+from nonsmooth.continuation.branch import ENDINGS
+
+support = ns.models.discontinuous_support
+
+
+def ends(branch: object) -> list[str]:
+    words = list(ENDINGS)
+    return [words[int(i)] for i in branch["ended"].values]  # type: ignore[index]
+
+
+def test_a_chaotic_start() -> None:
+    with pytest.raises(ns.SolveError, match="period_number=") as caught:
+        ns.find_orbit(support(rho=0.22, omega=3.69, g=-0.0045))
+    assert caught.value.status == "not_periodic"
+
+
+def test_an_unstable_orbit_within_chaos() -> None:
+    """Given its period number, Newton finds the saddle; it lies on the branch that comes from the stable side."""
+    system = support(rho=0.22, omega=3.69, g=-0.0045)
+    orbit = ns.find_orbit(system, period_number=1)
+    assert not orbit.stable and not orbit.virtual
+    branch = ns.continue_orbit(ns.find_orbit(system.with_parameters(rho=0.45)), "rho", (0.22, 0.5))
+    assert branch["section"].values[0] == pytest.approx(orbit.u, abs=1e-10)
+
+
+def test_an_equilibrium_is_no_cycle() -> None:
+    with pytest.raises(ns.SolveError, match="equilibrium"):
+        ns.find_orbit(ns.models.relief_valve(q=9.5), start={"y1": 0.2, "y2": 0.0, "y3": 10.0})
+
+
+def test_a_start_beyond_a_stop() -> None:
+    with pytest.raises(ns.SolveError, match="stop"):
+        ns.find_orbit(ns.models.impact_oscillator(), start={"x": 2.0})
+
+
+def test_an_orbit_that_grazes_at_the_start() -> None:
+    """At the grazing frequency itself: the branch goes both ways, and the graze is reported."""
+    graze = known.grazing_frequencies(0.14, 0.02)[0]
+    orbit = ns.find_orbit(support(rho=0.14, g=0.02, omega=graze), period_number=1)
+    assert abs(orbit.clearance["penetration"]) < 1e-12
+    branch = ns.continue_orbit(orbit, "omega", (3.4, 3.7))
+    special = ns.special_points(branch)
+    found = special["omega"].values[special["kind"].values == "grazing"]
+    assert found == pytest.approx([graze], abs=1e-9)
+    assert float(branch["omega"].min()) == pytest.approx(3.4) and float(branch["omega"].max()) == pytest.approx(3.7)
+    assert set(np.unique(branch["contacts_per_period"])) == {0.0, 1.0}
+
+
+def test_a_range_that_leaves_the_physical_region() -> None:
+    """A mass that would become negative, a period without end: the range is cut, and the end says so."""
+    orbit = ns.find_orbit(support(rho=0.14, g=0.02, omega=3.3))
+    for name, limits in (("m", (-0.5, 1.0)), ("omega", (-1.0, 4.0))):
+        branch = ns.continue_orbit(orbit, name, limits, points=150)
+        assert float(branch[name].min()) > 0.0
+        assert "allow" in str(branch["ended_because"].values[0]) or ends(branch)[0] in ("points", "no_convergence")
+        assert all(str(text) for text in branch["ended_because"].values)
+
+
+def test_a_fold_at_the_edge_of_the_range() -> None:
+    """The range ends exactly at the fold: the branch ends there or just turns, and says which."""
+    fold = known.FOLDS["figure 9 rising"]
+    orbit = ns.find_orbit(support(rho=0.14, g=0.02, omega=4.5))
+    for edge in (fold, fold - 1e-9, fold + 1e-9):
+        branch = ns.continue_orbit(orbit, "omega", (4.0, edge))
+        assert set(ends(branch)) <= {"range", "grazing"}
+        assert float(branch["omega"].max()) <= edge + 1e-12
+        assert np.isfinite(branch["section"].values).all()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("omegas", (3.0, 4.0)), "parameter"),
+        (("omega", (5.0, 6.0)), "outside"),
+        (("omega", (4.0, 3.0)), "below"),
+        (("omega", 3.0), "two ends"),
+        ((), "which parameter"),
+    ],
+)
+def test_wrong_arguments(arguments: tuple[object, ...], words: str) -> None:
+    orbit = ns.find_orbit(support(rho=0.14, g=0.02, omega=3.3))
+    with pytest.raises((ValueError, TypeError), match=words):
+        ns.continue_orbit(orbit, *arguments)  # type: ignore[arg-type]
+
+
+def test_what_is_no_orbit() -> None:
+    with pytest.raises(TypeError, match="Orbit"):
+        ns.continue_orbit(3.0, "omega", (3.0, 4.0))
+    with pytest.raises(TypeError, match="branch"):
+        ns.special_points({})
+    with pytest.raises(TypeError):
+        ns.find_orbit("discontinuous_support")  # type: ignore[arg-type]
+
+
+def test_switching_where_nothing_branches() -> None:
+    branch = ns.continue_orbit(ns.find_orbit(support(rho=0.14, g=0.02, omega=3.3)), "omega", (3.0, 7.0))
+    special = ns.special_points(branch)
+    row = special.isel(special=int(np.flatnonzero(special["kind"].values == "fold")[0]))
+    with pytest.raises(ValueError, match="no other branch"):
+        ns.continue_orbit(row)
+    with pytest.raises(ValueError, match="one special point"):
+        ns.continue_orbit(special)

@@ -1,0 +1,70 @@
+"""Pictures of charts, basins and multistability: what is drawn is what the result holds."""
+
+from __future__ import annotations
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+from nonsmooth.analysis.basin_fractions import basin_fractions
+from nonsmooth.analysis.basins import basins
+from nonsmooth.analysis.chart import chart
+from nonsmooth.plot.basin_fractions import basin_fractions as draw_fractions
+from nonsmooth.plot.basins import basins as draw_basins
+from nonsmooth.plot.chart import chart as draw_chart
+from nonsmooth.plot.palette import PERIODS, attractor_color
+
+mpl.use("Agg")
+QUIET = {"progress": False}
+BOX = {"x": (-0.02, 0.02), "v": (-0.2, 0.2)}
+
+
+@pytest.fixture(scope="module")
+def support() -> ns.System:
+    return ns.models.discontinuous_support(omega=11.15, rho=0.33, g=0.0014)
+
+
+def texts(ax) -> list[str]:
+    return [text.get_text() for text in ax.get_legend().get_texts()]
+
+
+def test_a_chart_shows_each_period_once_with_its_colour(support: ns.System) -> None:
+    plane = chart(support, {"g": [-0.001, 0.0009, 0.0012, 0.0018], "rho": [0.33, 0.331]}, lyapunov=100, **QUIET)
+    ax = draw_chart(plane)
+    assert texts(ax) == [str(p) for p in sorted(set(plane["period_number"].values.ravel().tolist()) - {0})] + ["none"]
+    mesh = ax.collections[0]
+    assert mesh.get_array().size == 8
+    first = mesh.to_rgba(mesh.get_array().ravel())[0]
+    assert mpl.colors.to_hex(first) == PERIODS[int(plane["period_number"][0, 0]) - 1].lower()
+    assert ax.get_xlabel() == "$g$ (m)" and ax.get_ylabel() == r"$\rho$ (N)"
+    for show in ("lyapunov", "maximum", "contacts_per_period"):
+        drawn = draw_chart(plane, show=show)
+        low, high = drawn.collections[0].get_clim()
+        assert show != "lyapunov" or low == -high
+        values = drawn.collections[0].get_array().ravel()
+        expected = plane[show].isel(state=0) if "state" in plane[show].dims else plane[show]
+        np.testing.assert_allclose(values, expected.transpose("rho", "g").values.ravel())
+    with pytest.raises(ValueError, match="chart"):
+        draw_chart(ns.sweep(support, "g", [0.001], keep=4, **QUIET))
+
+
+def test_basins_show_their_attractors(support: ns.System) -> None:
+    found = basins(support, {"x": np.linspace(-0.02, 0.02, 12), "v": np.linspace(-0.2, 0.2, 10)}, **QUIET)
+    ax = draw_basins(found)
+    words = texts(ax)
+    assert len(words) == 3 and {word.split(":")[0] for word in words[:2]} == {"period 3", "period 4"}
+    assert sum(len(line.get_xdata()) for line in ax.lines) == 7
+    np.testing.assert_array_equal(ax.collections[0].get_array().ravel(), found["label"].values.T.ravel())
+    assert len({attractor_color(k) for k in range(9)}) == 9 and attractor_color(-1) == "#FFFFFF"
+
+
+def test_shares_add_up_to_all(support: ns.System) -> None:
+    along = basin_fractions(support, "g", [0.0012, 0.0014, 0.0018], n_starts=30, box=BOX, **QUIET)
+    ax = draw_fractions(along)
+    top = max(path.vertices[:, 1].max() for item in ax.collections for path in item.get_paths())
+    assert top == pytest.approx(100.0)
+    above = draw_fractions(along, y="x")
+    assert above.get_ylabel() == "max $x$ (m)"
+    with pytest.raises(ValueError, match="not a state"):
+        draw_fractions(along, y="z")
