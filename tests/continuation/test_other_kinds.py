@@ -107,7 +107,10 @@ def test_pitchfork_of_a_symmetric_double_well() -> None:
         return v, -0.3 * v + p.a * x - x**3 + 0.05 * np.cos(t)
 
     system = ns.System(
-        name="double well", states=["x", "v"], parameters={"a": -0.5}, modes={"one": well},
+        name="double well",
+        states=["x", "v"],
+        parameters={"a": -0.5},
+        modes={"one": well},
         symmetry=(lambda u: (-u.x, -u.v), 0.5),
     )
     branch = ns.continue_orbit(ns.find_orbit(system), "a", (-1.0, 1.0))
