@@ -16,6 +16,7 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(name, "1")
 sys.path.insert(0, str(Path(__file__).parent))
 
+import branch  # noqa: E402
 import chart  # noqa: E402
 import diagram  # noqa: E402
 import lyapunov  # noqa: E402
@@ -31,7 +32,7 @@ def main() -> int:
     options = parser.parse_args()
     effort = 0.1 if options.quick else 1.0
     text, verdicts = ["# Benchmarks", "", *(f"- {fact}" for fact in machine.facts() if fact), ""], []
-    for part in (oscillator, valve, diagram, chart, lyapunov):
+    for part in (oscillator, valve, diagram, chart, lyapunov, branch):
         lines, part_verdicts = part.run(effort)
         print("\n".join(lines), flush=True)
         text += lines

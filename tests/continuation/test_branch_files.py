@@ -58,6 +58,16 @@ def test_trajectory_closes() -> None:
     assert run["u"].max("time").values == pytest.approx(orbit.maximum, abs=1e-5)  # samples miss the peaks
 
 
+def test_orbit_of_the_smoothed_switch() -> None:
+    """Its memory, the velocity at the entry into the band, is part of the orbit; eta^2 away from the sharp one."""
+    sharp = ns.models.discontinuous_support(rho=0.45, omega=3.69, g=-0.0045)
+    orbit, near = ns.find_orbit(sharp), ns.find_orbit(sharp.smoothed(1e-6), transient=200)
+    assert near.u == pytest.approx(orbit.u, abs=1e-6)
+    assert np.abs(near.floquet_multipliers[:2] - orbit.floquet_multipliers).max() < 1e-2
+    run = near.trajectory()
+    assert run["u"].values[-1] == pytest.approx(near.u, abs=1e-10)
+
+
 def test_schema() -> None:
     """Dims and variables that scripts may rely on."""
     orbit = ns.find_orbit(ns.models.discontinuous_support(rho=0.45, omega=3.69, g=-0.0045))

@@ -95,8 +95,21 @@ class Orbit:
 
         rtol = 1e-13 if _needs_tolerance(self.system) else None
         return simulate(
-            self.system, duration=self.period, start=self.u, mode=self.mode, samples=samples or 1025, rtol=rtol
+            self.system, duration=self.period, start=self._start(), mode=self.mode, samples=samples or 1025, rtol=rtol
         )
+
+    def _start(self) -> Any:
+        """The state at the section as a start; with the memory, where the system has one."""
+        if not len(self.memory):
+            return self.u
+        import xarray as xr
+
+        variables: dict[str, Any] = {
+            "u": (("time", "state"), self.u[None, :]),
+            "mode": ("time", np.zeros(1, dtype=int), {"flag_meanings": "-"}),  # given by name beside it
+        }
+        variables |= {name: ("time", [value]) for name, value in zip(self.system.memory, self.memory, strict=True)}
+        return xr.Dataset(variables, {"state": list(self.system.states)})
 
     def __repr__(self) -> str:
         name = f"period-{self.period_number}" if self.period_number else "autonomous"

@@ -73,7 +73,7 @@ def spectrum(
     """One-sided spectrum of an evenly sampled signal.
 
     A sinusoid of amplitude A on a line has ``amplitude`` A there, whatever the window:
-    amplitude_k = 2 |sum of w_j x_j exp(-2 pi i j k / N)| / sum of w_j.
+    ``amplitude_k = 2 |sum of w_j x_j exp(-2 pi i j k / N)| / sum of w_j``.
 
     Parameters
     ----------
