@@ -28,7 +28,6 @@ from distributed import Client
 from simple_work import Squares
 from nonsmooth.campaign.run import run
 with Client({address!r}) as client:
-    client.run(sys.path.insert, 0, {here!r})
     run(Squares(size={size}, step=7, seconds={seconds}), store={store!r}, client=client, progress=False)
 """
 
@@ -39,28 +38,62 @@ def test_without_dask_the_message_says_what_to_install(monkeypatch: pytest.Monke
         cluster.on_cluster(Squares(), [0], print, None, None)
 
 
+class Crew:
+    """Three worker processes of a cluster, each put back when it is gone, as a batch system would."""
+
+    def __init__(self, address: str) -> None:
+        self.command = [
+            sys.executable, "-c", "from distributed.cli.dask_worker import main; main()", address, "--nthreads", "1",
+            "--no-nanny", "--no-dashboard", "--memory-limit", "0",
+        ]  # fmt: skip
+        self.environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(HERE), *filter(None, sys.path)])}
+        self.members = [self._begin() for _ in range(3)]
+        self.stop = threading.Event()
+        self.thread = threading.Thread(target=self._watch)
+        self.thread.start()
+
+    def _begin(self) -> subprocess.Popen[bytes]:
+        quiet = subprocess.DEVNULL
+        return subprocess.Popen(self.command, env=self.environment, stdout=quiet, stderr=quiet)
+
+    def _watch(self) -> None:
+        while not self.stop.wait(0.3):
+            for k, member in enumerate(self.members):
+                if member.poll() is not None:
+                    self.members[k] = self._begin()
+
+    def close(self) -> None:
+        self.stop.set()
+        self.thread.join()
+        for member in self.members:
+            member.kill()
+            member.wait()
+
+
 @pytest.fixture
 def three_workers():
     distributed = pytest.importorskip("distributed")
     with (
-        distributed.LocalCluster(
-            n_workers=3, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
-        ) as found,
+        distributed.LocalCluster(n_workers=0, processes=True, dashboard_address=None, silence_logs=50) as found,
         distributed.Client(found) as client,
     ):
-        client.run(sys.path.insert, 0, str(HERE))
-        yield client
+        crew = Crew(client.scheduler.address)
+        try:
+            client.wait_for_workers(3, timeout=120)
+            yield client, crew
+        finally:
+            crew.close()
 
 
 def test_a_cluster_computes_the_same(three_workers, tmp_path: Path) -> None:
     work = Squares()
-    assert right(run(work, client=three_workers, **QUIET), work)
-    assert right(run(work, client=three_workers, store=tmp_path / "far.zarr", **QUIET), work)
+    assert right(run(work, client=three_workers[0], **QUIET), work)
+    assert right(run(work, client=three_workers[0], store=tmp_path / "far.zarr", **QUIET), work)
     run(work, threads=1, store=tmp_path / "here.zarr", **QUIET)
     assert hashes(tmp_path / "far.zarr") == hashes(tmp_path / "here.zarr")
 
 
-def disturbed(client, path: Path, chunks: int, seconds: float, kills: int, client_kills: int) -> int:
+def disturbed(client, crew: Crew, path: Path, chunks: int, seconds: float, kills: int, client_kills: int) -> int:
     """Run a campaign in a process of its own while workers and that process are killed. Returns the kills made."""
     program = CAMPAIGN.format(
         here=str(HERE), address=client.scheduler.address, size=7 * chunks, seconds=seconds, store=str(path)
@@ -69,15 +102,15 @@ def disturbed(client, path: Path, chunks: int, seconds: float, kills: int, clien
 
     def killer() -> None:
         span = chunks * seconds / 3
-        while made[0] < kills and not stop.is_set():
-            time.sleep(rng.uniform(0.3, 1.7) * span / kills)
-            busy = [name for name, tasks in client.processing().items() if tasks]
+        while made[0] < kills and not stop.wait(rng.uniform(0.3, 1.7) * span / kills):
+            started = path / "run" / "started.log"  # kill whoever began last: it is busy
+            if not started.exists():
+                continue
+            lines = [json.loads(line) for line in started.read_text().splitlines()]
+            busy = [m for m in crew.members if m.poll() is None and m.pid in {line["process"] for line in lines[-3:]}]
             if busy:
-                pids = client.run(os.getpid)
-                victim = rng.choice([name for name in busy if name in pids] or [None])
-                if victim:
-                    os.kill(pids[victim], signal.SIGKILL)
-                    made[0] += 1
+                os.kill(rng.choice(busy).pid, signal.SIGKILL)
+                made[0] += 1
 
     thread = threading.Thread(target=killer)
     thread.start()
@@ -107,7 +140,7 @@ def test_killed_workers_and_clients_change_nothing(
         words = os.environ["NONSMOOTH_FAULTS"].split(",")
         chunks, seconds, kills, client_kills = int(words[0]), float(words[1]), int(words[2]), int(words[3])
     path = tmp_path / "disturbed.zarr"
-    made = disturbed(three_workers, path, chunks, seconds, kills, client_kills)
+    made = disturbed(*three_workers, path, chunks, seconds, kills, client_kills)
     assert made >= kills // 2
     calm = tmp_path / "calm.zarr"
     run(Squares(size=7 * chunks), threads=1, store=calm, **QUIET)
