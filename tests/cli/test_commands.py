@@ -55,6 +55,14 @@ def test_show_tells_what_a_file_holds(swept: xr.Dataset, tmp_path: Path, capsys:
     assert "the system as text" in capsys.readouterr().out
 
 
+def test_show_tells_what_a_recording_holds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "tap.csv"
+    path.write_text("Time (s) Run #1,Position (m) Run #1\n0,0.25\n0.01,0.5\n0.02,0.75\n")
+    assert run("show", path) == 0
+    shown = capsys.readouterr().out
+    assert "tap.csv" in shown and "3 samples at 100 Hz" in shown and "Position [m]" in shown
+
+
 def test_a_damaged_file_is_one_message_and_exit_code_2(
     swept: xr.Dataset, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -11,13 +11,13 @@ from collections.abc import Sequence
 # fits), and beside our own threads for a core. Must stand before NumPy is loaded.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from nonsmooth.cli import compare, identify, models, reproduce, rig, run, show
+from nonsmooth.cli import compare, identify, models, plan, reproduce, rig, run, show
 from nonsmooth.errors import SolveError
 from nonsmooth.results.provenance import package_version
 
 __all__ = ["main"]
 
-_COMMANDS = (run, identify, compare, reproduce, models, show, rig)
+_COMMANDS = (run, plan, identify, compare, reproduce, models, show, rig)
 #: What a user can have caused and mend. Anything else is a fault of the package and keeps its traceback.
 _USER_ERRORS = (ValueError, TypeError, OSError, SolveError)
 

@@ -1,4 +1,4 @@
-"""``nonsmooth show FILE``: what a saved result holds."""
+"""``nonsmooth show FILE``: what a saved result, a store of chunks or a recording holds."""
 
 from __future__ import annotations
 
@@ -11,15 +11,16 @@ import numpy as np
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["add", "summary"]
+__all__ = ["add", "progress_of", "summary"]
 
 
 def add(commands: Any) -> None:
     """Declare the sub-command."""
     parser = commands.add_parser(
-        "show", help="show what a saved result holds", description="Show what a saved result (.nc, .zarr) holds."
+        "show", help="show what a file holds",
+        description="Show what a saved result (.nc, .zarr), a store of chunks or a recording (.csv, .cap, ...) holds.",
     )
-    parser.add_argument("file", type=Path, help="a result saved by this package")
+    parser.add_argument("file", type=Path, help="a result saved by this package, or a recording")
     parser.add_argument("--text", action="store_true", help="show the whole text of the system too")
     parser.set_defaults(run=_run)
 
@@ -28,11 +29,37 @@ def _run(options: argparse.Namespace) -> int:
     from nonsmooth.results.provenance import read_provenance
     from nonsmooth.results.store import load
 
+    if (options.file / "run").is_dir():  # a store of chunks, finished or not
+        print(progress_of(options.file))
+        return 0
+    if options.file.suffix not in (".nc", ".zarr"):  # what an instrument wrote
+        from nonsmooth.experiment.load import load_recording
+
+        print(load_recording(options.file))
+        return 0
     result = load(options.file)
     print(summary(result))
     if options.text:
         print(read_provenance(result).get("system", {}).get("text", "(not made from a system)"))
     return 0
+
+
+def progress_of(path: Path) -> str:
+    """How far a store of chunks is."""
+    from nonsmooth.campaign.store import describe_store
+
+    record = describe_store(path)
+    done, chunks = record["done"], record["chunks"]
+    each = record["seconds"] / done if done else 0.0
+    part, places = 100 * done / chunks, record["places"]
+    lines = [
+        f"{record['verb']}: {done} of {chunks} chunks are there ({part:.3g} %), {places} points",
+        f"worked      {record['seconds']:.3g} s of one core, on a processor of type {record['cpu']}",
+        f"remains     about {each * (chunks - done):.3g} s of one core" if done < chunks else "remains     nothing",
+    ]
+    if record["started"] > done:
+        lines.append(f"begun       {record['started']}: some chunks are under way, or were lost with their worker")
+    return "\n".join(lines)
 
 
 def summary(result: xr.Dataset) -> str:

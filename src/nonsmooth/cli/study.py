@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Study", "load_model", "named_model", "read_study"]
 
-VERBS = ("simulate", "sweep", "frequency_response", "poincare")
+VERBS = ("simulate", "sweep", "frequency_response", "poincare", "chart", "basins", "basin_fractions")
 _SYSTEM_KEYS = ("model", "parameters", "smoothed")
 _OUTPUT_KEYS = ("data", "figure", "x", "y")
 #: Arguments of verbs that belong to the command line, or that a file cannot hold.
@@ -31,7 +31,7 @@ _NOT_IN_FILES = ("progress", "client", "store")
 _HANDS_ON_TO = {"frequency_response": "sweep"}
 _FIGURES = {
     "simulate": "phase_portrait", "sweep": "bifurcation", "frequency_response": "frequency_response",
-    "poincare": "section",
+    "poincare": "section", "chart": "chart", "basins": "basins", "basin_fractions": "basin_fractions",
 }  # fmt: skip
 
 
@@ -175,7 +175,7 @@ def _options(verb: str, table: Mapping[str, Any], where: str) -> dict[str, Any]:
     missing = [name for name in allowed if signature[name].default is inspect.Parameter.empty and name not in table]
     if missing:
         raise ValueError(f"{place}: needs {', '.join(missing)}; all keys: {', '.join(allowed)}")
-    readers = {"values": _values, "section": _section, "start": _start, "direction": _direction}
+    readers = {"values": _values, "grid": _grid, "section": _section, "start": _start, "direction": _direction}
     return {name: readers[name](value, place) if name in readers else value for name, value in table.items()}
 
 
@@ -192,6 +192,12 @@ def _values(value: Any, place: str) -> Any:
     elif isinstance(value, list):
         return float_array(value, f"{place}: values")
     raise ValueError(f"{place}: values is {value!r}; give a list or {{ from = ..., to = ..., n = ... }}")
+
+
+def _grid(value: Any, place: str) -> Any:
+    if not isinstance(value, dict):
+        raise ValueError(f"{place}: grid is {value!r}; give {{ name = VALUES, other = VALUES }}")
+    return {name: _values(values, f"{place}, grid, {name}") for name, values in value.items()}
 
 
 def _section(value: Any, place: str) -> Any:

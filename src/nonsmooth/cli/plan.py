@@ -1,0 +1,35 @@
+"""``nonsmooth plan STUDY.toml``: what a chart would take, before it is started."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+__all__ = ["add"]
+
+
+def add(commands: Any) -> None:
+    """Declare the sub-command."""
+    parser = commands.add_parser(
+        "plan",
+        help="say what a chart would take",
+        description="Run a small random sample of a chart's points and print what the whole would take.",
+    )
+    parser.add_argument("study", type=Path, metavar="STUDY.toml", help="a study file with a table [chart]")
+    parser.add_argument("--workers", type=int, help="cores of a cluster to reckon with")
+    parser.add_argument("--seconds", type=float, default=5.0, help="time to spend on the sample (default: 5)")
+    parser.set_defaults(run=_run)
+
+
+def _run(options: argparse.Namespace) -> int:
+    from nonsmooth.analysis.chart import plan_chart
+    from nonsmooth.campaign.plan import plan
+    from nonsmooth.cli.study import read_study
+
+    study = read_study(options.study)
+    if study.verb != "chart":
+        raise ValueError(f"{options.study}: plan is for charts, this study runs {study.verb}")
+    given = {name: value for name, value in study.options.items() if name not in ("threads", "any_cpu")}
+    print(plan(plan_chart(study.system, **given).work, seconds=options.seconds).text(options.workers))
+    return 0
