@@ -10,8 +10,10 @@ from matplotlib.lines import Line2D
 
 from nonsmooth import plot
 from nonsmooth.analysis.sweep import sweep
+from nonsmooth.plot.branch import draw_branch
 from nonsmooth.results.provenance import read_provenance
-from nonsmooth.studies.savi2007.flows import FLOWS, Settings, starts
+from nonsmooth.studies.savi2007.branches import branches_of
+from nonsmooth.studies.savi2007.flows import EXACT, FLOWS, Settings, starts
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -19,7 +21,13 @@ if TYPE_CHECKING:
 
 Place: TypeAlias = Literal["best", "upper left", "upper right", "lower left"]
 
-__all__ = ["diagrams", "draw_diagram", "how", "legend"]
+__all__ = ["ABOUT_BRANCHES", "diagrams", "draw_branches", "draw_diagram", "how", "legend"]
+
+#: What a caption says of them.
+ABOUT_BRANCHES = (
+    "Black lines in (a): periodic orbits of the exact flow, continued from one of them (solid: stable, dashed: "
+    "unstable), with their special points. "
+)
 
 
 def diagrams(
@@ -63,7 +71,10 @@ def _grid(low: float, high: float, steps: int, also: tuple[float, ...]) -> np.nd
 def draw_diagram(
     ax: Axes, data: Mapping[str, xr.Dataset], key: str, y: str, *, values: Sequence[float] = (), loc: Place = "best"
 ) -> None:
-    """One diagram: starts in grey behind, down over up; the paper's parameter values as dotted lines."""
+    """One diagram: starts in grey behind, down over up; the paper's parameter values as dotted lines.
+
+    On that of the exact flow the branches of periodic orbits.
+    """
     plot.bifurcation(data[f"{key}_starts"], ax, y=y, color="#B4B4B4", size=1.8)
     behind = len(ax.get_lines())
     plot.bifurcation(data[key], ax, y=y, size=0.9 if data[key].sizes["iterate"] > 100 else 1.3)
@@ -73,7 +84,20 @@ def draw_diagram(
     for i, value in enumerate(values):
         label = "printed in the paper" if i == 0 else None
         ax.axvline(value, color="black", linewidth=0.6, linestyle=":", zorder=0, label=label)
+    if key == EXACT.key:
+        draw_branches(ax, data, y=y)
     legend(ax, loc)
+
+
+def draw_branches(ax: Axes, data: Mapping[str, xr.Dataset], *, y: str, quantity: str = "section") -> None:
+    """The branches of a figure in black, where there are any; marks on those of period 1 and 2."""
+    found = branches_of(data)
+    for one in found:
+        few = int(one["period_number"]) <= 2
+        draw_branch(ax, one, y=y, quantity=quantity, special=few, color="black", width=0.7)
+    for words, line in (("stable orbits", "-"), ("unstable orbits", "--")):
+        if found:
+            ax.plot([], [], line, color="black", linewidth=0.7, label=words)
 
 
 def legend(ax: Axes, loc: Place) -> None:

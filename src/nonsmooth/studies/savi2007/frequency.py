@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 from nonsmooth import plot
 from nonsmooth.analysis.sweep import sweep
 from nonsmooth.flow.poincare import poincare
-from nonsmooth.studies.savi2007.diagrams import diagrams, draw_diagram, how, legend
+from nonsmooth.studies.savi2007.branches import branches
+from nonsmooth.studies.savi2007.diagrams import ABOUT_BRANCHES, diagrams, draw_diagram, how, legend
 from nonsmooth.studies.savi2007.figure import Figure, sheet
 from nonsmooth.studies.savi2007.flows import EXACT, FLOWS, Settings, starts
 from nonsmooth.studies.savi2007.portraits import chosen_start, describe, draw_portraits, portraits
@@ -33,7 +34,7 @@ def _compute_17(settings: Settings) -> dict[str, xr.Dataset]:
             EXACT.system(**FIGURE_17), "omega", [_JUST_ABOVE], direction=None, start=starts(16), transient=transient,
             keep=64, progress=settings.progress, **EXACT.options,
         )  # fmt: skip
-    return data
+    return data | branches("fig17")
 
 
 def _draw_17(data: Mapping[str, xr.Dataset]) -> Canvas:
@@ -63,7 +64,7 @@ def _caption_17(data: Mapping[str, xr.Dataset]) -> str:
         "Bifurcation diagram over the forcing frequency, rho = 0.23 N, g = 0.0036 m: displacement (above) and "
         "velocity at the section. Dotted: the three frequencies of Fig. 18; green: closed-form grazing of the "
         f"motion without contact ({grazing} rad/s; in (b) that of a gap g - eta). Above it chaos dies out, given time. "
-        "Grey shows motions that coexist with what the sweeps follow. " + how(data)
+        "Grey shows motions that coexist with what the sweeps follow. " + ABOUT_BRANCHES + how(data)
     )
 
 
