@@ -24,8 +24,8 @@ _LOOKS: dict[str, dict[str, Any]] = {
     "none": {"color": style.COLORS["section"], "linestyle": "none", "marker": ".", "markersize": 1.5},
 }
 _POINTS = {  # beside branches, whose lines are solid and dashed
-    key: {"color": look["color"], "linestyle": "none", "marker": ".", "markersize": 1.8, "markeredgewidth": 0}
-    for key, look in _LOOKS.items()
+    key: {"color": _LOOKS[key]["color"], "linestyle": "none", "marker": ".", "markersize": size, "markeredgewidth": 0}
+    for key, size in {"up": 4.5, "down": 3.0, "none": 1.8}.items()
 }
 _WORDS = {"up": "increasing", "down": "decreasing", "none": "each from its start"}
 
@@ -78,8 +78,8 @@ def frequency_response(
                 if jumps:
                     for place, i in found:
                         _mark(drawn, curve, i, values[0] <= values[-1], place, direction, digits)
-        for one in branches:
-            draw_branch(drawn, one, y=name, quantity=quantity, color=style.COLORS["section"], width=0.7)
+        for behind in branches:
+            draw_branch(drawn, behind, y=name, quantity=quantity, color=style.COLORS["section"], width=0.6)
         drawn.legend(loc="best")
         drawn.margins(x=0)
         drawn.set(xlabel=label(result, parameter), ylabel=_ordinate(result, name, quantity))

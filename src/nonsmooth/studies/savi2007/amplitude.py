@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from nonsmooth import plot
 from nonsmooth.studies.savi2007.branches import branches
-from nonsmooth.studies.savi2007.diagrams import ABOUT_BRANCHES, diagrams, draw_diagram, how
+from nonsmooth.studies.savi2007.diagrams import ABOUT_BRANCHES, diagrams, draw_diagram, how, shared_legend
 from nonsmooth.studies.savi2007.figure import Figure, sheet
 from nonsmooth.studies.savi2007.flows import FLOWS, Settings
 from nonsmooth.studies.savi2007.portraits import describe, draw_portraits, portraits
@@ -28,11 +28,12 @@ def _compute_11(settings: Settings) -> dict[str, xr.Dataset]:
 
 def _draw_11(data: Mapping[str, xr.Dataset]) -> Canvas:
     with plot.journal():
-        canvas = sheet(plot.PAGE, 0.44 * plot.PAGE)
+        canvas = sheet(plot.PAGE, 0.5 * plot.PAGE)
         for ax, flow, letter in zip(canvas.subplots(1, 2, sharey=True), FLOWS, "ab", strict=True):
-            draw_diagram(ax, data, flow.key, "v", values=_PRINTED, loc="upper right")
+            draw_diagram(ax, data, flow.key, "v", values=_PRINTED)
             ax.set_title(f"({letter}) {flow.title}")
         ax.set_ylabel("")
+        shared_legend(canvas)
     return canvas
 
 

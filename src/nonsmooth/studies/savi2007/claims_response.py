@@ -119,7 +119,7 @@ def f9c(data: Data) -> list[Row]:
     unstable = not bool(between["stable"].any())
     ends = sorted(branch["omega"].values[[folds.min(), folds.max()]])
     largest = float(np.abs(between["floquet_multipliers"]).max())
-    x = 1e3 * 0.5 * (between["maximum"] - between["minimum"]).sel(state="x").values
+    heights = 1e3 * 0.5 * (between["maximum"] - between["minimum"]).sel(state="x").values
     texts[0] += (
         f"; the branch between them, from fold to fold, {ends[0]:.8f} ... {ends[1]:.8f} rad/s: "
         f"{'unstable throughout' if unstable else 'stable in part'}, largest multiplier up to {largest:.3f}"
@@ -127,8 +127,8 @@ def f9c(data: Data) -> list[Row]:
     below = grazing_of(data["fig09"]["exact"])[-1] - ends[0]
     why = (
         "Two stable motions coexist between the jumps. The period-1 branch, continued from one orbit, turns at "
-        f"{ends[1]:.5f} rad/s, where rising frequency jumps, runs back with amplitudes of {x.min():.2f} to "
-        f"{x.max():.2f} mm, and turns again at {ends[0]:.5f} rad/s, {below:.5f} rad/s "
+        f"{ends[1]:.5f} rad/s, where rising frequency jumps, runs back with amplitudes of {heights.min():.2f} to "
+        f"{heights.max():.2f} mm, and turns again at {ends[0]:.5f} rad/s, {below:.5f} rad/s "
         "below the grazing of the motion without contact, where falling frequency jumps."
     )
     return [

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.lines import Line2D
@@ -18,10 +18,9 @@ from nonsmooth.studies.savi2007.flows import EXACT, FLOWS, Settings, starts
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure as Canvas
 
-Place: TypeAlias = Literal["best", "upper left", "upper right", "lower left"]
-
-__all__ = ["ABOUT_BRANCHES", "diagrams", "draw_branches", "draw_diagram", "how", "legend"]
+__all__ = ["ABOUT_BRANCHES", "diagrams", "draw_branches", "draw_diagram", "how", "name_lines", "shared_legend"]
 
 #: What a caption says of them.
 ABOUT_BRANCHES = (
@@ -69,7 +68,7 @@ def _grid(low: float, high: float, steps: int, also: tuple[float, ...]) -> np.nd
 
 
 def draw_diagram(
-    ax: Axes, data: Mapping[str, xr.Dataset], key: str, y: str, *, values: Sequence[float] = (), loc: Place = "best"
+    ax: Axes, data: Mapping[str, xr.Dataset], key: str, y: str, *, values: Sequence[float] = ()
 ) -> None:
     """One diagram: starts in grey behind, down over up; the paper's parameter values as dotted lines.
 
@@ -86,26 +85,36 @@ def draw_diagram(
         ax.axvline(value, color="black", linewidth=0.6, linestyle=":", zorder=0, label=label)
     if key == EXACT.key:
         draw_branches(ax, data, y=y)
-    legend(ax, loc)
 
 
-def draw_branches(ax: Axes, data: Mapping[str, xr.Dataset], *, y: str, quantity: str = "section") -> None:
+def draw_branches(ax: Axes, data: Mapping[str, xr.Dataset], *, y: str) -> None:
     """The branches of a figure in black, where there are any; marks on those of period 1 and 2."""
     found = branches_of(data)
     for one in found:
         few = int(one["period_number"]) <= 2
-        draw_branch(ax, one, y=y, quantity=quantity, special=few, color="black", width=0.7)
+        draw_branch(ax, one, y=y, special=few, color="black", width=0.6)
+    if found:
+        name_lines(ax)
+
+
+def name_lines(ax: Axes) -> None:
+    """Entries of the legend for the lines of branches."""
     for words, line in (("stable orbits", "-"), ("unstable orbits", "--")):
-        if found:
-            ax.plot([], [], line, color="black", linewidth=0.7, label=words)
+        ax.plot([], [], line, color="black", linewidth=0.7, label=words)
 
 
-def legend(ax: Axes, loc: Place) -> None:
-    """The legend of a diagram, its points large enough to be seen."""
-    frame = {"frameon": True, "facecolor": "white", "edgecolor": "none", "framealpha": 0.85}
-    for handle in ax.legend(loc=loc, **frame).legend_handles:
-        if isinstance(handle, Line2D):
-            handle.set_markersize(4)
+def shared_legend(canvas: Canvas, columns: int = 5) -> None:
+    """One legend under all axes in place of their own, so that it hides no branch."""
+    entries: dict[str, Any] = {}
+    for ax in canvas.axes:
+        for handle, words in zip(*ax.get_legend_handles_labels(), strict=True):
+            entries.setdefault(words, handle)
+        if (own := ax.get_legend()) is not None:
+            own.remove()
+    drawn = canvas.legend(list(entries.values()), list(entries), loc="outside lower center", ncols=columns)
+    for shown in drawn.legend_handles:
+        if isinstance(shown, Line2D):
+            shown.set_markersize(4)
 
 
 def how(data: Mapping[str, xr.Dataset]) -> str:

@@ -9,7 +9,7 @@ from nonsmooth import plot
 from nonsmooth.analysis.sweep import sweep
 from nonsmooth.flow.poincare import poincare
 from nonsmooth.studies.savi2007.branches import branches
-from nonsmooth.studies.savi2007.diagrams import ABOUT_BRANCHES, diagrams, draw_diagram, how, legend
+from nonsmooth.studies.savi2007.diagrams import ABOUT_BRANCHES, diagrams, draw_diagram, how, shared_legend
 from nonsmooth.studies.savi2007.figure import Figure, sheet
 from nonsmooth.studies.savi2007.flows import EXACT, FLOWS, Settings, starts
 from nonsmooth.studies.savi2007.portraits import chosen_start, describe, draw_portraits, portraits
@@ -39,22 +39,20 @@ def _compute_17(settings: Settings) -> dict[str, xr.Dataset]:
 
 def _draw_17(data: Mapping[str, xr.Dataset]) -> Canvas:
     with plot.journal():
-        canvas = sheet(plot.PAGE, 0.72 * plot.PAGE)
+        canvas = sheet(plot.PAGE, 0.76 * plot.PAGE)
         grid = canvas.subplots(2, 2, sharex=True, sharey="row")
         for j, flow in enumerate(FLOWS):
             for i, state in enumerate("xv"):
                 ax = grid[i, j]
-                draw_diagram(ax, data, flow.key, state, values=tuple(FIGURE_18), loc="lower left")
+                draw_diagram(ax, data, flow.key, state, values=tuple(FIGURE_18))
                 for omega in grazing_of(data[flow.key]):
                     if data[flow.key]["omega"].min() < omega < data[flow.key]["omega"].max():
-                        ax.axvline(omega, color=plot.COLORS["third"], linewidth=0.8, zorder=0, label="grazing")
+                        label = "grazing, closed form"
+                        ax.axvline(omega, color=plot.COLORS["third"], linewidth=0.8, zorder=0, label=label)
                 ax.set_xlabel(ax.get_xlabel() if i else "")
                 ax.set_ylabel(ax.get_ylabel() if j == 0 else "")
-                if (i, j) == (0, 0):
-                    legend(ax, "upper left")
-                else:
-                    ax.get_legend().remove()
             grid[0, j].set_title(f"({'ab'[j]}) {flow.title}")
+        shared_legend(canvas)
     return canvas
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from nonsmooth import plot
 from nonsmooth.analysis.response import frequency_response
 from nonsmooth.studies.savi2007.branches import branches, branches_of
+from nonsmooth.studies.savi2007.diagrams import name_lines, shared_legend
 from nonsmooth.studies.savi2007.figure import Figure, sheet
 from nonsmooth.studies.savi2007.flows import EXACT, FLOWS, Settings
 from nonsmooth.studies.savi2007.grazing import grazing_frequencies
@@ -50,15 +51,17 @@ def _compute(
 def _draw(printed: Mapping[str, float]) -> Callable[[Mapping[str, xr.Dataset]], Canvas]:
     def draw(data: Mapping[str, xr.Dataset]) -> Canvas:
         with plot.journal():
-            canvas = sheet(plot.PAGE, 0.46 * plot.PAGE)
+            canvas = sheet(plot.PAGE, 0.5 * plot.PAGE)
             for ax, flow, letter in zip(canvas.subplots(1, 2, sharey=True), FLOWS, "ab", strict=True):
                 response = data[flow.key]
                 found = branches_of(data) if flow is EXACT else []
                 plot.frequency_response(response, *found, ax)
+                if found:
+                    name_lines(ax)
                 _mark(ax, response, printed)
                 ax.set_title(f"({letter}) {flow.title}")
-                ax.legend(loc="lower left")
             ax.set_ylabel("")
+            shared_legend(canvas)
         return canvas
 
     return draw

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -85,7 +85,7 @@ def _closed(branch: xr.Dataset, value: float) -> float:
     return min(grazing_frequencies(parameters), key=lambda omega: abs(omega - value))
 
 
-def special_table(points: list[SpecialPoint]) -> Table:
+def special_table(points: Sequence[SpecialPoint]) -> Table:
     """The points as a table of the report."""
     header = (
         "figure", "period of the orbit", "point", "at", "largest multiplier", "with the contact, in the limit",
@@ -112,12 +112,12 @@ def _number(value: complex) -> str:
     return f"{value.real:.6f} ± {abs(value.imag):.6f}i, modulus {abs(value):.6f}"
 
 
-def ratios(points: list[SpecialPoint]) -> Mapping[str, list[float]]:
+def ratios(points: Sequence[SpecialPoint]) -> Mapping[str, list[float]]:
     """Ratios of successive intervals between the flips of periods 1, 2, 4 and 8 in each cascade."""
     found = {}
     for figure in dict.fromkeys(one.figure for one in points):
         flips = [one for one in points if one.figure == figure and one.kind == "flip"]
-        first = {}
+        first: dict[int, float] = {}
         for one in flips:  # the first flip along each branch is where the cascade goes on
             first.setdefault(one.period, one.value)
         values = [first[period] for period in (1, 2, 4, 8) if period in first]
