@@ -12,6 +12,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "independent"))
 import reference_values as known
 
 import nonsmooth as ns
+from nonsmooth import plot
 from nonsmooth.studies.savi2007 import Reproduction
 from nonsmooth.studies.savi2007.branches import BEGINNINGS, branches, branches_of
 from nonsmooth.studies.savi2007.pages import to_markdown
@@ -105,3 +106,17 @@ def test_the_unstable_branch_is_in_the_report(quick: Reproduction) -> None:
     text = (quick.out / "report.md").read_text(encoding="utf-8")
     assert "## Special points" in text and "0.24044985 N" in text
     assert {"fig09_branch.nc", "fig09_branch_2.nc", "fig11_branch_8.nc"} <= {path.name for path in quick.out.iterdir()}
+
+
+def test_branches_are_drawn_over_the_response(quick: Reproduction) -> None:
+    plt = pytest.importorskip("matplotlib.pyplot")
+    swept, branch = quick.data["fig09"]["exact"], quick.data["fig09"]["branch"]
+    ax = plot.frequency_response(swept, branch, plt.figure().add_subplot())
+    half = 0.5 * (branch["maximum"] - branch["minimum"]).sel(state="x").values
+    unstable = next(line for line in ax.lines if line.get_linestyle() == "--")
+    drawn = ~np.isnan(unstable.get_ydata())
+    assert unstable.get_ydata()[drawn] == pytest.approx(half[drawn])
+    assert drawn[~branch["stable"].values].all()
+    with pytest.raises(ValueError, match=r"over 'omega', this branch over 'rho'"):
+        plot.frequency_response(swept, quick.data["fig11"]["branch"])
+    plt.close("all")

@@ -67,9 +67,7 @@ def _grid(low: float, high: float, steps: int, also: tuple[float, ...]) -> np.nd
     return np.unique(np.round(np.concatenate([np.linspace(low, high, steps + 1), also]), 9))
 
 
-def draw_diagram(
-    ax: Axes, data: Mapping[str, xr.Dataset], key: str, y: str, *, values: Sequence[float] = ()
-) -> None:
+def draw_diagram(ax: Axes, data: Mapping[str, xr.Dataset], key: str, y: str, *, values: Sequence[float] = ()) -> None:
     """One diagram: starts in grey behind, down over up; the paper's parameter values as dotted lines.
 
     On that of the exact flow the branches of periodic orbits.
