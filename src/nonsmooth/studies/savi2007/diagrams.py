@@ -24,8 +24,8 @@ __all__ = ["ABOUT_BRANCHES", "diagrams", "draw_branches", "draw_diagram", "how",
 
 #: What a caption says of them.
 ABOUT_BRANCHES = (
-    "Black lines in (a): periodic orbits of the exact flow, continued from one of them (solid: stable, dashed: "
-    "unstable), with their special points. "
+    "Black lines in (a): orbits of period 1, 2, 4 and 8 of the exact flow, continued from one of period 1 (solid: "
+    "stable, dashed: unstable); special points marked on those of period 1 and 2. "
 )
 
 
