@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = ["bifurcation"]
+__all__ = ["bifurcation", "sorted_out"]
 
 _LINES = ("second", "third", "fourth")
 _COLORS = {"up": "first", "down": "second", "none": "section"}
@@ -53,7 +53,7 @@ def bifurcation(
     variable_along(result, "section", "sweep")
     (name,) = first_states(result, y)
     parameter = str(result["maximum"].dims[0])
-    ax, branches = _sorted_out(over, ax, parameter)
+    ax, branches = sorted_out(over, ax, parameter)
     points = column(result, "section", name)
     directions = [str(word) for word in np.atleast_1d(result["direction"].values)]
     with style.axes(ax) as drawn:
@@ -78,7 +78,7 @@ def bifurcation(
     return drawn
 
 
-def _sorted_out(
+def sorted_out(
     over: tuple[xr.Dataset | Axes | None, ...], ax: Axes | None, parameter: str
 ) -> tuple[Axes | None, list[xr.Dataset]]:
     """Axes given in place of a branch, and the branches, which must be over the same parameter."""

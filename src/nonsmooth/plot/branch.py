@@ -29,6 +29,7 @@ MARKS = {
     "boundary_equilibrium": ("p", "boundary equilibrium"),
 }
 _OTHER = "*"
+_WORDS = {"section": "", "maximum": "largest ", "minimum": "smallest ", "amplitude": "amplitude of "}
 
 
 def branch(
@@ -50,8 +51,9 @@ def branch(
         Where to draw; a new one-column figure if None.
     y
         The state of the ordinate; by default the first.
-    quantity : {"section", "maximum", "minimum"}
-        Section points (all of a period-n orbit), or extremes over the orbit.
+    quantity : {"section", "maximum", "minimum", "amplitude"}
+        Section points (all of a period-n orbit where the branch has ``returns``), extremes over the orbit, or half
+        their distance.
     special
         Mark the special points, each kind with its own sign, named in the legend.
     color
@@ -76,11 +78,12 @@ def draw_branch(
     quantity: str = "section",
     special: bool = True,
     color: str | None = None,
+    width: float = 0.9,
 ) -> None:
-    """Draw the lines and marks of a branch on axes that are labelled by the caller."""
+    """Draw the lines (``width`` in typographic points) and marks of a branch on axes that the caller labels."""
     variable_along(result, "stable", "continue_orbit")
-    if quantity not in ("section", "maximum", "minimum"):
-        raise ValueError(f'quantity = {quantity!r}; allowed: "section", "maximum", "minimum"')
+    if quantity not in _WORDS:
+        raise ValueError(f"quantity = {quantity!r}; allowed: {', '.join(map(repr, _WORDS))}")
     (name,) = first_states(result, y)
     values = result[_parameter(result)].values
     ordinates = _ordinates(result, name, quantity)
@@ -94,32 +97,36 @@ def draw_branch(
         if not chosen.any():
             continue
         for row in ordinates:
-            ax.plot(values, np.where(chosen, row, np.nan), line, color=shade, linewidth=0.9, zorder=3)
+            ax.plot(values, np.where(chosen, row, np.nan), line, color=shade, linewidth=width, zorder=3)
     if special:
-        _mark(ax, result, name, quantity)
+        _mark(ax, result, ordinates)
 
 
 def _ordinates(result: xr.Dataset, name: str, quantity: str) -> NDArray[np.float64]:
     """One line for each section point of the orbit, (lines, point)."""
-    source = "returns" if quantity == "section" and "returns" in result else quantity
-    chosen = result[source].sel(state=name)
+    if quantity == "amplitude":
+        chosen = 0.5 * (result["maximum"] - result["minimum"]).sel(state=name)
+    else:
+        source = "returns" if quantity == "section" and "returns" in result else quantity
+        chosen = result[source].sel(state=name)
     others = [dim for dim in chosen.dims if dim != "point"]
     return np.asarray(chosen.transpose(*others, "point").values, dtype=float).reshape(-1, result.sizes["point"])
 
 
-def _mark(ax: Axes, result: xr.Dataset, name: str, quantity: str) -> None:
+def _mark(ax: Axes, result: xr.Dataset, ordinates: NDArray[np.float64]) -> None:
+    """The special points on each of the lines."""
     if not result.sizes.get("special", 0):
         return
     values = result["special_value"].values
     kinds = [str(kind) for kind in result["special_kind"].values]
-    ordinates = result[quantity].sel(state=name).values[result["special_point"].values]
+    heights = ordinates[:, result["special_point"].values]
     known = ax.get_legend_handles_labels()[1]
     for kind in dict.fromkeys(kinds):
         here = np.array([one == kind for one in kinds])
         marker, words = MARKS.get(kind, (_OTHER, kind.replace("_", " ")))
         ax.plot(
-            values[here], ordinates[here], marker, markersize=4, markerfacecolor="white", zorder=5, linestyle="none",
-            markeredgecolor=style.COLORS["section"], markeredgewidth=0.8,
+            np.tile(values[here], len(heights)), heights[:, here].ravel(), marker, markersize=4, zorder=5,
+            linestyle="none", markerfacecolor="white", markeredgecolor=style.COLORS["section"], markeredgewidth=0.8,
             label=None if words in known else words,
         )  # fmt: skip
 
@@ -130,8 +137,7 @@ def _parameter(result: xr.Dataset) -> str:
 
 
 def _ordinate(result: xr.Dataset, name: str, quantity: str) -> str:
-    words = {"section": "", "maximum": "largest ", "minimum": "smallest "}[quantity]
-    return words + label(result, name)
+    return _WORDS[quantity] + label(result, name)
 
 
 def _virtual(result: xr.Dataset) -> NDArray[np.bool_]:

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.plot import style
+from nonsmooth.plot.bifurcation import sorted_out
+from nonsmooth.plot.branch import draw_branch
 from nonsmooth.plot.labels import column, first_states, label, variable_along
 
 if TYPE_CHECKING:
@@ -21,13 +23,17 @@ _LOOKS: dict[str, dict[str, Any]] = {
     "down": {"color": style.COLORS["second"], "linestyle": "--"},
     "none": {"color": style.COLORS["section"], "linestyle": "none", "marker": ".", "markersize": 1.5},
 }
+_POINTS = {  # beside branches, whose lines are solid and dashed
+    key: {"color": _LOOKS[key]["color"], "linestyle": "none", "marker": ".", "markersize": size, "markeredgewidth": 0}
+    for key, size in {"up": 4.5, "down": 3.0, "none": 1.8}.items()
+}
 _WORDS = {"up": "increasing", "down": "decreasing", "none": "each from its start"}
 
 
 def frequency_response(
     result: xr.Dataset,
+    *over: xr.Dataset | Axes | None,
     ax: Axes | None = None,
-    *,
     y: str | None = None,
     quantity: str = "amplitude",
     jumps: bool = True,
@@ -39,6 +45,9 @@ def frequency_response(
     ----------
     result
         What ``frequency_response`` gave.
+    *over
+        Branches of ``continue_orbit`` over the same parameter: stable solid, unstable dashed, special points marked;
+        the response is then drawn as points. Axes to draw on may stand here too, as in the other plots.
     ax
         Where to draw; a new one-column figure if None.
     y
@@ -55,6 +64,8 @@ def frequency_response(
     parameter = str(result["maximum"].dims[0])
     values = result[parameter].values
     heights = column(result, quantity, name)
+    ax, branches = sorted_out(over, ax, parameter)
+    looks = _POINTS if branches else _LOOKS
     with style.axes(ax) as drawn:
         for i, direction in enumerate(np.atleast_1d(result["direction"].values).astype(str)):
             one = heights.isel(direction=i) if "direction" in heights.dims else heights
@@ -63,10 +74,12 @@ def frequency_response(
                 found = _intervals(values, curve, _jumps(result, direction, k))
                 at = [i for _, i in found]
                 broken = np.insert(values, at, np.nan), np.insert(curve, at, np.nan)
-                drawn.plot(*broken, label=_WORDS[direction] if k == 0 else None, **_LOOKS[direction])
+                drawn.plot(*broken, label=_WORDS[direction] if k == 0 else None, **looks[direction])
                 if jumps:
                     for place, i in found:
                         _mark(drawn, curve, i, values[0] <= values[-1], place, direction, digits)
+        for behind in branches:
+            draw_branch(drawn, behind, y=name, quantity=quantity, color=style.COLORS["section"], width=0.6)
         drawn.legend(loc="best")
         drawn.margins(x=0)
         drawn.set(xlabel=label(result, parameter), ylabel=_ordinate(result, name, quantity))

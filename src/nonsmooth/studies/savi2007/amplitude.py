@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from nonsmooth import plot
-from nonsmooth.studies.savi2007.diagrams import diagrams, draw_diagram, how
+from nonsmooth.studies.savi2007.branches import branches
+from nonsmooth.studies.savi2007.diagrams import ABOUT_BRANCHES, diagrams, draw_diagram, how, shared_legend
 from nonsmooth.studies.savi2007.figure import Figure, sheet
 from nonsmooth.studies.savi2007.flows import FLOWS, Settings
 from nonsmooth.studies.savi2007.portraits import describe, draw_portraits, portraits
@@ -22,23 +23,24 @@ _PRINTED = [NUMBERS[f"period {n} from"].value for n in (4, 2, 1)]
 
 
 def _compute_11(settings: Settings) -> dict[str, xr.Dataset]:
-    return diagrams(settings, FIGURE_11, "rho", 0.2, 0.5, (600, 300), tuple(FIGURE_12))
+    return diagrams(settings, FIGURE_11, "rho", 0.2, 0.5, (600, 300), tuple(FIGURE_12)) | branches("fig11")
 
 
 def _draw_11(data: Mapping[str, xr.Dataset]) -> Canvas:
     with plot.journal():
-        canvas = sheet(plot.PAGE, 0.44 * plot.PAGE)
+        canvas = sheet(plot.PAGE, 0.5 * plot.PAGE)
         for ax, flow, letter in zip(canvas.subplots(1, 2, sharey=True), FLOWS, "ab", strict=True):
-            draw_diagram(ax, data, flow.key, "v", values=_PRINTED, loc="upper right")
+            draw_diagram(ax, data, flow.key, "v", values=_PRINTED)
             ax.set_title(f"({letter}) {flow.title}")
         ax.set_ylabel("")
+        shared_legend(canvas)
     return canvas
 
 
 def _caption_11(data: Mapping[str, xr.Dataset]) -> str:
     return (
         "Bifurcation diagram over the forcing amplitude, omega = 3.69 rad/s, g = -0.0045 m: velocity at the section. "
-        "Dotted: the paper's printed ends of chaos, period 4 and period 2. " + how(data)
+        "Dotted: the paper's printed ends of chaos, period 4 and period 2. " + ABOUT_BRANCHES + how(data)
     )
 
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from nonsmooth.continuation.special import special_points
 from nonsmooth.studies.savi2007.measure import Interval, changes, jumps, lowest, range_of
 from nonsmooth.studies.savi2007.printed import NUMBERS
 from nonsmooth.studies.savi2007.resonance import grazing_of
@@ -94,7 +95,7 @@ def f9b(data: Data) -> list[Row]:
 
 
 def f9c(data: Data) -> list[Row]:
-    """The region between the two jumps."""
+    """The region between the two jumps: the branch from fold to fold."""
     texts, wide = [], []
     for key in ("exact", "smoothed"):
         response = data["fig09"][key]
@@ -111,12 +112,29 @@ def f9c(data: Data) -> list[Row]:
         )
     texts += [""] * (2 - len(texts))
     two = len(wide) == 2 and min(wide) > 0.05
+    branch = data["fig09"]["branch"]
+    table = special_points(branch)
+    folds = table["point"].values[table["kind"].values == "fold"]
+    between = branch.isel(point=slice(int(folds.min()) + 1, int(folds.max())))
+    unstable = not bool(between["stable"].any())
+    ends = sorted(branch["omega"].values[[folds.min(), folds.max()]])
+    largest = float(np.abs(between["floquet_multipliers"]).max())
+    heights = 1e3 * 0.5 * (between["maximum"] - between["minimum"]).sel(state="x").values
+    texts[0] += (
+        f"; the branch between them, from fold to fold, {ends[0]:.8f} ... {ends[1]:.8f} rad/s: "
+        f"{'unstable throughout' if unstable else 'stable in part'}, largest multiplier up to {largest:.3f}"
+    )
+    below = grazing_of(data["fig09"]["exact"])[-1] - ends[0]
+    why = (
+        "Two stable motions coexist between the jumps. The period-1 branch, continued from one orbit, turns at "
+        f"{ends[1]:.5f} rad/s, where rising frequency jumps, runs back with amplitudes of {heights.min():.2f} to "
+        f"{heights.max():.2f} mm, and turns again at {ends[0]:.5f} rad/s, {below:.5f} rad/s "
+        "below the grazing of the motion without contact, where falling frequency jumps."
+    )
     return [
         Row(
             "F9c", _9, "an unstable region between the jumps with rising and falling frequency", texts[0], texts[1],
-            "none in kind", "agrees in part" if two else "differs",
-            "Two stable motions coexist between the jumps, as they must on both sides of an unstable one. The "
-            "unstable branch itself is not drawn here: sweeps only see what is stable.",
+            "none in kind", "agrees" if two and unstable else "agrees in part" if two else "differs", why,
         )
     ]  # fmt: skip
 

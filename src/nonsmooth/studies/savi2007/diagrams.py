@@ -3,23 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.lines import Line2D
 
 from nonsmooth import plot
 from nonsmooth.analysis.sweep import sweep
+from nonsmooth.plot.branch import draw_branch
 from nonsmooth.results.provenance import read_provenance
-from nonsmooth.studies.savi2007.flows import FLOWS, Settings, starts
+from nonsmooth.studies.savi2007.branches import branches_of
+from nonsmooth.studies.savi2007.flows import EXACT, FLOWS, Settings, starts
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure as Canvas
 
-Place: TypeAlias = Literal["best", "upper left", "upper right", "lower left"]
+__all__ = ["ABOUT_BRANCHES", "diagrams", "draw_branches", "draw_diagram", "how", "name_lines", "shared_legend"]
 
-__all__ = ["diagrams", "draw_diagram", "how", "legend"]
+#: What a caption says of them.
+ABOUT_BRANCHES = (
+    "Black lines in (a): orbits of period 1, 2, 4 and 8 of the exact flow, continued from one of period 1 (solid: "
+    "stable, dashed: unstable); special points marked on those of period 1 and 2. "
+)
 
 
 def diagrams(
@@ -60,10 +67,11 @@ def _grid(low: float, high: float, steps: int, also: tuple[float, ...]) -> np.nd
     return np.unique(np.round(np.concatenate([np.linspace(low, high, steps + 1), also]), 9))
 
 
-def draw_diagram(
-    ax: Axes, data: Mapping[str, xr.Dataset], key: str, y: str, *, values: Sequence[float] = (), loc: Place = "best"
-) -> None:
-    """One diagram: starts in grey behind, down over up; the paper's parameter values as dotted lines."""
+def draw_diagram(ax: Axes, data: Mapping[str, xr.Dataset], key: str, y: str, *, values: Sequence[float] = ()) -> None:
+    """One diagram: starts in grey behind, down over up; the paper's parameter values as dotted lines.
+
+    On that of the exact flow the branches of periodic orbits.
+    """
     plot.bifurcation(data[f"{key}_starts"], ax, y=y, color="#B4B4B4", size=1.8)
     behind = len(ax.get_lines())
     plot.bifurcation(data[key], ax, y=y, size=0.9 if data[key].sizes["iterate"] > 100 else 1.3)
@@ -73,15 +81,38 @@ def draw_diagram(
     for i, value in enumerate(values):
         label = "printed in the paper" if i == 0 else None
         ax.axvline(value, color="black", linewidth=0.6, linestyle=":", zorder=0, label=label)
-    legend(ax, loc)
+    if key == EXACT.key:
+        draw_branches(ax, data, y=y)
 
 
-def legend(ax: Axes, loc: Place) -> None:
-    """The legend of a diagram, its points large enough to be seen."""
-    frame = {"frameon": True, "facecolor": "white", "edgecolor": "none", "framealpha": 0.85}
-    for handle in ax.legend(loc=loc, **frame).legend_handles:
-        if isinstance(handle, Line2D):
-            handle.set_markersize(4)
+def draw_branches(ax: Axes, data: Mapping[str, xr.Dataset], *, y: str) -> None:
+    """The branches of a figure in black, where there are any; marks on those of period 1 and 2."""
+    found = branches_of(data)
+    for one in found:
+        few = int(one["period_number"]) <= 2
+        draw_branch(ax, one, y=y, special=few, color="black", width=0.6)
+    if found:
+        name_lines(ax)
+
+
+def name_lines(ax: Axes) -> None:
+    """Entries of the legend for the lines of branches."""
+    for words, line in (("stable orbits", "-"), ("unstable orbits", "--")):
+        ax.plot([], [], line, color="black", linewidth=0.7, label=words)
+
+
+def shared_legend(canvas: Canvas, columns: int = 5) -> None:
+    """One legend under all axes in place of their own, so that it hides no branch."""
+    entries: dict[str, Any] = {}
+    for ax in canvas.axes:
+        for handle, words in zip(*ax.get_legend_handles_labels(), strict=True):
+            entries.setdefault(words, handle)
+        if (own := ax.get_legend()) is not None:
+            own.remove()
+    drawn = canvas.legend(list(entries.values()), list(entries), loc="outside lower center", ncols=columns)
+    for shown in drawn.legend_handles:
+        if isinstance(shown, Line2D):
+            shown.set_markersize(4)
 
 
 def how(data: Mapping[str, xr.Dataset]) -> str:

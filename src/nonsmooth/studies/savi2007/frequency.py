@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 from nonsmooth import plot
 from nonsmooth.analysis.sweep import sweep
 from nonsmooth.flow.poincare import poincare
-from nonsmooth.studies.savi2007.diagrams import diagrams, draw_diagram, how, legend
+from nonsmooth.studies.savi2007.branches import branches
+from nonsmooth.studies.savi2007.diagrams import ABOUT_BRANCHES, diagrams, draw_diagram, how, shared_legend
 from nonsmooth.studies.savi2007.figure import Figure, sheet
 from nonsmooth.studies.savi2007.flows import EXACT, FLOWS, Settings, starts
 from nonsmooth.studies.savi2007.portraits import chosen_start, describe, draw_portraits, portraits
@@ -33,27 +34,25 @@ def _compute_17(settings: Settings) -> dict[str, xr.Dataset]:
             EXACT.system(**FIGURE_17), "omega", [_JUST_ABOVE], direction=None, start=starts(16), transient=transient,
             keep=64, progress=settings.progress, **EXACT.options,
         )  # fmt: skip
-    return data
+    return data | branches("fig17")
 
 
 def _draw_17(data: Mapping[str, xr.Dataset]) -> Canvas:
     with plot.journal():
-        canvas = sheet(plot.PAGE, 0.72 * plot.PAGE)
+        canvas = sheet(plot.PAGE, 0.76 * plot.PAGE)
         grid = canvas.subplots(2, 2, sharex=True, sharey="row")
         for j, flow in enumerate(FLOWS):
             for i, state in enumerate("xv"):
                 ax = grid[i, j]
-                draw_diagram(ax, data, flow.key, state, values=tuple(FIGURE_18), loc="lower left")
+                draw_diagram(ax, data, flow.key, state, values=tuple(FIGURE_18))
                 for omega in grazing_of(data[flow.key]):
                     if data[flow.key]["omega"].min() < omega < data[flow.key]["omega"].max():
-                        ax.axvline(omega, color=plot.COLORS["third"], linewidth=0.8, zorder=0, label="grazing")
+                        label = "grazing, closed form"
+                        ax.axvline(omega, color=plot.COLORS["third"], linewidth=0.8, zorder=0, label=label)
                 ax.set_xlabel(ax.get_xlabel() if i else "")
                 ax.set_ylabel(ax.get_ylabel() if j == 0 else "")
-                if (i, j) == (0, 0):
-                    legend(ax, "upper left")
-                else:
-                    ax.get_legend().remove()
             grid[0, j].set_title(f"({'ab'[j]}) {flow.title}")
+        shared_legend(canvas)
     return canvas
 
 
@@ -63,7 +62,7 @@ def _caption_17(data: Mapping[str, xr.Dataset]) -> str:
         "Bifurcation diagram over the forcing frequency, rho = 0.23 N, g = 0.0036 m: displacement (above) and "
         "velocity at the section. Dotted: the three frequencies of Fig. 18; green: closed-form grazing of the "
         f"motion without contact ({grazing} rad/s; in (b) that of a gap g - eta). Above it chaos dies out, given time. "
-        "Grey shows motions that coexist with what the sweeps follow. " + how(data)
+        "Grey shows motions that coexist with what the sweeps follow. " + ABOUT_BRANCHES + how(data)
     )
 
 

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 from nonsmooth import plot
 from nonsmooth.flow.poincare import poincare
 from nonsmooth.flow.sections import Stroboscopic
-from nonsmooth.studies.savi2007.diagrams import diagrams, draw_diagram, how
+from nonsmooth.studies.savi2007.branches import branches
+from nonsmooth.studies.savi2007.diagrams import ABOUT_BRANCHES, diagrams, draw_diagram, how, shared_legend
 from nonsmooth.studies.savi2007.figure import Figure, sheet
 from nonsmooth.studies.savi2007.flows import FLOWS, Settings
 from nonsmooth.studies.savi2007.portraits import describe, draw_portraits, portraits
@@ -27,23 +28,25 @@ _CHAOTIC = 0.0018
 
 
 def _compute_13(settings: Settings) -> dict[str, xr.Dataset]:
-    return diagrams(settings, FIGURE_13, "g", -0.0015, 0.002, (700, 280), tuple(FIGURE_14))
+    return diagrams(settings, FIGURE_13, "g", -0.0015, 0.002, (700, 280), tuple(FIGURE_14)) | branches("fig13")
 
 
 def _draw_13(data: Mapping[str, xr.Dataset]) -> Canvas:
     with plot.journal():
-        canvas = sheet(plot.PAGE, 0.44 * plot.PAGE)
+        canvas = sheet(plot.PAGE, 0.5 * plot.PAGE)
         for ax, flow, letter in zip(canvas.subplots(1, 2, sharey=True), FLOWS, "ab", strict=True):
-            draw_diagram(ax, data, flow.key, "v", values=tuple(FIGURE_14), loc="lower left")
+            draw_diagram(ax, data, flow.key, "v", values=tuple(FIGURE_14))
             ax.set_title(f"({letter}) {flow.title}")
         ax.set_ylabel("")
+        shared_legend(canvas)
     return canvas
 
 
 def _caption_13(data: Mapping[str, xr.Dataset]) -> str:
     return (
         "Bifurcation diagram over the gap, omega = 11.15 rad/s, rho = 0.33 N: velocity at the section. Dotted: the "
-        "four gaps of Fig. 14. Grey shows motions that coexist with what the sweeps follow. " + how(data)
+        "four gaps of Fig. 14. Grey shows motions that coexist with what the sweeps follow. "
+        + ABOUT_BRANCHES + how(data)
     )
 
 

@@ -23,6 +23,7 @@ from nonsmooth.studies.savi2007.pages import (
 from nonsmooth.studies.savi2007.printed import NUMBERS
 from nonsmooth.studies.savi2007.rig_parameters import NAMES, table_rows
 from nonsmooth.studies.savi2007.rows import CLOSE, NOT_ASKED, Data, Row
+from nonsmooth.studies.savi2007.special import SpecialPoint, ratios, special_table, table_of_points
 
 __all__ = ["write_report"]
 
@@ -72,6 +73,9 @@ def _blocks(
         blocks += [Heading("Statements"), Paragraph(_summary(rows)), Paragraph(_rules()), _table(rows)]
     if "table1" in data:
         blocks += [Heading("Table 1, identified"), _parameters(data)]
+    points = table_of_points(data)
+    if points:
+        blocks += [Heading("Special points"), Paragraph(_about_points(points)), special_table(points)]
     blocks += [Heading("What the paper leaves open"), Bullets(_OPEN), Heading("Figures")]
     for figure in figures:
         title = figure.title if figure.number is None else f"Fig. {figure.number}: {figure.title}"
@@ -141,6 +145,22 @@ def _rules() -> str:
         f"how far the paper's own two natural frequencies ({one} and {other}) lie apart; beyond that it differs. "
         "Differences are (found - printed) / printed."
     )
+
+
+def _about_points(points: Sequence[SpecialPoint]) -> str:
+    text = (
+        "Every flip, fold and grazing point of the periodic orbits of Figs. 9, 10, 11, 13 and 17 (exact flow), along "
+        "the branches, which are continued from one stable orbit of each figure and switched at flips. The largest "
+        "multiplier is +1 at a fold and -1 at a flip; at a graze it is given without the contact and with a contact of "
+        "no length. The motion without contact grazes where g = (rho/m) / sqrt((2k/m - omega^2)^2 + (c omega/m)^2), a "
+        "closed form; of the others none is known."
+    )
+    for figure, found in ratios(points).items():
+        text += (
+            f" Ratios of successive intervals between the flips of periods 1, 2, 4, 8 in Fig. {int(figure[3:])}: "
+            f"{', '.join(f'{ratio:.3f}' for ratio in found)}."
+        )
+    return text
 
 
 _ABOUT_THE_RIG = (

@@ -9,8 +9,10 @@ import numpy as np
 
 from nonsmooth import plot
 from nonsmooth.analysis.response import frequency_response
+from nonsmooth.studies.savi2007.branches import branches, branches_of
+from nonsmooth.studies.savi2007.diagrams import name_lines, shared_legend
 from nonsmooth.studies.savi2007.figure import Figure, sheet
-from nonsmooth.studies.savi2007.flows import FLOWS, Settings
+from nonsmooth.studies.savi2007.flows import EXACT, FLOWS, Settings
 from nonsmooth.studies.savi2007.grazing import grazing_frequencies
 from nonsmooth.studies.savi2007.printed import FIGURE_9, FIGURE_10, NUMBERS
 
@@ -29,7 +31,9 @@ def grazing_of(response: xr.Dataset) -> list[float]:
     return grazing_frequencies({**parameters, "g": parameters["g"] - band})
 
 
-def _compute(parameters: Mapping[str, float], low: float, high: float) -> Callable[[Settings], dict[str, xr.Dataset]]:
+def _compute(
+    name: str, parameters: Mapping[str, float], low: float, high: float
+) -> Callable[[Settings], dict[str, xr.Dataset]]:
     def compute(settings: Settings) -> dict[str, xr.Dataset]:
         data = {}
         for flow in FLOWS:
@@ -39,7 +43,7 @@ def _compute(parameters: Mapping[str, float], low: float, high: float) -> Callab
                 flow.system(**parameters), values, transient=settings.of(flow, exact=300, smoothed=150, quick=60),
                 keep=16, max_period=4, progress=settings.progress, **flow.options,
             )  # fmt: skip
-        return data
+        return data | branches(name)
 
     return compute
 
@@ -47,14 +51,17 @@ def _compute(parameters: Mapping[str, float], low: float, high: float) -> Callab
 def _draw(printed: Mapping[str, float]) -> Callable[[Mapping[str, xr.Dataset]], Canvas]:
     def draw(data: Mapping[str, xr.Dataset]) -> Canvas:
         with plot.journal():
-            canvas = sheet(plot.PAGE, 0.46 * plot.PAGE)
+            canvas = sheet(plot.PAGE, 0.5 * plot.PAGE)
             for ax, flow, letter in zip(canvas.subplots(1, 2, sharey=True), FLOWS, "ab", strict=True):
                 response = data[flow.key]
-                plot.frequency_response(response, ax)
+                found = branches_of(data) if flow is EXACT else []
+                plot.frequency_response(response, *found, ax)
+                if found:
+                    name_lines(ax)
                 _mark(ax, response, printed)
                 ax.set_title(f"({letter}) {flow.title}")
-                ax.legend(loc="lower left")
             ax.set_ylabel("")
+            shared_legend(canvas)
         return canvas
 
     return draw
@@ -86,9 +93,10 @@ def _caption(name: str) -> Callable[[Mapping[str, xr.Dataset]], str]:
         grazing = " and ".join(f"{omega:.5f}" for omega in grazing_of(exact))
         return (
             f"Frequency response for rho = {float(exact['rho']):g} N and g = {float(exact['g']):g} m: half the "
-            "peak-to-peak displacement with rising and falling frequency, jumps marked. Closed-form grazing at "
-            f"{grazing} rad/s (green; in (b) of g - eta). Steps of {_step(exact):.4f} rad/s (exact) and "
-            f"{_step(smoothed):.4f} rad/s (smoothed; a shorter transient).{name}"
+            "peak-to-peak displacement with rising and falling frequency, jumps marked. Black in (a): periodic "
+            "orbits of the exact flow, continued from one of them (solid: stable, dashed: unstable). "
+            f"Closed-form grazing at {grazing} rad/s (green; in (b) of g - eta). Steps of "
+            f"{_step(exact):.4f} rad/s (exact) and {_step(smoothed):.4f} rad/s (smoothed; a shorter transient).{name}"
         )
 
     return caption
@@ -102,11 +110,11 @@ _PRINTED_9 = {key: NUMBERS[key].value for key in ("period 2 near", "jump rising"
 
 FIGURES = (
     Figure(
-        "fig09", 9, "Frequency response with a period-2 range", _compute(FIGURE_9, 3.0, 7.0), _draw(_PRINTED_9),
-        _caption(" Triangles: printed in the paper. The unstable branch between the jumps is not drawn."),
+        "fig09", 9, "Frequency response with a period-2 range", _compute("fig09", FIGURE_9, 3.0, 7.0),
+        _draw(_PRINTED_9), _caption(" Triangles: printed in the paper."),
     ),
     Figure(
-        "fig10", 10, "Frequency response with a small jump", _compute(FIGURE_10, 2.4, 7.4), _draw({}),
+        "fig10", 10, "Frequency response with a small jump", _compute("fig10", FIGURE_10, 2.4, 7.4), _draw({}),
         _caption(" The paper prints no numbers for this figure."),
     ),
 )  # fmt: skip
