@@ -6,7 +6,8 @@ of the unstable manifold is the union of the images of one fundamental segment,
 
 .. math::
 
-    W = \bigcup_{k \ge 0} P^k(c_0), \quad c_0(s) = (1 - s)\, q + s\, P(q), \quad q = u^* \pm \delta e, \quad 0 \le s < 1 .
+    W = \bigcup_{k \ge 0} P^k(c_0), \quad c_0(s) = (1 - s)\, q + s\, P(q), \quad q = u^* \pm \delta e,
+    \quad 0 \le s < 1 .
 
 Each image is made as fine as asked for by new values of s, so every point is an image of a point of the segment and no
 interpolated point is mapped. The segment is straight where the manifold is curved by :math:`O(\delta^2)`; that error
@@ -44,8 +45,8 @@ ENDS = {
     "length": "The length asked for was reached.",
     "closed": "The manifold ends: its images no longer grow (it runs into another orbit).",
     "points": "The largest number of points was reached.",
-    "lost": "The next points have no image, or no preimage was found: the motion diverges, starts beyond a stop, or the "
-    "section map cannot be inverted there.",
+    "lost": "The next points have no image, or no preimage was found: the motion diverges, starts beyond a stop, or "
+    "the section map cannot be inverted there.",
 }
 BEGIN = 9  # points of the first segment
 FINEST = 1e-3  # of the distance: neighbours nearer than this are never parted
@@ -102,10 +103,10 @@ def manifolds(
     Returns
     -------
     xarray.Dataset
-        Over ``point``, from the orbit outwards: ``section``, ``arc_length``, ``iterate`` (the image of the first segment
-        it lies on), ``piece`` (it changes where the map jumps), ``arc_number``. Over ``arc``: ``manifold`` (unstable, stable),
-        ``side``, ``orbit_point`` (a period-n orbit has n points), ``multiplier``, ``ended``, ``ended_because``.
-        ``orbit_section`` holds the orbit's own points.
+        Over ``point``, from the orbit outwards: ``section``, ``arc_length``, ``iterate`` (the image of the first
+        segment it lies on), ``piece`` (it changes where the map jumps), ``arc_number``. Over ``arc``: ``manifold``
+        (unstable, stable), ``side``, ``orbit_point`` (a period-n orbit has n points), ``multiplier``, ``ended``,
+        ``ended_because``. ``orbit_section`` holds the orbit's own points, ``size`` what a scaled state of 1 is.
 
     Raises
     ------
@@ -188,7 +189,7 @@ def _direction(orbit: Orbit, kind: str, size: FloatArray) -> tuple[float, FloatA
         )
     value = float(mu[chosen[0]].real)
     if kind == "stable" and abs(value) < 1e-12:
-        raise ValueError(f"the section map cannot be inverted at the orbit (multipliers {numbers}); use kind='unstable'")
+        raise ValueError(f"the section map cannot be inverted at the orbit (multipliers {numbers}); ask for 'unstable'")
     e = vectors[:, chosen[0]].real
     return value, e / np.linalg.norm(e) * (1.0 if e[np.abs(e).argmax()] > 0.0 else -1.0)
 

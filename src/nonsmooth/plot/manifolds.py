@@ -62,7 +62,8 @@ def manifolds(
             )  # fmt: skip
         drawn.plot(
             *saddle, "o", markersize=4, markerfacecolor="white", markeredgecolor=style.COLORS["section"],
-            markeredgewidth=0.9, zorder=5, label="saddle",
+            markeredgewidth=0.9, zorder=5,
+            label=None if "saddle" in drawn.get_legend_handles_labels()[1] else "saddle",
         )  # fmt: skip
         drawn.set(xlabel=label(result, names[0]), ylabel=label(result, names[1]))
         drawn.legend(loc="best")
