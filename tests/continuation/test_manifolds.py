@@ -148,6 +148,8 @@ def test_what_has_no_manifolds_is_refused(tmp_path: Any) -> None:
         ns.manifolds(orbit, kind="other")
     with pytest.raises(ValueError, match="length = -1"):
         ns.manifolds(orbit, length=-1)
+    few = ns.manifolds(orbit, length=1.0, kind="unstable", distance=0.01, points=30)
+    assert "largest number of points" in str(few["ended_because"].values[0])
     with pytest.raises(TypeError, match="takes an Orbit"):
         ns.manifolds("orbit")  # type: ignore[arg-type]
     short = ns.manifolds(orbit, length=1.0, kind="unstable", distance=0.2)

@@ -213,11 +213,13 @@ def _grow(
             guess = levels[-1] + (levels[-1][-1] - levels[-1][0])
             levels.append(step(levels[-1], guess))
         s, levels, whole = _refine(step, s, levels, reach - arc.length, near, turn, most - arc.count)
+        if not whole:  # as far as it is fine
+            fine = int(np.flatnonzero(_bad(levels[-1], s, reach - arc.length, near, turn))[0]) + 1
+            _emit(arc, levels[-1][:fine], s[:fine], k, reach, near)
+            arc.ending = "points"
+            return arc
         here = _emit(arc, levels[-1], s, k, reach, near)
         if arc.ending != "length" or arc.length >= reach:
-            return arc
-        if not whole:
-            arc.ending = "points" if arc.count >= most else "lost"
             return arc
         if here < SHORT * near and here < last and k > 0 and arc.length > 10 * np.linalg.norm(q - u):
             arc.ending = "closed"
@@ -232,7 +234,7 @@ def _bad(x: FloatArray, s: FloatArray, left: float, near: float, turn: float) ->
     """Which gaps between neighbours want another point; none beyond the length that is left."""
     chord = np.diff(x, axis=0)
     d = np.linalg.norm(chord, axis=1)
-    wide = ~(d <= near)  # NaN is wide: the edge of what has an image
+    wide: NDArray[np.bool_] = np.logical_not(d <= near)  # NaN is wide: the edge of what has an image
     lost = ~np.isfinite(x).all(axis=1)
     wide[lost[:-1] & lost[1:]] = False
     with np.errstate(invalid="ignore", divide="ignore"):

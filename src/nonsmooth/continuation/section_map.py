@@ -91,7 +91,7 @@ class SectionMap:
         m, n = w.shape
         x, done = guess.copy(), np.zeros(m, dtype=bool)
         r = self.forward(x) - w
-        size = np.abs(r).max(axis=1, initial=0.0)
+        size = np.asarray(np.abs(r).max(axis=1, initial=0.0), dtype=np.float64)
         for _ in range(ITERATIONS):
             done |= size <= SOLVED * 0.01
             live = np.flatnonzero(~done & np.isfinite(size))
@@ -102,14 +102,14 @@ class SectionMap:
                 moved = x[live].copy()
                 moved[:, j] += STEP
                 J[:, :, j] = (self.forward(moved) - (r[live] + w[live])) / STEP
-            sound = np.isfinite(J).all(axis=(1, 2))
+            sound = np.asarray(np.isfinite(J).all(axis=(1, 2)), dtype=bool)
             sound[sound] = np.abs(np.linalg.det(J[sound])) > 1e-14
             size[live[~sound]] = np.inf
             live, J = live[sound], J[sound]
             if not len(live):
                 break
-            step = -np.linalg.solve(J, r[live][:, :, None])[:, :, 0]
-            length = np.abs(step).max(axis=1)
+            step = np.asarray(-np.linalg.solve(J, r[live][:, :, None])[:, :, 0], dtype=np.float64)
+            length = np.asarray(np.abs(step).max(axis=1), dtype=np.float64)
             step *= np.minimum(1.0, REACH / np.maximum(length, 1e-300))[:, None]
             self._advance(live, x, r, size, done, step, length, w)
         x[~done] = np.nan
