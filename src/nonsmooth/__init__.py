@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from nonsmooth.continuation.continue_equilibrium import continue_equilibrium as continue_equilibrium
     from nonsmooth.continuation.continue_orbit import continue_orbit as continue_orbit
     from nonsmooth.continuation.find import find_orbit as find_orbit
+    from nonsmooth.continuation.manifolds import manifolds as manifolds
     from nonsmooth.continuation.orbit import Orbit as Orbit
     from nonsmooth.continuation.special import special_points as special_points
     from nonsmooth.errors import DataFileError as DataFileError
@@ -76,6 +77,7 @@ _WHERE = {
     "continue_curve": "continuation.continue_curve",
     "continue_equilibrium": "continuation.continue_equilibrium",
     "special_points": "continuation.special",
+    "manifolds": "continuation.manifolds",
     "load_recording": "experiment.load",
     "Recording": "experiment.recording",
     "identify": "identification.chain",

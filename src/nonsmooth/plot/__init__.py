@@ -17,8 +17,11 @@ from nonsmooth.plot.comparison_motion import (
     comparison_time,
 )
 from nonsmooth.plot.comparison_response import comparison_response
+from nonsmooth.plot.curve import curve
 from nonsmooth.plot.frequency_response import frequency_response
+from nonsmooth.plot.manifolds import manifolds
 from nonsmooth.plot.multipliers import multipliers
+from nonsmooth.plot.orbit import orbit
 from nonsmooth.plot.phase_portrait import phase_portrait
 from nonsmooth.plot.regions import regions
 from nonsmooth.plot.section import section
@@ -40,10 +43,13 @@ __all__ = [
     "comparison_response",
     "comparison_section",
     "comparison_time",
+    "curve",
     "frequency_response",
     "identification",
     "journal",
+    "manifolds",
     "multipliers",
+    "orbit",
     "phase_portrait",
     "regions",
     "save_figure",

@@ -1,0 +1,84 @@
+"""Curves of special points in the plane of two parameters, with their points of codimension two."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nonsmooth.plot import style
+from nonsmooth.plot.labels import label, variable_along
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+
+__all__ = ["curve"]
+
+#: Colour, line and words of each kind of curve.
+KINDS = {
+    "fold": ("first", "-", "fold"),
+    "flip": ("second", "--", "flip"),
+    "neimark_sacker": ("fourth", "-.", "Neimark-Sacker"),
+    "grazing": ("section", ":", "grazing"),
+}
+#: Marker and words of each point of codimension two.
+POINTS = {
+    "cusp": ("v", "cusp"),
+    "fold_flip": ("s", "fold-flip"),
+    "resonance_1_1": ("D", "1:1 resonance"),
+    "resonance_1_2": ("h", "1:2 resonance"),
+    "resonance_1_3": ("^", "1:3 resonance"),
+    "resonance_1_4": ("d", "1:4 resonance"),
+    "grazing_fold": ("o", "grazing-fold"),
+    "grazing_flip": ("p", "grazing-flip"),
+    "grazing": ("X", "grazing (contact changes)"),
+    "corner": ("P", "corner"),
+}
+
+
+def curve(result: xr.Dataset, ax: Axes | None = None, *, special: bool = True, color: str | None = None) -> Axes:
+    """Draw a curve of special points over its two parameters; call it again on the same axes for another curve.
+
+    Parameters
+    ----------
+    result
+        A ``continue_curve``. Folds are solid, flips dashed, Neimark-Sacker points dash-dotted, grazing points dotted.
+    ax
+        Where to draw; a new one-column figure if None.
+    special
+        Mark the points of codimension two, each kind with its own sign, named in the legend.
+    color
+        Colour of the line in place of that of its kind.
+    """
+    variable_along(result, "kind", "continue_curve")
+    variable_along(result, "special_point", "continue_curve")
+    # The two parameters are the only coordinates over the points, in the order in which they were given.
+    names = [str(name) for name, values in result.coords.items() if values.dims == ("point",)]
+    x, y = names
+    shade, line, words = KINDS[str(result["kind"].values)]
+    with style.axes(ax) as drawn:
+        known = drawn.get_legend_handles_labels()[1]
+        drawn.plot(
+            result[x].values, result[y].values, line, color=color or style.COLORS[shade], linewidth=1.0, zorder=3,
+            label=None if words in known else words,
+        )  # fmt: skip
+        if special:
+            _mark(drawn, result, x, y)
+        drawn.set(xlabel=label(result, x), ylabel=label(result, y))
+        drawn.legend(loc="best")
+    return drawn
+
+
+def _mark(ax: Axes, result: xr.Dataset, x: str, y: str) -> None:
+    kinds = np.array([str(kind) for kind in result["special_kind"].values])
+    places = result["special_point"].values
+    known = ax.get_legend_handles_labels()[1]
+    for kind in dict.fromkeys(kinds.tolist()):
+        at = places[kinds == kind]
+        marker, words = POINTS.get(kind, ("*", kind.replace("_", " ")))
+        ax.plot(
+            result[x].values[at], result[y].values[at], marker, linestyle="none", markersize=4.5, zorder=5,
+            markerfacecolor="white", markeredgecolor=style.COLORS["section"], markeredgewidth=0.8,
+            label=None if words in known else words,
+        )  # fmt: skip

@@ -1,0 +1,99 @@
+"""Figures of continuation: curves in two parameters, orbits with their crossings, manifolds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+import xarray as xr
+
+import nonsmooth as ns
+from nonsmooth import plot
+
+
+@pytest.fixture(autouse=True)
+def _close() -> Iterator[None]:
+    yield
+    plt.close("all")
+
+
+@pytest.fixture(scope="module")
+def orbit() -> ns.Orbit:
+    return ns.find_orbit(ns.models.discontinuous_support(rho=0.14, g=0.02, omega=4.5))
+
+
+@pytest.fixture(scope="module")
+def branch(orbit: ns.Orbit) -> xr.Dataset:
+    return ns.continue_orbit(orbit, "omega", (3.0, 7.0))
+
+
+@pytest.fixture(scope="module")
+def special(branch: xr.Dataset) -> xr.Dataset:
+    return ns.special_points(branch)
+
+
+def words(ax: Any) -> list[str]:
+    return [text.get_text() for text in ax.get_legend().get_texts()]
+
+
+def test_curves_share_axes_and_each_kind_is_named_once(special: xr.Dataset, tmp_path: Path) -> None:
+    box = {"omega": (3.0, 7.0), "rho": (0.05, 0.3)}
+    ax = None
+    drawn = []
+    for i in np.flatnonzero(np.isin(special["kind"].values, ("fold", "grazing"))):
+        drawn.append(ns.continue_curve(special.isel(special=int(i)), box, points=40, step=0.1))
+        ax = plot.curve(drawn[-1], ax)
+    assert ax is not None
+    assert sorted(words(ax)) == ["cusp", "fold", "grazing"]
+    assert ax.get_xlabel() == r"$\omega$ (rad/s)"
+    assert ax.get_ylabel() == r"$\rho$ (N)"
+    lines = [line for line in ax.get_lines() if len(line.get_xdata()) > 1]
+    assert len(lines) == len(drawn)
+    assert np.array_equal(lines[0].get_ydata(), drawn[0]["rho"].values)
+    assert {line.get_linestyle() for line in lines} == {"-", ":"}
+    assert plot.save_figure(ax, tmp_path / "a.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_an_orbit_shows_its_crossings_and_section_point(orbit: ns.Orbit) -> None:
+    ax = plot.orbit(orbit)
+    assert words(ax) == ["free", "contact", "crossing", "section"]
+    by_name = {line.get_label(): line.get_xydata() for line in ax.get_lines()}
+    assert by_name["section"][0] == pytest.approx(orbit.u, abs=1e-12)
+    at = by_name["crossing"]
+    for state in orbit.crossing_states:
+        assert np.abs(at - state).max(axis=1).min() < 1e-8
+    assert len(at) == 2 * len(orbit.crossing_times)  # before and after each
+
+
+def test_an_orbit_without_contact_shows_its_nearest_approach() -> None:
+    """Far from the support: next to the largest displacement, where the force that would begin a contact is largest."""
+    free = ns.find_orbit(ns.models.discontinuous_support(rho=0.14, g=0.02, omega=7.5))
+    ax = plot.orbit(free)
+    assert any(word.startswith("least clearance") for word in words(ax))
+    mark = next(line for line in ax.get_lines() if str(line.get_label()).startswith("least")).get_xydata()[0]
+    assert mark[0] == pytest.approx(free.maximum[0], rel=1e-4)
+    assert abs(mark[1]) < 0.01 * free.maximum[1]
+
+
+def test_manifolds_start_at_the_saddle(orbit: ns.Orbit, branch: xr.Dataset) -> None:
+    folds = branch["special_point"].values[branch["special_kind"].values == "fold"]
+    at = branch.isel(point=int(folds.sum() // 2))
+    saddle = ns.find_orbit(orbit.system.with_parameters(omega=float(at["omega"])), start=at["section"].values,
+                           period_number=1, transient=0)  # fmt: skip
+    assert not saddle.stable
+    ax = plot.manifolds(ns.manifolds(saddle, length=1.0, distance=0.1))
+    assert words(ax) == ["unstable manifold", "stable manifold", "saddle"]
+    lines = [line.get_xydata() for line in ax.get_lines() if len(line.get_xdata()) > 1]
+    assert len(lines) == 4
+    for line in lines:
+        assert line[0] == pytest.approx(saddle.u, abs=1e-12)
+
+
+@pytest.mark.parametrize("figure", ["curve", "manifolds"])
+def test_a_result_of_another_verb_is_refused(figure: str) -> None:
+    with pytest.raises(ValueError, match="it is not the result of"):
+        getattr(plot, figure)(xr.Dataset({"u2": 1.0}))
