@@ -1,4 +1,4 @@
-"""The saddle between the jumps of the oscillator with a support: its manifolds lead to, and part, two stable motions."""
+"""The saddle between the jumps of the oscillator with a support: its manifolds part two stable motions."""
 
 from __future__ import annotations
 

@@ -235,7 +235,7 @@ def _bad(x: FloatArray, s: FloatArray, left: float, near: float, turn: float) ->
     chord = np.diff(x, axis=0)
     d = np.linalg.norm(chord, axis=1)
     wide: NDArray[np.bool_] = np.logical_not(d <= near)  # NaN is wide: the edge of what has an image
-    lost = ~np.isfinite(x).all(axis=1)
+    lost: NDArray[np.bool_] = np.asarray(~np.isfinite(x).all(axis=1), dtype=np.bool_)
     wide[lost[:-1] & lost[1:]] = False
     with np.errstate(invalid="ignore", divide="ignore"):
         along = chord / d[:, None]
