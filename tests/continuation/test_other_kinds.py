@@ -125,3 +125,15 @@ def test_pitchfork_of_a_symmetric_double_well() -> None:
     # Beyond the fork the symmetric orbit is unstable, the others are stable.
     assert not branch["stable"].values[branch["a"] > float(fork["a"]) + 1e-6].any()
     assert other["stable"].values[np.abs(other["a"].values - float(fork["a"])) > 1e-6].all()
+
+
+@pytest.mark.parametrize(("r", "period_number", "multiplier"), [(1.5, 1, 0.5), (2.9, 1, -0.9), (3.2, 2, 0.16)])
+def test_a_reset_at_a_phase_counts_where_it_changes_nothing(r: float, period_number: int, multiplier: float) -> None:
+    """The logistic map as a kick: 2 - r at its fixed point, 4 + 2 r - r^2 on its cycle of two."""
+    system = ns.System(
+        states=["x"], parameters={"r": r}, modes={"rest": lambda t, u, p: 0 * u.x}, period=1.0,
+        transitions=[ns.Transition("rest", "rest", at=0.5, reset=lambda t, u, p: p.r * u.x * (1 - u.x))],
+    )  # fmt: skip
+    orbit = ns.find_orbit(system, start={"x": 0.3})
+    assert orbit.period_number == period_number
+    assert orbit.floquet_multipliers == pytest.approx([multiplier], abs=1e-12)

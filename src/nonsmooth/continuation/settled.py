@@ -117,6 +117,9 @@ def touching(guess: Guess, system: System) -> list[Guess]:
     while i < len(times):
         visits = signature.visits
         here = jumps[visits[i].transition]
+        if here.at is not None:  # it happens whether it changes the state or not
+            i += 1
+            continue
         if here.reset is not None and here.source == here.target and kicks[i] < TOUCH:
             kicks = np.delete(kicks, i)
             signature = signature.without(i, 1)
