@@ -89,7 +89,8 @@ def variational_model(traced: Traced, active: tuple[int, ...]) -> VariationalMod
     module = load_module("\n".join(part for part in parts if part) + "\n", "variations")
     return VariationalModel(
         module.jet, module.field, module.switch,
-        np.array(entries, dtype=np.int64).reshape(-1, 2), np.array(kinds, dtype=np.int64).reshape(len(kinds), len(entries)),
+        np.array(entries, dtype=np.int64).reshape(-1, 2),
+        np.array(kinds, dtype=np.int64).reshape(len(kinds), len(entries)),
         max([1, *(jet.n_scratch for jet in jets)]),
     )  # fmt: skip
 
