@@ -111,7 +111,8 @@ def basins(
     A start exactly on a boundary, as at a saddle, is pushed off it to one side. Cycles whose multipliers are nearer
     than 0.002 to the unit circle are not certified; their starts keep -1 with the status ``slow``.
 
-    Where a Poincare section is used, ``lyapunov`` and ``multiplier`` are those of its map: the exponent 0 along the
+    ``lyapunov`` of a cycle is minus infinity where its multipliers are zero, NaN where they are not zero but lost in
+    rounding (below 1e-8). Where a Poincare section is used, ``lyapunov`` and ``multiplier`` are those of its map: the exponent 0 along the
     flow is not among them.
     """
     check_system(system, "basins")

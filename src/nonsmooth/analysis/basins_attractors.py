@@ -25,6 +25,7 @@ __all__ = ["DIVERGED", "NOT_CONVERGED", "Attractor", "Patience", "find_attractor
 
 NOT_CONVERGED, DIVERGED = -1, -2  # labels of starts without an attractor
 SAME = 1e-5  # of the motion's size: runs that end this near to a cycle's point are on it
+ROUNDING = 1e-8  # multipliers below this are differences of rounding errors
 STILL = (codes.NOT_PERIODIC, codes.SLOW)
 
 
@@ -125,6 +126,8 @@ def _cycle(settler: Settler, point: FloatArray, run: Settled) -> Attractor:
             cycle = Cycle(place[None, :n], run.mode[:1], float(run.multiplier[0]), np.nan, place, mode)
     with np.errstate(divide="ignore"):
         exponent = float(np.log(cycle.multiplier) / cycle.duration)
+    if 0.0 < cycle.multiplier < ROUNDING:
+        exponent = np.nan
     return Attractor(
         p, cycle.points, cycle.modes, cycle.end, cycle.mode, run.maximum[0], run.minimum[0], cycle.multiplier,
         exponent, 0.0, settler.least, confirmed,
