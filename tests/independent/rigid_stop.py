@@ -1,4 +1,4 @@
-r"""A forced linear oscillator against a rigid stop, from its closed-form pieces: a truth that shares nothing with kernels.
+r"""A forced linear oscillator against a rigid stop, from closed-form pieces: a truth that shares nothing with kernels.
 
 Between impacts x'' + c x' + k x = A cos(w t) is solved in closed form; an impact is found by bisection between nodes of
 a 48th of a period (a maximum in between is found by bisection of v first); then v -> -e v. With e = 0 the mass stays at

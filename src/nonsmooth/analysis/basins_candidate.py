@@ -14,6 +14,7 @@ import numpy as np
 from nonsmooth.analysis.attractors import Settler
 from nonsmooth.analysis.attractors_trace import Trace
 from nonsmooth.analysis.basins_found import NEAR, Attractor, Patience
+from nonsmooth.analysis.basins_newton import confirmed_cycle, exponent_on
 from nonsmooth.flow.engine import FloatArray
 from nonsmooth.kernels import codes
 
@@ -88,9 +89,13 @@ class Search:
             p = _long_period(long.points, size)
             if not p:
                 return None
-            points = long.points[-p:]
+            points, modes, multiplier = long.points[-p:], long.modes[-p:], np.nan
+            cycle = confirmed_cycle(settler, point, end, last, p, size)
+            if cycle is not None:
+                points, modes, multiplier = cycle.points, cycle.modes, cycle.multiplier
+                exponent, error = exponent_on(cycle), 0.0
             return Attractor(
-                p, points, long.modes[-p:], end, last, maximum, minimum, np.nan, exponent, error, least,
+                p, points, modes, end, last, maximum, minimum, multiplier, exponent, error, least, cycle is not None,
                 near=ON_CYCLE, tree=cKDTree(points / size),
             )  # fmt: skip
         half = len(long.points) // 2
@@ -125,7 +130,7 @@ class Search:
         return back >= max(2.0, COME_BACK * came)
 
     def _keeps_areas(self, item: Attractor) -> bool:
-        """Whether the section's map neither stretches nor shrinks areas (volumes) along the run."""
+        """Whether the section's map neither stretches nor shrinks areas (volumes) on the average."""
         if self.settler.plan.indicator >= 0:
             return False  # a map of the surface: the states are no coordinates on it
         n, total = len(item.size), 0.0
@@ -147,7 +152,7 @@ class Search:
             with np.errstate(divide="ignore"):
                 total += float(np.log(np.abs(np.linalg.det(np.array(columns)))))
             place, mode = here.end, here.mode
-        return total / AREAS > -LEAST_EXPONENT
+        return abs(total) / AREAS < LEAST_EXPONENT
 
     def _on(self, place: FloatArray, mode: int, transient: int, keep: int) -> Trace:
         return self.settler.trace(self.point, place, mode, transient, keep)
