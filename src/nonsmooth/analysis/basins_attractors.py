@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.analysis.attractors import Settled, Settler
+from nonsmooth.analysis.attractors import Settler
+from nonsmooth.analysis.settled import Settled
 from nonsmooth.flow.engine import FloatArray, IntArray
 from nonsmooth.kernels import codes
 

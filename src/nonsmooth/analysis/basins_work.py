@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.analysis.attractors import Settled, Settler
+from nonsmooth.analysis.attractors import Settler
 from nonsmooth.analysis.chart_work import CHUNK
+from nonsmooth.analysis.settled import Settled
 from nonsmooth.campaign.work import Column
 from nonsmooth.flow.engine import FloatArray
 
