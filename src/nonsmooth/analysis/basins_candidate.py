@@ -7,7 +7,7 @@ recurrent too, but neighbours stay on orbits of their own, or (in a chaotic sea)
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -75,13 +75,15 @@ class Search:
         long = settler.trace(point, place, mode, 0, self.patience.candidate)
         if not len(long.points):
             return None
-        checked = settler.run(point, [0], long.end[None], modes=[long.mode], begin=settler.section_phase)
+        wide = replace(settler, keep=max(settler.keep, self.patience.more))  # extremes over many returns
+        checked = wide.run(point, [0], long.end[None], modes=[long.mode], begin=settler.section_phase)
         if checked.status[0] != codes.NOT_PERIODIC or not _recurrent(long.points):
             return None
         exponents, errors = settler.exponents(
             point, [0], long.end[None], np.array([long.mode]), self.patience.exponent
         )
-        maximum, minimum = checked.maximum[0], checked.minimum[0]
+        maximum = np.maximum(checked.maximum[0], long.points.max(axis=0))
+        minimum = np.minimum(checked.minimum[0], long.points.min(axis=0))
         exponent, error, least = float(exponents[0]), float(errors[0]), settler.least
         size = np.maximum(0.5 * (maximum - minimum), least)
         end, last = long.end, long.mode
