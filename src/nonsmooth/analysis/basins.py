@@ -91,8 +91,9 @@ def basins(
         ``label`` over the two states: the attractor's number, in the order of falling share; -1 not converged, -2
         diverged; ``status`` says why a start has no label (one beyond a stop, say). Over ``attractor``:
         ``period_number`` (0: no cycle), ``confirmed`` (1 where Newton's method has found the cycle), ``fraction`` of
-        the starts with its binomial ``fraction_error``, ``lyapunov``, ``multiplier``, ``maximum``, ``minimum``, a
-        point on the ``section``, and ``minimal_shock``: the least jump of the state, in units of the states' scales,
+        the starts with its binomial ``fraction_error``, ``lyapunov`` with its error, ``chaotic`` (1 where that is above
+        zero beyond doubt), ``multiplier``, ``maximum``, ``minimum``, a point on the ``section``, and
+        ``minimal_shock``: the least jump of the state, in units of the states' scales,
         that leads from the section to a start of this plane in another basin or one that diverges.
         ``section_points`` holds the attractors' points one after the other, with ``point_attractor``.
         Of the picture: ``entropy``, ``boundary_entropy``, ``boundary_dimension``, ``uncertain`` over ``distance``,

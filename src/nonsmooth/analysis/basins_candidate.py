@@ -22,7 +22,7 @@ __all__ = ["Search", "among"]
 
 CELLS = 40  # cells along the section's extent in which recurrence is judged
 MOSTLY = 0.95
-LEAST_EXPONENT = 1e-3  # per return: a faster contraction than this ends on a cycle
+LEAST_EXPONENT = 1e-3  # per return: contraction faster than this ends on a cycle, expansion is chaos
 LONGEST = 1024  # period number looked for where the exponent says that there is a cycle
 LONG_RETURN = 1e-8
 ON_CYCLE = 1e-3  # of the size: runs nearer than this to a long cycle are on it
@@ -87,7 +87,8 @@ class Search:
         exponent, error, least = float(exponents[0]), float(errors[0]), settler.least
         size = np.maximum(0.5 * (maximum - minimum), least)
         end, last = long.end, long.mode
-        if exponent < -3.0 * error - LEAST_EXPONENT * len(long.points) / long.times[-1]:
+        doubt = 3.0 * error + LEAST_EXPONENT * len(long.points) / long.times[-1]
+        if exponent < -doubt:
             p = _long_period(long.points, size)
             if not p:
                 return None
@@ -105,10 +106,10 @@ class Search:
         gap, _ = tree.query(long.points[:half] / size, p=np.inf)
         near = float(np.clip(3.0 * np.quantile(gap, MOSTLY), 1e-9, NEAR))
         item = Attractor(
-            0, points, long.modes[half:], end, last, maximum, minimum, np.nan, exponent, error, least, near=near,
-            tree=tree,
+            0, points, long.modes[half:], end, last, maximum, minimum, np.nan, exponent, error, least,
+            chaotic=exponent > doubt, near=near, tree=tree,
         )  # fmt: skip
-        if not self._attracts(item) or (exponent > 3.0 * error and self._keeps_areas(item)):
+        if not self._attracts(item) or (item.chaotic and self._keeps_areas(item)):
             self.repelled += 1
             return None
         return item
