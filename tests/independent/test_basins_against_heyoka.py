@@ -73,6 +73,7 @@ def test_exactly_these_attractors_from_200_starts_in_20_seeds() -> None:
                 progress=False,
             )  # fmt: skip
             assert sorted(found["period_number"].values[0].tolist()) == periods, (parameters, seed)
+        print(f"200 starts, 20 seeds: {periods} and no others")
 
 
 def test_a_rare_attractor_is_met_as_often_as_predicted() -> None:
@@ -88,4 +89,5 @@ def test_a_rare_attractor_is_met_as_often_as_predicted() -> None:
     for seed in range(20):
         found = basin_fractions(system, "g", [0.001375], n_starts=needed, box=box, seed=seed, progress=False)
         met += sorted(found["period_number"].values[0].tolist()) == [3, 4, 6]
+    print(f"share {shares[rarest]:.4f}, {needed} starts predicted for 99 %: all attractors met in {met} of 20 seeds")
     assert met >= 19
