@@ -40,6 +40,10 @@ ENDINGS = {
     ),
     "corner": "The orbit meets the corner of two boundaries, and no orbit near it goes on.",
     "physical": "Beyond this value the equations do not allow the parameter: the range was cut there.",
+    "landing": (
+        "A reset leads just onto a boundary: beyond this point it leads behind it, where another transition follows at "
+        "the same instant."
+    ),
 }
 LEAST_STEP = 1e-9
 COSINE = 0.98  # of the angle between the tangents of neighbours
@@ -47,7 +51,7 @@ SPREAD = 0.15  # chordal change of the multipliers between neighbours
 NOTHING = 2e-2  # of the first orbit's size: a fold there is the cycle's birth
 SMALL = 2e-3  # of the first orbit's size: a cycle this small is about to vanish in a Hopf bifurcation
 TURN = 1e-5  # along the branch: a fold nearer to a crossing of branches than this is that crossing
-EXPLAINS = ("short", "slow", "own", "touch", "others")
+EXPLAINS = ("short", "slow", "own", "touch", "others", "landed")
 BESIDE = 1e-6  # along the branch: nearer to a change of signature than this is the change itself
 
 
@@ -350,9 +354,10 @@ def _change(found: March, curve: Curve, met: list[tuple[str, float, Point]]) -> 
             return fresh, first, ds
     kind, _, point = met[0]
     name = "grazing" if kind in ("touch", "slow", "short") else "corner"
+    ending = "landing" if kind == "landed" else name
     known = [change.indicator for change in changed(curve, point, kind)]
     found.mark(name, curve, point, indicator=known[0] if known else _indicator(curve, point, kind))
-    found.ending = name
+    found.ending = ending
     return None
 
 
@@ -361,6 +366,10 @@ def _indicator(curve: Curve, point: Point, kind: str) -> int:
     if kind == "touch":
         visit, k = point.path.touched
         return int(curve.walk.rows[point.path.which[visit, k], 0])
+    if kind == "landed":
+        k = int(point.path.landing[int(point.path.landed.argmax())])
+        rows = curve.walk.rows[curve.walk.transitions[k, 2] : curve.walk.transitions[k, 3], 0]
+        return int(rows[0]) if len(rows) == 1 else -1
     return -1
 
 
