@@ -64,7 +64,7 @@ def _parts(curve: Curve, point: Point) -> tuple[tuple[Visit, ...], FloatArray, F
 
 def _touched(curve: Curve, point: Point) -> list[Change]:
     """A transition that has only been touched: put it in, and if it leads to another mode the way back too."""
-    visits, times, states = _parts(curve, point)
+    visits, _, states = _parts(curve, point)
     path, flow, values = point.path, curve.shooting.flow, point.solved.values
     place, k = path.touched
     traced = curve.shooting.system.traced

@@ -108,8 +108,9 @@ class Walk:
                 self.crossed[i] = self.crossed[i - 1]
             elif self.fired_row[i - 1] >= 0:
                 self.crossed[i, self.rows[self.fired_row[i - 1], 0]] = True
-        for i in np.flatnonzero(self.at_once):  # of conditions that hold together the first is taken
-            self.elsewhere[i, self.fired[i] :] = False
+        for i in range(m):  # of conditions that hold together the first is taken
+            if self.at_once[i]:
+                self.elsewhere[i, self.fired[i] :] = False
         self.inside = np.array([(i, self.fired[i]) for i in self.conditional], dtype=np.int64).reshape(-1, 2).T
 
     def along(self, solved: Solved, states: FloatArray) -> Path | None:

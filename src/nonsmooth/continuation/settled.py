@@ -157,7 +157,7 @@ def touching(guess: Guess, system: System) -> list[Guess]:
 
 
 def fired_row(flow: VariationalFlow, values: FloatArray, k: int, t: float, z: FloatArray, same: bool) -> int:
-    """The row of transition k that is zero; AT_ONCE where a reset at the ``same`` instant has led behind all of them."""
+    """The row of transition k that is zero; AT_ONCE where one at the ``same`` instant has led behind them all."""
     found = flow.jump(values, k, t, z)
     size = float(np.abs(found.h_z) @ flow.scale) + abs(float(found.h_z @ z))
     return AT_ONCE if same and abs(found.h) > BEHIND * size else found.row

@@ -7,7 +7,8 @@ orbit: the period too), and the active parameters:
 
     X = (z_0;\ t_1, z_1;\ \dots;\ t_m, z_m;\ [T];\ p)
 
-    h_i(t_i, z_i^-) = 0 \text{ (at once: } t_i = t_{i-1}), \quad z_i = R_i(t_i, z_i^-), \quad z_i^- = \varphi(t_i - t_{i-1}; t_{i-1}, z_{i-1}),
+    h_i(t_i, z_i^-) = 0 \text{ (at once: } t_i = t_{i-1}), \quad z_i = R_i(t_i, z_i^-), \quad
+    z_i^- = \varphi(t_i - t_{i-1}; t_{i-1}, z_{i-1}),
     \quad z_0 = \varphi(T - t_m; t_m, z_m)
 
 An autonomous orbit is anchored so that its section lies in the middle of a visit, t_1 = T - t_m (no transitions: by
@@ -54,7 +55,7 @@ class Solved:
     def monodromy(self) -> FloatArray:
         """Derivative of the return map (autonomous: with the trivial multiplier 1; zero for what is constant)."""
         M = self.legs.Phi[0]
-        for i, jump in enumerate(self.jumps):
+        for i in range(len(self.jumps)):
             if i + 1 < len(self.jumps) and self.at_once[i + 1]:
                 continue  # its instant is that of the first of them
             first = i
