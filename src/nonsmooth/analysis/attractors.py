@@ -57,12 +57,15 @@ class Settler:
     atol: Any = None
     expert: Mapping[str, Any] = field(default_factory=dict)
     tolerance: float = field(init=False)
+    width: int = field(init=False)  # numbers that say where a run stands on the section (``attractors_trace``)
 
     def __post_init__(self) -> None:
         noise = TOLERANCE
         if self.engine.name != "exact":
             noise = max(TOLERANCE, 10.0 * (RTOL if self.rtol is None else self.rtol))
         object.__setattr__(self, "tolerance", noise)
+        u, m, forced = self.system.traced.u, self.system.traced.m, self.system.traced.period is not None
+        object.__setattr__(self, "width", len(u) + len(m) + int(forced and self.plan.indicator >= 0))
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Sent to another process as the system's text: what is compiled there comes from that machine's own cache."""
@@ -133,12 +136,6 @@ class Settler:
     def section_phase(self) -> float:
         """Phase of the forcing at which the section stands; 0 where it is no phase."""
         return self.plan.phase if self.plan.indicator < 0 else 0.0
-
-    @property
-    def width(self) -> int:
-        """Numbers that say where a run stands on the section, its mode apart (``attractors_trace``)."""
-        traced = self.system.traced
-        return len(traced.u) + len(traced.m) + (self.plan.indicator >= 0 and self.system.period() is not None)
 
     def trace(self, point: FloatArray, place: FloatArray, mode: int, transient: int, keep: int) -> Trace:
         """Section points of one run at one parameter point (1, n_parameters), from a place on the section."""

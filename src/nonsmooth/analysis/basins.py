@@ -20,6 +20,7 @@ from nonsmooth.analysis.basins_measures import (
 from nonsmooth.analysis.basins_work import StartsWork, settled_from
 from nonsmooth.analysis.chart import described
 from nonsmooth.analysis.chart_work import CHUNK, STORED
+from nonsmooth.analysis.classify import longest_period
 from nonsmooth.analysis.settled import usable
 from nonsmooth.campaign.run import run
 from nonsmooth.flow.arguments import check_options, check_system, float_array, real_number, whole_number
@@ -70,7 +71,7 @@ def basins(
         Section returns passed over, then judged; a run ends earlier where its cycle is certain, and is followed for
         20 000 returns and more where it has no period.
     max_period : int
-        Longest period number looked for.
+        Longest period number looked for, less than ``keep``.
     method, rtol, atol
         See :func:`nonsmooth.flow.methods.engine_for`.
     threads : int, optional
@@ -90,8 +91,9 @@ def basins(
         ``label`` over the two states: the attractor's number, in the order of falling share; -1 not converged, -2
         diverged; ``status`` says why a start has no label (one beyond a stop, say). Over ``attractor``:
         ``period_number`` (0: no cycle), ``confirmed`` (1 where Newton's method has found the cycle), ``fraction`` of
-        the starts with its binomial ``fraction_error``, ``lyapunov``, ``multiplier``, ``maximum``, ``minimum``, a
-        point on the ``section``, and ``minimal_shock``: the least jump of the state, in units of the states' scales,
+        the starts with its binomial ``fraction_error``, ``lyapunov`` with its error, ``chaotic`` (1 where that is above
+        zero beyond doubt), ``multiplier``, ``maximum``, ``minimum``, a point on the ``section``, and
+        ``minimal_shock``: the least jump of the state, in units of the states' scales,
         that leads from the section to a start of this plane in another basin or one that diverges.
         ``section_points`` holds the attractors' points one after the other, with ``point_attractor``.
         Of the picture: ``entropy``, ``boundary_entropy``, ``boundary_dimension``, ``uncertain`` over ``distance``,
@@ -112,8 +114,8 @@ def basins(
     than 0.002 to the unit circle are not certified; their starts keep -1 with the status ``slow``.
 
     ``lyapunov`` of a cycle is minus infinity where its multipliers are zero, NaN where they are not zero but lost in
-    rounding (below 1e-8). Where a Poincare section is used, ``lyapunov`` and ``multiplier`` are those of its map: the exponent 0 along the
-    flow is not among them.
+    rounding (below 1e-8). Where a Poincare section is used, ``lyapunov`` and ``multiplier`` are those of its map: the
+    exponent 0 along the flow is not among them.
     """
     check_system(system, "basins")
     check_options(system, expert, basins)
@@ -178,7 +180,7 @@ def settler_of(
 ) -> tuple[Any, Settler]:  # fmt: skip
     """Check the options that basins share, and the settler they describe."""
     transient, keep = whole_number(transient, "transient", 0), whole_number(keep, "keep", 2)
-    max_period = whole_number(max_period, "max_period", 1)
+    max_period = longest_period(keep, max_period)
     if threads is not None:
         whole_number(threads, "threads", 1)
     section, plan = section_plan(system, section)

@@ -10,6 +10,7 @@ import numpy as np
 
 from nonsmooth.analysis.attractors import Settler
 from nonsmooth.analysis.chart_work import CHUNK, STORED, ChartWork
+from nonsmooth.analysis.classify import longest_period
 from nonsmooth.analysis.sweep import swept_values
 from nonsmooth.campaign.run import run
 from nonsmooth.flow.arguments import check_options, check_system, whole_number
@@ -68,14 +69,15 @@ def chart(
     transient, keep : int
         Section returns passed over, then judged. A point that is still settling gets up to eight transients.
     max_period : int
-        Longest period number looked for.
+        Longest period number looked for, less than ``keep``.
     stop_early : bool
         A point ends as soon as its period number is certain (a small return, and multipliers inside the unit circle)
         instead of at the end of its transient. Labels are the same, but for chaotic transients that end about then.
     extremes : bool
         Whether ``maximum`` and ``minimum`` are wanted.
     lyapunov : bool or int
-        Largest exponent, from two neighbours over 1000 (or this many) returns.
+        Largest exponent, from two neighbours over 1000 (or this many) returns. On a Poincare section of an autonomous
+        system the largest beside the zero along the flow.
     refine : bool or float
         Compute points near boundaries only and infer the rest; a number is the largest part of the points to compute.
         See Notes.
@@ -160,11 +162,13 @@ def plan_chart(
     check_options(system, expert, chart)
     values = _grid(system, grid)
     transient, keep = whole_number(transient, "transient", 0), whole_number(keep, "keep", 2)
-    max_period = whole_number(max_period, "max_period", 1)
+    max_period = longest_period(keep, max_period)
+    _check_edges(system, values)
     section, plan = section_plan(system, section)
     along = _carry(values, carry)
     starts = start_states(system, start)
-    n_exponent = EXPONENT_RETURNS if lyapunov is True else whole_number(int(lyapunov), "lyapunov", 0)
+    n_exponent = {True: EXPONENT_RETURNS, False: 0}[lyapunov] if isinstance(lyapunov, bool) else lyapunov
+    n_exponent = whole_number(n_exponent, "lyapunov", 0)
     if 0 < n_exponent < 40:
         raise ValueError(f"lyapunov = {lyapunov} returns are too few for an exponent; at least 40")
     extremes = bool(extremes) or len(starts) > 1  # attractors are told apart by them
@@ -202,6 +206,14 @@ def _grid(system: System, grid: Any) -> dict[str, FloatArray]:
         given = list(grid) if isinstance(grid, Mapping) else grid
         raise ValueError(f'grid must name two parameters, {{"omega": values, "rho": values}}; given: {given!r}')
     return {str(name): swept_values(system, name, values) for name, values in grid.items()}
+
+
+def _check_edges(system: System, values: Mapping[str, FloatArray]) -> None:
+    """Values that the system cannot have are told before anything is computed, not at the last of many points."""
+    (a, first), (b, second) = values.items()
+    for along, across in ((first[[0, -1]], second), (first, second[[0, -1]])):  # the plane's edges
+        x, y = np.meshgrid(along, across)
+        system.parameter_points({a: x.ravel(), b: y.ravel()})
 
 
 def _carry(values: Mapping[str, FloatArray], carry: Any) -> tuple[str, str] | None:
