@@ -12,7 +12,9 @@ from .series_step import polished
 from .taylor import dense_states, step_length
 from .watch import extend_at_node, forget
 
-__all__ = ["begin", "clear", "copy", "count_pass", "leap", "look", "meets_section", "open_window", "passes"]
+__all__ = [
+    "begin", "clear", "copy", "count_pass", "leap", "look", "meets_section", "open_window", "passes", "rests",
+]  # fmt: skip
 
 
 @device
@@ -233,3 +235,25 @@ def meets_section(choice, before, slope_before, after, slope_after, noise):
     if way == 0 or slope_before * way > 0.0:
         return True
     return fabs(after) <= noise and slope_after * way > 0.0
+
+
+@device
+def rests(J, u, n, lacking, mode, h, weight, rtol, tally, memo):
+    """Whether a state without forcing has come to rest, so that no section is met again.
+
+    On ``AT_REST`` steps in a row nothing moves by more than a thousandth of the tolerance, and it moves no faster at
+    their end than at their beginning: a state that leaves an unstable equilibrium would."""
+    speed = 0.0
+    for i in range(n):
+        if lacking[mode, i] == 0:
+            speed = max(speed, fabs(J[i, 1]) / (fabs(u[i]) + weight[i]))
+    if not (speed * h <= max(1e-3 * rtol, 1e-14)):
+        tally[place.RESTING] = 0
+        return False
+    if tally[place.RESTING] == 0:
+        memo[place.REST_SPEED] = speed
+    tally[place.RESTING] += 1
+    if tally[place.RESTING] <= place.AT_REST:
+        return False
+    tally[place.RESTING] = 0
+    return speed <= memo[place.REST_SPEED]
