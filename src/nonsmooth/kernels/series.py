@@ -139,7 +139,7 @@ def march(
             if waited >= t_max * (1.0 - 1e-12) or waited > 1e100:
                 status = NO_CONVERGENCE
                 break
-            if not forced and not record and rests(J, u, n, lacking, mode, h, norms[0], rtol, tally, memo):
+            if not forced and not record and rests(u, n, lacking, mode, norms[0], rtol, tally, memo):
                 status = NO_CONVERGENCE
                 break
             h = min(h, t_max - waited)

@@ -238,22 +238,16 @@ def meets_section(choice, before, slope_before, after, slope_after, noise):
 
 
 @device
-def rests(J, u, n, lacking, mode, h, weight, rtol, tally, memo):
-    """Whether a state without forcing has come to rest, so that no section is met again.
-
-    On ``AT_REST`` steps in a row nothing moves by more than a thousandth of the tolerance, and it moves no faster at
-    their end than at their beginning: a state that leaves an unstable equilibrium would."""
-    speed = 0.0
+def rests(u, n, lacking, mode, weight, rtol, tally, memo):
+    """Whether a state without forcing has come to rest, so that no section is met again: ``AT_REST`` steps in a row,
+    and no return among them, have left it where it was within a hundred tolerances."""
+    moved = 0.0
     for i in range(n):
         if lacking[mode, i] == 0:
-            speed = max(speed, fabs(J[i, 1]) / (fabs(u[i]) + weight[i]))
-    if not (speed * h <= max(1e-3 * rtol, 1e-14)):
-        tally[place.RESTING] = 0
-        return False
-    if tally[place.RESTING] == 0:
-        memo[place.REST_SPEED] = speed
+            moved = max(moved, fabs(u[i] - memo[place.REST + i]) / (fabs(u[i]) + weight[i]))
     tally[place.RESTING] += 1
-    if tally[place.RESTING] <= place.AT_REST:
-        return False
-    tally[place.RESTING] = 0
-    return speed <= memo[place.REST_SPEED]
+    if not (moved <= 1e2 * rtol) or tally[place.STEPS_IN_RETURN] <= 1:
+        tally[place.RESTING] = 0
+        for i in range(n):
+            memo[place.REST + i] = u[i]
+    return tally[place.RESTING] > place.AT_REST
