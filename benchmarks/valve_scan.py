@@ -65,8 +65,8 @@ def run(effort: float) -> tuple[list[str], list[Verdict]]:
     peers = [found["returns"] / t for t in times["heyoka"]]
     rate = max(rates)
     lines = [
-        f"## The relief valve scanned as published: q {LOWEST} to {HIGHEST}, {len(values)} inflows, {TRANSIENT} + {KEEP}"
-        f" maxima of the lift, tolerance {TOLERANCE:g}",
+        f"## The relief valve scanned as published: q {LOWEST} to {HIGHEST}, {len(values)} inflows,"
+        f" {TRANSIENT} + {KEEP} maxima of the lift, tolerance {TOLERANCE:g}",
         "",
         "| code | returns | seconds | returns/s and core (best) | median |",
         "|---|---|---|---|---|",

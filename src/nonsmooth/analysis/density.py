@@ -49,7 +49,7 @@ def given_ranges(system: System, density: Any, bins: Any) -> tuple[dict[str, tup
             raise ValueError(f"density of {name!r} is {limits!r}; write {form}")
         low, high = (real_number(one, f"a limit of {name!r}") for one in limits)
         if not (np.isfinite([low, high]).all() and low < high):
-            raise ValueError(f"density of {name!r} reaches from {low} to {high}: the first must be less than the second")
+            raise ValueError(f"density of {name!r} from {low} to {high}: the first limit must be less than the second")
         ranges[name] = (low, high)
     return ranges, number
 
@@ -63,7 +63,7 @@ def coarse_values(numbers: FloatArray) -> FloatArray:
 def bin_edges(
     system: System, ranges: Mapping[str, tuple[float, float]], bins: int, section: FloatArray | None
 ) -> FloatArray:
-    """Edges (n, bins + 1): of the ranges given, and for the other states of the section points (..., n) of a coarse run.
+    """Edges (n, bins + 1): of the ranges given, for other states of the section points (..., n) of a coarse run.
 
     Raises
     ------
@@ -107,7 +107,9 @@ class Counter:
 class CountedSlot:
     """One direction and start of a sweep of which no section points are kept: ``chain`` has all but these."""
 
-    def __init__(self, attractors: Attractors, points: FloatArray, sizes: tuple[int, int, int], edges: FloatArray) -> None:
+    def __init__(
+        self, attractors: Attractors, points: FloatArray, sizes: tuple[int, int, int], edges: FloatArray
+    ) -> None:
         self.attractors, self.points, self.sizes = attractors, points, sizes
         self.chain = Chain.empty(len(points), 0, *sizes)
         self.counter = Counter(len(points), edges)

@@ -78,7 +78,7 @@ def sweep(
         Longest period number looked for (and no longer than ``keep`` - 1).
     density : bool or mapping
         Store a histogram of each state's section points instead of the points. A mapping gives ranges,
-        ``{"x": (lowest, highest)}``; where none is given it is that of a coarse sweep, and a twentieth more either side.
+        ``{"x": (lowest, highest)}``; where none is given it is that of a coarse sweep and a twentieth more either side.
     bins : int
         Bins of these histograms.
     method, rtol, atol
@@ -94,8 +94,8 @@ def sweep(
         Over the parameter (and ``direction``, ``start``): ``section(..., iterate, state)``, true extremes ``maximum``,
         ``minimum``, ``period_number`` (0: none found), ``residual``, ``crossings_per_period``,
         ``contacts_per_period``, ``clearance``, extremes of the outputs, ``status``. With ``density``, in place of
-        ``section``: ``density(..., state, bin)`` (section points in each bin), ``outside(..., state)`` (those beyond the
-        range) and ``bin_edge(state, edge)``.
+        ``section``: ``density(..., state, bin)`` (section points in each bin), ``outside(..., state)`` (those beyond
+        the range) and ``bin_edge(state, edge)``.
 
     Raises
     ------

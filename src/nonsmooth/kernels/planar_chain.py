@@ -4,7 +4,17 @@ from .cache import inline, kernel
 from .codes import CHATTER, DIVERGED, NO_CONVERGENCE, OK, TOO_MANY_CROSSINGS
 from .planar_extremes import find_twins, finish, include, widen
 from .planar_layout import (
-    _INTEGERS, _LINEAR, _MATRIX, _NET, _SCRATCH, _TABLE, _VECTOR, BURST, MOST_CROSSINGS, MOST_STEPS, SHORT,
+    _INTEGERS,
+    _LINEAR,
+    _MATRIX,
+    _NET,
+    _SCRATCH,
+    _TABLE,
+    _VECTOR,
+    BURST,
+    MOST_CROSSINGS,
+    MOST_STEPS,
+    SHORT,
 )  # fmt: skip
 from .planar_march import bounded, jump, leg, next_holding, set_phase, settle, sign_after, stride, trigger, wrap_phase
 from .planar_search import dense, value_of

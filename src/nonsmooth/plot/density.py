@@ -17,7 +17,7 @@ __all__ = ["density"]
 
 
 def density(result: xr.Dataset, ax: Axes | None = None, *, y: str | None = None, cmap: str = "magma_r") -> Axes:
-    """Draw the histograms of a ``sweep(..., density=True)`` over its parameter, in a logarithmic scale of grey or colour.
+    """Draw the histograms of a ``sweep(..., density=True)`` over its parameter, in a logarithmic scale of colour.
 
     Parameters
     ----------
