@@ -80,6 +80,8 @@ def test_a_density_diagram_shows_the_shares_of_the_bins() -> None:
     np.testing.assert_allclose(np.nan_to_num(shown), 5.0 * swept["density"].sel(state="v").values.T)
     assert ax.get_xlabel() == r"$\rho$ (N)" and ax.get_ylabel() == "$v$ (m/s)"
     np.testing.assert_allclose(ax.get_xlim(), (0.29, 0.38))
+    with pytest.raises(ValueError, match=r"plot\.density"):
+        ns.plot.bifurcation(swept)
     with pytest.raises(ValueError, match="density=True"):
         density(ns.sweep(system, "rho", [0.3], keep=4, **QUIET))
     with pytest.raises(ValueError, match="not a state"):

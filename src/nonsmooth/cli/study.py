@@ -68,7 +68,7 @@ class Study:
             from nonsmooth import plot
 
             named = {axis: self.output[axis] for axis in ("x", "y") if axis in self.output}
-            ax = getattr(plot, _FIGURES[self.verb])(result, **named)
+            ax = getattr(plot, "density" if "density" in result else _FIGURES[self.verb])(result, **named)
             written.append(plot.save_figure(ax, _with_folder(folder / self.output["figure"])))
         return written
 
