@@ -68,7 +68,8 @@ class Study:
             from nonsmooth import plot
 
             named = {axis: self.output[axis] for axis in ("x", "y") if axis in self.output}
-            ax = getattr(plot, _FIGURES[self.verb])(result, **named)
+            counted = self.verb == "sweep" and "density" in result
+            ax = getattr(plot, "density" if counted else _FIGURES[self.verb])(result, **named)
             written.append(plot.save_figure(ax, with_folder(folder / self.output["figure"])))
         return written
 
