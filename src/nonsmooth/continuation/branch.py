@@ -274,6 +274,9 @@ def _mark_graze(found: March, curve: Curve, point: Point, change: Change, after:
 def _mark_unexplained(found: March, curve: Curve, kind: str, point: Point) -> str:
     """Record a boundary beyond which no orbit of another signature is known; its name."""
     name = "grazing" if kind in ("touch", "slow", "short") else "corner"
+    if kind == "short" and 0 < (i := int(point.path.tau.argmin())) < curve.shooting.m:
+        visits = curve.shooting.signature.visits
+        name = "grazing" if visits[i - 1].mode == visits[i + 1].mode else "corner"
     known = [change.indicator for change in changed(curve, point, kind)]
     found.mark(name, curve, point, indicator=known[0] if known else _indicator(curve, point, kind))
     return name

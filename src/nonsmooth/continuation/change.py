@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.continuation.arclength import Curve, Point
+from nonsmooth.continuation.corners import begins_well, other_ways, short_run
 from nonsmooth.continuation.shooting import Shooting
 from nonsmooth.continuation.signature import Signature, Visit
 
@@ -47,12 +48,15 @@ def changed(curve: Curve, point: Point, kind: str) -> list[Change]:
     if kind == "touch":
         return _touched(curve, point)
     if kind == "short":
-        return _shortened(curve, point)
+        i = int(point.path.tau.argmin())
+        inside = 0 < i < curve.shooting.m
+        return [*_shortened(curve, point), *(_around(curve, point, *short_run(point, i)) if inside else [])]
     if kind == "slow":
         return _slowed(curve, point)
     if kind == "own":
         return _other_row(curve, point)
-    return []
+    i = int(point.path.others.argmax())
+    return _around(curve, point, i, i + 1)
 
 
 def _parts(curve: Curve, point: Point) -> tuple[tuple[Visit, ...], FloatArray, FloatArray]:
@@ -183,6 +187,18 @@ def _other_row(curve: Curve, point: Point) -> list[Change]:
     return [Change("corner", Signature(new), times, states, indicator)]
 
 
+def _around(curve: Curve, point: Point, first: int, last: int) -> list[Change]:
+    """Other ways through a corner of two transitions, in place of the crossings ``first`` to ``last - 1``."""
+    visits, times, states = _parts(curve, point)
+    found = []
+    for way, after, indicator in other_ways(curve, point, first, last):
+        signature = Signature((*visits[:first], *way, *visits[last:]))
+        t_new = np.concatenate([times[:first], np.full(len(way), times[first]), times[last:]])
+        z_new = np.concatenate([states[: first + 1], np.array(after), states[last + 1 :]])
+        found.append(Change("corner", signature, t_new, z_new, indicator))
+    return found
+
+
 def resumed(curve: Curve, point: Point, change: Change, active: tuple[str, ...]) -> tuple[Curve, Point, float] | None:
     """The curve of the new signature, its first admissible point, and the step that led there."""
     new = _curve(curve, change, point, active)
@@ -205,7 +221,9 @@ def resumed(curve: Curve, point: Point, change: Change, active: tuple[str, ...])
             if found is None:
                 continue
             first = fresh.point(found[0], found[1], direction)
-            if first is not None and (first.path.violation() > 0.0).all():
+            if first is None or not (first.path.violation() > 0.0).all():
+                continue
+            if change.kind != "corner" or begins_well(fresh, first):
                 return fresh, first, ds
     return None
 
