@@ -191,8 +191,8 @@ def test_a_torus_beside_a_fold_or_a_flip(own: str) -> None:
 
 
 def test_rigid_stop_changes_over_where_the_free_period_fits() -> None:
-    """On A's grazing curve persistence and non-smooth fold change over where half the free period divides the forcing's:
-    M- has no entry from speed to position at omega = 2 sqrt(k - c^2 / 4) / n."""
+    """On A's grazing curve persistence and non-smooth fold change over where half the free period divides the
+    forcing's: M- has no entry from speed to position at omega = 2 sqrt(k - c^2 / 4) / n."""
     branch = ns.continue_orbit(ns.find_orbit(ns.models.impact_oscillator(A=0.05)), "A", (0.02, 1.2))
     curve = ns.continue_curve(row(branch, "grazing"), {"omega": (0.45, 1.5), "A": (0.01, 1.0)})
     w = np.sqrt(1 - 0.01 / 4)
@@ -211,7 +211,8 @@ def test_soft_stop_changes_over_with_its_damper() -> None:
     a, w, T = c / (2 * m), np.sqrt(2 * k / m - (c / (2 * m)) ** 2), 2 * np.pi / omega
     trace, det, corner = 2 * np.exp(-a * T) * np.cos(w * T), np.exp(-2 * a * T), np.exp(-a * T) * np.sin(w * T) / w
     # tr(M S) = tr M - (c_s / m) M12
-    exact = {kind: m * (trace + sign * (1 + det)) / corner for kind, sign in (("grazing_fold", -1), ("grazing_flip", 1))}
+    signs = {"grazing_fold": -1, "grazing_flip": 1}
+    exact = {kind: m * (trace + sign * (1 + det)) / corner for kind, sign in signs.items()}
     curve = ns.continue_curve(graze, {"c_s": (0.01, 40.0), "rho": (0.1, 0.2)})
     found = {name: x for name, x, _ in points(curve)}
     expected = {kind: c_s for kind, c_s in exact.items() if 0.01 < c_s < 40.0}

@@ -86,7 +86,7 @@ def test_motion_without_contact_beyond_the_support(way: str) -> None:
 
 
 def test_virtual_contact_goes_round_or_closes() -> None:
-    """Without damper a contact of negative length is reached through zero, and the branch closes; with it, it goes round."""
+    """A contact of negative length is reached through zero; without damper the branch closes, with it it goes round."""
     for c_s in (0.0, 0.6):
         orbit = ns.find_orbit(support(rho=0.14, g=0.02, c_s=c_s, omega=4.5), period_number=1)
         branch = ns.continue_orbit(orbit, "omega", (3.0, 7.0), virtual=True)
