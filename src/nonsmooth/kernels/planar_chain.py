@@ -85,7 +85,7 @@ def chain(
             o_max[i, k] = -1e300
             o_min[i, k] = 1e300
         set_phase(w, s, rates)
-        mode, code = settle(fun, tay, mode, w, transitions, rows, row_start, mode_start, mode_list, zero)
+        mode, code = settle(fun, tay, info, mode, w, transitions, rows, row_start, mode_start, mode_list, zero)
         if surface >= 0:  # a start on the section is no return
             found[3] = sign_after(fun, tay, mode, w, surface, zero)
         crossings[i] = 0
@@ -190,7 +190,9 @@ def chain(
                         if jumps > mode_start.shape[0]:
                             code = CHATTER
                             break
-                        mode = jump(i, nxt, fired if jumps == 0 else -1, fun, w, wn, transitions, ra, rb, rc, rs, zero)
+                        mode = jump(
+                            i, nxt, fired if jumps == 0 else -1, fun, info, w, wn, transitions, ra, rb, rc, rs, zero
+                        )
                         jumps += 1
                         if is_open:
                             crossings[i] += 1
