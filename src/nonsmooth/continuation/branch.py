@@ -116,10 +116,11 @@ def march(curve: Curve, point: Point, limits: Limits, first_step: float) -> Marc
         point = curve.anchored_anew(point)
     tests = Tests(curve)
     numbers, violation = tests.smooth(point), point.path.violation()
+    before: Point | None = None
     count = 0
     circle, again = None, 8  # a point that is met again if the branch goes round (Brent's method)
     while len(found.rows) < limits.points:
-        new = _stepped(curve, point, ds)
+        new = _stepped(curve, point, ds, before)
         if new is None:
             ds *= 0.5
             if ds < LEAST_STEP:
@@ -187,6 +188,7 @@ def march(curve: Curve, point: Point, limits: Limits, first_step: float) -> Marc
             if after is None:
                 break
             curve, point, ds = after
+            before = None
             ds = ds or 0.1 * limits.largest
             tests = Tests(curve)
             numbers, violation = tests.smooth(point), point.path.violation()
@@ -215,15 +217,15 @@ def march(curve: Curve, point: Point, limits: Limits, first_step: float) -> Marc
         if new.iterations >= 6:
             easy = min(easy, 0.7)
         ds = min(ds * easy, limits.largest)
-        point, numbers, violation = new, numbers_new, violation_new
+        before, point, numbers, violation = point, new, numbers_new, violation_new
         if curve.shooting.reference is not None:
-            point = curve.anchored_anew(point)
+            before, point = None, curve.anchored_anew(point)
     return found
 
 
-def _stepped(curve: Curve, point: Point, ds: float) -> Point | None:
+def _stepped(curve: Curve, point: Point, ds: float, before: Point | None) -> Point | None:
     try:
-        new = curve.step(point, ds)
+        new = curve.step(point, ds, before)
     except SystemDefinitionError:
         return None
     if new is None or not np.isfinite(new.M).all():
