@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.analysis.attractors import Settled, Settler, usable
+from nonsmooth.analysis.attractors import Settler
+from nonsmooth.analysis.settled import Settled, usable
 from nonsmooth.campaign.work import Column
 from nonsmooth.flow.engine import FloatArray, IntArray
 from nonsmooth.kernels import codes

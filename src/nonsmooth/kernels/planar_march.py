@@ -195,14 +195,16 @@ def stride(
 ):  # fmt: skip
     """Whole steps without crossings, past section phases, as long as ``returns`` < ``most``.
 
-    Returns (s, whole, returns); w1 then stands at the end of the step that is not clear, or that would be one return
-    too many."""
+    Returns (s, whole, returns, clear); w1 then stands at the end of the step that is not clear, or that would be one
+    return too many (``clear``: no transition on it)."""
     step = info[mode, 0]
     to_node(prop, rot, mode, NODES, w, w1)
+    clear = False
     while clear_step(fun, info, mode, w, w1, rows, row_start, mode_start, mode_list, zero):
         after = s + step
         if (s < target and target <= after) or (s < target + period and target + period <= after):
             if returns + 1 >= most:
+                clear = True
                 break
             returns += 1
         s = after
@@ -217,7 +219,7 @@ def stride(
         for f in range(zero.shape[0]):
             zero[f] = 0
         to_node(prop, rot, mode, NODES, w, w1)
-    return s, whole, returns
+    return s, whole, returns, clear
 
 
 @inline
