@@ -50,6 +50,10 @@ ENDINGS = {
     "corner": "The orbit meets the corner of two boundaries, and no orbit near it goes on.",
     "physical": "Beyond this value the equations do not allow the parameter: the range was cut there.",
     "circle": "The virtual branch came back to an earlier point of its own and goes round from here on.",
+    "landing": (
+        "A reset leads just onto a boundary: beyond this point it leads behind it, where another transition follows at "
+        "the same instant."
+    ),
 }
 LEAST_STEP = 1e-9
 COSINE = 0.98  # of the angle between the tangents of neighbours
@@ -302,7 +306,8 @@ def _change(found: March, curve: Curve, met: list[Event]) -> tuple[Curve, Point,
                 return None
             return fresh, first, ds
     kind, _, point = met[0]
-    found.ending = _mark_unexplained(found, curve, kind, point)
+    name = _mark_unexplained(found, curve, kind, point)
+    found.ending = "landing" if kind == "landed" else name
     return None
 
 
@@ -311,6 +316,10 @@ def _indicator(curve: Curve, point: Point, kind: str) -> int:
     if kind == "touch":
         visit, k = point.path.touched
         return int(curve.walk.rows[point.path.which[visit, k], 0])
+    if kind == "landed":
+        k = int(point.path.landing[int(point.path.landed.argmax())])
+        rows = curve.walk.rows[curve.walk.transitions[k, 2] : curve.walk.transitions[k, 3], 0]
+        return int(rows[0]) if len(rows) == 1 else -1
     return -1
 
 

@@ -178,7 +178,7 @@ def _march(locus: Locus, place: Place, box: Any, largest: float, most: int, begi
             if now[i] < 0.0 <= safe[i]:
                 there = root(locus, place, new, _Leaving(locus, i))
                 if there is not None:
-                    events.append((there[0], "corner" if name in ("own", "others") else "grazing", there[1]))
+                    events.append((there[0], "corner" if name in ("own", "others", "landed") else "grazing", there[1]))
         outside = any(not low <= float(new.X[-2 + i]) <= high for i, (low, high) in enumerate(box))
         if not events and (outside or ((now < 0.0) & (safe >= 0.0)).any()):  # not located: nearer
             ds *= 0.25

@@ -18,7 +18,7 @@ from nonsmooth.continuation.signature import Visit
 if TYPE_CHECKING:
     from nonsmooth.continuation.arclength import Curve, Point
 
-__all__ = ["begins_well", "other_ways", "short_run"]
+__all__ = ["other_ways", "short_run"]
 
 FloatArray = NDArray[np.float64]
 Way = tuple[list[Visit], list[FloatArray], int]  # visits, states after their ends, indicator of the first new crossing
@@ -26,7 +26,6 @@ SHORT = 1e-7  # of the period: visits that have shrunk to nothing
 ZERO = 1e-7  # of an indicator's size: it vanishes
 LONGEST = 3  # transitions of a way
 MOST = 24  # ways
-HELD = 1e-10  # of an indicator's size: a condition that holds where a visit begins should have fired
 
 
 def short_run(point: Point, i: int) -> tuple[int, int]:
@@ -46,9 +45,8 @@ def other_ways(curve: Curve, point: Point, first: int, last: int) -> list[Way]:
     traced = shooting.system.traced
     visits = shooting.signature.visits
     t, target = float(point.solved.times[first + 1]), visits[last].mode
-    phases = {
-        traced.transitions[v.transition].at: v.turn for v in visits[first:last] if v.row < 0 and v.transition >= 0
-    }
+    phases = {traced.transitions[v.transition].at: v.turn for v in visits[first:last] if v.transition >= 0}
+    phases.pop(None, None)
     known = [(v.mode, v.transition, v.row) for v in visits[first:last]]
     found: list[Way] = []
 
@@ -80,23 +78,3 @@ def other_ways(curve: Curve, point: Point, first: int, last: int) -> list[Way]:
 
     go(visits[first].mode, point.solved.legs.z[first], [], [])
     return sorted(found, key=lambda way: len(way[0]))
-
-
-def begins_well(curve: Curve, point: Point) -> bool:
-    """Whether no condition holds already where a visit begins: it would have fired there."""
-    shooting, values = curve.shooting, point.solved.values
-    traced = shooting.system.traced
-    states = shooting.split(point.X)[1]
-    for i, visit in enumerate(shooting.signature.visits[1:], start=1):
-        t, z = float(point.solved.times[i]), states[i]
-        for jump in traced.transitions:
-            if jump.source != visit.mode or jump.at is not None:
-                continue
-            margin = np.inf
-            for row in jump.rows:
-                here = shooting.flow.indicator(values, row.indicator, visit.mode, t, z)
-                size = float(np.abs(here.h_z * curve.size).sum()) or 1.0
-                margin = min(margin, row.sign * here.h / size)
-            if margin > HELD:
-                return False
-    return True

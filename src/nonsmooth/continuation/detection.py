@@ -8,7 +8,7 @@ flip
     det(M + I) = 0;
 neimark_sacker
     :math:`\prod_{i<j} (\mu_i \mu_j - 1) = 0` with a complex pair;
-and the five ways in which a path can leave its signature (``path.VIOLATIONS``).
+and the six ways in which a path can leave its signature (``path.VIOLATIONS``).
 
 Each is a number along the branch that changes its sign; the root is bracketed by two points and found by Brent's
 method, every trial being an orbit corrected to rounding.

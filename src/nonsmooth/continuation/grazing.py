@@ -19,6 +19,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.continuation.signature import AT_ONCE
+from nonsmooth.flow.saltation import chained
+
 if TYPE_CHECKING:
     from nonsmooth.continuation.arclength import Curve, Point
     from nonsmooth.continuation.change import Change
@@ -93,7 +96,7 @@ class _Product:
     def __call__(self, aside: float) -> FloatArray:
         """With ``aside`` > 0 the contact's saltation matrices are put in, looked at so far from the touch (periods)."""
         M = np.eye(self.flow.n)
-        begin = 0.0
+        begin, taken = 0.0, None
         for i, visit in enumerate(self.visits):
             end = self.end if i == len(self.times) else float(self.times[i])
             if i == self.change.place and aside > 0.0:
@@ -102,7 +105,10 @@ class _Product:
                 step, z = self._leg(visit.mode, begin, end, self.states[i])
             M = step @ M
             if i < len(self.times):
-                M = self.flow.jump(self.values, visit.transition, end, z, visit.row).saltation @ M
+                jump = self.flow.jump(self.values, visit.transition, end, z, visit.row)
+                taken = chained([taken, jump]) if taken is not None and visit.row == AT_ONCE else jump
+                if self.visits[i + 1].row != AT_ONCE:
+                    M = taken.saltation @ M
             begin = end
         return np.asarray(M)
 
@@ -118,8 +124,12 @@ class _Product:
         An impact is looked at before the touch, where the indicator still rises; the motion goes on from the touch."""
         touch, inserted = self.change.touch, self.change.inserted
         first, z = self._leg(mode, begin, touch - aside, z)
-        entry = self.flow.jump(self.values, inserted[0].transition, touch - aside, z, inserted[0].row)
-        if len(inserted) == 1:
+        taken = [inserted[0].transition]
+        for visit in inserted[1:]:
+            if visit.row == AT_ONCE:
+                taken.append(visit.transition)
+        entry = self.flow.jump(self.values, taken, touch - aside, z, inserted[0].row)
+        if len(taken) == len(inserted):
             there, z = self._leg(mode, touch - aside, touch, z)
             rest, z = self._leg(mode, touch, end, z)
             # Phi of the last stretch before the touch belongs behind the impact, to the order of ``aside``.
