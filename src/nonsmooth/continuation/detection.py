@@ -27,7 +27,7 @@ from nonsmooth.continuation.path import VIOLATIONS
 if TYPE_CHECKING:
     from nonsmooth.continuation.arclength import Curve, Point
 
-__all__ = ["SMOOTH", "Tests", "limited", "locate"]
+__all__ = ["SMOOTH", "Tests", "locate"]
 
 BEGUN = 1e-6
 ROUNDING = 1e-13  # of the numbers at both ends: smaller than this is zero

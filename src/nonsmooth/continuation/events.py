@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.continuation.arclength import Curve, Point
-from nonsmooth.continuation.detection import SMOOTH, Tests, limited, locate
+from nonsmooth.continuation.detection import SMOOTH, Tests, locate
 from nonsmooth.continuation.path import VIOLATIONS
 from nonsmooth.continuation.solve import determinant
 from nonsmooth.continuation.switching import branch_point, is_doubled
@@ -38,7 +38,7 @@ def first_met(curve: Curve, a: Point, b: Point, tests: Tests, crossed: list[str]
     for kind in sorted(crossed, key=EXPLAINS.index):
         number = tests.one(kind)
         known = [(number(point), s, point) for _, s, point in located]
-        largest = max(abs(limited(number(end))) for end in (a, b))
+        largest = max(abs(x) for x in (number(a), number(b)) if np.isfinite(x))
         same = [(kind, s, point) for value, s, point in known if abs(value) < SAME * largest]
         if same or any(value > 0.0 for value, _, _ in known):  # met at the same place, or farther on
             located += same[:1]
