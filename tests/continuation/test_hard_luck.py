@@ -14,7 +14,7 @@ support = ns.models.discontinuous_support
 
 def ends(branch: object) -> list[str]:
     words = list(ENDINGS)
-    return [words[int(i)] for i in branch["ended"].values]  # type: ignore[index]
+    return [words[int(i)] for i in branch["ended"].values]
 
 
 def test_a_chaotic_start() -> None:
@@ -89,7 +89,7 @@ def test_a_fold_at_the_edge_of_the_range() -> None:
 def test_wrong_arguments(arguments: tuple[object, ...], words: str) -> None:
     orbit = ns.find_orbit(support(rho=0.14, g=0.02, omega=3.3))
     with pytest.raises((ValueError, TypeError), match=words):
-        ns.continue_orbit(orbit, *arguments)  # type: ignore[arg-type]
+        ns.continue_orbit(orbit, *arguments)
 
 
 def test_what_is_no_orbit() -> None:
@@ -98,7 +98,7 @@ def test_what_is_no_orbit() -> None:
     with pytest.raises(TypeError, match="branch"):
         ns.special_points({})
     with pytest.raises(TypeError):
-        ns.find_orbit("discontinuous_support")  # type: ignore[arg-type]
+        ns.find_orbit("discontinuous_support")
 
 
 def test_switching_where_nothing_branches() -> None:

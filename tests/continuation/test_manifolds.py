@@ -151,7 +151,7 @@ def test_what_has_no_manifolds_is_refused(tmp_path: Any) -> None:
     few = ns.manifolds(orbit, length=1.0, kind="unstable", distance=0.01, points=30)
     assert "largest number of points" in str(few["ended_because"].values[0])
     with pytest.raises(TypeError, match="takes an Orbit"):
-        ns.manifolds("orbit")  # type: ignore[arg-type]
+        ns.manifolds("orbit")
     short = ns.manifolds(orbit, length=1.0, kind="unstable", distance=0.2)
     ns.save(short, tmp_path / "m.nc")
     assert np.array_equal(ns.load(tmp_path / "m.nc")["section"].values, short["section"].values)

@@ -174,7 +174,7 @@ def test_c_sticking_orbit_grazes_the_wall() -> None:
         def top(t: float, y: np.ndarray) -> float:
             return float(y[1])
 
-        top.direction = -1  # type: ignore[attr-defined]
+        top.direction = -1
         run = solve_ivp(field, (0.0, np.pi / 0.92), u, method="DOP853", rtol=1e-13, atol=1e-13, events=top)
         return run.y[:, -1], max(float(y[0]) for y in run.y_events[0])
 

@@ -59,7 +59,7 @@ def swing() -> ns.System:
     ],
     ids=str,
 )
-def test_passages_of_a_harmonic_motion(section, first, spacing, method: str, swing: ns.System) -> None:  # type: ignore[no-untyped-def]
+def test_passages_of_a_harmonic_motion(section, first, spacing, method: str, swing: ns.System) -> None:
     """x = cos t from t = 0: the start, where the speed is zero, is no passage."""
     options = {"section": section, "start": {"x": 1.0}, "method": method, **METHODS[method]}
     if first is None:

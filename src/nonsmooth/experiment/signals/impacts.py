@@ -288,7 +288,7 @@ def _forward(t: Floats, x: Floats, variance: float, significance: float, window:
     """Times of kinks and their errors, in order; more rather than fewer."""
     gain, place, error = (np.zeros(len(t) - 1) for _ in range(3))
     taken: dict[int, tuple[float, float]] = {}
-    todo = range(2, len(t) - 3)
+    todo = list(range(2, len(t) - 3))
     while True:
         for i in todo:
             # A window ends at the neighbouring kinks.
@@ -299,9 +299,9 @@ def _forward(t: Floats, x: Floats, variance: float, significance: float, window:
             return [taken[i] for i in sorted(taken)]
         i = int(np.argmax(gain))
         taken[i] = (float(place[i]), float(error[i]))
-        todo = range(max(2, i - window), min(len(t) - 3, i + window + 1))
+        near = range(max(2, i - window), min(len(t) - 3, i + window + 1))
         gain[max(i - 1, 0) : i + 2] = 0.0
-        todo = [k for k in todo if all(abs(k - j) > 1 for j in taken)]  # type: ignore[assignment]
+        todo = [k for k in near if all(abs(k - j) > 1 for j in taken)]
 
 
 def _kink(t: Floats, x: Floats, i: int, low: int, high: int, variance: float) -> tuple[float, float, float]:
