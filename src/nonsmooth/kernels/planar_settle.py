@@ -90,6 +90,53 @@ def shrinks(section, i, keep, size, max_period):
 
 
 @device
+def modulus(images, nudge):
+    """Largest modulus of the eigenvalues of the map whose images of a point and its two neighbours these are."""
+    a = (images[1, 0] - images[0, 0]) / nudge
+    c = (images[1, 1] - images[0, 1]) / nudge
+    b = (images[2, 0] - images[0, 0]) / nudge
+    d = (images[2, 1] - images[0, 1]) / nudge
+    half = 0.5 * (a + d)
+    square = 0.25 * (a - d) * (a - d) + b * c
+    if square >= 0.0:
+        return fabs(half) + sqrt(square)
+    return hypot(half, sqrt(-square))
+
+
+@device
+def candidate(section, i, keep, size, max_period, tolerance, returns):
+    """(period number, status, residual) by the kept section points of row i alone; the status is OK where there is a
+    period whose multipliers are still to be seen, and the period number is 0 where there is none."""
+    longest = max_period if max_period < keep - 1 else keep - 1
+    find_returns(section, i, keep, size, longest, returns)
+    least = returns[0]
+    p = 0
+    for k in range(longest):
+        if not returns[k] < 1e300:
+            return 0, SLOW, returns[k]
+        if returns[k] < least:
+            least = returns[k]
+        if p == 0 and returns[k] <= tolerance:
+            p = k + 1
+    if p > 0:
+        return p, OK, returns[p - 1]
+    settling = least < NEARLY or shrinks(section, i, keep, size, max_period)
+    return 0, SLOW if settling else NOT_PERIODIC, least
+
+
+@device
+def certain(p, mu, residual, returns):
+    """Whether the period number p stands with the multiplier mu: it contracts, and no shorter period is as near."""
+    if mu < 0.0 or mu >= 1.0 - MARGIN:
+        return False
+    away = residual / (1.0 - mu)
+    for d in range(1, p):
+        if p % d == 0 and returns[d - 1] <= APART * away:
+            return False
+    return True
+
+
+@device
 def multiplier(
     i, p, keep, size, tolerance, linear, net, quiet, phase, t_max, limit, out, probe, scratch, rest, moved,
     moved_clock, moved_counters, images,
@@ -118,15 +165,7 @@ def multiplier(
             return -1.0
         images[j, 0] = moved[0] / size[0]
         images[j, 1] = moved[1] / size[1]
-    a = (images[1, 0] - images[0, 0]) / nudge
-    c = (images[1, 1] - images[0, 1]) / nudge
-    b = (images[2, 0] - images[0, 0]) / nudge
-    d = (images[2, 1] - images[0, 1]) / nudge
-    half = 0.5 * (a + d)
-    square = 0.25 * (a - d) * (a - d) + b * c
-    if square >= 0.0:
-        return fabs(half) + sqrt(square)
-    return hypot(half, sqrt(-square))
+    return modulus(images, nudge)
 
 
 @device
@@ -135,32 +174,15 @@ def verdict_of(
     moved_clock, moved_counters, images, returns,
 ):  # fmt: skip
     """(period number, status, residual, multiplier) of the kept section points of row i: see ``analysis.classify``."""
-    section = out[0]
-    longest = max_period if max_period < keep - 1 else keep - 1
-    find_returns(section, i, keep, size, longest, returns)
-    least = returns[0]
-    p = 0
-    for k in range(longest):
-        if not returns[k] < 1e300:
-            return 0, SLOW, returns[k], -1.0
-        if returns[k] < least:
-            least = returns[k]
-        if p == 0 and returns[k] <= tolerance:
-            p = k + 1
+    p, status, residual = candidate(out[0], i, keep, size, max_period, tolerance, returns)
     if p == 0:
-        settling = least < NEARLY or shrinks(section, i, keep, size, max_period)
-        return 0, SLOW if settling else NOT_PERIODIC, least, -1.0
-    residual = returns[p - 1]
+        return 0, status, residual, -1.0
     mu = multiplier(
         i, p, keep, size, tolerance, linear, net, quiet, phase, t_max, limit, out, probe, scratch, rest, moved,
         moved_clock, moved_counters, images,
     )  # fmt: skip
-    if mu < 0.0 or mu >= 1.0 - MARGIN:
+    if not certain(p, mu, residual, returns):
         return 0, SLOW, residual, mu
-    away = residual / (1.0 - mu)
-    for d in range(1, p):
-        if p % d == 0 and returns[d - 1] <= APART * away:
-            return 0, SLOW, residual, mu
     return p, OK, residual, mu
 
 
