@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.analysis.attractors_compiled import exponents_compiled, load, run_compiled
+from nonsmooth.analysis.attractors_cuda import run_on_gpu
 from nonsmooth.analysis.attractors_parting import exponent_of
 from nonsmooth.analysis.classify import TOLERANCE, Verdict
 from nonsmooth.analysis.settle import LEAST, LONGER, Attractors
@@ -42,6 +43,8 @@ class Settler:
         A job ends as soon as its period number is certain, not at the end of the transient.
     extremes : bool
         Whether extremes are wanted; they cost time where the motion is not periodic.
+    device : str
+        ``"cpu"`` or ``"cuda"``: see :mod:`nonsmooth.flow.devices`.
     """
 
     system: System
@@ -55,6 +58,7 @@ class Settler:
     rtol: float | None = None
     atol: Any = None
     expert: Mapping[str, Any] = field(default_factory=dict)
+    device: str = "cpu"
     tolerance: float = field(init=False)
 
     def __post_init__(self) -> None:
@@ -118,7 +122,9 @@ class Settler:
             self.transient, self.keep, self.max_period, FIRST_LOOK if self.stop_early else 0, attempts, carried,
             self.extremes,
         )  # fmt: skip
-        return run_compiled(
+        if self.device == "cuda" and carried:
+            raise ValueError('device="cuda" runs all jobs at once: none can go on from another')
+        return (run_on_gpu if self.device == "cuda" else run_compiled)(
             self.planar, points, rows, starts, modes, begin, self.plan.phase, choice, self.tolerance, self.least
         )
 

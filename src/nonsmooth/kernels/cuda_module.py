@@ -17,7 +17,7 @@ __all__ = ["cuda_planar_module"]
 
 PARTS = (
     "planar_tables", "planar_polynomial", "planar_search", "planar_march", "planar_extremes", "planar_layout",
-    "planar_chain", "cuda_planar",
+    "planar_chain", "planar_settle", "cuda_planar", "cuda_judge",
 )  # fmt: skip
 
 
@@ -25,7 +25,7 @@ PARTS = (
 def cuda_planar_module(
     harmonics: int, modes: int, indicators: int, outputs: int, transitions: int, rows: int
 ) -> ModuleType:
-    """The module with ``advance``; ``rows`` counts those of the section too."""
+    """The module with ``advance``, ``judge``, ``beside`` and ``decide``; ``rows`` counts those of the section too."""
     folder = Path(__file__).parent
     text = "\n".join((folder / f"{part}.py").read_text(encoding="utf-8") for part in PARTS)
     text = re.sub(r"^from \.planar_\w+ import (\([^)]*\).*|[^(\n]*)$", "", text, flags=re.MULTILINE)

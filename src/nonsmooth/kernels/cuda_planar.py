@@ -64,14 +64,16 @@ def unpack4(target, packed, i, at):
 
 
 @entry
-def advance(rows, packed, multiples, net, u, clock, counters, transient, keep, plan, phase, limit, out):
-    """Thread k: march the state k under parameter row rows[k] by transient[k] returns, then keep[k] more into ``out``.
+def advance(jobs, rows, packed, multiples, net, u, clock, counters, transient, keep, plan, phase, limit, out):
+    """Thread k: march the state of job j = jobs[k] under parameter row rows[j] by transient[j] section returns, then
+    keep[j] more into row j of ``out``. (One entry for all jobs where they are short.)
 
-    The state is left at the last return; out[12] are the statuses. With an infinite period there are no returns."""
+    The state is left at the last return; out[12] are the statuses."""
     k = cuda.grid(1)
-    if k >= rows.shape[0]:
+    if k >= jobs.shape[0]:
         return
-    i = rows[k]
+    j = jobs[k]
+    i = rows[j]
     A = cuda.local.array((1, N_MODES, 2, 2), float64)
     b = cuda.local.array((1, N_MODES, 2), float64)
     c = cuda.local.array((1, N_MODES, N_HARMONICS, 2), float64)
@@ -120,18 +122,20 @@ def advance(rows, packed, multiples, net, u, clock, counters, transient, keep, p
     points = cuda.local.array(4, float64)
     rates = cuda.local.array(N_HARMONICS, float64)
     integers = cuda.local.array(N_INTEGERS, int64)
-    for j in range(N_INTEGERS):
-        integers[j] = 0
+    for n in range(N_INTEGERS):
+        integers[n] = 0
+    n_transient = transient[min(j, transient.shape[0] - 1)]
+    n_keep = keep[min(j, keep.shape[0] - 1)]
     transitions, pairs, row_start, mode_start, mode_list, phases = net
     section, maximum, minimum, i_max, i_min, o_max, o_min, crossings, contacts, elapsed, times, modes, status = out
-    clock[k, 2] = 0.0  # the time stands as it is
+    clock[j, 2] = 0.0  # the time stands as it is
     chain(
-        0, 1, 1, u[k : k + 1], u[k], clock[k], counters[k],
+        0, 1, 1, u[j : j + 1], u[j], clock[j], counters[j],
         A, b, c, s, multiples, omega, period, ia, ib, ic, is_, oa, ob, oc, os_, ra, rb, rc, rs,
         transitions, pairs, row_start, mode_start, mode_list, phases,
-        phase, plan, 1e300, transient[k], keep[k], limit,
-        section[k : k + 1], maximum[k : k + 1], minimum[k : k + 1], i_max[k : k + 1], i_min[k : k + 1],
-        o_max[k : k + 1], o_min[k : k + 1], crossings[k : k + 1], contacts[k : k + 1], elapsed[k : k + 1],
-        times[k : k + 1], modes[k : k + 1], status[k : k + 1],
+        phase, plan, 1e300, n_transient, n_keep, limit,
+        section[j : j + 1], maximum[j : j + 1], minimum[j : j + 1], i_max[j : j + 1], i_min[j : j + 1],
+        o_max[j : j + 1], o_min[j : j + 1], crossings[j : j + 1], contacts[j : j + 1], elapsed[j : j + 1],
+        times[j : j + 1], modes[j : j + 1], status[j : j + 1],
         prop, rot, fun, tay, field, info, row, vectors, scr, points, rates, integers,
     )  # fmt: skip

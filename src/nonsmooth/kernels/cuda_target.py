@@ -13,16 +13,19 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from numba import cuda
+from numba import config, cuda
 
 __all__ = ["THREADS", "cuda", "device", "entry", "inline", "kernel"]
 
 THREADS = 64  # in a block: few, because a trajectory fills a thread's registers
 
 
+_SIMULATED = bool(config.ENABLE_CUDASIM)
+
+
 def device(function: Callable[..., Any]) -> Any:
-    """Mark a function that kernels call."""
-    return cuda.jit(device=True, forceinline=True)(function)
+    """Mark a function that kernels call. The simulator takes it as it is: only entries use ``cuda`` themselves."""
+    return function if _SIMULATED else cuda.jit(device=True, forceinline=True)(function)
 
 
 inline = device
@@ -35,4 +38,4 @@ def kernel(signature: Any) -> Callable[[Callable[..., Any]], Any]:
 
 def entry(function: Callable[..., Any]) -> Any:
     """Mark what the host launches; compiled for the types of its first call, and kept on disk."""
-    return cuda.jit(launch_bounds=THREADS, cache=True)(function)
+    return cuda.jit(function) if _SIMULATED else cuda.jit(launch_bounds=THREADS, cache=True)(function)

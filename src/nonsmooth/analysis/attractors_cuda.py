@@ -1,0 +1,141 @@
+"""Jobs of systems of two states with the exact flow and a stroboscopic section, on a GPU.
+
+The looks of ``kernels.planar_settle`` come at the same returns for every job, so they are rounds here: all jobs that
+are still under way are marched together, judged together, and those that are done are left out of the next round.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from nonsmooth.analysis.settled import Settled, usable
+from nonsmooth.flow.engine import FloatArray, IntArray
+from nonsmooth.flow.planar import PlanarEngine
+from nonsmooth.flow.planar_cuda import Buffers, PlanarOnGpu, States
+from nonsmooth.flow.poincare import result_status
+from nonsmooth.kernels import codes
+
+__all__ = ["run_on_gpu"]
+
+
+def run_on_gpu(
+    engine: PlanarEngine, points: FloatArray, rows: IntArray, starts: FloatArray, modes: IntArray, begin: float,
+    phase: float, choice: tuple[Any, ...], tolerance: float, least: FloatArray,
+) -> Settled:  # fmt: skip
+    """Jobs settled and judged; arguments and result as in :func:`.attractors_compiled.run_compiled`."""
+    transient, keep, max_period, look, attempts, _, extremes = choice
+    gpu = PlanarOnGpu(engine, points, phase)
+    judging = _Judging(gpu, len(rows), keep, max_period, tolerance, least, rows)
+    states = gpu.states(rows, starts, modes, begin)
+    found = Settled.empty(len(rows), 2)
+    found.multiplier[:] = -1.0
+    under_way = np.arange(len(rows))
+    used, extra = 0, 0
+    todo = look if 0 < look < transient else transient
+    early = todo < transient
+    while len(under_way):
+        found.returns[under_way] = used
+        done = gpu.run(under_way, states, todo, keep, judging.kept)
+        _fail(found, under_way, done, judging.kept)
+        ran = gpu.run(done, states, 0, 1, judging.single, extremes=True)
+        _fail(found, done, ran, judging.single)
+        used += todo + keep + 1
+        found.returns[ran] = used
+        judging.judge(ran, found)
+        verdict = found.status[ran]
+        if early:
+            under_way = ran[verdict != codes.OK]
+            todo = used if 2 * used + keep < transient else max(transient - used, 0)
+            early = used + todo < transient
+            continue
+        if extra >= attempts:
+            break
+        under_way = ran[verdict == codes.SLOW]
+        judging.push(states, under_way, found.multiplier)
+        todo = (1 << extra) * max(transient, 1)
+        extra += 1
+    found.last[:], found.mode[:] = states.u.copy_to_host(), states.counters.copy_to_host()[:, 0]
+    _window(gpu, states, judging.kept, found, keep, bool(extremes))
+    failed = ~usable(found.status)
+    found.period_number[failed] = 0
+    found.status[failed] = [result_status(code) for code in found.status[failed]]
+    found.residual[failed] = np.nan
+    found.multiplier[found.multiplier < 0.0] = np.nan
+    return found
+
+
+def _fail(found: Settled, before: IntArray, after: IntArray, out: Buffers) -> None:
+    """Codes of the jobs that did not come to the end of a run."""
+    lost = np.setdiff1d(before, after, assume_unique=True)
+    if len(lost):
+        found.status[lost] = out.status.copy_to_host()[lost]
+
+
+def _window(gpu: PlanarOnGpu, states: States, out: Buffers, found: Settled, keep: int, extremes: bool) -> None:
+    """Extremes and counts: over one whole cycle where there is one, else over as many returns as were kept."""
+    good = np.flatnonzero(usable(found.status))
+    n = np.where(found.period_number > 0, found.period_number, keep)
+    ran = gpu.run(good, states, 0, n, out, extremes=extremes)
+    _fail(found, good, ran, out)
+    found.crossings[ran] = (out.crossings.copy_to_host() / n)[ran]
+    found.contacts[ran] = (out.contacts.copy_to_host() / n)[ran]
+    if extremes:
+        found.maximum[ran], found.minimum[ran] = out.maximum.copy_to_host()[ran], out.minimum.copy_to_host()[ran]
+
+
+class _Judging:
+    """Arrays on the GPU for the judgement of J jobs."""
+
+    def __init__(
+        self, gpu: PlanarOnGpu, n: int, keep: int, max_period: int, tolerance: float, least: FloatArray, rows: IntArray
+    ) -> None:
+        array = gpu.cuda.device_array
+        self.gpu, self.keep, self.max_period, self.tolerance = gpu, keep, max_period, tolerance
+        rules = gpu.module
+        self.nudge, self.kick, self.unstable = max(rules.NUDGE, 1e2 * tolerance), rules.KICK, 1.0 + rules.MARGIN
+        self.least = gpu.cuda.to_device(least)
+        self.kept, self.single = gpu.buffers(n, keep), gpu.buffers(n, 1)
+        self.sizes, self.returns = array((n, 2)), array((n, max_period))
+        self.period, self.status = (gpu.cuda.to_device(np.zeros(n, dtype=np.int64)) for _ in range(2))
+        self.residual, self.multiplier = (gpu.cuda.to_device(np.zeros(n)) for _ in range(2))
+        twice = np.repeat(rows, 2)
+        self.neighbours = gpu.states(twice, np.zeros((2 * n, 2)), np.zeros(2 * n, dtype=np.int64), 0.0)
+        self.arrived = gpu.buffers(2 * n, 1)
+
+    def judge(self, jobs: IntArray, found: Settled) -> None:
+        """Period number, status, residual and multiplier of jobs whose section points stand in ``kept``."""
+        if not len(jobs):
+            return
+        gpu, module, other = self.gpu, self.gpu.module, self.neighbours
+        gpu.launch(
+            module.judge, jobs, self.keep, self.max_period, self.tolerance, self.least, self.kept.section,
+            self.single.maximum, self.single.minimum, self.sizes, self.period, self.status, self.residual, self.returns,
+        )  # fmt: skip
+        period = self.period.copy_to_host()
+        cycles = jobs[period[jobs] > 0]
+        if len(cycles):
+            gpu.launch(
+                module.beside, cycles, self.keep, self.nudge, gpu.phase, gpu.periods, other.rows, self.kept.section,
+                self.kept.section_mode, self.sizes, self.period, other.u, other.clock, other.counters,
+            )  # fmt: skip
+            pairs = (2 * cycles[:, None] + np.arange(2)).ravel()
+            gpu.run(pairs, other, np.repeat(np.maximum(period - 1, 0), 2), 1, self.arrived)
+            gpu.launch(
+                module.decide, cycles, self.keep, self.nudge, self.kept.section, self.sizes, other.u,
+                self.arrived.status, self.period, self.status, self.residual, self.multiplier, self.returns,
+            )  # fmt: skip
+            found.multiplier[cycles] = self.multiplier.copy_to_host()[cycles]
+        found.multiplier[np.setdiff1d(jobs, cycles, assume_unique=True)] = -1.0
+        found.period_number[jobs] = self.period.copy_to_host()[jobs]
+        found.status[jobs] = self.status.copy_to_host()[jobs]
+        found.residual[jobs] = self.residual.copy_to_host()[jobs]
+
+    def push(self, states: States, jobs: IntArray, multiplier: FloatArray) -> None:
+        """Push jobs that sit on an unstable orbit off it."""
+        pushed = jobs[multiplier[jobs] > self.unstable]
+        if len(pushed):
+            u = states.u.copy_to_host()
+            u[pushed] += self.kick * self.sizes.copy_to_host()[pushed]
+            states.u.copy_to_device(u)
