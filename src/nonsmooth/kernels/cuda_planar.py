@@ -12,9 +12,9 @@ numbers; what a thread works with lies in its local memory, which the GPU interl
 
 from numba import float64, int64
 
-from .cuda_target import cuda, device, entry
-from .planar_chain import chain
+from .cuda_target import cuda, device, entry, local
 from .planar_search import WIDTH
+from .planar_settle import go
 from .planar_tables import HARMONICS, NODES, TERMS, M
 
 # Set for each system; none is below 1, so that no array is empty.
@@ -63,17 +63,9 @@ def unpack4(target, packed, i, at):
     return at
 
 
-@entry
-def advance(jobs, rows, packed, multiples, net, u, clock, counters, transient, keep, plan, phase, limit, out):
-    """Thread k: march the state of job j = jobs[k] under parameter row rows[j] by transient[j] section returns, then
-    keep[j] more into row j of ``out``. (One entry for all jobs where they are short.)
-
-    The state is left at the last return; out[12] are the statuses."""
-    k = cuda.grid(1)
-    if k >= jobs.shape[0]:
-        return
-    j = jobs[k]
-    i = rows[j]
+@local
+def arrays_of_thread(packed, multiples, i):
+    """The parameter row i and the scratch memory of a thread, as ``chain`` takes them: (linear, scratch)."""
     A = cuda.local.array((1, N_MODES, 2, 2), float64)
     b = cuda.local.array((1, N_MODES, 2), float64)
     c = cuda.local.array((1, N_MODES, N_HARMONICS, 2), float64)
@@ -124,18 +116,30 @@ def advance(jobs, rows, packed, multiples, net, u, clock, counters, transient, k
     integers = cuda.local.array(N_INTEGERS, int64)
     for n in range(N_INTEGERS):
         integers[n] = 0
-    n_transient = transient[min(j, transient.shape[0] - 1)]
-    n_keep = keep[min(j, keep.shape[0] - 1)]
-    transitions, pairs, row_start, mode_start, mode_list, phases = net
+    linear = (A, b, c, s, multiples, omega, period, ia, ib, ic, is_, oa, ob, oc, os_, ra, rb, rc, rs)
+    return linear, (prop, rot, fun, tay, field, info, row, vectors, scr, points, rates, integers)
+
+
+@entry
+def advance(jobs, rows, packed, multiples, net, u, clock, counters, transient, keep, plan, phase, limit, out):
+    """Thread k: march the state of job j = jobs[k] under parameter row rows[j] by transient[j] section returns, then
+    keep[j] more into row j of ``out``. (One entry for all jobs where they are short.)
+
+    The state is left at the last return; out[12] are the statuses."""
+    k = cuda.grid(1)
+    if k >= jobs.shape[0]:
+        return
+    j = jobs[k]
+    linear, scratch = arrays_of_thread(packed, multiples, rows[j])
     section, maximum, minimum, i_max, i_min, o_max, o_min, crossings, contacts, elapsed, times, modes, status = out
-    clock[j, 2] = 0.0  # the time stands as it is
-    chain(
-        0, 1, 1, u[j : j + 1], u[j], clock[j], counters[j],
-        A, b, c, s, multiples, omega, period, ia, ib, ic, is_, oa, ob, oc, os_, ra, rb, rc, rs,
-        transitions, pairs, row_start, mode_start, mode_list, phases,
-        phase, plan, 1e300, n_transient, n_keep, limit,
+    own = (
         section[j : j + 1], maximum[j : j + 1], minimum[j : j + 1], i_max[j : j + 1], i_min[j : j + 1],
         o_max[j : j + 1], o_min[j : j + 1], crossings[j : j + 1], contacts[j : j + 1], elapsed[j : j + 1],
         times[j : j + 1], modes[j : j + 1], status[j : j + 1],
-        prop, rot, fun, tay, field, info, row, vectors, scr, points, rates, integers,
+    )  # fmt: skip
+    n_transient = transient[min(j, transient.shape[0] - 1)]
+    n_keep = keep[min(j, keep.shape[0] - 1)]
+    go(
+        0, u[j], clock[j], counters[j], linear, net, plan, phase, 1e300, n_transient, n_keep, limit, own, scratch,
+        u[j : j + 1],
     )  # fmt: skip

@@ -15,7 +15,7 @@ from typing import Any
 
 from numba import config, cuda
 
-__all__ = ["THREADS", "cuda", "device", "entry", "inline", "kernel"]
+__all__ = ["THREADS", "cuda", "device", "entry", "inline", "kernel", "local"]
 
 THREADS = 64  # in a block: few, because a trajectory fills a thread's registers
 
@@ -29,6 +29,11 @@ def device(function: Callable[..., Any]) -> Any:
 
 
 inline = device
+
+
+def local(function: Callable[..., Any]) -> Any:
+    """Mark a function that makes arrays of a thread: it becomes part of its caller before anything is compiled."""
+    return function if _SIMULATED else cuda.jit(device=True, inline="always")(function)
 
 
 def kernel(signature: Any) -> Callable[[Callable[..., Any]], Any]:

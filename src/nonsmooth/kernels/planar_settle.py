@@ -300,6 +300,60 @@ def settle_many(
         contacts[j] = out[8][i] / n
 
 
+@device
+def part(
+    begin, end, batch, i, size, u, clock, counters, moved, moved_clock, moved_counters, apart, sums, linear, net, quiet,
+    phase, t_max, limit, out, scratch, rest,
+):  # fmt: skip
+    """Returns begin <= n < end of a run and of a neighbour, put back to a small distance after each; gives a status.
+
+    ``apart`` is the neighbour's distance, ``sums`` the growth in the present batch, the sum of the batches' rates and
+    of their squares; nothing counts in the first quarter of a batch, in which the direction turns in."""
+    first = hypot(NUDGE, NUDGE)
+    for n in range(begin, end):
+        moved[0] = u[0] + apart[0]
+        moved[1] = u[1] + apart[1]
+        for k in range(3):
+            moved_clock[k] = clock[k]
+        for k in range(4):
+            moved_counters[k] = counters[k]
+        for one in range(2):
+            code = go(
+                i, u if one == 0 else moved, clock if one == 0 else moved_clock,
+                counters if one == 0 else moved_counters, linear, net, quiet, phase, t_max, 0, 1, limit, out, scratch,
+                rest,
+            )  # fmt: skip
+            if code != OK:
+                return code
+        apart[0] = moved[0] - u[0]
+        apart[1] = moved[1] - u[1]
+        distance_now = hypot(apart[0] / size[0], apart[1] / size[1])
+        if distance_now > 0.0:
+            apart[0] *= first / distance_now
+            apart[1] *= first / distance_now
+        else:  # fallen together: a direction that vanishes
+            distance_now = 1e-16 * first
+            apart[0] = size[0] * NUDGE
+            apart[1] = size[1] * NUDGE
+        if n < batch // 4:
+            continue
+        sums[0] += log(distance_now / first)
+        if (n - batch // 4) % batch == batch - 1:
+            rate = sums[0] / (batch * linear[6][i])
+            sums[0] = 0.0
+            sums[1] += rate
+            sums[2] += rate * rate
+    return OK
+
+
+@device
+def rate_of(code, sums):
+    """The mean of ten batches' rates and its standard error; nan where the runs failed."""
+    if code != OK:
+        return nan, nan
+    return sums[1] / 10.0, sqrt(max(sums[2] / 10.0 - (sums[1] / 10.0) ** 2, 0.0) / 9.0)
+
+
 @kernel(types.void(
     _i1, _f2, _i1, _i, _f1, LINEAR, NET, _i1, _f, _f, _f1, BUFFERS, SCRATCH, WORK, _f1, _f1,
 ))  # fmt: skip
@@ -308,57 +362,22 @@ def exponents_of(
 ):
     """Largest Lyapunov exponent per unit time, from two neighbours over ``n_returns`` section returns; nan: failed.
 
-    The second neighbour is put back to a small distance of the first after every return. ``error`` is the standard
-    error from ten batches. Job j begins on the section at starts[j] in the mode modes[j]."""
+    ``error`` is the standard error from ten batches. Job j begins on the section at starts[j] in the mode modes[j]."""
     u, clock, counters, moved, moved_clock, moved_counters, images, returns = work
+    apart, sums = images[0], returns[0:3]
+    batch = n_returns // 10
     for j in range(rows.shape[0]):
         i = rows[j]
-        T = linear[6][i]
-        clock[0] = phase * T
+        clock[0] = phase * linear[6][i]
         clock[1] = 0.0
         counters[0] = modes[j]
-        dx, dv = size[0] * NUDGE, size[1] * NUDGE
-        first = hypot(dx / size[0], dv / size[1])
         for k in range(2):
             u[k] = starts[j, k]
-        batch = n_returns // 10
-        total, square, growth = 0.0, 0.0, 0.0
-        code = OK
-        for n in range(batch // 4 + 10 * batch):  # a few returns first, in which the direction turns in
-            moved[0] = u[0] + dx
-            moved[1] = u[1] + dv
-            for k in range(3):
-                moved_clock[k] = clock[k]
-            for k in range(4):
-                moved_counters[k] = counters[k]
-            code = go(i, u, clock, counters, linear, net, quiet, phase, t_max, 0, 1, limit, out, scratch, starts)
-            if code == OK:
-                code = go(
-                    i, moved, moved_clock, moved_counters, linear, net, quiet, phase, t_max, 0, 1, limit, out, scratch,
-                    starts,
-                )  # fmt: skip
-            if code != OK:
-                break
-            dx = moved[0] - u[0]
-            dv = moved[1] - u[1]
-            distance_now = hypot(dx / size[0], dv / size[1])
-            if distance_now > 0.0:
-                dx *= first / distance_now
-                dv *= first / distance_now
-            else:  # fallen together: a direction that vanishes
-                distance_now = 1e-16 * first
-                dx, dv = size[0] * NUDGE, size[1] * NUDGE
-            if n < batch // 4:
-                continue
-            growth += log(distance_now / first)
-            if (n - batch // 4) % batch == batch - 1:
-                rate = growth / (batch * T)
-                total += rate
-                square += rate * rate
-                growth = 0.0
-        if code != OK:
-            largest[j] = nan
-            error[j] = nan
-            continue
-        largest[j] = total / 10.0
-        error[j] = sqrt(max(square / 10.0 - (total / 10.0) ** 2, 0.0) / 9.0)
+            apart[k] = size[k] * NUDGE
+        for k in range(3):
+            sums[k] = 0.0
+        code = part(
+            0, batch // 4 + 10 * batch, batch, i, size, u, clock, counters, moved, moved_clock, moved_counters, apart,
+            sums, linear, net, quiet, phase, t_max, limit, out, scratch, starts,
+        )  # fmt: skip
+        largest[j], error[j] = rate_of(code, sums)
