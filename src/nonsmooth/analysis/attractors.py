@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.analysis.attractors_compiled import exponents_compiled, load, run_compiled
-from nonsmooth.analysis.attractors_cuda import run_on_gpu
+from nonsmooth.analysis.attractors_cuda import exponents_on_gpu, run_on_gpu
 from nonsmooth.analysis.attractors_parting import exponent_of
 from nonsmooth.analysis.classify import TOLERANCE, Verdict
 from nonsmooth.analysis.settle import LEAST, LONGER, Attractors
@@ -81,7 +81,7 @@ class Settler:
 
     def load(self) -> None:
         """Compile or load the kernel now, before threads ask for it."""
-        if self.planar is not None:
+        if self.planar is not None and self.device == "cpu":
             load(self.planar)
 
     def run(
@@ -122,8 +122,6 @@ class Settler:
             self.transient, self.keep, self.max_period, FIRST_LOOK if self.stop_early else 0, attempts, carried,
             self.extremes,
         )  # fmt: skip
-        if self.device == "cuda" and carried:
-            raise ValueError('device="cuda" runs all jobs at once: none can go on from another')
         return (run_on_gpu if self.device == "cuda" else run_compiled)(
             self.planar, points, rows, starts, modes, begin, self.plan.phase, choice, self.tolerance, self.least
         )
@@ -173,6 +171,10 @@ class Settler:
         rows = np.ascontiguousarray(rows, dtype=np.int64)
         starts = np.ascontiguousarray(starts, dtype=float)
         modes = np.array(modes, dtype=np.int64)
+        if self.planar is not None and self.device == "cuda":
+            return exponents_on_gpu(
+                self.planar, points, rows, starts, modes, n_returns, self.plan.phase, self.system.scale_vector()
+            )
         if self.planar is not None:
             return exponents_compiled(
                 self.planar, points, rows, starts, modes, n_returns, self.plan.phase, self.system.scale_vector(),

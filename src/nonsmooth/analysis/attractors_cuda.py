@@ -6,18 +6,21 @@ are still under way are marched together, judged together, and those that are do
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
 
 from nonsmooth.analysis.settled import Settled, usable
+from nonsmooth.flow.devices import BATCH
 from nonsmooth.flow.engine import FloatArray, IntArray
 from nonsmooth.flow.planar import PlanarEngine
-from nonsmooth.flow.planar_cuda import Buffers, PlanarOnGpu, States
+from nonsmooth.flow.planar_cuda import SLICE, Buffers, PlanarOnGpu, States
 from nonsmooth.flow.poincare import result_status
 from nonsmooth.kernels import codes
 
-__all__ = ["run_on_gpu"]
+__all__ = ["Judging", "exponents_on_gpu", "run_on_gpu"]
 
 
 def run_on_gpu(
@@ -25,9 +28,31 @@ def run_on_gpu(
     phase: float, choice: tuple[Any, ...], tolerance: float, least: FloatArray,
 ) -> Settled:  # fmt: skip
     """Jobs settled and judged; arguments and result as in :func:`.attractors_compiled.run_compiled`."""
+    found = Settled.empty(len(rows), 2)
+    for some, own, own_rows in _batches(points, rows):
+        part = _settle(
+            PlanarOnGpu(engine, own, phase), own_rows, starts[some], modes[some], begin, choice, tolerance, least
+        )
+        for item in fields(found):
+            getattr(found, item.name)[some] = getattr(part, item.name)
+    return found
+
+
+def _batches(points: FloatArray, rows: IntArray) -> Iterator[tuple[slice, FloatArray, IntArray]]:
+    """Jobs in batches: which, the parameter points that they need, and their rows among these."""
+    for first in range(0, len(rows), BATCH):
+        some = slice(first, first + BATCH)
+        needed, own = np.unique(rows[some], return_inverse=True)
+        yield some, points[needed], own.astype(np.int64)
+
+
+def _settle(
+    gpu: PlanarOnGpu, rows: IntArray, starts: FloatArray, modes: IntArray, begin: float, choice: tuple[Any, ...],
+    tolerance: float, least: FloatArray,
+) -> Settled:  # fmt: skip
+    """One batch of jobs."""
     transient, keep, max_period, look, attempts, _, extremes = choice
-    gpu = PlanarOnGpu(engine, points, phase)
-    judging = _Judging(gpu, len(rows), keep, max_period, tolerance, least, rows)
+    judging = Judging(gpu, len(rows), keep, max_period, tolerance, least, rows)
     states = gpu.states(rows, starts, modes, begin)
     found = Settled.empty(len(rows), 2)
     found.multiplier[:] = -1.0
@@ -43,7 +68,7 @@ def run_on_gpu(
         _fail(found, done, ran, judging.single)
         used += todo + keep + 1
         found.returns[ran] = used
-        judging.judge(ran, found)
+        judging.judge(ran, found, judging.single)
         verdict = found.status[ran]
         if early:
             under_way = ran[verdict != codes.OK]
@@ -85,7 +110,7 @@ def _window(gpu: PlanarOnGpu, states: States, out: Buffers, found: Settled, keep
         found.maximum[ran], found.minimum[ran] = out.maximum.copy_to_host()[ran], out.minimum.copy_to_host()[ran]
 
 
-class _Judging:
+class Judging:
     """Arrays on the GPU for the judgement of J jobs."""
 
     def __init__(
@@ -104,14 +129,14 @@ class _Judging:
         self.neighbours = gpu.states(twice, np.zeros((2 * n, 2)), np.zeros(2 * n, dtype=np.int64), 0.0)
         self.arrived = gpu.buffers(2 * n, 1)
 
-    def judge(self, jobs: IntArray, found: Settled) -> None:
+    def judge(self, jobs: IntArray, found: Settled, extremes: Buffers) -> None:
         """Period number, status, residual and multiplier of jobs whose section points stand in ``kept``."""
         if not len(jobs):
             return
         gpu, module, other = self.gpu, self.gpu.module, self.neighbours
         gpu.launch(
             module.judge, jobs, self.keep, self.max_period, self.tolerance, self.least, self.kept.section,
-            self.single.maximum, self.single.minimum, self.sizes, self.period, self.status, self.residual, self.returns,
+            extremes.maximum, extremes.minimum, self.sizes, self.period, self.status, self.residual, self.returns,
         )  # fmt: skip
         period = self.period.copy_to_host()
         cycles = jobs[period[jobs] > 0]
@@ -139,3 +164,38 @@ class _Judging:
             u = states.u.copy_to_host()
             u[pushed] += self.kick * self.sizes.copy_to_host()[pushed]
             states.u.copy_to_device(u)
+
+
+def exponents_on_gpu(
+    engine: PlanarEngine, points: FloatArray, rows: IntArray, starts: FloatArray, modes: IntArray, n_returns: int,
+    phase: float, scale: FloatArray,
+) -> tuple[FloatArray, FloatArray]:  # fmt: skip
+    """Largest exponents of jobs and their standard errors, as :func:`.attractors_compiled.exponents_compiled`."""
+    largest, error = np.full(len(rows), np.nan), np.full(len(rows), np.nan)
+    for some, own, own_rows in _batches(points, rows):
+        gpu = PlanarOnGpu(engine, own, phase)
+        largest[some], error[some] = _exponents(gpu, own_rows, starts[some], modes[some], n_returns, scale)
+    return largest, error
+
+
+def _exponents(
+    gpu: PlanarOnGpu, rows: IntArray, starts: FloatArray, modes: IntArray, n_returns: int, scale: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    n, batch, module, to_device = len(rows), n_returns // 10, gpu.module, gpu.cuda.to_device
+    states = gpu.states(rows, starts, modes, gpu.phase)
+    apart, sums = to_device(np.tile(scale * module.NUDGE, (n, 1))), to_device(np.zeros((n, 3)))
+    status, size = to_device(np.zeros(n, dtype=np.int64)), to_device(scale)
+    jobs, end = np.arange(n), batch // 4 + 10 * batch
+    for begin in range(0, end, SLICE // 2):
+        gpu.launch(
+            module.neighbours, jobs, states.rows, *gpu.tables, gpu.net, states.u, states.clock, states.counters,
+            begin, min(begin + SLICE // 2, end), batch, size, apart, sums, gpu.plans[0], gpu.phase, gpu.limit, status,
+        )  # fmt: skip
+        jobs = jobs[status.copy_to_host()[jobs] == codes.OK]
+        if not len(jobs):
+            break
+    largest, error = np.full(n, np.nan), np.full(n, np.nan)
+    _, total, square = sums.copy_to_host()[jobs].T
+    largest[jobs] = total / 10.0
+    error[jobs] = np.sqrt(np.maximum(square / 10.0 - (total / 10.0) ** 2, 0.0) / 9.0)
+    return largest, error

@@ -210,6 +210,7 @@ def _candidate(
     """A long run as an attractor, where it is one: recurrent, and no cycle that a longer wait would find."""
     from scipy.spatial import cKDTree
 
+    settler = replace(settler, device="cpu")  # a single run
     points, last, mode, _ = settler.trace(point, start, mode, 0, patience.candidate)
     if not len(points):
         return None

@@ -17,7 +17,7 @@ __all__ = ["cuda_planar_module"]
 
 PARTS = (
     "planar_tables", "planar_polynomial", "planar_search", "planar_march", "planar_extremes", "planar_layout",
-    "planar_chain", "planar_settle", "cuda_planar", "cuda_judge",
+    "planar_chain", "planar_settle", "planar_spectrum", "cuda_planar", "cuda_judge", "cuda_growth",
 )  # fmt: skip
 
 
@@ -25,10 +25,10 @@ PARTS = (
 def cuda_planar_module(
     harmonics: int, modes: int, indicators: int, outputs: int, transitions: int, rows: int
 ) -> ModuleType:
-    """The module with ``advance``, ``judge``, ``beside`` and ``decide``; ``rows`` counts those of the section too."""
+    """The module with the entries of the ``cuda_*`` texts; ``rows`` counts those of the section too."""
     folder = Path(__file__).parent
     text = "\n".join((folder / f"{part}.py").read_text(encoding="utf-8") for part in PARTS)
-    text = re.sub(r"^from \.planar_\w+ import (\([^)]*\).*|[^(\n]*)$", "", text, flags=re.MULTILINE)
+    text = re.sub(r"^from \.(?:planar|cuda)_(?!target)\w+ import (\([^)]*\).*|[^(\n]*)$", "", text, flags=re.MULTILINE)
     text = re.sub(r"^from \.cache import", "from nonsmooth.kernels.cuda_target import", text, flags=re.MULTILINE)
     text = re.sub(r"^from \.(\w+) import", r"from nonsmooth.kernels.\1 import", text, flags=re.MULTILINE)
     sizes = {
