@@ -20,7 +20,7 @@ from nonsmooth.flow.planar_cuda import SLICE, Buffers, PlanarOnGpu, States
 from nonsmooth.flow.poincare import result_status
 from nonsmooth.kernels import codes
 
-__all__ = ["Judging", "exponents_on_gpu", "run_on_gpu"]
+__all__ = ["Judging", "exponents_on_gpu", "fail", "run_on_gpu"]
 
 
 def run_on_gpu(
@@ -63,9 +63,9 @@ def _settle(
     while len(under_way):
         found.returns[under_way] = used
         done = gpu.run(under_way, states, todo, keep, judging.kept)
-        _fail(found, under_way, done, judging.kept)
+        fail(found, under_way, done, judging.kept)
         ran = gpu.run(done, states, 0, 1, judging.single, extremes=True)
-        _fail(found, done, ran, judging.single)
+        fail(found, done, ran, judging.single)
         used += todo + keep + 1
         found.returns[ran] = used
         judging.judge(ran, found, judging.single)
@@ -91,7 +91,7 @@ def _settle(
     return found
 
 
-def _fail(found: Settled, before: IntArray, after: IntArray, out: Buffers) -> None:
+def fail(found: Settled, before: IntArray, after: IntArray, out: Buffers) -> None:
     """Codes of the jobs that did not come to the end of a run."""
     lost = np.setdiff1d(before, after, assume_unique=True)
     if len(lost):
@@ -103,7 +103,7 @@ def _window(gpu: PlanarOnGpu, states: States, out: Buffers, found: Settled, keep
     good = np.flatnonzero(usable(found.status))
     n = np.where(found.period_number > 0, found.period_number, keep)
     ran = gpu.run(good, states, 0, n, out, extremes=extremes)
-    _fail(found, good, ran, out)
+    fail(found, good, ran, out)
     found.crossings[ran] = (out.crossings.copy_to_host() / n)[ran]
     found.contacts[ran] = (out.contacts.copy_to_host() / n)[ran]
     if extremes:

@@ -99,7 +99,8 @@ def _find_gpu() -> None:
             return
         reason = "the driver reports no GPU"
     except Exception as error:  # the driver's loader raises whatever its own layers do
-        reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
+        lines = [line.strip(" .:") for line in str(error).splitlines() if line.strip(" .:")]
+        reason = ": ".join(lines[:2]) or type(error).__name__
     raise RuntimeError(
         f'device="cuda" found no GPU on this machine ({reason}). It needs an NVIDIA GPU and its driver (nvidia-smi '
         'shows both); without one use device="cpu"'
