@@ -5,6 +5,7 @@ from __future__ import annotations
 import heyoka_basins as hb
 import numpy as np
 import pytest
+from where_runs_end import agreement
 
 import nonsmooth as ns
 from nonsmooth.analysis.basin_fractions import basin_fractions
@@ -34,7 +35,7 @@ def check(system: ns.System, machine: hb.Support | hb.Duffing, box: tuple[float,
     assert sorted(found["period_number"].values.tolist()) == periods
     starts = np.column_stack([np.repeat(x, n), np.tile(v, n)])
     longest = 6000 if n > 50 else 1500
-    assert hb.agreement(found, hb.ends(machine, starts, longest=longest)) >= 0.998
+    assert agreement(found, hb.ends(machine, starts, longest=longest)) >= 0.998
     return found
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from nonsmooth.analysis.attractors_compiled import exponents_compiled, load, run_compiled
 from nonsmooth.analysis.attractors_cuda import exponents_on_gpu, run_on_gpu
 from nonsmooth.analysis.attractors_parting import exponent_of
+from nonsmooth.analysis.attractors_trace import Trace, period_of, place_of, state_at, trace
 from nonsmooth.analysis.classify import TOLERANCE, Verdict
 from nonsmooth.analysis.settle import LEAST, LONGER, Attractors
 from nonsmooth.analysis.settled import Settled, usable
@@ -102,13 +103,14 @@ class Settler:
         points : array (P, n_parameters)
         rows : array (J,) of int
             The parameter point of each job.
-        starts : array (J, n)
+        starts : array (J, n) or (J, width)
+            States, or places at which other runs ended (``last``).
         carried : bool
             Job j goes on from where job j - 1 ended (from its own start where that failed).
         modes : array (J,) of int, optional
             Mode at the start; the first where not given.
         begin : float
-            Phase of the forcing at the starts, in periods.
+            Phase of the forcing at the starts, in periods, where they do not say it themselves.
         attempts : int
             Further transients (of 1, 2, 4 times the first) for a point that is still settling.
         """
@@ -136,34 +138,20 @@ class Settler:
         """Phase of the forcing at which the section stands; 0 where it is no phase."""
         return self.plan.phase if self.plan.indicator < 0 else 0.0
 
-    def period(self, point: FloatArray) -> float:
-        """Period of the forcing at one parameter point (1, n_parameters); 1 where there is none."""
-        tables = self.engine.prepare(point)
-        found = float((tables.period if hasattr(tables, "period") else tables.periods)[0])
-        return found if found < np.inf else 1.0
-
-    def trace(
-        self, point: FloatArray, start: FloatArray, mode: int, transient: int, keep: int
-    ) -> tuple[FloatArray, FloatArray, int, float]:
-        """Section points of one run that begins on the section: points (keep, n), the last one, its mode, their time.
-
-        No points where the run failed."""
+    @property
+    def width(self) -> int:
+        """Numbers that say where a run stands on the section, its mode apart (``attractors_trace``)."""
         traced = self.system.traced
-        state, tables = State(start.copy(), self.system.memory_vector()), self.engine.prepare(point)
-        state.counters[0] = mode
-        period = float((tables.period if hasattr(tables, "period") else tables.periods)[0])
-        if self.plan.indicator < 0:
-            state.clock[0], state.clock[2] = self.plan.phase * period, period
-        out = Chain.empty(1, keep, len(traced.u), len(traced.indicators), len(traced.outputs))
-        self.engine.chain(tables, 0, 1, state, None, replace(self.plan, extremes=False), transient, keep, out)
-        if out.status[0] not in (codes.OK, codes.NOT_GUARANTEED):
-            return np.zeros((0, len(start))), start, mode, 0.0
-        return out.section[0], state.u, int(state.counters[0]), float(out.elapsed[0])
+        return len(traced.u) + len(traced.m) + (self.plan.indicator >= 0 and self.system.period() is not None)
+
+    def trace(self, point: FloatArray, place: FloatArray, mode: int, transient: int, keep: int) -> Trace:
+        """Section points of one run at one parameter point (1, n_parameters), from a place on the section."""
+        return trace(self.system, self.engine, self.plan, point, place, mode, transient, keep, self.width)
 
     def exponents(
         self, points: FloatArray, rows: Any, starts: FloatArray, modes: Any, n_returns: int
     ) -> tuple[FloatArray, FloatArray]:
-        """Largest Lyapunov exponents (per unit time) of J jobs that begin on the section, and their standard errors.
+        """Largest Lyapunov exponents (per unit time) of J jobs that begin on the section, and their errors.
 
         Two neighbours over ``n_returns`` returns, put back to a small distance after each; NaN where one failed.
         """
@@ -198,18 +186,13 @@ class Settler:
             system.scale_vector(), LONGER[:attempts],
         )  # fmt: skip
         out = Chain.empty(len(points), self.keep, len(traced.u), len(traced.indicators), len(traced.outputs))
-        found = Settled.empty(len(rows), len(traced.u))
-        memory = system.memory_vector()
-        period = tables.period if hasattr(tables, "period") else tables.periods
+        found = Settled.empty(len(rows), len(traced.u), self.width)
         state: State | None = None
         for j, i in enumerate(rows):
 
             def fresh(j: int = j, i: int = i) -> State:
-                new = State(starts[j].copy(), memory.copy())
-                new.counters[0] = modes[j]
-                if period[i] < np.inf:
-                    new.clock[0], new.clock[2] = begin * period[i], period[i]
-                return new
+                period = period_of(tables, i)
+                return state_at(system, starts[j], int(modes[j]), begin * period, period)
 
             if state is None or not carried:
                 state = fresh()
@@ -219,16 +202,15 @@ class Settler:
             if not usable(verdict.status):
                 state = None
                 continue
-            p = verdict.period_number
-            n = p if p and self.keep % p else self.keep
-            if n != self.keep:  # counts over whole cycles
-                cycle = Chain.empty(int(i) + 1, n, len(traced.u), len(traced.indicators), len(traced.outputs))
-                self.engine.chain(tables, int(i), int(i) + 1, state.copy(), None, self.plan, 0, n, cycle)
-            else:
-                cycle = out
+            # counts and extremes over one whole cycle: the kept window may begin before it was reached
+            p, cycle = verdict.period_number, out
+            if p:
+                cycle = Chain.empty(int(i) + 1, p, len(traced.u), len(traced.indicators), len(traced.outputs))
+                self.engine.chain(tables, int(i), int(i) + 1, state.copy(), None, self.plan, 0, p, cycle)
+            n = p or self.keep
             found.crossings[j], found.contacts[j] = cycle.crossings[i] / n, cycle.contacts[i] / n
-            found.maximum[j], found.minimum[j] = out.maximum[i], out.minimum[i]
-            found.last[j], found.mode[j] = state.u, state.counters[0]
+            found.maximum[j], found.minimum[j] = cycle.maximum[i], cycle.minimum[i]
+            found.last[j], found.mode[j] = place_of(state, self.width), state.counters[0]
         return found
 
     def _settle(

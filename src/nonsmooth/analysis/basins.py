@@ -20,11 +20,13 @@ from nonsmooth.analysis.basins_measures import (
 from nonsmooth.analysis.basins_work import StartsWork, settled_from
 from nonsmooth.analysis.chart import described
 from nonsmooth.analysis.chart_work import CHUNK, STORED
+from nonsmooth.analysis.settled import usable
 from nonsmooth.campaign.run import run
 from nonsmooth.flow.arguments import check_options, check_system, float_array, real_number, whole_number
 from nonsmooth.flow.devices import BATCH, on_gpu, workers_of
 from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
+from nonsmooth.kernels import codes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -32,7 +34,7 @@ if TYPE_CHECKING:
     from nonsmooth.flow.engine import FloatArray, IntArray
     from nonsmooth.system.system import System
 
-__all__ = ["basins", "by_share", "settler_of"]
+__all__ = ["basins", "by_share", "failed", "settler_of"]
 
 
 def basins(
@@ -91,10 +93,12 @@ def basins(
     -------
     xarray.Dataset
         ``label`` over the two states: the attractor's number, in the order of falling share; -1 not converged, -2
-        diverged. Over ``attractor``: ``period_number`` (0: no cycle), ``fraction`` of the starts with its binomial
-        ``fraction_error``, ``lyapunov``, ``multiplier``, ``maximum``, ``minimum``, a point on the ``section``, and
-        ``minimal_shock``: the least jump of the state, in units of the states' scales, that leads from the section
-        to another basin. ``section_points`` holds the attractors' points one after the other, with ``point_attractor``.
+        diverged; ``status`` says why a start has no label (one beyond a stop, say). Over ``attractor``:
+        ``period_number`` (0: no cycle), ``confirmed`` (1 where Newton's method has found the cycle), ``fraction`` of
+        the starts with its binomial ``fraction_error``, ``lyapunov``, ``multiplier``, ``maximum``, ``minimum``, a
+        point on the ``section``, and ``minimal_shock``: the least jump of the state, in units of the states' scales,
+        that leads from the section to a start of this plane in another basin or one that diverges.
+        ``section_points`` holds the attractors' points one after the other, with ``point_attractor``.
         Of the picture: ``entropy``, ``boundary_entropy``, ``boundary_dimension``, ``uncertain`` over ``distance``,
         and ``n_starts_99``, the number of random starts that meet every one of these attractors with 99 %.
 
@@ -107,9 +111,16 @@ def basins(
 
     Notes
     -----
-    A cycle counts with a certificate only (:mod:`nonsmooth.analysis.classify`); motion without a period only where a
-    run of 20 000 returns neither settles nor leaves the places it has visited
-    (:mod:`nonsmooth.analysis.basins_attractors`).
+    A cycle counts with a certificate only (:mod:`nonsmooth.analysis.classify`), and Newton's method on the section's
+    map then gives its points and multipliers to rounding. Motion without a period counts only where a run of 20 000
+    returns neither settles nor leaves the places it has visited, and where runs that begin beside it come back
+    (:mod:`nonsmooth.analysis.basins_candidate`); so motion without damping, and a slow transient, keep the label -1.
+    A start exactly on a boundary, as at a saddle, is pushed off it to one side. Cycles whose multipliers are nearer
+    than 0.002 to the unit circle are not certified; their starts keep -1 with the status ``slow``.
+
+    ``lyapunov`` of a cycle is minus infinity where its multipliers are zero, NaN where they are not zero but lost in
+    rounding (below 1e-8). Where a Poincare section is used, ``lyapunov`` and ``multiplier`` are those of its map: the exponent 0 along the
+    flow is not among them.
     """
     check_system(system, "basins")
     check_options(system, expert, basins)
@@ -136,21 +147,29 @@ def basins(
         work, threads=threads, progress=progress, label=f"basins over {x_name} and {y_name}", store=store,
         client=client, any_cpu=any_cpu,
     )  # fmt: skip
-    found, labels = by_share(*find_attractors(settler, point, settled_from(columns), Patience()))
+    found, labels, status = find_attractors(settler, point, settled_from(columns), Patience())
+    found, labels = by_share(found, labels)
     label = labels.reshape(len(x), len(y))
     from nonsmooth.results.global_schema import basins as build
     from nonsmooth.results.labels import labels_of
     from nonsmooth.results.provenance import provenance
 
     fraction, error = share_errors([np.sum(labels == k) for k in range(len(found))], labels.size)
-    scale = system.scale_vector()[[names.index(x_name), names.index(y_name)]]
-    inside = [item.points[:, [names.index(x_name), names.index(y_name)]] / scale for item in found]
-    shocks = [minimal_shock(label, x / scale[0], y / scale[1], item, k) for k, item in enumerate(inside)]
+    scale, at = system.scale_vector(), [names.index(x_name), names.index(y_name)]
+    others = [k for k in range(len(names)) if k not in at]
+    shocks = [
+        minimal_shock(
+            label, x / scale[at[0]], y / scale[at[1]], item.points[:, at] / scale[at], k,
+            np.linalg.norm((item.points - rest)[:, others] / scale[others], axis=1),
+        )
+        for k, item in enumerate(found)
+    ]  # fmt: skip
     entropy, boundary = basin_entropy(label)
     steps, parts = uncertain_part(label)
     named = labels_of(system)
     return build(
         named, provenance(named, "basins", options, method=settler.engine.name), values, label, found,
+        status=status.reshape(label.shape),
         fixed={name: rest[names.index(name)] for name in names if name not in values},
         per_attractor={"fraction": fraction, "fraction_error": error, "minimal_shock": np.array(shocks)},
         measures={
@@ -171,6 +190,11 @@ def settler_of(
     if threads is not None:
         whole_number(threads, "threads", 1)
     section, plan = section_plan(system, section)
+    if isinstance(section, Poincare) and system.period() is not None:
+        raise ValueError(
+            f"{system.name!r} is forced: its fate depends on the phase at which a run starts, so its section must be "
+            "one too: section=ns.Stroboscopic(phase)"
+        )
     engine = engine_for(system, method, rtol, atol, **expert)
     on_gpu(device, "basins", engine, plan)
     settler = Settler(
@@ -178,6 +202,11 @@ def settler_of(
     )  # fmt: skip
     settler.load()
     return section, settler
+
+
+def failed(status: Any) -> Any:
+    """Which runs could not be followed to an end, other than by diverging."""
+    return ~usable(status) & (np.asarray(status) != codes.DIVERGED)
 
 
 def by_share(found: list[Attractor], labels: IntArray) -> tuple[list[Attractor], IntArray]:
@@ -213,6 +242,8 @@ def _fixed(system: System, values: Mapping[str, Any], fixed: Any) -> FloatArray:
 
     names = list(system.states)
     rest = np.zeros(len(names))
+    if not isinstance(fixed, Mapping | None):
+        raise TypeError(f"fixed = {fixed!r}: name the states that are not in the grid, fixed={{name: value}}")
     for name, value in (fixed or {}).items():
         if name not in names:
             raise ValueError(unknown(name, "a state", repr(system.name), dict(system.states)))

@@ -17,7 +17,6 @@ from nonsmooth.flow.engine import FloatArray
 __all__ = ["StartsWork", "settled_from"]
 
 
-
 @dataclass(frozen=True)
 class StartsWork:
     """Starts (S, n), the same at each of the parameter points (P, n_parameters); places are (point, start)."""
@@ -31,9 +30,9 @@ class StartsWork:
     def columns(self) -> dict[str, Column]:
         n = self.starts.shape[1]
         kinds = {"period_number": "i8", "status": "i8", "mode": "i8", "returns": "i8"}
-        wide = ("maximum", "minimum", "last")
+        wide = {"maximum": (n,), "minimum": (n,), "last": (self.settler.width,)}
         return {
-            item.name: Column(kinds.get(item.name, "f8"), (n,) if item.name in wide else ()) for item in fields(Settled)
+            item.name: Column(kinds.get(item.name, "f8"), wide.get(item.name, ())) for item in fields(Settled)
         }
 
     def n_chunks(self) -> int:

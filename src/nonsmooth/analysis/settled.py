@@ -38,23 +38,24 @@ class Settled:
     contacts: FloatArray
     maximum: FloatArray  # (J, n)
     minimum: FloatArray  # (J, n)
-    last: FloatArray  # (J, n): the section point at the end
+    last: FloatArray  # (J, width): the section point at the end, and what else is needed to go on from there
     mode: IntArray
     returns: IntArray
 
     @classmethod
-    def empty(cls, jobs: int, n: int) -> Settled:
+    def empty(cls, jobs: int, n: int, width: int | None = None) -> Settled:
         def whole() -> IntArray:
             return np.zeros(jobs, dtype=np.int64)
 
         def one() -> FloatArray:
             return np.full(jobs, np.nan)
 
-        def state() -> FloatArray:
-            return np.full((jobs, n), np.nan)
+        def state(size: int = n) -> FloatArray:
+            return np.full((jobs, size), np.nan)
 
         return cls(
-            whole(), whole(), one(), one(), one(), one(), state(), state(), state(), whole(), whole()
+            whole(), whole(), one(), one(), one(), one(), state(), state(), state(width or n), whole(),
+            whole(),
         )  # fmt: skip
 
     @classmethod

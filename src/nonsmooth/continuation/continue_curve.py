@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.continuation.continue_orbit import size_of, special_row
+from nonsmooth.continuation.begin import size_of
+from nonsmooth.continuation.files import special_row
 from nonsmooth.continuation.locus import KINDS, Locus, Place
 from nonsmooth.continuation.path import VIOLATIONS
 from nonsmooth.continuation.physical import allowed_range

@@ -30,7 +30,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.continuation.continue_orbit import size_of
+from nonsmooth.continuation.begin import size_of
 from nonsmooth.continuation.orbit import EDGE, Orbit
 from nonsmooth.continuation.section_map import SectionMap
 from nonsmooth.flow.arguments import real_number, whole_number

@@ -85,7 +85,7 @@ def chain(
             o_max[i, k] = -1e300
             o_min[i, k] = 1e300
         set_phase(w, s, rates)
-        mode, code = settle(fun, tay, mode, w, transitions, rows, row_start, mode_start, mode_list, zero)
+        mode, code = settle(fun, tay, info, mode, w, transitions, rows, row_start, mode_start, mode_list, zero)
         if surface >= 0:  # a start on the section is no return
             found[3] = sign_after(fun, tay, mode, w, surface, zero)
         crossings[i] = 0
@@ -99,24 +99,32 @@ def chain(
         since = 1e300  # time since the last crossing
         closed = False
         while code == OK and returns < transient + keep:
-            ready = strides and returns < transient
+            # where extremes are wanted, every step of the kept window must be seen
+            ready = strides and (returns < transient or extremes == 0)
+            clear = False
             if ready:
                 counted = returns
                 began, turns = s, whole
-                s, whole, returns = stride(
+                s, whole, returns, clear = stride(
                     prop, rot, fun, info, mode, rates, w, w1, rows, row_start, mode_start, mode_list, zero,
-                    s, whole, target, T, returns, transient,
+                    s, whole, target, T, returns, transient if returns < transient else 0,
                 )  # fmt: skip
                 if returns > counted:
                     n_here = 0
                 if s != began or whole != turns:
                     since = 1e300
+                    if returns >= transient:
+                        elapsed[i] += (whole - turns) * T + (s - began)
             wait, timed = (1e300, -1) if strides else trigger(mode, s, T, mode_start, mode_list, at)
-            step, t, full, crossed = leg(
-                prop, rot, fun, tay, info, mode, n_i, rates, w, wait, rows, row_start, mode_start, mode_list,
-                surface, direction, surface_mode, zero, w1, wn, wp, wq, scr, points, end, there, found,
-                ready,
-            )  # fmt: skip
+            if clear:
+                step, t, full, crossed = info[mode, 0], -1, True, 0
+                found[1] = -1
+            else:
+                step, t, full, crossed = leg(
+                    prop, rot, fun, tay, info, mode, n_i, rates, w, wait, rows, row_start, mode_start, mode_list,
+                    surface, direction, surface_mode, zero, w1, wn, wp, wq, scr, points, end, there, found,
+                    ready,
+                )  # fmt: skip
             if t < 0 and crossed == 0 and timed >= 0 and step >= wait:
                 t = timed
                 found[0] = -1
@@ -190,7 +198,9 @@ def chain(
                         if jumps > mode_start.shape[0]:
                             code = CHATTER
                             break
-                        mode = jump(i, nxt, fired if jumps == 0 else -1, fun, w, wn, transitions, ra, rb, rc, rs, zero)
+                        mode = jump(
+                            i, nxt, fired if jumps == 0 else -1, fun, info, w, wn, transitions, ra, rb, rc, rs, zero
+                        )
                         jumps += 1
                         if is_open:
                             crossings[i] += 1

@@ -43,6 +43,7 @@ _LONG_NAMES = {
     "section": "a section point",
     "not_converged": "share of starts that had not converged",
     "diverged": "share of starts that diverged",
+    "failed": "share of starts that could not be followed (among those not converged)",
     "computed": "1 where the point was computed, 0 where its label was inferred",
 }
 
@@ -93,10 +94,12 @@ def basins(
     per_attractor: Mapping[str, Any],
     measures: Mapping[str, float],
     uncertain: tuple[Any, Any],
+    status: ArrayLike,
 ) -> xr.Dataset:
     """The result of ``basins``. ``attractors`` have the fields of ``analysis.basins_attractors.Attractor``."""
     plane = tuple(grid)
     variables: dict[str, Any] = {"label": (plane, np.asarray(label, np.int32), _label_attributes())}
+    variables["status"] = (plane, np.asarray(status, np.int8), status_attributes())
     variables |= attractor_variables(labels, attractors)
     for name, values in per_attractor.items():
         variables[name] = ("attractor", values, {"long_name": _LONG_NAMES[name]})
@@ -123,6 +126,10 @@ def attractor_variables(labels: Labels, attractors: Sequence[Any]) -> dict[str, 
         "period_number": (
             "attractor", np.array([item.period_number for item in attractors], np.int64),
             {"long_name": "period number (0: no cycle)"},
+        ),
+        "confirmed": (
+            "attractor", np.array([item.confirmed for item in attractors], np.int8),
+            {"long_name": "1 where Newton's method has found the cycle"},
         ),
         "lyapunov": (
             "attractor", np.array([item.exponent for item in attractors], float),
