@@ -280,6 +280,11 @@ def settle_many(
         residual[j] = gap
         # extremes and counts: over one whole cycle where there is one, else over as many returns as were kept
         n = p if p > 0 else keep
+        if p == 0:
+            crossings[j] = out[7][i] / keep
+            contacts[j] = out[8][i] / keep
+            if choice[6] == 0:
+                continue
         for k in range(2):
             moved[k] = u[k]
         for k in range(3):
@@ -296,8 +301,9 @@ def settle_many(
         for k in range(2):
             maximum[j, k] = out[1][i, k] if choice[6] != 0 else nan
             minimum[j, k] = out[2][i, k] if choice[6] != 0 else nan
-        crossings[j] = out[7][i] / n
-        contacts[j] = out[8][i] / n
+        if p > 0:
+            crossings[j] = out[7][i] / n
+            contacts[j] = out[8][i] / n
 
 
 @device
