@@ -99,13 +99,19 @@ def fail(found: Settled, before: IntArray, after: IntArray, out: Buffers) -> Non
 
 
 def _window(gpu: PlanarOnGpu, states: States, out: Buffers, found: Settled, keep: int, extremes: bool) -> None:
-    """Extremes and counts: over one whole cycle where there is one, else over as many returns as were kept."""
+    """Extremes and counts: over one whole cycle where there is one; else counts of the judged window, extremes of as
+    many returns behind it."""
     good = np.flatnonzero(usable(found.status))
-    n = np.where(found.period_number > 0, found.period_number, keep)
-    ran = gpu.run(good, states, 0, n, out, extremes=extremes)
-    fail(found, good, ran, out)
-    found.crossings[ran] = (out.crossings.copy_to_host() / n)[ran]
-    found.contacts[ran] = (out.contacts.copy_to_host() / n)[ran]
+    cyclic = found.period_number > 0
+    n = np.where(cyclic, found.period_number, keep)
+    crossings, contacts = out.crossings.copy_to_host(), out.contacts.copy_to_host()
+    wanted = good if extremes else good[cyclic[good]]
+    ran = gpu.run(wanted, states, 0, n, out, extremes=extremes)
+    fail(found, wanted, ran, out)
+    cycles = ran[cyclic[ran]]
+    crossings[cycles], contacts[cycles] = out.crossings.copy_to_host()[cycles], out.contacts.copy_to_host()[cycles]
+    good = np.flatnonzero(usable(found.status))
+    found.crossings[good], found.contacts[good] = crossings[good] / n[good], contacts[good] / n[good]
     if extremes:
         found.maximum[ran], found.minimum[ran] = out.maximum.copy_to_host()[ran], out.minimum.copy_to_host()[ran]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from typing import Any
 
@@ -69,7 +70,7 @@ class PlanarOnGpu:
         self.module = cuda_planar_module(
             len(engine.form.multiples), n_modes, *self.sizes, max(len(engine.net[0]), 1), n_rows
         )
-        self.cuda, self.threads, self.phase = cuda, THREADS, phase
+        self.cuda, self.threads, self.phase = cuda, THREADS, float(phase)
         self.period: FloatArray = tables.period
         multiples = tables.linear[4] if len(tables.linear[4]) else np.ones(1, dtype=np.int64)
         self.tables = cuda.to_device(_packed(tables.linear)), cuda.to_device(multiples)
@@ -80,7 +81,12 @@ class PlanarOnGpu:
 
     def launch(self, entry: Any, jobs: IntArray, *arguments: Any) -> None:
         """One thread for each job; waits for nothing."""
-        entry[-(-len(jobs) // self.threads), self.threads](self.cuda.to_device(jobs), *arguments)
+        from numba.core.errors import NumbaPerformanceWarning
+
+        with warnings.catch_warnings():  # a few threads on a large GPU: Numba warns of it
+            warnings.simplefilter("ignore", NumbaPerformanceWarning)
+            configured = entry[-(-len(jobs) // self.threads), self.threads]
+        configured(self.cuda.to_device(jobs), *arguments)
 
     def states(self, rows: IntArray, u: FloatArray, modes: IntArray, phase: float) -> States:
         """States at a phase of the forcing."""

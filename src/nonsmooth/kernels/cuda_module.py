@@ -6,6 +6,7 @@ arrays have constant shapes.
 
 from __future__ import annotations
 
+import hashlib
 import re
 from functools import cache
 from pathlib import Path
@@ -38,4 +39,7 @@ def cuda_planar_module(
     for name, size in sizes.items():
         text, found = re.subn(rf"^{name} = \d+$", f"{name} = {size}", text, flags=re.MULTILINE)
         assert found == 1, name
+    # Numba's disk cache goes by this text alone, and the header decides how it is compiled
+    header = (folder / "cuda_target.py").read_text(encoding="utf-8")
+    text += f"\nHEADER = {hashlib.sha256(header.encode()).hexdigest()!r}\n"
     return load_module(text, "cuda_planar_" + "_".join(str(size) for size in sizes.values()))

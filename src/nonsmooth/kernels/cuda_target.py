@@ -15,9 +15,10 @@ from typing import Any
 
 from numba import config, cuda
 
-__all__ = ["THREADS", "cuda", "device", "entry", "inline", "kernel", "local"]
+__all__ = ["REGISTERS", "THREADS", "cuda", "device", "entry", "inline", "kernel", "local"]
 
 THREADS = 64  # in a block: few, because a trajectory fills a thread's registers
+REGISTERS = None  # of a thread, at most; None: as many as the compiler takes (255)
 
 
 _SIMULATED = bool(config.ENABLE_CUDASIM)
@@ -43,4 +44,6 @@ def kernel(signature: Any) -> Callable[[Callable[..., Any]], Any]:
 
 def entry(function: Callable[..., Any]) -> Any:
     """Mark what the host launches; compiled for the types of its first call, and kept on disk."""
-    return cuda.jit(function) if _SIMULATED else cuda.jit(launch_bounds=THREADS, cache=True)(function)
+    if _SIMULATED:
+        return cuda.jit(function)
+    return cuda.jit(launch_bounds=THREADS, max_registers=REGISTERS, lto=False, cache=True)(function)
