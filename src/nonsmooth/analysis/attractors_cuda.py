@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from nonsmooth.analysis.settled import Settled, usable
-from nonsmooth.flow.devices import BATCH
+from nonsmooth.flow.devices import batch_size
 from nonsmooth.flow.engine import FloatArray, IntArray
 from nonsmooth.flow.planar import PlanarEngine
 from nonsmooth.flow.planar_cuda import SLICE, Buffers, PlanarOnGpu, States
@@ -40,8 +40,9 @@ def run_on_gpu(
 
 def _batches(points: FloatArray, rows: IntArray) -> Iterator[tuple[slice, FloatArray, IntArray]]:
     """Jobs in batches: which, the parameter points that they need, and their rows among these."""
-    for first in range(0, len(rows), BATCH):
-        some = slice(first, first + BATCH)
+    size = batch_size()
+    for first in range(0, len(rows), size):
+        some = slice(first, first + size)
         needed, own = np.unique(rows[some], return_inverse=True)
         yield some, points[needed], own.astype(np.int64)
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.flow.devices import BATCH
+from nonsmooth.flow.devices import batch_size
 from nonsmooth.flow.engine import FloatArray, IntArray
 from nonsmooth.flow.planar import PlanarEngine
 from nonsmooth.flow.planar_cuda import PlanarOnGpu
@@ -37,9 +37,9 @@ def growth_on_gpu(
         Integral of div f, sum of log|det S|, crossings, least angle of a crossing.
     status : array (P,)
     """
-    parts = []
-    for first in range(0, len(points), BATCH):
-        some = points[first : first + BATCH]
+    parts, size = [], batch_size()
+    for first in range(0, len(points), size):
+        some = points[first : first + size]
         parts.append(_batch(engine, some, start, mode, scale, align, wait, edges))
         advance(len(some))
     growth, sums, status = (np.concatenate(part) for part in zip(*parts, strict=True))

@@ -10,7 +10,7 @@ import numpy as np
 from nonsmooth.analysis.attractors_cuda import Judging, fail
 from nonsmooth.analysis.settle import LEAST, LONGER
 from nonsmooth.analysis.settled import Settled, usable
-from nonsmooth.flow.devices import BATCH
+from nonsmooth.flow.devices import batch_size
 from nonsmooth.flow.engine import Chain, FloatArray
 from nonsmooth.flow.planar import PlanarEngine
 from nonsmooth.flow.planar_cuda import PlanarOnGpu
@@ -28,9 +28,9 @@ def sweep_on_gpu(
     max_period: int, tolerance: float, scale: FloatArray, chain: Chain, advance: Callable[[int], Any],
 ) -> Settled:  # fmt: skip
     """Every parameter point from one start: the rules of ``analysis.settle``, whose buffers ``chain`` is filled."""
-    parts = []
-    for first in range(0, len(points), BATCH):
-        some = slice(first, first + BATCH)
+    parts, size = [], batch_size()
+    for first in range(0, len(points), size):
+        some = slice(first, first + size)
         gpu = PlanarOnGpu(engine, points[some], phase)
         parts.append(_batch(gpu, start, transient, keep, max_period, tolerance, scale, chain, some))
         advance(len(parts[-1].status))

@@ -9,10 +9,24 @@ from typing import Any
 from nonsmooth.flow.engine import Engine, SectionPlan
 from nonsmooth.flow.planar import PlanarEngine
 
-__all__ = ["BATCH", "DEVICES", "check_device", "on_gpu", "workers_of"]
+__all__ = ["BATCH", "DEVICES", "batch_size", "check_device", "on_gpu", "workers_of"]
 
 DEVICES = ("cpu", "cuda")
-BATCH = 65536  # trajectories of one launch, at most: half a gigabyte, and enough to fill the largest GPU
+BATCH = 65536  # trajectories of one chunk of work on a GPU
+PER_MULTIPROCESSOR = 512  # of one launch: twice what its registers hold, so that a small GPU is not busy for long
+
+
+def batch_size() -> int:
+    """Trajectories of one launch on the present GPU; results do not depend on it."""
+    from numba import cuda
+
+    if _simulated():
+        return BATCH
+    return min(BATCH, PER_MULTIPROCESSOR * int(cuda.get_current_device().MULTIPROCESSOR_COUNT))
+
+
+def _simulated() -> bool:
+    return os.environ.get("NUMBA_ENABLE_CUDASIM", "0") not in ("", "0")
 
 
 def check_device(device: Any) -> str:
@@ -86,7 +100,7 @@ def on_gpu(device: Any, verb: str, engine: Engine, plan: SectionPlan | None, *, 
             'device="cuda" needs the package numba-cuda, which is not installed: pip install "nonsmooth[cuda]", '
             'or use device="cpu"'
         )
-    if os.environ.get("NUMBA_ENABLE_CUDASIM", "0") in ("", "0"):
+    if not _simulated():
         _find_gpu()
     return True
 

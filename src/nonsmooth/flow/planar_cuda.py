@@ -14,7 +14,7 @@ from nonsmooth.kernels import codes
 
 __all__ = ["SLICE", "Buffers", "PlanarOnGpu", "States"]
 
-SLICE = 128  # section returns of one launch, at most: below a second also on a small GPU
+SLICE = 256  # section returns of one launch, at most: below a second also on a small GPU
 
 
 @dataclass
