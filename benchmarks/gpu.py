@@ -1,4 +1,4 @@
-"""`make gpu`: the GPU against the processor on the paper's chart, and how fast it is; `make gpu-compiler` without a GPU.
+"""`make gpu`: a GPU against the processor on the paper's chart, and how fast it is; `make gpu-compiler` without a GPU.
 
 With a GPU: every label of a 200 x 200 chart and every periodic point against the processor's, then forcing periods
 per second of one launch and of whole charts, with the part of the FP64 peak that a counted number of operations per
@@ -22,12 +22,12 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-import machine  # noqa: E402
-import nonsmooth as ns  # noqa: E402
-from gpu_flops import PLANES  # noqa: E402
-from nonsmooth.analysis.chart import plan_chart  # noqa: E402
-from nonsmooth.analysis.chart_refine import labels_of_points  # noqa: E402
-from nonsmooth.kernels import codes  # noqa: E402
+import machine
+import nonsmooth as ns
+from gpu_flops import PLANES
+from nonsmooth.analysis.chart import plan_chart
+from nonsmooth.analysis.chart_refine import labels_of_points
+from nonsmooth.kernels import codes
 
 HERE = Path(__file__).parent
 # FP64 units of a multiprocessor, by compute capability; each makes a multiplication and an addition per clock.

@@ -58,8 +58,8 @@ def operations(system: ns.System, returns: int) -> int:
     engine: Any = engine_for(system)
     tables = engine.prepare(system.parameter_vector()[None, :])
     module = tables.module
-    for name in ("cos", "sin", "fabs", "sqrt"):
-        setattr(module, name, lambda x, f=getattr(math, name): Counted(f(x)))
+    for plain in (math.cos, math.sin, math.fabs, math.sqrt):
+        setattr(module, plain.__name__, lambda x, f=plain: Counted(f(x)))
     sizes = len(system.states), len(system.indicators), tables.sizes[2]
     out = Chain.empty(1, 1, *sizes)
     rows = engine.net[1].copy()

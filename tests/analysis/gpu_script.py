@@ -9,6 +9,7 @@ import json
 from typing import Any
 
 import numpy as np
+
 import nonsmooth as ns
 from nonsmooth.flow import planar_cuda
 

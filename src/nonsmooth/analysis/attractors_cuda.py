@@ -63,10 +63,9 @@ def _settle(
     early = todo < transient
     while len(under_way):
         found.returns[under_way] = used
-        done = gpu.run(under_way, states, todo, keep, judging.kept)
-        fail(found, under_way, done, judging.kept)
-        ran = gpu.run(done, states, 0, 1, judging.single, extremes=True)
-        fail(found, done, ran, judging.single)
+        ran = gpu.run(under_way, states, todo, keep, judging.kept, one_more=judging.single)
+        fail(found, under_way, ran, judging.single)
+        fail(found, under_way, ran, judging.kept)
         used += todo + keep + 1
         found.returns[ran] = used
         judging.judge(ran, found, judging.single)
@@ -95,8 +94,8 @@ def _settle(
 def fail(found: Settled, before: IntArray, after: IntArray, out: Buffers) -> None:
     """Codes of the jobs that did not come to the end of a run."""
     lost = np.setdiff1d(before, after, assume_unique=True)
-    if len(lost):
-        found.status[lost] = out.status.copy_to_host()[lost]
+    codes_of = out.status.copy_to_host()[lost]
+    found.status[lost] = np.where(codes_of != codes.OK, codes_of, found.status[lost])
 
 
 def _window(gpu: PlanarOnGpu, states: States, out: Buffers, found: Settled, keep: int, extremes: bool) -> None:
@@ -132,7 +131,7 @@ class Judging:
         self.sizes, self.returns = array((n, 2)), array((n, max_period))
         self.period, self.status = (gpu.cuda.to_device(np.zeros(n, dtype=np.int64)) for _ in range(2))
         self.residual, self.multiplier = (gpu.cuda.to_device(np.zeros(n)) for _ in range(2))
-        twice = np.repeat(rows, 2)
+        twice = np.tile(rows, 2)
         self.neighbours = gpu.states(twice, np.zeros((2 * n, 2)), np.zeros(2 * n, dtype=np.int64), 0.0)
         self.arrived = gpu.buffers(2 * n, 1)
 
@@ -152,8 +151,7 @@ class Judging:
                 module.beside, cycles, self.keep, self.nudge, gpu.phase, gpu.periods, other.rows, self.kept.section,
                 self.kept.section_mode, self.sizes, self.period, other.u, other.clock, other.counters,
             )  # fmt: skip
-            pairs = (2 * cycles[:, None] + np.arange(2)).ravel()
-            gpu.run(pairs, other, np.repeat(np.maximum(period - 1, 0), 2), 1, self.arrived)
+            gpu.run_pairs(cycles, other, np.maximum(period - 1, 0), self.arrived)
             gpu.launch(
                 module.decide, cycles, self.keep, self.nudge, self.kept.section, self.sizes, other.u,
                 self.arrived.status, self.period, self.status, self.residual, self.multiplier, self.returns,

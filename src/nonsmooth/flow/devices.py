@@ -89,7 +89,9 @@ def on_gpu(device: Any, verb: str, engine: Engine, plan: SectionPlan | None, *, 
             'use device="cpu"'
         )
     if plan is not None and plan.indicator >= 0:
-        raise ValueError(f'{verb} with device="cuda" takes stroboscopic sections only; use device="cpu" for ns.Poincare')
+        raise ValueError(
+            f'{verb} with device="cuda" takes stroboscopic sections only; with ns.Poincare use device="cpu"'
+        )
     if carried:
         raise ValueError(
             f'{verb} with device="cuda" runs all points at once, so none can go on from the state of another: begin '

@@ -105,30 +105,44 @@ class PlanarOnGpu:
         )  # fmt: skip
 
     def run(
-        self, jobs: IntArray, states: States, transient: Any, keep: Any, out: Buffers, *, extremes: bool = False
-    ) -> IntArray:
+        self, jobs: IntArray, states: States, transient: Any, keep: Any, out: Buffers, *, extremes: bool = False,
+        one_more: Buffers | None = None,
+    ) -> IntArray:  # fmt: skip
         """March jobs by ``transient`` returns, then ``keep`` more into ``out`` (numbers, or one for each trajectory).
+
+        Parameters
+        ----------
+        one_more : Buffers, optional
+            One return more, with extremes, goes in here.
 
         Returns
         -------
         array
-            The jobs that came to their end; the others have their code in ``out.status``.
+            The jobs that came to their end; the others have their code in ``out.status`` (or ``one_more.status``).
         """
         todo = transient
         while np.ndim(todo) == 0 and todo > SLICE and len(jobs):
-            jobs = self._advance(jobs, states, SLICE - 1, 1, out, False)
+            jobs = self._advance(jobs, states, SLICE - 1, 1, out)
             todo -= SLICE
-        return self._advance(jobs, states, todo, keep, out, extremes) if len(jobs) else jobs
+        return self._advance(jobs, states, todo, keep, out, extremes, one_more) if len(jobs) else jobs
+
+    def run_pairs(self, jobs: IntArray, states: States, transient: Any, out: Buffers) -> None:
+        """March the states j and J + j of each of J jobs by ``transient`` returns and one more, kept in ``out``."""
+        self._advance(jobs, states, transient, 1, out, False, out, len(states.u) // 2)
 
     def _advance(
-        self, jobs: IntArray, states: States, transient: Any, keep: Any, out: Buffers, extremes: bool
-    ) -> IntArray:
+        self, jobs: IntArray, states: States, transient: Any, keep: Any, out: Buffers, extremes: bool = False,
+        other: Buffers | None = None, apart: int = 0,
+    ) -> IntArray:  # fmt: skip
         counts = (self.cuda.to_device(np.atleast_1d(np.asarray(n, dtype=np.int64))) for n in (transient, keep))
         self.launch(
             self.module.advance, jobs, states.rows, *self.tables, self.net, states.u, states.clock, states.counters,
-            *counts, self.plans[extremes], self.phase, self.limit, out.all(),
+            *counts, self.plans[extremes], self.plans[1], 1 if other is None else 2, apart, self.phase, self.limit,
+            out.all(), (out if other is None else other).all(),
         )  # fmt: skip
-        done: IntArray = jobs[out.status.copy_to_host()[jobs] == codes.OK]
+        done = jobs[out.status.copy_to_host()[jobs] == codes.OK]
+        if other is not None and not apart:
+            done = done[other.status.copy_to_host()[done] == codes.OK]
         return done
 
 

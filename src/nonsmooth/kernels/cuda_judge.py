@@ -30,19 +30,20 @@ def judge(
 
 @entry
 def beside(jobs, keep, nudge, phase, periods, rows, section, modes, sizes, period_number, u, clock, counters):
-    """Two neighbours (states 2 j, 2 j + 1) of the section point whose p-th return is the last one kept."""
+    """Two neighbours (states j and J + j) of the section point whose p-th return is the last one kept."""
     k = cuda.grid(1)
     if k >= jobs.shape[0]:
         return
     j = jobs[k]
     base = keep - 1 - period_number[j]
     for c in range(2):
+        row = j + c * period_number.shape[0]
         for d in range(2):
-            u[2 * j + c, d] = section[j, base, d]
-        u[2 * j + c, c] += nudge * sizes[j, c]
-        clock[2 * j + c, 0] = phase * periods[rows[2 * j]]
-        clock[2 * j + c, 1] = 0.0
-        counters[2 * j + c, 0] = modes[j, base]
+            u[row, d] = section[j, base, d]
+        u[row, c] += nudge * sizes[j, c]
+        clock[row, 0] = phase * periods[rows[j]]
+        clock[row, 1] = 0.0
+        counters[row, 0] = modes[j, base]
 
 
 @entry
@@ -52,13 +53,14 @@ def decide(jobs, keep, nudge, section, sizes, u, codes, period_number, status, r
     if k >= jobs.shape[0]:
         return
     j = jobs[k]
+    beyond = j + period_number.shape[0]
     images = cuda.local.array((3, 2), float64)
     for d in range(2):
         images[0, d] = section[j, keep - 1, d] / sizes[j, d]
-        images[1, d] = u[2 * j, d] / sizes[j, d]
-        images[2, d] = u[2 * j + 1, d] / sizes[j, d]
+        images[1, d] = u[j, d] / sizes[j, d]
+        images[2, d] = u[beyond, d] / sizes[j, d]
     mu = -1.0
-    if codes[2 * j] == OK and codes[2 * j + 1] == OK:
+    if codes[j] == OK and codes[beyond] == OK:
         mu = modulus(images, nudge)
     multiplier[j] = mu
     if not certain(period_number[j], mu, residual[j], returns[j]):

@@ -6,12 +6,13 @@ returns is decided outside, so that all threads do the same thing at the same ti
 of the next launch, and a launch stays short.
 
 A thread copies its parameter row into arrays of constant shape and builds its tables anew in each launch, which costs
-as much as a few forcing periods. ``packed`` holds the rows as columns, so that neighbouring threads read neighbouring
+as much as some 18 forcing periods. ``packed`` holds the rows as columns, so that neighbouring threads read neighbouring
 numbers; what a thread works with lies in its local memory, which the GPU interleaves in the same way.
 """
 
 from numba import float64, int64
 
+from .codes import OK
 from .cuda_target import cuda, device, entry, local
 from .planar_search import WIDTH
 from .planar_settle import go
@@ -120,26 +121,43 @@ def arrays_of_thread(packed, multiples, i):
     return linear, (prop, rot, fun, tay, field, info, row, vectors, scr, points, rates, integers)
 
 
-@entry
-def advance(jobs, rows, packed, multiples, net, u, clock, counters, transient, keep, plan, phase, limit, out):
-    """Thread k: march the state of job j = jobs[k] under parameter row rows[j] by transient[j] section returns, then
-    keep[j] more into row j of ``out``. (One entry for all jobs where they are short.)
+@device
+def row_of(buffers, row):
+    """What ``chain`` writes for one trajectory, from the buffers of all."""
+    section, maximum, minimum, i_max, i_min, o_max, o_min, crossings, contacts, elapsed, times, modes, status = buffers
+    return (
+        section[row : row + 1], maximum[row : row + 1], minimum[row : row + 1], i_max[row : row + 1],
+        i_min[row : row + 1], o_max[row : row + 1], o_min[row : row + 1], crossings[row : row + 1],
+        contacts[row : row + 1], elapsed[row : row + 1], times[row : row + 1], modes[row : row + 1],
+        status[row : row + 1],
+    )  # fmt: skip
 
-    The state is left at the last return; out[12] are the statuses."""
+
+@entry
+def advance(
+    jobs, rows, packed, multiples, net, u, clock, counters, transient, keep, plan, full, legs, apart, phase, limit, out,
+    other,
+):  # fmt: skip
+    """Thread k: march the state of job j = jobs[k] under parameter row rows[j] by transient[j] section returns, then
+    keep[j] more into row j of ``out``. (One number for all jobs where these arrays are short.)
+
+    With two legs the tables serve twice: ``apart`` = 0, one more return with extremes (the plan ``full``), into row j
+    of ``other``; else the same for the state j + apart, into that row of ``other``. A state is left at its last
+    return; statuses stand in the buffers, and the second leg is left out where the first one failed."""
     k = cuda.grid(1)
     if k >= jobs.shape[0]:
         return
     j = jobs[k]
     linear, scratch = arrays_of_thread(packed, multiples, rows[j])
-    section, maximum, minimum, i_max, i_min, o_max, o_min, crossings, contacts, elapsed, times, modes, status = out
-    own = (
-        section[j : j + 1], maximum[j : j + 1], minimum[j : j + 1], i_max[j : j + 1], i_min[j : j + 1],
-        o_max[j : j + 1], o_min[j : j + 1], crossings[j : j + 1], contacts[j : j + 1], elapsed[j : j + 1],
-        times[j : j + 1], modes[j : j + 1], status[j : j + 1],
-    )  # fmt: skip
     n_transient = transient[min(j, transient.shape[0] - 1)]
     n_keep = keep[min(j, keep.shape[0] - 1)]
-    go(
-        0, u[j], clock[j], counters[j], linear, net, plan, phase, 1e300, n_transient, n_keep, limit, own, scratch,
-        u[j : j + 1],
-    )  # fmt: skip
+    for leg in range(legs):
+        row = j + leg * apart
+        again = leg > 0 and apart == 0
+        code = go(
+            0, u[row], clock[row], counters[row], linear, net, full if again else plan, phase, 1e300,
+            0 if again else n_transient, 1 if again else n_keep, limit, row_of(other if leg > 0 else out, row), scratch,
+            u[row : row + 1],
+        )  # fmt: skip
+        if code != OK:
+            break
