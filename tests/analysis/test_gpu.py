@@ -27,10 +27,13 @@ COMPILE = """
 import json, sys
 from nonsmooth.kernels.cuda_ptx import ptx_of
 
-name, signature = json.load(sys.stdin)
-text = ptx_of(name, signature, (1, 2, 2, 1, 2, 5))
-print(text.count(".entry"), ".target sm_90" in text)
+found = {}
+for name, signature in json.load(sys.stdin).items():
+    text = ptx_of(name, signature, (1, 2, 2, 1, 2, 5))
+    found[name] = [text.count(".visible .entry"), ".target sm_90" in text]
+print(json.dumps(found))
 """
+ENTRIES = {"judge", "beside", "decide", "frames", "advance", "neighbours"}
 
 
 def run(code: list[str], given: str = "", **environment: str) -> str:
@@ -100,15 +103,15 @@ def test_spectra_are_those_of_the_processor(simulated: dict[str, Any]) -> None:
 
 @pytest.mark.skipif(not COMPILER[1], reason="the compiler of numba-cuda (nvidia-nvvm) is not installed")
 @pytest.mark.parametrize(
-    "entry", ["judge", "beside", "decide", "frames", "advance", pytest.param("neighbours", marks=pytest.mark.slow)]
+    "entries", [ENTRIES - {"neighbours"}, pytest.param({"neighbours"}, marks=pytest.mark.slow)], ids=["most", "rest"]
 )
-def test_every_kernel_compiles_for_the_types_it_is_launched_with(simulated: dict[str, Any], entry: str) -> None:
-    printed = run(["-c", COMPILE], json.dumps([entry, simulated["launched"][entry]]))
-    assert printed.split() == ["1", "True"]
+def test_every_kernel_compiles_for_the_types_it_is_launched_with(simulated: dict[str, Any], entries: set[str]) -> None:
+    printed = run(["-c", COMPILE], json.dumps({name: simulated["launched"][name] for name in sorted(entries)}))
+    assert json.loads(printed) == {name: [1, True] for name in entries}
 
 
 def test_no_kernel_is_left_out(simulated: dict[str, Any]) -> None:
-    assert set(simulated["launched"]) == {"judge", "beside", "decide", "frames", "advance", "neighbours"}
+    assert set(simulated["launched"]) == ENTRIES
 
 
 PLANE = {"omega": [3.2, 3.69], "rho": [0.15, 0.3]}
@@ -126,6 +129,22 @@ def test_what_a_gpu_does_not_take_is_said_at_the_door() -> None:
         ns.chart(oscillator, PLANE, method="taylor", device="cuda")
     with pytest.raises(ValueError, match="stroboscopic sections only"):
         ns.chart(oscillator, PLANE, section=ns.Poincare("penetration"), device="cuda")
+
+
+def test_without_the_package_the_door_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    with pytest.raises(ImportError, match=r'pip install "nonsmooth\[cuda\]"'):
+        ns.sweep(ns.models.discontinuous_support(), "rho", [0.1, 0.2], direction=None, device="cuda")
+
+
+def test_threads_and_clusters_are_those_of_the_processor(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NUMBA_ENABLE_CUDASIM", "1")
+    with pytest.raises(ValueError, match="leave threads out"):
+        ns.chart(ns.models.discontinuous_support(), PLANE, device="cuda", threads=2)
+    with pytest.raises(ValueError, match="leave client out"):
+        ns.chart(ns.models.discontinuous_support(), PLANE, device="cuda", client=object())
+    with pytest.raises(ValueError, match="a single trajectory is one thread"):
+        ns.lyapunov(ns.models.discontinuous_support(), device="cuda")
 
 
 def test_a_machine_without_a_gpu_says_so() -> None:
