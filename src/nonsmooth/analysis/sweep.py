@@ -14,6 +14,7 @@ from nonsmooth.analysis.classify import TOLERANCE, Verdict
 from nonsmooth.analysis.density import CountedSlot, bin_edges, coarse_values, given_ranges
 from nonsmooth.analysis.settle import Attractors
 from nonsmooth.flow.arguments import check_options, check_system, float_array, whole_number
+from nonsmooth.flow.devices import on_gpu, workers_of
 from nonsmooth.flow.engine import Chain, FloatArray, State
 from nonsmooth.flow.methods import RTOL, engine_for
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
@@ -52,6 +53,7 @@ def sweep(
     rtol: float | None = None,
     atol: Any = None,
     threads: int | None = None,
+    device: str = "cpu",
     progress: bool = True,
     **expert: Any,
 ) -> xr.Dataset:
@@ -85,6 +87,9 @@ def sweep(
         See :func:`nonsmooth.flow.methods.engine_for`.
     threads : int, optional
         Threads for independent work; the result does not depend on it. Default: one per core.
+    device : {"cpu", "cuda"}
+        ``"cuda"`` runs the points on an NVIDIA GPU, one per thread, with ``direction=None``: see the guide "A chart on
+        a GPU".
     progress : bool
         A bar on a terminal.
 
@@ -101,6 +106,8 @@ def sweep(
     ------
     ValueError, TypeError
         Arguments that do not fit. A point that fails keeps its status; the others are whole.
+    ImportError, RuntimeError
+        ``device="cuda"`` without the package numba-cuda, or without a GPU.
 
     Notes
     -----
@@ -118,6 +125,10 @@ def sweep(
         threads = whole_number(threads, "threads", 1)
     section, plan = section_plan(system, section)
     engine = engine_for(system, method, rtol, atol, **expert)
+    gpu = on_gpu(device, "sweep", engine, plan, carried=direction is not None)
+    if gpu and density is not False:
+        raise ValueError("section points are counted on the processor: leave out density, or device=\"cuda\"")
+    threads = workers_of(device, threads)
     starts = start_states(system, start)
     points = system.parameter_points({parameter: numbers})
     noise = TOLERANCE if engine.name == "exact" else max(TOLERANCE, 10.0 * (RTOL if rtol is None else rtol))
@@ -139,6 +150,16 @@ def sweep(
     slots = {
         (d, k): Slot(attractors, points, sizes, edges) for d in range(len(directions)) for k in range(len(starts))
     }
+    options = {
+        "parameter": parameter, "values": values, "direction": direction, "start": plain_start(system, start),
+        "section": section, "transient": transient, "keep": keep, "max_period": max_period,
+        **({} if density is False else {"density": density, "bins": bins}),
+        "method": method, "rtol": rtol, "atol": atol, **({"device": device} if gpu else {}), **expert,
+    }  # fmt: skip
+    squeeze = (() if direction == "both" else ("direction",)) + (("start",) if is_one_start(start) else ())
+    if gpu:
+        _on_gpu(engine, points, starts, attractors, slots, progress, parameter)
+        return _dataset(system, engine.name, parameter, numbers, directions, starts, slots, options, squeeze)
     memory = system.memory_vector()
 
     def march(slot: tuple[int, int], order: Sequence[int], report: Report) -> None:
@@ -154,17 +175,7 @@ def sweep(
             report.advance(1)
 
     _run(march, _pieces(directions, len(starts), numbers), threads, progress, parameter)
-    return _dataset(
-        system, engine.name, parameter, numbers, directions, starts, slots,
-        {
-            "parameter": parameter, "values": values, "direction": direction, "start": plain_start(system, start),
-            "section": section,
-            "transient": transient, "keep": keep, "max_period": max_period,
-            **({} if density is False else {"density": density, "bins": bins}),
-            "method": method, "rtol": rtol, "atol": atol, **expert,
-        },
-        (() if direction == "both" else ("direction",)) + (("start",) if is_one_start(start) else ()),
-    )  # fmt: skip
+    return _dataset(system, engine.name, parameter, numbers, directions, starts, slots, options, squeeze)
 
 
 class Slot:
@@ -267,6 +278,23 @@ def _run(
                 for future in futures:
                     future.cancel()
                 raise
+
+
+def _on_gpu(
+    engine: Any, points: FloatArray, starts: FloatArray, rules: Attractors, slots: Mapping[tuple[int, int], Slot],
+    progress: bool, label: str,
+) -> None:  # fmt: skip
+    """All points from each start, on the GPU."""
+    from nonsmooth.analysis.sweep_cuda import sweep_on_gpu
+
+    with progress_bar(len(points) * len(starts), f"sweep over {label}", progress) as advance:
+        for k, start in enumerate(starts):
+            slot = slots[0, k]
+            found = sweep_on_gpu(
+                engine, points, start, rules.plan.phase, rules.transient, rules.keep, rules.max_period,
+                rules.tolerance, rules.scale, slot.chain, advance,
+            )  # fmt: skip
+            slot.period_number[:], slot.residual[:], slot.status[:] = found.period_number, found.residual, found.status
 
 
 def _dataset(
