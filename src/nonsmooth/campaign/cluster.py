@@ -14,11 +14,35 @@ from numpy.typing import NDArray
 from nonsmooth.campaign.store import ChunkStore
 from nonsmooth.campaign.work import Work
 
-__all__ = ["MISSING", "compute_chunk", "on_cluster"]
+__all__ = ["MISSING", "compute_chunk", "connect", "on_cluster"]
 
-MISSING = 'client= needs Dask distributed: python -m pip install "nonsmooth[cluster]"'
+MISSING = 'a cluster needs Dask distributed: python -m pip install "nonsmooth[cluster]"'
 AHEAD = 2  # chunks that wait at each thread of the cluster
+ANSWER = 20  # seconds to wait for a scheduler
 ATTEMPTS = 10  # times that a chunk is sent again after its workers died
+
+
+def connect(address: str) -> Any:
+    """A client of the scheduler at an address such as ``tcp://127.0.0.1:8786``.
+
+    Raises
+    ------
+    ImportError
+        Without Dask distributed.
+    OSError
+        Where no scheduler answers.
+    """
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise ImportError(MISSING) from error
+    try:
+        return Client(address, timeout=ANSWER, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise OSError(
+            f"no scheduler answers at {address} ({error}); start one with `dask scheduler` and give the address that "
+            "it prints"
+        ) from error
 
 
 def compute_chunk(work: Work, chunk: int, path: str | None, key: str) -> Mapping[str, NDArray[Any]] | None:
@@ -50,9 +74,12 @@ def on_cluster(
     ------
     ImportError
         Without Dask distributed.
+    ConnectionError
+        The scheduler is gone; what has come back, or is in the store, stands.
     """
     try:
         from distributed import as_completed
+        from distributed.client import FutureCancelledError
         from distributed.scheduler import KilledWorker
     except ImportError as error:
         raise ImportError(MISSING) from error
@@ -66,6 +93,7 @@ def on_cluster(
         name = f"nonsmooth-{family}-{chunk}" + (f"-{attempts[chunk]}" if attempts[chunk] > 1 else "")
         return client.submit(compute_chunk, work, chunk, path, key, key=name, pure=False)
 
+    address = client.scheduler.address
     threads = max(sum(client.nthreads().values()), 1)
     pending = {send(chunk): chunk for chunk in islice(order, AHEAD * threads)}
     if not pending:
@@ -84,6 +112,12 @@ def on_cluster(
                 pending[again] = chunk
                 queue.add(again)
                 continue
+            except FutureCancelledError as error:
+                kept = "finished chunks are in the store: " if store is not None else ""
+                raise ConnectionError(
+                    f"the scheduler at {address} is gone ({error.reason}); {kept}start it again with its workers, and "
+                    "run again"
+                ) from error
             done(chunk, arrays)
             future.release()
             for following in islice(order, 1):

@@ -23,7 +23,7 @@ import socket
 import tempfile
 import time
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -56,6 +56,11 @@ class ChunkStore:
         """Whether a chunk is there, whole."""
         mark = _mark(self.path / "run" / f"{chunk:06d}.json")
         return mark is not None and mark["key"] == self._key(chunk)
+
+    def begun(self) -> set[int]:
+        """Chunks that somebody has begun, whether they are there by now or not."""
+        log = self.path / "run" / "started.log"
+        return set(_started(log)) if log.exists() else set()
 
     def note_start(self, chunk: int) -> None:
         """Write into the log that the work on a chunk begins: what was begun more often than once was lost before."""
@@ -177,7 +182,7 @@ def describe_store(path: str | os.PathLike[str]) -> dict[str, Any]:
     record["done"] = len({mark["chunk"] for mark in marks})
     record["seconds"] = sum(mark["seconds"] for mark in marks)
     log = target / "run" / "started.log"
-    record["started"] = len(log.read_text(encoding="utf-8").splitlines()) if log.exists() else record["done"]
+    record["started"] = len(_started(log)) if log.exists() else record["done"]
     return record
 
 
@@ -254,6 +259,15 @@ def _marks(path: Path) -> Iterator[dict[str, Any]]:
         mark = _mark(file)
         if mark is not None:
             yield mark
+
+
+def _started(log: Path) -> list[int]:
+    """The chunks that were begun, in their order; a line cut short by a crash of the machine is passed over."""
+    found = []
+    for line in log.read_text(encoding="utf-8").splitlines():
+        with suppress(ValueError, KeyError, TypeError):
+            found.append(int(json.loads(line)["chunk"]))
+    return found
 
 
 def _mark(file: Path) -> dict[str, Any] | None:
