@@ -22,7 +22,7 @@ import platform
 import socket
 import tempfile
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
@@ -35,10 +35,11 @@ from numpy.typing import NDArray
 from nonsmooth.campaign.work import Work
 from nonsmooth.errors import DataFileError
 
-__all__ = ["ChunkStore", "cpu_type", "describe_store", "open_store"]
+__all__ = ["ChunkStore", "cpu_type", "describe_store", "open_store", "stored_bytes"]
 
 ATTRIBUTE = "nonsmooth_campaign"
 LEVEL = 3  # of the compression
+FACTS = 360  # bytes of the facts about the run that are kept for each chunk
 
 
 @dataclass(frozen=True)
@@ -80,8 +81,7 @@ class ChunkStore:
         with _told(self.path):
             group = _results(self.path, "r+")
             kept = {name: np.ascontiguousarray(arrays[name], item.dtype) for name, item in work.columns().items()}
-            for name, values in kept.items():
-                group[name][first:last] = values
+            _put(group, kept, first, last)
             mark = {
                 "chunk": chunk, "key": self._key(chunk), "content": _content(kept), "cpu": cpu_type(),
                 "host": socket.gethostname(), "process": os.getpid(), "seconds": round(seconds, 4),
@@ -186,6 +186,27 @@ def describe_store(path: str | os.PathLike[str]) -> dict[str, Any]:
     return record
 
 
+def stored_bytes(work: Work, samples: Sequence[Mapping[str, NDArray[Any]]], kept: int) -> int:
+    """Bytes that a store of the whole work takes, by what a sample of its places takes in a store in memory.
+
+    ``kept``: places of a chunk of the store.
+    """
+    import zarr
+    from zarr.storage import MemoryStore
+
+    taken: dict[str, Any] = {}
+    group = zarr.open_group(MemoryStore(taken), mode="w", zarr_format=3)
+    columns = {name: np.concatenate([sample[name] for sample in samples]) for name in work.columns()}
+    there = len(next(iter(columns.values())))
+    _create(group, work, there, min(kept, there))
+    _put(group, columns, 0, there)
+    places = work.bounds(work.n_chunks() - 1)[1]
+    heads = sum(len(data) for name, data in taken.items() if name.endswith("zarr.json"))
+    heads += len(json.dumps(json.dumps(_described(work))))
+    chunks = sum(len(data) for name, data in taken.items() if not name.endswith("zarr.json"))
+    return heads + round(chunks * places / there) + -(-places // kept) * FACTS
+
+
 def _content(arrays: Mapping[str, NDArray[Any]]) -> str:
     digest = hashlib.sha256()
     for name in sorted(arrays):
@@ -226,25 +247,36 @@ def _described(work: Work) -> dict[str, Any]:
 def _make(target: Path, work: Work, described: Mapping[str, Any], key: str) -> None:
     """A whole empty store, or none."""
     import zarr
-    from zarr.codecs import ZstdCodec
 
     with _told(target), tempfile.TemporaryDirectory(prefix=f".{target.name}-", dir=target.parent) as folder:
         fresh = Path(folder) / "new.zarr"
         root = zarr.open_group(fresh, mode="w", zarr_format=3)
         root.attrs[ATTRIBUTE] = json.dumps({**described, "key": key, "cpu": cpu_type(), "made": time.time()})
         results = root.create_group("results")
-        places, (first, last) = described["places"], work.bounds(0)
-        for name, item in work.columns().items():
-            results.create_array(
-                name, shape=(places, *item.shape), chunks=(last - first, *item.shape), dtype=item.dtype,
-                compressors=ZstdCodec(level=LEVEL), config={"write_empty_chunks": True},
-            )  # fmt: skip
+        first, last = work.bounds(0)
+        _create(results, work, described["places"], last - first)
         (fresh / "run").mkdir()
         try:
             os.replace(fresh, target)
         except OSError:
             if not target.is_dir():  # else another process was faster
                 raise
+
+
+def _create(group: Any, work: Work, places: int, chunk: int) -> None:
+    """One array per column, in chunks of so many places."""
+    from zarr.codecs import ZstdCodec
+
+    for name, item in work.columns().items():
+        group.create_array(
+            name, shape=(places, *item.shape), chunks=(chunk, *item.shape), dtype=item.dtype,
+            compressors=ZstdCodec(level=LEVEL), config={"write_empty_chunks": True},
+        )  # fmt: skip
+
+
+def _put(group: Any, arrays: Mapping[str, NDArray[Any]], first: int, last: int) -> None:
+    for name, values in arrays.items():
+        group[name][first:last] = values
 
 
 def _results(path: Path, mode: Any) -> Any:
