@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 import uuid
 from collections.abc import Callable, Iterable, Mapping
@@ -36,6 +37,8 @@ def connect(address: str) -> Any:
         from distributed import Client
     except ImportError as error:
         raise ImportError(MISSING) from error
+    # A scheduler that goes is told by on_cluster in one sentence; no traceback of the connection before it.
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
     try:
         return Client(address, timeout=ANSWER, set_as_default=False)
     except (OSError, ValueError) as error:
@@ -98,7 +101,7 @@ def on_cluster(
     pending = {send(chunk): chunk for chunk in islice(order, AHEAD * threads)}
     if not pending:
         return
-    queue = as_completed(list(pending))
+    queue = as_completed(list(pending), loop=client.loop)  # without it: that of the default client
     try:
         for future in queue:
             chunk = pending.pop(future)
