@@ -37,10 +37,10 @@ def agree(case, n: int, part: float, least: float) -> None:
             there += 1
             missed += (found[islands == k] == label).mean() <= 0.5
     print(
-        f"{' and '.join(case[1])}, {n} x {n}: {100 * right.mean():.3f} % of labels from {100 * computed.mean():.2f} % of "
-        f"the points; {there} islands of more than 30 pixels, {missed} missed; of the {100 * sure.mean():.2f} % of cells "
-        f"with a confidence of 0.95 or more {100 * right[sure].mean():.3f} % are right, of those inferred among them "
-        f"{100 * right[sure & ~computed].mean():.3f} %"
+        f"{' and '.join(case[1])}, {n} x {n}: {100 * right.mean():.3f} % of labels from {100 * computed.mean():.2f} % "
+        f"of the points; {there} islands of more than 30 pixels, {missed} missed; of the {100 * sure.mean():.2f} % of "
+        f"cells with a confidence of 0.95 or more {100 * right[sure].mean():.3f} % are right, of those inferred among "
+        f"them {100 * right[sure & ~computed].mean():.3f} %"
     )
     assert computed.mean() <= part
     assert right[computed].all()
