@@ -119,14 +119,17 @@ def _draw(data: Mapping[str, xr.Dataset]) -> Canvas:
     with plot.journal():
         canvas = sheet(plot.PAGE, 0.42 * plot.PAGE)
         left, right = canvas.subplots(1, 2, sharey=True)
-        plot.chart(found, left)
+        simple = "omega" in found.dims  # few periods; what tells regions apart there is whether there is contact
+        plot.chart(found, left, show="contacts_per_period" if simple else "period_number")
         plot.chart(found, right)
         for key, one in data.items():
             if key.startswith("curve"):
                 plot.curve(one, right, special=False)
-        left.get_legend().remove()
+        if not simple:
+            left.get_legend().remove()
         right.set_ylabel("")
-        for ax, words in ((left, "(a) from rest"), (right, "(b) with the curves of folds, flips and grazing")):
+        titles = ("(a) contacts per period" if simple else "(a) period", "(b) period, with folds, flips and grazing")
+        for ax, words in zip((left, right), titles, strict=True):
             ax.set_title(words, y=1.0, pad=9)
             ax.set(xlim=_ends(found, 0), ylim=_ends(found, 1))
     return canvas
@@ -150,7 +153,7 @@ def _caption(data: Mapping[str, xr.Dataset]) -> str:
         if fixed == "omega" else ""
     )
     return (
-        f"Period number over {first} and {second} at {fixed} = {float(found[fixed]):g} {found[fixed].attrs['units']}, "
+        f"{'Contacts per forcing period and period number' if fixed == 'g' else 'Period number'} over {first} and {second} at {fixed} = {float(found[fixed]):g} {found[fixed].attrs['units']}, "
         f"{found.sizes[first]} x {found.sizes[second]} points from rest (exact flow). Statuses: {ended}. Curves: "
         f"{counted}, through the special points of the branches (continue_curve); where they do not bound a region, "
         f"the motion that changes there is not the one met from rest.{rays}"
