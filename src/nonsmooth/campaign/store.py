@@ -4,7 +4,7 @@
 
     chart.zarr/              a Zarr group; the attribute ``nonsmooth_campaign`` says what the work is
         results/             one array per column, one file per chunk (Zstandard, one thread, fixed level)
-        run/000017.json      chunk 17 is done: its key and the hash of its content, by whom, when, how long
+        run/000017.json      chunk 17 is done: its key and the hash of its content, by whom, when, processor time
         run/started.log      which chunks were begun: one begun twice was lost with its worker
 
 A chunk's key is a hash of the model, the parameters, the options, the kernels' source, and the chunk's place. Its
