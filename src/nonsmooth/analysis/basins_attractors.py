@@ -55,7 +55,7 @@ def find_attractors(
     _label_cycles(settler, point, runs, np.arange(len(labels)), found, labels)
     wandering = np.flatnonzero(np.isin(status, STILL))
     places, modes = runs.last[wandering].copy(), runs.mode[wandering].copy()
-    search = Search(settler, point, patience, found)
+    search = Search(replace(settler, device="cpu"), point, patience, found)  # it makes single runs
     for _ in range(patience.rounds):
         places, modes, wandering = _join(search, places, modes, wandering, labels, status)
         if search.hopeless:  # motion that nothing draws in, as without damping: waiting changes nothing

@@ -14,6 +14,7 @@ from nonsmooth.analysis.classify import longest_period
 from nonsmooth.analysis.sweep import swept_values
 from nonsmooth.campaign.run import run
 from nonsmooth.flow.arguments import check_options, check_system, whole_number
+from nonsmooth.flow.devices import BATCH, on_gpu, workers_of
 from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.flow.starts import is_one_start, plain_start, start_states
@@ -47,6 +48,7 @@ def chart(
     rtol: float | None = None,
     atol: Any = None,
     threads: int | None = None,
+    device: str = "cpu",
     store: Any = None,
     client: Any = None,
     any_cpu: bool = False,
@@ -85,6 +87,8 @@ def chart(
         See :func:`nonsmooth.flow.methods.engine_for`.
     threads : int, optional
         Threads for independent work; the result does not depend on it. Default: one per core.
+    device : {"cpu", "cuda"}
+        ``"cuda"`` runs the points on an NVIDIA GPU, one per thread: see the guide "A chart on a GPU".
     store : path, optional
         A Zarr store for finished chunks; what is there already is not computed again.
     client : dask.distributed.Client, optional
@@ -105,6 +109,8 @@ def chart(
     ------
     ValueError, TypeError
         Arguments that do not fit. A point that fails keeps its status; the others are whole.
+    ImportError, RuntimeError
+        ``device="cuda"`` without the package numba-cuda, or without a GPU.
 
     Notes
     -----
@@ -118,6 +124,7 @@ def chart(
     planned = plan_chart(system, grid, campaign=store is not None or client is not None, **given, **expert)
     if threads is not None:
         threads = whole_number(threads, "threads", 1)
+    threads = workers_of(device, threads, client)
     work, label = planned.work, f"chart over {' and '.join(planned.values)}"
     if refine is not False:
         from nonsmooth.analysis.chart_refine import refined
@@ -155,7 +162,7 @@ def plan_chart(
     system: System, grid: Mapping[str, Any], *, start: Any = None, carry: Any = None, section: Any = None,
     transient: Any = 500, keep: Any = 60, max_period: Any = 16, stop_early: bool = True, extremes: bool = True,
     lyapunov: Any = False, refine: Any = False, method: str = "auto", rtol: Any = None, atol: Any = None,
-    campaign: bool = False, **expert: Any,
+    device: str = "cpu", campaign: bool = False, **expert: Any,
 ) -> PlannedChart:  # fmt: skip
     """Check the arguments of :func:`chart` and lay its work out, without computing anything."""
     check_system(system, "chart")
@@ -173,18 +180,19 @@ def plan_chart(
         raise ValueError(f"lyapunov = {lyapunov} returns are too few for an exponent; at least 40")
     extremes = bool(extremes) or len(starts) > 1  # attractors are told apart by them
     engine = engine_for(system, method, rtol, atol, **expert)
+    gpu = on_gpu(device, "chart", engine, plan, carried=along is not None)
     settler = Settler(
-        system, engine, plan, transient, keep, max_period, bool(stop_early), extremes, rtol, atol, expert
+        system, engine, plan, transient, keep, max_period, bool(stop_early), extremes, rtol, atol, expert, device
     )
     settler.load()
     options = {
         "grid": values, "start": plain_start(system, start), "carry": None if carry is None else dict(carry),
         "section": section, "transient": transient, "keep": keep, "max_period": max_period,
         "stop_early": bool(stop_early), "extremes": extremes, "lyapunov": n_exponent, "refine": refine,
-        "method": method, "rtol": rtol, "atol": atol, **expert,
+        "method": method, "rtol": rtol, "atol": atol, **({"device": device} if gpu else {}), **expert,
     }  # fmt: skip
     axes, order = _axes(values, along)
-    chunk = STORED if campaign else CHUNK
+    chunk = BATCH if gpu else STORED if campaign else CHUNK
     work = ChartWork(
         settler, axes, starts, along is not None, n_exponent, chunk=chunk, described=described(system, "chart", options)
     )

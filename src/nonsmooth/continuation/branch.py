@@ -50,6 +50,10 @@ ENDINGS = {
     "corner": "The orbit meets the corner of two boundaries, and no orbit near it goes on.",
     "physical": "Beyond this value the equations do not allow the parameter: the range was cut there.",
     "circle": "The virtual branch came back to an earlier point of its own and goes round from here on.",
+    "landing": (
+        "A reset leads just onto a boundary: beyond this point it leads behind it, where another transition follows at "
+        "the same instant."
+    ),
 }
 LEAST_STEP = 1e-9
 COSINE = 0.98  # of the angle between the tangents of neighbours
@@ -116,10 +120,11 @@ def march(curve: Curve, point: Point, limits: Limits, first_step: float) -> Marc
         point = curve.anchored_anew(point)
     tests = Tests(curve)
     numbers, violation = tests.smooth(point), point.path.violation()
+    before: Point | None = None
     count = 0
     circle, again = None, 8  # a point that is met again if the branch goes round (Brent's method)
     while len(found.rows) < limits.points:
-        new = _stepped(curve, point, ds)
+        new = _stepped(curve, point, ds, before)
         if new is None:
             ds *= 0.5
             if ds < LEAST_STEP:
@@ -187,6 +192,7 @@ def march(curve: Curve, point: Point, limits: Limits, first_step: float) -> Marc
             if after is None:
                 break
             curve, point, ds = after
+            before = None
             ds = ds or 0.1 * limits.largest
             tests = Tests(curve)
             numbers, violation = tests.smooth(point), point.path.violation()
@@ -215,15 +221,15 @@ def march(curve: Curve, point: Point, limits: Limits, first_step: float) -> Marc
         if new.iterations >= 6:
             easy = min(easy, 0.7)
         ds = min(ds * easy, limits.largest)
-        point, numbers, violation = new, numbers_new, violation_new
+        before, point, numbers, violation = point, new, numbers_new, violation_new
         if curve.shooting.reference is not None:
-            point = curve.anchored_anew(point)
+            before, point = None, curve.anchored_anew(point)
     return found
 
 
-def _stepped(curve: Curve, point: Point, ds: float) -> Point | None:
+def _stepped(curve: Curve, point: Point, ds: float, before: Point | None) -> Point | None:
     try:
-        new = curve.step(point, ds)
+        new = curve.step(point, ds, before)
     except SystemDefinitionError:
         return None
     if new is None or not np.isfinite(new.M).all():
@@ -274,6 +280,9 @@ def _mark_graze(found: March, curve: Curve, point: Point, change: Change, after:
 def _mark_unexplained(found: March, curve: Curve, kind: str, point: Point) -> str:
     """Record a boundary beyond which no orbit of another signature is known; its name."""
     name = "grazing" if kind in ("touch", "slow", "short") else "corner"
+    if kind == "short" and 0 < (i := int(point.path.tau.argmin())) < curve.shooting.m:
+        visits = curve.shooting.signature.visits
+        name = "grazing" if visits[i - 1].mode == visits[i + 1].mode else "corner"
     known = [change.indicator for change in changed(curve, point, kind)]
     found.mark(name, curve, point, indicator=known[0] if known else _indicator(curve, point, kind))
     return name
@@ -297,7 +306,8 @@ def _change(found: March, curve: Curve, met: list[Event]) -> tuple[Curve, Point,
                 return None
             return fresh, first, ds
     kind, _, point = met[0]
-    found.ending = _mark_unexplained(found, curve, kind, point)
+    name = _mark_unexplained(found, curve, kind, point)
+    found.ending = "landing" if kind == "landed" else name
     return None
 
 
@@ -306,6 +316,10 @@ def _indicator(curve: Curve, point: Point, kind: str) -> int:
     if kind == "touch":
         visit, k = point.path.touched
         return int(curve.walk.rows[point.path.which[visit, k], 0])
+    if kind == "landed":
+        k = int(point.path.landing[int(point.path.landed.argmax())])
+        rows = curve.walk.rows[curve.walk.transitions[k, 2] : curve.walk.transitions[k, 3], 0]
+        return int(rows[0]) if len(rows) == 1 else -1
     return -1
 
 

@@ -34,7 +34,7 @@ def primitive(shooting: Shooting, solved: Solved, size: FloatArray) -> tuple[Sho
         few, turns = m // rounds, p // rounds
         first = visits[:few]
         shifted = tuple(
-            Visit(v.mode, v.transition, v.row, v.turn + turns * i if v.row < 0 else 0)
+            Visit(v.mode, v.transition, v.row, v.turn + turns * i if v.row == -1 else 0)
             for i in range(rounds) for v in first
         )  # fmt: skip
         if shifted != visits[:-1]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.continuation.signature import Signature, Visit
+from nonsmooth.continuation.signature import AT_ONCE, Signature, Visit
 from nonsmooth.flow.engine import Chain, Log, SectionPlan, State
 from nonsmooth.flow.variational import VariationalFlow
 from nonsmooth.kernels import codes
@@ -17,12 +17,13 @@ if TYPE_CHECKING:
     from nonsmooth.flow.engine import Engine
     from nonsmooth.system.system import System
 
-__all__ = ["CLOSED", "NEAR", "Guess", "forced_guesses", "settle_forced", "touching"]
+__all__ = ["CLOSED", "NEAR", "Guess", "fired_row", "forced_guesses", "settle_forced", "touching"]
 
 FloatArray = NDArray[np.float64]
 CHOICE = 6  # candidates tried: period numbers, or returning points for a given one
 CLOSED = 1e-8  # a return nearer than this has closed: the shortest such period comes first
 TOUCH = 1e-6  # of the period, of the motion's size: a contact as short, an impact as weak as this may be a touch
+BEHIND = 1e-9  # of an indicator's size: nearer to a boundary than this is on it
 NEAR = 0.2  # of the motion's size: a return farther off than this is no candidate
 
 
@@ -155,6 +156,13 @@ def touching(guess: Guess, system: System) -> list[Guess]:
     return [replace(guess, signature=signature, times=times, states=states)]
 
 
+def fired_row(flow: VariationalFlow, values: FloatArray, k: int, t: float, z: FloatArray, same: bool) -> int:
+    """The row of transition k that is zero; AT_ONCE where one at the ``same`` instant has led behind them all."""
+    found = flow.jump(values, k, t, z)
+    size = float(np.abs(found.h_z) @ flow.scale) + abs(float(found.h_z @ z))
+    return AT_ONCE if same and abs(found.h) > BEHIND * size else found.row
+
+
 def _signature(system: System, log: Log, start: FloatArray, mode: int) -> Signature:
     """The signature of a logged round; the row of each condition that became true last is the one that is zero."""
     traced, flow, values = system.traced, VariationalFlow.of(system), system.parameter_vector()
@@ -167,7 +175,8 @@ def _signature(system: System, log: Log, start: FloatArray, mode: int) -> Signat
             visits.append(Visit(jump.source, int(k), -1, round(t / period - jump.at)))
         else:
             z = np.concatenate([np.nan_to_num(log.u_before[i]), memory])
-            visits.append(Visit(jump.source, int(k), flow.jump(values, int(k), t, z).row))
+            same = i > 0 and t == log.crossing_time[i - 1]
+            visits.append(Visit(jump.source, int(k), fired_row(flow, values, int(k), t, z, same)))
         memory = log.memory_after[i]
     last = traced.transitions[log.crossing_transition[-1]].target if visits else mode
     return Signature((*visits, Visit(int(last))))

@@ -89,5 +89,8 @@ def _maxima(result: xr.Dataset, drawn: Axes, values: np.ndarray, y: str) -> None
         drawn.plot(values[good], heights[good], ".", color=palette.attractor_color(k), markersize=1.5)
         drawn.scatter(
             values[good], heights[good], s=_LARGEST**2 * share[good], color=palette.attractor_color(k),
-            edgecolors="black", linewidths=0.3, label=_names(result, k),
+            edgecolors="black", linewidths=0.3,
         )  # fmt: skip
+        drawn.scatter(  # of one size in the legend, whatever the share
+            [], [], s=25, color=palette.attractor_color(k), edgecolors="black", linewidths=0.3, label=_names(result, k)
+        )
