@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.plot import palette, style
+from nonsmooth.plot.cells import cell_edges
 from nonsmooth.plot.labels import label, variable_along
 
 if TYPE_CHECKING:
@@ -44,7 +45,8 @@ def basins(result: xr.Dataset, ax: Axes | None = None, *, size: float = 3.0) -> 
     x, y = result[first].values, result[second].values
     with style.axes(ax, ratio=0.85) as drawn:
         drawn.pcolormesh(
-            _edges(x), _edges(y), np.maximum(labels, -1), shading="flat", rasterized=True, vmin=-1.5, vmax=n - 0.5,
+            cell_edges(x), cell_edges(y), np.maximum(labels, -1), shading="flat", rasterized=True,
+            vmin=-1.5, vmax=n - 0.5,
             cmap=ListedColormap([palette.UNKNOWN, *(palette.attractor_color(k) for k in range(n))]),
         )  # fmt: skip
         xlim, ylim = drawn.get_xlim(), drawn.get_ylim()
@@ -80,12 +82,3 @@ def kind_of(period: int, chaotic: bool) -> str:
     if period > 0:
         return f"period {period}"
     return "chaos" if chaotic else "no period"
-
-
-def _edges(values: np.ndarray) -> np.ndarray:
-    """Edges of the cells around rising values; one value alone gets a cell too."""
-    if len(values) == 1:
-        half = 0.5 * max(abs(float(values[0])), 1e-3)
-        return np.array([values[0] - half, values[0] + half])
-    middles = 0.5 * (values[1:] + values[:-1])
-    return np.concatenate([[2 * values[0] - middles[0]], middles, [2 * values[-1] - middles[-1]]])
