@@ -26,7 +26,8 @@ def main() -> Axes:
     orbit = ns.find_orbit(support.with_parameters(g=-0.0012, rho=0.33))
     flips = ns.special_points(ns.continue_orbit(orbit, "g", (-0.0015, 0.002)))
     flip = ns.continue_curve(flips.isel(special=0), {"g": (-0.0015, 0.002), "rho": (0.2, 0.5)})
-    ns.plot.curve(flip, ax, special=False)
+    with ns.plot.journal():
+        ns.plot.curve(flip, ax, special=False)
     ratio = flip.g / flip.rho
     assert np.allclose(ratio, ratio[0], rtol=1e-9)  # a straight line through zero
     rays = ns.chart(support, {"g": [0.0008, 0.0016], "rho": [0.2, 0.4]}, progress=False)

@@ -65,8 +65,7 @@ def test_attractors_are_drawn_where_runs_from_their_basins_end(basins: dict[str,
 def test_curves_of_the_chart_over_the_frequency() -> None:
     """Motion without contact grazes where g = (rho/m) / sqrt((2k/m - w^2)^2 + (c w/m)^2), all along the curves."""
     found = curves(CHARTS["chart09"])
-    table = {name: 0.0 for name in ("m", "k", "c")} | {"m": 0.838, "k": 8.47, "c": 0.87}
-    m, k, c = table["m"], table["k"], table["c"]
+    m, k, c = 0.838, 8.47, 0.87
     met = 0
     for one in found:
         if str(one["kind"].values) == "grazing" and int(one["period_number"]) == 1:

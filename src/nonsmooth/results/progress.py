@@ -13,8 +13,9 @@ __all__ = ["progress"]
 def progress(total: int, label: str, enabled: bool = True, done: int = 0) -> Iterator[Callable[..., None]]:
     """A bar of ``total`` steps on stderr; yields ``advance(n=1)``, which any thread may call.
 
-    ``done`` steps were made before: they fill the bar, and do not count in the estimate of what remains. No bar is drawn, and nothing is imported, when ``enabled`` is False, when there is nothing to do or when
-    stderr is not a terminal. The bar is wiped when the block ends, by an exception too.
+    ``done`` steps were made before: they fill the bar, and do not count in the estimate of what remains. No bar is
+    drawn, and nothing is imported, when ``enabled`` is False, when there is nothing to do or when stderr is not a
+    terminal. The bar is wiped when the block ends, by an exception too.
     """
     if not enabled or total <= 0 or not sys.stderr.isatty():
         yield _count_nothing

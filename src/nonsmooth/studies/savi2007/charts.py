@@ -152,8 +152,9 @@ def _caption(data: Mapping[str, xr.Dataset]) -> str:
         " The system is piecewise linear, so all depends on g / rho alone: every boundary is a straight line."
         if fixed == "omega" else ""
     )
+    shown = "Contacts per forcing period and period number" if fixed == "g" else "Period number"
     return (
-        f"{'Contacts per forcing period and period number' if fixed == 'g' else 'Period number'} over {first} and {second} at {fixed} = {float(found[fixed]):g} {found[fixed].attrs['units']}, "
+        f"{shown} over {first} and {second} at {fixed} = {float(found[fixed]):g} {found[fixed].attrs['units']}, "
         f"{found.sizes[first]} x {found.sizes[second]} points from rest (exact flow). Statuses: {ended}. Curves: "
         f"{counted}, through the special points of the branches (continue_curve); where they do not bound a region, "
         f"the motion that changes there is not the one met from rest.{rays}"
