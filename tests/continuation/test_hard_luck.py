@@ -55,6 +55,20 @@ def test_an_orbit_that_grazes_at_the_start() -> None:
     assert set(np.unique(branch["contacts_per_period"])) == {0.0, 1.0}
 
 
+@pytest.mark.parametrize("shift", [0.0, 1e-14, -1e-14])
+def test_an_orbit_that_is_a_flip_at_the_start(shift: float) -> None:
+    """Begun at the flip itself the branch reports it once, whatever rounding says."""
+    system = support(rho=0.14, g=0.02)
+    plain = ns.continue_orbit(ns.find_orbit(system.with_parameters(omega=4.5)), "omega", (3.9, 5.0))
+    special = ns.special_points(plain)
+    row = special.isel(special=int(np.flatnonzero(special["kind"].values == "flip")[0]))
+    at = system.with_parameters(omega=float(row["omega"]) + shift)
+    orbit = ns.find_orbit(at, start=row["section"].values, period_number=1, transient=0)
+    found = ns.special_points(ns.continue_orbit(orbit, "omega", (3.9, 4.3)))
+    values = found["omega"].values[found["kind"].values == "flip"]
+    assert values == pytest.approx([float(row["omega"])], abs=1e-9)
+
+
 def test_a_range_that_leaves_the_physical_region() -> None:
     """A mass that would become negative, a period without end: the range is cut, and the end says so."""
     orbit = ns.find_orbit(support(rho=0.14, g=0.02, omega=3.3))

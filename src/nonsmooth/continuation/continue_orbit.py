@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from nonsmooth.continuation.arclength import Curve, Point
 from nonsmooth.continuation.begin import Asked, curve_of, limits, resumed_at, sentence, size_of
 from nonsmooth.continuation.branch import ENDINGS, March, march
+from nonsmooth.continuation.detection import Tests
+from nonsmooth.continuation.events import BESIDE
 from nonsmooth.continuation.files import branch_dataset, read_branch
 from nonsmooth.continuation.orbit import Orbit
 from nonsmooth.continuation.other_branches import born, straight_on, switched
@@ -25,6 +27,7 @@ __all__ = ["continue_orbit"]
 
 FloatArray = NDArray[np.float64]
 Records = tuple[list[PointRecord], list[SpecialRecord]]
+ZERO = 1e-6  # of the numbers beside it: the first orbit is a special point
 
 
 def continue_orbit(
@@ -117,6 +120,8 @@ def _from_orbit(orbit: Orbit, name: str | None, given: Any, asked: Asked) -> xr.
     bounds = allowed_range(system, name, low, high)
     up, down = _both_ways(curve, first, bounds, asked)
     points, special = joined(from_march(down), [point_record(curve, first)], from_march(up))
+    special += [SpecialRecord(kind, len(down.rows)) for kind in _at_the_start(curve, first, down, up)]
+    special.sort(key=lambda one: one.place)
     sentences = (sentence(down, bounds, name, (low, high)), sentence(up, bounds, name, (low, high)))
     record = BranchRecord(name, (low, high), orbit.period_number, points, special, (down.ending, up.ending), sentences)
     return branch_dataset(system, record, asked.options(name, (low, high)))
@@ -128,6 +133,24 @@ def _both_ways(curve: Curve, first: Point, bounds: tuple[float, float], asked: A
     if up.ending == "closed":
         return up, March(ending="closed")
     return up, march(curve, _facing(first, -1.0), asked.limits(bounds), asked.first)
+
+
+def _at_the_start(curve: Curve, first: Point, down: March, up: March) -> list[str]:
+    """Folds, flips and tori at the first orbit itself: rounding decides whether a march from there sees them."""
+    if not (down.rows and up.rows) or not all(march.rows[0].curve is curve for march in (down, up)):
+        return []
+    tests = Tests(curve)
+    here, before, after = (tests.smooth(point) for point in (first, down.rows[0].point, up.rows[0].point))
+    before[0] = -before[0]  # the march down has its tangents the other way
+    seen = {one.kind for march in (down, up) for one in march.special
+            if one.curve is curve and np.abs(one.point.Y - first.Y).max() < BESIDE}  # fmt: skip
+    found = []
+    for i, kind in ((0, "fold"), (2, "flip"), (3, "neimark_sacker")):
+        if kind in seen or not before[i] * after[i] < 0.0 or abs(here[i]) > ZERO * max(abs(before[i]), abs(after[i])):
+            continue
+        if kind != "neimark_sacker" or (np.abs(first.multipliers.imag) > BESIDE).any():
+            found.append(kind)
+    return found
 
 
 def _facing(point: Point, sign: float) -> Point:
