@@ -7,7 +7,7 @@ import pytest
 import reference_values as known
 
 import nonsmooth as ns
-from nonsmooth.continuation.branch import ENDINGS
+from nonsmooth.continuation.marches import ENDINGS
 
 support = ns.models.discontinuous_support
 

@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 
 from nonsmooth.continuation.arclength import Curve, Point
 from nonsmooth.continuation.begin import Asked, curve_of, limits, resumed_at, sentence, size_of
-from nonsmooth.continuation.branch import ENDINGS, March, march
+from nonsmooth.continuation.branch import march
 from nonsmooth.continuation.detection import Tests
 from nonsmooth.continuation.events import BESIDE
 from nonsmooth.continuation.files import branch_dataset, read_branch
+from nonsmooth.continuation.marches import ENDINGS, March
 from nonsmooth.continuation.orbit import Orbit
 from nonsmooth.continuation.other_branches import born, straight_on, switched
 from nonsmooth.continuation.physical import allowed_range
