@@ -54,6 +54,7 @@ ENDINGS = {
         "A reset leads just onto a boundary: beyond this point it leads behind it, where another transition follows at "
         "the same instant."
     ),
+    "interrupted": "Interrupted: what was found until then stands; continue the branch with continue_orbit(branch).",
 }
 LEAST_STEP = 1e-9
 COSINE = 0.98  # of the angle between the tangents of neighbours
@@ -115,6 +116,15 @@ class Limits:
 def march(curve: Curve, point: Point, limits: Limits, first_step: float) -> March:
     """Follow a branch from a point along its tangent until it ends; the first row is the point after it."""
     found = March()
+    try:
+        _follow(found, curve, point, limits, first_step)
+    except KeyboardInterrupt:  # what was found stands
+        found.ending = "interrupted"
+    return found
+
+
+def _follow(found: March, curve: Curve, point: Point, limits: Limits, first_step: float) -> None:
+    """March on, point by point, into ``found``."""
     ds = first_step
     if curve.shooting.reference is not None:
         point = curve.anchored_anew(point)
@@ -181,7 +191,7 @@ def march(curve: Curve, point: Point, limits: Limits, first_step: float) -> Marc
             if kind in ("hopf", "flip_end"):
                 found.ending = "equilibrium" if kind == "hopf" else "branching"
                 found.special[-1].kind = "hopf" if kind == "hopf" else "flip"
-                return found
+                return
         if reason == "range":
             found.add(curve, stop_point)
             found.ending = "range"
@@ -222,7 +232,6 @@ def march(curve: Curve, point: Point, limits: Limits, first_step: float) -> Marc
         point, numbers, violation = new, numbers_new, violation_new
         if curve.shooting.reference is not None:
             point = curve.anchored_anew(point)
-    return found
 
 
 def _stepped(curve: Curve, point: Point, ds: float) -> Point | None:
