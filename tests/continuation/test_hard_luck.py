@@ -41,7 +41,7 @@ def test_an_equilibrium_is_no_cycle() -> None:
 
 
 def test_an_unstable_orbit_whose_motion_diverges() -> None:
-    """x' = x + cos t has the orbit (sin t - cos t) / 2, with the multiplier exp(2 pi); the motion leaves it for ever."""
+    """x' = x + cos t has the orbit (sin t - cos t) / 2 with the multiplier exp(2 pi); the motion leaves it."""
     system = ns.System(states=["x"], parameters={}, modes={"one": lambda t, u, p: u.x + np.cos(t)})
     orbit = ns.find_orbit(system, start={"x": -0.5}, transient=0, period_number=1)
     assert orbit.u == pytest.approx([-0.5], abs=1e-12)
