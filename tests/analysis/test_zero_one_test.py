@@ -43,6 +43,7 @@ def test_a_sweep_of_the_papers_oscillator() -> None:
     k = zero_one_test(swept)
     assert k.dims == ("rho", "state") and list(k.rho.values) == values
     exponents = ns.lyapunov(system, parameter="rho", values=values, periods=1500, progress=False)
+    assert np.abs(exponents.trace_defect.values).max() < 1e-10
     largest = exponents.exponents.values[:, 0]
     assert (np.abs(largest) > 0.03).all()
     assert np.array_equal(k.values > 0.5, np.repeat((largest > 0)[:, None], 2, axis=1))

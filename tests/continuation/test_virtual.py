@@ -17,7 +17,7 @@ support = ns.models.discontinuous_support
 def amplitude(v: np.ndarray, c: float = 0.1, e: float = 0.8, d: float = 1.0) -> np.ndarray:
     """A of the orbits of problem A with one impact of speed v per period, in closed form; v may be negative.
 
-    With the response (r, r') at the impact, z+ = (d - r, -e v - r') goes to z- = (d - r, v - r') along the free flow."""
+    With the response (r, r') at the impact, z+ = (d - r, -e v - r') flows to z- = (d - r, v - r')."""
     T, w = 2 * np.pi, np.sqrt(1 - c * c / 4)
     E, cos, sin = np.exp(-c * T / 2), np.cos(w * T), np.sin(w * T)
     flow = np.array([[cos + c / (2 * w) * sin, sin / w], [-sin / w, cos - c / (2 * w) * sin]]) * E
@@ -86,7 +86,7 @@ def test_motion_without_contact_beyond_the_support(way: str) -> None:
 
 
 def test_virtual_contact_goes_round_or_closes() -> None:
-    """Without damper a contact of negative length is reached through zero, and the branch closes; with it an end too."""
+    """A contact of negative length is reached through zero; without damper the branch closes, with it it goes round."""
     for c_s in (0.0, 0.6):
         orbit = ns.find_orbit(support(rho=0.14, g=0.02, c_s=c_s, omega=4.5), period_number=1)
         branch = ns.continue_orbit(orbit, "omega", (3.0, 7.0), virtual=True)

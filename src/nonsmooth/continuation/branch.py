@@ -130,10 +130,11 @@ def _follow(found: March, curve: Curve, point: Point, limits: Limits, first_step
         point = curve.anchored_anew(point)
     tests = Tests(curve)
     numbers, violation = tests.smooth(point), point.path.violation()
+    before: Point | None = None
     count = 0
     circle, again = None, 8  # a point that is met again if the branch goes round (Brent's method)
     while len(found.rows) < limits.points:
-        new = _stepped(curve, point, ds)
+        new = _stepped(curve, point, ds, before)
         if new is None:
             ds *= 0.5
             if ds < LEAST_STEP:
@@ -201,6 +202,7 @@ def _follow(found: March, curve: Curve, point: Point, limits: Limits, first_step
             if after is None:
                 break
             curve, point, ds = after
+            before = None
             ds = ds or 0.1 * limits.largest
             tests = Tests(curve)
             numbers, violation = tests.smooth(point), point.path.violation()
@@ -229,14 +231,14 @@ def _follow(found: March, curve: Curve, point: Point, limits: Limits, first_step
         if new.iterations >= 6:
             easy = min(easy, 0.7)
         ds = min(ds * easy, limits.largest)
-        point, numbers, violation = new, numbers_new, violation_new
+        before, point, numbers, violation = point, new, numbers_new, violation_new
         if curve.shooting.reference is not None:
-            point = curve.anchored_anew(point)
+            before, point = None, curve.anchored_anew(point)
 
 
-def _stepped(curve: Curve, point: Point, ds: float) -> Point | None:
+def _stepped(curve: Curve, point: Point, ds: float, before: Point | None) -> Point | None:
     try:
-        new = curve.step(point, ds)
+        new = curve.step(point, ds, before)
     except SystemDefinitionError:
         return None
     if new is None or not np.isfinite(new.M).all():
@@ -287,6 +289,9 @@ def _mark_graze(found: March, curve: Curve, point: Point, change: Change, after:
 def _mark_unexplained(found: March, curve: Curve, kind: str, point: Point) -> str:
     """Record a boundary beyond which no orbit of another signature is known; its name."""
     name = "grazing" if kind in ("touch", "slow", "short") else "corner"
+    if kind == "short" and 0 < (i := int(point.path.tau.argmin())) < curve.shooting.m:
+        visits = curve.shooting.signature.visits
+        name = "grazing" if visits[i - 1].mode == visits[i + 1].mode else "corner"
     known = [change.indicator for change in changed(curve, point, kind)]
     found.mark(name, curve, point, indicator=known[0] if known else _indicator(curve, point, kind))
     return name

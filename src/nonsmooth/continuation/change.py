@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.continuation.arclength import Curve, Point
+from nonsmooth.continuation.corners import other_ways, short_run
 from nonsmooth.continuation.shooting import Shooting
 from nonsmooth.continuation.signature import AT_ONCE, Signature, Visit
 
@@ -47,14 +48,17 @@ def changed(curve: Curve, point: Point, kind: str) -> list[Change]:
     if kind == "touch":
         return _touched(curve, point)
     if kind == "short":
-        return _shortened(curve, point)
+        i = int(point.path.tau.argmin())
+        inside = 0 < i < curve.shooting.m
+        return [*_shortened(curve, point), *(_around(curve, point, *short_run(point, i)) if inside else [])]
     if kind == "slow":
         return _slowed(curve, point)
     if kind == "own":
         return _other_row(curve, point)
     if kind == "landed":
         return _landed(curve, point)
-    return []
+    i = int(point.path.others.argmax())
+    return _around(curve, point, i, i + 1)
 
 
 def _parts(curve: Curve, point: Point) -> tuple[tuple[Visit, ...], FloatArray, FloatArray]:
@@ -213,6 +217,18 @@ def _other_row(curve: Curve, point: Point) -> list[Change]:
     _, r, indicator = min(found)
     new = (*visits[:i], Visit(visit.mode, visit.transition, r), *visits[i + 1 :])
     return [Change("corner", Signature(new), times, states, indicator)]
+
+
+def _around(curve: Curve, point: Point, first: int, last: int) -> list[Change]:
+    """Other ways through a corner of two transitions, in place of the crossings ``first`` to ``last - 1``."""
+    visits, times, states = _parts(curve, point)
+    found = []
+    for way, after, indicator in other_ways(curve, point, first, last):
+        signature = Signature((*visits[:first], *way, *visits[last:]))
+        t_new = np.concatenate([times[:first], np.full(len(way), times[first]), times[last:]])
+        z_new = np.concatenate([states[: first + 1], np.array(after), states[last + 1 :]])
+        found.append(Change("corner", signature, t_new, z_new, indicator))
+    return found
 
 
 def resumed(curve: Curve, point: Point, change: Change, active: tuple[str, ...]) -> tuple[Curve, Point, float] | None:

@@ -21,6 +21,8 @@ NOTHING = 2e-2  # of the first orbit's size: a fold there is the cycle's birth
 TURN = 1e-5  # along the branch: a fold nearer to a crossing of branches than this is that crossing
 EXPLAINS = ("short", "slow", "own", "touch", "others", "landed")
 BESIDE = 1e-6  # along the branch: nearer to a change of signature than this is the change itself
+ABOUT = 1e-2  # along the branch: steps are short beside a crossing of branches, and its first place is rough
+SAME = 1e-9  # of the numbers at both ends: smaller than this at the place of another event is the same event
 POLE = 1e-2  # of a multiplier from 1 or -1: farther off it is no fold, no flip, but a contact of no length
 ENDS = 1e-4  # of the period: a maximum as near to a crossing belongs to it
 JUMP = 1e-3  # of the numbers at both ends: one larger than this at its root has jumped there
@@ -32,9 +34,16 @@ def first_met(curve: Curve, a: Point, b: Point, tests: Tests, crossed: list[str]
     Beyond the place where an impact or a short visit ends the path also goes through the boundary, and the other way
     round: what vanishes explains what is touched.
     """
-    located = []
-    for kind in crossed:
-        there = locate(curve, a, b, tests.one(kind))
+    located: list[Event] = []
+    for kind in sorted(crossed, key=EXPLAINS.index):
+        number = tests.one(kind)
+        known = [(number(point), s, point) for _, s, point in located]
+        largest = max(abs(x) for x in (number(a), number(b)) if np.isfinite(x))
+        same = [(kind, s, point) for value, s, point in known if abs(value) < SAME * largest]
+        if same or any(value > 0.0 for value, _, _ in known):  # met at the same place, or farther on
+            located += same[:1]
+            continue
+        there = locate(curve, a, b, number)
         if there is not None and there[0] <= stop * (1 + 1e-12):
             located.append((kind, *there))
     if not located:
@@ -141,14 +150,17 @@ def _branch_point(curve: Curve, a: Point, b: Point, tests: Tests) -> tuple[float
     if there is None:
         return None
     Y = branch_point(curve, there[1].Y)
-    if Y is None or np.abs(Y - there[1].Y).max() > np.abs(b.Y - a.Y).max():
+    if Y is None or np.abs(Y - there[1].Y).max() > max(float(np.abs(b.Y - a.Y).max()), ABOUT):
         return there
-    solved = curve.shooting.evaluate(Y * curve.scale)
-    point = curve.point(solved, Y, there[1].tangent)
-    if point is None:
+    shooting = curve.shooting
+    solved = shooting.evaluate(Y * curve.scale)
+    path = curve.walk.along(solved, shooting.split(solved.X)[1])
+    if path is None:
         return there
-    # Any direction in the plane of both branches is null here: keep that of the branch.
-    return float(a.tangent @ (Y - a.Y)), replace(point, tangent=there[1].tangent)
+    # Any direction in the plane of both branches is null here, and the border is singular: keep that of the branch.
+    M = solved.monodromy
+    point = replace(there[1], Y=Y, solved=solved, M=M, multipliers=shooting.multipliers(M), path=path)
+    return float(a.tangent @ (Y - a.Y)), point
 
 
 def _has_pair(point: Point) -> bool:

@@ -25,10 +25,11 @@ from nonsmooth.flow.saltation import chained
 if TYPE_CHECKING:
     from nonsmooth.continuation.arclength import Curve, Point
     from nonsmooth.continuation.change import Change
+    from nonsmooth.continuation.shooting import Shooting, Solved
     from nonsmooth.continuation.signature import Visit
     from nonsmooth.flow.variational import VariationalFlow
 
-__all__ = ["Graze", "graze"]
+__all__ = ["Graze", "both_sides", "graze"]
 
 FloatArray = NDArray[np.float64]
 ASIDE = 1e-6  # of the period: the touch is looked at from this far before and behind
@@ -50,14 +51,7 @@ class Graze:
 def graze(curve: Curve, point: Point, first: Point, change: Change) -> Graze | None:
     """Judge the graze at ``point``, where ``curve`` ends; ``first`` is the first point behind it."""
     shooting = curve.shooting
-    if change.gained:
-        visits, (times, states) = shooting.signature.visits, shooting.split(point.X)
-    else:
-        visits, times, states = change.signature.visits, change.times, change.states
-    product = _Product(shooting.flow, point.solved.values, visits, times, states, float(point.solved.times[-1]), change)
-    M, M_far, M_near = product(0.0), product(ASIDE), product(0.5 * ASIDE)
-    for matrix in (M, M_far, M_near):
-        matrix[shooting.free], matrix[:, shooting.free] = 0.0, 0.0
+    M, M_far, M_near = both_sides(shooting, point.solved, change)
     if not (np.isfinite(M).all() and np.isfinite(M_far).all() and np.isfinite(M_near).all()):
         return None
     bounded = bool(np.abs(M_near).max() < 1.5 * np.abs(M_far).max())
@@ -72,6 +66,19 @@ def graze(curve: Curve, point: Point, first: Point, change: Change) -> Graze | N
         "persistence" if same else "non_smooth_fold", bounded, M, M_plus,
         shooting.multipliers(M), shooting.multipliers(M_plus), doubled,
     )  # fmt: skip
+
+
+def both_sides(shooting: Shooting, solved: Solved, change: Change) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """M-, and M+ looked at from ``ASIDE`` and from half of it (their limit, where there is one)."""
+    if change.gained:
+        visits, (times, states) = shooting.signature.visits, shooting.split(solved.X)
+    else:
+        visits, times, states = change.signature.visits, change.times, change.states
+    product = _Product(shooting.flow, solved.values, visits, times, states, float(solved.times[-1]), change)
+    matrices = product(0.0), product(ASIDE), product(0.5 * ASIDE)
+    for matrix in matrices:
+        matrix[shooting.free], matrix[:, shooting.free] = 0.0, 0.0
+    return matrices
 
 
 @dataclass
