@@ -11,13 +11,17 @@ export OPENBLAS_NUM_THREADS ?= 1
 PYTEST_ARGS ?= -n auto --dist loadfile
 
 .DEFAULT_GOAL := help
-.PHONY: help reproduce test slow fuzz coverage rig-against-model check bench docs clean distclean
+.PHONY: help reproduce reproduce-full test slow fuzz coverage rig-against-model check bench gpu gpu-compiler docs clean \
+	distclean
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 26
 
 reproduce: $(VENV)/.installed-run  ## reproduce Savi et al. (2007): figures, data and report in out/savi2007
 	$(BIN)/nonsmooth reproduce savi2007 --out $(OUT)
+
+reproduce-full: $(VENV)/.installed-run  ## the same with charts of a million points; an interrupted run goes on
+	$(BIN)/nonsmooth reproduce savi2007 --full --out $(OUT)
 
 test: $(VENV)/.installed-test  ## run the tests
 	$(BIN)/python -m pytest $(PYTEST_ARGS)
@@ -42,6 +46,12 @@ check: $(VENV)/.installed-dev  ## ruff, mypy, import-linter, codespell
 
 bench: $(VENV)/.installed-bench  ## compare with other programs on the same work; writes benchmarks/results.md
 	$(BIN)/python benchmarks/run.py
+
+gpu: $(VENV)/.installed-gpu  ## compare a GPU with the processor and time it; writes benchmarks/results_gpu.md
+	$(BIN)/python benchmarks/gpu.py --out benchmarks/results_gpu.md
+
+gpu-compiler: $(VENV)/.installed-gpu  ## registers, spills and operations of the GPU's kernels; needs no GPU
+	$(BIN)/python benchmarks/gpu.py --compiler
 
 docs: $(VENV)/.installed-docs  ## build the documentation into docs/_build/html
 	$(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html

@@ -1,4 +1,7 @@
-"""Multistability over the gap (Savi et al. 2007, Fig. 13): every attractor with its share of random starts."""
+"""Multistability over the forcing amplitude: every attractor, with its share of random starts.
+
+The oscillator of Savi et al. (2007) at the gap of their Fig. 14(c), where they show a motion of period 3.
+"""
 
 from __future__ import annotations
 
@@ -13,17 +16,28 @@ if TYPE_CHECKING:
 
 
 def main() -> Axes:
-    """At g = 0.0014 m, where the paper shows period 3, a period-4 motion coexists with it."""
-    support = ns.models.discontinuous_support(omega=11.15, rho=0.33)
+    """At rho = 0.33 N a motion of period 4 coexists with that of period 3 which the paper shows."""
+    from matplotlib.figure import Figure
+
+    support = ns.models.discontinuous_support(omega=11.15, g=0.0014)
     shares = ns.basin_fractions(
-        support, "g", np.linspace(0.0005, 0.002, 61), n_starts=150, box={"x": (-0.02, 0.02), "v": (-0.2, 0.2)}, seed=1,
+        support, "rho", np.linspace(0.25, 0.5, 101), n_starts=150, box={"x": (-0.02, 0.02), "v": (-0.2, 0.2)}, seed=1,
         progress=False,
     )  # fmt: skip
-    ax = ns.plot.basin_fractions(shares)
-    there = shares.sel(g=0.0014, method="nearest")
+    there = shares.sel(rho=0.33, method="nearest")
     periods = there.period_number.values[there.fraction.values > 0]
     assert sorted(periods.tolist()) == [3, 4]
-    return ax
+    with ns.plot.journal():
+        figure = Figure(figsize=(ns.plot.COLUMN, 1.25 * ns.plot.COLUMN))
+        above, below = figure.subplots(2, 1, sharex=True)
+        ns.plot.basin_fractions(shares, above, y="x")
+        above.set_xlabel("")
+        above.get_legend().remove()
+        ns.plot.basin_fractions(shares, below)
+        names = below.get_legend()
+        names.remove()
+        figure.legend(handles=names.legend_handles, loc="outside upper center", ncols=2)
+    return below
 
 
 if __name__ == "__main__":

@@ -12,9 +12,11 @@ import threading
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 from simple_work import Squares, hashes, right
 
+import nonsmooth as ns
 from nonsmooth.campaign import cluster
 from nonsmooth.campaign.run import run
 from nonsmooth.campaign.store import describe_store
@@ -93,6 +95,27 @@ def test_a_cluster_computes_the_same(three_workers, tmp_path: Path) -> None:
     assert hashes(tmp_path / "far.zarr") == hashes(tmp_path / "here.zarr")
 
 
+@pytest.mark.slow
+def test_one_process_and_eight_workers_write_the_same_chart(tmp_path: Path) -> None:
+    distributed = pytest.importorskip("distributed")
+    system = ns.models.discontinuous_support(omega=11.15)
+    grid = {"g": np.linspace(-0.0015, 0.002, 200), "rho": np.linspace(0.2, 0.5, 200)}
+    one = ns.chart(system, grid, store=tmp_path / "one.zarr", threads=1, **QUIET)
+    with (
+        distributed.LocalCluster(
+            n_workers=8, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
+        ) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        client.wait_for_workers(8, timeout=120)
+        eight = ns.chart(system, grid, store=tmp_path / "eight.zarr", client=client, **QUIET)
+        far = ns.chart(system, grid, client=client, **QUIET)
+    assert eight.identical(one) and far.identical(one)
+    assert hashes(tmp_path / "one.zarr") == hashes(tmp_path / "eight.zarr")
+    marks = [json.loads(file.read_text()) for file in (tmp_path / "eight.zarr" / "run").glob("*.json")]
+    assert len(marks) == 10 and len({mark["process"] for mark in marks}) > 2
+
+
 def disturbed(client, crew: Crew, path: Path, chunks: int, seconds: float, kills: int, client_kills: int) -> int:
     """Run a campaign in a process of its own while workers and that process are killed. Returns the kills made."""
     program = CAMPAIGN.format(
@@ -141,14 +164,14 @@ def test_killed_workers_and_clients_change_nothing(
         chunks, seconds, kills, client_kills = int(words[0]), float(words[1]), int(words[2]), int(words[3])
     path = tmp_path / "disturbed.zarr"
     made = disturbed(*three_workers, path, chunks, seconds, kills, client_kills)
-    assert made >= kills // 2
+    assert made == kills
     calm = tmp_path / "calm.zarr"
     run(Squares(size=7 * chunks), threads=1, store=calm, **QUIET)
     assert hashes(path) == hashes(calm)
     found = describe_store(path)
     assert found["done"] == found["chunks"] == chunks
     print(f"{made} workers and {client_kills} clients killed, {found['started'] - chunks} chunks begun again")
-    assert found["started"] - chunks <= made + 3 * client_kills  # three workers were busy when a client went
+    assert found["started"] - chunks <= made + client_kills  # one for each kill
     for file in (path / "run").glob("*.json"):
         other = json.loads((calm / "run" / file.name).read_text())
         assert json.loads(file.read_text())["content"] == other["content"]

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 import reference_values as known
 
 import nonsmooth as ns
+from nonsmooth.continuation.arclength import Curve
 from nonsmooth.continuation.marches import ENDINGS
 
 support = ns.models.discontinuous_support
@@ -35,6 +38,34 @@ def test_an_unstable_orbit_within_chaos() -> None:
 def test_an_equilibrium_is_no_cycle() -> None:
     with pytest.raises(ns.SolveError, match="equilibrium"):
         ns.find_orbit(ns.models.relief_valve(q=9.5), start={"y1": 0.2, "y2": 0.0, "y3": 10.0})
+
+
+def test_an_unstable_orbit_whose_motion_diverges() -> None:
+    """x' = x + cos t has the orbit (sin t - cos t) / 2 with the multiplier exp(2 pi); the motion leaves it."""
+    system = ns.System(states=["x"], parameters={}, modes={"one": lambda t, u, p: u.x + np.cos(t)})
+    orbit = ns.find_orbit(system, start={"x": -0.5}, transient=0, period_number=1)
+    assert orbit.u == pytest.approx([-0.5], abs=1e-12)
+    assert orbit.floquet_multipliers == pytest.approx([np.exp(2 * np.pi)], rel=1e-10)
+
+
+def test_a_branch_that_is_interrupted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ctrl-C returns what was found, which goes on from there to the same ends."""
+    orbit = ns.find_orbit(support(rho=0.14, g=0.02, omega=3.3))
+    whole = ns.continue_orbit(orbit, "omega", (3.0, 3.5))
+    steps, step = iter(range(5)), Curve.step
+
+    def interrupted(*arguments: Any, **options: Any) -> Any:
+        if next(steps, None) is None:
+            raise KeyboardInterrupt
+        return step(*arguments, **options)
+
+    monkeypatch.setattr(Curve, "step", interrupted)
+    part = ns.continue_orbit(orbit, "omega", (3.0, 3.5))
+    monkeypatch.undo()
+    assert ends(part) == ["interrupted", "interrupted"] and 3 < part.sizes["point"] < whole.sizes["point"]
+    rest = ns.continue_orbit(part)
+    assert ends(rest) == ends(whole) and rest["omega"].values[[0, -1]] == pytest.approx(whole["omega"].values[[0, -1]])
+    assert ns.special_points(rest)["omega"].values == pytest.approx(ns.special_points(whole)["omega"].values, abs=1e-9)
 
 
 def test_a_start_beyond_a_stop() -> None:

@@ -1,8 +1,9 @@
-r"""A forced linear oscillator against a rigid stop, from its closed-form pieces: a truth that shares nothing with kernels.
+r"""A forced linear oscillator against a rigid stop, from closed-form pieces: a truth that shares nothing with kernels.
 
 Between impacts x'' + c x' + k x = A cos(w t) is solved in closed form; an impact is found by bisection between nodes of
 a 48th of a period (a maximum in between is found by bisection of v first); then v -> -e v. With e = 0 the mass stays at
-the stop while the force presses it there, A cos(w t) > k d, and leaves in the closed form of that instant.
+the stop while the force presses it there, A cos(w t) > k d, and leaves in the closed form of that instant; so it does
+after 100 impacts between two nodes, when they have accumulated.
 All starts are followed at once.
 """
 
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 NODES = 48
 HALVINGS = 60
+ACCUMULATED = 100  # impacts between two nodes that count as infinitely many
 
 
 class RigidStop:
@@ -47,6 +49,7 @@ class RigidStop:
         """All runs on to one time, in place."""
         d, e, k = self.p["d"], self.p["e"], self.p["k"]
         todo = t < until
+        impacts = np.zeros(len(t), dtype=np.int64)
         while todo.any():
             i = np.flatnonzero(todo & stuck)
             if len(i):  # at the stop until the force lets go
@@ -62,12 +65,13 @@ class RigidStop:
                     stuck[i] = False
             i = np.flatnonzero(todo & ~stuck & (t < until))
             if len(i):
-                self._fly(i, t, x, v, stuck, until, d, e)
+                self._fly(i, t, x, v, stuck, until, d, e, impacts)
             todo = t < until
 
     def _fly(
-        self, i: Any, t: Array, x: Array, v: Array, stuck: NDArray[np.bool_], until: float, d: float, e: float
-    ) -> None:
+        self, i: Any, t: Array, x: Array, v: Array, stuck: NDArray[np.bool_], until: float, d: float, e: float,
+        impacts: NDArray[np.int64],
+    ) -> None:  # fmt: skip
         begin, x0, v0 = t[i], x[i], v[i]
         last = until - begin
         x1, v1 = self.flow(begin, x0, v0, last)
@@ -90,7 +94,10 @@ class RigidStop:
         j = i[hit]
         t[j], x[j], v[j] = b + s, d, -e * speed
         pressed = self.p["A"] * np.cos(self.p["omega"] * t[j]) > self.p["k"] * d
-        stuck[j] = (e == 0.0) & pressed
+        impacts[j] += 1
+        ended = impacts[j] > ACCUMULATED
+        v[j[ended]] = 0.0
+        stuck[j] = ((e == 0.0) | ended) & pressed
 
     def sections(self, starts: Array, transient: int, keep: int) -> Array:
         """(keep, S, 2): the states at the beginning of periods after ``transient`` of them."""

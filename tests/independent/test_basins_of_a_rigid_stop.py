@@ -45,7 +45,7 @@ def check(system: ns.System, half: tuple[float, float], n: int, periods: list[in
     assert sorted(found["period_number"].values.tolist()) == periods
     assert found["confirmed"].values.all()
     starts = np.column_stack([np.repeat(x, n), np.tile(v, n)])
-    kept = RigidStop(p).sections(starts, 250, 52)
+    kept = RigidStop(p).sections(starts, 150, 52)
     share = agreement(found, [end_of(kept[:, k]) for k in range(len(starts))])
     print(f"{n * n} starts, {periods}: {100 * share:.3f} % end where brute force says")
     assert share >= 0.998

@@ -68,3 +68,21 @@ def test_shares_add_up_to_all(support: ns.System) -> None:
     assert above.get_ylabel() == "max $x$ (m)"
     with pytest.raises(ValueError, match="not a state"):
         draw_fractions(along, y="z")
+
+
+def test_a_density_diagram_shows_the_shares_of_the_bins() -> None:
+    from nonsmooth.plot.density import density
+
+    system = ns.models.discontinuous_support(omega=3.69, g=-0.0045)
+    swept = ns.sweep(system, "rho", [0.3, 0.32, 0.36], transient=40, keep=20, density=True, bins=10, **QUIET)
+    ax = density(swept, y="v")
+    shown = np.ma.filled(ax.collections[0].get_array(), 0.0).reshape(10, 3)
+    np.testing.assert_allclose(np.nan_to_num(shown), 5.0 * swept["density"].sel(state="v").values.T)
+    assert ax.get_xlabel() == r"$\rho$ (N)" and ax.get_ylabel() == "$v$ (m/s)"
+    np.testing.assert_allclose(ax.get_xlim(), (0.29, 0.38))
+    with pytest.raises(ValueError, match=r"plot\.density"):
+        ns.plot.bifurcation(swept)
+    with pytest.raises(ValueError, match="density=True"):
+        density(ns.sweep(system, "rho", [0.3], keep=4, **QUIET))
+    with pytest.raises(ValueError, match="not a state"):
+        density(swept, y="z")

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
@@ -56,6 +57,21 @@ def test_curves_share_axes_and_each_kind_is_named_once(special: xr.Dataset, tmp_
     assert np.array_equal(lines[0].get_ydata(), drawn[0]["rho"].values)
     assert {line.get_linestyle() for line in lines} == {"-", ":"}
     assert plot.save_figure(ax, tmp_path / "a.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_curves_over_a_chart_leave_its_legend(special: xr.Dataset) -> None:
+    plane = ns.chart(
+        ns.models.discontinuous_support(g=0.02), {"omega": [3.0, 5.0, 7.0], "rho": [0.1, 0.2, 0.3]}, progress=False
+    )
+    ax = plot.chart(plane)
+    periods = words(ax)
+    for i in np.flatnonzero(np.isin(special["kind"].values, ("fold", "grazing"))):
+        curve = ns.continue_curve(special.isel(special=int(i)), {"omega": (3.0, 7.0), "rho": (0.1, 0.3)}, step=0.2)
+        plot.curve(curve, ax, special=False)
+    assert sorted(words(ax)) == ["fold", "grazing"]
+    kept = [item for item in ax.artists if isinstance(item, mpl.legend.Legend)]
+    assert [[text.get_text() for text in item.get_texts()] for item in kept] == [periods]
+    assert all(line.get_path_effects() for line in ax.get_lines())  # a seam on every colour
 
 
 def test_an_orbit_shows_its_crossings_and_section_point(orbit: ns.Orbit) -> None:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.analysis.attractors_compiled import exponents_compiled, load, run_compiled
+from nonsmooth.analysis.attractors_cuda import exponents_on_gpu, run_on_gpu
 from nonsmooth.analysis.attractors_parting import exponent_of
 from nonsmooth.analysis.attractors_trace import Trace, period_of, place_of, state_at, trace
 from nonsmooth.analysis.classify import TOLERANCE, Verdict
@@ -43,6 +44,8 @@ class Settler:
         A job ends as soon as its period number is certain, not at the end of the transient.
     extremes : bool
         Whether extremes are wanted; they cost time where the motion is not periodic.
+    device : str
+        ``"cpu"`` or ``"cuda"``: see :mod:`nonsmooth.flow.devices`.
     """
 
     system: System
@@ -56,13 +59,17 @@ class Settler:
     rtol: float | None = None
     atol: Any = None
     expert: Mapping[str, Any] = field(default_factory=dict)
+    device: str = "cpu"
     tolerance: float = field(init=False)
+    width: int = field(init=False)  # numbers that say where a run stands on the section (``attractors_trace``)
 
     def __post_init__(self) -> None:
         noise = TOLERANCE
         if self.engine.name != "exact":
             noise = max(TOLERANCE, 10.0 * (RTOL if self.rtol is None else self.rtol))
         object.__setattr__(self, "tolerance", noise)
+        u, m, forced = self.system.traced.u, self.system.traced.m, self.system.traced.period is not None
+        object.__setattr__(self, "width", len(u) + len(m) + int(forced and self.plan.indicator >= 0))
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Sent to another process as the system's text: what is compiled there comes from that machine's own cache."""
@@ -78,7 +85,7 @@ class Settler:
 
     def load(self) -> None:
         """Compile or load the kernel now, before threads ask for it."""
-        if self.planar is not None:
+        if self.planar is not None and self.device == "cpu":
             load(self.planar)
 
     def run(
@@ -120,7 +127,7 @@ class Settler:
             self.transient, self.keep, self.max_period, FIRST_LOOK if self.stop_early else 0, attempts, carried,
             self.extremes,
         )  # fmt: skip
-        return run_compiled(
+        return (run_on_gpu if self.device == "cuda" else run_compiled)(
             self.planar, points, rows, starts, modes, begin, self.plan.phase, choice, self.tolerance, self.least
         )
 
@@ -133,12 +140,6 @@ class Settler:
     def section_phase(self) -> float:
         """Phase of the forcing at which the section stands; 0 where it is no phase."""
         return self.plan.phase if self.plan.indicator < 0 else 0.0
-
-    @property
-    def width(self) -> int:
-        """Numbers that say where a run stands on the section, its mode apart (``attractors_trace``)."""
-        traced = self.system.traced
-        return len(traced.u) + len(traced.m) + (self.plan.indicator >= 0 and self.system.period() is not None)
 
     def trace(self, point: FloatArray, place: FloatArray, mode: int, transient: int, keep: int) -> Trace:
         """Section points of one run at one parameter point (1, n_parameters), from a place on the section."""
@@ -155,6 +156,10 @@ class Settler:
         rows = np.ascontiguousarray(rows, dtype=np.int64)
         starts = np.ascontiguousarray(starts, dtype=float)
         modes = np.array(modes, dtype=np.int64)
+        if self.planar is not None and self.device == "cuda":
+            return exponents_on_gpu(
+                self.planar, points, rows, starts, modes, n_returns, self.plan.phase, self.system.scale_vector()
+            )
         if self.planar is not None:
             return exponents_compiled(
                 self.planar, points, rows, starts, modes, n_returns, self.plan.phase, self.system.scale_vector(),

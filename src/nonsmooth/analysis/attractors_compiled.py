@@ -73,9 +73,9 @@ def exponents_compiled(
 
 
 def _work(max_period: int) -> tuple[Any, ...]:
-    """Two states in pieces (u, clock, counters), images of the return map, returns."""
+    """Two states in pieces (u, clock, counters), images of the return map, returns (and three sums)."""
     one, other = ((np.zeros(2), np.zeros(3), np.zeros(4, dtype=np.int64)) for _ in range(2))
-    return *one, *other, np.zeros((3, 2)), np.zeros(max_period)
+    return *one, *other, np.zeros((3, 2)), np.zeros(max(max_period, 3))
 
 
 def _buffers(chain: Chain) -> tuple[Any, ...]:

@@ -73,8 +73,9 @@ def basin_fractions(
     -------
     xarray.Dataset
         Over the parameter and ``attractor``: ``fraction`` with its binomial ``fraction_error``, ``period_number`` (0:
-        no cycle, -1: not there), ``lyapunov``, ``maximum``, ``minimum``, a point on the ``section``. A number stays
-        with an attractor along the parameter. A share of 0 beside a period number is an attractor that only a run
+        no cycle, -1: not there), ``chaotic``, ``lyapunov`` with its error, ``maximum``, ``minimum``, a point on the
+        ``section``. A number stays with an attractor along the parameter: one that a run carried over ends on, and is
+        carried back from. A share of 0 beside a period number is an attractor that only a run
         carried from the value before has met. Over the parameter: ``not_converged`` and ``diverged`` (shares; of the
         first, ``failed`` are runs that could not be followed, as from a start beyond a stop) and ``n_starts_99``, the
         number of starts that meet every attractor met there by random starts with 99 %.
@@ -150,14 +151,17 @@ def _dataset(
     count = np.stack([(labels == k).sum(axis=1) for k in range(n_attractors)], axis=1).reshape(len(numbers), -1)
     fraction, error = share_errors(count, n_starts)
     period = np.full(count.shape, -1, dtype=np.int64)
-    exponent = np.full(count.shape, np.nan)
+    exponent, spread = np.full(count.shape, np.nan), np.full(count.shape, np.nan)
+    chaotic = np.zeros(count.shape, dtype=np.int8)
     maximum, minimum, section = (np.full((*count.shape, n), np.nan) for _ in range(3))
     for i, found in enumerate(per_value):
         for k, item in found.items():
-            period[i, k], exponent[i, k] = item.period_number, item.exponent
+            period[i, k], chaotic[i, k] = item.period_number, item.chaotic
+            exponent[i, k], spread[i, k] = item.exponent, item.exponent_error
             maximum[i, k], minimum[i, k], section[i, k] = item.maximum, item.minimum, item.points[0]
     arrays = {
         "fraction": fraction, "fraction_error": error, "period_number": period, "lyapunov": exponent,
+        "lyapunov_error": spread, "chaotic": chaotic,
         "maximum": maximum, "minimum": minimum, "section": section,
         "not_converged": (labels == -1).mean(axis=1), "diverged": (labels == -2).mean(axis=1),
         "failed": (failed(status) & (labels == -1)).mean(axis=1),

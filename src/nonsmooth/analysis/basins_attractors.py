@@ -16,7 +16,7 @@ import numpy as np
 from nonsmooth.analysis.attractors import Settler
 from nonsmooth.analysis.basins_candidate import Search, among
 from nonsmooth.analysis.basins_found import Attractor, Patience
-from nonsmooth.analysis.basins_newton import Cycle, confirmed_cycle
+from nonsmooth.analysis.basins_newton import Cycle, confirmed_cycle, exponent_on
 from nonsmooth.analysis.settled import Settled
 from nonsmooth.flow.engine import FloatArray, IntArray
 from nonsmooth.kernels import codes
@@ -25,7 +25,6 @@ __all__ = ["DIVERGED", "NOT_CONVERGED", "Attractor", "Patience", "find_attractor
 
 NOT_CONVERGED, DIVERGED = -1, -2  # labels of starts without an attractor
 SAME = 1e-5  # of the motion's size: runs that end this near to a cycle's point are on it
-ROUNDING = 1e-8  # multipliers below this are differences of rounding errors
 STILL = (codes.NOT_PERIODIC, codes.SLOW)
 
 
@@ -56,7 +55,7 @@ def find_attractors(
     _label_cycles(settler, point, runs, np.arange(len(labels)), found, labels)
     wandering = np.flatnonzero(np.isin(status, STILL))
     places, modes = runs.last[wandering].copy(), runs.mode[wandering].copy()
-    search = Search(settler, point, patience, found)
+    search = Search(replace(settler, device="cpu"), point, patience, found)  # it makes single runs
     for _ in range(patience.rounds):
         places, modes, wandering = _join(search, places, modes, wandering, labels, status)
         if search.hopeless:  # motion that nothing draws in, as without damping: waiting changes nothing
@@ -124,13 +123,9 @@ def _cycle(settler: Settler, point: FloatArray, run: Settled) -> Attractor:
             )
         else:
             cycle = Cycle(place[None, :n], run.mode[:1], float(run.multiplier[0]), np.nan, place, mode)
-    with np.errstate(divide="ignore"):
-        exponent = float(np.log(cycle.multiplier) / cycle.duration)
-    if 0.0 < cycle.multiplier < ROUNDING:
-        exponent = np.nan
     return Attractor(
         p, cycle.points, cycle.modes, cycle.end, cycle.mode, run.maximum[0], run.minimum[0], cycle.multiplier,
-        exponent, 0.0, settler.least, confirmed,
+        exponent_on(cycle), 0.0, settler.least, confirmed,
     )  # fmt: skip
 
 

@@ -7,13 +7,14 @@ recurrent too, but neighbours stay on orbits of their own, or (in a chaotic sea)
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from nonsmooth.analysis.attractors import Settler
 from nonsmooth.analysis.attractors_trace import Trace
 from nonsmooth.analysis.basins_found import NEAR, Attractor, Patience
+from nonsmooth.analysis.basins_newton import confirmed_cycle, exponent_on
 from nonsmooth.flow.engine import FloatArray
 from nonsmooth.kernels import codes
 
@@ -21,7 +22,7 @@ __all__ = ["Search", "among"]
 
 CELLS = 40  # cells along the section's extent in which recurrence is judged
 MOSTLY = 0.95
-LEAST_EXPONENT = 1e-3  # per return: a faster contraction than this ends on a cycle
+LEAST_EXPONENT = 1e-3  # per return: contraction faster than this ends on a cycle, expansion is chaos
 LONGEST = 1024  # period number looked for where the exponent says that there is a cycle
 LONG_RETURN = 1e-8
 ON_CYCLE = 1e-3  # of the size: runs nearer than this to a long cycle are on it
@@ -74,23 +75,30 @@ class Search:
         long = settler.trace(point, place, mode, 0, self.patience.candidate)
         if not len(long.points):
             return None
-        checked = settler.run(point, [0], long.end[None], modes=[long.mode], begin=settler.section_phase)
+        wide = replace(settler, keep=max(settler.keep, self.patience.more))  # extremes over many returns
+        checked = wide.run(point, [0], long.end[None], modes=[long.mode], begin=settler.section_phase)
         if checked.status[0] != codes.NOT_PERIODIC or not _recurrent(long.points):
             return None
         exponents, errors = settler.exponents(
             point, [0], long.end[None], np.array([long.mode]), self.patience.exponent
         )
-        maximum, minimum = checked.maximum[0], checked.minimum[0]
+        maximum = np.maximum(checked.maximum[0], long.points.max(axis=0))
+        minimum = np.minimum(checked.minimum[0], long.points.min(axis=0))
         exponent, error, least = float(exponents[0]), float(errors[0]), settler.least
         size = np.maximum(0.5 * (maximum - minimum), least)
         end, last = long.end, long.mode
-        if exponent < -3.0 * error - LEAST_EXPONENT * len(long.points) / long.times[-1]:
+        doubt = 3.0 * error + LEAST_EXPONENT * len(long.points) / long.times[-1]
+        if exponent < -doubt:
             p = _long_period(long.points, size)
             if not p:
                 return None
-            points = long.points[-p:]
+            points, modes, multiplier = long.points[-p:], long.modes[-p:], np.nan
+            cycle = confirmed_cycle(settler, point, end, last, p, size)
+            if cycle is not None:
+                points, modes, multiplier = cycle.points, cycle.modes, cycle.multiplier
+                exponent, error = exponent_on(cycle), 0.0
             return Attractor(
-                p, points, long.modes[-p:], end, last, maximum, minimum, np.nan, exponent, error, least,
+                p, points, modes, end, last, maximum, minimum, multiplier, exponent, error, least, cycle is not None,
                 near=ON_CYCLE, tree=cKDTree(points / size),
             )  # fmt: skip
         half = len(long.points) // 2
@@ -98,10 +106,10 @@ class Search:
         gap, _ = tree.query(long.points[:half] / size, p=np.inf)
         near = float(np.clip(3.0 * np.quantile(gap, MOSTLY), 1e-9, NEAR))
         item = Attractor(
-            0, points, long.modes[half:], end, last, maximum, minimum, np.nan, exponent, error, least, near=near,
-            tree=tree,
+            0, points, long.modes[half:], end, last, maximum, minimum, np.nan, exponent, error, least,
+            chaotic=exponent > doubt, near=near, tree=tree,
         )  # fmt: skip
-        if not self._attracts(item) or (exponent > 3.0 * error and self._keeps_areas(item)):
+        if not self._attracts(item) or (item.chaotic and self._keeps_areas(item)):
             self.repelled += 1
             return None
         return item
@@ -125,7 +133,7 @@ class Search:
         return back >= max(2.0, COME_BACK * came)
 
     def _keeps_areas(self, item: Attractor) -> bool:
-        """Whether the section's map neither stretches nor shrinks areas (volumes) along the run."""
+        """Whether the section's map neither stretches nor shrinks areas (volumes) on the average."""
         if self.settler.plan.indicator >= 0:
             return False  # a map of the surface: the states are no coordinates on it
         n, total = len(item.size), 0.0
@@ -147,7 +155,7 @@ class Search:
             with np.errstate(divide="ignore"):
                 total += float(np.log(np.abs(np.linalg.det(np.array(columns)))))
             place, mode = here.end, here.mode
-        return total / AREAS > -LEAST_EXPONENT
+        return abs(total) / AREAS < LEAST_EXPONENT
 
     def _on(self, place: FloatArray, mode: int, transient: int, keep: int) -> Trace:
         return self.settler.trace(self.point, place, mode, transient, keep)

@@ -47,6 +47,7 @@ class Attractor:
     exponent_error: float
     least: FloatArray  # (n,): a motion smaller than this is one that has come to rest
     confirmed: bool = False
+    chaotic: bool = False  # its exponent is above zero beyond doubt
     near: float = NEAR  # of its size: section points nearer than this belong to it
     tree: Any = field(default=None, repr=False, compare=False)
 

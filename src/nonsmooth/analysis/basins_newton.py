@@ -9,10 +9,11 @@ import numpy as np
 from nonsmooth.analysis.attractors import Settler
 from nonsmooth.flow.engine import FloatArray, IntArray
 
-__all__ = ["Cycle", "confirmed_cycle"]
+__all__ = ["Cycle", "confirmed_cycle", "exponent_on"]
 
 MOST = 8  # Newton steps
 STEP = 1e-5  # of the differences that give the map's derivative, in units of the motion's size
+ROUNDING = 1e-8  # multipliers below this are differences of rounding errors
 NEAR = 5e-6  # of the motion's size: farther from the run's end than this lies another orbit
 
 
@@ -26,6 +27,14 @@ class Cycle:
     duration: float
     end: FloatArray  # a place on it
     mode: int
+
+
+def exponent_on(cycle: Cycle) -> float:
+    """The largest exponent per unit time; NaN where the multiplier is lost in rounding, but not zero."""
+    if 0.0 < cycle.multiplier < ROUNDING:
+        return np.nan
+    with np.errstate(divide="ignore"):
+        return float(np.log(cycle.multiplier) / cycle.duration)
 
 
 def confirmed_cycle(

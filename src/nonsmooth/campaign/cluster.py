@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 import uuid
 from collections.abc import Callable, Iterable, Mapping
@@ -14,11 +15,37 @@ from numpy.typing import NDArray
 from nonsmooth.campaign.store import ChunkStore
 from nonsmooth.campaign.work import Work
 
-__all__ = ["MISSING", "compute_chunk", "on_cluster"]
+__all__ = ["MISSING", "compute_chunk", "connect", "on_cluster"]
 
-MISSING = 'client= needs Dask distributed: python -m pip install "nonsmooth[cluster]"'
+MISSING = 'a cluster needs Dask distributed: python -m pip install "nonsmooth[cluster]"'
 AHEAD = 2  # chunks that wait at each thread of the cluster
+ANSWER = 60  # seconds to wait for a scheduler
 ATTEMPTS = 10  # times that a chunk is sent again after its workers died
+
+
+def connect(address: str) -> Any:
+    """A client of the scheduler at an address such as ``tcp://127.0.0.1:8786``.
+
+    Raises
+    ------
+    ImportError
+        Without Dask distributed.
+    OSError
+        Where no scheduler answers.
+    """
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise ImportError(MISSING) from error
+    # A scheduler that goes is told by on_cluster in one sentence; no traceback of the connection before it.
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
+    try:
+        return Client(address, timeout=ANSWER, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise OSError(
+            f"no scheduler answers at {address} ({error}); start one with `dask scheduler` and give the address that "
+            "it prints"
+        ) from error
 
 
 def compute_chunk(work: Work, chunk: int, path: str | None, key: str) -> Mapping[str, NDArray[Any]] | None:
@@ -29,8 +56,8 @@ def compute_chunk(work: Work, chunk: int, path: str | None, key: str) -> Mapping
     if store.has(chunk):  # computed meanwhile for a client that is gone
         return None
     store.note_start(chunk)
-    began = time.perf_counter()
-    store.write(work, chunk, work.compute(chunk), time.perf_counter() - began)
+    began = time.thread_time()  # of a processor: other users of the machine do not lengthen it
+    store.write(work, chunk, work.compute(chunk), time.thread_time() - began)
     return None
 
 
@@ -50,9 +77,12 @@ def on_cluster(
     ------
     ImportError
         Without Dask distributed.
+    ConnectionError
+        The scheduler is gone; what has come back, or is in the store, stands.
     """
     try:
         from distributed import as_completed
+        from distributed.client import FutureCancelledError
         from distributed.scheduler import KilledWorker
     except ImportError as error:
         raise ImportError(MISSING) from error
@@ -66,11 +96,12 @@ def on_cluster(
         name = f"nonsmooth-{family}-{chunk}" + (f"-{attempts[chunk]}" if attempts[chunk] > 1 else "")
         return client.submit(compute_chunk, work, chunk, path, key, key=name, pure=False)
 
+    address = client.scheduler.address
     threads = max(sum(client.nthreads().values()), 1)
     pending = {send(chunk): chunk for chunk in islice(order, AHEAD * threads)}
     if not pending:
         return
-    queue = as_completed(list(pending))
+    queue = as_completed(list(pending), loop=client.loop)  # without it: that of the default client
     try:
         for future in queue:
             chunk = pending.pop(future)
@@ -84,6 +115,12 @@ def on_cluster(
                 pending[again] = chunk
                 queue.add(again)
                 continue
+            except FutureCancelledError as error:
+                kept = "finished chunks are in the store: " if store is not None else ""
+                raise ConnectionError(
+                    f"the scheduler at {address} is gone ({error.reason}); {kept}start it again with its workers, and "
+                    "run again"
+                ) from error
             done(chunk, arrays)
             future.release()
             for following in islice(order, 1):

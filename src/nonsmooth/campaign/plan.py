@@ -1,9 +1,11 @@
-"""What a work would take, from a small random sample of its chunks."""
+"""What a work would take, from a small sample of its chunks, spread over the whole from a random place on."""
 
 from __future__ import annotations
 
+import sys
 import time
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -14,11 +16,17 @@ __all__ = ["Plan", "plan"]
 
 SECONDS = 5.0  # of sampling
 LEAST = 8  # chunks, where there are so many
+PATIENCE = 4  # times the seconds, on a machine that is busy otherwise
+GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 
 
 @dataclass(frozen=True)
 class Plan:
-    """An estimate: core-seconds with their standard error, and bytes."""
+    """An estimate: core-seconds with their standard error, and bytes.
+
+    ``process_bytes``: of this process as it is now, with all that is loaded (0: not known on this system);
+    ``stored_bytes``: of a store, compressed.
+    """
 
     places: int
     chunks: int
@@ -26,6 +34,13 @@ class Plan:
     core_seconds: float
     error: float
     result_bytes: int
+    stored_bytes: int
+    process_bytes: int
+
+    @property
+    def memory_bytes(self) -> int:
+        """Of the whole process with the result in it."""
+        return self.process_bytes + self.result_bytes
 
     def seconds(self, workers: int) -> float:
         """Seconds on so many cores of this kind."""
@@ -41,33 +56,70 @@ class Plan:
         ]
         if workers is not None:
             lines.append(f"cluster     {_time(self.seconds(workers))} on {workers} cores of this kind")
-        lines.append(f"memory      {_size(self.result_bytes)} for the result, and below 50 MB per thread")
-        lines.append(f"store       at most {_size(self.result_bytes)} (less after compression)")
+        process = f"{_size(self.memory_bytes)} for the process, " if self.process_bytes else ""
+        lines.append(f"memory      {process}{_size(self.result_bytes)} of it for the result")
+        lines.append(f"store       {_size(self.stored_bytes)}, compressed")
         return "\n".join(lines)
 
 
-def plan(work: Work, *, seconds: float = SECONDS, seed: int = 0) -> Plan:
-    """Run random chunks for some seconds, one after the other, and scale up.
+def plan(work: Work, *, seconds: float = SECONDS, seed: int = 0, kept: int | None = None) -> Plan:
+    """Run some chunks for some seconds of processor time, one after the other, and scale up.
 
     The first chunk is run once before the clock: it compiles and loads what all need.
+
+    Parameters
+    ----------
+    kept : int, optional
+        Places of a chunk of the store; those of the work's own chunks where not given.
     """
+    from nonsmooth.campaign.store import stored_bytes
+
     n = work.n_chunks()
-    order = np.random.default_rng(seed).permutation(n)
+    order = _spread(n, seed)
     work.compute(int(order[0]))
-    per_place = []
-    began = time.perf_counter()
+    per_place, samples = [], {}
+    began, spent = time.perf_counter(), 0.0
     for k, chunk in enumerate(order):
-        if k >= min(LEAST, n) and time.perf_counter() - began > seconds:
+        if k >= min(LEAST, n) and (spent > seconds or time.perf_counter() - began > PATIENCE * seconds):
             break
         first, last = work.bounds(int(chunk))
         start = time.thread_time()  # other users of the machine do not lengthen it
-        work.compute(int(chunk))
-        per_place.append((time.thread_time() - start) / (last - first))
+        samples[int(chunk)] = work.compute(int(chunk))
+        took = time.thread_time() - start
+        per_place.append(took / (last - first))
+        spent += took
     places = work.bounds(n - 1)[1]
     width = sum(np.dtype(item.dtype).itemsize * int(np.prod(item.shape)) for item in work.columns().values())
     rest = 1.0 - len(per_place) / n
     error = places * float(np.std(per_place)) / max(len(per_place) - 1, 1) ** 0.5 * rest**0.5
-    return Plan(places, n, len(per_place), places * float(np.mean(per_place)), error, places * width)
+    first, last = work.bounds(0)
+    together = [samples[chunk] for chunk in sorted(samples)]
+    return Plan(
+        places, n, len(per_place), places * float(np.mean(per_place)), error, places * width,
+        stored_bytes(work, together, kept or last - first), _resident(),
+    )  # fmt: skip
+
+
+def _spread(n: int, seed: int) -> Any:
+    """All chunks in an order whose every beginning lies evenly over the whole: multiples of the golden ratio.
+
+    The cost of a point changes from region to region; an even sample knows its mean better than a random one.
+    """
+    begin = np.random.default_rng(seed).random()
+    met = np.floor((begin + GOLDEN * np.arange(2 * n)) % 1.0 * n).astype(np.int64)
+    _, first = np.unique(met, return_index=True)
+    ordered = met[np.sort(first)]
+    return np.append(ordered, np.setdiff1d(np.arange(n), ordered))
+
+
+def _resident() -> int:
+    """Bytes of memory that this process has needed at most, so far."""
+    try:
+        import resource
+    except ImportError:  # not on Windows
+        return 0
+    most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return int(most) * (1 if sys.platform == "darwin" else 1024)
 
 
 def _time(seconds: float) -> str:

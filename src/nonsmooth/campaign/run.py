@@ -41,11 +41,13 @@ def run(
         keeper = open_store(store, work, any_cpu=any_cpu)
     there = set() if keeper is None else keeper.done()
     missing = [chunk for chunk in range(work.n_chunks()) if chunk not in there]
+    if keeper is not None and client is not None:
+        begun = keeper.begun()  # by workers that may be at them still, for a client that is gone: they come last
+        missing.sort(key=begun.__contains__)
     columns = empty_columns(work) if keeper is None else {}
     size = work.bounds(work.n_chunks() - 1)[1]
-    with progress_bar(size, label, progress) as advance:
-        for chunk in there:
-            advance(_places(work, chunk))
+    before = size - sum(_places(work, chunk) for chunk in missing)
+    with progress_bar(size, label, progress, before) as advance:
 
         def keep(chunk: int, arrays: Mapping[str, NDArray[Any]] | None) -> None:
             first, last = work.bounds(chunk)
@@ -78,7 +80,7 @@ class _Kept:
 
     def compute(self, chunk: int) -> Mapping[str, NDArray[Any]]:
         self.keeper.note_start(chunk)
-        began = time.perf_counter()
+        began = time.thread_time()
         arrays = self.work.compute(chunk)
-        self.keeper.write(self.work, chunk, arrays, time.perf_counter() - began)
+        self.keeper.write(self.work, chunk, arrays, time.thread_time() - began)
         return arrays

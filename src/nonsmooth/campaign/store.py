@@ -4,7 +4,7 @@
 
     chart.zarr/              a Zarr group; the attribute ``nonsmooth_campaign`` says what the work is
         results/             one array per column, one file per chunk (Zstandard, one thread, fixed level)
-        run/000017.json      chunk 17 is done: its key and the hash of its content, by whom, when, how long
+        run/000017.json      chunk 17 is done: its key and the hash of its content, by whom, when, processor time
         run/started.log      which chunks were begun: one begun twice was lost with its worker
 
 A chunk's key is a hash of the model, the parameters, the options, the kernels' source, and the chunk's place. Its
@@ -22,8 +22,8 @@ import platform
 import socket
 import tempfile
 import time
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -35,10 +35,11 @@ from numpy.typing import NDArray
 from nonsmooth.campaign.work import Work
 from nonsmooth.errors import DataFileError
 
-__all__ = ["ChunkStore", "cpu_type", "describe_store", "open_store"]
+__all__ = ["ChunkStore", "cpu_type", "describe_store", "open_store", "stored_bytes"]
 
 ATTRIBUTE = "nonsmooth_campaign"
 LEVEL = 3  # of the compression
+FACTS = 360  # bytes of the facts about the run that are kept for each chunk
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,11 @@ class ChunkStore:
         """Whether a chunk is there, whole."""
         mark = _mark(self.path / "run" / f"{chunk:06d}.json")
         return mark is not None and mark["key"] == self._key(chunk)
+
+    def begun(self) -> set[int]:
+        """Chunks that somebody has begun, whether they are there by now or not."""
+        log = self.path / "run" / "started.log"
+        return set(_started(log)) if log.exists() else set()
 
     def note_start(self, chunk: int) -> None:
         """Write into the log that the work on a chunk begins: what was begun more often than once was lost before."""
@@ -75,8 +81,7 @@ class ChunkStore:
         with _told(self.path):
             group = _results(self.path, "r+")
             kept = {name: np.ascontiguousarray(arrays[name], item.dtype) for name, item in work.columns().items()}
-            for name, values in kept.items():
-                group[name][first:last] = values
+            _put(group, kept, first, last)
             mark = {
                 "chunk": chunk, "key": self._key(chunk), "content": _content(kept), "cpu": cpu_type(),
                 "host": socket.gethostname(), "process": os.getpid(), "seconds": round(seconds, 4),
@@ -177,8 +182,29 @@ def describe_store(path: str | os.PathLike[str]) -> dict[str, Any]:
     record["done"] = len({mark["chunk"] for mark in marks})
     record["seconds"] = sum(mark["seconds"] for mark in marks)
     log = target / "run" / "started.log"
-    record["started"] = len(log.read_text(encoding="utf-8").splitlines()) if log.exists() else record["done"]
+    record["started"] = len(_started(log)) if log.exists() else record["done"]
     return record
+
+
+def stored_bytes(work: Work, samples: Sequence[Mapping[str, NDArray[Any]]], kept: int) -> int:
+    """Bytes that a store of the whole work takes, by what a sample of its places takes in a store in memory.
+
+    ``kept``: places of a chunk of the store.
+    """
+    import zarr
+    from zarr.storage import MemoryStore
+
+    taken: dict[str, Any] = {}
+    group = zarr.open_group(MemoryStore(taken), mode="w", zarr_format=3)
+    columns = {name: np.concatenate([sample[name] for sample in samples]) for name in work.columns()}
+    there = len(next(iter(columns.values())))
+    _create(group, work, there, min(kept, there))
+    _put(group, columns, 0, there)
+    places = work.bounds(work.n_chunks() - 1)[1]
+    heads = sum(len(data) for name, data in taken.items() if name.endswith("zarr.json"))
+    heads += len(json.dumps(json.dumps(_described(work))))
+    chunks = sum(len(data) for name, data in taken.items() if not name.endswith("zarr.json"))
+    return heads + round(chunks * places / there) + -(-places // kept) * FACTS
 
 
 def _content(arrays: Mapping[str, NDArray[Any]]) -> str:
@@ -221,25 +247,36 @@ def _described(work: Work) -> dict[str, Any]:
 def _make(target: Path, work: Work, described: Mapping[str, Any], key: str) -> None:
     """A whole empty store, or none."""
     import zarr
-    from zarr.codecs import ZstdCodec
 
     with _told(target), tempfile.TemporaryDirectory(prefix=f".{target.name}-", dir=target.parent) as folder:
         fresh = Path(folder) / "new.zarr"
         root = zarr.open_group(fresh, mode="w", zarr_format=3)
         root.attrs[ATTRIBUTE] = json.dumps({**described, "key": key, "cpu": cpu_type(), "made": time.time()})
         results = root.create_group("results")
-        places, (first, last) = described["places"], work.bounds(0)
-        for name, item in work.columns().items():
-            results.create_array(
-                name, shape=(places, *item.shape), chunks=(last - first, *item.shape), dtype=item.dtype,
-                compressors=ZstdCodec(level=LEVEL), config={"write_empty_chunks": True},
-            )  # fmt: skip
+        first, last = work.bounds(0)
+        _create(results, work, described["places"], last - first)
         (fresh / "run").mkdir()
         try:
             os.replace(fresh, target)
         except OSError:
             if not target.is_dir():  # else another process was faster
                 raise
+
+
+def _create(group: Any, work: Work, places: int, chunk: int) -> None:
+    """One array per column, in chunks of so many places."""
+    from zarr.codecs import ZstdCodec
+
+    for name, item in work.columns().items():
+        group.create_array(
+            name, shape=(places, *item.shape), chunks=(chunk, *item.shape), dtype=item.dtype,
+            compressors=ZstdCodec(level=LEVEL), config={"write_empty_chunks": True},
+        )  # fmt: skip
+
+
+def _put(group: Any, arrays: Mapping[str, NDArray[Any]], first: int, last: int) -> None:
+    for name, values in arrays.items():
+        group[name][first:last] = values
 
 
 def _results(path: Path, mode: Any) -> Any:
@@ -254,6 +291,15 @@ def _marks(path: Path) -> Iterator[dict[str, Any]]:
         mark = _mark(file)
         if mark is not None:
             yield mark
+
+
+def _started(log: Path) -> list[int]:
+    """The chunks that were begun, in their order; a line cut short by a crash of the machine is passed over."""
+    found = []
+    for line in log.read_text(encoding="utf-8").splitlines():
+        with suppress(ValueError, KeyError, TypeError):
+            found.append(int(json.loads(line)["chunk"]))
+    return found
 
 
 def _mark(file: Path) -> dict[str, Any] | None:

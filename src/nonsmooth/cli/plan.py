@@ -14,7 +14,8 @@ def add(commands: Any) -> None:
     parser = commands.add_parser(
         "plan",
         help="say what a chart would take",
-        description="Run a small random sample of a chart's points and print what the whole would take.",
+        description="Run a small sample of a chart's points and print what the whole would take: time, memory, and "
+        "the bytes of a store.",
     )
     parser.add_argument("study", type=Path, metavar="STUDY.toml", help="a study file with a table [chart]")
     parser.add_argument("--workers", type=int, help="cores of a cluster to reckon with")
@@ -23,7 +24,11 @@ def add(commands: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
+    import netCDF4  # noqa: F401  (what the run itself loads counts in its memory)
+    import xarray  # noqa: F401
+
     from nonsmooth.analysis.chart import plan_chart
+    from nonsmooth.analysis.chart_work import STORED
     from nonsmooth.campaign.plan import plan
     from nonsmooth.cli.study import read_study
 
@@ -31,5 +36,9 @@ def _run(options: argparse.Namespace) -> int:
     if study.verb != "chart":
         raise ValueError(f"{options.study}: plan is for charts, this study runs {study.verb}")
     given = {name: value for name, value in study.options.items() if name not in ("threads", "any_cpu")}
-    print(plan(plan_chart(study.system, **given).work, seconds=options.seconds).text(options.workers))
+    work = plan_chart(study.system, **given).work
+    found = plan(work, seconds=options.seconds, kept=STORED)
+    print(found.text(options.workers))
+    if study.options.get("refine"):
+        print("refine      computes a part of these points; the time above is that of all")
     return 0

@@ -26,6 +26,9 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("--out", type=Path, metavar="DIR", help="where to write (default: out/STUDY)")
     parser.add_argument("--quick", action="store_true", help="coarser grids and shorter runs: a first look")
+    parser.add_argument(
+        "--full", action="store_true", help="large charts over two parameters too; an interrupted run goes on"
+    )
     parser.add_argument("--quiet", action="store_true", help="no progress bars")
     parser.set_defaults(run=_run)
 
@@ -40,7 +43,9 @@ def _run(options: argparse.Namespace) -> int:
     _draw_without_screen()
     study = importlib.import_module(f"nonsmooth.studies.{options.study}")
     out = options.out or Path("out") / options.study
-    study.reproduce(out=out, figures=options.figure, quick=options.quick, progress=not options.quiet)
+    study.reproduce(
+        out=out, figures=options.figure, quick=options.quick, full=options.full, progress=not options.quiet
+    )
     print(f"written to {out}", file=sys.stderr)
     return 0
 

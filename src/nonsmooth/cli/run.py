@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import sys
 import time
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +21,13 @@ def add(commands: Any) -> None:
         "Paths in the file are relative to the file.",
     )
     parser.add_argument("study", type=Path, metavar="STUDY.toml", help="the study file")
+    parser.add_argument(
+        "--store", type=Path, metavar="STORE.zarr",
+        help="keep finished chunks of a chart or of basins there, and go on from what is there (or [output] store)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--scheduler", metavar="ADDRESS", help="compute the chunks on the workers of this Dask scheduler (tcp://...)"
+    )
     parser.add_argument("--quiet", action="store_true", help="no progress bars, no summary")
     parser.set_defaults(run=_run)
 
@@ -29,7 +38,14 @@ def _run(options: argparse.Namespace) -> int:
 
     study = read_study(options.study)
     began = time.perf_counter()
-    result = study.compute(progress=not options.quiet)
+    store = options.store or study.store
+    with _connected(options.scheduler) as client:
+        try:
+            result = study.compute(progress=not options.quiet, store=store, client=client)
+        except KeyboardInterrupt:
+            if store:
+                print(f"\nfinished chunks are kept in {store}; the same command goes on", file=sys.stderr)
+            raise
     seconds = time.perf_counter() - began
     written = study.write(result)
     if not options.quiet:
@@ -37,6 +53,20 @@ def _run(options: argparse.Namespace) -> int:
         print(f"computed in {seconds:.2f} s")
         for path in written:
             print(f"written to {path}")
-        if not written:
-            print("nothing was kept: the file has no [output] with `data` or `figure`")
+        if store:
+            print(f"chunks are kept in {store}")
+        if not written and not store:
+            print("nothing was kept: the file has no [output] with `data`, `figure` or `store`")
     return 0
+
+
+def _connected(address: str | None) -> Any:
+    """A client of the scheduler at an address, for a ``with`` block; None without an address."""
+    if address is None:
+        return nullcontext()
+    from nonsmooth.campaign.cluster import connect
+
+    try:
+        return connect(address)
+    except ImportError as error:  # the message says what to install
+        raise ValueError(str(error)) from error

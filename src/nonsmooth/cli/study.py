@@ -24,9 +24,11 @@ __all__ = ["Study", "load_model", "named_model", "read_study"]
 
 VERBS = ("simulate", "sweep", "frequency_response", "poincare", "chart", "basins", "basin_fractions")
 _SYSTEM_KEYS = ("model", "parameters", "smoothed")
-_OUTPUT_KEYS = ("data", "figure", "x", "y")
+_OUTPUT_KEYS = ("data", "figure", "store", "x", "y")
 #: Arguments of verbs that belong to the command line, or that a file cannot hold.
 _NOT_IN_FILES = ("progress", "client", "store")
+#: Verbs whose work is cut into chunks.
+_IN_CHUNKS = ("chart", "basins", "basin_fractions")
 #: A verb that hands its further options on to another takes that one's keys too.
 _HANDS_ON_TO = {"frequency_response": "sweep"}
 _FIGURES = {
@@ -45,14 +47,41 @@ class Study:
     options: Mapping[str, Any]
     output: Mapping[str, str] = field(default_factory=dict)
 
-    def compute(self, *, progress: bool = False) -> xr.Dataset:
-        """Call the verb."""
+    def compute(self, *, progress: bool = False, store: Path | None = None, client: Any = None) -> xr.Dataset:
+        """Call the verb.
+
+        Parameters
+        ----------
+        store : path, optional
+            Where finished chunks are kept.
+        client : dask.distributed.Client, optional
+            Computes the chunks.
+
+        Raises
+        ------
+        ValueError
+            A store or a client for a verb whose work is not cut into chunks.
+        """
         import nonsmooth
 
         verb = getattr(nonsmooth, self.verb)
-        extra = {"progress": progress} if "progress" in inspect.signature(verb).parameters else {}
+        given = {"progress": progress, "store": store, "client": client}
+        known = inspect.signature(verb).parameters
+        for name in ("store", "client"):
+            if given[name] is not None and name not in known:
+                what = "store" if name == "store" else "scheduler"
+                raise ValueError(
+                    f"{self.path}: {self.verb} is not cut into chunks and takes no {what}; "
+                    f"those that do: {', '.join(_IN_CHUNKS)}"
+                )
+        extra = {name: value for name, value in given.items() if name in known}
         result: xr.Dataset = verb(self.system, **self.options, **extra)
         return result
+
+    @property
+    def store(self) -> Path | None:
+        """Where ``[output]`` says that finished chunks are kept."""
+        return self.path.parent / self.output["store"] if "store" in self.output else None
 
     def write(self, result: xr.Dataset) -> list[Path]:
         """Save the data and draw the figure that ``[output]`` asks for; returns what was written."""
@@ -68,7 +97,8 @@ class Study:
             from nonsmooth import plot
 
             named = {axis: self.output[axis] for axis in ("x", "y") if axis in self.output}
-            ax = getattr(plot, _FIGURES[self.verb])(result, **named)
+            counted = self.verb == "sweep" and "density" in result
+            ax = getattr(plot, "density" if counted else _FIGURES[self.verb])(result, **named)
             written.append(plot.save_figure(ax, with_folder(folder / self.output["figure"])))
         return written
 

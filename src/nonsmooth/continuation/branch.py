@@ -35,6 +35,15 @@ SMALL = 2e-3  # of the first orbit's size: a cycle this small is about to vanish
 def march(curve: Curve, point: Point, limits: Limits, first_step: float) -> March:
     """Follow a branch from a point along its tangent until it ends; the first row is the point after it."""
     found = March()
+    try:
+        _follow(found, curve, point, limits, first_step)
+    except KeyboardInterrupt:  # what was found stands
+        found.ending = "interrupted"
+    return found
+
+
+def _follow(found: March, curve: Curve, point: Point, limits: Limits, first_step: float) -> None:
+    """March on, point by point, into ``found``."""
     ds = first_step
     if curve.shooting.reference is not None:
         point = curve.anchored_anew(point)
@@ -102,7 +111,7 @@ def march(curve: Curve, point: Point, limits: Limits, first_step: float) -> Marc
             if kind in ("hopf", "flip_end"):
                 found.ending = "equilibrium" if kind == "hopf" else "branching"
                 found.special[-1].kind = "hopf" if kind == "hopf" else "flip"
-                return found
+                return
         if reason == "range":
             found.add(curve, stop_point)
             found.ending = "range"
@@ -144,7 +153,6 @@ def march(curve: Curve, point: Point, limits: Limits, first_step: float) -> Marc
         before, point, numbers, violation = point, new, numbers_new, violation_new
         if curve.shooting.reference is not None:
             before, point = None, curve.anchored_anew(point)
-    return found
 
 
 def _stepped(curve: Curve, point: Point, ds: float, before: Point | None) -> Point | None:

@@ -46,9 +46,9 @@ def continue_orbit(
     ----------
     start : Orbit, branch, or one row of ``special_points``
         An orbit is followed both ways from its parameter. A branch goes on at each end that stopped at the edge of
-        its range (give a wider ``range``) or at the largest number of points. A flip gives the branch of twice the
-        period, a pitchfork or branch_point the other branch through it, a Hopf point of ``continue_equilibrium`` the
-        cycles that are born there.
+        its range (give a wider ``range``), at the largest number of points or by Ctrl-C (what was found until then is
+        returned). A flip gives the branch of twice the period, a pitchfork or branch_point the other branch through
+        it, a Hopf point of ``continue_equilibrium`` the cycles that are born there.
     parameter : str
         Name of the parameter; that of the branch where not given.
     range : (low, high)
@@ -133,6 +133,8 @@ def _both_ways(curve: Curve, first: Point, bounds: tuple[float, float], asked: A
     up = march(curve, first, asked.limits(bounds, (curve, first)), asked.first)
     if up.ending == "closed":
         return up, March(ending="closed")
+    if up.ending == "interrupted":
+        return up, March(ending="interrupted")
     return up, march(curve, _facing(first, -1.0), asked.limits(bounds), asked.first)
 
 
@@ -187,7 +189,7 @@ def _go_on(start: xr.Dataset, name: str | None, given: Any, asked: Asked) -> xr.
     endings, sentences = list(record.endings), list(record.sentences)
     for side, point in ((0, record.points[0]), (1, record.points[-1])):
         ends.append(([], []))
-        open_end = record.endings[side] == "points" or (
+        open_end = record.endings[side] in ("points", "interrupted") or (
             record.endings[side] in ("range", "physical") and bounds[0] < point.value < bounds[1]
         )
         if not open_end and not (asked.virtual and record.endings[side] in ("grazing", "corner")):

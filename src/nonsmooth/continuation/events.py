@@ -38,6 +38,7 @@ def first_met(curve: Curve, a: Point, b: Point, tests: Tests, crossed: list[str]
     for kind in sorted(crossed, key=EXPLAINS.index):
         number = tests.one(kind)
         known = [(number(point), s, point) for _, s, point in located]
+        # Both are infinite where a visit has turned negative: it is not followed.
         largest = max((abs(x) for x in (number(a), number(b)) if np.isfinite(x)), default=0.0)
         same = [(kind, s, point) for value, s, point in known if abs(value) < SAME * largest]
         if same or any(value > 0.0 for value, _, _ in known):  # met at the same place, or farther on

@@ -34,6 +34,7 @@ ENDINGS = {
         "A reset leads just onto a boundary: beyond this point it leads behind it, where another transition follows at "
         "the same instant."
     ),
+    "interrupted": "Interrupted: what was found until then stands; continue the branch with continue_orbit(branch).",
 }
 
 

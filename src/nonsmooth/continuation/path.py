@@ -162,6 +162,7 @@ class Walk:
         near = np.where(np.take_along_axis(crossed, self.rows[row, 0], axis=1), SOLVED, ROUNDING)
         zero = np.abs(begin) <= near * size
         held = np.where(self.armed & ~zero, begin, -np.inf)
+        held[0] = -np.inf  # the section is passed, nothing has led there
         for i in np.flatnonzero(self.at_once):  # what happens at once must hold; the others: ``elsewhere``
             k = self.fired[i]
             held[i], held[i, k] = -np.inf, 0.0 if zero[i, k] else -begin[i, k]

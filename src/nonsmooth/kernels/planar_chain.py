@@ -3,7 +3,19 @@
 from .cache import inline, kernel
 from .codes import CHATTER, DIVERGED, NO_CONVERGENCE, OK, TOO_MANY_CROSSINGS
 from .planar_extremes import find_twins, finish, include, widen
-from .planar_layout import _INTEGERS, _LINEAR, _MATRIX, _NET, _SCRATCH, _TABLE, _VECTOR, BURST, MOST_CROSSINGS, SHORT
+from .planar_layout import (
+    _INTEGERS,
+    _LINEAR,
+    _MATRIX,
+    _NET,
+    _SCRATCH,
+    _TABLE,
+    _VECTOR,
+    BURST,
+    MOST_CROSSINGS,
+    MOST_STEPS,
+    SHORT,
+)  # fmt: skip
 from .planar_march import bounded, jump, leg, next_holding, set_phase, settle, sign_after, stride, trigger, wrap_phase
 from .planar_search import dense, value_of
 from .planar_tables import HARMONICS, M, build
@@ -96,6 +108,7 @@ def chain(
         n_here = 0
         burst = 0
         waited = 0.0
+        tries = 0
         since = 1e300  # time since the last crossing
         closed = False
         while code == OK and returns < transient + keep:
@@ -166,6 +179,7 @@ def chain(
                 w[1] = section[i, keep - 1, 1]
                 break
             waited += step
+            tries += 1
             short = since + step < SHORT * info[mode, 0]
             since = 0.0 if t >= 0 else since + step
             for j in range(M):
@@ -222,6 +236,7 @@ def chain(
                 if crossed != 0:
                     passes += 1
                     waited = 0.0
+                    tries = 0
                     n_here = 0
                     if passes % every == 0:
                         returns += 1
@@ -240,7 +255,7 @@ def chain(
                     value = value_of(fun, mode, surface, w)
                     if value != 0.0:
                         found[3] = 1 if value > 0.0 else -1
-            if surface >= 0 and waited > t_max and code == OK:
+            if surface >= 0 and (waited > t_max or tries > MOST_STEPS) and code == OK:
                 code = NO_CONVERGENCE
         finish(i, fun, n_i, twin, maximum, minimum, i_max, i_min)
         status[i] = code

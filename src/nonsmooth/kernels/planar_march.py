@@ -47,8 +47,14 @@ def rounding(fun, mode, f, at, w):
 
 
 @inline
+def flat(fun, mode, f, w):
+    """Whether the slope of functional f is zero within rounding at w."""
+    return fabs(slope_of(fun, mode, f, w)) <= rounding(fun, mode, f, M, w)
+
+
+@inline
 def mark_zeros(fun, info, mode, w, zero):
-    """Which indicators are zero within rounding at w.
+    """Which indicators are zero within rounding at w (1), or zero with a slope that is (2): where a stick ends.
 
     At a crossing w carries the rounding of the step that led there: it decides where an indicator has no constant
     part, such as that of a stop at x = 0."""
@@ -58,6 +64,8 @@ def mark_zeros(fun, info, mode, w, zero):
     for f in range(zero.shape[0]):
         noise = rounding(fun, mode, f, 0, w) + 0.25 * step * rounding(fun, mode, f, M, w)
         zero[f] = 1 if fabs(value_of(fun, mode, f, w)) <= noise else 0
+        if zero[f] != 0 and flat(fun, mode, f, w):
+            zero[f] = 2
 
 
 @device
@@ -80,9 +88,8 @@ def sign_after(fun, tay, mode, w, f, zero):
     """Sign (-1, 0, 1) of functional f just after w along the mode: its value's, or its first non-zero derivative's."""
     if f >= zero.shape[0] or zero[f] == 0:
         return 1 if value_of(fun, mode, f, w) > 0.0 else -1
-    slope = slope_of(fun, mode, f, w)
-    if fabs(slope) > rounding(fun, mode, f, M, w):
-        return 1 if slope > 0.0 else -1
+    if not flat(fun, mode, f, w):
+        return 1 if slope_of(fun, mode, f, w) > 0.0 else -1
     return sign_of_derivatives(tay, mode, f, w)
 
 
@@ -142,7 +149,7 @@ def jump(i, t, fired, fun, info, w, wn, transitions, ra, rb, rc, rs, zero):
             fired = -1
     mark_zeros(fun, info, mode, w, zero)
     if fired >= 0:
-        zero[fired] = 1
+        zero[fired] = 2 if flat(fun, mode, fired, w) else 1
     return mode
 
 
@@ -179,6 +186,8 @@ def clear_step(fun, info, mode, w, w1, rows, row_start, mode_start, mode_list, z
             g1 = sign * value_of(fun, mode, f, w1)
             s0 = sign * slope_of(fun, mode, f, w)
             s1 = sign * slope_of(fun, mode, f, w1)
+            if zero[f] == 2:
+                s0 = 0.0
             if classify(g0, s0, g1, s1, info[mode, 0], bound_at(fun, info, mode, f, w)) == NEVER:
                 blocked = True
                 break

@@ -63,7 +63,7 @@ def _names(result: xr.Dataset, k: int) -> str:
     """What an attractor is along the parameter, each kind once, in the order met."""
     there = np.flatnonzero(result["period_number"].values[:, k] >= 0)
     kinds = [
-        kind_of(int(result["period_number"].values[i, k]), float(result["lyapunov"].values[i, k])) for i in there
+        kind_of(int(result["period_number"].values[i, k]), bool(result["chaotic"].values[i, k])) for i in there
     ]
     distinct = list(dict.fromkeys(kinds))
     periods = [kind.removeprefix("period ") for kind in distinct if kind.startswith("period")]
@@ -89,5 +89,8 @@ def _maxima(result: xr.Dataset, drawn: Axes, values: np.ndarray, y: str) -> None
         drawn.plot(values[good], heights[good], ".", color=palette.attractor_color(k), markersize=1.5)
         drawn.scatter(
             values[good], heights[good], s=_LARGEST**2 * share[good], color=palette.attractor_color(k),
-            edgecolors="black", linewidths=0.3, label=_names(result, k),
+            edgecolors="black", linewidths=0.3,
         )  # fmt: skip
+        drawn.scatter(  # of one size in the legend, whatever the share
+            [], [], s=25, color=palette.attractor_color(k), edgecolors="black", linewidths=0.3, label=_names(result, k)
+        )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -66,13 +66,37 @@ def curve(result: xr.Dataset, ax: Axes | None = None, *, special: bool = True, c
         known = drawn.get_legend_handles_labels()[1]
         drawn.plot(
             result[x].values, result[y].values, line, color=color or style.COLORS[shade], linewidth=1.0, zorder=3,
-            label=None if words in known else words,
+            label=None if words in known else words, path_effects=_seam() if _over_chart(drawn) else None,
         )  # fmt: skip
         if special:
             _mark(drawn, result, x, y)
         drawn.set(xlabel=label(result, x), ylabel=label(result, y))
-        drawn.legend(loc="best")
+        _legend(drawn)
     return drawn
+
+
+def _over_chart(ax: Axes) -> bool:
+    from matplotlib.collections import QuadMesh
+
+    return any(isinstance(item, QuadMesh) for item in ax.collections)
+
+
+def _seam() -> list[Any]:
+    """A white seam, so that a line shows over every colour of a chart."""
+    from matplotlib import patheffects
+
+    return [patheffects.withStroke(linewidth=1.8, foreground="white")]
+
+
+def _legend(ax: Axes) -> None:
+    """The legend of the curves; that of a chart beneath them stays, and the new one stands below it."""
+    own, before = ax.get_legend_handles_labels()[1], ax.get_legend()
+    if before is not None and not {text.get_text() for text in before.get_texts()} <= set(own):
+        ax.add_artist(before)
+    if _over_chart(ax):
+        ax.legend(loc="lower left", bbox_to_anchor=(1.01, 0.0), borderaxespad=0.0)
+    else:
+        ax.legend(loc="best")
 
 
 def _mark(ax: Axes, result: xr.Dataset, x: str, y: str) -> None:

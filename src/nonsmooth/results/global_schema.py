@@ -40,6 +40,8 @@ _LONG_NAMES = {
     "n_starts_99": "random starts that meet every attractor with 99 %",
     "uncertain": "share of starts with another label at this distance",
     "lyapunov": "largest Lyapunov exponent",
+    "lyapunov_error": "standard error of the largest Lyapunov exponent",
+    "chaotic": "1 where the largest exponent is above zero beyond its error",
     "section": "a section point",
     "not_converged": "share of starts that had not converged",
     "diverged": "share of starts that diverged",
@@ -131,6 +133,10 @@ def attractor_variables(labels: Labels, attractors: Sequence[Any]) -> dict[str, 
             "attractor", np.array([item.confirmed for item in attractors], np.int8),
             {"long_name": "1 where Newton's method has found the cycle"},
         ),
+        "chaotic": (
+            "attractor", np.array([item.chaotic for item in attractors], np.int8),
+            {"long_name": _LONG_NAMES["chaotic"]},
+        ),
         "lyapunov": (
             "attractor", np.array([item.exponent for item in attractors], float),
             {"long_name": "largest Lyapunov exponent", "units": per},
@@ -178,7 +184,8 @@ def basin_fractions(
         dims: tuple[str, ...] = (parameter, "attractor", "state")[: np.ndim(array)]
         variables[name] = (dims, array, {"long_name": _LONG_NAMES[name]})
     variables["period_number"][2]["long_name"] = "period number (0: no cycle, -1: not there)"
-    variables["lyapunov"][2]["units"] = f"1/{labels.time_unit}"
+    for name in ("lyapunov", "lyapunov_error"):
+        variables[name][2]["units"] = f"1/{labels.time_unit}"
     coords: dict[str, Any] = parameter_coords(labels, without=parameter) | state_coords(labels)
     coords[parameter] = (parameter, _floats(values), quantity_attributes(parameter, labels.parameters[parameter]))
     coords["attractor"] = ("attractor", np.arange(np.shape(arrays["fraction"])[1]), {"long_name": "attractor"})

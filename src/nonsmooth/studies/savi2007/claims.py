@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from nonsmooth.studies.savi2007 import claims_basins as basins
 from nonsmooth.studies.savi2007 import claims_diagrams as diagrams
 from nonsmooth.studies.savi2007 import claims_model as model
 from nonsmooth.studies.savi2007 import claims_parameters as parameters
@@ -64,11 +65,13 @@ CLAIMS = (
     Claim("F11", ("fig11", "fig11_rig"), diagrams.f11, rig.f11),
     Claim("F12", ("fig12", "fig12_rig"), diagrams.f12, rig.f12),
     Claim("F13", ("fig13", "fig13_rig"), diagrams.f13, rig.f13),
+    Claim("F13", ("basins13",), basins.f13_basins, _model(1)),
     Claim("F14", ("fig14", "fig14_rig"), diagrams.f14, rig.f14),
     Claim("F15", ("fig15",), diagrams.f15, rig.f15),
     Claim("F16", ("fig16",), rig.f16),
     Claim("F17", ("fig17", "fig17_rig"), diagrams.f17, rig.f17),
     Claim("F17", ("fig17", "fig17_rig"), diagrams.f17_grazing, rig.f17_grazing),
+    Claim("F17", ("basins17",), basins.f17_basins, _model(1)),
     Claim("F18", ("fig18", "fig18_rig"), diagrams.f18, rig.f18),
     Claim("C1", ("fig09_rig", "fig10_rig", "fig11_rig", "fig16", "fig09", "fig10", "fig11", "fig15"), model.c1, rig.c1),
     Claim("C1", ("eta",), model.c1_other_systems, _model(1)),

@@ -34,6 +34,10 @@ class Figure:
         Datasets -> the caption, with the numbers of this run.
     rig : bool
         Whether it is measured on the virtual rig (``settings.bench``); what it shows is then synthetic.
+    beside : int, optional
+        Of a figure that the paper has not: the one of the paper whose parameters it has.
+    full : bool
+        Whether it is made in a full run only.
     """
 
     name: str
@@ -43,6 +47,15 @@ class Figure:
     draw: Callable[[Mapping[str, xr.Dataset]], Canvas]
     caption: Callable[[Mapping[str, xr.Dataset]], str]
     rig: bool = False
+    beside: int | None = None
+    full: bool = False
+
+    @property
+    def place(self) -> float:
+        """Its place in the report: that of its number; of none, at the end."""
+        if self.number is None and self.beside is not None:
+            return self.beside + 0.5
+        return 99.0 if self.number is None else float(self.number)
 
 
 def sheet(width: float, height: float) -> Canvas:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from nonsmooth.flow.starts import random_starts
@@ -43,11 +44,15 @@ FLOWS = (EXACT, SMOOTHED)
 
 @dataclass(frozen=True)
 class Settings:
-    """How much work: ``quick`` for a first look. ``laboratory``: where the figures of the rig are measured."""
+    """How much work: ``quick`` for a first look, ``full`` for the finest. ``laboratory``: where the figures of the rig
+    are measured; ``folder``: where stores of chunks are kept.
+    """
 
     quick: bool = False
+    full: bool = False
     progress: bool = True
     laboratory: Laboratory | None = None
+    folder: Path | None = None
 
     @property
     def bench(self) -> Laboratory:

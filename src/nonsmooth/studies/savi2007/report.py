@@ -79,6 +79,7 @@ def _blocks(
     blocks += [Heading("What the paper leaves open"), Bullets(_OPEN), Heading("Figures")]
     for figure in figures:
         title = figure.title if figure.number is None else f"Fig. {figure.number}: {figure.title}"
+        title += f" (not in the paper; beside Fig. {figure.beside})" if figure.beside is not None else ""
         title += " (virtual rig, synthetic)" if figure.rig else ""
         caption = figure.caption(data[figure.name])
         blocks += [Heading(title, 3), Picture(folder / f"{figure.name}.png", f"{figure.name}.pdf", caption)]

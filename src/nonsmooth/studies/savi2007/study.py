@@ -35,11 +35,16 @@ class Reproduction:
     seconds: dict[str, float] = field(default_factory=dict)
 
 
-def figures_of_the_study() -> tuple[Figure, ...]:
-    """All figures, in the order of the paper, the model's before the rig's; the effect of eta last."""
+def figures_of_the_study(full: bool = False) -> tuple[Figure, ...]:
+    """All figures, in the order of the paper, the model's before the rig's; the effect of eta last.
+
+    Those that take long only where ``full`` is asked for.
+    """
     from nonsmooth.studies.savi2007 import (
         amplitude,
         band,
+        charts,
+        coexisting,
         frequency,
         gap,
         regions,
@@ -53,15 +58,19 @@ def figures_of_the_study() -> tuple[Figure, ...]:
 
     rooms = (
         regions, rig_parameters, resonance, rig_response, amplitude, rig_amplitude, gap, rig_gap, frequency,
-        rig_frequency, band,
+        rig_frequency, coexisting, charts, band,
     )  # fmt: skip
-    figures = [figure for room in rooms for figure in room.FIGURES]
-    places = {PARAMETERS: 8.5, "eta": 99.0}
-    return tuple(sorted(figures, key=lambda figure: (places.get(figure.name, figure.number or 0), figure.rig)))
+    figures = [figure for room in rooms for figure in room.FIGURES if full or not figure.full]
+    places = {PARAMETERS: 8.5}
+    return tuple(sorted(figures, key=lambda figure: (places.get(figure.name, figure.place), figure.rig)))
 
 
 def reproduce(
-    out: str | Path, figures: Sequence[int] | None = None, quick: bool = False, progress: bool = True
+    out: str | Path,
+    figures: Sequence[int] | None = None,
+    quick: bool = False,
+    progress: bool = True,
+    full: bool = False,
 ) -> Reproduction:
     """Reproduce the figures of Savi et al. (2007) by model and virtual rig, and check the paper's statements.
 
@@ -75,10 +84,13 @@ def reproduce(
         Folder to write into, made where missing: ``figNN.pdf``, ``figNN.png``, datasets ``figNN_*.nc``,
         ``report.md``, ``report.html`` (self-contained), ``claims.json``; the rig's sessions in ``rig``.
     figures : list of int, optional
-        Numbers of the paper's figures; all, and the effect of eta, where not given. The report then holds the
-        statements that these figures decide.
+        Numbers of the paper's figures, with the basins and charts that belong to them; all, and the effect of eta,
+        where not given. The report then holds the statements that these figures decide.
     quick : bool
         Coarse grids, short transients and records: a first look, whose numbers have wide intervals.
+    full : bool
+        The charts over two parameters too, of a million points each, and finer basins. Finished parts of a chart are
+        kept in ``chartNN_store.zarr``: a run that was interrupted goes on from there.
     progress : bool
         Bars and a line per figure, on a terminal.
 
@@ -96,10 +108,10 @@ def reproduce(
     from nonsmooth.studies.savi2007.claims import measure_claims
     from nonsmooth.studies.savi2007.report import write_report
 
-    chosen = _chosen(figures)
+    chosen = _chosen(figures, full)
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
-    settings = Settings(quick=quick, progress=progress)
+    settings = Settings(quick=quick, full=full, progress=progress, folder=folder)
     data: dict[str, dict[str, xr.Dataset]] = {}
     seconds: dict[str, float] = {}
     computed = [figure for figure in chosen if not figure.rig]
@@ -123,8 +135,8 @@ def reproduce(
     return Reproduction(folder, chosen, data, rows, seconds)
 
 
-def _chosen(numbers: Sequence[int] | None) -> tuple[Figure, ...]:
-    known = figures_of_the_study()
+def _chosen(numbers: Sequence[int] | None, full: bool) -> tuple[Figure, ...]:
+    known = figures_of_the_study(full)
     if numbers is None:
         return known
     there = {figure.number for figure in known if figure.number is not None}
@@ -136,7 +148,9 @@ def _chosen(numbers: Sequence[int] | None) -> tuple[Figure, ...]:
         )
     with_rig = any(figure.rig and figure.number in numbers for figure in known)
     return tuple(
-        figure for figure in known if figure.number in numbers or (with_rig and figure.name == PARAMETERS)
+        figure
+        for figure in known
+        if figure.number in numbers or figure.beside in numbers or (with_rig and figure.name == PARAMETERS)
     )
 
 
