@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.continuation.arclength import Curve
-from nonsmooth.continuation.branch import ENDINGS, Limits, March
+from nonsmooth.continuation.marches import ENDINGS, Limits, March
 from nonsmooth.continuation.orbit import Orbit
 from nonsmooth.continuation.records import BranchRecord, PointRecord
 from nonsmooth.continuation.shooting import Shooting

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.continuation.arclength import Curve, Point, chordal
-from nonsmooth.continuation.change import Change, changed, common_point, resumed
 from nonsmooth.continuation.detection import Tests
 from nonsmooth.continuation.events import (
     BESIDE,
@@ -21,100 +17,33 @@ from nonsmooth.continuation.events import (
     smooth_events,
     swing,
 )
-from nonsmooth.continuation.grazing import Graze, graze
+from nonsmooth.continuation.leaving import change_of_signature, passed_by
+from nonsmooth.continuation.marches import Limits, March
 from nonsmooth.continuation.path import VIOLATIONS
-from nonsmooth.continuation.switching import is_doubled
 from nonsmooth.errors import SystemDefinitionError
 
-__all__ = ["ENDINGS", "March", "Row", "Special", "march"]
+__all__ = ["march"]
 
 FloatArray = NDArray[np.float64]
 
-#: How a branch can end, with the sentence for each.
-ENDINGS = {
-    "range": "The branch reached the edge of the range.",
-    "branching": "The branch begins where it leaves another one.",
-    "closed": "The branch came back to where it began.",
-    "points": "The largest number of points was reached; continue the branch with continue_orbit(branch).",
-    "equilibrium": (
-        "The cycle shrinks to an equilibrium, a Hopf bifurcation: continue_equilibrium finds it to the last digit."
-    ),
-    "no_convergence": (
-        "Newton's method did not converge, however small the step; the orbit may end in an event that is not known "
-        "here (a chatter, an infinite period)."
-    ),
-    "grazing": (
-        "The orbit touches a boundary and no orbit near it goes on: beyond this point the motion leaves for another "
-        "attractor."
-    ),
-    "corner": "The orbit meets the corner of two boundaries, and no orbit near it goes on.",
-    "physical": "Beyond this value the equations do not allow the parameter: the range was cut there.",
-    "circle": "The virtual branch came back to an earlier point of its own and goes round from here on.",
-    "landing": (
-        "A reset leads just onto a boundary: beyond this point it leads behind it, where another transition follows at "
-        "the same instant."
-    ),
-}
 LEAST_STEP = 1e-9
 COSINE = 0.98  # of the angle between the tangents of neighbours
 SPREAD = 0.15  # chordal change of the multipliers between neighbours
 SMALL = 2e-3  # of the first orbit's size: a cycle this small is about to vanish in a Hopf bifurcation
 
 
-@dataclass
-class Row:
-    """One point of the branch with the curve it lies on; ``virtual`` beyond a boundary that its path should obey."""
-
-    curve: Curve
-    point: Point
-    virtual: bool = False
-
-
-@dataclass
-class Special:
-    """A special point: its kind, its place among the rows, and what belongs to its kind."""
-
-    kind: str
-    curve: Curve
-    point: Point
-    row: int = -1
-    indicator: int = -1
-    graze: Graze | None = None
-
-
-@dataclass
-class March:
-    """Rows in the order of the march, special points, and the ending (a key of ``ENDINGS``)."""
-
-    rows: list[Row] = field(default_factory=list)
-    special: list[Special] = field(default_factory=list)
-    ending: str = "points"
-
-    def add(self, curve: Curve, point: Point) -> None:
-        """Append a point."""
-        self.rows.append(Row(curve, point, bool((point.path.violation() < 0.0).any())))
-
-    def mark(self, kind: str, curve: Curve, point: Point, *, virtual: bool = False, **more: Any) -> None:
-        """Append a special point, and a row for it; on a boundary itself no path is virtual."""
-        self.rows.append(Row(curve, point, virtual))
-        self.special.append(Special(kind, curve, point, len(self.rows) - 1, **more))
-
-
-@dataclass
-class Limits:
-    """What bounds a march."""
-
-    low: float
-    high: float
-    largest: float  # step
-    points: int
-    closed: tuple[Curve, Point] | None = None
-    virtual: bool = False  # go on beyond boundaries with the same signature
-
-
 def march(curve: Curve, point: Point, limits: Limits, first_step: float) -> March:
     """Follow a branch from a point along its tangent until it ends; the first row is the point after it."""
     found = March()
+    try:
+        _follow(found, curve, point, limits, first_step)
+    except KeyboardInterrupt:  # what was found stands
+        found.ending = "interrupted"
+    return found
+
+
+def _follow(found: March, curve: Curve, point: Point, limits: Limits, first_step: float) -> None:
+    """March on, point by point, into ``found``."""
     ds = first_step
     if curve.shooting.reference is not None:
         point = curve.anchored_anew(point)
@@ -173,7 +102,7 @@ def march(curve: Curve, point: Point, limits: Limits, first_step: float) -> Marc
             events = sorted([*events, *_apart(beyond, found, met)], key=lambda event: event[1])
         for kind, _, special in events:
             if kind in VIOLATIONS:
-                _pass(found, curve, kind, special)
+                passed_by(found, curve, kind, special)
                 continue
             if not limits.low <= float(special.X[-1]) <= limits.high:  # a fold just beyond the edge of the range
                 stop_point, reason = edge_before_fold(curve, point, special, limits.low, limits.high), "range"
@@ -182,13 +111,13 @@ def march(curve: Curve, point: Point, limits: Limits, first_step: float) -> Marc
             if kind in ("hopf", "flip_end"):
                 found.ending = "equilibrium" if kind == "hopf" else "branching"
                 found.special[-1].kind = "hopf" if kind == "hopf" else "flip"
-                return found
+                return
         if reason == "range":
             found.add(curve, stop_point)
             found.ending = "range"
             break
         if reason == "change":
-            after = _change(found, curve, met)
+            after = change_of_signature(found, curve, met)
             if after is None:
                 break
             curve, point, ds = after
@@ -224,7 +153,6 @@ def march(curve: Curve, point: Point, limits: Limits, first_step: float) -> Marc
         before, point, numbers, violation = point, new, numbers_new, violation_new
         if curve.shooting.reference is not None:
             before, point = None, curve.anchored_anew(point)
-    return found
 
 
 def _stepped(curve: Curve, point: Point, ds: float, before: Point | None) -> Point | None:
@@ -255,72 +183,6 @@ def _apart(passed_by: list[Event], found: March, met: list[Event]) -> list[Event
     begun = 0.0 if found.rows else BESIDE
     taken = [s for _, s, _ in met]
     return [event for event in passed_by if event[1] > begun and all(abs(event[1] - s) > BESIDE for s in taken)]
-
-
-def _pass(found: March, curve: Curve, kind: str, point: Point) -> None:
-    """Record a boundary that a virtual branch passes with its signature."""
-    for change in changed(curve, point, kind):
-        after = resumed(curve, point, change, curve.shooting.active)
-        if after is None:
-            continue
-        if change.kind == "grazing":
-            _mark_graze(found, curve, point, change, after)
-            return
-    _mark_unexplained(found, curve, kind, point)
-
-
-def _mark_graze(found: March, curve: Curve, point: Point, change: Change, after: tuple[Curve, Point, float]) -> None:
-    """Record a graze: the orbit without the contact, whichever side the branch came from."""
-    fresh, first, _ = after
-    judged = graze(curve, point, first, change)
-    free = (curve, point) if change.gained else (fresh, common_point(curve, point, change) or first)
-    found.mark("grazing", *free, indicator=change.indicator, graze=judged)
-
-
-def _mark_unexplained(found: March, curve: Curve, kind: str, point: Point) -> str:
-    """Record a boundary beyond which no orbit of another signature is known; its name."""
-    name = "grazing" if kind in ("touch", "slow", "short") else "corner"
-    if kind == "short" and 0 < (i := int(point.path.tau.argmin())) < curve.shooting.m:
-        visits = curve.shooting.signature.visits
-        name = "grazing" if visits[i - 1].mode == visits[i + 1].mode else "corner"
-    known = [change.indicator for change in changed(curve, point, kind)]
-    found.mark(name, curve, point, indicator=known[0] if known else _indicator(curve, point, kind))
-    return name
-
-
-def _change(found: March, curve: Curve, met: list[Event]) -> tuple[Curve, Point, float] | None:
-    """Record a change of signature and begin anew behind it; None where the branch ends."""
-    for kind, _, point in met:
-        for change in changed(curve, point, kind):
-            after = resumed(curve, point, change, curve.shooting.active)
-            if after is None:
-                continue
-            fresh, first, ds = after
-            if change.kind == "grazing":
-                _mark_graze(found, curve, point, change, after)
-            elif change.kind == "corner":
-                found.mark("corner", curve, point, indicator=change.indicator)
-            if change.kind != "section" and is_doubled(fresh, first) and not is_doubled(curve, point):
-                # Beyond the graze at which a doubled orbit is born there is only the shorter one, gone round twice.
-                found.ending = "branching"
-                return None
-            return fresh, first, ds
-    kind, _, point = met[0]
-    name = _mark_unexplained(found, curve, kind, point)
-    found.ending = "landing" if kind == "landed" else name
-    return None
-
-
-def _indicator(curve: Curve, point: Point, kind: str) -> int:
-    """The indicator that an unexplained event is about (-1: not known)."""
-    if kind == "touch":
-        visit, k = point.path.touched
-        return int(curve.walk.rows[point.path.which[visit, k], 0])
-    if kind == "landed":
-        k = int(point.path.landing[int(point.path.landed.argmax())])
-        rows = curve.walk.rows[curve.walk.transitions[k, 2] : curve.walk.transitions[k, 3], 0]
-        return int(rows[0]) if len(rows) == 1 else -1
-    return -1
 
 
 def _closed(begin: tuple[Curve, Point], curve: Curve, a: Point, b: Point) -> bool:

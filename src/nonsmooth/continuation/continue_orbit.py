@@ -9,8 +9,11 @@ from numpy.typing import NDArray
 
 from nonsmooth.continuation.arclength import Curve, Point
 from nonsmooth.continuation.begin import Asked, curve_of, limits, resumed_at, sentence, size_of
-from nonsmooth.continuation.branch import ENDINGS, March, march
+from nonsmooth.continuation.branch import march
+from nonsmooth.continuation.detection import Tests
+from nonsmooth.continuation.events import BESIDE
 from nonsmooth.continuation.files import branch_dataset, read_branch
+from nonsmooth.continuation.marches import ENDINGS, March
 from nonsmooth.continuation.orbit import Orbit
 from nonsmooth.continuation.other_branches import born, straight_on, switched
 from nonsmooth.continuation.physical import allowed_range
@@ -25,6 +28,7 @@ __all__ = ["continue_orbit"]
 
 FloatArray = NDArray[np.float64]
 Records = tuple[list[PointRecord], list[SpecialRecord]]
+ZERO = 1e-6  # of the numbers beside it: the first orbit is a special point
 
 
 def continue_orbit(
@@ -42,9 +46,9 @@ def continue_orbit(
     ----------
     start : Orbit, branch, or one row of ``special_points``
         An orbit is followed both ways from its parameter. A branch goes on at each end that stopped at the edge of
-        its range (give a wider ``range``) or at the largest number of points. A flip gives the branch of twice the
-        period, a pitchfork or branch_point the other branch through it, a Hopf point of ``continue_equilibrium`` the
-        cycles that are born there.
+        its range (give a wider ``range``), at the largest number of points or by Ctrl-C (what was found until then is
+        returned). A flip gives the branch of twice the period, a pitchfork or branch_point the other branch through
+        it, a Hopf point of ``continue_equilibrium`` the cycles that are born there.
     parameter : str
         Name of the parameter; that of the branch where not given.
     range : (low, high)
@@ -117,6 +121,8 @@ def _from_orbit(orbit: Orbit, name: str | None, given: Any, asked: Asked) -> xr.
     bounds = allowed_range(system, name, low, high)
     up, down = _both_ways(curve, first, bounds, asked)
     points, special = joined(from_march(down), [point_record(curve, first)], from_march(up))
+    special += [SpecialRecord(kind, len(down.rows)) for kind in _at_the_start(curve, first, down, up)]
+    special.sort(key=lambda one: one.place)
     sentences = (sentence(down, bounds, name, (low, high)), sentence(up, bounds, name, (low, high)))
     record = BranchRecord(name, (low, high), orbit.period_number, points, special, (down.ending, up.ending), sentences)
     return branch_dataset(system, record, asked.options(name, (low, high)))
@@ -127,7 +133,27 @@ def _both_ways(curve: Curve, first: Point, bounds: tuple[float, float], asked: A
     up = march(curve, first, asked.limits(bounds, (curve, first)), asked.first)
     if up.ending == "closed":
         return up, March(ending="closed")
+    if up.ending == "interrupted":
+        return up, March(ending="interrupted")
     return up, march(curve, _facing(first, -1.0), asked.limits(bounds), asked.first)
+
+
+def _at_the_start(curve: Curve, first: Point, down: March, up: March) -> list[str]:
+    """Folds, flips and tori at the first orbit itself: rounding decides whether a march from there sees them."""
+    if not (down.rows and up.rows) or not all(march.rows[0].curve is curve for march in (down, up)):
+        return []
+    tests = Tests(curve)
+    here, before, after = (tests.smooth(point) for point in (first, down.rows[0].point, up.rows[0].point))
+    before[0] = -before[0]  # the march down has its tangents the other way
+    seen = {one.kind for march in (down, up) for one in march.special
+            if one.curve is curve and np.abs(one.point.Y - first.Y).max() < BESIDE}  # fmt: skip
+    found = []
+    for i, kind in ((0, "fold"), (2, "flip"), (3, "neimark_sacker")):
+        if kind in seen or not before[i] * after[i] < 0.0 or abs(here[i]) > ZERO * max(abs(before[i]), abs(after[i])):
+            continue
+        if kind != "neimark_sacker" or (np.abs(first.multipliers.imag) > BESIDE).any():
+            found.append(kind)
+    return found
 
 
 def _facing(point: Point, sign: float) -> Point:
@@ -163,7 +189,7 @@ def _go_on(start: xr.Dataset, name: str | None, given: Any, asked: Asked) -> xr.
     endings, sentences = list(record.endings), list(record.sentences)
     for side, point in ((0, record.points[0]), (1, record.points[-1])):
         ends.append(([], []))
-        open_end = record.endings[side] == "points" or (
+        open_end = record.endings[side] in ("points", "interrupted") or (
             record.endings[side] in ("range", "physical") and bounds[0] < point.value < bounds[1]
         )
         if not open_end and not (asked.virtual and record.endings[side] in ("grazing", "corner")):

@@ -38,7 +38,8 @@ def first_met(curve: Curve, a: Point, b: Point, tests: Tests, crossed: list[str]
     for kind in sorted(crossed, key=EXPLAINS.index):
         number = tests.one(kind)
         known = [(number(point), s, point) for _, s, point in located]
-        largest = max(abs(x) for x in (number(a), number(b)) if np.isfinite(x))
+        # Both are infinite where a visit has turned negative: it is not followed.
+        largest = max((abs(x) for x in (number(a), number(b)) if np.isfinite(x)), default=0.0)
         same = [(kind, s, point) for value, s, point in known if abs(value) < SAME * largest]
         if same or any(value > 0.0 for value, _, _ in known):  # met at the same place, or farther on
             located += same[:1]
@@ -92,6 +93,8 @@ def passed(
             continue
         if kind == "touch" and _at_an_end(there[1]):
             continue  # the other side of an impact of no speed
+        if kind == "landed" and int(there[1].path.landed.argmax()) == 0:
+            continue  # the section passes behind the boundary, the orbit was there before
         found.append((kind, *there))
     found.sort(key=lambda event: EXPLAINS.index(event[0]))
     kept: list[Event] = []

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.continuation.branch import ENDINGS
+from nonsmooth.continuation.marches import ENDINGS
 from nonsmooth.continuation.records import BranchRecord, PointRecord, SpecialRecord
 from nonsmooth.continuation.signature import Signature, Visit
 

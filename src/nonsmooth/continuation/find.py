@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 __all__ = ["failed", "find_orbit"]
 
 FloatArray = NDArray[np.float64]
+GOOD = (codes.OK, codes.NOT_GUARANTEED)
 RTOL = 1e-12  # of the runs from which orbits are read
 NOISE = 1e-11  # of the motion's size: beyond a boundary by less than this is on it
 FAR = 30.0  # how far from the motion, in units of its gap, the orbit may lie
@@ -84,8 +85,12 @@ def find_orbit(
         guesses = autonomous_guesses(system, engine, state, transient, max_period, period_number)
     else:
         keep = 2 * max(max_period, period_number or 1) + 2
+        begun = state.copy()
         settled = settle_forced(system, engine, state, transient, keep)
-        if settled.status not in (codes.OK, codes.NOT_GUARANTEED):
+        if settled.status not in GOOD and not transient and period_number is not None:
+            # The motion leaves an unstable orbit and fails later: its first rounds are enough.
+            settled = settle_forced(system, engine, begun, 0, period_number + 1)
+        if settled.status not in GOOD:
             raise failed(settled.status)
         guesses = forced_guesses(system, settled, period_number, max_period)
     if not guesses:

@@ -13,7 +13,7 @@ from nonsmooth.continuation.signature import Signature
 
 if TYPE_CHECKING:
     from nonsmooth.continuation.arclength import Curve, Point
-    from nonsmooth.continuation.branch import March, Special
+    from nonsmooth.continuation.marches import March, Special
 
 __all__ = ["BranchRecord", "PointRecord", "SpecialRecord", "from_march", "joined"]
 
