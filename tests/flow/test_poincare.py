@@ -159,8 +159,9 @@ def test_a_valve_that_comes_to_rest_ends_with_a_status_without_t_max() -> None:
     top = ns.Poincare("lift_velocity", rising=False)
     options = {"section": top, "start": start, "method": "taylor", "rtol": 1e-10}
     scan = ns.sweep(
-        ns.models.relief_valve(), "q", [8.0, 8.6, 9.0], direction=None, transient=1024, keep=32, progress=False, **options
-    )
+        ns.models.relief_valve(), "q", [8.0, 8.6, 9.0], direction=None, transient=1024, keep=32, progress=False,
+        **options,
+    )  # fmt: skip
     meanings = scan["status"].attrs["flag_meanings"].split()
     assert [meanings[int(code)] for code in scan["status"]] == ["ok", "ok", "no_convergence"]
     assert np.isclose(scan["maximum"].sel(q=8.0, state="y1"), 6.009885866, atol=2e-7)
