@@ -157,18 +157,16 @@ def test_a_valve_that_comes_to_rest_ends_with_a_status_without_t_max() -> None:
     """Beyond the Hopf point (q = 8.4911) the lift's maxima die out: an equilibrium, and no section is met again."""
     start = {"y1": 0.2, "y2": 0.0, "y3": 10.0}
     top = ns.Poincare("lift_velocity", rising=False)
+    options = {"section": top, "start": start, "method": "taylor", "rtol": 1e-10}
     scan = ns.sweep(
-        ns.models.relief_valve(), "q", [8.0, 8.55, 9.5], direction=None, section=top, start=start, transient=1024,
-        keep=32, method="taylor", rtol=1e-10, progress=False,
+        ns.models.relief_valve(), "q", [8.0, 8.6, 9.0], direction=None, transient=1024, keep=32, progress=False,
+        **options,
     )  # fmt: skip
     meanings = scan["status"].attrs["flag_meanings"].split()
     assert [meanings[int(code)] for code in scan["status"]] == ["ok", "ok", "no_convergence"]
     assert np.isclose(scan["maximum"].sel(q=8.0, state="y1"), 6.009885866, atol=2e-7)
-    for method in ("taylor", "rkf45"):
-        with pytest.raises(ns.SolveError, match="come to rest"):
-            ns.poincare(
-                ns.models.relief_valve(q=9.5), n=2000, section=top, start=start, method=method, rtol=1e-8
-            )  # fmt: skip
+    with pytest.raises(ns.SolveError, match="come to rest"):
+        ns.poincare(ns.models.relief_valve(q=9.0), n=1056, **options)
 
 
 def test_a_slow_drift_is_no_rest() -> None:
