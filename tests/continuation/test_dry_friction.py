@@ -62,7 +62,7 @@ def slip(t0: float, x0: float, w: float, F: float) -> tuple[float, float]:
 
 
 def test_a_cycle_that_sticks_twice() -> None:
-    """w = 0.4, F = 0.3: one slip each way. The place x of rest gives the next one, -x, in closed form; its slope too."""
+    """w = 0.4, F = 0.3: one slip each way. The place x of rest gives the next, -x, in closed form; its slope too."""
     w, F = 0.4, 0.3
 
     def next_rest(x: float) -> float:  # from rest at x it goes backward once cos(w t) - x = -F, t < pi / w

@@ -99,6 +99,7 @@ def describe(
     )
     kinds = {key: _mode(mode, key, units) for key, mode in modes.items()}
     traced = trace_system(name, symbols, kinds, indicators, transitions, shown)
+    _check_phases(traced)
     surfaces = tuple(trace_surface(item, traced) for item in transitions if isinstance(item, Surface))
     values = {symbol: known[key].value for key, symbol in symbols.p.items()}
     traced, explicit = _with_period(traced, symbols, values, period)
@@ -200,6 +201,22 @@ def _with_period(
         Domain(traced).check({name: values[symbol] for name, symbol in symbols.p.items()})
         check_period(expressions, traced.t, values, float(period.subs(values)), _plain(period, symbols))
     return traced, timed and period is None
+
+
+def _check_phases(traced: Traced) -> None:
+    """Of two transitions from one mode at one phase only the first would ever be taken."""
+    met: dict[tuple[int, float], str] = {}
+    for jump in traced.transitions:
+        if jump.at is None:
+            continue
+        place = (jump.source, float(jump.at))
+        if place in met:
+            raise SystemDefinitionError(
+                f"transitions {met[place]} and {jump.label} both leave mode {traced.mode_names[jump.source]!r} at phase "
+                f"{float(jump.at):g}: only the first would be taken. Put what both do into one reset, or give them "
+                "different phases"
+            )
+        met[place] = jump.label
 
 
 def _plain(expression: sp.Expr, symbols: Symbols) -> str:
