@@ -94,8 +94,10 @@ def test_two_transitions_from_one_mode_at_one_phase_are_refused():
     """Only the first would ever be taken."""
     kicks = [Transition("only", "only", at=0.25, reset=lambda t, u, p, k=k: (u.x + k,)) for k in (1, 2)]
     told = {
-        "states": ["x"], "parameters": {"w": (1.0, "rad/s")}, "modes": {"only": lambda t, u, p: (-u.x + np.cos(p.w * t),)},
-    }  # fmt: skip
+        "states": ["x"],
+        "parameters": {"w": (1.0, "rad/s")},
+        "modes": {"only": lambda t, u, p: (-u.x + np.cos(p.w * t),)},
+    }
     with pytest.raises(SystemDefinitionError, match=r"both leave mode 'only' at phase 0.25: only the first"):
         System(**told, transitions=kicks)
     later = Transition("only", "only", at=0.5, reset=lambda t, u, p: (u.x + 2,))

@@ -212,8 +212,8 @@ def _check_phases(traced: Traced) -> None:
         place = (jump.source, float(jump.at))
         if place in met:
             raise SystemDefinitionError(
-                f"transitions {met[place]} and {jump.label} both leave mode {traced.mode_names[jump.source]!r} at phase "
-                f"{float(jump.at):g}: only the first would be taken. Put what both do into one reset, or give them "
+                f"transitions {met[place]} and {jump.label} both leave mode {traced.mode_names[jump.source]!r} at "
+                f"phase {float(jump.at):g}: only the first would be taken. Put what both do into one reset, or give them "
                 "different phases"
             )
         met[place] = jump.label
