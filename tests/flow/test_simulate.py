@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -334,3 +335,24 @@ def test_a_run_is_saved_and_loaded_whole(suffix: str, tmp_path: Path) -> None:
         run = ns.simulate(system, periods=3)
         again = ns.load(ns.save(run, tmp_path / (name + suffix)))
         xr.testing.assert_identical(run, again)
+
+
+def test_a_motion_as_small_as_the_tolerance_is_warned_of() -> None:
+    """x'' + x = 1e-9 cos 2t by a method whose atol is 1e-9: nothing of it is sure; with the right scale it is."""
+    def system(**more):
+        return ns.System(
+            states=["x", "v"], parameters={"F": 1e-9}, modes={"m": lambda t, u, p: (u.v, p.F * np.cos(2 * t) - u.x)},
+            **more,
+        )
+
+    with pytest.warns(UserWarning, match=r"below a hundred times atol.*System\(scale="):
+        ns.simulate(system(), periods=2, method="rkf45")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        run = ns.simulate(system(scale={"x": 1e-9, "v": 1e-9}), periods=2, method="rkf45")
+        ns.simulate(system(), periods=2, method="exact")
+    t = run.time.values
+    exact = 1e-9 / 3 * (np.cos(t) - np.cos(2 * t))
+    np.testing.assert_allclose(run.u.sel(state="x"), exact, atol=1e-16)
+    with pytest.warns(UserWarning, match="below a hundred times atol"):
+        ns.sweep(system(), "F", [1e-9, 2e-9], transient=2, keep=4, method="rkf45", progress=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     from nonsmooth.system.system import System
     from nonsmooth.system.traced import Traced
 
-__all__ = ["EXPERT", "METHODS", "RTOL", "engine_for"]
+__all__ = ["EXPERT", "METHODS", "RTOL", "engine_for", "warn_if_coarse"]
 
 METHODS = ("auto", "exact", "taylor", "rkf45")
 RTOL = 1e-9
@@ -102,6 +103,26 @@ def engine_for(
     from nonsmooth.flow.series import SeriesEngine
 
     return SeriesEngine(equations, system.scale_vector(), name, tolerance, absolute, step=step, **expert)
+
+
+def warn_if_coarse(system: System, engine: Engine, largest: FloatArray) -> None:
+    """Warn where no state ever exceeds a hundred times its ``atol``: the tolerance is then as large as the motion.
+
+    Parameters
+    ----------
+    largest : array (n,)
+        The largest size of each state, that at the start included.
+    """
+    absolute = getattr(engine, "norms", (None, None))[1]
+    if engine.name == "exact" or absolute is None or not (largest > 0).any():
+        return
+    if (largest[np.isfinite(largest)] < 100.0 * absolute[np.isfinite(largest)]).all():
+        sizes = ", ".join(f"{name!r}: {size:.2g}" for name, size in zip(system.states, largest, strict=True))
+        warnings.warn(
+            f"{system.name!r}: the states stay below a hundred times atol, so they may be wrong by as much as they "
+            f"are; give System(scale={{{sizes}}}), or atol",
+            stacklevel=3,
+        )
 
 
 def _absolute(system: System, atol: Any) -> FloatArray | None:

@@ -10,7 +10,7 @@ import numpy as np
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.arguments import check_options, check_system, float_array, real_number, whole_number
 from nonsmooth.flow.engine import FloatArray, Log, State
-from nonsmooth.flow.methods import engine_for
+from nonsmooth.flow.methods import engine_for, warn_if_coarse
 from nonsmooth.flow.starts import first_state, is_one_start, plain_start
 from nonsmooth.kernels import codes
 
@@ -101,11 +101,13 @@ def simulate(
     engine = engine_for(system, method, rtol, atol, step, traced=traced if ramps else None, **expert)
     instants = _instants(samples, t_begin, t_end, None if ramps and period is None else period)
     state = first_state(system, start, mode)
+    begun = np.abs(state.u)
     tables = engine.prepare(system.parameter_vector()[None, :])
     if t_begin > 0:
         check_complete(engine.record(tables, state, t_begin, np.empty(0)), system, state, period)
     log = engine.record(tables, state, t_end, instants)
     check_complete(log, system, state, period)
+    warn_if_coarse(system, engine, np.nanmax(np.abs(np.vstack([begun, log.sample_u, log.u_after])), axis=0))
     options = {
         "periods": periods, "duration": duration, "start": plain_start(system, start), "mode": mode,
         "transient": transient, "samples": samples, "step": step,

@@ -213,8 +213,8 @@ def _check_phases(traced: Traced) -> None:
         if place in met:
             raise SystemDefinitionError(
                 f"transitions {met[place]} and {jump.label} both leave mode {traced.mode_names[jump.source]!r} at "
-                f"phase {float(jump.at):g}: only the first would be taken. Put what both do into one reset, or give them "
-                "different phases"
+                f"phase {float(jump.at):g}: only the first would be taken. Put what both do into one reset, or give "
+                "them different phases"
             )
         met[place] = jump.label
 
