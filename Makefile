@@ -11,7 +11,8 @@ export OPENBLAS_NUM_THREADS ?= 1
 PYTEST_ARGS ?= -n auto --dist loadfile
 
 .DEFAULT_GOAL := help
-.PHONY: help reproduce reproduce-full test slow fuzz coverage rig-against-model check bench docs clean distclean
+.PHONY: help reproduce reproduce-full test slow fuzz coverage rig-against-model check bench gpu gpu-compiler docs clean \
+	distclean
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 26
@@ -45,6 +46,12 @@ check: $(VENV)/.installed-dev  ## ruff, mypy, import-linter, codespell
 
 bench: $(VENV)/.installed-bench  ## compare with other programs on the same work; writes benchmarks/results.md
 	$(BIN)/python benchmarks/run.py
+
+gpu: $(VENV)/.installed-gpu  ## compare a GPU with the processor and time it; writes benchmarks/results_gpu.md
+	$(BIN)/python benchmarks/gpu.py --out benchmarks/results_gpu.md
+
+gpu-compiler: $(VENV)/.installed-gpu  ## registers, spills and operations of the GPU's kernels; needs no GPU
+	$(BIN)/python benchmarks/gpu.py --compiler
 
 docs: $(VENV)/.installed-docs  ## build the documentation into docs/_build/html
 	$(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html

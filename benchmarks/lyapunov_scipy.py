@@ -20,7 +20,7 @@ def exponents(p: Mapping[str, float], u: NDArray[np.float64], n_periods: int) ->
     tau = c_s / k_s
     stiffness, damping = (2 * k / m, (2 * k + k_s) / m), (c / m, (c + c_s) / m)
 
-    def field(mode: int):  # type: ignore[no-untyped-def]
+    def field(mode: int):
         def augmented(t: float, z: NDArray[np.float64]) -> tuple[float, ...]:
             x, v, a, b, d, e = z
             push = (k_s * g / m) if mode else 0.0
@@ -40,7 +40,7 @@ def exponents(p: Mapping[str, float], u: NDArray[np.float64], n_periods: int) ->
         return -separation(t, z) if z[0] > g else -1.0
 
     for event in (entry, separation, second_entry):
-        event.terminal, event.direction = True, 1  # type: ignore[attr-defined]
+        event.terminal, event.direction = True, 1
     saltation = np.array([[1.0, 0.0], [-c_s / m / UNITS, 1.0]])
     q, sums = np.eye(2), np.zeros(2)
     inside = u[0] > g and separation(0.0, u) < 0

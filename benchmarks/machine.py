@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
-from importlib.metadata import version
+from importlib.metadata import distributions, version
 from pathlib import Path
 
 
@@ -21,11 +21,12 @@ def processor() -> str:
 
 
 def facts() -> list[str]:
-    packages = ("nonsmooth", "numpy", "numba", "scipy", "heyoka", "xarray", "sympy")
+    packages = ("nonsmooth", "numpy", "numba", "numba-cuda", "scipy", "heyoka", "xarray", "sympy")
+    there = {found.name.lower() for found in distributions()}
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     return [
         f"processor: {processor()}; {cores} cores visible",
         f"system: {platform.system()}, Python {platform.python_version()}",
-        "versions: " + ", ".join(f"{name} {version(name)}" for name in packages),
+        "versions: " + ", ".join(f"{name} {version(name)}" for name in packages if name in there),
         f"load of the machine when the run began: {os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else "",
     ]

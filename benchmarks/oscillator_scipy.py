@@ -42,7 +42,7 @@ def march(
         return -separation(t, u) if u[0] > g else -1.0
 
     for event in (entry, separation, second_entry):
-        event.terminal, event.direction = True, 1  # type: ignore[attr-defined]
+        event.terminal, event.direction = True, 1
     inside = u[0] > g and separation(0.0, u) < 0
     t, end = 0.0, n_periods * period
     while t < end:

@@ -18,11 +18,13 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 import branch  # noqa: E402
 import chart  # noqa: E402
+import chart_size  # noqa: E402
 import diagram  # noqa: E402
 import lyapunov  # noqa: E402
 import machine  # noqa: E402
 import oscillator  # noqa: E402
 import valve  # noqa: E402
+import valve_scan  # noqa: E402
 
 
 def main() -> int:
@@ -32,7 +34,7 @@ def main() -> int:
     options = parser.parse_args()
     effort = 0.1 if options.quick else 1.0
     text, verdicts = ["# Benchmarks", "", *(f"- {fact}" for fact in machine.facts() if fact), ""], []
-    for part in (oscillator, valve, diagram, chart, lyapunov, branch):
+    for part in (oscillator, valve, valve_scan, diagram, chart, chart_size, lyapunov, branch):
         lines, part_verdicts = part.run(effort)
         print("\n".join(lines), flush=True)
         text += lines

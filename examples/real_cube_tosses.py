@@ -19,7 +19,7 @@ import xarray as xr
 import nonsmooth as ns
 from nonsmooth.experiment.signals.restitution import flights
 from nonsmooth.experiment.signals.rigid_body import corner_heights, corner_restitution, cube
-from nonsmooth.plot.identification.impacts import restitution, toss
+from nonsmooth.plot.identification import restitution, toss
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

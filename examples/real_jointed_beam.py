@@ -17,7 +17,7 @@ import numpy as np
 
 import nonsmooth as ns
 from nonsmooth.identification.amplitude_dependent import amplitude_dependent, response_curves
-from nonsmooth.plot.identification.amplitude_dependent import backbone, forced_responses, modal_damping
+from nonsmooth.plot.identification import backbone, forced_responses, modal_damping
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import nonsmooth as ns
 from nonsmooth.experiment.signals.checks import take
 from nonsmooth.experiment.signals.steady import steady_response
-from nonsmooth.plot.identification.steady_response import steady_amplitude, steady_phase
+from nonsmooth.plot.identification import steady_amplitude, steady_phase
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.analysis.attractors import Settled, Settler
+from nonsmooth.analysis.attractors import Settler
 from nonsmooth.analysis.chart import chart
+from nonsmooth.analysis.settled import Settled
 from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.sections import section_plan
 from nonsmooth.results.provenance import read_provenance

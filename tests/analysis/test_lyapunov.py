@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
+import xarray as xr
 
 import nonsmooth as ns
 from nonsmooth.analysis.lyapunov import kaplan_yorke
@@ -11,7 +15,7 @@ from nonsmooth.analysis.lyapunov import kaplan_yorke
 DEFECT = 1e-10
 
 
-def spectrum(system, **options):  # type: ignore[no-untyped-def]
+def spectrum(system: ns.System, **options: Any) -> xr.Dataset:
     """``ns.lyapunov``, with the trace identity asserted for every spectrum computed here."""
     found = ns.lyapunov(system, progress=False, **options)
     whole = np.isfinite(found.trace_defect.values)
@@ -19,11 +23,11 @@ def spectrum(system, **options):  # type: ignore[no-untyped-def]
     return found
 
 
-def multipliers(system, period_number, transient=2000):  # type: ignore[no-untyped-def]
+def multipliers(system: ns.System, period_number: int, transient: int = 2000) -> np.ndarray:
     """Of the return map at the attractor, by central differences of the exact flow."""
     last = ns.poincare(system, n=1, transient=transient).section.values[-1]
 
-    def image(u):  # type: ignore[no-untyped-def]
+    def image(u: np.ndarray) -> Any:
         return ns.poincare(system, n=period_number, start=u).section.values[-1]
 
     assert np.abs(image(last) - last).max() < 1e-11 * np.abs(last).max() + 1e-13
@@ -35,10 +39,10 @@ def multipliers(system, period_number, transient=2000):  # type: ignore[no-untyp
 def folded(expansion: float, contraction: float, reset: float = 0.0) -> ns.System:
     """A tent map as a flow: x grows by mu in a period; what is beyond mu / 2 at its end is folded back; y shrinks."""
 
-    def grow(t, u, p):  # type: ignore[no-untyped-def]
+    def grow(t: Any, u: Any, p: Any) -> Any:
         return np.log(p.mu) * u.x, -p.b * u.y
 
-    def fold(t, u, p):  # type: ignore[no-untyped-def]
+    def fold(t: Any, u: Any, p: Any) -> Any:
         return p.mu - u.x, u.y + p.r * u.x
 
     return ns.System(
@@ -66,10 +70,10 @@ def test_what_a_saltation_matrix_adds_is_counted() -> None:
     """Constant fields: a crossing stretches by f+ / f-, a pulse by k. The exponent is the count of both."""
     k, low, high, edge = 1.6, 1.0, 2.5, 1.4
 
-    def pulse(t, u, p):  # type: ignore[no-untyped-def]
+    def pulse(t: Any, u: Any, p: Any) -> Any:
         return p.k * (u.x - 1.0), u.y
 
-    def fold(t, u, p):  # type: ignore[no-untyped-def]
+    def fold(t: Any, u: Any, p: Any) -> Any:
         return 1.0 - (u.x - p.edge) / 1.5, u.y
 
     system = ns.System(
@@ -155,7 +159,7 @@ def test_an_autonomous_cycle_with_impacts_has_a_zero_exponent() -> None:
 def test_sticking_loses_a_direction() -> None:
     """Test problem K: multipliers 1 and 0, so the exponents 0 and minus infinity; the defect is 0."""
 
-    def slip(t, u, p):  # type: ignore[no-untyped-def]
+    def slip(t: Any, u: Any, p: Any) -> Any:
         return u.v, -u.x + p.F / (1 + p.d * (p.b - u.v))
 
     system = ns.System(
@@ -235,7 +239,7 @@ def test_errors_at_the_door() -> None:
         ns.lyapunov("Lorenz")
 
 
-def test_results_are_saved_whole(tmp_path) -> None:  # type: ignore[no-untyped-def]
+def test_results_are_saved_whole(tmp_path: Path) -> None:
     """NetCDF keeps infinities, units and the input; a sweep and a single point."""
     system = ns.models.discontinuous_support()
     for k, found in enumerate((

@@ -206,7 +206,7 @@ def linear_with_phase(omega: float, phase: float, linear: ns.System) -> ns.Syste
     """The same motion with the forcing's clock set so that t = 0 is at ``phase``."""
     p = linear.values
 
-    def shifted(t, u, q):  # type: ignore[no-untyped-def]
+    def shifted(t, u, q):
         force = p["rho"] * np.cos(q.omega * t + 2 * np.pi * phase)
         return u.v, (force - 2 * p["k"] * u.x - p["c"] * u.v) / p["m"]
 

@@ -23,6 +23,13 @@ def test_logistic_map(mu: float, chaotic: int) -> None:
     assert abs(float(zero_one_test(logistic(mu))) - chaotic) < 0.06
 
 
+@pytest.mark.parametrize(("offset", "factor"), [(0.0, 1e-9), (100.0, 1.0), (-1e6, 1.0), (3.0, 1e-3)])
+def test_units_do_not_matter(offset: float, factor: float) -> None:
+    """K does not know where the observable has its zero, nor its unit."""
+    for mu, chaotic in ((3.55, 0), (4.0, 1)):
+        assert abs(float(zero_one_test(offset + factor * logistic(mu))) - chaotic) < 0.06
+
+
 def test_quasiperiodic_motion_is_regular() -> None:
     n = np.arange(3000)
     assert abs(float(zero_one_test(np.cos(2 * np.pi * (np.sqrt(5) - 1) / 2 * n)))) < 0.06
@@ -36,6 +43,7 @@ def test_a_sweep_of_the_papers_oscillator() -> None:
     k = zero_one_test(swept)
     assert k.dims == ("rho", "state") and list(k.rho.values) == values
     exponents = ns.lyapunov(system, parameter="rho", values=values, periods=1500, progress=False)
+    assert np.abs(exponents.trace_defect.values).max() < 1e-10
     largest = exponents.exponents.values[:, 0]
     assert (np.abs(largest) > 0.03).all()
     assert np.array_equal(k.values > 0.5, np.repeat((largest > 0)[:, None], 2, axis=1))

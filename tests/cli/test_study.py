@@ -28,7 +28,7 @@ keep = 8
 
 
 @pytest.fixture
-def write(tmp_path: Path):  # type: ignore[no-untyped-def]
+def write(tmp_path: Path):
     def _write(text: str) -> Path:
         path = tmp_path / "study.toml"
         path.write_text(text)
@@ -37,7 +37,7 @@ def write(tmp_path: Path):  # type: ignore[no-untyped-def]
     return _write
 
 
-def test_a_file_computes_what_the_call_computes(write, tmp_path: Path, capsys) -> None:  # type: ignore[no-untyped-def]
+def test_a_file_computes_what_the_call_computes(write, tmp_path: Path, capsys) -> None:
     path = write(SYSTEM + SWEEP + '[output]\ndata = "out/a.nc"\nfigure = "out/a.pdf"\ny = "v"\n')
     assert cli.main(["run", str(path)]) == 0
     assert "sweep of" in capsys.readouterr().out
@@ -57,14 +57,14 @@ def test_a_file_computes_what_the_call_computes(write, tmp_path: Path, capsys) -
         ("[frequency_response]\nvalues = [3.0, 3.1, 3.2]\ntransient = 20\nkeep = 4\n", "amplitude"),
     ],
 )
-def test_every_verb_is_a_table(verb: str, figure_of: str, write, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+def test_every_verb_is_a_table(verb: str, figure_of: str, write, tmp_path: Path) -> None:
     path = write(SYSTEM + verb + '[output]\ndata = "r.zarr"\nfigure = "r.svg"\n')
     assert cli.main(["run", str(path), "--quiet"]) == 0
     assert figure_of in ns.load(tmp_path / "r.zarr")
     assert (tmp_path / "r.svg").exists()
 
 
-def test_a_model_may_come_from_a_file_and_be_smoothed(write, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+def test_a_model_may_come_from_a_file_and_be_smoothed(write, tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(
         "from nonsmooth import models\n"
         "oscillator = models.discontinuous_support(g=0.5)\n"
@@ -100,7 +100,7 @@ def test_a_model_may_come_from_a_file_and_be_smoothed(write, tmp_path: Path) -> 
         ("[system\n", "is not a TOML file: .*line 1"),
     ],
 )
-def test_what_is_wrong_is_named(text: str, message: str, write, capsys) -> None:  # type: ignore[no-untyped-def]
+def test_what_is_wrong_is_named(text: str, message: str, write, capsys) -> None:
     path = write(text)
     with pytest.raises(ValueError, match=message):
         read_study(path)

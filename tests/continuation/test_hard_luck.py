@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 import reference_values as known
 
 import nonsmooth as ns
-from nonsmooth.continuation.branch import ENDINGS
+from nonsmooth.continuation.arclength import Curve
+from nonsmooth.continuation.marches import ENDINGS
 
 support = ns.models.discontinuous_support
 
 
 def ends(branch: object) -> list[str]:
     words = list(ENDINGS)
-    return [words[int(i)] for i in branch["ended"].values]  # type: ignore[index]
+    return [words[int(i)] for i in branch["ended"].values]
 
 
 def test_a_chaotic_start() -> None:
@@ -37,6 +40,34 @@ def test_an_equilibrium_is_no_cycle() -> None:
         ns.find_orbit(ns.models.relief_valve(q=9.5), start={"y1": 0.2, "y2": 0.0, "y3": 10.0})
 
 
+def test_an_unstable_orbit_whose_motion_diverges() -> None:
+    """x' = x + cos t has the orbit (sin t - cos t) / 2 with the multiplier exp(2 pi); the motion leaves it."""
+    system = ns.System(states=["x"], parameters={}, modes={"one": lambda t, u, p: u.x + np.cos(t)})
+    orbit = ns.find_orbit(system, start={"x": -0.5}, transient=0, period_number=1)
+    assert orbit.u == pytest.approx([-0.5], abs=1e-12)
+    assert orbit.floquet_multipliers == pytest.approx([np.exp(2 * np.pi)], rel=1e-10)
+
+
+def test_a_branch_that_is_interrupted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ctrl-C returns what was found, which goes on from there to the same ends."""
+    orbit = ns.find_orbit(support(rho=0.14, g=0.02, omega=3.3))
+    whole = ns.continue_orbit(orbit, "omega", (3.0, 3.5))
+    steps, step = iter(range(5)), Curve.step
+
+    def interrupted(*arguments: Any, **options: Any) -> Any:
+        if next(steps, None) is None:
+            raise KeyboardInterrupt
+        return step(*arguments, **options)
+
+    monkeypatch.setattr(Curve, "step", interrupted)
+    part = ns.continue_orbit(orbit, "omega", (3.0, 3.5))
+    monkeypatch.undo()
+    assert ends(part) == ["interrupted", "interrupted"] and 3 < part.sizes["point"] < whole.sizes["point"]
+    rest = ns.continue_orbit(part)
+    assert ends(rest) == ends(whole) and rest["omega"].values[[0, -1]] == pytest.approx(whole["omega"].values[[0, -1]])
+    assert ns.special_points(rest)["omega"].values == pytest.approx(ns.special_points(whole)["omega"].values, abs=1e-9)
+
+
 def test_a_start_beyond_a_stop() -> None:
     with pytest.raises(ns.SolveError, match="stop"):
         ns.find_orbit(ns.models.impact_oscillator(), start={"x": 2.0})
@@ -53,6 +84,20 @@ def test_an_orbit_that_grazes_at_the_start() -> None:
     assert found == pytest.approx([graze], abs=1e-9)
     assert float(branch["omega"].min()) == pytest.approx(3.4) and float(branch["omega"].max()) == pytest.approx(3.7)
     assert set(np.unique(branch["contacts_per_period"])) == {0.0, 1.0}
+
+
+@pytest.mark.parametrize("shift", [0.0, 1e-14, -1e-14])
+def test_an_orbit_that_is_a_flip_at_the_start(shift: float) -> None:
+    """Begun at the flip itself the branch reports it once, whatever rounding says."""
+    system = support(rho=0.14, g=0.02)
+    plain = ns.continue_orbit(ns.find_orbit(system.with_parameters(omega=4.5)), "omega", (3.9, 5.0))
+    special = ns.special_points(plain)
+    row = special.isel(special=int(np.flatnonzero(special["kind"].values == "flip")[0]))
+    at = system.with_parameters(omega=float(row["omega"]) + shift)
+    orbit = ns.find_orbit(at, start=row["section"].values, period_number=1, transient=0)
+    found = ns.special_points(ns.continue_orbit(orbit, "omega", (3.9, 4.3)))
+    values = found["omega"].values[found["kind"].values == "flip"]
+    assert values == pytest.approx([float(row["omega"])], abs=1e-9)
 
 
 def test_a_range_that_leaves_the_physical_region() -> None:
@@ -89,7 +134,7 @@ def test_a_fold_at_the_edge_of_the_range() -> None:
 def test_wrong_arguments(arguments: tuple[object, ...], words: str) -> None:
     orbit = ns.find_orbit(support(rho=0.14, g=0.02, omega=3.3))
     with pytest.raises((ValueError, TypeError), match=words):
-        ns.continue_orbit(orbit, *arguments)  # type: ignore[arg-type]
+        ns.continue_orbit(orbit, *arguments)
 
 
 def test_what_is_no_orbit() -> None:
@@ -98,7 +143,7 @@ def test_what_is_no_orbit() -> None:
     with pytest.raises(TypeError, match="branch"):
         ns.special_points({})
     with pytest.raises(TypeError):
-        ns.find_orbit("discontinuous_support")  # type: ignore[arg-type]
+        ns.find_orbit("discontinuous_support")
 
 
 def test_switching_where_nothing_branches() -> None:

@@ -139,6 +139,29 @@ def test_manifolds_of_a_linear_saddle_are_straight_lines(kind: str, direction: t
     assert along.min() < 0.0 < along.max()
 
 
+def test_manifold_behind_the_kick() -> None:
+    """At phase 0.7 the points have been mapped once more: they lie on the manifold of the power series too."""
+    found = ns.manifolds(saddle(0.63), length=1.0, kind="unstable", distance=0.05, section=ns.Stroboscopic(0.7))
+    x0 = (B - 1 + np.sqrt((1 - B) ** 2 + 4 * A)) / (2 * A)
+    mu = -A * x0 - np.sqrt((A * x0) ** 2 + B)
+    assert distance(found["section"].values, series(x0, mu), mu, False, 30.0) < 1e-8
+    step = np.linalg.norm(np.diff(found["section"].values, axis=0), axis=1)[np.diff(found["arc_number"].values) == 0]
+    assert step.max() <= 0.05 * (1 + 1e-9)
+
+
+def test_phases_of_a_linear_saddle() -> None:
+    """The line through the orbit's point along the eigenvector: the orbit moves with the phase, the direction stays."""
+    orbit = ns.find_orbit(linear(), period_number=1, transient=0, max_period=1)
+    found = ns.manifolds(orbit, length=20.0, kind="unstable", distance=0.5, section=ns.Stroboscopic(0.3))
+    run = orbit.trajectory(samples=1001)
+    at = run["u"].values[int(np.argmin(np.abs(run["time"].values - 0.3 * orbit.period)))]
+    assert found["orbit_section"].values[0] == pytest.approx(at, abs=1e-9)
+    off = found["section"].values - found["orbit_section"].values[0]
+    assert np.abs(off @ np.array([-1.0, 1.0])).max() < 1e-9 * np.abs(off).max()
+    with pytest.raises(TypeError, match="Stroboscopic"):
+        ns.manifolds(orbit, section=0.3)  # type: ignore[arg-type]
+
+
 def test_what_has_no_manifolds_is_refused(tmp_path: Any) -> None:
     stable = ns.find_orbit(ns.models.discontinuous_support(rho=0.14, g=0.02, omega=4.5))
     with pytest.raises(ValueError, match="has no unstable manifold that is a curve: 0 multipliers lie outside"):
@@ -151,7 +174,7 @@ def test_what_has_no_manifolds_is_refused(tmp_path: Any) -> None:
     few = ns.manifolds(orbit, length=1.0, kind="unstable", distance=0.01, points=30)
     assert "largest number of points" in str(few["ended_because"].values[0])
     with pytest.raises(TypeError, match="takes an Orbit"):
-        ns.manifolds("orbit")  # type: ignore[arg-type]
+        ns.manifolds("orbit")
     short = ns.manifolds(orbit, length=1.0, kind="unstable", distance=0.2)
     ns.save(short, tmp_path / "m.nc")
     assert np.array_equal(ns.load(tmp_path / "m.nc")["section"].values, short["section"].values)

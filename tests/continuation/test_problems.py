@@ -138,6 +138,18 @@ def test_b_symmetric_branch_is_symmetric(duffing: list[xr.Dataset]) -> None:
     assert not np.allclose(duffing[0]["maximum"], -duffing[0]["minimum"], rtol=1e-2)
 
 
+def test_b_doubled_branches_lead_from_flip_to_flip(duffing: list[xr.Dataset]) -> None:
+    """The branch of twice the period that leaves one flip ends at the other one of the pair, to the last digits."""
+    special = ns.special_points(duffing[0])
+    flips = special.isel(special=np.flatnonzero(special["kind"].values == "flip"))
+    low, high = flips["omega"].values.min(), flips["omega"].values.max()
+    for i in range(flips.sizes["special"]):
+        doubled = ns.continue_orbit(flips.isel(special=i))
+        ends = sorted(float(doubled["omega"][k]) for k in (0, -1))
+        assert ends == pytest.approx([low, high], abs=1e-9)
+        assert [of_kind(doubled, "flip")[k] for k in (0, -1)] == pytest.approx([low, high], abs=1e-9)
+
+
 @pytest.mark.parametrize("kind", ["fold", "flip"])
 def test_b_against_scipy(duffing: list[xr.Dataset], kind: str) -> None:
     """SciPy's own solution of P(u) = u, det(DP -+ I) = 0 from our numbers: they move by less than 1e-8."""
@@ -174,7 +186,7 @@ def test_c_sticking_orbit_grazes_the_wall() -> None:
         def top(t: float, y: np.ndarray) -> float:
             return float(y[1])
 
-        top.direction = -1  # type: ignore[attr-defined]
+        top.direction = -1
         run = solve_ivp(field, (0.0, np.pi / 0.92), u, method="DOP853", rtol=1e-13, atol=1e-13, events=top)
         return run.y[:, -1], max(float(y[0]) for y in run.y_events[0])
 

@@ -89,11 +89,11 @@ def test_bad_files_say_where(data: bytes, options: Options, message: str) -> Non
 )
 def test_wrong_arguments_at_the_door(given: dict[str, object], message: str) -> None:
     with pytest.raises(ValueError, match=message):
-        load_recording("absent.csv", **given)  # type: ignore[arg-type]
+        load_recording("absent.csv", **given)
 
 
 def test_wrong_columns_at_the_door() -> None:
     with pytest.raises(TypeError, match="columns must be a mapping"):
-        load_recording("absent.csv", columns=["t"])  # type: ignore[arg-type]
+        load_recording("absent.csv", columns=["t"])
     with pytest.raises(TypeError, match=r"columns\['x'\] must be a header"):
-        load_recording("absent.csv", columns={"x": 1.5})  # type: ignore[dict-item]
+        load_recording("absent.csv", columns={"x": 1.5})

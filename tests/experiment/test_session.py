@@ -55,7 +55,7 @@ def test_a_session_reads(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="`rsponse` is not a procedure of a session; nearest: response"):
         session.recordings("rsponse")
     with pytest.raises(TypeError):
-        session.apparatus["mass"] = 1.0  # type: ignore[index]
+        session.apparatus["mass"] = 1.0
 
 
 def test_a_bare_notebook_is_enough(tmp_path: Path) -> None:

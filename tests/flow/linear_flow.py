@@ -14,7 +14,7 @@ from scipy.linalg import expm
 class LinearFlow:
     """The flow of one linear mode."""
 
-    def __init__(self, A, b=None, harmonics=None, omega=1.0):  # type: ignore[no-untyped-def]
+    def __init__(self, A, b=None, harmonics=None, omega=1.0):
         self.A = np.asarray(A, dtype=float)
         self.n = len(self.A)
         self.omega = float(omega)
@@ -28,15 +28,15 @@ class LinearFlow:
             self.M[: self.n, at], self.M[: self.n, at + 1] = harmonics[k]
             self.M[at, at + 1], self.M[at + 1, at] = -k * self.omega, k * self.omega
 
-    def _z(self, t0: float, u0) -> np.ndarray:  # type: ignore[no-untyped-def]
+    def _z(self, t0: float, u0) -> np.ndarray:
         waves = [f(k * self.omega * t0) for k in self.multiples for f in (np.cos, np.sin)]
         return np.array([*u0, 1.0, *waves])
 
-    def at(self, t0: float, u0, t: float) -> np.ndarray:  # type: ignore[no-untyped-def]
+    def at(self, t0: float, u0, t: float) -> np.ndarray:
         """The state at t, in double precision."""
         return (expm(self.M * (t - t0)) @ self._z(t0, u0))[: self.n]
 
-    def exactly(self, t0: float, u0, t: float) -> np.ndarray:  # type: ignore[no-untyped-def]
+    def exactly(self, t0: float, u0, t: float) -> np.ndarray:
         """The state at t, by 40 digits."""
         with mpmath.workdps(40):
             w = [f(k * mpmath.mpf(self.omega) * t0) for k in self.multiples for f in (mpmath.cos, mpmath.sin)]
@@ -44,7 +44,7 @@ class LinearFlow:
             end = mpmath.expm(mpmath.matrix(self.M.tolist()) * (mpmath.mpf(float(t)) - mpmath.mpf(float(t0)))) * z
             return np.array([float(end[i]) for i in range(self.n)])
 
-    def along(self, t0: float, u0, t1: float, count: int) -> tuple[np.ndarray, np.ndarray]:  # type: ignore[no-untyped-def]
+    def along(self, t0: float, u0, t1: float, count: int) -> tuple[np.ndarray, np.ndarray]:
         """``count`` + 1 equidistant instants from t0 to t1, and the states there."""
         step = expm(self.M * ((t1 - t0) / count))
         z = self._z(t0, u0)

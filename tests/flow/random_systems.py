@@ -25,7 +25,7 @@ class Template:
     duration: tuple[float, float]
 
 
-def draw(template: Template, rng: np.random.Generator):  # type: ignore[no-untyped-def]
+def draw(template: Template, rng: np.random.Generator):
     """(system, start, duration) with every number random."""
     system = template.system.with_parameters({k: rng.uniform(*r) for k, r in template.ranges.items()})
     start = rng.uniform(*template.start, size=len(system.states))
@@ -41,7 +41,7 @@ def _matrix(name: str, n: int) -> dict[str, tuple[float, float]]:
     return {f"{name}{i}{j}": (-0.5, -0.1) if i == j else (-1.5, 1.5) for i in range(n) for j in range(n)}
 
 
-def _product(p, name: str, u) -> list:  # type: ignore[no-untyped-def, type-arg]
+def _product(p, name: str, u) -> list:
     n = len(u)
     return [sum(getattr(p, f"{name}{i}{j}") * u[j] for j in range(n)) for i in range(n)]
 
@@ -54,13 +54,13 @@ def bilinear() -> Template:
         "w": (0.6, 1.8), "g": (-0.3, 0.5), "a": (0.0, 0.3),
     }  # fmt: skip
 
-    def wall(t, u, p):  # type: ignore[no-untyped-def]
+    def wall(t, u, p):
         return u.x - p.g - p.a * np.sin(p.w * t)
 
-    def free(t, u, p):  # type: ignore[no-untyped-def]
+    def free(t, u, p):
         return u.v, p.F * np.cos(p.w * t) - p.k * u.x - p.c * u.v
 
-    def contact(t, u, p):  # type: ignore[no-untyped-def]
+    def contact(t, u, p):
         return u.v, free(t, u, p)[1] - p.k_s * (u.x - p.g) - p.c_s * u.v + p.b
 
     system = ns.System(
@@ -80,13 +80,13 @@ def impact() -> Template:
         "e": (0.5, 0.9), "d": (0.0, 0.1),
     }  # fmt: skip
 
-    def wall(t, u, p):  # type: ignore[no-untyped-def]
+    def wall(t, u, p):
         return u.x - p.g - p.a * np.sin(p.w * t)
 
-    def flight(t, u, p):  # type: ignore[no-untyped-def]
+    def flight(t, u, p):
         return u.v, p.F * np.cos(p.w * t) - p.k * u.x - p.c * u.v
 
-    def bounce(t, u, p):  # type: ignore[no-untyped-def]
+    def bounce(t, u, p):
         speed = p.a * p.w * np.cos(p.w * t)
         return u.x - p.d * (u.v - speed), speed - p.e * (u.v - speed)
 
@@ -105,14 +105,14 @@ def relay() -> Template:
         "s": (0.5, 2.0), "F": (0.0, 1.0),
     }  # fmt: skip
 
-    def field(name, sign):  # type: ignore[no-untyped-def]
-        def vector(t, u, p):  # type: ignore[no-untyped-def]
+    def field(name, sign):
+        def vector(t, u, p):
             x, y, z = _product(p, name, u)
             return x + sign * p.s, y, z + p.F * np.cos(p.w * t)
 
         return vector
 
-    def signal(u, p):  # type: ignore[no-untyped-def]
+    def signal(u, p):
         return u.x + p.c1 * u.y + p.c2 * u.z
 
     system = ns.System(
@@ -133,16 +133,16 @@ def shell() -> Template:
         "e": (0.6, 0.8), "b": (0.0, 0.3), "n": (0.5, 2.0),
     }  # fmt: skip
 
-    def size(u):  # type: ignore[no-untyped-def]
+    def size(u):
         return u.x**2 + u.y**2 + 0.7 * u.z**2 + 0.3 * u.x * u.z
 
-    def out(t, u, p):  # type: ignore[no-untyped-def]
+    def out(t, u, p):
         return p.r * u.x - u.y + p.b * u.y * u.z, u.x + p.r * u.y - u.x * u.z, p.r * u.z + p.n * u.x * u.y
 
-    def home(t, u, p):  # type: ignore[no-untyped-def]
+    def home(t, u, p):
         return -p.q * u.x - p.n * u.y, p.n * u.x - p.q * u.y - u.x * u.z, -p.q * u.z + p.b * np.sin(u.x * u.y)
 
-    def squash(t, u, p):  # type: ignore[no-untyped-def]
+    def squash(t, u, p):
         return p.e * u.x, p.e * u.y + p.b * 0.2 * u.x * u.y, p.e * u.z + 0.1 * p.a * np.cos(p.w * t)
 
     system = ns.System(
@@ -163,14 +163,14 @@ def two_masses() -> Template:
         "w": (0.6, 1.8), "g": (0.1, 0.6), "e": (0.5, 0.9),
     }  # fmt: skip
 
-    def field(t, u, p):  # type: ignore[no-untyped-def]
+    def field(t, u, p):
         coupling = p.k12 * (u.x - u.y)
         return (
             u.v, p.F * np.cos(p.w * t) - p.k1 * u.x - p.c * u.v - coupling,
             u.r, (-p.k2 * u.y - p.c * u.r + coupling) / p.m,
         )  # fmt: skip
 
-    def strike(t, u, p):  # type: ignore[no-untyped-def]
+    def strike(t, u, p):
         impulse = (1 + p.e) * (u.v - u.r) * p.m / (1 + p.m)
         return u.x, u.v - impulse, u.y, u.r + impulse / p.m
 
@@ -190,16 +190,16 @@ def pendula() -> Template:
         "a": (0.0, 0.2), "b": (0.2, 1.0), "s": (1.0, 4.0),
     }  # fmt: skip
 
-    def rim(t, u, p):  # type: ignore[no-untyped-def]
+    def rim(t, u, p):
         return np.sin(u.x) + 0.3 * u.y - p.g - p.a * np.cos(p.w * t)
 
-    def free(t, u, p):  # type: ignore[no-untyped-def]
+    def free(t, u, p):
         return (
             u.v, p.F * np.cos(p.w * t) - p.l * np.sin(u.x) - p.c * u.v - p.k * (u.x - u.y),
             u.r, -np.sin(u.y) - p.c * u.r + p.k * (u.x - u.y),
         )  # fmt: skip
 
-    def pressed(t, u, p):  # type: ignore[no-untyped-def]
+    def pressed(t, u, p):
         push = p.b + p.s * rim(t, u, p) + p.b * u.v
         x, v, y, r = free(t, u, p)
         return x, v - push * np.cos(u.x), y, r - 0.3 * push
@@ -221,10 +221,10 @@ def remembering() -> Template:
         "n": (0.0, 0.5), "m0": (-0.5, 0.5),
     }  # fmt: skip
 
-    def free(t, u, p):  # type: ignore[no-untyped-def]
+    def free(t, u, p):
         return u.v, p.F * np.cos(p.w * t) - p.k * u.x - p.c * u.v - p.n * u.x**3 + 0.2 * p.v_a
 
-    def held(t, u, p):  # type: ignore[no-untyped-def]
+    def held(t, u, p):
         return u.v, free(t, u, p)[1] - p.d * u.v * p.v_a - p.d
 
     system = ns.System(
@@ -245,10 +245,10 @@ def growing() -> Template:
         "T": (0.3, 1.0), "e": (0.1, 0.6),
     }  # fmt: skip
 
-    def free(t, u, p):  # type: ignore[no-untyped-def]
+    def free(t, u, p):
         return u.v, p.F * np.cos(p.w * t) - p.k * u.x - p.c * u.v
 
-    def pressed(t, u, p):  # type: ignore[no-untyped-def]
+    def pressed(t, u, p):
         v, a = free(t, u, p)
         return v, a - p.s * (u.x - p.g) - u.y, (u.v - u.y) / p.T
 
@@ -270,13 +270,13 @@ def pulsed() -> Template:
         "e": (0.5, 0.9), "j": (-0.5, 0.5),
     }  # fmt: skip
 
-    def field(sign):  # type: ignore[no-untyped-def]
-        def vector(t, u, p):  # type: ignore[no-untyped-def]
+    def field(sign):
+        def vector(t, u, p):
             return u.v, sign * p.F - p.k * u.x - p.c * u.v - p.n * u.x**3
 
         return vector
 
-    def bounce(t, u, p):  # type: ignore[no-untyped-def]
+    def bounce(t, u, p):
         return u.x, -p.e * u.v
 
     system = ns.System(

@@ -50,7 +50,7 @@ def in_stretches(f: Callable[..., Any], u: Any, end: float, level: float, inside
     while t < end:
         edges = [lambda t, u, s=s: s * relative(t, u) - level for s in (1.0, -1.0)]
         for edge in edges:
-            edge.terminal, edge.direction = True, 1.0 if within else -1.0  # type: ignore[attr-defined]
+            edge.terminal, edge.direction = True, 1.0 if within else -1.0
         step = inside if within else 1e-2
         run = solve_ivp(f, (t, end), u, method="LSODA", rtol=1e-13, atol=1e-15, max_step=step, events=edges)
         t, u, within = run.t[-1], run.y[:, -1], not within
@@ -62,7 +62,7 @@ def in_stretches(f: Callable[..., Any], u: Any, end: float, level: float, inside
 def test_a_layer_of_any_width_is_seen(shape: str, width: float) -> None:
     f, reach = SHAPES[shape]
     system = BLOCKS[shape].with_parameters(w=width)
-    field = lambda t, u: (u[1], -K * u[0] - F * float(f(u[1] / width)))  # noqa: E731
+    field = lambda t, u: (u[1], -K * u[0] - F * float(f(u[1] / width)))
     # At v = 0 the acceleration is about K * START = 2: the steep part lasts for width / 2.
     truth = in_stretches(field, (START, 0.0), END, reach * width, 0.1 * width, lambda t, u: u[1])
     for rtol in TOLERANCES:
@@ -85,7 +85,7 @@ def test_a_block_that_comes_to_rest_in_the_layer_creeps() -> None:
     """At last K x is less than F: v = -w artanh(K x / F) up to terms of the size of w (K / F) w."""
     width, end = 1e-3, 4.0
     system = BLOCKS["step"].with_parameters(w=width)
-    field = lambda t, u: (u[1], -K * u[0] - F * np.tanh(u[1] / width))  # noqa: E731
+    field = lambda t, u: (u[1], -K * u[0] - F * np.tanh(u[1] / width))
     truth = solve_ivp(field, (0.0, end), (START, 0.0), method="LSODA", rtol=1e-12, atol=1e-15, max_step=1e-3).y[:, -1]
     x, v = ns.simulate(system, duration=end, start={"x": START}, method="taylor", rtol=1e-9, samples=2)["u"].values[-1]
     assert abs(x) < F / K
@@ -97,14 +97,14 @@ def test_a_block_that_comes_to_rest_in_the_layer_creeps() -> None:
 def test_friction_on_a_moving_belt(speed: float) -> None:
     """The layer moves with the belt; about speed 0.2 the free motion only just overtakes it."""
     width = 1e-4
-    belt = lambda t: 1.0 + 0.1 * np.cos(7.0 * t)  # noqa: E731
+    belt = lambda t: 1.0 + 0.1 * np.cos(7.0 * t)
     system = ns.System(
         states=("x", "v"),
         parameters={"s": 1.0},
         modes={"slip": lambda t, u, p: (u.v, -K * u.x - F * np.tanh((u.v - p.s * belt(t)) / width))},
     ).with_parameters(s=speed)
-    field = lambda t, u: (u[1], -K * u[0] - F * np.tanh((u[1] - speed * belt(t)) / width))  # noqa: E731
-    relative = lambda t, u: u[1] - speed * belt(t)  # noqa: E731
+    field = lambda t, u: (u[1], -K * u[0] - F * np.tanh((u[1] - speed * belt(t)) / width))
+    relative = lambda t, u: u[1] - speed * belt(t)
     truth = in_stretches(field, (START, 0.0), END, 25.0 * width, 0.1 * width, relative)
     for rtol in (1e-6, 1e-9):
         end = ns.simulate(system, duration=END, start={"x": START}, method="taylor", rtol=rtol, samples=2)
@@ -186,7 +186,7 @@ class Counting(SeriesEngine):
     watchful = True
 
     @property
-    def layers(self) -> Any:  # type: ignore[override]
+    def layers(self) -> Any:
         found = layers(self.traced)
         return found if self.watchful else type(found)(self.traced, 0, False)
 

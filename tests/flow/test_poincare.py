@@ -59,7 +59,7 @@ def swing() -> ns.System:
     ],
     ids=str,
 )
-def test_passages_of_a_harmonic_motion(section, first, spacing, method: str, swing: ns.System) -> None:  # type: ignore[no-untyped-def]
+def test_passages_of_a_harmonic_motion(section, first, spacing, method: str, swing: ns.System) -> None:
     """x = cos t from t = 0: the start, where the speed is zero, is no passage."""
     options = {"section": section, "start": {"x": 1.0}, "method": method, **METHODS[method]}
     if first is None:
@@ -151,3 +151,33 @@ def test_maxima_of_the_relief_valve_repeat_the_published_cycle() -> None:
     assert np.allclose(top["section"].sel(state="y1"), 6.009885866, atol=2e-7)
     assert np.allclose(low["section"].sel(state="y1"), 0.668282564, atol=2e-7)
     assert np.allclose(np.diff(top["time"]), 2.392389442, atol=2e-7)
+
+
+def test_a_valve_that_comes_to_rest_ends_with_a_status_without_t_max() -> None:
+    """Beyond the Hopf point (q = 8.4911) the lift's maxima die out: an equilibrium, and no section is met again."""
+    start = {"y1": 0.2, "y2": 0.0, "y3": 10.0}
+    top = ns.Poincare("lift_velocity", rising=False)
+    options = {"section": top, "start": start, "method": "taylor", "rtol": 1e-10}
+    scan = ns.sweep(
+        ns.models.relief_valve(), "q", [8.0, 8.6, 9.0], direction=None, transient=1024, keep=32, progress=False,
+        **options,
+    )  # fmt: skip
+    meanings = scan["status"].attrs["flag_meanings"].split()
+    assert [meanings[int(code)] for code in scan["status"]] == ["ok", "ok", "no_convergence"]
+    assert np.isclose(scan["maximum"].sel(q=8.0, state="y1"), 6.009885866, atol=2e-7)
+    with pytest.raises(ns.SolveError, match="come to rest"):
+        ns.poincare(ns.models.relief_valve(q=9.0), n=1056, **options)
+
+
+def test_a_slow_drift_is_no_rest() -> None:
+    """x' = 1e-9 reaches the section x = 1e-5 after 10^4 units of time, on steps as long as the waiting."""
+
+    def drift(t, u, p):
+        return (1e-9,)
+
+    def level(t, u, p):
+        return u.x - 1e-5
+
+    system = ns.System(states={"x": "m"}, parameters={}, modes={"only": drift}, indicators={"level": level})
+    points = ns.poincare(system, section=ns.Poincare("level"), n=1, start={"x": 0.0}, method="taylor")
+    assert np.isclose(float(points["time"][0]), 1e4, rtol=1e-6)

@@ -52,8 +52,8 @@ def test_the_support_under_a_slow_ramp_of_the_force(method: str) -> None:
     end = periods * system.period()
     run = ns.simulate(system, periods=periods, ramps={"rho": (0.2, 0.5)}, method=method, **METHODS[method])
 
-    def field(mode):  # type: ignore[no-untyped-def]
-        def f(t, u):  # type: ignore[no-untyped-def]
+    def field(mode):
+        def f(t, u):
             rho = 0.2 + 0.3 * t / end
             support = (p["k_s"] * (u[0] - p["g"]) + p["c_s"] * u[1]) if mode else 0.0
             force = rho * np.cos(p["omega"] * t) - 2 * p["k"] * u[0] - p["c"] * u[1] - support
@@ -61,10 +61,10 @@ def test_the_support_under_a_slow_ramp_of_the_force(method: str) -> None:
 
         return f
 
-    def enter(t, u):  # type: ignore[no-untyped-def]
+    def enter(t, u):
         return u[0] - p["g"]
 
-    def leave(t, u):  # type: ignore[no-untyped-def]
+    def leave(t, u):
         return -(u[0] - p["g"]) - p["c_s"] / p["k_s"] * u[1]
 
     for event in (enter, leave):

@@ -56,7 +56,7 @@ def ball(e: float = 0.8) -> System:
 
 def rotor(**modes: Any) -> System:
     """(x, y) = (cos t, sin t), with indicators x and y."""
-    turn = lambda t, u, p: (-u.y, u.x)  # noqa: E731
+    turn = lambda t, u, p: (-u.y, u.x)
     return System(
         states=("x", "y"), parameters={"a": 1.0}, modes={"only": turn} | modes,
         indicators={"right": lambda t, u, p: u.x, "up": lambda t, u, p: u.y},
@@ -139,7 +139,7 @@ def test_simultaneous_transitions_go_in_declared_order_and_chains_are_logged() -
 
 def test_an_endless_chain_is_chatter() -> None:
     """Two modes that hand a moving point to one another at the same instant."""
-    field = lambda t, u, p: (1.0,)  # noqa: E731
+    field = lambda t, u, p: (1.0,)
     system = System(
         states=("x",), parameters={"g": 1.0}, modes={"a": field, "b": field},
         indicators={"h": lambda t, u, p: u.x - p.g},
@@ -278,7 +278,7 @@ def test_poincare_section_of_a_rotation(method: str, rising: int, every: int, ti
 
 def test_a_section_may_be_bound_to_a_mode() -> None:
     """y = sin t; mode b from t = 4 on (x + t clock): only passes after that count."""
-    turn = lambda t, u, p: (-u.y, u.x, 1.0)  # noqa: E731
+    turn = lambda t, u, p: (-u.y, u.x, 1.0)
     system = System(
         states=("x", "y", "s"), parameters={"g": 4.0}, modes={"a": turn, "b": turn},
         indicators={"up": lambda t, u, p: u.y, "clock": lambda t, u, p: u.s - p.g},

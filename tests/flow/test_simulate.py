@@ -31,10 +31,10 @@ def replay(run: xr.Dataset, p: dict[str, float], tolerance: float) -> None:
     becomes true, and at no instant before (1000 per stretch)."""
     flows = support_flows(p)
 
-    def h_a(u):  # type: ignore[no-untyped-def]
+    def h_a(u):
         return u[..., 0] - p["g"]
 
-    def h_b(u):  # type: ignore[no-untyped-def]
+    def h_b(u):
         return -(u[..., 0] - p["g"]) - p["c_s"] / p["k_s"] * u[..., 1]
 
     scale = np.array([1e-3, 1e-2])

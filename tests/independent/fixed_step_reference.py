@@ -80,9 +80,9 @@ def duffing_truth(duration: float) -> tuple[tuple[float, float], tuple[float, ..
 
     class Switch:
         def __call__(self, ta: object, direction: int) -> bool:
-            ta.pars[0] = float(direction > 0)  # type: ignore[attr-defined]
-            times.append(float(ta.time))  # type: ignore[attr-defined]
-            speeds.append(abs(float(ta.state[1])))  # type: ignore[attr-defined]
+            ta.pars[0] = float(direction > 0)
+            times.append(float(ta.time))
+            speeds.append(abs(float(ta.state[1])))
             return True
 
         def __deepcopy__(self, _memo: object) -> Switch:

@@ -7,25 +7,16 @@ A run is followed over a long transient; its last section points give its period
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import heyoka as hy
 import numpy as np
 from numpy.typing import NDArray
+from where_runs_end import End, end_of
 
 TABLE_1 = {"m": 0.838, "k": 8.47, "k_s": 1210.0, "c": 0.87, "c_s": 0.60}
 ON = 8  # index of the mode among the runtime parameters
-RETURN = 1e-6  # a return closer than this part of the motion's size closes a cycle
 KEPT = 64
-
-
-@dataclass(frozen=True)
-class End:
-    """Where a run ended: its period number (0: none up to 24) and its last section points."""
-
-    period_number: int
-    points: NDArray[np.float64]
 
 
 class Support:
@@ -97,36 +88,8 @@ def _end(machine: Support | Duffing, u: NDArray[np.float64], transient: int, lon
     while True:
         grid = ta.time + machine.period * np.arange(KEPT + 1)
         points = np.asarray(ta.propagate_grid(grid)[5])[1:]
-        size = np.maximum(np.ptp(points, axis=0), 1e-3 * np.abs(points).max(axis=0))
-        scaled = points / size
-        for p in range(1, 25):
-            if np.abs(scaled[p:] - scaled[:-p])[-p:].max() < RETURN:
-                return End(p, points)
+        end = end_of(points)
         waited += 500
-        if waited > longest:
-            return End(0, points)
+        if end.period_number or waited > longest:
+            return end
         ta.propagate_until(ta.time + 500 * machine.period)
-
-
-def agreement(result: Any, found: list[End]) -> float:
-    """Share of starts (in the order of the grid, flat) that end where their label says.
-
-    A cycle: equal period number, and the last point within 1e-5 of the attractor's size of one of its points. No
-    cycle: no period, and nearly all points within a twentieth of its size of its cloud.
-    """
-    from scipy.spatial import cKDTree
-
-    trees = []
-    for k in range(result.sizes["attractor"]):
-        points = result["section_points"].values[result["point_attractor"].values == k]
-        size = (result["maximum"] - result["minimum"]).values[k]
-        trees.append((cKDTree(points / size), size, int(result["period_number"][k])))
-    right = 0
-    for label, end in zip(result["label"].values.ravel(), found, strict=True):
-        if label < 0:
-            continue
-        tree, size, period = trees[int(label)]
-        gap = tree.query(end.points / size)[0]
-        if period == end.period_number:
-            right += bool(gap[-1] < 1e-5) if period else bool((gap < 0.05).mean() > 0.9)
-    return right / len(found)

@@ -35,7 +35,7 @@ def run_oscillator(
             rows = [(separation, 1, "release")] if mode else [(penetration, 1, "enter_a"), (separation, -1, "enter_b")]
             events = []
             for function, direction, _ in rows:
-                event = lambda t, u, function=function: function(t, u)  # noqa: E731 (carries its own direction)
+                event = lambda t, u, function=function: function(t, u)
                 event.direction = direction
                 events.append(event)
             s = solve_ivp(
@@ -76,7 +76,7 @@ def run_valve(
     def top(_t: float, u: NDArray[np.float64]) -> float:
         return u[1]
 
-    seat.terminal, seat.direction, top.direction = True, -1, -1  # type: ignore[attr-defined]
+    seat.terminal, seat.direction, top.direction = True, -1, -1
     while t < duration:
         s = solve_ivp(
             field, (t, duration), u, method="DOP853", rtol=1e-12, atol=1e-14, events=[seat, top], max_step=0.02

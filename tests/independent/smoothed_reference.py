@@ -43,8 +43,8 @@ def march(
 ) -> tuple[NDArray[np.float64], list[tuple[float, str, str]]]:
     """State after `n_periods` from phase 0, and the border crossings (time, from, to). rtol 1e-12."""
     tau, end = p["c_s"] / p["k_s"], n_periods * 2 * np.pi / p["omega"]
-    h_a: Callable[[float, float], float] = lambda x, v: x - p["g"]  # noqa: E731
-    h_b: Callable[[float, float], float] = lambda x, v: -(x - p["g"]) - tau * v  # noqa: E731
+    h_a: Callable[[float, float], float] = lambda x, v: x - p["g"]
+    h_b: Callable[[float, float], float] = lambda x, v: -(x - p["g"]) - tau * v
     # Border: value that rises through zero, whether it counts at (x, v), the region beyond.
     borders: dict[str, list[tuple[Callable, Callable, str]]] = {
         FREE: [
@@ -70,7 +70,7 @@ def march(
         events = []
         for value, counts, _ in borders[where]:
             # A border that does not count here is kept below zero.
-            event = lambda t, u, value=value, counts=counts: value(*u) if counts(*u) else -1.0  # noqa: E731
+            event = lambda t, u, value=value, counts=counts: value(*u) if counts(*u) else -1.0
             event.terminal, event.direction = True, 1
             events.append(event)
 

@@ -13,7 +13,7 @@ from nonsmooth.kernels.circular import LARGEST, QUARTER, REST, cosine, sine
 
 
 @numba.njit
-def _both(x):  # type: ignore[no-untyped-def]
+def _both(x):
     return cosine(x), sine(x)
 
 

@@ -28,7 +28,7 @@ print(json.dumps([numbers, compiled]))
 """
 
 
-def run(folder, **environment):  # type: ignore[no-untyped-def]
+def run(folder, **environment):
     done = subprocess.run(
         [sys.executable, "-c", SCRIPT], capture_output=True, text=True, check=True,
         env={**os.environ, "NONSMOOTH_CACHE_DIR": str(folder), **environment},
@@ -37,7 +37,7 @@ def run(folder, **environment):  # type: ignore[no-untyped-def]
     return np.array(numbers), compiled
 
 
-def test_addresses(tmp_path) -> None:  # type: ignore[no-untyped-def]
+def test_addresses(tmp_path) -> None:
     first, compiled = run(tmp_path)
     second, compiled_again = run(tmp_path)
     plain, nothing = run(tmp_path, NUMBA_DISABLE_JIT="1")

@@ -59,6 +59,20 @@ def test_basins_show_their_attractors(support: ns.System) -> None:
     assert len({attractor_color(k) for k in range(9)}) == 9 and attractor_color(-1) == "#FFFFFF"
 
 
+def test_one_value_has_a_cell_and_any_order_is_drawn_rising(support: ns.System) -> None:
+    found = basins(support, {"x": [0.01], "v": [0.0]}, **QUIET)
+    corners = draw_basins(found).collections[0].get_coordinates()
+    assert np.ptp(corners[..., 0]) > 0 and np.ptp(corners[..., 1]) > 0
+    np.testing.assert_allclose(corners[..., 0].mean(), 0.01)
+    plane = chart(support, {"g": [0.0012, -0.001, 0.0009], "rho": [0.33]}, **QUIET)
+    for show in ("period_number", "maximum"):
+        mesh = draw_chart(plane, show=show).collections[0]
+        middle = mesh.get_coordinates()[0, :, 0]
+        assert (np.diff(middle) > 0).all() and middle.min() < -0.001 and middle.max() > 0.0012
+    rising = plane["maximum"].sel(state="x").sortby("g").values.ravel()
+    np.testing.assert_allclose(mesh.get_array().ravel(), rising)
+
+
 def test_shares_add_up_to_all(support: ns.System) -> None:
     along = basin_fractions(support, "g", [0.0012, 0.0014, 0.0018], n_starts=30, box=BOX, **QUIET)
     ax = draw_fractions(along)
@@ -68,3 +82,21 @@ def test_shares_add_up_to_all(support: ns.System) -> None:
     assert above.get_ylabel() == "max $x$ (m)"
     with pytest.raises(ValueError, match="not a state"):
         draw_fractions(along, y="z")
+
+
+def test_a_density_diagram_shows_the_shares_of_the_bins() -> None:
+    from nonsmooth.plot.density import density
+
+    system = ns.models.discontinuous_support(omega=3.69, g=-0.0045)
+    swept = ns.sweep(system, "rho", [0.3, 0.32, 0.36], transient=40, keep=20, density=True, bins=10, **QUIET)
+    ax = density(swept, y="v")
+    shown = np.ma.filled(ax.collections[0].get_array(), 0.0).reshape(10, 3)
+    np.testing.assert_allclose(np.nan_to_num(shown), 5.0 * swept["density"].sel(state="v").values.T)
+    assert ax.get_xlabel() == r"$\rho$ (N)" and ax.get_ylabel() == "$v$ (m/s)"
+    np.testing.assert_allclose(ax.get_xlim(), (0.29, 0.38))
+    with pytest.raises(ValueError, match=r"plot\.density"):
+        ns.plot.bifurcation(swept)
+    with pytest.raises(ValueError, match="density=True"):
+        density(ns.sweep(system, "rho", [0.3], keep=4, **QUIET))
+    with pytest.raises(ValueError, match="not a state"):
+        density(swept, y="z")

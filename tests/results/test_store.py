@@ -90,7 +90,7 @@ def test_wrong_arguments_are_refused_before_anything_is_written(swept: xr.Datase
     with pytest.raises(ValueError, match=r"must end in \.nc .* or \.zarr"):
         save(swept, tmp_path / "result.csv")
     with pytest.raises(TypeError, match=r"xarray\.Dataset"):
-        save(swept["section"], tmp_path / "result.nc")  # type: ignore[arg-type]
+        save(swept["section"], tmp_path / "result.nc")
     with pytest.raises(DataFileError, match="does not exist"):
         save(swept, tmp_path / "nowhere" / "result.nc")
     with pytest.raises(TypeError, match=r"attribute 'converged' .* bool"):

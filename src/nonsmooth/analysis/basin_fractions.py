@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.analysis.basins import settler_of
+from nonsmooth.analysis.basins import failed, settler_of
 from nonsmooth.analysis.basins_attractors import Attractor, Patience, find_attractors
 from nonsmooth.analysis.basins_matching import numbered
 from nonsmooth.analysis.basins_measures import share_errors, starts_needed
@@ -73,10 +73,12 @@ def basin_fractions(
     -------
     xarray.Dataset
         Over the parameter and ``attractor``: ``fraction`` with its binomial ``fraction_error``, ``period_number`` (0:
-        no cycle, -1: not there), ``lyapunov``, ``maximum``, ``minimum``, a point on the ``section``. A number stays
-        with an attractor along the parameter. A share of 0 beside a period number is an attractor that only a run
-        carried from the value before has met. Over the parameter: ``not_converged``, ``diverged`` (shares) and
-        ``n_starts_99``, the number of starts that meet every attractor met there by random starts with 99 %.
+        no cycle, -1: not there), ``chaotic``, ``lyapunov`` with its error, ``maximum``, ``minimum``, a point on the
+        ``section``. A number stays with an attractor along the parameter: one that a run carried over ends on, and is
+        carried back from. A share of 0 beside a period number is an attractor that only a run
+        carried from the value before has met. Over the parameter: ``not_converged`` and ``diverged`` (shares; of the
+        first, ``failed`` are runs that could not be followed, as from a start beyond a stop) and ``n_starts_99``, the
+        number of starts that meet every attractor met there by random starts with 99 %.
 
     Raises
     ------
@@ -109,15 +111,21 @@ def basin_fractions(
     labels = np.full((len(numbers), n_starts), -1, dtype=np.int64)
     seen: dict[int, Attractor] = {}
     last: dict[int, Attractor] = {}
+    status, before = np.zeros_like(labels), points[rising[0] : rising[0] + 1]
     for i in rising:
         point = points[i : i + 1]
-        found, label = find_attractors(settler, point, runs[i * n_starts : (i + 1) * n_starts], Patience())
-        ids = numbered(settler, point, found, last, seen)
+        found, label, status[i] = find_attractors(
+            settler, point, runs[i * n_starts : (i + 1) * n_starts], Patience()
+        )
+        ids = numbered(settler, point, found, before, last, seen)
+        before = point
         last = dict(zip(ids, found, strict=True))
         seen |= {k: replace(item, tree=None) for k, item in last.items()}
         per_value[i] = last
         labels[i] = np.append(ids, [-2, -1])[label] if len(ids) else label
-    return _dataset(system, settler.engine.name, parameter, numbers, per_value, labels, len(seen), options, seed)
+    return _dataset(
+        system, settler.engine.name, parameter, numbers, per_value, labels, status, len(seen), options, seed
+    )
 
 
 def _starts(system: System, box: Any, n_starts: int, seed: int) -> Any:
@@ -133,7 +141,7 @@ def _starts(system: System, box: Any, n_starts: int, seed: int) -> Any:
 
 def _dataset(
     system: System, method: str, parameter: str, numbers: Any, per_value: list[dict[int, Attractor]],
-    labels: IntArray, n_attractors: int, options: Mapping[str, Any], seed: int,
+    labels: IntArray, status: IntArray, n_attractors: int, options: Mapping[str, Any], seed: int,
 ) -> xr.Dataset:  # fmt: skip
     from nonsmooth.results.global_schema import basin_fractions as build
     from nonsmooth.results.labels import labels_of
@@ -143,16 +151,20 @@ def _dataset(
     count = np.stack([(labels == k).sum(axis=1) for k in range(n_attractors)], axis=1).reshape(len(numbers), -1)
     fraction, error = share_errors(count, n_starts)
     period = np.full(count.shape, -1, dtype=np.int64)
-    exponent = np.full(count.shape, np.nan)
+    exponent, spread = np.full(count.shape, np.nan), np.full(count.shape, np.nan)
+    chaotic = np.zeros(count.shape, dtype=np.int8)
     maximum, minimum, section = (np.full((*count.shape, n), np.nan) for _ in range(3))
     for i, found in enumerate(per_value):
         for k, item in found.items():
-            period[i, k], exponent[i, k] = item.period_number, item.exponent
+            period[i, k], chaotic[i, k] = item.period_number, item.chaotic
+            exponent[i, k], spread[i, k] = item.exponent, item.exponent_error
             maximum[i, k], minimum[i, k], section[i, k] = item.maximum, item.minimum, item.points[0]
     arrays = {
         "fraction": fraction, "fraction_error": error, "period_number": period, "lyapunov": exponent,
+        "lyapunov_error": spread, "chaotic": chaotic,
         "maximum": maximum, "minimum": minimum, "section": section,
         "not_converged": (labels == -1).mean(axis=1), "diverged": (labels == -2).mean(axis=1),
+        "failed": (failed(status) & (labels == -1)).mean(axis=1),
         "n_starts_99": np.array([starts_needed(row) for row in fraction], dtype=np.int64),
     }  # fmt: skip
     named = labels_of(system)

@@ -20,10 +20,14 @@ from nonsmooth.analysis.basins_measures import (
 from nonsmooth.analysis.basins_work import StartsWork, settled_from
 from nonsmooth.analysis.chart import described
 from nonsmooth.analysis.chart_work import CHUNK, STORED
+from nonsmooth.analysis.classify import longest_period
+from nonsmooth.analysis.settled import usable
 from nonsmooth.campaign.run import run
 from nonsmooth.flow.arguments import check_options, check_system, float_array, real_number, whole_number
+from nonsmooth.flow.devices import BATCH, on_gpu, workers_of
 from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
+from nonsmooth.kernels import codes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,7 +35,7 @@ if TYPE_CHECKING:
     from nonsmooth.flow.engine import FloatArray, IntArray
     from nonsmooth.system.system import System
 
-__all__ = ["basins", "by_share", "settler_of"]
+__all__ = ["basins", "by_share", "failed", "settler_of"]
 
 
 def basins(
@@ -47,6 +51,7 @@ def basins(
     rtol: float | None = None,
     atol: Any = None,
     threads: int | None = None,
+    device: str = "cpu",
     store: Any = None,
     client: Any = None,
     any_cpu: bool = False,
@@ -68,11 +73,14 @@ def basins(
         Section returns passed over, then judged; a run ends earlier where its cycle is certain, and is followed for
         20 000 returns and more where it has no period.
     max_period : int
-        Longest period number looked for.
+        Longest period number looked for, less than ``keep``.
     method, rtol, atol
         See :func:`nonsmooth.flow.methods.engine_for`.
     threads : int, optional
         Threads for independent work; the result does not depend on it. Default: one per core.
+    device : {"cpu", "cuda"}
+        ``"cuda"`` runs the starts on an NVIDIA GPU, one per thread: see the guide "A chart on a GPU". What a few
+        single runs decide stays on the processor.
     store : path, optional
         A Zarr store for finished chunks; what is there already is not computed again.
     client : dask.distributed.Client, optional
@@ -86,10 +94,13 @@ def basins(
     -------
     xarray.Dataset
         ``label`` over the two states: the attractor's number, in the order of falling share; -1 not converged, -2
-        diverged. Over ``attractor``: ``period_number`` (0: no cycle), ``fraction`` of the starts with its binomial
-        ``fraction_error``, ``lyapunov``, ``multiplier``, ``maximum``, ``minimum``, a point on the ``section``, and
-        ``minimal_shock``: the least jump of the state, in units of the states' scales, that leads from the section
-        to another basin. ``section_points`` holds the attractors' points one after the other, with ``point_attractor``.
+        diverged; ``status`` says why a start has no label (one beyond a stop, say). Over ``attractor``:
+        ``period_number`` (0: no cycle), ``confirmed`` (1 where Newton's method has found the cycle), ``fraction`` of
+        the starts with its binomial ``fraction_error``, ``lyapunov`` with its error, ``chaotic`` (1 where that is above
+        zero beyond doubt), ``multiplier``, ``maximum``, ``minimum``, a point on the ``section``, and
+        ``minimal_shock``: the least jump of the state, in units of the states' scales,
+        that leads from the section to a start of this plane in another basin or one that diverges.
+        ``section_points`` holds the attractors' points one after the other, with ``point_attractor``.
         Of the picture: ``entropy``, ``boundary_entropy``, ``boundary_dimension``, ``uncertain`` over ``distance``,
         and ``n_starts_99``, the number of random starts that meet every one of these attractors with 99 %.
 
@@ -97,20 +108,30 @@ def basins(
     ------
     ValueError, TypeError
         Arguments that do not fit. A run that fails keeps the label -1 or -2.
+    ImportError, RuntimeError
+        ``device="cuda"`` without the package numba-cuda, or without a GPU.
 
     Notes
     -----
-    A cycle counts with a certificate only (:mod:`nonsmooth.analysis.classify`); motion without a period only where a
-    run of 20 000 returns neither settles nor leaves the places it has visited
-    (:mod:`nonsmooth.analysis.basins_attractors`).
+    A cycle counts with a certificate only (:mod:`nonsmooth.analysis.classify`), and Newton's method on the section's
+    map then gives its points and multipliers to rounding. Motion without a period counts only where a run of 20 000
+    returns neither settles nor leaves the places it has visited, and where runs that begin beside it come back
+    (:mod:`nonsmooth.analysis.basins_candidate`); so motion without damping, and a slow transient, keep the label -1.
+    A start exactly on a boundary, as at a saddle, is pushed off it to one side. Cycles whose multipliers are nearer
+    than 0.002 to the unit circle are not certified; their starts keep -1 with the status ``slow``.
+
+    ``lyapunov`` of a cycle is minus infinity where its multipliers are zero, NaN where they are not zero but lost in
+    rounding (below 1e-8). Where a Poincare section is used, ``lyapunov`` and ``multiplier`` are those of its map: the
+    exponent 0 along the flow is not among them.
     """
     check_system(system, "basins")
     check_options(system, expert, basins)
     values = _plane(system, grid)
     rest = _fixed(system, values, fixed)
     section, settler = settler_of(
-        system, section, transient, keep, max_period, method, rtol, atol, expert, threads=threads
+        system, section, transient, keep, max_period, method, rtol, atol, expert, threads=threads, device=device
     )
+    gpu, threads = device == "cuda", workers_of(device, threads, client)
     names = list(system.states)
     (x_name, x), (y_name, y) = values.items()
     starts = np.tile(rest, (len(x) * len(y), 1))
@@ -119,30 +140,38 @@ def basins(
     options = {
         "grid": values, "fixed": None if fixed is None else dict(fixed), "section": section,
         "transient": transient, "keep": keep, "max_period": max_period, "method": method, "rtol": rtol, "atol": atol,
-        **expert,
+        **({"device": device} if gpu else {}), **expert,
     }  # fmt: skip
     point = system.parameter_vector()[None, :]
-    chunk = CHUNK if store is None and client is None else STORED
+    chunk = BATCH if gpu else CHUNK if store is None and client is None else STORED
     work = StartsWork(settler, point, starts, chunk, described(system, "basins", options))
     columns = run(
         work, threads=threads, progress=progress, label=f"basins over {x_name} and {y_name}", store=store,
         client=client, any_cpu=any_cpu,
     )  # fmt: skip
-    found, labels = by_share(*find_attractors(settler, point, settled_from(columns), Patience()))
+    found, labels, status = find_attractors(settler, point, settled_from(columns), Patience())
+    found, labels = by_share(found, labels)
     label = labels.reshape(len(x), len(y))
     from nonsmooth.results.global_schema import basins as build
     from nonsmooth.results.labels import labels_of
     from nonsmooth.results.provenance import provenance
 
     fraction, error = share_errors([np.sum(labels == k) for k in range(len(found))], labels.size)
-    scale = system.scale_vector()[[names.index(x_name), names.index(y_name)]]
-    inside = [item.points[:, [names.index(x_name), names.index(y_name)]] / scale for item in found]
-    shocks = [minimal_shock(label, x / scale[0], y / scale[1], item, k) for k, item in enumerate(inside)]
+    scale, at = system.scale_vector(), [names.index(x_name), names.index(y_name)]
+    others = [k for k in range(len(names)) if k not in at]
+    shocks = [
+        minimal_shock(
+            label, x / scale[at[0]], y / scale[at[1]], item.points[:, at] / scale[at], k,
+            np.linalg.norm((item.points - rest)[:, others] / scale[others], axis=1),
+        )
+        for k, item in enumerate(found)
+    ]  # fmt: skip
     entropy, boundary = basin_entropy(label)
     steps, parts = uncertain_part(label)
     named = labels_of(system)
     return build(
         named, provenance(named, "basins", options, method=settler.engine.name), values, label, found,
+        status=status.reshape(label.shape),
         fixed={name: rest[names.index(name)] for name in names if name not in values},
         per_attractor={"fraction": fraction, "fraction_error": error, "minimal_shock": np.array(shocks)},
         measures={
@@ -155,20 +184,31 @@ def basins(
 
 def settler_of(
     system: System, section: Any, transient: Any, keep: Any, max_period: Any, method: str, rtol: Any, atol: Any,
-    expert: Mapping[str, Any], *, threads: Any = None,
+    expert: Mapping[str, Any], *, threads: Any = None, device: str = "cpu",
 ) -> tuple[Any, Settler]:  # fmt: skip
     """Check the options that basins share, and the settler they describe."""
     transient, keep = whole_number(transient, "transient", 0), whole_number(keep, "keep", 2)
-    max_period = whole_number(max_period, "max_period", 1)
+    max_period = longest_period(keep, max_period)
     if threads is not None:
         whole_number(threads, "threads", 1)
     section, plan = section_plan(system, section)
+    if isinstance(section, Poincare) and system.period() is not None:
+        raise ValueError(
+            f"{system.name!r} is forced: its fate depends on the phase at which a run starts, so its section must be "
+            "one too: section=ns.Stroboscopic(phase)"
+        )
+    engine = engine_for(system, method, rtol, atol, **expert)
+    on_gpu(device, "basins", engine, plan)
     settler = Settler(
-        system, engine_for(system, method, rtol, atol, **expert), plan, transient, keep, max_period, rtol=rtol,
-        atol=atol, expert=expert,
+        system, engine, plan, transient, keep, max_period, rtol=rtol, atol=atol, expert=expert, device=device
     )  # fmt: skip
     settler.load()
     return section, settler
+
+
+def failed(status: Any) -> Any:
+    """Which runs could not be followed to an end, other than by diverging."""
+    return ~usable(status) & (np.asarray(status) != codes.DIVERGED)
 
 
 def by_share(found: list[Attractor], labels: IntArray) -> tuple[list[Attractor], IntArray]:
@@ -204,6 +244,8 @@ def _fixed(system: System, values: Mapping[str, Any], fixed: Any) -> FloatArray:
 
     names = list(system.states)
     rest = np.zeros(len(names))
+    if not isinstance(fixed, Mapping | None):
+        raise TypeError(f"fixed = {fixed!r}: name the states that are not in the grid, fixed={{name: value}}")
     for name, value in (fixed or {}).items():
         if name not in names:
             raise ValueError(unknown(name, "a state", repr(system.name), dict(system.states)))

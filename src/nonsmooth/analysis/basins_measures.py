@@ -121,17 +121,21 @@ def starts_needed(fractions: Any, certainty: float = 0.99) -> int:
     return high
 
 
-def minimal_shock(label: IntArray, x: FloatArray, y: FloatArray, points: FloatArray, number: int) -> float:
-    """Least distance from an attractor's points to a start with another label, in the units of ``x`` and ``y``.
+def minimal_shock(
+    label: IntArray, x: FloatArray, y: FloatArray, points: FloatArray, number: int, off: FloatArray | None = None
+) -> float:
+    """Least distance from an attractor's points to a start in another basin or one that diverges.
 
-    ``points`` (k, 2) outside the grid are left out; NaN where none is inside, or no other label is there.
+    In the units of ``x`` and ``y``. ``points`` (k, 2) outside the grid are left out, and so are starts of unknown fate
+    (-1); NaN where nothing is left. ``off`` (k,) is the distance of the points from the plane of the starts, where
+    there are more states than two: the jump has to cover it too.
     """
     inside = (points >= [x.min(), y.min()]).all(axis=1) & (points <= [x.max(), y.max()]).all(axis=1)
-    rows, columns = np.nonzero(label != number)
+    rows, columns = np.nonzero((label != number) & (label != -1))
     if not inside.any() or not len(rows):
         return np.nan
     from scipy.spatial import cKDTree
 
     others: NDArray[np.float64] = np.column_stack([x[rows], y[columns]])
     gap, _ = cKDTree(others).query(points[inside])
-    return float(gap.min())
+    return float(np.hypot(gap, 0.0 if off is None else off[inside]).min())

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.analysis.attractors import Settled, Settler
+from nonsmooth.analysis.attractors import Settler
 from nonsmooth.analysis.chart_work import CHUNK
+from nonsmooth.analysis.settled import Settled
 from nonsmooth.campaign.work import Column
 from nonsmooth.flow.engine import FloatArray
 
 __all__ = ["StartsWork", "settled_from"]
-
 
 
 @dataclass(frozen=True)
@@ -30,9 +30,9 @@ class StartsWork:
     def columns(self) -> dict[str, Column]:
         n = self.starts.shape[1]
         kinds = {"period_number": "i8", "status": "i8", "mode": "i8", "returns": "i8"}
-        wide = ("maximum", "minimum", "last")
+        wide = {"maximum": (n,), "minimum": (n,), "last": (self.settler.width,)}
         return {
-            item.name: Column(kinds.get(item.name, "f8"), (n,) if item.name in wide else ()) for item in fields(Settled)
+            item.name: Column(kinds.get(item.name, "f8"), wide.get(item.name, ())) for item in fields(Settled)
         }
 
     def n_chunks(self) -> int:

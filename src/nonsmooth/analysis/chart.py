@@ -10,9 +10,11 @@ import numpy as np
 
 from nonsmooth.analysis.attractors import Settler
 from nonsmooth.analysis.chart_work import CHUNK, STORED, ChartWork
+from nonsmooth.analysis.classify import longest_period
 from nonsmooth.analysis.sweep import swept_values
 from nonsmooth.campaign.run import run
 from nonsmooth.flow.arguments import check_options, check_system, whole_number
+from nonsmooth.flow.devices import BATCH, on_gpu, workers_of
 from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.flow.starts import is_one_start, plain_start, start_states
@@ -46,6 +48,7 @@ def chart(
     rtol: float | None = None,
     atol: Any = None,
     threads: int | None = None,
+    device: str = "cpu",
     store: Any = None,
     client: Any = None,
     any_cpu: bool = False,
@@ -68,14 +71,15 @@ def chart(
     transient, keep : int
         Section returns passed over, then judged. A point that is still settling gets up to eight transients.
     max_period : int
-        Longest period number looked for.
+        Longest period number looked for, less than ``keep``.
     stop_early : bool
         A point ends as soon as its period number is certain (a small return, and multipliers inside the unit circle)
         instead of at the end of its transient. Labels are the same, but for chaotic transients that end about then.
     extremes : bool
         Whether ``maximum`` and ``minimum`` are wanted.
     lyapunov : bool or int
-        Largest exponent, from two neighbours over 1000 (or this many) returns.
+        Largest exponent, from two neighbours over 1000 (or this many) returns. On a Poincare section of an autonomous
+        system the largest beside the zero along the flow.
     refine : bool or float
         Compute points near boundaries only and infer the rest; a number is the largest part of the points to compute.
         See Notes.
@@ -83,6 +87,8 @@ def chart(
         See :func:`nonsmooth.flow.methods.engine_for`.
     threads : int, optional
         Threads for independent work; the result does not depend on it. Default: one per core.
+    device : {"cpu", "cuda"}
+        ``"cuda"`` runs the points on an NVIDIA GPU, one per thread: see the guide "A chart on a GPU".
     store : path, optional
         A Zarr store for finished chunks; what is there already is not computed again.
     client : dask.distributed.Client, optional
@@ -103,6 +109,8 @@ def chart(
     ------
     ValueError, TypeError
         Arguments that do not fit. A point that fails keeps its status; the others are whole.
+    ImportError, RuntimeError
+        ``device="cuda"`` without the package numba-cuda, or without a GPU.
 
     Notes
     -----
@@ -116,6 +124,7 @@ def chart(
     planned = plan_chart(system, grid, campaign=store is not None or client is not None, **given, **expert)
     if threads is not None:
         threads = whole_number(threads, "threads", 1)
+    threads = workers_of(device, threads, client)
     work, label = planned.work, f"chart over {' and '.join(planned.values)}"
     if refine is not False:
         from nonsmooth.analysis.chart_refine import refined
@@ -153,34 +162,37 @@ def plan_chart(
     system: System, grid: Mapping[str, Any], *, start: Any = None, carry: Any = None, section: Any = None,
     transient: Any = 500, keep: Any = 60, max_period: Any = 16, stop_early: bool = True, extremes: bool = True,
     lyapunov: Any = False, refine: Any = False, method: str = "auto", rtol: Any = None, atol: Any = None,
-    campaign: bool = False, **expert: Any,
+    device: str = "cpu", campaign: bool = False, **expert: Any,
 ) -> PlannedChart:  # fmt: skip
     """Check the arguments of :func:`chart` and lay its work out, without computing anything."""
     check_system(system, "chart")
     check_options(system, expert, chart)
     values = _grid(system, grid)
     transient, keep = whole_number(transient, "transient", 0), whole_number(keep, "keep", 2)
-    max_period = whole_number(max_period, "max_period", 1)
+    max_period = longest_period(keep, max_period)
+    _check_edges(system, values)
     section, plan = section_plan(system, section)
     along = _carry(values, carry)
     starts = start_states(system, start)
-    n_exponent = EXPONENT_RETURNS if lyapunov is True else whole_number(int(lyapunov), "lyapunov", 0)
+    n_exponent = {True: EXPONENT_RETURNS, False: 0}[lyapunov] if isinstance(lyapunov, bool) else lyapunov
+    n_exponent = whole_number(n_exponent, "lyapunov", 0)
     if 0 < n_exponent < 40:
         raise ValueError(f"lyapunov = {lyapunov} returns are too few for an exponent; at least 40")
     extremes = bool(extremes) or len(starts) > 1  # attractors are told apart by them
     engine = engine_for(system, method, rtol, atol, **expert)
+    gpu = on_gpu(device, "chart", engine, plan, carried=along is not None)
     settler = Settler(
-        system, engine, plan, transient, keep, max_period, bool(stop_early), extremes, rtol, atol, expert
+        system, engine, plan, transient, keep, max_period, bool(stop_early), extremes, rtol, atol, expert, device
     )
     settler.load()
     options = {
         "grid": values, "start": plain_start(system, start), "carry": None if carry is None else dict(carry),
         "section": section, "transient": transient, "keep": keep, "max_period": max_period,
         "stop_early": bool(stop_early), "extremes": extremes, "lyapunov": n_exponent, "refine": refine,
-        "method": method, "rtol": rtol, "atol": atol, **expert,
+        "method": method, "rtol": rtol, "atol": atol, **({"device": device} if gpu else {}), **expert,
     }  # fmt: skip
     axes, order = _axes(values, along)
-    chunk = STORED if campaign else CHUNK
+    chunk = BATCH if gpu else STORED if campaign else CHUNK
     work = ChartWork(
         settler, axes, starts, along is not None, n_exponent, chunk=chunk, described=described(system, "chart", options)
     )
@@ -202,6 +214,14 @@ def _grid(system: System, grid: Any) -> dict[str, FloatArray]:
         given = list(grid) if isinstance(grid, Mapping) else grid
         raise ValueError(f'grid must name two parameters, {{"omega": values, "rho": values}}; given: {given!r}')
     return {str(name): swept_values(system, name, values) for name, values in grid.items()}
+
+
+def _check_edges(system: System, values: Mapping[str, FloatArray]) -> None:
+    """Values that the system cannot have are told before anything is computed, not at the last of many points."""
+    (a, first), (b, second) = values.items()
+    for along, across in ((first[[0, -1]], second), (first, second[[0, -1]])):  # the plane's edges
+        x, y = np.meshgrid(along, across)
+        system.parameter_points({a: x.ravel(), b: y.ravel()})
 
 
 def _carry(values: Mapping[str, FloatArray], carry: Any) -> tuple[str, str] | None:

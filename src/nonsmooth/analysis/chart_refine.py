@@ -26,6 +26,7 @@ from nonsmooth.kernels import codes
 
 __all__ = ["labels_of_points", "refined"]
 
+LEAST_POINTS = 4  # computed whatever the part
 LARGEST_PART = 0.25  # of the points, where no number is given
 FOR_THE_GRID = 1 / 3  # of the budget, at most, for the coarse grid
 FOR_PROBES = 0.06  # of the budget, for each round of probes
@@ -75,7 +76,8 @@ class _Refinement:
     def __init__(self, work: ChartWork, share: float, threads: int | None, progress: bool, label: str) -> None:
         self.work, self.threads, self.progress, self.text = work, threads, progress, label
         self.shape = (len(next(iter(work.grid.values()))), len(list(work.grid.values())[1]))
-        self.budget = int(share * self.shape[0] * self.shape[1])
+        size = self.shape[0] * self.shape[1]
+        self.budget = max(int(share * size), min(size, LEAST_POINTS))
         self.label = np.full(self.shape, UNKNOWN, dtype=np.int64)
         self.columns = {
             name: np.full((*self.shape, *item.shape), np.nan if item.dtype == "f8" else 0, item.dtype)

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.analysis.attractors import Settled, Settler, usable
+from nonsmooth.analysis.attractors import Settler
+from nonsmooth.analysis.settled import Settled, usable
 from nonsmooth.campaign.work import Column
 from nonsmooth.flow.engine import FloatArray, IntArray
 from nonsmooth.kernels import codes
@@ -18,6 +19,7 @@ __all__ = ["CHUNK", "STORED", "ChartWork", "attractors_among"]
 CHUNK = 256  # runs of one chunk, at least: a tenth of a second
 STORED = 4096  # and of one that is kept in a store or sent to a cluster: a second
 SAME = 1e-6  # extremes that agree to this part of the motion's size belong to one attractor
+POINT = 1e-5  # and section points that agree to this part
 
 
 @dataclass(frozen=True)
@@ -113,7 +115,7 @@ class ChartWork:
             name: arrays[name].reshape(n_places, *item.shape) for name, item in self.columns().items() if name in arrays
         }
         if n_starts > 1:
-            kept["n_attractors"] = attractors_among(found, n_places, n_starts, self.settler.least)
+            kept["n_attractors"] = attractors_among(found, n_places, n_starts, self.settler, points)
         return kept
 
     def _along_rows(self, points: FloatArray, n_starts: int) -> Settled:
@@ -129,21 +131,35 @@ class ChartWork:
         return joined[order.transpose(0, 2, 1).ravel()]
 
 
-def attractors_among(found: Settled, n_places: int, n_starts: int, least: FloatArray) -> IntArray:
-    """Distinct attractors among the starts of each place: by period number and extremes; what has no period is one.
+def attractors_among(
+    found: Settled, n_places: int, n_starts: int, settler: Settler, points: FloatArray
+) -> IntArray:
+    """Distinct attractors among the starts of each place; what has no period is one.
 
-    A cycle's extremes do not depend on where in the cycle a run ended. What is still settling, or failed, is none.
+    Cycles are told apart by period number and extremes, which do not depend on where in the cycle a run ended. Where
+    both agree but the last section points do not, the section points of a whole cycle decide: cycles that differ by a
+    shift in time have equal extremes. What is still settling, or failed, is none.
     """
     period = found.period_number.reshape(n_places, n_starts)
     wandering = found.status.reshape(n_places, n_starts) == codes.NOT_PERIODIC
     extremes = np.concatenate([found.maximum, found.minimum], axis=1).reshape(n_places, n_starts, -1)
-    size = np.maximum(found.maximum - found.minimum, least).reshape(n_places, n_starts, -1)
-    size = np.concatenate([size, size], axis=2)
+    size = np.maximum(found.maximum - found.minimum, settler.least).reshape(n_places, n_starts, -1)
+    n = size.shape[2]
+    last, mode = found.last.reshape(n_places, n_starts, -1)[..., :n], found.mode.reshape(n_places, n_starts)
     count = wandering.any(axis=1).astype(np.int64)
     for k in range(n_starts):
         new = period[:, k] > 0
         for j in range(k):
-            near = np.abs(extremes[:, k] - extremes[:, j]) <= SAME * size[:, k]
-            new &= ~((period[:, j] == period[:, k]) & near.all(axis=1))
+            near = np.abs(extremes[:, k] - extremes[:, j]) <= SAME * np.tile(size[:, k], 2)
+            alike = new & (period[:, j] == period[:, k]) & near.all(axis=1)
+            apart = np.abs(last[:, k] - last[:, j]) > POINT * size[:, k]
+            apart = apart.any(axis=1) | (mode[:, k] != mode[:, j])
+            for i in np.flatnonzero(alike & apart):
+                run = settler.trace(
+                    points[i : i + 1], found.last[i * n_starts + j], int(mode[i, j]), 0, int(period[i, j])
+                )
+                at = (np.abs(run.points - last[i, k]) <= POINT * size[i, k]).all(axis=1) & (run.modes == mode[i, k])
+                alike[i] = at.any() or not len(run.points)
+            new &= ~alike
         count += new
     return count

@@ -14,10 +14,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from nonsmooth.flow.arguments import whole_number
 from nonsmooth.flow.engine import FloatArray
 from nonsmooth.kernels import codes
 
-__all__ = ["TOLERANCE", "Verdict", "judge", "residuals"]
+__all__ = ["TOLERANCE", "Verdict", "judge", "longest_period", "residuals"]
 
 TOLERANCE = 1e-9  # of the return, in units of the motion's size
 NEARLY = 1e-3  # a smallest return below this is a motion that may still settle
@@ -38,6 +39,23 @@ class Verdict:
     status: int
     unstable: bool = False
     multiplier: float = np.nan
+
+
+def longest_period(keep: int, max_period: object) -> int:
+    """``max_period`` as a whole number that ``keep`` section points can show.
+
+    Raises
+    ------
+    ValueError, TypeError
+        One that is not, or not a whole number from 1.
+    """
+    longest = whole_number(max_period, "max_period", 1)
+    if longest >= keep:
+        raise ValueError(
+            f"max_period = {longest}: {keep} kept section points show periods up to {keep - 1} only; raise keep above "
+            "max_period, or lower max_period"
+        )
+    return longest
 
 
 def residuals(points: FloatArray, size: FloatArray, max_period: int) -> FloatArray:

@@ -14,10 +14,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nonsmooth.analysis.sweep import DIRECTIONS, swept_values
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.arguments import check_options, check_system, real_number, whole_number
+from nonsmooth.flow.devices import on_gpu
 from nonsmooth.flow.engine import Chain, Engine, FloatArray, SectionPlan, State
 from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.poincare import result_status
@@ -54,6 +56,7 @@ def lyapunov(
     method: str = "auto",
     rtol: float | None = None,
     atol: Any = None,
+    device: str = "cpu",
     progress: bool = True,
     **expert: Any,
 ) -> xr.Dataset:
@@ -75,6 +78,9 @@ def lyapunov(
         First state and mode, as in :func:`nonsmooth.simulate`.
     method, rtol, atol
         Of the trajectory; see :func:`nonsmooth.flow.methods.engine_for`. Its derivatives are accurate to rounding.
+    device : {"cpu", "cuda"}
+        ``"cuda"`` runs a sweep with ``direction=None`` on an NVIDIA GPU, one point per thread: see the guide "A chart
+        on a GPU".
     progress : bool
         A bar on a terminal.
 
@@ -92,6 +98,8 @@ def lyapunov(
         Arguments that do not fit.
     SolveError
         A single run that could not be completed. In a sweep such a point keeps its status.
+    ImportError, RuntimeError
+        ``device="cuda"`` without the package numba-cuda, or without a GPU.
 
     Notes
     -----
@@ -126,6 +134,20 @@ def lyapunov(
     forced = system.period() is not None
     count, length, wait = _length(system, periods, duration, transient, forced)
     engine = engine_for(system, method, rtol, atol, **expert)
+    options = {
+        "parameter": parameter, "values": values, "direction": direction, "periods": periods, "duration": duration,
+        "transient": transient, "start": plain_start(system, start), "mode": mode, "method": method, "rtol": rtol,
+        "atol": atol, **({"device": device} if device != "cpu" else {}), **expert,
+    }  # fmt: skip
+    if on_gpu(device, "lyapunov", engine, None, carried=numbers is not None and direction is not None):
+        if numbers is None or not forced or duration is not None:
+            raise ValueError(
+                'lyapunov with device="cuda" takes a sweep (parameter, values, direction=None) counted in forcing '
+                'periods: a single trajectory is one thread, which a processor runs faster; use device="cpu"'
+            )
+        with progress_bar(len(points), "lyapunov", progress) as advance:
+            done = _on_gpu(system, engine, points, first_state(system, start, mode), count, int(wait), advance)
+        return _dataset(system, engine.name, options, parameter, numbers, done)
     tables = engine.prepare(points)
     order = np.arange(len(points)) if numbers is None else np.argsort(numbers, kind="stable")
     if direction == "down":
@@ -151,11 +173,6 @@ def lyapunov(
             raise SolveError(BEYOND_STOP, status="beyond_stop")
         status = by_code(result_status(done[0].status))
         raise SolveError(status.sentence, status=status.name)
-    options = {
-        "parameter": parameter, "values": values, "direction": direction, "periods": periods, "duration": duration,
-        "transient": transient, "start": plain_start(system, start), "mode": mode, "method": method, "rtol": rtol,
-        "atol": atol, **expert,
-    }  # fmt: skip
     return _dataset(system, engine.name, options, parameter, numbers, done)
 
 
@@ -215,30 +232,75 @@ def _spectrum(
         status = growth.status
     n = len(frame.active)
     if status not in GOOD:
-        nan = np.full(n, np.nan)
-        return _Spectrum(nan, nan, np.full((BATCHES, n), np.nan), np.nan, np.nan, np.nan, count * unit, status)
+        return _failed(n, count * unit, status)
     if period is not None:
         state.clock[2] = period
     used = int(frame.active.sum())
     logs = growth.logarithms[:, :used]
-    exponents, error, running = np.full((3, n), np.nan)[0], np.full(n, np.nan), np.full((BATCHES, n), np.nan)
-    mean = logs.mean(axis=0) / unit
+    batches = np.add.reduceat(logs, _edges(count)[:-1]) if count >= BATCHES else None
+    return _evaluated(
+        n, logs.mean(axis=0) / unit, batches, count, unit, growth.defect, growth.nearest, status, period is not None
+    )
+
+
+def _edges(count: int) -> NDArray[np.int64]:
+    """Ends of the batches of a run of ``count`` units."""
+    return np.linspace(0, count, BATCHES + 1).astype(np.int64)
+
+
+def _failed(n: int, elapsed: float, status: int) -> _Spectrum:
+    nan = np.full(n, np.nan)
+    return _Spectrum(nan, nan, np.full((BATCHES, n), np.nan), np.nan, np.nan, np.nan, elapsed, status)
+
+
+def _evaluated(
+    n: int, mean: FloatArray, batches: FloatArray | None, count: int, unit: float, defect: float, nearest: float,
+    status: int, forced: bool,
+) -> _Spectrum:  # fmt: skip
+    """Exponents from the mean growth per unit time, their errors from that of the batches."""
+    used = len(mean)
+    exponents, error, running = np.full(n, np.nan), np.full(n, np.nan), np.full((BATCHES, n), np.nan)
     order = np.argsort(-mean, kind="stable")
     exponents[:used] = mean[order]
-    edges = np.linspace(0, count, BATCHES + 1).astype(int)
-    if count >= BATCHES:
+    edges = _edges(count)
+    if batches is not None:
         with np.errstate(invalid="ignore"):
-            sums = np.add.reduceat(logs, edges[:-1])[:, order]
+            sums = batches[:, order]
             means = sums / (np.diff(edges)[:, None] * unit)
             error[:used] = means.std(axis=0, ddof=1) / np.sqrt(BATCHES)
             running[:, :used] = np.cumsum(sums, axis=0) / (edges[1:, None] * unit)
         error[:used][~np.isfinite(exponents[:used])] = 0.0
     # In an autonomous system one exponent is zero, and its estimate of the order of 1/t.
-    zero = 0.0 if period is not None else float(np.nanmax([0.0, *(3 * error[:used])]) + 3.0 / (count * unit))
+    zero = 0.0 if forced else float(np.nanmax([0.0, *(3 * error[:used])]) + 3.0 / (count * unit))
     return _Spectrum(
-        exponents, error, running, growth.defect / (count * unit), kaplan_yorke(exponents[:used], zero),
-        growth.nearest, count * unit, status,
+        exponents, error, running, defect / (count * unit), kaplan_yorke(exponents[:used], zero), nearest,
+        count * unit, status,
     )  # fmt: skip
+
+
+def _on_gpu(
+    system: System, engine: Any, points: FloatArray, state: State, count: int, wait: int, advance: Any
+) -> list[_Spectrum]:
+    """Every point from one start, on the GPU."""
+    from nonsmooth.analysis.lyapunov_cuda import growth_on_gpu
+
+    edges = _edges(count) if count >= BATCHES else np.array([0, count], dtype=np.int64)
+    growth, sums, status = growth_on_gpu(
+        engine, points, state.u, int(state.counters[0]), system.scale_vector(), min(ALIGN, wait), wait, edges, advance
+    )
+    found = []
+    for i, logs in enumerate(growth):
+        unit = float(system.period_at(points[i]) or np.nan)
+        if status[i] not in GOOD:
+            found.append(_failed(2, count * unit, int(status[i])))
+            continue
+        total, demanded = float(logs.sum()), float(sums[i, 0] + sums[i, 1])
+        defect = 0.0 if total == demanded else total - demanded
+        found.append(_evaluated(
+            2, logs.sum(axis=0) / (count * unit), logs if count >= BATCHES else None, count, unit, defect,
+            float(sums[i, 3]), int(status[i]), True,
+        ))  # fmt: skip
+    return found
 
 
 def _run_on(

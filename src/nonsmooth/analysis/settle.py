@@ -40,6 +40,10 @@ class Attractors:
     scale: FloatArray
     longer: tuple[int, ...] = LONGER
 
+    def over(self, tables: Any) -> Attractors:
+        """The same over other tables of the engine."""
+        return replace(self, tables=tables)
+
     def settle(self, i: int, state: State, out: Chain, fresh: Callable[[], State]) -> Verdict:
         """Run point i on from ``state`` (left where the run ends) and judge it; ``fresh`` makes a start."""
         state.settled = False  # a parameter has changed under it: what holds already is taken first

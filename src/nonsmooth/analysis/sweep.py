@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.analysis.classify import TOLERANCE
+from nonsmooth.analysis.classify import TOLERANCE, Verdict
+from nonsmooth.analysis.density import CountedSlot, bin_edges, coarse_values, given_ranges
 from nonsmooth.analysis.settle import Attractors
 from nonsmooth.flow.arguments import check_options, check_system, float_array, whole_number
+from nonsmooth.flow.devices import on_gpu, workers_of
 from nonsmooth.flow.engine import Chain, FloatArray, State
 from nonsmooth.flow.methods import RTOL, engine_for
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
@@ -31,6 +33,7 @@ DIRECTIONS: dict[str | None, tuple[str, ...]] = {
     "up": ("up",), "down": ("down",), "both": ("up", "down"), None: ("none",),
 }  # fmt: skip
 PIECE = 16  # points of one piece of independent work
+USABLE = (codes.OK, codes.SLOW, codes.NOT_PERIODIC, codes.NOT_GUARANTEED)  # the run came to its end
 
 
 def sweep(
@@ -44,10 +47,13 @@ def sweep(
     transient: int = 500,
     keep: int = 100,
     max_period: int = 16,
+    density: bool | Mapping[str, Any] = False,
+    bins: int = 400,
     method: str = "auto",
     rtol: float | None = None,
     atol: Any = None,
     threads: int | None = None,
+    device: str = "cpu",
     progress: bool = True,
     **expert: Any,
 ) -> xr.Dataset:
@@ -72,10 +78,18 @@ def sweep(
         transients; what is not settled then has the status ``slow``.
     max_period : int
         Longest period number looked for (and no longer than ``keep`` - 1).
+    density : bool or mapping
+        Store a histogram of each state's section points instead of the points. A mapping gives ranges,
+        ``{"x": (lowest, highest)}``; where none is given it is that of a coarse sweep and a twentieth more either side.
+    bins : int
+        Bins of these histograms.
     method, rtol, atol
         See :func:`nonsmooth.flow.methods.engine_for`.
     threads : int, optional
         Threads for independent work; the result does not depend on it. Default: one per core.
+    device : {"cpu", "cuda"}
+        ``"cuda"`` runs the points on an NVIDIA GPU, one per thread, with ``direction=None``: see the guide "A chart on
+        a GPU".
     progress : bool
         A bar on a terminal.
 
@@ -84,15 +98,20 @@ def sweep(
     xarray.Dataset
         Over the parameter (and ``direction``, ``start``): ``section(..., iterate, state)``, true extremes ``maximum``,
         ``minimum``, ``period_number`` (0: none found), ``residual``, ``crossings_per_period``,
-        ``contacts_per_period``, ``clearance``, extremes of the outputs, ``status``.
+        ``contacts_per_period``, ``clearance``, extremes of the outputs, ``status``. With ``density``, in place of
+        ``section``: ``density(..., state, bin)`` (section points in each bin), ``outside(..., state)`` (those beyond
+        the range) and ``bin_edge(state, edge)``.
 
     Raises
     ------
     ValueError, TypeError
         Arguments that do not fit. A point that fails keeps its status; the others are whole.
+    ImportError, RuntimeError
+        ``device="cuda"`` without the package numba-cuda, or without a GPU.
 
     Notes
     -----
+    With ``density`` memory does not depend on ``keep``: points are counted as soon as they have been judged.
     A period number p is granted only where the p-th return is below 1e-9 of the motion's size and contracts:
     see :mod:`nonsmooth.analysis.classify`.
     """
@@ -106,6 +125,10 @@ def sweep(
         threads = whole_number(threads, "threads", 1)
     section, plan = section_plan(system, section)
     engine = engine_for(system, method, rtol, atol, **expert)
+    gpu = on_gpu(device, "sweep", engine, plan, carried=direction is not None)
+    if gpu and density is not False:
+        raise ValueError("section points are counted on the processor: leave out density, or device=\"cuda\"")
+    threads = workers_of(device, threads)
     starts = start_states(system, start)
     points = system.parameter_points({parameter: numbers})
     noise = TOLERANCE if engine.name == "exact" else max(TOLERANCE, 10.0 * (RTOL if rtol is None else rtol))
@@ -113,47 +136,74 @@ def sweep(
                             system.scale_vector())  # fmt: skip
     traced = system.traced
     sizes = len(traced.u), len(traced.indicators), len(traced.outputs)
+    edges = None
+    if density is not False:
+        ranges, n_bins = given_ranges(system, density, bins)
+        coarse = None
+        if len(ranges) < len(system.states):
+            coarse = sweep(
+                system, parameter, coarse_values(numbers), direction=direction, start=start, section=section,
+                transient=transient, keep=min(keep, 1000), max_period=max_period, method=method, rtol=rtol, atol=atol,
+                threads=threads, progress=False, **expert,
+            )["section"].transpose(..., "state").values  # fmt: skip
+        edges = bin_edges(system, ranges, n_bins, coarse)
     slots = {
-        (d, k): Slot(Chain.empty(len(numbers), keep, *sizes), len(numbers))
-        for d in range(len(directions)) for k in range(len(starts))
+        (d, k): Slot(attractors, points, sizes, edges) for d in range(len(directions)) for k in range(len(starts))
+    }
+    options = {
+        "parameter": parameter, "values": values, "direction": direction, "start": plain_start(system, start),
+        "section": section, "transient": transient, "keep": keep, "max_period": max_period,
+        **({} if density is False else {"density": density, "bins": bins}),
+        "method": method, "rtol": rtol, "atol": atol, **({"device": device} if gpu else {}), **expert,
     }  # fmt: skip
+    squeeze = (() if direction == "both" else ("direction",)) + (("start",) if is_one_start(start) else ())
+    if gpu:
+        _on_gpu(engine, points, starts, attractors, slots, progress, parameter)
+        return _dataset(system, engine.name, parameter, numbers, directions, starts, slots, options, squeeze)
     memory = system.memory_vector()
 
     def march(slot: tuple[int, int], order: Sequence[int], report: Report) -> None:
         d, k = slot
         state: State | None = None
-        for i in order:
+        for i, row, judge, chain in slots[slot].places(order):
             if report.stop.is_set():
                 return
             if state is None or directions[d] == "none":
                 state = State(starts[k].copy(), memory.copy())
-            verdict = attractors.settle(i, state, slots[slot].chain, lambda: State(starts[k].copy(), memory.copy()))
-            slots[slot].period_number[i] = verdict.period_number
-            slots[slot].residual[i] = verdict.residual
-            slots[slot].status[i] = verdict.status
+            verdict = judge.settle(row, state, chain, lambda: State(starts[k].copy(), memory.copy()))
+            slots[slot].keep(i, row, verdict, chain)
             report.advance(1)
 
     _run(march, _pieces(directions, len(starts), numbers), threads, progress, parameter)
-    return _dataset(
-        system, engine.name, parameter, numbers, directions, starts, slots,
-        {
-            "parameter": parameter, "values": values, "direction": direction, "start": plain_start(system, start),
-            "section": section,
-            "transient": transient, "keep": keep, "max_period": max_period, "method": method, "rtol": rtol,
-            "atol": atol, **expert,
-        },
-        (() if direction == "both" else ("direction",)) + (("start",) if is_one_start(start) else ()),
-    )  # fmt: skip
+    return _dataset(system, engine.name, parameter, numbers, directions, starts, slots, options, squeeze)
 
 
 class Slot:
-    """One direction and start: the kernel's buffers over all points, and the verdicts."""
+    """One direction and start: the kernel's buffers over all points (histograms in place of points), the verdicts."""
 
-    def __init__(self, chain: Chain, n_points: int) -> None:
-        self.chain = chain
+    def __init__(
+        self, attractors: Attractors, points: FloatArray, sizes: tuple[int, int, int], edges: FloatArray | None
+    ) -> None:
+        n_points = len(points)
+        self.attractors = attractors
+        self.counted = None if edges is None else CountedSlot(attractors, points, sizes, edges)
+        self.chain = Chain.empty(n_points, attractors.keep, *sizes) if self.counted is None else self.counted.chain
         self.period_number = np.zeros(n_points, dtype=np.int64)
         self.residual = np.full(n_points, np.nan)
         self.status = np.full(n_points, codes.INTERRUPTED, dtype=np.int8)
+
+    def places(self, order: Sequence[int]) -> Iterable[tuple[int, int, Attractors, Chain]]:
+        """For each point of ``order``: its number, its row in a buffer, what runs it, that buffer."""
+        if self.counted is not None:
+            return self.counted.places(order)
+        return ((i, i, self.attractors, self.chain) for i in order)
+
+    def keep(self, i: int, row: int, verdict: Verdict, chain: Chain) -> None:
+        self.period_number[i] = verdict.period_number
+        self.residual[i] = verdict.residual
+        self.status[i] = verdict.status
+        if self.counted is not None and verdict.status in USABLE:
+            self.counted.count(i, row, chain)
 
 
 class Report:
@@ -230,6 +280,23 @@ def _run(
                 raise
 
 
+def _on_gpu(
+    engine: Any, points: FloatArray, starts: FloatArray, rules: Attractors, slots: Mapping[tuple[int, int], Slot],
+    progress: bool, label: str,
+) -> None:  # fmt: skip
+    """All points from each start, on the GPU."""
+    from nonsmooth.analysis.sweep_cuda import sweep_on_gpu
+
+    with progress_bar(len(points) * len(starts), f"sweep over {label}", progress) as advance:
+        for k, start in enumerate(starts):
+            slot = slots[0, k]
+            found = sweep_on_gpu(
+                engine, points, start, rules.plan.phase, rules.transient, rules.keep, rules.max_period,
+                rules.tolerance, rules.scale, slot.chain, advance,
+            )  # fmt: skip
+            slot.period_number[:], slot.residual[:], slot.status[:] = found.period_number, found.residual, found.status
+
+
 def _dataset(
     system: System,
     method: str,
@@ -257,7 +324,7 @@ def _dataset(
         """NaN where the point failed: the kernel's buffers hold what it had by then."""
         return np.where(failed.reshape(failed.shape + (1,) * (values.ndim - 3)), np.nan, values)
 
-    returns = gather(lambda slot: np.full(slot.chain.section.shape[0], slot.chain.section.shape[1], dtype=float))
+    returns = gather(lambda slot: np.full(len(numbers), slot.attractors.keep, dtype=float))
     arrays = {
         "section": whole(gather(lambda s: s.chain.section)),
         "maximum": whole(gather(lambda s: s.chain.maximum)),
@@ -273,15 +340,21 @@ def _dataset(
     }
     if not system.outputs or arrays["output_maximum"].shape[-1] != len(system.outputs):
         del arrays["output_maximum"], arrays["output_minimum"]
+    counted = next(iter(slots.values())).counted
+    if counted is not None:
+        del arrays["section"]
+        arrays["density"] = gather(lambda s: s.counted.counter.counts)  # type: ignore[union-attr]  # all slots are alike
+        arrays["outside"] = gather(lambda s: s.counted.counter.outside)  # type: ignore[union-attr]  # likewise
     labels = labels_of(system)
     return build(
         labels, provenance(labels, "sweep", options, method=method), parameter, numbers, arrays,
         directions=directions, starts=starts, squeeze=tuple(squeeze),
+        edges=None if counted is None else counted.counter.edges,
     )  # fmt: skip
 
 
 def _usable(slot: Slot) -> np.ndarray:
-    return np.isin(slot.status, (codes.OK, codes.SLOW, codes.NOT_PERIODIC, codes.NOT_GUARANTEED))
+    return np.isin(slot.status, USABLE)
 
 
 def armed_signs(system: System) -> np.ndarray:

@@ -9,7 +9,8 @@ onset of chaos, and for a slow approach to a periodic orbit, it takes long serie
 
 References
 ----------
-G.A. Gottwald, I. Melbourne, SIAM J. Appl. Dyn. Syst. 8 (2009) 129-145 (Eqs. 2.1, 3.1-3.5).
+G.A. Gottwald, I. Melbourne, SIAM J. Appl. Dyn. Syst. 8 (2009) 129-145 (Eqs. 2.1, 3.1-3.5;
+the mean is taken out beforehand, so that the oscillation of Eq. 3.3 is zero).
 """
 
 from __future__ import annotations
@@ -87,17 +88,15 @@ def _k(phi: FloatArray, c: FloatArray) -> float:
     n = len(phi)
     cut = n // 10
     lags = np.arange(1, cut + 1)
-    phi = phi / size
+    phi = (phi - phi.mean()) / size  # a constant makes p and q swing, and would hide how they wander
     waves = np.exp(1j * np.outer(c, np.arange(1, n + 1)))
     path = np.cumsum(waves * phi, axis=1)
     displacement = np.empty((len(c), cut))
     for k, lag in enumerate(lags):
         moved = path[:, lag : n - cut + lag] - path[:, : n - cut]
         displacement[:, k] = (moved.real**2 + moved.imag**2).mean(axis=1)
-    oscillation = phi.mean() ** 2 * (1 - np.cos(np.outer(c, lags))) / (1 - np.cos(c))[:, None]
-    d = displacement - oscillation
     x = lags - lags.mean()
-    centred = d - d.mean(axis=1, keepdims=True)
+    centred = displacement - displacement.mean(axis=1, keepdims=True)
     spread = np.sqrt((centred**2).sum(axis=1) * (x**2).sum())
     with np.errstate(divide="ignore", invalid="ignore"):
         each = np.where(spread > 0.0, centred @ x / spread, 0.0)

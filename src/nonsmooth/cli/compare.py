@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import argparse
 import inspect
-import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nonsmooth.system.names import unknown
+from nonsmooth.cli.tables import read_tables, with_folder
+from nonsmooth.system.names import check_keys, unknown
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -128,20 +128,12 @@ def _offset(parameters: Any, session: Any) -> float | tuple[float, float]:
 def _read(path: Path) -> dict[str, Any]:
     from nonsmooth.identification.compare import compare
 
-    try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise ValueError(f"{path}: no such study file") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path}: is not a TOML file: {error}") from None
-    _check(document, _TABLES, str(path), "a table")
+    document = read_tables(path, _TABLES)
     ours = ("measured", "theory", "parameters")
     allowed = [name for name in inspect.signature(compare).parameters if name not in ours]
     for name, table in document.items():
-        if not isinstance(table, dict):
-            raise ValueError(f"{path}: `{name}` must be a table: write [{name}] and its keys below it")
         keys = [*(key for key in allowed if key != "options"), "method", "rtol", "atol"]
-        _check(table, keys if name == "compare" else _KEYS[name], f"{path}, table [{name}]", "a key")
+        check_keys(table, keys if name == "compare" else _KEYS[name], f"{path}, table [{name}]", "a key")
     for name, needed in (("system", ("model",)), ("measured", ("session", "procedure"))):
         if missing := [key for key in needed if key not in document.get(name, {})]:
             raise ValueError(f"{path}: table [{name}] needs {', '.join(missing)}")
@@ -172,7 +164,7 @@ def _write(result: xr.Dataset, output: Mapping[str, str], folder: Path) -> list[
     if "data" in output:
         from nonsmooth.results.store import save
 
-        written.append(save(result, _with_folder(folder / output["data"])))
+        written.append(save(result, with_folder(folder / output["data"])))
     if "figure" in output:
         import matplotlib as mpl
 
@@ -188,7 +180,7 @@ def _write(result: xr.Dataset, output: Mapping[str, str], folder: Path) -> list[
         draw = getattr(module[result.attrs["comparison"]], pictures[wanted])
         axes = {key: output[key] for key in ("x", "y") if key in output and key in inspect.signature(draw).parameters}
         zone = {"zone": "g"} if wanted == "phase_portrait" and "g" in result.coords else {}
-        written.append(plot.save_figure(draw(result, **axes, **zone), _with_folder(folder / output["figure"])))
+        written.append(plot.save_figure(draw(result, **axes, **zone), with_folder(folder / output["figure"])))
     return written
 
 
@@ -207,15 +199,3 @@ def _summary(result: xr.Dataset) -> str:
 
 def _word(value: Any) -> str:
     return str(value) if isinstance(value, str) else f"{float(value):.5g}"
-
-
-def _check(table: Mapping[str, Any], allowed: Iterable[str], where: str, what: str) -> None:
-    known = list(allowed)
-    for key in table:
-        if key not in known:
-            raise ValueError(f"{where}: {unknown(key, what, 'this place', known)}")
-
-
-def _with_folder(path: Path) -> Path:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    return path

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from nonsmooth.system.names import unknown
+from nonsmooth.cli.tables import read_tables, with_folder
+from nonsmooth.system.names import check_keys, unknown
 
 __all__ = ["add"]
 
@@ -83,17 +83,9 @@ def _read(path: Path) -> _Study:
         return _Study(path)
     if path.name == NOTEBOOK:
         return _Study(path.parent)
-    try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise ValueError(f"{path}: no such study file or session folder") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path}: is not a TOML file: {error}") from None
-    _check(document, _KEYS, str(path), "a table")
+    document = read_tables(path, _KEYS, "study file or session folder")
     for name, table in document.items():
-        if not isinstance(table, dict):
-            raise ValueError(f"{path}: `{name}` must be a table: write [{name}] and its keys below it")
-        _check(table, _KEYS[name], f"{path}, table [{name}]", "a key")
+        check_keys(table, _KEYS[name], f"{path}, table [{name}]", "a key")
     if "session" not in document.get("identify", {}):
         raise ValueError(f'{path}: needs a table [identify] with session = "..." (the folder of a {NOTEBOOK})')
     return _study(path, document["identify"], document.get("output", {}))
@@ -119,7 +111,7 @@ def _study(path: Path, asked: Mapping[str, Any], output: Mapping[str, Any]) -> _
     apparatus = asked.get("apparatus", {})
     if not isinstance(apparatus, dict):
         raise ValueError(f"{where}: apparatus must be a table of numbers or of {{ value = ..., uncertainty = ... }}")
-    _check(apparatus, APPARATUS, f"{where}, apparatus", "a key")
+    check_keys(apparatus, APPARATUS, f"{where}, apparatus", "a key")
     crank = asked.get("crank_length")
     if crank is not None and (isinstance(crank, bool) or not isinstance(crank, int | float)):
         raise ValueError(f"{where}: crank_length = {crank!r} must be a length in m")
@@ -143,11 +135,11 @@ def _write(found: Any, study: _Study, data: Path | None) -> list[Path]:
     if data is not None:
         from nonsmooth.results.store import save
 
-        written.append(save(found.to_dataset(), _with_folder(data)))
+        written.append(save(found.to_dataset(), with_folder(data)))
     if study.table is not None:
         from nonsmooth.identification.report import report
 
-        _with_folder(study.table).write_text(report(found), encoding="utf-8")
+        with_folder(study.table).write_text(report(found), encoding="utf-8")
         written.append(study.table)
     if study.figures is not None:
         import matplotlib as mpl
@@ -159,18 +151,6 @@ def _write(found: Any, study: _Study, data: Path | None) -> list[Path]:
         from nonsmooth.plot.identification.pictures import pictures
 
         for name, ax in pictures(found):
-            written.append(plot.save_figure(ax, _with_folder(study.figures / f"{name}.{study.format}")))
+            written.append(plot.save_figure(ax, with_folder(study.figures / f"{name}.{study.format}")))
             plt.close("all")
     return written
-
-
-def _check(table: Mapping[str, Any], allowed: Iterable[str], where: str, what: str) -> None:
-    known = list(allowed)
-    for key in table:
-        if key not in known:
-            raise ValueError(f"{where}: {unknown(key, what, 'this place', known)}")
-
-
-def _with_folder(path: Path) -> Path:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    return path

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import importlib.util
 import inspect
-import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nonsmooth.system.names import unknown
+from nonsmooth.cli.tables import read_tables, with_folder
+from nonsmooth.system.names import check_keys, unknown
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -89,7 +89,7 @@ class Study:
         if "data" in self.output:
             from nonsmooth.results.store import save
 
-            written.append(save(result, _with_folder(folder / self.output["data"])))
+            written.append(save(result, with_folder(folder / self.output["data"])))
         if "figure" in self.output:
             import matplotlib as mpl
 
@@ -97,8 +97,9 @@ class Study:
             from nonsmooth import plot
 
             named = {axis: self.output[axis] for axis in ("x", "y") if axis in self.output}
-            ax = getattr(plot, _FIGURES[self.verb])(result, **named)
-            written.append(plot.save_figure(ax, _with_folder(folder / self.output["figure"])))
+            counted = self.verb == "sweep" and "density" in result
+            ax = getattr(plot, "density" if counted else _FIGURES[self.verb])(result, **named)
+            written.append(plot.save_figure(ax, with_folder(folder / self.output["figure"])))
         return written
 
 
@@ -111,17 +112,8 @@ def read_study(path: Path) -> Study:
         Not TOML, an unknown table or key, no verb or two, a value that cannot be read; the message names the
         file and the table.
     """
-    try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise ValueError(f"{path}: no such study file") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path}: is not a TOML file: {error}") from None
+    document = read_tables(path, ("system", *VERBS, "output"))
     where = str(path)
-    _check_keys(document, ("system", *VERBS, "output"), where, "a table")
-    for name, table in document.items():
-        if not isinstance(table, dict):
-            raise ValueError(f"{where}: `{name}` must be a table: write [{name}] and its keys below it")
     verbs = [name for name in document if name in VERBS]
     if len(verbs) != 1:
         raise ValueError(
@@ -131,7 +123,7 @@ def read_study(path: Path) -> Study:
     if "system" not in document:
         raise ValueError(f'{where}: needs a table [system] with at least model = "..."')
     output = document.get("output", {})
-    _check_keys(output, _OUTPUT_KEYS, f"{where}, table [output]", "a key")
+    check_keys(output, _OUTPUT_KEYS, f"{where}, table [output]", "a key")
     system = _system(document["system"], path)
     options = _options(verbs[0], document[verbs[0]], where)
     return Study(path, system, verbs[0], options, output)
@@ -176,7 +168,7 @@ def load_model(text: str, folder: Path) -> Any:
 
 def _system(table: Mapping[str, Any], path: Path) -> Any:
     where = f"{path}, table [system]"
-    _check_keys(table, _SYSTEM_KEYS, where, "a key")
+    check_keys(table, _SYSTEM_KEYS, where, "a key")
     if not isinstance(table.get("model"), str):
         raise ValueError(f'{where}: needs model = "name" (see `nonsmooth models`) or model = "file.py:object"')
     system = load_model(table["model"], path.parent)
@@ -200,7 +192,7 @@ def _options(verb: str, table: Mapping[str, Any], where: str) -> dict[str, Any]:
         if name not in (*_NOT_IN_FILES, "system") and item.kind is not inspect.Parameter.VAR_KEYWORD
     ]  # fmt: skip
     place = f"{where}, table [{verb}]"
-    _check_keys(table, allowed, place, "a key")
+    check_keys(table, allowed, place, "a key")
     missing = [name for name in allowed if signature[name].default is inspect.Parameter.empty and name not in table]
     if missing:
         raise ValueError(f"{place}: needs {', '.join(missing)}; all keys: {', '.join(allowed)}")
@@ -214,7 +206,7 @@ def _values(value: Any, place: str) -> Any:
     from nonsmooth.flow.arguments import float_array, real_number, whole_number
 
     if isinstance(value, dict):
-        _check_keys(value, ("from", "to", "n"), f"{place}, values", "a key")
+        check_keys(value, ("from", "to", "n"), f"{place}, values", "a key")
         if set(value) == {"from", "to", "n"}:
             low, high = (real_number(value[key], f"{place}, values: {key}") for key in ("from", "to"))
             return np.linspace(low, high, whole_number(value["n"], f"{place}, values: n", 1))
@@ -235,7 +227,7 @@ def _section(value: Any, place: str) -> Any:
     if not isinstance(value, dict):
         raise ValueError(f"{place}: section is {value!r}; give {{ phase = 0.25 }} or {{ indicator = \"name\" }}")
     kind = nonsmooth.Poincare if "indicator" in value else nonsmooth.Stroboscopic
-    _check_keys(value, list(inspect.signature(kind).parameters), f"{place}, section", "a key")
+    check_keys(value, list(inspect.signature(kind).parameters), f"{place}, section", "a key")
     return kind(**value)
 
 
@@ -243,7 +235,7 @@ def _start(value: Any, place: str) -> Any:
     import nonsmooth
 
     if isinstance(value, dict) and "seed" in value:
-        _check_keys(value, ("n", "low", "high", "seed"), f"{place}, start", "a key")
+        check_keys(value, ("n", "low", "high", "seed"), f"{place}, start", "a key")
         return nonsmooth.random_starts(**value)
     return value
 
@@ -253,17 +245,5 @@ def _direction(value: Any, place: str) -> Any:
     return None if value == "none" else value
 
 
-def _check_keys(table: Mapping[str, Any], allowed: Iterable[str], where: str, what: str) -> None:
-    known = list(allowed)
-    for key in table:
-        if key not in known:
-            raise ValueError(f"{where}: {unknown(key, what, 'this place', known)}")
-
-
 def _public(module: Any) -> list[str]:
     return [name for name in vars(module) if not name.startswith("_")]
-
-
-def _with_folder(path: Path) -> Path:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    return path

@@ -20,6 +20,7 @@ __all__ = ["Curve", "Point", "chordal"]
 FloatArray = NDArray[np.float64]
 MOST = 8  # Newton iterations
 DONE = 1e-9  # a step this small is followed by one of its square
+FARTHEST = 2.5  # times the last step: a cubic is not trusted beyond
 CLOSE = 1e-12  # where multipliers are wanted to the last digits
 
 
@@ -144,10 +145,23 @@ class Curve:
             return None
         return Point(Y, found[0], solved, M, self.shooting.multipliers(M), path, found[1], iterations)
 
-    def step(self, point: Point, ds: float, *, tolerance: float = DONE) -> Point | None:
-        """The point at distance ds along the tangent."""
+    def predicted(self, point: Point, ds: float, before: Point | None) -> FloatArray:
+        """A guess at distance ds along the tangent: straight, or on the cubic through both last points and tangents."""
         Y = point.Y + ds * point.tangent
-        found = self.correct(Y, point.tangent, float(point.tangent @ Y), tolerance=tolerance)
+        if before is None:
+            return Y
+        back = point.Y - before.Y
+        h = float(before.tangent @ back)
+        if not (h > 0.0 and ds < FARTHEST * h):
+            return Y
+        second = (2 * before.tangent + 4 * point.tangent - 6 / h * back) / h
+        third = (6 * (before.tangent + point.tangent) - 12 / h * back) / (h * h)
+        return Y + ds * ds * (0.5 * second + ds / 6 * third)
+
+    def step(self, point: Point, ds: float, before: Point | None = None, *, tolerance: float = DONE) -> Point | None:
+        """The point at distance ds along the tangent; with the point ``before`` from a better guess."""
+        level = float(point.tangent @ point.Y) + ds
+        found = self.correct(self.predicted(point, ds, before), point.tangent, level, tolerance=tolerance)
         if found is None:
             return None
         return self.point(found[0], found[1], point.tangent, found[2])

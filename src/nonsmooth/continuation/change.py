@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.continuation.arclength import Curve, Point
+from nonsmooth.continuation.corners import other_ways, short_run
 from nonsmooth.continuation.shooting import Shooting
-from nonsmooth.continuation.signature import Signature, Visit
+from nonsmooth.continuation.signature import AT_ONCE, Signature, Visit
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
@@ -47,12 +48,17 @@ def changed(curve: Curve, point: Point, kind: str) -> list[Change]:
     if kind == "touch":
         return _touched(curve, point)
     if kind == "short":
-        return _shortened(curve, point)
+        i = int(point.path.tau.argmin())
+        inside = 0 < i < curve.shooting.m
+        return [*_shortened(curve, point), *(_around(curve, point, *short_run(point, i)) if inside else [])]
     if kind == "slow":
         return _slowed(curve, point)
     if kind == "own":
         return _other_row(curve, point)
-    return []
+    if kind == "landed":
+        return _landed(curve, point)
+    i = int(point.path.others.argmax())
+    return _around(curve, point, i, i + 1)
 
 
 def _parts(curve: Curve, point: Point) -> tuple[tuple[Visit, ...], FloatArray, FloatArray]:
@@ -62,7 +68,7 @@ def _parts(curve: Curve, point: Point) -> tuple[tuple[Visit, ...], FloatArray, F
 
 def _touched(curve: Curve, point: Point) -> list[Change]:
     """A transition that has only been touched: put it in, and if it leads to another mode the way back too."""
-    visits, times, states = _parts(curve, point)
+    visits, _, states = _parts(curve, point)
     path, flow, values = point.path, curve.shooting.flow, point.solved.values
     place, k = path.touched
     traced = curve.shooting.system.traced
@@ -71,6 +77,30 @@ def _touched(curve: Curve, point: Point) -> list[Change]:
     t = float(path.place[place, k])
     begin = float(point.solved.times[place])
     z = flow.legs(values, [visits[place].mode], [begin], [t - begin], states[place][None, :]).z[0]
+    return _inserted(curve, point, "grazing", place, Visit(jump.source, k, row), row, t, z)
+
+
+def _landed(curve: Curve, point: Point) -> list[Change]:
+    """A reset leads onto the boundary of a transition: it is taken at once, and led back by a visit of no length."""
+    visits, times, states = _parts(curve, point)
+    place = int(point.path.landed.argmax())
+    k = int(point.path.landing[place])
+    if place == 0 or visits[place].row == AT_ONCE:
+        return []
+    t, z = float(times[place - 1]), states[place]
+    row = curve.shooting.flow.jump(point.solved.values, k, t, z).row
+    first = Visit(visits[place].mode, k, AT_ONCE)
+    return _inserted(curve, point, "corner", place, first, row, t, z)
+
+
+def _inserted(
+    curve: Curve, point: Point, kind: str, place: int, first: Visit, row: int, t: float, z: FloatArray
+) -> list[Change]:
+    """The crossing ``first``, of the given row, put in at (t, z) in visit ``place``, and the ways back."""
+    _, times, states = _parts(curve, point)
+    flow, values, k = curve.shooting.flow, point.solved.values, first.transition
+    traced = curve.shooting.system.traced
+    jump = traced.transitions[k]
     entry = flow.jump(values, k, t, z, row)
     indicator = jump.rows[row].indicator
 
@@ -78,16 +108,17 @@ def _touched(curve: Curve, point: Point) -> list[Change]:
         signature = curve.shooting.signature.with_inserted(place, new)
         t_new = np.concatenate([times[:place], np.full(len(new), t), times[place:]])
         z_new = np.concatenate([states[: place + 1], np.array(after), states[place + 1 :]])
-        return Change("grazing", signature, t_new, z_new, indicator, True, place, tuple(new), t)
+        return Change(kind, signature, t_new, z_new, indicator, True, place, tuple(new), t)
 
-    first = Visit(jump.source, k, row)
     if jump.target == jump.source:
         return [change([first], [entry.z_after])]
     found = []
     for k_back, back in enumerate(traced.transitions):
         if back.source != jump.target or back.target != jump.source:
             continue
-        for r in range(len(back.rows)):
+        if back.at is not None:
+            continue
+        for r in (*range(len(back.rows)), AT_ONCE):
             leave = flow.jump(values, k_back, t, entry.z_after, r)
             found.append(change([first, Visit(jump.target, k_back, r)], [entry.z_after, leave.z_after]))
     return found
@@ -109,6 +140,8 @@ def _shortened(curve: Curve, point: Point) -> list[Change]:
     steepest = float(np.abs(point.path.slope).max())
     kind = "grazing" if slope < 1e-3 * max(steepest, 1e-300) or len(point.path.slope) < 3 else "corner"
     indicator = jump.rows[before.row].indicator if before.row >= 0 else -1
+    if before.row == AT_ONCE:
+        kind, indicator = "corner", jump.rows[0].indicator if len(jump.rows) == 1 else -1
     signature = curve.shooting.signature.without(i - 1, 2)
     return [
         Change(
@@ -141,7 +174,7 @@ def _rotated(curve: Curve, point: Point, first: bool) -> Change:
     turns = shooting.period_number
     fixed = []
     for visit in order:
-        if visit.row < 0 and visit.transition >= 0:
+        if visit.row == -1 and visit.transition >= 0:
             visit = Visit(visit.mode, visit.transition, -1, visit.turn % max(turns, 1))
         fixed.append(visit)
     return Change("section", Signature((*fixed, Visit(mode))), moved, after)
@@ -153,13 +186,16 @@ def _slowed(curve: Curve, point: Point) -> list[Change]:
     i = int(curve.walk.conditional[int(point.path.slope.argmin())])
     visit = visits[i]
     jump = curve.shooting.system.traced.transitions[visit.transition]
-    if jump.target != jump.source:
+    count = 1
+    while visits[i + count].row == AT_ONCE:  # an impact made of several transitions
+        count += 1
+    if visits[i + count].mode != visit.mode:
         return []
-    signature = curve.shooting.signature.without(i, 1)
+    signature, gone = curve.shooting.signature.without(i, count), np.arange(i, i + count)
     return [
         Change(
-            "grazing", signature, np.delete(times, i), np.delete(states, i + 1, axis=0),
-            jump.rows[visit.row].indicator, False, i, (visit,), float(times[i]),
+            "grazing", signature, np.delete(times, gone), np.delete(states, gone + 1, axis=0),
+            jump.rows[visit.row].indicator, False, i, visits[i : i + count], float(times[i]),
         )
     ]  # fmt: skip
 
@@ -181,6 +217,18 @@ def _other_row(curve: Curve, point: Point) -> list[Change]:
     _, r, indicator = min(found)
     new = (*visits[:i], Visit(visit.mode, visit.transition, r), *visits[i + 1 :])
     return [Change("corner", Signature(new), times, states, indicator)]
+
+
+def _around(curve: Curve, point: Point, first: int, last: int) -> list[Change]:
+    """Other ways through a corner of two transitions, in place of the crossings ``first`` to ``last - 1``."""
+    visits, times, states = _parts(curve, point)
+    found = []
+    for way, after, indicator in other_ways(curve, point, first, last):
+        signature = Signature((*visits[:first], *way, *visits[last:]))
+        t_new = np.concatenate([times[:first], np.full(len(way), times[first]), times[last:]])
+        z_new = np.concatenate([states[: first + 1], np.array(after), states[last + 1 :]])
+        found.append(Change("corner", signature, t_new, z_new, indicator))
+    return found
 
 
 def resumed(curve: Curve, point: Point, change: Change, active: tuple[str, ...]) -> tuple[Curve, Point, float] | None:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.continuation.continue_orbit import size_of, special_row
+from nonsmooth.continuation.begin import size_of
+from nonsmooth.continuation.codimension_two import ENDED, root, sign_changes
+from nonsmooth.continuation.codimension_two import numbers as numbers_of
+from nonsmooth.continuation.files import special_row
 from nonsmooth.continuation.locus import KINDS, Locus, Place
 from nonsmooth.continuation.path import VIOLATIONS
 from nonsmooth.continuation.physical import allowed_range
@@ -32,7 +35,13 @@ ENDS = {
     "no_convergence": "Newton's method did not converge, however small the step.",
     "grazing": "A contact begins or ends here: beyond this point the orbit has another signature.",
     "corner": "The orbit meets the corner of two boundaries: beyond this point it has another signature.",
+    "resonance": "Both multipliers meet on the real axis: beyond this point they are real, and no torus is born.",
 }
+#: The point of codimension two at which a curve meets a graze (another one, for a grazing curve).
+MEETS = {
+    "fold": "grazing_fold", "flip": "grazing_flip", "neimark_sacker": "grazing_neimark_sacker",
+    "grazing": "double_grazing",
+}  # fmt: skip
 FIRST, LEAST = 1e-3, 1e-8
 COSINE = 0.97
 BESIDE = 1e-6
@@ -66,8 +75,10 @@ def continue_curve(
     xarray.Dataset
         Over ``point``: both parameters, ``section``, ``period``, ``floquet_multipliers``; the curve's ``kind``; over
         ``special`` the points of codimension two: ``special_kind`` and ``special_point``. Kinds: ``cusp``,
-        ``fold_flip``, ``resonance_1_1``, ``resonance_1_2``, ``resonance_1_3``, ``resonance_1_4``, ``grazing_fold``,
-        ``grazing_flip``, ``grazing`` (a second touch).
+        ``fold_flip``, ``generalised_flip`` (its cubic coefficient vanishes), ``chenciner`` (that of the torus),
+        ``resonance_1_1`` to ``resonance_1_4``, ``fold_neimark_sacker``, ``flip_neimark_sacker``; ``grazing_fold``,
+        ``grazing_flip``, ``grazing_neimark_sacker`` where such a curve meets a grazing curve or Feigin's signs change,
+        ``double_grazing`` (a second touch), ``corner``.
 
     Raises
     ------
@@ -131,31 +142,6 @@ def _box(system: System, ranges: Any) -> tuple[tuple[str, str], list[tuple[float
     return (str(first), str(second)), box
 
 
-def _tests(locus: Locus, place: Place) -> dict[str, float]:
-    """Numbers that change their sign at a point of codimension two."""
-    M, one = place.M, np.eye(len(place.M))
-    mu = place.multipliers
-    det = float(np.linalg.det(M))
-    found: dict[str, float] = {}
-    planar = len(M) == 2 and locus.shooting.forced
-    if locus.kind == "fold":
-        found["fold_flip"] = float(np.linalg.det(M + one))
-        if planar:
-            found["resonance_1_1"] = det - 1.0
-    elif locus.kind == "flip":
-        if locus.shooting.forced:
-            found["fold_flip"] = float(np.linalg.det(M - one))
-        if planar:
-            found["resonance_1_2"] = det - 1.0
-    elif locus.kind == "neimark_sacker":
-        pair = mu[np.argmin(np.abs(np.abs(mu) - 1.0) + (np.abs(mu.imag) < 1e-9))]
-        found["resonance_1_3"], found["resonance_1_4"] = float(pair.real) + 0.5, float(pair.real)
-    elif locus.kind == "grazing" and locus.shooting.forced:
-        found["grazing_fold"] = float(np.linalg.det(M - one))
-        found["grazing_flip"] = float(np.linalg.det(M + one))
-    return found
-
-
 def _violation(locus: Locus, place: Place) -> FloatArray:
     """How far the path is from leaving its signature; on a grazing curve by another touch than its own."""
     path = place.path
@@ -168,7 +154,7 @@ def _violation(locus: Locus, place: Place) -> FloatArray:
 
 def _march(locus: Locus, place: Place, box: Any, largest: float, most: int, begin: Place | None) -> _March:
     found, ds = _March(), min(FIRST, largest)
-    numbers, safe = _tests(locus, place), _violation(locus, place)
+    second, safe = numbers_of(locus, place), _violation(locus, place)
     while len(found.places) < most:
         new = locus.step(place, ds)
         if new is not None and ds > LEAST and float(new.tangent @ place.tangent) < COSINE:
@@ -184,15 +170,15 @@ def _march(locus: Locus, place: Place, box: Any, largest: float, most: int, begi
             value = float(new.X[-2 + i])
             if not low <= value <= high:
                 edge = low if value < low else high
-                there = _root(locus, place, new, _Edge(i, edge))
+                there = root(locus, place, new, _Edge(i, edge))
                 if there is not None:
                     events.append((there[0], "range", there[1]))
         now = _violation(locus, new)
         for i, name in enumerate(VIOLATIONS):
             if now[i] < 0.0 <= safe[i]:
-                there = _root(locus, place, new, _Leaving(locus, i))
+                there = root(locus, place, new, _Leaving(locus, i))
                 if there is not None:
-                    events.append((there[0], "corner" if name in ("own", "others") else "grazing", there[1]))
+                    events.append((there[0], "corner" if name in ("own", "others", "landed") else "grazing", there[1]))
         outside = any(not low <= float(new.X[-2 + i]) <= high for i, (low, high) in enumerate(box))
         if not events and (outside or ((now < 0.0) & (safe >= 0.0)).any()):  # not located: nearer
             ds *= 0.25
@@ -201,15 +187,11 @@ def _march(locus: Locus, place: Place, box: Any, largest: float, most: int, begi
                 break
             continue
         stop = min((s for s, _, _ in events), default=np.inf)
-        after = _tests(locus, new)
-        for name, was in numbers.items():
-            if was * after[name] < 0.0:
-                there = _root(locus, place, new, _Second(locus, name))
-                if there is not None and there[0] < stop - BESIDE:
-                    events.append((there[0], name, there[1]))
+        after = numbers_of(locus, new)
+        events += sign_changes(locus, place, new, second, after, stop - BESIDE)
         # A cusp: both parameters turn round together.
         if float(place.tangent[-2:] @ new.tangent[-2:]) < 0.0:
-            there = _root(locus, place, new, _Turning(place))
+            there = root(locus, place, new, _Turning(place))
             if there is not None and there[0] < stop - BESIDE:
                 events.append((there[0], "cusp" if locus.kind == "fold" else "turn", there[1]))
         ended = False
@@ -217,10 +199,13 @@ def _march(locus: Locus, place: Place, box: Any, largest: float, most: int, begi
             if name == "turn":
                 continue
             found.places.append(there_place)
+            ends = name if name in ENDS else "resonance" if locus.kind == "neimark_sacker" and name in ENDED else ""
+            if name == "grazing":
+                name = MEETS[locus.kind]
             if name != "range":
                 found.special.append((name, len(found.places) - 1))
-            if name in ("range", "grazing", "corner"):
-                found.ending, ended = name, True
+            if ends:
+                found.ending, ended = ends, True
                 break
         if ended:
             break
@@ -229,7 +214,7 @@ def _march(locus: Locus, place: Place, box: Any, largest: float, most: int, begi
             found.ending = "closed"
             break
         ds = min(ds * (1.7 if new.iterations <= 4 else 1.0), largest)
-        place, numbers, safe = new, after, now
+        place, second, safe = new, after, now
         if locus.shooting.reference is not None:
             _anchor_anew(locus, place)
     return found
@@ -268,17 +253,6 @@ class _Leaving:
 
 
 @dataclass
-class _Second:
-    """The number that vanishes at a point of codimension two."""
-
-    locus: Locus
-    name: str
-
-    def __call__(self, place: Place) -> float:
-        return _tests(self.locus, place)[self.name]
-
-
-@dataclass
 class _Turning:
     """How the parameters move, against how they did."""
 
@@ -286,29 +260,6 @@ class _Turning:
 
     def __call__(self, place: Place) -> float:
         return float(place.tangent[-2:] @ self.before.tangent[-2:])
-
-
-def _root(locus: Locus, a: Place, b: Place, number: Callable[[Place], float]) -> tuple[float, Place] | None:
-    """The zero of ``number`` on the curve between two of its points."""
-    from scipy.optimize import brentq
-
-    end = float(a.tangent @ (b.Y - a.Y))
-    known: dict[float, Place] = {}
-
-    def value(s: float) -> float:
-        place = a if s == 0.0 else b if s == end else locus.between(a, b, s)
-        if place is None:
-            raise ArithmeticError
-        known[s] = place
-        return number(place)
-
-    try:
-        s = float(brentq(value, 0.0, end, xtol=1e-15, rtol=1e-14, maxiter=100))
-    except (ArithmeticError, ValueError, RuntimeError):
-        return None
-    if s not in known:
-        value(s)
-    return s, known[s]
 
 
 def _met(begin: Place, a: Place, b: Place) -> bool:

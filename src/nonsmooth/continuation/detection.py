@@ -8,7 +8,7 @@ flip
     det(M + I) = 0;
 neimark_sacker
     :math:`\prod_{i<j} (\mu_i \mu_j - 1) = 0` with a complex pair;
-and the five ways in which a path can leave its signature (``path.VIOLATIONS``).
+and the six ways in which a path can leave its signature (``path.VIOLATIONS``).
 
 Each is a number along the branch that changes its sign; the root is bracketed by two points and found by Brent's
 method, every trial being an orbit corrected to rounding.
@@ -17,7 +17,6 @@ method, every trial being an orbit corrected to rounding.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,19 +27,11 @@ from nonsmooth.continuation.path import VIOLATIONS
 if TYPE_CHECKING:
     from nonsmooth.continuation.arclength import Curve, Point
 
-__all__ = ["SMOOTH", "Event", "Tests", "locate"]
+__all__ = ["SMOOTH", "Tests", "locate"]
 
 BEGUN = 1e-6
+ROUNDING = 1e-13  # of the numbers at both ends: smaller than this is zero
 SMOOTH = ("fold", "branch", "flip", "neimark_sacker")
-
-
-@dataclass
-class Event:
-    """A located event at distance ``s`` from the first of two points."""
-
-    kind: str
-    s: float
-    point: Point
 
 
 class Tests:
@@ -90,6 +81,7 @@ def locate(curve: Curve, a: Point, b: Point, number: Callable[[Point], float]) -
     if number(a) * number(b) > 0.0 and abs(number(a)) < BEGUN * abs(number(b)):
         return 0.0, a  # the branch begins at the event itself
     found: dict[float, Point] = {}
+    nothing = ROUNDING * max(abs(limited(number(a))), abs(limited(number(b))))
 
     class _Lost(Exception):
         pass
@@ -103,7 +95,8 @@ def locate(curve: Curve, a: Point, b: Point, number: Callable[[Point], float]) -
         if point is None:
             raise _Lost
         found[s] = point
-        return limited(number(point))
+        x = limited(number(point))
+        return 0.0 if abs(x) < nothing else x
 
     try:
         s = brentq(value, 0.0, end, xtol=1e-16, rtol=1e-15, maxiter=200)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.continuation.branch import ENDINGS
+from nonsmooth.continuation.marches import ENDINGS
 from nonsmooth.continuation.records import BranchRecord, PointRecord, SpecialRecord
 from nonsmooth.continuation.signature import Signature, Visit
 
@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from nonsmooth.continuation.orbit import Orbit
     from nonsmooth.system.system import System
 
-__all__ = ["branch_dataset", "orbit_dataset", "read_branch", "read_orbit", "signature_data", "signature_from"]
+__all__ = ["branch_dataset", "orbit_dataset", "read_branch", "read_orbit", "signature_data", "signature_from",
+           "special_row"]  # fmt: skip
 
 
 def signature_data(signature: Signature) -> list[list[int]]:
@@ -213,3 +214,31 @@ def read_orbit(dataset: xr.Dataset) -> Orbit:
         clearance={str(k): float(v) for k, v in zip(dataset["indicator"].values, get("clearance"), strict=True)},
         virtual=bool(get("virtual")),
     )  # fmt: skip
+
+
+def special_row(start: Any, verb: str) -> tuple[System, str, str, PointRecord, int, Any]:
+    """One row of ``special_points`` as data: system, kind, parameter, point, period number and the branch's range."""
+    from nonsmooth.results.provenance import read_provenance
+    from nonsmooth.system.system import System
+
+    if not hasattr(start, "data_vars") or "kind" not in start or "unknowns" not in start:
+        raise TypeError(f"{verb} takes one row of special_points, not {type(start).__name__}")
+    if "special" in start.dims:
+        if start.sizes["special"] != 1:
+            raise ValueError(
+                f"{verb} takes one special point, not {start.sizes['special']}: choose it, "
+                "special_points(branch).isel(special=0)"
+            )
+        start = start.isel(special=0)
+    source = read_provenance(start)
+    system = System.from_text(source["system"]["text"]).with_parameters(source["system"]["parameters"])
+    own = str(start.attrs["parameter"])
+    signature = signature_from(json.loads(start.attrs["layouts"])[int(start["layout"])])
+    X = start["unknowns"].values
+    known = ~np.isnan(X)
+    point = PointRecord(
+        float(start[own]), signature, X[known], start["tangent"].values[known], int(start["mode"]),
+        start["section"].values, start["maximum"].values, start["minimum"].values, float(start["period"]),
+        start["floquet_multipliers"].values, bool(start["stable"]), start["clearance"].values,
+    )  # fmt: skip
+    return system, str(start["kind"].values), own, point, int(start["period_number"]), source["options"]["range"]

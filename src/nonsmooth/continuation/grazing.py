@@ -19,13 +19,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.continuation.signature import AT_ONCE
+from nonsmooth.flow.saltation import chained
+
 if TYPE_CHECKING:
     from nonsmooth.continuation.arclength import Curve, Point
     from nonsmooth.continuation.change import Change
+    from nonsmooth.continuation.shooting import Shooting, Solved
     from nonsmooth.continuation.signature import Visit
     from nonsmooth.flow.variational import VariationalFlow
 
-__all__ = ["Graze", "graze"]
+__all__ = ["Graze", "both_sides", "graze"]
 
 FloatArray = NDArray[np.float64]
 ASIDE = 1e-6  # of the period: the touch is looked at from this far before and behind
@@ -47,14 +51,7 @@ class Graze:
 def graze(curve: Curve, point: Point, first: Point, change: Change) -> Graze | None:
     """Judge the graze at ``point``, where ``curve`` ends; ``first`` is the first point behind it."""
     shooting = curve.shooting
-    if change.gained:
-        visits, (times, states) = shooting.signature.visits, shooting.split(point.X)
-    else:
-        visits, times, states = change.signature.visits, change.times, change.states
-    product = _Product(shooting.flow, point.solved.values, visits, times, states, float(point.solved.times[-1]), change)
-    M, M_far, M_near = product(0.0), product(ASIDE), product(0.5 * ASIDE)
-    for matrix in (M, M_far, M_near):
-        matrix[shooting.free], matrix[:, shooting.free] = 0.0, 0.0
+    M, M_far, M_near = both_sides(shooting, point.solved, change)
     if not (np.isfinite(M).all() and np.isfinite(M_far).all() and np.isfinite(M_near).all()):
         return None
     bounded = bool(np.abs(M_near).max() < 1.5 * np.abs(M_far).max())
@@ -69,6 +66,19 @@ def graze(curve: Curve, point: Point, first: Point, change: Change) -> Graze | N
         "persistence" if same else "non_smooth_fold", bounded, M, M_plus,
         shooting.multipliers(M), shooting.multipliers(M_plus), doubled,
     )  # fmt: skip
+
+
+def both_sides(shooting: Shooting, solved: Solved, change: Change) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """M-, and M+ looked at from ``ASIDE`` and from half of it (their limit, where there is one)."""
+    if change.gained:
+        visits, (times, states) = shooting.signature.visits, shooting.split(solved.X)
+    else:
+        visits, times, states = change.signature.visits, change.times, change.states
+    product = _Product(shooting.flow, solved.values, visits, times, states, float(solved.times[-1]), change)
+    matrices = product(0.0), product(ASIDE), product(0.5 * ASIDE)
+    for matrix in matrices:
+        matrix[shooting.free], matrix[:, shooting.free] = 0.0, 0.0
+    return matrices
 
 
 @dataclass
@@ -86,7 +96,7 @@ class _Product:
     def __call__(self, aside: float) -> FloatArray:
         """With ``aside`` > 0 the contact's saltation matrices are put in, looked at so far from the touch (periods)."""
         M = np.eye(self.flow.n)
-        begin = 0.0
+        begin, taken = 0.0, None
         for i, visit in enumerate(self.visits):
             end = self.end if i == len(self.times) else float(self.times[i])
             if i == self.change.place and aside > 0.0:
@@ -95,7 +105,10 @@ class _Product:
                 step, z = self._leg(visit.mode, begin, end, self.states[i])
             M = step @ M
             if i < len(self.times):
-                M = self.flow.jump(self.values, visit.transition, end, z, visit.row).saltation @ M
+                jump = self.flow.jump(self.values, visit.transition, end, z, visit.row)
+                taken = chained([taken, jump]) if taken is not None and visit.row == AT_ONCE else jump
+                if self.visits[i + 1].row != AT_ONCE:
+                    M = taken.saltation @ M
             begin = end
         return np.asarray(M)
 
@@ -111,8 +124,12 @@ class _Product:
         An impact is looked at before the touch, where the indicator still rises; the motion goes on from the touch."""
         touch, inserted = self.change.touch, self.change.inserted
         first, z = self._leg(mode, begin, touch - aside, z)
-        entry = self.flow.jump(self.values, inserted[0].transition, touch - aside, z, inserted[0].row)
-        if len(inserted) == 1:
+        taken = [inserted[0].transition]
+        for visit in inserted[1:]:
+            if visit.row == AT_ONCE:
+                taken.append(visit.transition)
+        entry = self.flow.jump(self.values, taken, touch - aside, z, inserted[0].row)
+        if len(taken) == len(inserted):
             there, z = self._leg(mode, touch - aside, touch, z)
             rest, z = self._leg(mode, touch, end, z)
             # Phi of the last stretch before the touch belongs behind the impact, to the order of ``aside``.

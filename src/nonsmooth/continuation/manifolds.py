@@ -12,7 +12,8 @@ of the unstable manifold is the union of the images of one fundamental segment,
 Each image is made as fine as asked for by new values of s, so every point is an image of a point of the segment and no
 interpolated point is mapped. The segment is straight where the manifold is curved by :math:`O(\delta^2)`; that error
 lies along the other directions, which shrink under the map. The stable manifold is grown in the same way by the inverse
-of P (see :mod:`nonsmooth.continuation.section_map`).
+of P (see :mod:`nonsmooth.continuation.section_map`). At another phase of the section they are the images of both under
+the flow from phase 0.
 
 References
 ----------
@@ -23,17 +24,18 @@ B. Krauskopf, H. Osinga, J. Computational Physics 146 (1998) 404-419.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.continuation.continue_orbit import size_of
+from nonsmooth.continuation.arcs import BEGIN, Arc, grow
+from nonsmooth.continuation.begin import size_of
 from nonsmooth.continuation.orbit import EDGE, Orbit
 from nonsmooth.continuation.section_map import SectionMap
 from nonsmooth.flow.arguments import real_number, whole_number
+from nonsmooth.flow.sections import Stroboscopic
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -48,30 +50,13 @@ ENDS = {
     "lost": "The next points have no image, or no preimage was found: the motion diverges, starts beyond a stop, or "
     "the section map cannot be inverted there.",
 }
-BEGIN = 9  # points of the first segment
-FINEST = 1e-3  # of the distance: neighbours nearer than this are never parted
-NARROW = 1e-12  # in s: a gap that remains is a jump of the section map
-SHORT = 1e-3  # of the distance: segments shorter than this, and shrinking, add nothing
 RETURN = 1e-6
-MOST_LEVELS = 2000
-
-
-@dataclass
-class _Arc:
-    """One side of the manifold of one point of the orbit, in scaled states."""
-
-    points: list[FloatArray] = field(default_factory=list)
-    iterate: list[NDArray[np.int64]] = field(default_factory=list)
-    piece: list[NDArray[np.int64]] = field(default_factory=list)
-    length: float = 0.0
-    count: int = 0
-    pieces: int = 0
-    ending: str = "length"
 
 
 def manifolds(
     orbit: Orbit,
     *,
+    section: Stroboscopic | None = None,
     length: float = 10.0,
     kind: str = "both",
     distance: float = 0.02,
@@ -88,6 +73,8 @@ def manifolds(
     orbit : Orbit
         A saddle of a forced system: one real multiplier beyond the unit circle for ``"unstable"``, one within it for
         ``"stable"``.
+    section : Stroboscopic, optional
+        The phase at which the manifolds are looked at; 0 where not given.
     length : float
         Arc length of each side.
     kind : {"both", "unstable", "stable"}
@@ -125,6 +112,9 @@ def manifolds(
         for value, name in ((length, "length"), (distance, "distance"), (angle, "angle"), (delta, "delta"))
     )
     most = whole_number(points, "points", 2 * BEGIN)
+    if not (section is None or isinstance(section, Stroboscopic)):
+        raise TypeError(f"section = {section!r}: manifolds are grown in a stroboscopic section, ns.Stroboscopic(phase)")
+    phase = 0.0 if section is None else float(section.phase)
     size = _checked(orbit)
     wanted = ("unstable", "stable") if kind == "both" else (kind,)
     directions = {one: _direction(orbit, one, size) for one in wanted}
@@ -138,7 +128,8 @@ def manifolds(
             f"the section map does not bring the orbit back (it misses by {missed:.1e} of its size): its mode at the "
             f"section, {orbit.mode!r}, does not follow from the states alone, so the section has no manifolds of points"
         )
-    arcs: list[tuple[str, int, int, float, _Arc]] = []
+    view = partial(once.at_phase, phase=phase)
+    arcs: list[tuple[str, int, int, float, Arc]] = []
     for one, (mu, e) in directions.items():
         section_map = SectionMap(orbit.system, size, orbit.period_number * (2 if mu < 0.0 else 1))
         step = section_map.forward if one == "unstable" else section_map.backward
@@ -148,9 +139,10 @@ def manifolds(
                 if j:
                     q = once.forward(q[None, :])[0]
                     q = u + (q - u) * (first / np.linalg.norm(q - u))
-                arcs.append((one, side, j, mu, _grow(step, u, q, reach, near, turn, most)))
-    options = {"length": reach, "kind": kind, "distance": near, "angle": turn, "delta": first, "points": most}
-    return _dataset(orbit, size, np.array(cycle), arcs, options)
+                arcs.append((one, side, j, mu, grow(step, view, u, q, reach, near, turn, most)))
+    options = {"length": reach, "kind": kind, "distance": near, "angle": turn, "delta": first, "points": most,
+               "section": f"Stroboscopic(phase={phase!r})"}  # fmt: skip
+    return _dataset(orbit, size, view(np.array(cycle)), arcs, options)
 
 
 def _positive(value: Any, name: str) -> float:
@@ -194,127 +186,8 @@ def _direction(orbit: Orbit, kind: str, size: FloatArray) -> tuple[float, FloatA
     return value, e / np.linalg.norm(e) * (1.0 if e[np.abs(e).argmax()] > 0.0 else -1.0)
 
 
-def _grow(
-    step: Callable[[FloatArray, FloatArray], FloatArray], u: FloatArray, q: FloatArray, reach: float, near: float,
-    turn: float, most: int,
-) -> _Arc:  # fmt: skip
-    """One side: images of the fundamental segment until the length is reached."""
-    arc = _Arc()
-    end = step(q[None, :], q[None, :])[0]
-    if not np.isfinite(end).all():
-        arc.ending = "lost"
-        return arc
-    s = np.linspace(0.0, 1.0, BEGIN)
-    levels = [(1.0 - s)[:, None] * q + s[:, None] * end]
-    arc.length = float(np.linalg.norm(q - u))
-    last = np.inf
-    for k in range(MOST_LEVELS):
-        if k:
-            guess = levels[-1] + (levels[-1][-1] - levels[-1][0])
-            levels.append(step(levels[-1], guess))
-        s, levels, whole = _refine(step, s, levels, reach - arc.length, near, turn, most - arc.count)
-        if not whole:  # as far as it is fine
-            fine = int(np.flatnonzero(_bad(levels[-1], s, reach - arc.length, near, turn))[0]) + 1
-            _emit(arc, levels[-1][:fine], s[:fine], k, reach, near)
-            arc.ending = "points"
-            return arc
-        here = _emit(arc, levels[-1], s, k, reach, near)
-        if arc.ending != "length" or arc.length >= reach:
-            return arc
-        if here < SHORT * near and here < last and k > 0 and arc.length > 10 * np.linalg.norm(q - u):
-            arc.ending = "closed"
-            return arc
-        last = here
-        s, levels = _thin(s, levels, near, turn)
-    arc.ending = "closed"
-    return arc
-
-
-def _bad(x: FloatArray, s: FloatArray, left: float, near: float, turn: float) -> NDArray[np.bool_]:
-    """Which gaps between neighbours want another point; none beyond the length that is left."""
-    chord = np.diff(x, axis=0)
-    d = np.linalg.norm(chord, axis=1)
-    wide: NDArray[np.bool_] = np.logical_not(d <= near)  # NaN is wide: the edge of what has an image
-    lost: NDArray[np.bool_] = np.asarray(~np.isfinite(x).all(axis=1), dtype=np.bool_)
-    wide[lost[:-1] & lost[1:]] = False
-    with np.errstate(invalid="ignore", divide="ignore"):
-        along = chord / d[:, None]
-        cosine = np.clip((along[1:] * along[:-1]).sum(axis=1), -1.0, 1.0)
-    sharp = np.arccos(cosine) > turn
-    far = d > FINEST * near
-    wide[:-1] |= sharp & far[:-1]
-    wide[1:] |= sharp & far[1:]
-    reached = np.concatenate([[0.0], np.cumsum(np.nan_to_num(d))])[:-1]
-    return np.asarray(wide & (np.diff(s) > NARROW) & (reached <= left))
-
-
-def _refine(
-    step: Callable[[FloatArray, FloatArray], FloatArray], s: FloatArray, levels: list[FloatArray], left: float,
-    near: float, turn: float, room: int,
-) -> tuple[FloatArray, list[FloatArray], bool]:  # fmt: skip
-    """New points on the first segment, mapped up to the last image, until that is as fine as asked for."""
-    for _ in range(60):
-        at = np.flatnonzero(_bad(levels[-1], s, left, near, turn))
-        if not len(at):
-            break
-        if len(s) + len(at) > max(room, BEGIN) + BEGIN:
-            return s, levels, False
-        new = 0.5 * (s[at] + s[at + 1])
-        q, end = levels[0][0], levels[0][-1]
-        x = (1.0 - new)[:, None] * q + new[:, None] * end
-        s = np.insert(s, at + 1, new)
-        grown = [np.insert(levels[0], at + 1, x, axis=0)]
-        for old in levels[1:]:
-            between = 0.5 * (old[at] + old[at + 1])
-            between = np.where(np.isfinite(between), between, np.where(np.isfinite(old[at]), old[at], old[at + 1]))
-            x = step(x, between)
-            grown.append(np.insert(old, at + 1, x, axis=0))
-        levels = grown
-    return s, levels, True
-
-
-def _emit(arc: _Arc, x: FloatArray, s: FloatArray, k: int, reach: float, near: float) -> float:
-    """Add an image to the arc, up to the length asked for or the first point that is lost; its length."""
-    lost = np.flatnonzero(~np.isfinite(x).all(axis=1))
-    if len(lost):
-        x, arc.ending = x[: lost[0]], "lost"
-    d = np.linalg.norm(np.diff(x, axis=0), axis=1)
-    jump = (d > 4.0 * near) & (np.diff(s)[: len(d)] <= 4.0 * NARROW)
-    d[jump] = 0.0
-    run = arc.length + np.concatenate([[0.0], np.cumsum(d)])
-    over = np.flatnonzero(run >= reach)
-    last = int(over[0]) + 1 if len(over) else len(x)
-    if len(over):
-        arc.ending = "length"
-    begin = 0 if not arc.points else 1  # the first point is the last of the image before
-    pieces = arc.pieces + np.concatenate([[0], np.cumsum(jump)]).astype(np.int64)
-    arc.points.append(x[begin:last])
-    arc.iterate.append(np.full(max(last - begin, 0), k, dtype=np.int64))
-    arc.piece.append(pieces[begin:last])
-    arc.count += max(last - begin, 0)
-    if last:
-        arc.length, arc.pieces = float(run[last - 1]), int(pieces[last - 1])
-    return float(d.sum())
-
-
-def _thin(s: FloatArray, levels: list[FloatArray], near: float, turn: float) -> tuple[FloatArray, list[FloatArray]]:
-    """Leave out every other point where the last image stays fine without it."""
-    x = levels[-1]
-    chord = np.diff(x, axis=0)
-    d = np.linalg.norm(chord, axis=1)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        along = chord / d[:, None]
-        cosine = np.clip((along[1:] * along[:-1]).sum(axis=1), -1.0, 1.0)
-    spare = np.zeros(len(s), dtype=bool)
-    spare[1:-1] = (d[1:] + d[:-1] < 0.2 * near) & (np.arccos(cosine) < 0.2 * turn)
-    spare[::2] = False
-    if len(s) - int(spare.sum()) < BEGIN:
-        return s, levels
-    return s[~spare], [level[~spare] for level in levels]
-
-
 def _dataset(
-    orbit: Orbit, size: FloatArray, cycle: FloatArray, arcs: list[tuple[str, int, int, float, _Arc]],
+    orbit: Orbit, size: FloatArray, cycle: FloatArray, arcs: list[tuple[str, int, int, float, Arc]],
     options: dict[str, Any],
 ) -> xr.Dataset:  # fmt: skip
     from nonsmooth.results.labels import labels_of

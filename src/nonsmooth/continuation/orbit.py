@@ -47,7 +47,8 @@ class Orbit:
         States (and memory) just after them.
     monodromy_matrix : array (n, n)
         Derivative of the return map, through every transition (with its saltation matrix); rows and columns of the
-        memory follow those of the states.
+        memory follow those of the states. A state or a memory that nothing on the orbit changes counts as a parameter:
+        its row, its column and its multiplier are 0.
     floquet_multipliers : array (n,), complex
         Its eigenvalues, largest modulus first; that of an autonomous orbit's own direction, 1, is among them.
     stable : bool

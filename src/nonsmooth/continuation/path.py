@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.continuation.signature import AT_ONCE
+
 if TYPE_CHECKING:
     from nonsmooth.continuation.shooting import Shooting, Solved
     from nonsmooth.system.traced import Traced
@@ -17,7 +19,9 @@ __all__ = ["VIOLATIONS", "Path", "Walk"]
 FloatArray = NDArray[np.float64]
 ORDER = 20
 RTOL = 1e-15
-VIOLATIONS = ("touch", "short", "slow", "own", "others")
+ROUNDING = 1e-13  # of an indicator's size
+SOLVED = 1e-6  # of its size: as near to a boundary just crossed as an orbit is solved for
+VIOLATIONS = ("touch", "short", "slow", "own", "others", "landed")
 
 
 @dataclass
@@ -36,16 +40,18 @@ class Path:
     other: NDArray[np.int64]  # (m,) which one
     slope: FloatArray  # (m,) how fast the indicator that fires rises: 0 where the orbit only touches
     tau: FloatArray  # (m + 1,) lengths of the visits; inf where it is fixed by the forcing
+    landed: FloatArray  # (m + 1,) where each visit begins, the largest margin of its transitions: 0 on a boundary
+    landing: NDArray[np.int64]  # (m + 1,) which transition
 
     def violation(self) -> FloatArray:
-        """Five numbers that are positive (or inf) on an orbit of the system; one turns negative beyond a boundary.
+        """Six numbers that are positive (or inf) on an orbit of the system; one turns negative beyond a boundary.
 
         In order (``VIOLATIONS``): the nearest touch, the shortest visit, the slowest crossing, the other rows of the
-        conditions that fire, the conditions that do not.
+        conditions that fire, the conditions that do not, those that hold where a visit begins (behind a reset).
         """
         return np.array([
             -self.touch, self.tau.min(), self.slope.min(initial=np.inf), self.own.min(initial=np.inf),
-            -self.others.max(initial=-np.inf),
+            -self.others.max(initial=-np.inf), -self.landed.max(),
         ])  # fmt: skip
 
 
@@ -88,8 +94,23 @@ class Walk:
             if k >= 0:
                 self.elsewhere[i, k] = False
         self.conditional = np.flatnonzero(self.fired_row[:-1] >= 0)
-        fixed = np.concatenate([[shooting.forced], self.fired_row[:-1] < 0, [shooting.forced]])
-        self.fixed = fixed[:-1] & fixed[1:] if m > 1 else np.array([True])  # visits whose length cannot vanish
+        self.at_once = np.array([*shooting.at_once, False], dtype=bool)  # visits of no length
+        fixed = [shooting.forced]
+        for visit in visits[:-1]:
+            fixed.append(fixed[-1] if visit.row == AT_ONCE else visit.row < 0)
+        fixed.append(shooting.forced)
+        ends = np.array(fixed, dtype=bool)
+        # Visits whose length cannot vanish
+        self.fixed = (ends[:-1] & ends[1:]) | self.at_once if m > 1 else np.array([True])
+        self.crossed = np.zeros((m, len(traced.indicators)), dtype=bool)  # indicators zero where a visit begins
+        for i in range(1, m):
+            if self.at_once[i - 1]:
+                self.crossed[i] = self.crossed[i - 1]
+            elif self.fired_row[i - 1] >= 0:
+                self.crossed[i, self.rows[self.fired_row[i - 1], 0]] = True
+        for i in range(m):  # of conditions that hold together the first is taken
+            if self.at_once[i]:
+                self.elsewhere[i, self.fired[i] :] = False
         self.inside = np.array([(i, self.fired[i]) for i in self.conditional], dtype=np.int64).reshape(-1, 2).T
 
     def along(self, solved: Solved, states: FloatArray) -> Path | None:
@@ -100,13 +121,15 @@ class Walk:
 
         m, n_t = self.shape
         extremes = np.empty((2, self.n))
-        inner, place, end = np.empty((m, n_t)), np.empty((m, n_t)), np.empty((m, n_t))
+        inner, place, begin, size, end = (np.empty((m, n_t)) for _ in range(5))
+        begin_row = np.empty((m, n_t), dtype=np.int64)
         which, slope = np.empty((m, n_t), dtype=np.int64), np.empty((m, 2))
-        tau = solved.times[1:] - solved.times[:-1]
+        tau = np.where(self.at_once, 0.0, solved.times[1:] - solved.times[:-1])
         status = follow(
             self.functions, ORDER, RTOL, self.weight, self.lacking, self.first, self.outgoing, self.transitions,
             self.rows, solved.values, self.modes, solved.times[:-1], tau, np.ascontiguousarray(states), self.fired,
-            self.fired_row, *self.scratch, extremes, inner, place, which, end, slope,
+            self.fired_row, *self.scratch, extremes, inner, place, which, begin, begin_row, size,
+            end, slope,
         )  # fmt: skip
         if status:
             return None
@@ -120,11 +143,30 @@ class Walk:
             others = rest[np.arange(m - 1), other]
         else:
             other, others = np.zeros(m - 1, dtype=np.int64), np.full(m - 1, -np.inf)
+        held = self._held(begin, begin_row, size) if len(self.rows) else np.full((m, 1), -np.inf)
+        landing = held.argmax(axis=1)
         extremes[~np.isfinite(extremes)] = np.nan  # states that no visit has
         return Path(
             extremes[0], extremes[1], inner, place, which, float(inner[touched]) if n_t else -np.inf, touched,
             own, others, other, slope[self.conditional, 0], np.where(self.fixed, np.inf, tau),
+            held[np.arange(m), landing], landing,
         )  # fmt: skip
+
+    def _held(self, begin: FloatArray, row: NDArray[np.int64], size: FloatArray) -> FloatArray:
+        """Margins where the visits begin; -inf for those that are zero there.
+
+        Beside a boundary that has just been crossed only what is solved for tells which side is meant."""
+        crossed = self.crossed.copy()
+        for i in np.flatnonzero(self.shooting.divided):  # the exit lies in the surface of the entry
+            crossed[i, self.rows[self.fired_row[i], 0]] = True
+        near = np.where(np.take_along_axis(crossed, self.rows[row, 0], axis=1), SOLVED, ROUNDING)
+        zero = np.abs(begin) <= near * size
+        held = np.where(self.armed & ~zero, begin, -np.inf)
+        held[0] = -np.inf  # the section is passed, nothing has led there
+        for i in np.flatnonzero(self.at_once):  # what happens at once must hold; the others: ``elsewhere``
+            k = self.fired[i]
+            held[i], held[i, k] = -np.inf, 0.0 if zero[i, k] else -begin[i, k]
+        return held
 
     def clearance(self, path: Path, indicators: int) -> FloatArray:
         """Per indicator the least distance left to a transition that did not happen; NaN where none came near."""

@@ -13,7 +13,7 @@ from nonsmooth.continuation.signature import Signature
 
 if TYPE_CHECKING:
     from nonsmooth.continuation.arclength import Curve, Point
-    from nonsmooth.continuation.branch import March, Special
+    from nonsmooth.continuation.marches import March, Special
 
 __all__ = ["BranchRecord", "PointRecord", "SpecialRecord", "from_march", "joined"]
 
@@ -66,7 +66,7 @@ class BranchRecord:
     sentences: tuple[str, str] = ("", "")
 
 
-def point_record(curve: Curve, point: Point) -> PointRecord:
+def point_record(curve: Curve, point: Point, virtual: bool = False) -> PointRecord:
     """What is kept of a solved point."""
     shooting, path = curve.shooting, point.path
     n_u = len(shooting.system.states)
@@ -74,7 +74,7 @@ def point_record(curve: Curve, point: Point) -> PointRecord:
         float(point.X[-1]), shooting.signature, point.X, point.tangent * curve.scale, shooting.at_section,
         point.X[:n_u], path.maximum, path.minimum, float(point.solved.times[-1]), point.multipliers,
         stable_by(point.multipliers, shooting.forced),
-        curve.walk.clearance(path, len(shooting.system.indicators)),
+        curve.walk.clearance(path, len(shooting.system.indicators)), virtual,
     )  # fmt: skip
 
 
@@ -94,7 +94,7 @@ def special_record(special: Special) -> SpecialRecord:
 
 def from_march(found: March, offset: int = 0) -> tuple[list[PointRecord], list[SpecialRecord]]:
     """The records of a march; special points count from ``offset``."""
-    points = [point_record(row.curve, row.point) for row in found.rows]
+    points = [point_record(row.curve, row.point, row.virtual) for row in found.rows]
     special = []
     for one in found.special:
         record = special_record(one)

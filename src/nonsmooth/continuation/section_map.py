@@ -47,9 +47,16 @@ class SectionMap:
         self.plan = SectionPlan(extremes=False)
         self.shape = (len(size), len(system.indicators), len(system.outputs))
 
+    def at_phase(self, x: FloatArray, phase: float) -> FloatArray:
+        """The scaled points x (m, n) of phase 0 at a later phase of the same period."""
+        return x if phase == 0.0 else self._images(x, SectionPlan(phase=phase, extremes=False), 1)
+
     def forward(self, x: FloatArray, near: FloatArray | None = None) -> FloatArray:
         """Images (m, n) of the scaled points x (m, n)."""
         del near
+        return self._images(x, self.plan, self.periods)
+
+    def _images(self, x: FloatArray, plan: SectionPlan, returns: int) -> FloatArray:
         images = np.full_like(x, np.nan)
         starts = np.ascontiguousarray(x * self.size)
         for a in range(0, len(x), CHUNK):
@@ -60,9 +67,7 @@ class SectionMap:
             given = np.ascontiguousarray(part[safe])
             out = Chain.empty(len(given), 1, *self.shape)
             state = State(given[0].copy(), self.system.memory_vector())
-            self.engine.chain(
-                self.tables, 0, len(given), state, given, self.plan, self.periods - 1, 1, out
-            )  # fmt: skip
+            self.engine.chain(self.tables, 0, len(given), state, given, plan, returns - 1, 1, out)
             good = np.isin(out.status, (codes.OK, codes.NOT_GUARANTEED))
             images[a + np.flatnonzero(safe)[good]] = out.section[good, 0] / self.size
         return images

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.continuation.signature import Signature, Visit
+from nonsmooth.continuation.signature import AT_ONCE, Signature, Visit
 from nonsmooth.flow.engine import Chain, Log, SectionPlan, State
 from nonsmooth.flow.variational import VariationalFlow
 from nonsmooth.kernels import codes
@@ -17,12 +17,13 @@ if TYPE_CHECKING:
     from nonsmooth.flow.engine import Engine
     from nonsmooth.system.system import System
 
-__all__ = ["CLOSED", "NEAR", "Guess", "forced_guesses", "settle_forced", "touching"]
+__all__ = ["CLOSED", "NEAR", "Guess", "fired_row", "forced_guesses", "settle_forced", "touching"]
 
 FloatArray = NDArray[np.float64]
 CHOICE = 6  # candidates tried: period numbers, or returning points for a given one
 CLOSED = 1e-8  # a return nearer than this has closed: the shortest such period comes first
 TOUCH = 1e-6  # of the period, of the motion's size: a contact as short, an impact as weak as this may be a touch
+BEHIND = 1e-9  # of an indicator's size: nearer to a boundary than this is on it
 NEAR = 0.2  # of the motion's size: a return farther off than this is no candidate
 
 
@@ -37,7 +38,8 @@ class Guess:
     states: FloatArray  # (m + 1, n_z): at the section and after the crossings
     gap: float
     size: FloatArray  # (n_u,) half the range of each state
-    kicks: FloatArray = field(default_factory=lambda: np.full(1000, np.inf))  # change of state in each crossing, scaled
+    gaps: FloatArray = field(default_factory=lambda: np.empty(0))  # after 1, 2 ... forcing periods
+    kicks: FloatArray | None = None  # (m,) change of state in each crossing, scaled; None: not known
 
 
 @dataclass
@@ -66,32 +68,39 @@ def settle_forced(system: System, engine: Engine, state: State, transient: int, 
 def forced_guesses(system: System, settled: Settled, period_number: int | None, most: int) -> list[Guess]:
     """Candidates for the period number, the smallest first, from the last section point.
 
-    For a given period number: from the section points that return nearest to themselves.
+    For a given period number: from the section points that return nearest to themselves. A return is one in the mode
+    it began in.
     """
     points = settled.points / settled.size
+
+    def gap(i: int, j: int) -> float:
+        return float(np.abs(points[i] - points[j]).max()) if settled.modes[i] == settled.modes[j] else np.inf
+
     guesses = []
     if period_number is not None:
         p = period_number
-        gaps = np.abs(points[p:] - points[:-p]).max(axis=1)
+        gaps = np.array([gap(i, i + p) for i in range(len(points) - p)])
         places = [int(i) for i in np.argsort(gaps, kind="stable")[:CHOICE]]
         if len(settled.state.memory):  # the memory is known at the last point only
             places = [len(gaps) - 1]
         starts = [(p, i, float(gaps[i])) for i in places]
     else:
         last = len(points) - 1
-        gaps = np.array([np.abs(points[last] - points[last - p]).max() for p in range(1, most + 1)])
+        gaps = np.array([gap(last, last - p) for p in range(1, most + 1)])
         starts = [(p, last, float(gaps[p - 1])) for p in range(1, most + 1) if gaps[p - 1] <= NEAR]
         # Chaos comes near its beginning again and again: the nearest few are tried.
         starts = sorted(sorted(starts, key=lambda start: (max(start[2], CLOSED), start[0]))[:CHOICE])
-    for p, i, gap in starts:
-        guess = _read_round(system, settled, p, i, gap)
+    for p, i, _ in starts:
+        back = period_number is None
+        returns = np.array([gap(i, i - q if back else i + q) for q in range(1, p + 1)])
+        guess = _read_round(system, settled, p, i, returns) if np.isfinite(returns[-1]) else None
         if guess is not None:
             guesses.append(guess)
     return guesses
 
 
-def _read_round(system: System, settled: Settled, p: int, i: int, gap: float) -> Guess | None:
-    """The motion over p forcing periods from section point i, as an orbit."""
+def _read_round(system: System, settled: Settled, p: int, i: int, gaps: FloatArray) -> Guess | None:
+    """The motion over p forcing periods from section point i, as an orbit; None where it ends in another mode."""
     state = settled.state.copy()
     if i < len(settled.points) - 1:
         state.u[:], state.counters[0] = settled.points[i], settled.modes[i]
@@ -105,13 +114,23 @@ def _read_round(system: System, settled: Settled, p: int, i: int, gap: float) ->
         return None
     states = np.concatenate([np.nan_to_num(log.u_after), log.memory_after], axis=1)
     signature = _signature(system, log, start, mode)
+    if signature.visits[-1].mode != mode:
+        return None
     kicks = np.abs(np.nan_to_num(log.u_after - log.u_before) / settled.size).max(axis=1, initial=0.0)
-    return Guess(p, p * period, signature, log.crossing_time, np.vstack([start, states]), gap, settled.size, kicks)
+    if len(states):  # the memory returns too, or the round is a longer one
+        begun, ended = start[len(state.u) :], states[-1, len(state.u) :]
+        apart = np.abs(ended - begun) / np.maximum(np.maximum(np.abs(begun), np.abs(ended)), 1e-12)
+        gaps[-1] = max(gaps[-1], float(apart.max(initial=0.0)))
+    return Guess(
+        p, p * period, signature, log.crossing_time, np.vstack([start, states]), float(gaps[-1]), settled.size, gaps,
+        kicks,
+    )  # fmt: skip
 
 
 def touching(guess: Guess, system: System) -> list[Guess]:
     """The same motion without contacts that are no more than a touch: an orbit at its grazing point, or none such."""
-    signature, times, states, kicks = guess.signature, guess.times, guess.states, guess.kicks
+    signature, times, states = guess.signature, guess.times, guess.states
+    kicks = np.full(len(times), np.inf) if guess.kicks is None else guess.kicks
     jumps = system.transitions
     i = 0
     while i < len(times):
@@ -137,6 +156,13 @@ def touching(guess: Guess, system: System) -> list[Guess]:
     return [replace(guess, signature=signature, times=times, states=states)]
 
 
+def fired_row(flow: VariationalFlow, values: FloatArray, k: int, t: float, z: FloatArray, same: bool) -> int:
+    """The row of transition k that is zero; AT_ONCE where one at the ``same`` instant has led behind them all."""
+    found = flow.jump(values, k, t, z)
+    size = float(np.abs(found.h_z) @ flow.scale) + abs(float(found.h_z @ z))
+    return AT_ONCE if same and abs(found.h) > BEHIND * size else found.row
+
+
 def _signature(system: System, log: Log, start: FloatArray, mode: int) -> Signature:
     """The signature of a logged round; the row of each condition that became true last is the one that is zero."""
     traced, flow, values = system.traced, VariationalFlow.of(system), system.parameter_vector()
@@ -149,7 +175,8 @@ def _signature(system: System, log: Log, start: FloatArray, mode: int) -> Signat
             visits.append(Visit(jump.source, int(k), -1, round(t / period - jump.at)))
         else:
             z = np.concatenate([np.nan_to_num(log.u_before[i]), memory])
-            visits.append(Visit(jump.source, int(k), flow.jump(values, int(k), t, z).row))
+            same = i > 0 and t == log.crossing_time[i - 1]
+            visits.append(Visit(jump.source, int(k), fired_row(flow, values, int(k), t, z, same)))
         memory = log.memory_after[i]
     last = traced.transitions[log.crossing_transition[-1]].target if visits else mode
     return Signature((*visits, Visit(int(last))))

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.continuation.anchor import anchored
-from nonsmooth.continuation.settled import NEAR, Guess
+from nonsmooth.continuation.settled import NEAR, Guess, fired_row
 from nonsmooth.continuation.signature import Signature, Visit
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.engine import Log, State
@@ -124,7 +124,8 @@ def _by_transitions(system: System, log: Log, most: int, given: int | None) -> l
         memory = log.memory_after[last - length]
         for i in range(last - length + 1, last + 1):
             z = np.concatenate([np.nan_to_num(log.u_before[i]), memory])
-            row = flow.jump(values, int(k[i]), float(log.crossing_time[i]), z).row
+            t = float(log.crossing_time[i])
+            row = fired_row(flow, values, int(k[i]), t, z, t == log.crossing_time[i - 1])
             visits.append(Visit(traced.transitions[k[i]].source, int(k[i]), row))
             memory = log.memory_after[i]
         states = np.concatenate([after[part], log.memory_after[part]], axis=1)

@@ -7,7 +7,8 @@ orbit: the period too), and the active parameters:
 
     X = (z_0;\ t_1, z_1;\ \dots;\ t_m, z_m;\ [T];\ p)
 
-    h_i(t_i, z_i^-) = 0, \quad z_i = R_i(t_i, z_i^-), \quad z_i^- = \varphi(t_i - t_{i-1}; t_{i-1}, z_{i-1}),
+    h_i(t_i, z_i^-) = 0 \text{ (at once: } t_i = t_{i-1}), \quad z_i = R_i(t_i, z_i^-), \quad
+    z_i^- = \varphi(t_i - t_{i-1}; t_{i-1}, z_{i-1}),
     \quad z_0 = \varphi(T - t_m; t_m, z_m)
 
 An autonomous orbit is anchored so that its section lies in the middle of a visit, t_1 = T - t_m (no transitions: by
@@ -22,8 +23,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.continuation.signature import Signature
+from nonsmooth.continuation.signature import AT_ONCE, Signature
 from nonsmooth.continuation.solve import solve
+from nonsmooth.flow.saltation import chained
 from nonsmooth.flow.variational import VariationalFlow
 
 if TYPE_CHECKING:
@@ -47,13 +49,19 @@ class Solved:
     jumps: list[Jump]
     values: FloatArray
     free: list[int]
+    at_once: list[bool]  # (m,) transitions at the instant of the one before
 
     @property
     def monodromy(self) -> FloatArray:
         """Derivative of the return map (autonomous: with the trivial multiplier 1; zero for what is constant)."""
         M = self.legs.Phi[0]
-        for i, jump in enumerate(self.jumps):
-            M = self.legs.Phi[i + 1] @ (jump.saltation @ M)
+        for i in range(len(self.jumps)):
+            if i + 1 < len(self.jumps) and self.at_once[i + 1]:
+                continue  # its instant is that of the first of them
+            first = i
+            while self.at_once[first]:
+                first -= 1
+            M = self.legs.Phi[i + 1] @ (chained(self.jumps[first : i + 1]).saltation @ M)
         if self.free:
             M = M.copy()
             M[self.free], M[:, self.free] = 0.0, 0.0
@@ -91,6 +99,7 @@ class Shooting:
         self.jumps = [(v.transition, v.row, traced.transitions[v.transition].at, v.turn) for v in signature.crossings]
         # A state or a memory that nothing on the orbit ever sets is a free constant, not an unknown.
         self.free = self._constants()
+        self.at_once = [v.row == AT_ONCE for v in signature.crossings]
         self._one = np.eye(n)
         self._columns = self.z_at[:, None] + np.arange(n)
         self.reference: tuple[FloatArray, FloatArray] | None = None  # autonomous, no crossings: (z_ref, f_ref)
@@ -176,7 +185,10 @@ class Shooting:
             if a:
                 D[:, size:] = legs.P[i]
             r = ti
-            if at is None:
+            if self.at_once[i]:
+                F[r] = t[i] - t[i - 1]
+                J[r, ti], J[r, self.t_at[i - 1]] = 1.0, -1.0
+            elif at is None:
                 F[r] = jump.h
                 J[r] = jump.h_z @ D
                 J[r, ti] += jump.h_t
@@ -215,7 +227,7 @@ class Shooting:
         if not self.forced:
             J[:n, size - 1] += legs.f_end[m]
             self._anchor(F, J, X, t, z[0])
-        return Solved(X, F, J, times, legs, jumps, values, self.free)
+        return Solved(X, F, J, times, legs, jumps, values, self.free, self.at_once)
 
     def _anchor(self, F: FloatArray, J: FloatArray, X: FloatArray, t: FloatArray, z0: FloatArray) -> None:
         """The phase condition of an autonomous orbit."""
@@ -272,7 +284,7 @@ class Shooting:
         traced = self.system.traced
         for i, (k, row, at, _) in enumerate(self.jumps):
             n_rows = len(traced.transitions[k].rows)
-            if at is None and n_rows > 1:
+            if at is None and n_rows > 1 and not self.at_once[i]:
                 found = [self.flow.jump(values, k, float(times[i]), z[i + 1], r) for r in range(n_rows)]
                 signs = [r.sign for r in traced.transitions[k].rows]
                 self.alone[i] = all(
@@ -283,7 +295,7 @@ class Shooting:
         for i in range(1, self.m):
             k, row, at, _ = self.jumps[i]
             k0, row0, at0, _ = self.jumps[i - 1]
-            if at is not None or at0 is not None or visits[i].mode == visits[i - 1].mode:
+            if at is not None or at0 is not None or self.at_once[i] or visits[i].mode == visits[i - 1].mode:
                 continue
             entry = self.flow.jump(values, k0, float(times[i - 1]), z[i], row0)
             leave = self.flow.jump(values, k, float(times[i - 1]), z[i], row)

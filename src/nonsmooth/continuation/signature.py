@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from nonsmooth.system.traced import Traced
 
-__all__ = ["SECTION", "Signature", "Visit"]
+__all__ = ["AT_ONCE", "SECTION", "Signature", "Visit"]
 
 SECTION = -1
+AT_ONCE = -2  # a row: the condition holds already where the transition before has led
 
 
 @dataclass(frozen=True)
@@ -23,7 +24,8 @@ class Visit:
     """Motion in ``mode`` until ``transition`` fires because row ``row`` of its condition becomes true.
 
     ``transition`` is -1 for the visit that ends at the section; ``row`` is -1 there and for a transition at a phase,
-    which then happens in the forcing period ``turn`` (0 ... n) after the section.
+    which then happens in the forcing period ``turn`` (0 ... n) after the section. ``row`` is -2 where the transition
+    follows another one at the same instant, because the reset has led behind its boundary.
     """
 
     mode: int
@@ -59,7 +61,7 @@ class Signature:
     def repeated(self, times: int, turns: int = 0) -> Signature:
         """The same orbit gone round several times; ``turns`` forcing periods are one round."""
         visits = [
-            Visit(v.mode, v.transition, v.row, v.turn + turns * i if v.row < 0 else 0)
+            Visit(v.mode, v.transition, v.row, v.turn + turns * i if v.row == -1 else 0)
             for i in range(times)
             for v in self.crossings
         ]
@@ -82,7 +84,9 @@ class Signature:
             if visit.transition == SECTION:
                 continue
             jump = traced.transitions[visit.transition]
-            if jump.at is not None:
+            if visit.row == AT_ONCE:
+                parts.append("(at once)")
+            elif jump.at is not None:
                 parts.append(f"(at {jump.at:g})")
             else:
                 row = jump.rows[visit.row]

@@ -11,8 +11,8 @@ __all__ = ["special_points"]
 
 #: Variables over ``point`` that describe the orbit at a special point too.
 _ORBIT = (
-    "section", "maximum", "minimum", "period", "floquet_multipliers", "stable", "signature", "mode", "clearance",
-    "layout", "unknowns", "tangent",
+    "section", "maximum", "minimum", "period", "floquet_multipliers", "stable", "virtual", "signature", "mode",
+    "clearance", "layout", "unknowns", "tangent",
 )  # fmt: skip
 
 

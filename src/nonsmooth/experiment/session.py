@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import tomllib
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 from nonsmooth.errors import DataFileError
 from nonsmooth.experiment.load import load_recording
 from nonsmooth.experiment.recording import Recording, RecordingWarning
-from nonsmooth.system.names import unknown
+from nonsmooth.system.names import check_keys, unknown
 
 __all__ = ["APPARATUS", "NOTEBOOK", "PROCEDURES", "SETTINGS", "Quantity", "RecordedRun", "Session", "load_session"]
 
@@ -208,9 +208,9 @@ def load_session(folder: str | os.PathLike[str]) -> Session:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise DataFileError(f"{notebook}: is not a TOML file: {error}") from None
     where = str(notebook)
-    _check_keys(document, ("session", "apparatus", "recording"), where, "a table")
+    check_keys(document, ("session", "apparatus", "recording"), where, "a table")
     head = _table(document.get("session", {}), f"{where}, [session]")
-    _check_keys(head, ("title", "synthetic"), f"{where}, [session]", "a key")
+    check_keys(head, ("title", "synthetic"), f"{where}, [session]", "a key")
     title, synthetic = head.get("title", place.name), head.get("synthetic", False)
     if not isinstance(title, str) or not isinstance(synthetic, bool):
         raise TypeError(f"{where}, [session]: title is a text and synthetic true or false, got {dict(head)!r}")
@@ -230,11 +230,11 @@ def load_session(folder: str | os.PathLike[str]) -> Session:
 
 def _apparatus(given: Any, where: str) -> Mapping[str, Quantity]:
     table = _table(given, where)
-    _check_keys(table, APPARATUS, where, "a key")
+    check_keys(table, APPARATUS, where, "a key")
     known = {}
     for name, value in table.items():
         stated = value if isinstance(value, dict) else {"value": value}
-        _check_keys(stated, ("value", "uncertainty"), f"{where}, {name}", "a key")
+        check_keys(stated, ("value", "uncertainty"), f"{where}, {name}", "a key")
         if "value" not in stated:
             raise ValueError(f"{where}, {name}: needs `value`")
         numbers = [_number(stated.get(key, 0.0), f"{where}, {name}: {key}") for key in ("value", "uncertainty")]
@@ -247,7 +247,7 @@ def _apparatus(given: Any, where: str) -> Mapping[str, Quantity]:
 
 def _entry(given: Any, folder: Path, where: str) -> _Entry:
     table = _table(given, where)
-    _check_keys(table, ("file", "procedure", "runs", "read"), where, "a key")
+    check_keys(table, ("file", "procedure", "runs", "read"), where, "a key")
     for key in ("file", "procedure", "runs"):
         if key not in table:
             raise ValueError(f"{where}: needs `{key}`")
@@ -267,7 +267,7 @@ def _entry(given: Any, folder: Path, where: str) -> _Entry:
             raise ValueError(f"{where}: run {name!r} is named twice")
         runs[name] = settings
     read = _table(table.get("read", {}), f"{where}, read")
-    _check_keys(read, _READ, f"{where}, read", "an option of load_recording")
+    check_keys(read, _READ, f"{where}, read", "an option of load_recording")
     options = dict(read)
     if isinstance(options.get("columns"), dict):  # TOML has lists where load_recording takes (column, unit)
         options["columns"] = {k: tuple(v) if isinstance(v, list) else v for k, v in options["columns"].items()}
@@ -276,7 +276,7 @@ def _entry(given: Any, folder: Path, where: str) -> _Entry:
 
 def _run(given: Any, procedure: str, where: str) -> tuple[str, Mapping[str, Any]]:
     table = dict(_table(given, where))
-    _check_keys(table, ("run", *SETTINGS), where, "a setting")
+    check_keys(table, ("run", *SETTINGS), where, "a setting")
     name = table.pop("run", None)
     if not isinstance(name, str) or not name:
         raise ValueError(f'{where}: needs run = "..." with the name of the run in the file')
@@ -305,10 +305,3 @@ def _table(value: Any, where: str) -> Mapping[str, Any]:
     if not isinstance(value, dict):
         raise ValueError(f"{where} must be a table with keys, got {value!r}")
     return value
-
-
-def _check_keys(table: Mapping[str, Any], allowed: Iterable[str], where: str, what: str) -> None:
-    known = list(allowed)
-    for key in table:
-        if key not in known:
-            raise ValueError(f"{where}: {unknown(key, what, 'this place', known)}")

@@ -156,7 +156,7 @@ class SeriesEngine:
         choice[[at.TRANSIENT, at.KEEP, at.SECTION, at.RISING]] = transient, keep, plan.indicator, plan.rising
         choice[[at.SECTION_MODE, at.AFTER, at.EVERY]] = plan.mode, plan.after, plan.every
         control = self._control(-1.0, plan.t_max, -1.0)
-        tally, memo = np.zeros(at.N_TALLY, dtype=np.int64), np.zeros(at.N_MEMO)
+        tally, memo = np.zeros(at.N_TALLY, dtype=np.int64), np.zeros(at.N_MEMO + len(self.traced.u))
         sections, extremes = np.zeros((keep, n + 2)), np.zeros((2, n + n_i + len(traced.outputs)))
         scratch, log = self._scratch(), _no_log()
         carried = state if starts is None else State(np.zeros(n), np.zeros(len(traced.m)))
@@ -205,7 +205,7 @@ class SeriesEngine:
         choice, control = self._choice(tables), self._control(-1.0, np.inf, until)
         choice[at.RECORD], choice[at.SECTION] = 1, -1
         control[at.PERIOD] = tables.periods[0]
-        tally, memo = np.zeros(at.N_TALLY, dtype=np.int64), np.zeros(at.N_MEMO)
+        tally, memo = np.zeros(at.N_TALLY, dtype=np.int64), np.zeros(at.N_MEMO + len(self.traced.u))
         tally[at.SETTLED] = state.settled
         q = np.concatenate([tables.points[0], state.memory])
         sampled = np.full((len(samples), n + n_memory + 2), np.nan)

@@ -15,7 +15,7 @@ Fractals 5 (1995) 1671-1681.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,17 +53,16 @@ class Growth:
         return 0.0 if found == wanted else found - wanted
 
 
-class Frame:
+class Frame(Protocol):
     """Orthonormal directions that follow a trajectory; :meth:`advance` carries both on."""
 
     active: NDArray[np.bool_]  # (n,) components of z = (u, memory) that have directions of their own
 
     def advance(self, state: State, count: int, unit: float) -> Growth:
         """March ``count`` units of time. ``state`` is left at the end; its clock may be set back by whole periods."""
-        raise NotImplementedError
 
 
-class _PlanarFrame(Frame):
+class _PlanarFrame:
     """One kernel for the trajectory and its frame."""
 
     def __init__(self, engine: PlanarEngine, tables: Any, i: int, scale: FloatArray) -> None:
@@ -85,7 +84,7 @@ class _PlanarFrame(Frame):
         return Growth(growth, float(sums[0]), float(sums[1]), float(sums[3]), int(status))
 
 
-class _RecordedFrame(Frame):
+class _RecordedFrame:
     """The engine records a stretch of the trajectory; the frame follows piece by piece."""
 
     def __init__(

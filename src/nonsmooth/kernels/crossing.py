@@ -23,10 +23,15 @@ def snap(C, m, n, n_indicators, h, scale, measured, side):
     """After-limits: set what is zero within rounding to zero in the jets of the indicators, and find their signs.
 
     ``side`` becomes the sign of the first coefficient that does not vanish (0: the indicator vanishes identically).
-    ``measured`` is the size of indicators known to be zero here: their rounding error, seen.
+    ``measured`` is the size of indicators known to be zero here: their rounding error, seen. Others share its relative
+    size: where a stick ends, the speed begins with a slope that is the indicator that ended it.
     """
+    seen = 0.0
     for i in range(n_indicators):
-        noise = max(NOISE * scale[i], 4.0 * measured[i])
+        if scale[i] > 0.0:
+            seen = max(seen, measured[i] / scale[i])
+    for i in range(n_indicators):
+        noise = max(NOISE * scale[i], 4.0 * measured[i], 16.0 * min(seen, 1e-12) * scale[i])
         sign, power = 0, 1.0
         for k in range(m + 1):
             c = C[n + i, k]

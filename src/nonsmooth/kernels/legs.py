@@ -122,6 +122,27 @@ def sum_series(D, i, c, h):
 
 
 @device
+def step_end(C, D, entries, kinds, mode, n_u, s, u, X):
+    """State and matrix at s from the step's begin; returns the integral of the divergence up to there."""
+    order = D.shape[2] - 1
+    divergence = 0.0
+    for e in range(entries.shape[0]):
+        if entries[e, 0] == entries[e, 1] and kinds[mode, e] != 0:
+            v = 0.0
+            for k in range(order - 1, -1, -1):
+                v = v * s + C[n_u + e, k] / (k + 1)
+            divergence += v * s
+    for i in range(n_u):
+        v = C[i, order]
+        for k in range(order - 1, -1, -1):
+            v = v * s + C[i, k]
+        u[i] = v
+        for c in range(D.shape[1]):
+            X[i, c] = sum_series(D, i, c, s)
+    return divergence
+
+
+@device
 def march_one(jet, mode, t0, tau, entries, kinds, n_u, u, q, total, work, guess):
     """March u over the time tau; ``total`` (n_u, columns) is multiplied up. Returns (status, integral of div f)."""
     C, W, D, X, Y, _, powers = work[:7]
@@ -145,19 +166,7 @@ def march_one(jet, mode, t0, tau, entries, kinds, n_u, u, q, total, work, guess)
             guess = h
             h = remaining / float(int(remaining / h) + 1)  # equal steps to the end, were all alike
         s = sign * h
-        for e in range(entries.shape[0]):
-            if entries[e, 0] == entries[e, 1] and kinds[mode, e] != 0:
-                v = 0.0
-                for k in range(order - 1, -1, -1):
-                    v = v * s + C[n_u + e, k] / (k + 1)
-                divergence += v * s
-        for i in range(n_u):
-            v = C[i, order]
-            for k in range(order - 1, -1, -1):
-                v = v * s + C[i, k]
-            u[i] = v
-            for c in range(n_c):
-                X[i, c] = sum_series(D, i, c, s)
+        divergence += step_end(C, D, entries, kinds, mode, n_u, s, u, X)
         for i in range(n_u):
             for c in range(n_c):
                 v = X[i, c] if c >= n_u else 0.0

@@ -55,6 +55,16 @@ def margin(C, m, n, transitions, rows, k, x, skipped):
 
 
 @device
+def size_of(C, m, row, h):
+    """The largest term of a row of the jet over the local time h."""
+    size, power = fabs(C[row, 0]), 1.0
+    for p in range(1, m + 1):
+        power *= h
+        size = max(size, fabs(C[row, p]) * power)
+    return size
+
+
+@device
 def extremum(C, m, row, a, b, sign):
     """Local time of the extremum of a row between a and b, where sign * slope is positive at a and negative at b."""
     for _ in range(BISECTIONS):
@@ -72,12 +82,12 @@ def extremum(C, m, row, a, b, sign):
 @kernel(
     types.int64(
         _i1, _i, _f, _f1, _i2, _i1, _i1, _i2, _i2, _f1, _i1, _f1, _f1, _f2, _i1, _i1,
-        _f2, _f2, _f1, _f1, _f1, _f2, _f2, _f2, _i2, _f2, _f2,
+        _f2, _f2, _f1, _f1, _f1, _f2, _f2, _f2, _i2, _f2, _i2, _f2, _f2, _f2,
     )
 )  # fmt: skip
 def follow(
     functions, order, rtol, weight, lacking, first, outgoing, transitions, rows, values, modes, t0, tau, z, fired,
-    fired_row, C, W, u, q, scale, extremes, inner, place, which, end, slope,
+    fired_row, C, W, u, q, scale, extremes, inner, place, which, begin, begin_row, begin_size, end, slope,
 ):  # fmt: skip
     """Follow all visits of an orbit.
 
@@ -95,6 +105,8 @@ def follow(
         Largest and smallest value of each state.
     inner, place, which : (m, n_transitions), written
         Largest local maximum of the margin inside the visit (-inf: none), its time, and the row it stands in.
+    begin, begin_row, begin_size : (m, n_transitions), written
+        The margin at the beginning of the visit, the row it stands in, and the size of that row's terms.
     end : (m, n_transitions), written
         The margin at the end; for the transition that fires there, without the row that is zero.
     slope : (m, 2), written
@@ -115,6 +127,7 @@ def follow(
             q[n_p + i - n] = z[leg, i]
         for k in range(transitions.shape[0]):
             inner[leg, k], place[leg, k], which[leg, k], end[leg, k] = -inf, 0.0, -1, -inf
+            begin[leg, k], begin_row[leg, k], begin_size[leg, k] = -inf, -1, 0.0
         slope[leg, 0], slope[leg, 1] = 0.0, 0.0
         steps = 0
         while True:
@@ -122,7 +135,8 @@ def follow(
                 break
             jet(mode, order, t, u, q, C, W)
             # An indicator is zero where a visit begins: its size says nothing, the states decide alone.
-            h = min(step_length(C, order, n, 0, u, weight, scale, log_rtol), left)
+            reach = step_length(C, order, n, 0, u, weight, scale, log_rtol)
+            h = min(reach, left)
             if not (h >= 0.0):
                 return DIVERGED
             steps += 1
@@ -149,7 +163,10 @@ def follow(
                 if transitions[k, 3] == transitions[k, 2]:
                     continue  # at a time, not by a condition
                 a = 0.0
-                begun, rising, _ = margin(C, order, n, transitions, rows, k, 0.0, -1)
+                begun, rising, row = margin(C, order, n, transitions, rows, k, 0.0, -1)
+                if steps == 1:
+                    begin[leg, k], begin_row[leg, k] = begun, row
+                    begin_size[leg, k] = size_of(C, order, n + rows[row, 0], reach)
                 for part in range(1, PARTS + 1):
                     b = h if part == PARTS else part * width
                     _, s, _ = margin(C, order, n, transitions, rows, k, b, -1)
@@ -163,9 +180,7 @@ def follow(
                             else:
                                 hi = c
                         v, _, row = margin(C, order, n, transitions, rows, k, lo, -1)
-                        size = fabs(C[n + rows[row, 0], 0])
-                        for p in range(1, order + 1):
-                            size = max(size, fabs(C[n + rows[row, 0], p]) * h**p)
+                        size = size_of(C, order, n + rows[row, 0], h)
                         # A visit may begin where the indicator and its slope are zero: rounding is no maximum.
                         begins = steps == 1 and a == 0.0 and max(fabs(v), fabs(begun)) <= ROUNDING * size
                         if not begins and v > inner[leg, k]:

@@ -3,7 +3,19 @@
 from .cache import inline, kernel
 from .codes import CHATTER, DIVERGED, NO_CONVERGENCE, OK, TOO_MANY_CROSSINGS
 from .planar_extremes import find_twins, finish, include, widen
-from .planar_layout import _INTEGERS, _LINEAR, _MATRIX, _NET, _SCRATCH, _TABLE, _VECTOR, BURST, MOST_CROSSINGS, SHORT
+from .planar_layout import (
+    _INTEGERS,
+    _LINEAR,
+    _MATRIX,
+    _NET,
+    _SCRATCH,
+    _TABLE,
+    _VECTOR,
+    BURST,
+    MOST_CROSSINGS,
+    MOST_STEPS,
+    SHORT,
+)  # fmt: skip
 from .planar_march import bounded, jump, leg, next_holding, set_phase, settle, sign_after, stride, trigger, wrap_phase
 from .planar_search import dense, value_of
 from .planar_tables import HARMONICS, M, build
@@ -85,7 +97,7 @@ def chain(
             o_max[i, k] = -1e300
             o_min[i, k] = 1e300
         set_phase(w, s, rates)
-        mode, code = settle(fun, tay, mode, w, transitions, rows, row_start, mode_start, mode_list, zero)
+        mode, code = settle(fun, tay, info, mode, w, transitions, rows, row_start, mode_start, mode_list, zero)
         if surface >= 0:  # a start on the section is no return
             found[3] = sign_after(fun, tay, mode, w, surface, zero)
         crossings[i] = 0
@@ -96,27 +108,36 @@ def chain(
         n_here = 0
         burst = 0
         waited = 0.0
+        tries = 0
         since = 1e300  # time since the last crossing
         closed = False
         while code == OK and returns < transient + keep:
-            ready = strides and returns < transient
+            # where extremes are wanted, every step of the kept window must be seen
+            ready = strides and (returns < transient or extremes == 0)
+            clear = False
             if ready:
                 counted = returns
                 began, turns = s, whole
-                s, whole, returns = stride(
+                s, whole, returns, clear = stride(
                     prop, rot, fun, info, mode, rates, w, w1, rows, row_start, mode_start, mode_list, zero,
-                    s, whole, target, T, returns, transient,
+                    s, whole, target, T, returns, transient if returns < transient else 0,
                 )  # fmt: skip
                 if returns > counted:
                     n_here = 0
                 if s != began or whole != turns:
                     since = 1e300
+                    if returns >= transient:
+                        elapsed[i] += (whole - turns) * T + (s - began)
             wait, timed = (1e300, -1) if strides else trigger(mode, s, T, mode_start, mode_list, at)
-            step, t, full, crossed = leg(
-                prop, rot, fun, tay, info, mode, n_i, rates, w, wait, rows, row_start, mode_start, mode_list,
-                surface, direction, surface_mode, zero, w1, wn, wp, wq, scr, points, end, there, found,
-                ready,
-            )  # fmt: skip
+            if clear:
+                step, t, full, crossed = info[mode, 0], -1, True, 0
+                found[1] = -1
+            else:
+                step, t, full, crossed = leg(
+                    prop, rot, fun, tay, info, mode, n_i, rates, w, wait, rows, row_start, mode_start, mode_list,
+                    surface, direction, surface_mode, zero, w1, wn, wp, wq, scr, points, end, there, found,
+                    ready,
+                )  # fmt: skip
             if t < 0 and crossed == 0 and timed >= 0 and step >= wait:
                 t = timed
                 found[0] = -1
@@ -158,6 +179,7 @@ def chain(
                 w[1] = section[i, keep - 1, 1]
                 break
             waited += step
+            tries += 1
             short = since + step < SHORT * info[mode, 0]
             since = 0.0 if t >= 0 else since + step
             for j in range(M):
@@ -190,7 +212,9 @@ def chain(
                         if jumps > mode_start.shape[0]:
                             code = CHATTER
                             break
-                        mode = jump(i, nxt, fired if jumps == 0 else -1, fun, w, wn, transitions, ra, rb, rc, rs, zero)
+                        mode = jump(
+                            i, nxt, fired if jumps == 0 else -1, fun, info, w, wn, transitions, ra, rb, rc, rs, zero
+                        )
                         jumps += 1
                         if is_open:
                             crossings[i] += 1
@@ -212,6 +236,7 @@ def chain(
                 if crossed != 0:
                     passes += 1
                     waited = 0.0
+                    tries = 0
                     n_here = 0
                     if passes % every == 0:
                         returns += 1
@@ -230,7 +255,7 @@ def chain(
                     value = value_of(fun, mode, surface, w)
                     if value != 0.0:
                         found[3] = 1 if value > 0.0 else -1
-            if surface >= 0 and waited > t_max and code == OK:
+            if surface >= 0 and (waited > t_max or tries > MOST_STEPS) and code == OK:
                 code = NO_CONVERGENCE
         finish(i, fun, n_i, twin, maximum, minimum, i_max, i_min)
         status[i] = code

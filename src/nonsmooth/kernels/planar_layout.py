@@ -6,6 +6,7 @@ from .planar_search import WIDTH
 from .planar_tables import DEGREE, HARMONICS, NODES, TERMS, M
 
 MOST_CROSSINGS = 1000  # within one section return
+MOST_STEPS = 2_000_000  # on the way to a surface that may never be met again
 BURST = 50  # crossings in a row at intervals below SHORT of the mode's step end a run as chatter
 SHORT = 1e-11
 

@@ -47,10 +47,25 @@ def rounding(fun, mode, f, at, w):
 
 
 @inline
-def mark_zeros(fun, mode, w, zero):
-    """Which indicators are zero within rounding at w."""
+def flat(fun, mode, f, w):
+    """Whether the slope of functional f is zero within rounding at w."""
+    return fabs(slope_of(fun, mode, f, w)) <= rounding(fun, mode, f, M, w)
+
+
+@inline
+def mark_zeros(fun, info, mode, w, zero):
+    """Which indicators are zero within rounding at w (1), or zero with a slope that is (2): where a stick ends.
+
+    At a crossing w carries the rounding of the step that led there: it decides where an indicator has no constant
+    part, such as that of a stop at x = 0."""
+    step = 0.0
+    for k in range(info.shape[0]):
+        step = max(step, info[k, 0])
     for f in range(zero.shape[0]):
-        zero[f] = 1 if fabs(value_of(fun, mode, f, w)) <= rounding(fun, mode, f, 0, w) else 0
+        noise = rounding(fun, mode, f, 0, w) + 0.25 * step * rounding(fun, mode, f, M, w)
+        zero[f] = 1 if fabs(value_of(fun, mode, f, w)) <= noise else 0
+        if zero[f] != 0 and flat(fun, mode, f, w):
+            zero[f] = 2
 
 
 @device
@@ -73,9 +88,8 @@ def sign_after(fun, tay, mode, w, f, zero):
     """Sign (-1, 0, 1) of functional f just after w along the mode: its value's, or its first non-zero derivative's."""
     if f >= zero.shape[0] or zero[f] == 0:
         return 1 if value_of(fun, mode, f, w) > 0.0 else -1
-    slope = slope_of(fun, mode, f, w)
-    if fabs(slope) > rounding(fun, mode, f, M, w):
-        return 1 if slope > 0.0 else -1
+    if not flat(fun, mode, f, w):
+        return 1 if slope_of(fun, mode, f, w) > 0.0 else -1
     return sign_of_derivatives(tay, mode, f, w)
 
 
@@ -98,13 +112,13 @@ def next_holding(fun, tay, mode, w, rows, row_start, mode_start, mode_list, zero
 
 
 @device
-def settle(fun, tay, mode, w, transitions, rows, row_start, mode_start, mode_list, zero):
+def settle(fun, tay, info, mode, w, transitions, rows, row_start, mode_start, mode_list, zero):
     """Start rule: transitions without a reset that already hold are taken, each mode at most once.
 
     Returns (mode, status): BEYOND_STOP where one with a reset holds."""
     visited = 1 << mode
     for _ in range(64):
-        mark_zeros(fun, mode, w, zero)
+        mark_zeros(fun, info, mode, w, zero)
         t = next_holding(fun, tay, mode, w, rows, row_start, mode_start, mode_list, zero)
         if t < 0:
             return mode, OK
@@ -118,20 +132,24 @@ def settle(fun, tay, mode, w, transitions, rows, row_start, mode_start, mode_lis
 
 
 @inline
-def jump(i, t, fired, fun, w, wn, transitions, ra, rb, rc, rs, zero):
-    """Take transition t (its functional ``fired`` has just crossed; -1: a time trigger). Returns the new mode."""
+def jump(i, t, fired, fun, info, w, wn, transitions, ra, rb, rc, rs, zero):
+    """Take transition t (its functional ``fired`` has just crossed; -1: a time trigger). Returns the new mode.
+
+    What has crossed is zero, also behind a reset that leaves it where it was."""
     mode = transitions[t, 0]
     if transitions[t, 1] != 0:
+        off = fabs(value_of(fun, mode, fired, w)) if fired >= 0 else 0.0
         for r in range(2):
             wn[r] = ra[i, t, r, 0] * w[0] + ra[i, t, r, 1] * w[1] + rb[i, t, r]
             for h in range(HARMONICS):
                 wn[r] += rc[i, t, h, r] * w[3 + 2 * h] + rs[i, t, h, r] * w[4 + 2 * h]
         w[0] = wn[0]
         w[1] = wn[1]
-        fired = -1
-    mark_zeros(fun, mode, w, zero)
+        if fired >= 0 and fabs(value_of(fun, mode, fired, w)) > 2.0 * off:
+            fired = -1
+    mark_zeros(fun, info, mode, w, zero)
     if fired >= 0:
-        zero[fired] = 1
+        zero[fired] = 2 if flat(fun, mode, fired, w) else 1
     return mode
 
 
@@ -168,6 +186,8 @@ def clear_step(fun, info, mode, w, w1, rows, row_start, mode_start, mode_list, z
             g1 = sign * value_of(fun, mode, f, w1)
             s0 = sign * slope_of(fun, mode, f, w)
             s1 = sign * slope_of(fun, mode, f, w1)
+            if zero[f] == 2:
+                s0 = 0.0
             if classify(g0, s0, g1, s1, info[mode, 0], bound_at(fun, info, mode, f, w)) == NEVER:
                 blocked = True
                 break
@@ -184,14 +204,16 @@ def stride(
 ):  # fmt: skip
     """Whole steps without crossings, past section phases, as long as ``returns`` < ``most``.
 
-    Returns (s, whole, returns); w1 then stands at the end of the step that is not clear, or that would be one return
-    too many."""
+    Returns (s, whole, returns, clear); w1 then stands at the end of the step that is not clear, or that would be one
+    return too many (``clear``: no transition on it)."""
     step = info[mode, 0]
     to_node(prop, rot, mode, NODES, w, w1)
+    clear = False
     while clear_step(fun, info, mode, w, w1, rows, row_start, mode_start, mode_list, zero):
         after = s + step
         if (s < target and target <= after) or (s < target + period and target + period <= after):
             if returns + 1 >= most:
+                clear = True
                 break
             returns += 1
         s = after
@@ -206,7 +228,7 @@ def stride(
         for f in range(zero.shape[0]):
             zero[f] = 0
         to_node(prop, rot, mode, NODES, w, w1)
-    return s, whole, returns
+    return s, whole, returns, clear
 
 
 @inline

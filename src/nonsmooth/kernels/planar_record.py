@@ -83,9 +83,9 @@ def record(
     w[2] = 1.0
     set_phase(w, s, rates)
     code = OK
-    mark_zeros(fun, mode, w, zero)
+    mark_zeros(fun, info, mode, w, zero)
     if counters[1] == 0:
-        mode, code = settle(fun, tay, mode, w, transitions, rows, row_start, mode_start, mode_list, zero)
+        mode, code = settle(fun, tay, info, mode, w, transitions, rows, row_start, mode_start, mode_list, zero)
         counters[1] = 1
     n_s = progress[0]
     n_c = progress[1]
@@ -142,7 +142,7 @@ def record(
                 crossing_transition[n_c] = t
                 u_before[n_c, 0] = w[0]
                 u_before[n_c, 1] = w[1]
-                mode = jump(0, t, fired if jumps == 0 else -1, fun, w, wn, transitions, ra, rb, rc, rs, zero)
+                mode = jump(0, t, fired if jumps == 0 else -1, fun, info, w, wn, transitions, ra, rb, rc, rs, zero)
                 u_after[n_c, 0] = w[0]
                 u_after[n_c, 1] = w[1]
                 n_c += 1

@@ -151,6 +151,8 @@ def refine(prop, rot, fun, tay, info, mode, n_i, w, f, sign, zero, guess, wn, sc
         combine(fun, tay, mode, f, n_i, wn, scr, 2)
         if node == 0 and zero != 0:
             scr[2, 0] = 0.0
+            if zero == 2:
+                scr[2, 1] = 0.0
         local = tau - node * spacing
         good = True
         slope = 1.0
@@ -193,6 +195,8 @@ def finest(prop, rot, tay, info, mode, w, rows, lo, hi, zero, node, up, wn, scr,
                 scr[row, k] = -scr[row, k]
         if node == 0 and rows[r, 0] < zero.shape[0] and zero[rows[r, 0]] != 0:
             scr[row, 0] = 0.0
+            if zero[rows[r, 0]] == 2:
+                scr[row, 1] = 0.0
     tau = 0.0
     current = -1
     if up:
@@ -272,6 +276,8 @@ def search(
                 s1 = sign * slope_of(fun, mode, f, wq)
             if node == 0 and f < zero.shape[0] and zero[f] != 0:
                 g0 = 0.0
+                if zero[f] == 2:
+                    s0 = 0.0
             kind = classify(g0, s0, g1, s1, h, bound_at(fun, info, mode, f, w))
             if kind == NEVER:
                 never = True

@@ -90,6 +90,53 @@ def shrinks(section, i, keep, size, max_period):
 
 
 @device
+def modulus(images, nudge):
+    """Largest modulus of the eigenvalues of the map whose images of a point and its two neighbours these are."""
+    a = (images[1, 0] - images[0, 0]) / nudge
+    c = (images[1, 1] - images[0, 1]) / nudge
+    b = (images[2, 0] - images[0, 0]) / nudge
+    d = (images[2, 1] - images[0, 1]) / nudge
+    half = 0.5 * (a + d)
+    square = 0.25 * (a - d) * (a - d) + b * c
+    if square >= 0.0:
+        return fabs(half) + sqrt(square)
+    return hypot(half, sqrt(-square))
+
+
+@device
+def candidate(section, i, keep, size, max_period, tolerance, returns):
+    """(period number, status, residual) by the kept section points of row i alone; the status is OK where there is a
+    period whose multipliers are still to be seen, and the period number is 0 where there is none."""
+    longest = max_period if max_period < keep - 1 else keep - 1
+    find_returns(section, i, keep, size, longest, returns)
+    least = returns[0]
+    p = 0
+    for k in range(longest):
+        if not returns[k] < 1e300:
+            return 0, SLOW, returns[k]
+        if returns[k] < least:
+            least = returns[k]
+        if p == 0 and returns[k] <= tolerance:
+            p = k + 1
+    if p > 0:
+        return p, OK, returns[p - 1]
+    settling = least < NEARLY or shrinks(section, i, keep, size, max_period)
+    return 0, SLOW if settling else NOT_PERIODIC, least
+
+
+@device
+def certain(p, mu, residual, returns):
+    """Whether the period number p stands with the multiplier mu: it contracts, and no shorter period is as near."""
+    if mu < 0.0 or mu >= 1.0 - MARGIN:
+        return False
+    away = residual / (1.0 - mu)
+    for d in range(1, p):
+        if p % d == 0 and returns[d - 1] <= APART * away:
+            return False
+    return True
+
+
+@device
 def multiplier(
     i, p, keep, size, tolerance, linear, net, quiet, phase, t_max, limit, out, probe, scratch, rest, moved,
     moved_clock, moved_counters, images,
@@ -118,15 +165,7 @@ def multiplier(
             return -1.0
         images[j, 0] = moved[0] / size[0]
         images[j, 1] = moved[1] / size[1]
-    a = (images[1, 0] - images[0, 0]) / nudge
-    c = (images[1, 1] - images[0, 1]) / nudge
-    b = (images[2, 0] - images[0, 0]) / nudge
-    d = (images[2, 1] - images[0, 1]) / nudge
-    half = 0.5 * (a + d)
-    square = 0.25 * (a - d) * (a - d) + b * c
-    if square >= 0.0:
-        return fabs(half) + sqrt(square)
-    return hypot(half, sqrt(-square))
+    return modulus(images, nudge)
 
 
 @device
@@ -135,32 +174,15 @@ def verdict_of(
     moved_clock, moved_counters, images, returns,
 ):  # fmt: skip
     """(period number, status, residual, multiplier) of the kept section points of row i: see ``analysis.classify``."""
-    section = out[0]
-    longest = max_period if max_period < keep - 1 else keep - 1
-    find_returns(section, i, keep, size, longest, returns)
-    least = returns[0]
-    p = 0
-    for k in range(longest):
-        if not returns[k] < 1e300:
-            return 0, SLOW, returns[k], -1.0
-        if returns[k] < least:
-            least = returns[k]
-        if p == 0 and returns[k] <= tolerance:
-            p = k + 1
+    p, status, residual = candidate(out[0], i, keep, size, max_period, tolerance, returns)
     if p == 0:
-        settling = least < NEARLY or shrinks(section, i, keep, size, max_period)
-        return 0, SLOW if settling else NOT_PERIODIC, least, -1.0
-    residual = returns[p - 1]
+        return 0, status, residual, -1.0
     mu = multiplier(
         i, p, keep, size, tolerance, linear, net, quiet, phase, t_max, limit, out, probe, scratch, rest, moved,
         moved_clock, moved_counters, images,
     )  # fmt: skip
-    if mu < 0.0 or mu >= 1.0 - MARGIN:
+    if not certain(p, mu, residual, returns):
         return 0, SLOW, residual, mu
-    away = residual / (1.0 - mu)
-    for d in range(1, p):
-        if p % d == 0 and returns[d - 1] <= APART * away:
-            return 0, SLOW, residual, mu
     return p, OK, residual, mu
 
 
@@ -258,6 +280,11 @@ def settle_many(
         residual[j] = gap
         # extremes and counts: over one whole cycle where there is one, else over as many returns as were kept
         n = p if p > 0 else keep
+        if p == 0:
+            crossings[j] = out[7][i] / keep
+            contacts[j] = out[8][i] / keep
+            if choice[6] == 0:
+                continue
         for k in range(2):
             moved[k] = u[k]
         for k in range(3):
@@ -274,8 +301,63 @@ def settle_many(
         for k in range(2):
             maximum[j, k] = out[1][i, k] if choice[6] != 0 else nan
             minimum[j, k] = out[2][i, k] if choice[6] != 0 else nan
-        crossings[j] = out[7][i] / n
-        contacts[j] = out[8][i] / n
+        if p > 0:
+            crossings[j] = out[7][i] / n
+            contacts[j] = out[8][i] / n
+
+
+@device
+def part(
+    begin, end, batch, i, size, u, clock, counters, moved, moved_clock, moved_counters, apart, sums, linear, net, quiet,
+    phase, t_max, limit, out, scratch, rest,
+):  # fmt: skip
+    """Returns begin <= n < end of a run and of a neighbour, put back to a small distance after each; gives a status.
+
+    ``apart`` is the neighbour's distance, ``sums`` the growth in the present batch, the sum of the batches' rates and
+    of their squares; nothing counts in the first quarter of a batch, in which the direction turns in."""
+    first = hypot(NUDGE, NUDGE)
+    for n in range(begin, end):
+        moved[0] = u[0] + apart[0]
+        moved[1] = u[1] + apart[1]
+        for k in range(3):
+            moved_clock[k] = clock[k]
+        for k in range(4):
+            moved_counters[k] = counters[k]
+        for one in range(2):
+            code = go(
+                i, u if one == 0 else moved, clock if one == 0 else moved_clock,
+                counters if one == 0 else moved_counters, linear, net, quiet, phase, t_max, 0, 1, limit, out, scratch,
+                rest,
+            )  # fmt: skip
+            if code != OK:
+                return code
+        apart[0] = moved[0] - u[0]
+        apart[1] = moved[1] - u[1]
+        distance_now = hypot(apart[0] / size[0], apart[1] / size[1])
+        if distance_now > 0.0:
+            apart[0] *= first / distance_now
+            apart[1] *= first / distance_now
+        else:  # fallen together: a direction that vanishes
+            distance_now = 1e-16 * first
+            apart[0] = size[0] * NUDGE
+            apart[1] = size[1] * NUDGE
+        if n < batch // 4:
+            continue
+        sums[0] += log(distance_now / first)
+        if (n - batch // 4) % batch == batch - 1:
+            rate = sums[0] / (batch * linear[6][i])
+            sums[0] = 0.0
+            sums[1] += rate
+            sums[2] += rate * rate
+    return OK
+
+
+@device
+def rate_of(code, sums):
+    """The mean of ten batches' rates and its standard error; nan where the runs failed."""
+    if code != OK:
+        return nan, nan
+    return sums[1] / 10.0, sqrt(max(sums[2] / 10.0 - (sums[1] / 10.0) ** 2, 0.0) / 9.0)
 
 
 @kernel(types.void(
@@ -286,57 +368,22 @@ def exponents_of(
 ):
     """Largest Lyapunov exponent per unit time, from two neighbours over ``n_returns`` section returns; nan: failed.
 
-    The second neighbour is put back to a small distance of the first after every return. ``error`` is the standard
-    error from ten batches. Job j begins on the section at starts[j] in the mode modes[j]."""
+    ``error`` is the standard error from ten batches. Job j begins on the section at starts[j] in the mode modes[j]."""
     u, clock, counters, moved, moved_clock, moved_counters, images, returns = work
+    apart, sums = images[0], returns[0:3]
+    batch = n_returns // 10
     for j in range(rows.shape[0]):
         i = rows[j]
-        T = linear[6][i]
-        clock[0] = phase * T
+        clock[0] = phase * linear[6][i]
         clock[1] = 0.0
         counters[0] = modes[j]
-        dx, dv = size[0] * NUDGE, size[1] * NUDGE
-        first = hypot(dx / size[0], dv / size[1])
         for k in range(2):
             u[k] = starts[j, k]
-        batch = n_returns // 10
-        total, square, growth = 0.0, 0.0, 0.0
-        code = OK
-        for n in range(batch // 4 + 10 * batch):  # a few returns first, in which the direction turns in
-            moved[0] = u[0] + dx
-            moved[1] = u[1] + dv
-            for k in range(3):
-                moved_clock[k] = clock[k]
-            for k in range(4):
-                moved_counters[k] = counters[k]
-            code = go(i, u, clock, counters, linear, net, quiet, phase, t_max, 0, 1, limit, out, scratch, starts)
-            if code == OK:
-                code = go(
-                    i, moved, moved_clock, moved_counters, linear, net, quiet, phase, t_max, 0, 1, limit, out, scratch,
-                    starts,
-                )  # fmt: skip
-            if code != OK:
-                break
-            dx = moved[0] - u[0]
-            dv = moved[1] - u[1]
-            distance_now = hypot(dx / size[0], dv / size[1])
-            if distance_now > 0.0:
-                dx *= first / distance_now
-                dv *= first / distance_now
-            else:  # fallen together: a direction that vanishes
-                distance_now = 1e-16 * first
-                dx, dv = size[0] * NUDGE, size[1] * NUDGE
-            if n < batch // 4:
-                continue
-            growth += log(distance_now / first)
-            if (n - batch // 4) % batch == batch - 1:
-                rate = growth / (batch * T)
-                total += rate
-                square += rate * rate
-                growth = 0.0
-        if code != OK:
-            largest[j] = nan
-            error[j] = nan
-            continue
-        largest[j] = total / 10.0
-        error[j] = sqrt(max(square / 10.0 - (total / 10.0) ** 2, 0.0) / 9.0)
+            apart[k] = size[k] * NUDGE
+        for k in range(3):
+            sums[k] = 0.0
+        code = part(
+            0, batch // 4 + 10 * batch, batch, i, size, u, clock, counters, moved, moved_clock, moved_counters, apart,
+            sums, linear, net, quiet, phase, t_max, limit, out, scratch, starts,
+        )  # fmt: skip
+        largest[j], error[j] = rate_of(code, sums)

@@ -136,8 +136,8 @@ def spectrum(
     w[1] = u[1]
     w[2] = 1.0
     set_phase(w, s, rates)
-    mark_zeros(fun, mode, w, zero)
-    mode, code = settle(fun, tay, mode, w, transitions, rows, row_start, mode_start, mode_list, zero)
+    mark_zeros(fun, info, mode, w, zero)
+    mode, code = settle(fun, tay, info, mode, w, transitions, rows, row_start, mode_start, mode_list, zero)
     lengths[0] = 1.0
     lengths[1] = 1.0
     done = 0.0
@@ -202,7 +202,7 @@ def spectrum(
                     break
                 for j in range(M):
                     wp[j] = w[j]
-                new = jump(i, t, fired if jumps == 0 else -1, fun, w, wn, transitions, ra, rb, rc, rs, zero)
+                new = jump(i, t, fired if jumps == 0 else -1, fun, info, w, wn, transitions, ra, rb, rc, rs, zero)
                 saltation(i, t, wp, w, field, mode, new, transitions, ra, rc, rs, rates, t_z, X, jumps == 0)
                 mode = new
                 jumps += 1

@@ -20,7 +20,7 @@ from .codes import DIVERGED, LOG_FULL, NO_CONVERGENCE, NOT_GUARANTEED, OK
 from .crossing import NOISE, earliest, sides_at
 from .polynomial import NONE, row_bounds
 from .rkf45 import hermite, quiet, stages, transit
-from .series_node import begin, clear, copy, count_pass, leap, meets_section, open_window, passes
+from .series_node import begin, clear, copy, count_pass, leap, meets_section, open_window, passes, rests
 from .series_step import at_end, failed, judged_at_end, next_stop, planned_length, polished, triggered
 from .taylor import dense_states, end_states, fill_powers
 from .trust import trusted
@@ -137,6 +137,9 @@ def march(
         if section >= 0:
             waited = memo[place.SINCE_RETURN]
             if waited >= t_max * (1.0 - 1e-12) or waited > 1e100:
+                status = NO_CONVERGENCE
+                break
+            if not forced and not record and rests(u, n, lacking, mode, norms[0], rtol, tally, memo):
                 status = NO_CONVERGENCE
                 break
             h = min(h, t_max - waited)

@@ -12,7 +12,9 @@ from .series_step import polished
 from .taylor import dense_states, step_length
 from .watch import extend_at_node, forget
 
-__all__ = ["begin", "clear", "copy", "count_pass", "leap", "look", "meets_section", "open_window", "passes"]
+__all__ = [
+    "begin", "clear", "copy", "count_pass", "leap", "look", "meets_section", "open_window", "passes", "rests",
+]  # fmt: skip
 
 
 @device
@@ -233,3 +235,19 @@ def meets_section(choice, before, slope_before, after, slope_after, noise):
     if way == 0 or slope_before * way > 0.0:
         return True
     return fabs(after) <= noise and slope_after * way > 0.0
+
+
+@device
+def rests(u, n, lacking, mode, weight, rtol, tally, memo):
+    """Whether a state without forcing has come to rest, so that no section is met again: ``AT_REST`` steps in a row,
+    and no return among them, have left it where it was within a hundred tolerances."""
+    moved = 0.0
+    for i in range(n):
+        if lacking[mode, i] == 0:
+            moved = max(moved, fabs(u[i] - memo[place.REST + i]) / (fabs(u[i]) + weight[i]))
+    tally[place.RESTING] += 1
+    if not (moved <= 1e2 * rtol) or tally[place.STEPS_IN_RETURN] <= 1:
+        tally[place.RESTING] = 0
+        for i in range(n):
+            memo[place.REST + i] = u[i]
+    return tally[place.RESTING] > place.AT_REST

@@ -14,15 +14,17 @@ N_CONTROL = 6
 
 # tally: what has been counted; kept when a full log makes the kernel return and be called again
 BEGUN, SETTLED, RETURNS, PASSES, SAMPLES, CROSSINGS, TOUCHES, JUMPS, WINDOW = range(9)
-KEPT_CROSSINGS, KEPT_CONTACTS, RAPID, DOUBTFUL, STEPS, STEPS_IN_RETURN, SEGMENT, READY = range(9, 17)
-N_TALLY = 17
+KEPT_CROSSINGS, KEPT_CONTACTS, RAPID, DOUBTFUL, STEPS, STEPS_IN_RETURN, SEGMENT, READY, RESTING = range(9, 18)
+N_TALLY = 18
 
 # memo: times that go with them
 SINCE_RETURN, SINCE_CROSSING, LONGEST, WINDOW_FRACTION, WINDOW_PERIODS, ELAPSED = range(6)
-N_MEMO = 6
+REST = 6  # and here begins the state about which it has stayed
+N_MEMO = 6  # and one for each state
 
 # limits
 MOST_JUMPS = 1000  # transitions within one return or period
 MOST_RAPID = 50  # transitions in a row closer than 1e-12 of the time scale
 MOST_STEPS = 2_000_000  # within one return or period
+AT_REST = 1000  # steps in a row near one place, before a state without forcing counts as an equilibrium
 HALVINGS = 8  # of a step whose polynomial leaves a graze undecided

@@ -11,7 +11,7 @@ from numba import types
 
 from .cache import device, kernel
 from .codes import DIVERGED, NO_CONVERGENCE, OK
-from .legs import MOST_STEPS, WORK, field_at, fundamental, jet_at, step_for, sum_series, switch_at
+from .legs import MOST_STEPS, WORK, field_at, fundamental, jet_at, step_end, step_for, switch_at
 
 __all__ = ["grow"]
 
@@ -106,7 +106,7 @@ def log_determinant(S, A):
 @device
 def frame_along(jet, mode, t0, tau, entries, kinds, n_u, u, q, Q, Y, scale, growth, work, guess):
     """March u and the frame (in units of ``scale``) over the time tau: (status, integral of div f, next guess)."""
-    C, W, D = work[0], work[1], work[2]
+    C, W, D, X = work[:4]
     powers = work[6]
     n, k, order = Q.shape[0], Q.shape[1], D.shape[2] - 1
     done, divergence = 0.0, 0.0
@@ -121,21 +121,12 @@ def frame_along(jet, mode, t0, tau, entries, kinds, n_u, u, q, Q, Y, scale, grow
             return DIVERGED, divergence, guess
         if h < remaining:
             guess = h
-        for e in range(entries.shape[0]):
-            if entries[e, 0] == entries[e, 1] and kinds[mode, e] != 0:
-                v = 0.0
-                for j in range(order - 1, -1, -1):
-                    v = v * h + C[n_u + e, j] / (j + 1)
-                divergence += v * h
+        divergence += step_end(C, D, entries, kinds, mode, n_u, h, u, X)
         for i in range(n_u):
-            v = C[i, order]
-            for j in range(order - 1, -1, -1):
-                v = v * h + C[i, j]
-            u[i] = v
             for c in range(k):
                 Y[i, c] = 0.0
             for j in range(n):
-                x = sum_series(D, i, j, h) * scale[j] / scale[i]
+                x = X[i, j] * scale[j] / scale[i]
                 for c in range(k):
                     Y[i, c] += x * Q[j, c]
         for i in range(n_u):

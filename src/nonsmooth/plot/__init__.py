@@ -18,6 +18,7 @@ from nonsmooth.plot.comparison_motion import (
 )
 from nonsmooth.plot.comparison_response import comparison_response
 from nonsmooth.plot.curve import curve
+from nonsmooth.plot.density import density
 from nonsmooth.plot.frequency_response import frequency_response
 from nonsmooth.plot.manifolds import manifolds
 from nonsmooth.plot.multipliers import multipliers
@@ -44,6 +45,7 @@ __all__ = [
     "comparison_section",
     "comparison_time",
     "curve",
+    "density",
     "frequency_response",
     "identification",
     "journal",

@@ -63,7 +63,7 @@ def _names(result: xr.Dataset, k: int) -> str:
     """What an attractor is along the parameter, each kind once, in the order met."""
     there = np.flatnonzero(result["period_number"].values[:, k] >= 0)
     kinds = [
-        kind_of(int(result["period_number"].values[i, k]), float(result["lyapunov"].values[i, k])) for i in there
+        kind_of(int(result["period_number"].values[i, k]), bool(result["chaotic"].values[i, k])) for i in there
     ]
     distinct = list(dict.fromkeys(kinds))
     periods = [kind.removeprefix("period ") for kind in distinct if kind.startswith("period")]

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.plot import palette, style
+from nonsmooth.plot.cells import cell_edges
 from nonsmooth.plot.labels import label, variable_along
 
 if TYPE_CHECKING:
@@ -44,7 +45,8 @@ def basins(result: xr.Dataset, ax: Axes | None = None, *, size: float = 3.0) -> 
     x, y = result[first].values, result[second].values
     with style.axes(ax, ratio=0.85) as drawn:
         drawn.pcolormesh(
-            x, y, np.maximum(labels, -1), shading="nearest", rasterized=True, vmin=-1.5, vmax=n - 0.5,
+            cell_edges(x), cell_edges(y), np.maximum(labels, -1), shading="flat", rasterized=True,
+            vmin=-1.5, vmax=n - 0.5,
             cmap=ListedColormap([palette.UNKNOWN, *(palette.attractor_color(k) for k in range(n))]),
         )  # fmt: skip
         xlim, ylim = drawn.get_xlim(), drawn.get_ylim()
@@ -61,11 +63,12 @@ def basins(result: xr.Dataset, ax: Axes | None = None, *, size: float = 3.0) -> 
             share = 100 * float(result["fraction"][k])
             handles.append(Patch(
                 facecolor=palette.attractor_color(k), edgecolor="black", linewidth=0.4,
-                label=f"{kind_of(int(result['period_number'][k]), float(result['lyapunov'][k]))}: {share:.3g} %",
+                label=f"{kind_of(int(result['period_number'][k]), bool(result['chaotic'][k]))}: {share:.3g} %",
             ))  # fmt: skip
         if (labels < 0).any():
             handles.append(Patch(facecolor="white", edgecolor="black", linewidth=0.4, label="none reached"))
-        handles.append(Line2D([], [], marker="o", color="black", linestyle="", markersize=size, label="attractor"))
+        if n:
+            handles.append(Line2D([], [], marker="o", color="black", linestyle="", markersize=size, label="attractor"))
         drawn.legend(
             handles=handles, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=min(len(handles), 3),
             handlelength=1.0, handleheight=1.0, columnspacing=1.0,
@@ -74,8 +77,8 @@ def basins(result: xr.Dataset, ax: Axes | None = None, *, size: float = 3.0) -> 
     return drawn
 
 
-def kind_of(period: int, exponent: float) -> str:
+def kind_of(period: int, chaotic: bool) -> str:
     """An attractor in a word or two."""
     if period > 0:
         return f"period {period}"
-    return "chaos" if exponent > 0 else "no period"
+    return "chaos" if chaotic else "no period"

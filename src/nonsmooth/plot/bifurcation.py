@@ -50,6 +50,8 @@ def bifurcation(
     -----
     The points are pixels in a vector figure: a diagram holds 10^5 of them. A point that diverged has none.
     """
+    if "section" not in result and "density" in result:
+        raise ValueError("this sweep counted its section points (density=...): draw it with plot.density")
     variable_along(result, "section", "sweep")
     (name,) = first_states(result, y)
     parameter = str(result["maximum"].dims[0])

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.plot import palette, style
+from nonsmooth.plot.cells import cell_edges
 from nonsmooth.plot.labels import first_states, label, variable_along
 
 if TYPE_CHECKING:
@@ -48,6 +49,7 @@ def chart(
     variable_along(result, show, "chart")
     first, second = (str(dim) for dim in result["status"].dims[:2])
     one = result.isel(start=start) if "start" in result["status"].dims else result
+    one = one.sortby([first, second])  # values may come in any order, cells cannot
     with style.axes(ax, ratio=0.8) as drawn:
         if show == "period_number":
             _periods(one, drawn, first, second)
@@ -81,7 +83,7 @@ def _periods(result: xr.Dataset, drawn: Axes, first: str, second: str) -> None:
     for k, (_, _, mask) in enumerate(there):
         number[mask] = k
     drawn.pcolormesh(
-        result[first].values, result[second].values, number, shading="nearest", rasterized=True,
+        cell_edges(result[first].values), cell_edges(result[second].values), number, shading="flat", rasterized=True,
         cmap=ListedColormap([color for _, color, _ in there]), vmin=-0.5, vmax=len(there) - 0.5,
     )  # fmt: skip
     patches = [Patch(facecolor=color, edgecolor="black", linewidth=0.4, label=text) for text, color, _ in there]
@@ -100,7 +102,8 @@ def _numbers(values: xr.DataArray, drawn: Axes, first: str, second: str, show: s
         limit = float(np.percentile(finite, 98)) if len(finite) else 1.0
         options = {"cmap": "RdBu_r", "vmin": -limit, "vmax": limit}
     mesh = drawn.pcolormesh(
-        values[first].values, values[second].values, table, shading="nearest", rasterized=True, **options
+        cell_edges(values[first].values), cell_edges(values[second].values), table, shading="flat", rasterized=True,
+        **options,
     )
     unit = values.attrs.get("units", "1")
     text = values.attrs.get("long_name", show)

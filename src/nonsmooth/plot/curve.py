@@ -32,7 +32,12 @@ POINTS = {
     "resonance_1_4": ("d", "1:4 resonance"),
     "grazing_fold": ("o", "grazing-fold"),
     "grazing_flip": ("p", "grazing-flip"),
-    "grazing": ("X", "grazing (contact changes)"),
+    "grazing_neimark_sacker": ("8", "grazing-Neimark-Sacker"),
+    "double_grazing": ("X", "double grazing"),
+    "generalised_flip": ("*", "generalised flip"),
+    "chenciner": ("<", "Chenciner"),
+    "fold_neimark_sacker": (">", "fold-Neimark-Sacker"),
+    "flip_neimark_sacker": ("H", "flip-Neimark-Sacker"),
     "corner": ("P", "corner"),
 }
 

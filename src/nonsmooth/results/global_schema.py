@@ -40,9 +40,12 @@ _LONG_NAMES = {
     "n_starts_99": "random starts that meet every attractor with 99 %",
     "uncertain": "share of starts with another label at this distance",
     "lyapunov": "largest Lyapunov exponent",
+    "lyapunov_error": "standard error of the largest Lyapunov exponent",
+    "chaotic": "1 where the largest exponent is above zero beyond its error",
     "section": "a section point",
     "not_converged": "share of starts that had not converged",
     "diverged": "share of starts that diverged",
+    "failed": "share of starts that could not be followed (among those not converged)",
     "computed": "1 where the point was computed, 0 where its label was inferred",
 }
 
@@ -93,10 +96,12 @@ def basins(
     per_attractor: Mapping[str, Any],
     measures: Mapping[str, float],
     uncertain: tuple[Any, Any],
+    status: ArrayLike,
 ) -> xr.Dataset:
     """The result of ``basins``. ``attractors`` have the fields of ``analysis.basins_attractors.Attractor``."""
     plane = tuple(grid)
     variables: dict[str, Any] = {"label": (plane, np.asarray(label, np.int32), _label_attributes())}
+    variables["status"] = (plane, np.asarray(status, np.int8), status_attributes())
     variables |= attractor_variables(labels, attractors)
     for name, values in per_attractor.items():
         variables[name] = ("attractor", values, {"long_name": _LONG_NAMES[name]})
@@ -123,6 +128,14 @@ def attractor_variables(labels: Labels, attractors: Sequence[Any]) -> dict[str, 
         "period_number": (
             "attractor", np.array([item.period_number for item in attractors], np.int64),
             {"long_name": "period number (0: no cycle)"},
+        ),
+        "confirmed": (
+            "attractor", np.array([item.confirmed for item in attractors], np.int8),
+            {"long_name": "1 where Newton's method has found the cycle"},
+        ),
+        "chaotic": (
+            "attractor", np.array([item.chaotic for item in attractors], np.int8),
+            {"long_name": _LONG_NAMES["chaotic"]},
         ),
         "lyapunov": (
             "attractor", np.array([item.exponent for item in attractors], float),
@@ -171,7 +184,8 @@ def basin_fractions(
         dims: tuple[str, ...] = (parameter, "attractor", "state")[: np.ndim(array)]
         variables[name] = (dims, array, {"long_name": _LONG_NAMES[name]})
     variables["period_number"][2]["long_name"] = "period number (0: no cycle, -1: not there)"
-    variables["lyapunov"][2]["units"] = f"1/{labels.time_unit}"
+    for name in ("lyapunov", "lyapunov_error"):
+        variables[name][2]["units"] = f"1/{labels.time_unit}"
     coords: dict[str, Any] = parameter_coords(labels, without=parameter) | state_coords(labels)
     coords[parameter] = (parameter, _floats(values), quantity_attributes(parameter, labels.parameters[parameter]))
     coords["attractor"] = ("attractor", np.arange(np.shape(arrays["fraction"])[1]), {"long_name": "attractor"})

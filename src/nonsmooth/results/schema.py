@@ -14,6 +14,7 @@ How to call them (``n`` states, ``I`` indicators, ``O`` outputs)::
         # arrays, leading dims always (direction D, start S, point P), points in the order of ``values``:
         # section (D,S,P,keep,n), maximum, minimum (D,S,P,n), period_number, residual, crossings_per_period,
         # contacts_per_period, status (D,S,P), clearance (D,S,P,I), output_maximum, output_minimum (D,S,P,O).
+        # of a density diagram in place of section: density (D,S,P,n,bins), outside (D,S,P,n), and edges=(n, bins + 1).
         # squeeze: which of "direction", "start" become scalar (the argument was one string, one state).
     response(sweep_dataset, amplitude=(D,S,P,n), jumps={"value": (J,), "direction": (J,) of str, ...})
     section_points(d, attrs, section=(S, N, n), time=(S, N), mode=(S, N), status=(S,), starts=(S, n), squeeze=())
@@ -52,6 +53,8 @@ _SWEEP_ARRAYS: dict[str, tuple[str, ...]] = {
     "output_maximum": ("output",),
     "output_minimum": ("output",),
     "status": (),
+    "density": ("state", "bin"),
+    "outside": ("state",),
 }
 
 _LONG_NAMES = {
@@ -62,6 +65,8 @@ _LONG_NAMES = {
     "residual": "scaled distance between a point and its period_number-th return",
     "crossings_per_period": "transitions per return",
     "contacts_per_period": "entries into contact per return",
+    "density": "section points in each bin",
+    "outside": "section points beyond the bins",
     "clearance": "smallest distance kept from the indicator's zero (negative: crossed)",
 }
 
@@ -132,6 +137,7 @@ def sweep(
     directions: Sequence[str],
     starts: ArrayLike,
     squeeze: Sequence[str] = (),
+    edges: ArrayLike | None = None,
 ) -> xr.Dataset:
     """The result of ``sweep``: everything known per point of the swept parameter.
 
@@ -161,6 +167,8 @@ def sweep(
         **state_coords(d),
         **parameter_coords(d, without=parameter),
     }
+    if edges is not None:
+        variables["bin_edge"] = (("state", "edge"), _floats(edges), {"long_name": "edges of the bins, per state"})
     if "clearance" in arrays:
         coords["indicator"] = ("indicator", _strings(d.indicators), {"long_name": "indicator"})
     result = xr.Dataset(variables, coords, dict(attrs))

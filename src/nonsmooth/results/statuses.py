@@ -62,7 +62,7 @@ STATUSES: tuple[Status, ...] = (
     ),
     Status(
         codes.NO_CONVERGENCE, "no_convergence",
-        "The trajectory did not return to the section, or an equation solved on the way did not converge.",
+        "The trajectory did not return to the section (it may have come to rest), or an equation did not converge.",
         "Check that the motion meets the section's surface in the direction asked for; otherwise lower `rtol`.",
     ),
     Status(

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping
 
 from nonsmooth.errors import SystemDefinitionError
 
-__all__ = ["RESERVED", "check_names", "unknown"]
+__all__ = ["RESERVED", "check_keys", "check_names", "unknown"]
 
 RESERVED = frozenset(
     [
@@ -67,6 +67,14 @@ def check_names(groups: Mapping[str, Iterable[str]], system: str) -> None:
                     f"all names of a system must be different"
                 )
             seen[name] = what
+
+
+def check_keys(table: Iterable[str], allowed: Iterable[str], where: str, what: str) -> None:
+    """Check the keys of a table that a user wrote; ``where`` names its place, ``what`` a key with its article."""
+    known = list(allowed)
+    for key in table:
+        if key not in known:
+            raise ValueError(f"{where}: {unknown(key, what, 'this place', known)}")
 
 
 def unknown(name: object, what: str, of: str, known: Mapping[str, str] | Iterable[str]) -> str:

@@ -181,7 +181,7 @@ class Printer:
         # No branch: NaN. Every branch value is a double, so that Numba sees one type.
         text = _number(sympy.nan)
         for value, condition in reversed(e.args):
-            if condition == True:  # noqa: E712 (a SymPy truth value)
+            if condition == sympy.true:
                 text = self(value)
             elif self.arrays:
                 text = f"np.where({self(condition)}, {self(value)}, {text})"

@@ -52,6 +52,10 @@ def _single(node: int, factor: Expr = ONE) -> Linear:
     return Linear(ZERO, ((node, factor),))
 
 
+def _times_of(a: int, b: int) -> Callable[[int], Node]:
+    return lambda y: recurrences.times(a, b)
+
+
 class Series:
     """The nodes that some expressions need, the states being the first.
 
@@ -214,7 +218,7 @@ class Series:
             pair = next((pair for pair in pairs if ("times", pair) in self._known), pairs[0])
             for node in pair:
                 factors.remove(node)
-            factors.append(self._node(("times", pair), lambda y, pair=pair: recurrences.times(*pair)))  # type: ignore[misc]
+            factors.append(self._node(("times", pair), _times_of(*pair)))
             factors.sort()
         return factors[0]
 

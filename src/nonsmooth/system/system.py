@@ -13,10 +13,10 @@ from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.system.description import Description, describe
 from nonsmooth.system.equations import TracedSurface
 from nonsmooth.system.mode import Band, Mode
-from nonsmooth.system.names import unknown
-from nonsmooth.system.parameter import Parameter, finite_number
+from nonsmooth.system.parameter import Parameter
 from nonsmooth.system.transition import Surface, Transition
-from nonsmooth.system.variant import ETA_PER_INDICATOR, ONE_ETA, SHARP, Variant, variant_of
+from nonsmooth.system.values import changed_values, parameter_rows, smoothed_values
+from nonsmooth.system.variant import ONE_ETA, SHARP, Variant, variant_of
 
 if TYPE_CHECKING:
     from nonsmooth.system.derivatives import Derivatives
@@ -253,23 +253,7 @@ class System:
         ValueError, SystemDefinitionError
             An unknown name, a value that is not finite, or one the equations do not allow.
         """
-        lists = {key: np.atleast_1d(np.asarray(column, dtype=np.float64)) for key, column in columns.items()}
-        sizes = {column.shape for column in lists.values()}
-        if len(sizes) > 1 or any(len(size) != 1 for size in sizes):
-            raise ValueError(f"columns of parameters must be one-dimensional and of equal length, not {sizes}")
-        points = np.tile(self.parameter_vector(), (next(iter(sizes))[0] if sizes else 1, 1))
-        order = list(self._values)
-        for key, column in lists.items():
-            if key not in self._values:
-                raise ValueError(self._unknown_parameter(key))
-            if not np.isfinite(column).all():
-                raise ValueError(f"parameter {key!r} must be finite, not {column[~np.isfinite(column)][0]}")
-            if key in dict(self._variant.etas):
-                _positive(float(column.min()), key)
-            points[:, order.index(key)] = column
-        if len(points):
-            self._variant.domain.check_points(points)
-        return points
+        return parameter_rows(self._variant, self._values, self.name, columns)
 
     # Copies
 
@@ -290,29 +274,8 @@ class System:
         SystemDefinitionError
             A value the equations do not allow, such as a mass of zero.
         """
-        if given is not None:
-            mapping = given if isinstance(given, Mapping) else getattr(given, "values", None)
-            if not isinstance(mapping, Mapping):
-                raise TypeError(f"with_parameters takes a mapping or an object with a mapping `values`, not {given!r}")
-            values = {**mapping, **values}
-        new = self._values.copy()
-        for key, value in values.items():
-            if key not in new:
-                raise ValueError(self._unknown_parameter(key))
-            if type(value) is not float or value - value != 0:
-                value = finite_number(value, f"parameter {key!r}")
-            new[key] = value
-        for key, _ in self._variant.etas:
-            if key in values:
-                _positive(new[key], key)
-        self._variant.domain.check(new, values)
+        new = changed_values(self._variant, self._values, self.name, given, values)
         return self._make(self._description, new, self._variant)
-
-    def _unknown_parameter(self, key: object) -> str:
-        text = unknown(key, "a parameter", repr(self.name), self._variant.units)
-        if str(key).startswith("eta") and not self.is_smoothed:
-            text += "; eta is set by smoothed(eta)"
-        return text
 
     def smoothed(self, eta: float | Mapping[str, float] | None) -> System:
         """Return the system with its switches smoothed over bands (Savi et al. 2007, Eqs. 6-10).
@@ -327,23 +290,7 @@ class System:
         SystemDefinitionError
             Transitions with a reset or at a time, hysteresis, or bands that overlap: the pair is named.
         """
-        plain = {key: self._values[key] for key in self._description.parameters}
-        if eta is None:
-            return self._make(self._description, plain, variant_of(self._description, SHARP))
-        if isinstance(eta, Mapping):
-            variant = variant_of(self._description, ETA_PER_INDICATOR)
-            wanted = [str(indicator) for _, indicator in variant.etas]
-            for key in eta:
-                if key not in wanted:
-                    raise ValueError(f"eta: {unknown(key, 'a smoothed indicator', repr(self.name), wanted)}")
-            if missing := [key for key in wanted if key not in eta]:
-                raise ValueError(f"eta: no width for {', '.join(missing)}; give {{{', '.join(wanted)}}} or one number")
-            widths = {key: eta[str(indicator)] for key, indicator in variant.etas}
-        else:
-            variant = variant_of(self._description, ONE_ETA)
-            widths = {"eta": eta}
-        new = plain | {key: _positive(finite_number(width, key), key) for key, width in widths.items()}
-        variant.domain.check(new)
+        new, variant = smoothed_values(self._description, self._values, eta)
         return self._make(self._description, new, variant)
 
     # Text
@@ -405,9 +352,3 @@ class System:
 
     def _repr_latex_(self) -> str:
         return self.to_latex()
-
-
-def _positive(width: float, key: str) -> float:
-    if width <= 0:
-        raise ValueError(f"{key} is the half width of a band and must be positive, not {width}")
-    return width

@@ -277,14 +277,14 @@ def test_strings_that_would_push_at_the_support_are_refused() -> None:
 )
 def test_a_truth_that_cannot_be_is_refused(truth: object, error: type[Exception], message: str) -> None:
     with pytest.raises(error, match=message):
-        VirtualRig(0, truth=truth)  # type: ignore[arg-type]
+        VirtualRig(0, truth=truth)
 
 
 def test_wrong_arguments_are_refused() -> None:
     with pytest.raises(ValueError, match="seed = -1 must be a whole number"):
         VirtualRig(-1)
     with pytest.raises(TypeError, match="a feature is on"):
-        VirtualRig(0, noise=0)  # type: ignore[arg-type]
+        VirtualRig(0, noise=0)
     with pytest.raises(ValueError, match="`tap` is not a procedure of a virtual rig"):
         VirtualRig(0).record("tap")
 

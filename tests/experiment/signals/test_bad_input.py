@@ -18,9 +18,10 @@ import nonsmooth as ns
 from nonsmooth.errors import DataFileError
 from nonsmooth.experiment import RecordingWarning
 from nonsmooth.experiment.signals.checks import take
+from nonsmooth.experiment.signals.contacts import contacts
 from nonsmooth.experiment.signals.displacement import position
 from nonsmooth.experiment.signals.harmonics import fit
-from nonsmooth.experiment.signals.impacts import contacts, impacts
+from nonsmooth.experiment.signals.impacts import impacts
 from nonsmooth.experiment.signals.peaks import extremes
 from nonsmooth.experiment.signals.phase import drive_phase
 from nonsmooth.experiment.signals.savitzky_golay import savitzky_golay

@@ -7,7 +7,8 @@ import pytest
 from motions import COUNT, Floats, bounces, decay, rms, sine
 
 import nonsmooth as ns
-from nonsmooth.experiment.signals.impacts import contacts, impacts
+from nonsmooth.experiment.signals.contacts import contacts
+from nonsmooth.experiment.signals.impacts import impacts
 
 TABLE_1 = {"k": 8.47, "k_s": 1210.0, "c": 0.87, "c_s": 0.60, "m": 0.838}
 
@@ -55,7 +56,7 @@ def test_a_given_gap_is_taken() -> None:
 
 @pytest.mark.parametrize("motion", [sine(0.02, 3.0), sine(0.02, 11.0, 0.3), decay(0.02, 4.46, 0.52, 15.0)])
 def test_no_contact_is_found_where_there_is_none(motion: object) -> None:
-    found = contacts(motion.t, motion.counted, resolution=COUNT)  # type: ignore[attr-defined]
+    found = contacts(motion.t, motion.counted, resolution=COUNT)
     assert found.sizes["contact"] == 0 and np.isnan(found.gap)
 
 
@@ -85,7 +86,7 @@ def test_bounces_in_noise_of_unknown_size() -> None:
 
 @pytest.mark.parametrize("motion", [sine(0.02, 3.0), sine(0.003, 30.0, 0.3), decay(0.02, 4.46, 0.52, 15.0)])
 def test_no_impact_is_found_where_there_is_none(motion: object) -> None:
-    found = impacts(motion.t, motion.counted, resolution=COUNT)  # type: ignore[attr-defined]
+    found = impacts(motion.t, motion.counted, resolution=COUNT)
     assert found.sizes["impact"] == 0
 
 

@@ -30,7 +30,7 @@ def tones(noise: float, n: int = 40, seed: int = 1) -> list[tuple[float, np.ndar
 def test_the_bias_stays_below_its_bound(window: object, interpolation: str, padding: int) -> None:
     for f, x in tones(0.0):
         spectra = spectrum(x, RATE, window=window, padding=padding)
-        found = peak(spectra, interpolation=interpolation)  # type: ignore[arg-type]
+        found = peak(spectra, interpolation=interpolation)
         assert abs(found.frequency - f) <= found.bias * 1.001 + 1e-9
         assert found.grid_step == pytest.approx(0.1)
         if interpolation == "window":
@@ -63,7 +63,7 @@ def test_amplitude_phase_and_power_of_a_line() -> None:
     t = np.arange(N) / RATE
     x = 2.0 + 0.5 * np.cos(2 * np.pi * 3.0 * t + 0.7)
     for window in WINDOWS:
-        lines = spectrum(x, RATE, window=window, detrend=None)  # type: ignore[arg-type]
+        lines = spectrum(x, RATE, window=window, detrend=None)
         at = lines.sel(frequency=3.0, method="nearest")
         assert float(at.amplitude) == pytest.approx(0.5, rel=1e-3) and float(at.phase) == pytest.approx(0.7, abs=1e-3)
         assert float(lines.amplitude[0]) == pytest.approx(2.0, rel=1e-3)

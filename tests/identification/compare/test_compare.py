@@ -174,9 +174,9 @@ def test_a_comparison_is_kept_whole(tmp_path: Path) -> None:
 def test_what_cannot_be_compared_is_refused() -> None:
     motion = record(MODEL.with_parameters(RUN, g=0.0009), 20.0)
     with pytest.raises(TypeError, match="measured_motion"):
-        compare("recording.csv", MODEL)  # type: ignore[arg-type]
+        compare("recording.csv", MODEL)
     with pytest.raises(TypeError, match="System or a result"):
-        compare(motion, 3)  # type: ignore[arg-type]
+        compare(motion, 3)
     with pytest.raises(ValueError, match="standard error of the measured states is not known"):
         compare(motion.drop_vars("u_error"), MODEL)
     with pytest.raises(ValueError, match="needs `phase`"):

@@ -33,7 +33,7 @@ OMEGA = 5.3
 def recorded(x: object, seconds: float = 30.0, omega: float = OMEGA, seed: int = 0) -> Recording:
     """A motion x(t) as the rotary sensor counts it, with the photogate of a drive of this frequency."""
     time = np.arange(int(seconds * 100)) / 100
-    counts = np.rint(x(time) / COUNT)  # type: ignore[operator]
+    counts = np.rint(x(time) / COUNT)
     turns = 2 * np.pi / omega * np.arange(1, int(seconds * omega / (2 * np.pi)))
     angle = xr.Dataset({"Angle": ("time", counts * 2 * np.pi / 1440, {"units": "rad"})}, {"time": time})
     gate = xr.Dataset({"Turn": ("time", np.arange(1.0, len(turns) + 1), {"units": "turns"})}, {"time": turns})
@@ -131,20 +131,20 @@ def test_the_gap_is_referred_by_string_and_ripple(rig: VirtualRig, session: obje
     a = 0.03896
     string, ripple = a**2 / 8, -a * 0.02 * np.cos(0.3) / 4
     assert mean_position(rig, a) == pytest.approx(string + ripple, abs=3e-7)
-    reference = gap_reference(session)  # type: ignore[arg-type]
+    reference = gap_reference(session)
     value, error = reference.mean(a)
     assert reference.runs == 1
     assert abs(value - (string + ripple)) < 3 * error < 5e-6
     gap, gap_error = reference.gap(0.001, a)
     assert gap == pytest.approx(0.001 - value, abs=1e-12)
     assert gap_error == pytest.approx(np.hypot(error, COUNT / np.sqrt(12)), rel=1e-9)
-    assert gap_reference(session, referred=False).mean(a) == (0.0, 0.0)  # type: ignore[arg-type]
+    assert gap_reference(session, referred=False).mean(a) == (0.0, 0.0)
 
 
 def test_a_session_is_compared_with_the_model(rig: VirtualRig, session: object) -> None:
     model = ns.models.discontinuous_support()
     for run, gap, number in (("Run #1", -0.0012, 1), ("Run #2", 0.0006, 2)):
-        measured, settings = session_measurement(session, "section", run, k=8.47)  # type: ignore[arg-type]
+        measured, settings = session_measurement(session, "section", run, k=8.47)
         assert settings["g"][0] == pytest.approx(gap, abs=5e-6) and settings["g"][1] > 1e-5
         assert settings["omega"][0] == pytest.approx(frequency(rig, voltage_for(rig, 11.15)), rel=1e-6)
         assert settings["rho"]({"k": 8.0}) == pytest.approx(8.0 * 0.03896)
@@ -156,7 +156,7 @@ def test_a_session_is_compared_with_the_model(rig: VirtualRig, session: object) 
 
 
 def test_runs_at_several_gaps_are_a_diagram(session: object) -> None:
-    measured, settings = session_measurement(session, "section", ["Run #1", "Run #2"], k=8.47)  # type: ignore[arg-type]
+    measured, settings = session_measurement(session, "section", ["Run #1", "Run #2"], k=8.47)
     np.testing.assert_allclose(measured["g"], [-0.0012, 0.0006], atol=5e-6)
     assert set(settings) == {"rho", "omega"}
     found = compare(measured, ns.models.discontinuous_support(), settings=settings, values=[-0.0012, 0.0, 0.0006])
@@ -173,12 +173,12 @@ def test_what_a_session_lacks_is_named(session: object) -> None:
         ("section", "Run #9", "`Run #9` is not a run"),
     ):
         with pytest.raises(ValueError, match=message):
-            session_measurement(session, procedure, runs, k=8.47)  # type: ignore[arg-type]
+            session_measurement(session, procedure, runs, k=8.47)
 
 
 def test_a_long_record_is_smoothed_as_a_short_one(session: object, monkeypatch: pytest.MonkeyPatch) -> None:
     """What the middle of the record tells serves the whole: the motion stays within a fraction of its own errors."""
-    item = session.recordings("section")[1]  # type: ignore[attr-defined]
+    item = session.recordings("section")[1]
     whole = measured_motion(item.recording, item.run, distance_per_turn=TRAVEL)
     monkeypatch.setattr(module, "LONG", 10.0)
     monkeypatch.setattr(module, "PIECE", 20.0)

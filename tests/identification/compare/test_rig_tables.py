@@ -90,7 +90,7 @@ def test_the_campaign_asks_what_a_miss_needs(tmp_path: Path, monkeypatch: pytest
     assert len(made) == count and out.read_text(encoding="utf-8") == first
 
 
-class SimpleParameters(dict):  # type: ignore[type-arg]
+class SimpleParameters(dict):
     """One parameter set, for all rigs."""
 
     def __init__(self) -> None:

@@ -56,7 +56,7 @@ def smooth(
     impacts : array_like
         Times at which the velocity may jump. The position stays continuous.
     contacts : Dataset or (begin, end), optional
-        Intervals of contact with a soft support, as :func:`~nonsmooth.experiment.signals.impacts.contacts` finds
+        Intervals of contact with a soft support, as :func:`~nonsmooth.experiment.signals.contacts.contacts` finds
         them. The velocity is continuous there, but the motion is quicker inside than outside: each has its own
         intensity.
     model : {"white_jerk", "white_snap", "white_acceleration"}, optional

@@ -106,7 +106,7 @@ def _smoothed(time: Any, x: xr.DataArray, step: float, omega: float, support: bo
     Of a long record a piece in the middle tells the support's place and the intensities of the smoother's noise; to
     find them in the whole would take ten passes over it.
     """
-    from nonsmooth.experiment.signals.impacts import contacts
+    from nonsmooth.experiment.signals.contacts import contacts
     from nonsmooth.experiment.signals.sections import poincare
     from nonsmooth.experiment.signals.smoothing import smooth
 

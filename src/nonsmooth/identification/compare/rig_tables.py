@@ -23,11 +23,7 @@ def page(found: Mapping[str, Results]) -> str:
     return "\n".join(parts)
 
 
-_HEAD = """---
-orphan: true
----
-
-# The virtual rig against the model
+_HEAD = """# The virtual rig against the model
 
 Written by `make rig-against-model`. **Every "rig" on this page is a virtual one: its records are synthetic.**
 

@@ -51,7 +51,7 @@ def names_of(found: xr.Dataset) -> list[str]:
     """``0: period 3, 67.30 ± 0.29 %`` of each attractor: its number, what it is, its share with the binomial error."""
     words = []
     for k in range(found.sizes["attractor"]):
-        kind = kind_of(int(found["period_number"][k]), float(found["lyapunov"][k]))
+        kind = kind_of(int(found["period_number"][k]), bool(found["chaotic"][k]))
         share, error = (100 * float(found[name][k]) for name in ("fraction", "fraction_error"))
         words.append(f"{k}: {kind}, {share:.2f} ± {error:.2f} %")
     return words

@@ -1,0 +1,210 @@
+"""`make gpu`: a GPU against the processor on the paper's chart, and how fast it is; `make gpu-compiler` without a GPU.
+
+With a GPU: every label of a 200 x 200 chart and every periodic point against the processor's, then forcing periods
+per second of one launch and of whole charts, with the part of the FP64 peak that a counted number of operations per
+period makes of it. With `--compiler` only what needs no GPU: registers, stack, spills and size of every kernel
+(ptxas), and the operations per period. Prints a page; `--out` keeps it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+import machine
+import nonsmooth as ns
+from gpu_flops import PLANES
+from nonsmooth.analysis.chart import plan_chart
+from nonsmooth.analysis.chart_refine import labels_of_points
+from nonsmooth.kernels import codes
+
+HERE = Path(__file__).parent
+# FP64 units of a multiprocessor, by compute capability; each makes a multiplication and an addition per clock.
+UNITS = {(6, 0): 32, (7, 0): 32, (8, 0): 32, (9, 0): 64, (10, 0): 64}
+SHAPE = (1, 2, 2, 1, 2, 5)  # of the paper's oscillator: see nonsmooth.kernels.cuda_module
+PERIODS = 500
+
+
+def page(flops: dict[str, Any]) -> list[str]:
+    """Operations of the exact flow."""
+    lines = ["## Floating-point operations, counted", "", "| plane | per forcing period | tables of a point |",
+             "|---|---|---|"]  # fmt: skip
+    return [*lines, *(f"| {name} | {one['per_period']:.0f} | {one['tables']:.0f} |" for name, one in flops.items()), ""]
+
+
+def counted() -> dict[str, Any]:
+    done = subprocess.run(
+        [sys.executable, str(HERE / "gpu_flops.py")], capture_output=True, text=True, check=True,
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": os.pathsep.join([*sys.path, str(HERE)])},
+    )  # fmt: skip
+    found: dict[str, Any] = json.loads(done.stdout)
+    return found
+
+
+def compiled() -> list[str]:
+    """What the compiler makes of every kernel, for the argument types of a simulated run."""
+    from nonsmooth.kernels.cuda_ptx import resources_of
+
+    script = HERE.parent / "tests" / "analysis" / "gpu_script.py"
+    done = subprocess.run(
+        [sys.executable, str(script)], capture_output=True, text=True, check=True,
+        env={**os.environ, "NUMBA_ENABLE_CUDASIM": "1", "PYTHONPATH": os.pathsep.join(sys.path)},
+    )  # fmt: skip
+    launched = json.loads(done.stdout.splitlines()[-1])["launched"]
+    lines = [
+        "## Kernels for compute capability 9.0, shape of the paper's oscillator", "",
+        "| kernel | registers | stack, bytes | spills (store, load), bytes | object, kB | seconds to PTX |",
+        "|---|---|---|---|---|---|",
+    ]  # fmt: skip
+    code = "import json, sys; from nonsmooth.kernels.cuda_ptx import ptx_of; print(ptx_of(*json.load(sys.stdin)))"
+    for name, signature in launched.items():
+        began = perf_counter()
+        ptx = subprocess.run(
+            [sys.executable, "-c", code], input=json.dumps([name, signature, SHAPE]), capture_output=True, text=True,
+            check=True, env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+        ).stdout  # fmt: skip
+        seconds = perf_counter() - began
+        used = resources_of(ptx)
+        if not used:
+            lines.append(f"| {name} | no ptxas here: pip install nvidia-cuda-nvcc | | | | {seconds:.0f} |")
+            continue
+        lines.append(
+            f"| {name} | {used['registers']} | {used['stack_bytes']} | {used['spill_store_bytes']}, "
+            f"{used['spill_load_bytes']} | {used['object_bytes'] / 1000:.0f} | {seconds:.0f} |"
+        )
+    return [*lines, ""]
+
+
+def peak() -> tuple[str, float]:
+    """The GPU's name and its FP64 peak in operations per second; NaN where its number of units is not known here."""
+    from numba import cuda
+
+    gpu = cuda.get_current_device()
+    units = UNITS.get(tuple(gpu.compute_capability), np.nan)
+    name = gpu.name.decode() if isinstance(gpu.name, bytes) else str(gpu.name)
+    return name, 2.0 * units * gpu.MULTIPROCESSOR_COUNT * gpu.CLOCK_RATE * 1e3
+
+
+def settlers(side: int, plane: str, **options: Any) -> tuple[Any, Any, Any, Any]:
+    """The processor's and the GPU's settler of a chart, its points, and its starts."""
+    parameters, ranges = PLANES[plane]
+    system = ns.models.discontinuous_support(**parameters)
+    grid = {name: np.linspace(*ends, side) for name, ends in ranges.items()}
+    settler = plan_chart(system, grid, **options).work.settler
+    (a, x), (b, y) = grid.items()
+    points = system.parameter_points({a: np.repeat(x, side), b: np.tile(y, side)})
+    return settler, replace(settler, device="cuda"), points, np.zeros((side * side, 2))
+
+
+def compared(plane: str, side: int) -> list[str]:
+    """Labels and periodic points of a chart on both devices."""
+    cpu, gpu, points, starts = settlers(side, plane)
+    rows = np.arange(len(points))
+    a, b = cpu.run(points, rows, starts), gpu.run(points, rows, starts)
+    names = {"contacts_per_period": "contacts", "period_number": "period_number", "status": "status"}
+    one, other = (
+        labels_of_points({name: getattr(found, key) for name, key in names.items()}).reshape(side, side)
+        for found in (a, b)
+    )
+    differs = one != other
+    padded = np.pad(one, 1, mode="edge")
+    beside = np.zeros_like(differs)
+    for dx in range(3):
+        for dy in range(3):
+            beside |= padded[dx : dx + side, dy : dy + side] != one
+    doubtful = np.isin(a.status, (codes.SLOW, codes.NOT_PERIODIC)) | np.isin(b.status, (codes.SLOW, codes.NOT_PERIODIC))
+    lost = differs & ~beside & ~doubtful.reshape(side, side)
+    good = ~differs.ravel() & (a.period_number > 0) & (a.multiplier < 0.95)
+    size = np.maximum(0.5 * (a.maximum - a.minimum), cpu.least)
+    gap = np.abs(a.last - b.last)[good] / size[good]
+    worst = float(gap.max()) if len(gap) else np.nan
+    met = worst <= 1e-9 and differs.mean() < 0.002 and not lost.any()
+    return [
+        f"- {plane}, {side} x {side}: {differs.mean():.3%} of the labels differ ({int(differs.sum())} points), "
+        f"{int(lost.sum())} of them neither beside a boundary nor slow nor chaotic; {int(good.sum())} periodic points "
+        f"with |multiplier| < 0.95, farthest apart {worst:.1e} of the motion's size: {'met' if met else '**not met**'}"
+    ]
+
+
+def one_launch(plane: str, side: int, returns: int = 256) -> float:
+    """Forcing periods per second while all trajectories of a chart are marched, tables included."""
+    from nonsmooth.flow.planar_cuda import PlanarOnGpu
+
+    _, settler, points, starts = settlers(side, plane)
+    gpu = PlanarOnGpu(settler.planar, points, settler.plan.phase)
+    jobs = np.arange(len(points))
+    states, out = gpu.states(jobs, starts, np.zeros(len(jobs), dtype=np.int64), 0.0), gpu.buffers(len(jobs), 1)
+    best = np.inf
+    for _ in range(4):
+        gpu.cuda.synchronize()
+        began = perf_counter()
+        gpu.run(jobs, states, returns - 1, 1, out)
+        best = min(best, perf_counter() - began)
+    return len(jobs) * returns / best
+
+
+def timed(flops: dict[str, Any]) -> list[str]:
+    name, most = peak()
+    lines = [
+        f"## Speed on {name}, FP64 peak {most / 1e12:.1f} TFLOP/s by its clock and units", "",
+        "| plane | points | periods/s of one launch | of the peak | chart of every period: s, periods/s |"
+        " chart stopping early: s, points/s |",
+        "|---|---|---|---|---|---|",
+    ]  # fmt: skip
+    for plane, (parameters, ranges) in PLANES.items():
+        for side in (200, 256, 1000):
+            rate = one_launch(plane, min(side, 256))
+            system = ns.models.discontinuous_support(**parameters)
+            grid = {key: np.linspace(*ends, side) for key, ends in ranges.items()}
+            options = {"transient": PERIODS - 60, "keep": 60, "extremes": False, "progress": False, "device": "cuda"}
+            seconds = {}
+            for early in (False, True):
+                best = np.inf
+                for _ in range(2 if side > 500 else 3):
+                    began = perf_counter()
+                    ns.chart(system, grid, stop_early=early, **options)
+                    best = min(best, perf_counter() - began)
+                seconds[early] = best
+            part = rate * flops[plane]["per_period"] / most
+            lines.append(
+                f"| {plane} | {side} x {side} | {rate:.3g} | {part:.1%} | {seconds[False]:.3g}, "
+                f"{side * side * PERIODS / seconds[False]:.3g} | {seconds[True]:.3g}, "
+                f"{side * side / seconds[True]:.3g} |"
+            )
+    return [*lines, ""]
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--compiler", action="store_true", help="only what needs no GPU")
+    parser.add_argument("--side", type=int, default=200, help="points along each side of the compared charts")
+    parser.add_argument("--out", type=Path, help="a file for the page that is printed")
+    options = parser.parse_args()
+    flops = counted()
+    text = ["# The GPU", "", *(f"- {fact}" for fact in machine.facts() if fact), "", *page(flops)]
+    if options.compiler:
+        text += compiled()
+    else:
+        text += ["## Against the processor", ""]
+        for plane in PLANES:
+            text += compared(plane, options.side)
+        text += ["", *timed(flops)]
+    print("\n".join(text))
+    if options.out is not None:
+        options.out.write_text("\n".join(text) + "\n", encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

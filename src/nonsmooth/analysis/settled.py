@@ -1,0 +1,66 @@
+"""What became of many starts: one array per quantity, one row per job."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.flow.engine import FloatArray, IntArray
+from nonsmooth.kernels import codes
+
+__all__ = ["Settled", "usable"]
+
+USABLE = (codes.OK, codes.SLOW, codes.NOT_PERIODIC, codes.NOT_GUARANTEED)
+
+
+def usable(status: Any) -> NDArray[np.bool_]:
+    """Where a run came to its end, so that its extremes and last point mean something."""
+    return np.isin(status, USABLE)
+
+
+@dataclass
+class Settled:
+    """What became of J jobs. Extremes and counts are over whole cycles where there is a period, else the kept window.
+
+    ``multiplier`` is the largest modulus over ``period_number`` returns (NaN: unknown); ``returns`` the section
+    returns run.
+    """
+
+    period_number: IntArray  # (J,)
+    status: IntArray
+    residual: FloatArray
+    multiplier: FloatArray
+    crossings: FloatArray
+    contacts: FloatArray
+    maximum: FloatArray  # (J, n)
+    minimum: FloatArray  # (J, n)
+    last: FloatArray  # (J, width): the section point at the end, and what else is needed to go on from there
+    mode: IntArray
+    returns: IntArray
+
+    @classmethod
+    def empty(cls, jobs: int, n: int, width: int | None = None) -> Settled:
+        def whole() -> IntArray:
+            return np.zeros(jobs, dtype=np.int64)
+
+        def one() -> FloatArray:
+            return np.full(jobs, np.nan)
+
+        def state(size: int = n) -> FloatArray:
+            return np.full((jobs, size), np.nan)
+
+        return cls(
+            whole(), whole(), one(), one(), one(), one(), state(), state(), state(width or n), whole(),
+            whole(),
+        )  # fmt: skip
+
+    @classmethod
+    def joined(cls, parts: Sequence[Settled]) -> Settled:
+        return cls(*(np.concatenate([getattr(part, item.name) for part in parts]) for item in fields(cls)))
+
+    def __getitem__(self, which: Any) -> Settled:
+        return Settled(*(getattr(self, item.name)[which] for item in fields(self)))

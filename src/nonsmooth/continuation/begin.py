@@ -1,0 +1,112 @@
+"""Where a march begins: the curve through an orbit or a recorded point, its range, and its ending in words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.continuation.arclength import Curve
+from nonsmooth.continuation.marches import ENDINGS, Limits, March
+from nonsmooth.continuation.orbit import Orbit
+from nonsmooth.continuation.records import BranchRecord, PointRecord
+from nonsmooth.continuation.shooting import Shooting
+from nonsmooth.flow.arguments import real_number
+
+if TYPE_CHECKING:
+    from nonsmooth.system.system import System
+
+__all__ = ["FIRST", "Asked", "curve_of", "limits", "resumed_at", "sentence", "size_of"]
+
+FloatArray = NDArray[np.float64]
+FIRST = 1e-3  # step
+
+
+@dataclass(frozen=True)
+class Asked:
+    """Options of ``continue_orbit`` that every march shares."""
+
+    step: float
+    points: int
+    virtual: bool
+
+    def limits(self, bounds: tuple[float, float], closed: Any = None) -> Limits:
+        """What bounds a march within ``bounds``."""
+        return Limits(*bounds, self.step, self.points, closed, self.virtual)
+
+    @property
+    def first(self) -> float:
+        """The first step."""
+        return min(FIRST, self.step)
+
+    def options(self, name: str, given: tuple[float, float], **more: Any) -> dict[str, Any]:
+        """The record of the options in the result."""
+        return {"parameter": name, "range": given, "step": self.step, "points": self.points, "virtual": self.virtual,
+                **more}  # fmt: skip
+
+
+def limits(system: System, name: Any, given: Any, here: float | None) -> tuple[float, float]:
+    """The range given, checked."""
+    if not isinstance(name, str) or name not in system.values:
+        system.with_parameters({str(name): 0.0})  # raises with the names there are
+    try:
+        low, high = (real_number(x, "an end of the range") for x in given)
+    except (TypeError, ValueError):
+        raise ValueError(f"range = {given!r}: give its two ends, (low, high)") from None
+    if not low < high:
+        raise ValueError(f"range = {given!r}: the first end must be below the second")
+    if here is not None and not low <= here <= high:
+        raise ValueError(f"the orbit lies at {name} = {here!r}, outside the range {low!r} ... {high!r}")
+    return low, high
+
+
+def size_of(maximum: FloatArray, minimum: FloatArray, system: System) -> FloatArray:
+    """Half the range of each state, and 1 for the memory."""
+    half = np.maximum(np.nan_to_num(0.5 * (maximum - minimum)), 1e-3 * system.scale_vector())
+    return np.concatenate([half, np.ones(len(system.memory))])
+
+
+def curve_of(
+    system: System, signature: Any, period_number: int, name: str, orbit: Orbit, size: FloatArray, width: float
+) -> tuple[Curve, FloatArray]:
+    """The curve through an orbit, and its unknowns."""
+    shooting = Shooting(system, signature, period_number, (name,))
+    section = np.concatenate([orbit.u, orbit.memory])
+    if not shooting.forced and not shooting.m:
+        from nonsmooth.continuation.anchor import free_anchor
+
+        shooting.reference = free_anchor(shooting.flow, shooting.values, shooting.at_section, section, size)
+    X = shooting.join(
+        orbit.crossing_times, np.vstack([section, orbit.crossing_states]), orbit.period, [system.values[name]]
+    )
+    shooting.look_at_surfaces(X)
+    return Curve(shooting, size, orbit.period, width), X
+
+
+def sentence(found: March, bounds: tuple[float, float], name: str, asked: tuple[float, float]) -> str:
+    """How a march ended, in words; where the range was cut, that is the reason."""
+    if found.ending == "range" and found.rows:
+        value = float(found.rows[-1].point.X[-1])
+        side = 0 if abs(value - bounds[0]) < abs(value - bounds[1]) else 1
+        if bounds[side] != asked[side]:
+            found.ending = "physical"
+            return f"{name} = {value:.6g}: {ENDINGS['physical']}"
+    return ENDINGS[found.ending]
+
+
+def resumed_at(
+    system: System, record: BranchRecord, point: PointRecord, name: str, width: float
+) -> tuple[Curve, FloatArray]:
+    """The curve through a recorded point."""
+    shooting = Shooting(system, point.signature, record.period_number, (name,))
+    size = size_of(point.maximum, point.minimum, system)
+    if not shooting.forced and not shooting.m:
+        from nonsmooth.continuation.anchor import free_anchor
+
+        shooting.reference = free_anchor(
+            shooting.flow, shooting.parameters(point.X), shooting.at_section, point.X[: shooting.n], size
+        )
+    shooting.look_at_surfaces(point.X)
+    return Curve(shooting, size, point.period, width), point.X

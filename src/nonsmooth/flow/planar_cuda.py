@@ -1,0 +1,164 @@
+"""Trajectories of the planar exact flow on a GPU: copies of the tables there, and launches that stay short."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from nonsmooth.flow.engine import FloatArray, IntArray
+from nonsmooth.flow.planar import DIVERGENCE, PlanarEngine
+from nonsmooth.kernels import codes
+
+__all__ = ["SLICE", "Buffers", "PlanarOnGpu", "States"]
+
+SLICE = 256  # section returns of one launch, at most: below a second also on a small GPU
+
+
+@dataclass
+class States:
+    """Where N trajectories are, on the GPU: states, clocks, modes, and the parameter row of each."""
+
+    u: Any  # (N, 2)
+    clock: Any  # (N, 3)
+    counters: Any  # (N, 4)
+    rows: Any  # (N,)
+
+
+@dataclass
+class Buffers:
+    """What a run leaves behind for N trajectories, on the GPU; the order is that of :class:`engine.Chain`."""
+
+    section: Any
+    maximum: Any
+    minimum: Any
+    indicator_max: Any
+    indicator_min: Any
+    output_max: Any
+    output_min: Any
+    crossings: Any
+    contacts: Any
+    elapsed: Any
+    section_time: Any
+    section_mode: Any
+    status: Any
+
+    def all(self) -> tuple[Any, ...]:
+        return tuple(vars(self).values())
+
+
+class PlanarOnGpu:
+    """A planar engine's parameter points on the GPU, and the runs from there.
+
+    Parameters
+    ----------
+    engine : PlanarEngine
+    points : array (P, n_parameters)
+    phase : float
+        Phase of the forcing at which the section stands.
+    """
+
+    def __init__(self, engine: PlanarEngine, points: FloatArray, phase: float) -> None:
+        from nonsmooth.kernels.cuda_module import cuda_planar_module
+        from nonsmooth.kernels.cuda_target import THREADS, cuda
+
+        tables = engine.prepare(points)
+        n_modes, n_indicators, n_outputs, n_rows = tables.sizes
+        self.sizes = max(n_indicators, 1), max(n_outputs, 1)
+        self.module = cuda_planar_module(
+            len(engine.form.multiples), n_modes, *self.sizes, max(len(engine.net[0]), 1), n_rows
+        )
+        self.cuda, self.threads, self.phase = cuda, THREADS, float(phase)
+        self.period: FloatArray = tables.period
+        multiples = tables.linear[4] if len(tables.linear[4]) else np.ones(1, dtype=np.int64)
+        self.tables = cuda.to_device(_packed(tables.linear)), cuda.to_device(multiples)
+        self.net = tuple(cuda.to_device(_not_empty(part)) for part in engine.net)
+        self.limit = cuda.to_device(DIVERGENCE * engine.scale)
+        self.plans = [cuda.to_device(np.array([-1, 1, -1, 1, 1, extremes], dtype=np.int64)) for extremes in (0, 1)]
+        self.periods = cuda.to_device(self.period)
+
+    def launch(self, entry: Any, jobs: IntArray, *arguments: Any) -> None:
+        """One thread for each job; waits for nothing."""
+        from numba.core.errors import NumbaPerformanceWarning
+
+        with warnings.catch_warnings():  # a few threads on a large GPU: Numba warns of it
+            warnings.simplefilter("ignore", NumbaPerformanceWarning)
+            configured = entry[-(-len(jobs) // self.threads), self.threads]
+        configured(self.cuda.to_device(jobs), *arguments)
+
+    def states(self, rows: IntArray, u: FloatArray, modes: IntArray, phase: float) -> States:
+        """States at a phase of the forcing."""
+        clock, counters = np.zeros((len(rows), 3)), np.zeros((len(rows), 4), dtype=np.int64)
+        clock[:, 0], counters[:, 0] = phase * self.period[rows], modes
+        return States(*(self.cuda.to_device(part) for part in (u, clock, counters, rows)))
+
+    def buffers(self, n: int, keep: int) -> Buffers:
+        """Room for ``keep`` section points of each of n trajectories."""
+        array, whole = self.cuda.device_array, np.int64
+        n_i, n_o = self.sizes
+        return Buffers(
+            array((n, keep, 2)), array((n, 2)), array((n, 2)), array((n, n_i)), array((n, n_i)), array((n, n_o)),
+            array((n, n_o)), array(n, whole), array(n, whole), array(n), array((n, keep)), array((n, keep), whole),
+            array(n, whole),
+        )  # fmt: skip
+
+    def run(
+        self, jobs: IntArray, states: States, transient: Any, keep: Any, out: Buffers, *, extremes: bool = False,
+        one_more: Buffers | None = None,
+    ) -> IntArray:  # fmt: skip
+        """March jobs by ``transient`` returns, then ``keep`` more into ``out`` (numbers, or one for each trajectory).
+
+        Parameters
+        ----------
+        one_more : Buffers, optional
+            One return more, with extremes, goes in here.
+
+        Returns
+        -------
+        array
+            The jobs that came to their end; the others have their code in ``out.status`` (or ``one_more.status``).
+        """
+        todo = transient
+        while np.ndim(todo) == 0 and todo > SLICE and len(jobs):
+            jobs = self._advance(jobs, states, SLICE - 1, 1, out)
+            todo -= SLICE
+        return self._advance(jobs, states, todo, keep, out, extremes, one_more) if len(jobs) else jobs
+
+    def run_pairs(self, jobs: IntArray, states: States, transient: Any, out: Buffers) -> None:
+        """March the states j and J + j of each of J jobs by ``transient`` returns and one more, kept in ``out``."""
+        self._advance(jobs, states, transient, 1, out, False, out, len(states.u) // 2)
+
+    def _advance(
+        self, jobs: IntArray, states: States, transient: Any, keep: Any, out: Buffers, extremes: bool = False,
+        other: Buffers | None = None, apart: int = 0,
+    ) -> IntArray:  # fmt: skip
+        counts = (self.cuda.to_device(np.atleast_1d(np.asarray(n, dtype=np.int64))) for n in (transient, keep))
+        self.launch(
+            self.module.advance, jobs, states.rows, *self.tables, self.net, states.u, states.clock, states.counters,
+            *counts, self.plans[extremes], self.plans[1], 1 if other is None else 2, apart, self.phase, self.limit,
+            out.all(), (out if other is None else other).all(),
+        )  # fmt: skip
+        done = jobs[out.status.copy_to_host()[jobs] == codes.OK]
+        if other is not None and not apart:
+            done = done[other.status.copy_to_host()[done] == codes.OK]
+        return done
+
+
+def _not_empty(array: Any) -> Any:
+    """A kernel's array of constant shape has no dimension of length zero; what fills it is never read."""
+    found = np.ascontiguousarray(array)
+    return found if found.size else np.zeros([max(n, 1) for n in found.shape], dtype=found.dtype)
+
+
+def _packed(linear: tuple[Any, ...]) -> FloatArray:
+    """All numbers of a parameter point as one column, in the order in which a thread unpacks them."""
+    n_points = len(linear[0])
+    parts = [linear[5], linear[6], *linear[:4], *linear[7:]]
+    columns = []
+    for part in parts:
+        shape = [n_points, *(max(n, 1) for n in part.shape[1:])]
+        full = part if part.shape == tuple(shape) else np.zeros(shape)
+        columns.append(full.reshape(n_points, -1))
+    return np.ascontiguousarray(np.concatenate(columns, axis=1).T)

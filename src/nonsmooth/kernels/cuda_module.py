@@ -1,0 +1,45 @@
+"""The planar kernels for CUDA: the text of the CPU's files under another header.
+
+One module for each shape of a system (modes, indicators, outputs, transitions, rows, harmonics), because a thread's
+arrays have constant shapes.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+
+from nonsmooth.kernels.cache import load_module
+
+__all__ = ["cuda_planar_module"]
+
+PARTS = (
+    "planar_tables", "planar_polynomial", "planar_search", "planar_march", "planar_extremes", "planar_layout",
+    "planar_chain", "planar_settle", "planar_spectrum", "cuda_planar", "cuda_judge", "cuda_growth",
+)  # fmt: skip
+
+
+@cache
+def cuda_planar_module(
+    harmonics: int, modes: int, indicators: int, outputs: int, transitions: int, rows: int
+) -> ModuleType:
+    """The module with the entries of the ``cuda_*`` texts; ``rows`` counts those of the section too."""
+    folder = Path(__file__).parent
+    text = "\n".join((folder / f"{part}.py").read_text(encoding="utf-8") for part in PARTS)
+    text = re.sub(r"^from \.(?:planar|cuda)_(?!target)\w+ import (\([^)]*\).*|[^(\n]*)$", "", text, flags=re.MULTILINE)
+    text = re.sub(r"^from \.cache import", "from nonsmooth.kernels.cuda_target import", text, flags=re.MULTILINE)
+    text = re.sub(r"^from \.(\w+) import", r"from nonsmooth.kernels.\1 import", text, flags=re.MULTILINE)
+    sizes = {
+        "HARMONICS": harmonics, "N_MODES": modes, "N_INDICATORS": indicators, "N_OUTPUTS": outputs,
+        "N_TRANSITIONS": transitions, "N_ROWS": rows,
+    }  # fmt: skip
+    for name, size in sizes.items():
+        text, found = re.subn(rf"^{name} = \d+$", f"{name} = {size}", text, flags=re.MULTILINE)
+        assert found == 1, name
+    # Numba's disk cache goes by this text alone, and the header decides how it is compiled
+    header = (folder / "cuda_target.py").read_text(encoding="utf-8")
+    text += f"\nHEADER = {hashlib.sha256(header.encode()).hexdigest()!r}\n"
+    return load_module(text, "cuda_planar_" + "_".join(str(size) for size in sizes.values()))

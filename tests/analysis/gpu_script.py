@@ -1,0 +1,88 @@
+"""Run in a process with NUMBA_ENABLE_CUDASIM=1: the same small work on the processor and under the simulator.
+
+Prints one JSON object: the arrays of both, and the argument types with which every kernel was launched.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+
+import nonsmooth as ns
+from nonsmooth.flow import planar_cuda
+
+LAUNCHED: dict[str, str] = {}
+SHAPES: dict[str, list[int]] = {}
+
+
+def type_of(value: Any) -> str:
+    """An argument's type as the text of a Numba signature."""
+    if isinstance(value, tuple):
+        return f"Tuple(({', '.join(map(type_of, value))},))"
+    if isinstance(value, bool | np.bool_):
+        return "boolean"
+    if isinstance(value, int | np.integer):
+        return "int64"
+    if isinstance(value, float | np.floating):
+        return "float64"
+    assert value.flags.c_contiguous, "a kernel takes arrays in C order only"
+    return f"{value.dtype}[{', '.join([':'] * (value.ndim - 1) + ['::1'])}]"
+
+
+plain_launch = planar_cuda.PlanarOnGpu.launch
+
+
+def launch(self: Any, entry: Any, jobs: Any, *arguments: Any) -> None:
+    signature = f"void({', '.join(map(type_of, (jobs, *arguments)))})"
+    name = entry.py_func.__name__
+    assert LAUNCHED.setdefault(name, signature) == signature, "one set of types for each kernel"
+    plain_launch(self, entry, jobs, *arguments)
+
+
+planar_cuda.PlanarOnGpu.launch = launch  # type: ignore[method-assign]  # to see what is launched
+
+
+def both(verb: Any, *arguments: Any, **options: Any) -> dict[str, Any]:
+    """The numbers of a verb's result on both devices."""
+    found = {}
+    for device in ("cpu", "cuda"):
+        result = verb(*arguments, device=device, progress=False, **options)
+        found[device] = {
+            name: np.asarray(result[name].values, dtype=float).tolist()
+            for name in result.data_vars
+            if result[name].dtype.kind in "fiu"
+        }
+    return found
+
+
+oscillator = ns.models.discontinuous_support()
+planar_cuda.SLICE = 16  # so that a transient takes several launches
+results = {
+    "chart": both(
+        ns.chart, oscillator.with_parameters(g=-0.0045), {"omega": [3.2, 3.69], "rho": [0.15, 0.3, 0.45]}, transient=40,
+        keep=12, max_period=4, lyapunov=40,
+    ),
+    "every_period": both(
+        ns.chart, oscillator.with_parameters(g=-0.0045), {"omega": [3.69], "rho": [0.3, 0.47]}, transient=20, keep=12,
+        max_period=4, stop_early=False, extremes=False, start=[{"x": 0.0}, {"x": 0.01, "v": 0.05}],
+    ),
+    "stop": both(
+        ns.chart, ns.models.impact_oscillator(), {"omega": [1.0, 2.7], "A": [0.05, 1.0]}, transient=30, keep=12,
+        max_period=4, start=[{"x": 0.0}, {"x": 5.0}],
+    ),
+    "basins": both(
+        ns.basins, oscillator.with_parameters(g=0.0014, omega=11.15, rho=0.33),
+        {"x": [-0.006, 0.0, 0.006], "v": [-0.1, 0.1]}, transient=60, keep=20, max_period=6,
+    ),
+    "sweep": both(
+        ns.sweep, oscillator.with_parameters(g=-0.0045, omega=3.69), "rho", [0.2, 0.3, 0.47], direction=None,
+        transient=20, keep=20,
+    ),
+    "lyapunov": both(
+        ns.lyapunov, oscillator.with_parameters(g=-0.0045, omega=3.69), parameter="rho", values=[0.25, 0.33],
+        direction=None, periods=64, transient=20,
+    ),
+}  # fmt: skip
+print(json.dumps({"results": results, "launched": LAUNCHED}))

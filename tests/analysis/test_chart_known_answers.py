@@ -1,0 +1,106 @@
+"""Charts against closed forms where the way they are asked for could mislead them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+from nonsmooth.errors import SystemDefinitionError
+
+QUIET = {"progress": False}
+OMEGA, DAMPING = np.array([2.0, 1.5, 0.7]), np.array([0.5, 0.2, 0.3])  # in no order
+
+
+@pytest.fixture(scope="module")
+def linear() -> ns.System:
+    return ns.System(
+        states=["x", "v"],
+        parameters={"omega": 1.3, "c": 0.2, "force": 1.0},
+        modes={"only": lambda t, u, p: (u.v, -u.x - p.c * u.v + p.force * np.cos(p.omega * t))},
+        indicators={"speed": lambda t, u, p: u.v},
+    )
+
+
+def amplitude(omega: np.ndarray, c: np.ndarray) -> np.ndarray:
+    return 1.0 / np.hypot(1.0 - omega**2, c * omega)
+
+
+@pytest.mark.parametrize("options", [{}, {"carry": {"omega": "up"}}, {"carry": {"c": "down"}}, {"method": "rkf45"}])
+def test_values_in_any_order(linear: ns.System, options: dict) -> None:
+    """Extremes of the linear response at the place of their parameters, in either order of the two."""
+    expected = amplitude(OMEGA[:, None], DAMPING)
+    one = ns.chart(linear, {"omega": OMEGA, "c": DAMPING}, **options, **QUIET)
+    other = ns.chart(linear, {"c": DAMPING, "omega": OMEGA}, **options, **QUIET).transpose("omega", "c", "state")
+    for plane in (one, other):
+        np.testing.assert_allclose(plane["maximum"].sel(state="x"), expected, rtol=1e-8)
+        np.testing.assert_allclose(plane["minimum"].sel(state="v"), -expected * OMEGA[:, None], rtol=1e-8)
+
+
+def test_exponents_do_not_depend_on_the_section(linear: ns.System) -> None:
+    """-c / 2, also where returns to a surface come at other phases of the forcing."""
+    for section in (ns.Stroboscopic(0.3), ns.Poincare("speed")):
+        plane = ns.chart(
+            linear, {"omega": [1.3], "c": DAMPING}, section=section, lyapunov=400, transient=200, keep=20, **QUIET
+        )
+        np.testing.assert_allclose(plane["lyapunov"].values[0], -DAMPING / 2, rtol=5e-3)
+
+
+def test_extremes_are_those_of_the_cycle_alone(linear: ns.System) -> None:
+    """Kept returns that begin before the motion has settled leave no mark: 40 returns passed over, then 60 kept."""
+    for method in ("auto", "taylor"):
+        plane = ns.chart(
+            linear.with_parameters(omega=3.0), {"omega": [3.0], "c": [0.5]}, start={"x": 1e5}, method=method, **QUIET
+        )
+        assert float(plane["maximum"].sel(state="x")[0, 0]) == pytest.approx(amplitude(3.0, 0.5), rel=1e-6)
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 7), (2, 3)])
+def test_small_charts_refined(linear: ns.System, shape: tuple[int, int]) -> None:
+    """Some points are computed however small the part; every label is right."""
+    grid = {"omega": np.linspace(2.0, 1.0, shape[0]), "c": np.linspace(0.5, 0.2, shape[1])}
+    plane = ns.chart(linear, grid, refine=0.1, **QUIET)
+    assert int(plane["computed"].sum()) >= 1
+    assert (plane["period_number"] == 1).all() and (plane["status"] == 0).all()
+
+
+def test_falling_axes_refined() -> None:
+    """The picture does not depend on the sense in which values are given."""
+    system = ns.models.discontinuous_support(g=0.02)
+    omega, rho = np.linspace(3, 7, 24), np.linspace(0.1, 0.3, 20)
+    falling = ns.chart(system, {"omega": omega[::-1], "rho": rho[::-1]}, refine=0.6, extremes=False, **QUIET)
+    whole = ns.chart(system, {"omega": omega, "rho": rho}, extremes=False, **QUIET)
+    same = falling.sortby(["omega", "rho"])["contacts_per_period"] == whole["contacts_per_period"]
+    assert float(same.mean()) > 0.98
+
+
+def test_starts_count_the_roots_they_reach() -> None:
+    """x -> a x - b x^3: 0 for a < 1, +-sqrt((a - 1) / b) for a in (1, 2), two cycles of period 2 for a above 2."""
+    system = ns.System(
+        states=["x"], parameters={"a": 1.5, "b": 1.0}, modes={"rest": lambda t, u, p: 0 * u.x},
+        transitions=[ns.Transition("rest", "rest", at=0.5, reset=lambda t, u, p: p.a * u.x - p.b * u.x**3)],
+        period=1.0,
+    )  # fmt: skip
+    starts = [{"x": -0.3}, {"x": 0.2}, {"x": 0.5}]
+    plane = ns.chart(system, {"a": [0.5, 1.9, 1.5, 2.1], "b": [1.0, 2.0]}, start=starts, **QUIET)
+    assert plane["n_attractors"].values.T.tolist() == [[1, 2, 2, 2]] * 2
+    assert plane["period_number"].values[:, 0].tolist() == [[1] * 3, [1] * 3, [1] * 3, [2] * 3]
+    roots = np.sqrt(np.array([0.9, 0.5]))
+    np.testing.assert_allclose(plane["maximum"].values[1:3, 0, :, 0], roots[:, None] * [-1, 1, 1], rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [({"max_period": 60}, "raise keep"), ({"keep": 9}, "up to 8"), ({"lyapunov": 100.5}, "whole number")],
+)
+def test_what_a_window_cannot_show_is_told(linear: ns.System, options: dict, message: str) -> None:
+    with pytest.raises((ValueError, TypeError), match=message):
+        ns.chart(linear, {"omega": [1.0], "c": [0.1]}, **options, **QUIET)
+
+
+def test_a_value_that_cannot_be_is_told_before_anything_is_computed(tmp_path) -> None:
+    system = ns.models.discontinuous_support()
+    store = tmp_path / "chart.zarr"
+    with pytest.raises(SystemDefinitionError, match="m = 0"):
+        ns.chart(system, {"g": np.linspace(0, 0.01, 50), "m": np.linspace(1, 0, 50)}, store=store, **QUIET)
+    assert not store.exists()

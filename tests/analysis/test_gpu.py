@@ -1,0 +1,156 @@
+"""``device="cuda"`` without a GPU: Numba's simulator against the processor, and every kernel through the compiler.
+
+The simulator accepts what the compiler refuses, and the compiler does not run anything: both are asked. The argument
+types that are compiled are those with which the simulated run launched the kernels.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+
+COMPILER = [importlib.util.find_spec(name) is not None for name in ("numba_cuda", "nvidia")]
+pytestmark = pytest.mark.skipif(not COMPILER[0], reason="numba-cuda is not installed")
+SCRIPT = Path(__file__).with_name("gpu_script.py")
+
+COMPILE = """
+import json, sys
+from nonsmooth.kernels.cuda_ptx import ptx_of
+
+found = {}
+for name, signature in json.load(sys.stdin).items():
+    text = ptx_of(name, signature, (1, 2, 2, 1, 2, 5))
+    found[name] = [text.count(".visible .entry"), ".target sm_90" in text]
+print(json.dumps(found))
+"""
+ENTRIES = {"judge", "beside", "decide", "frames", "advance", "neighbours"}
+
+
+def run(code: list[str], given: str = "", **environment: str) -> str:
+    done = subprocess.run(
+        [sys.executable, *code], input=given, capture_output=True, text=True, env={**os.environ, **environment}
+    )
+    assert done.returncode == 0, done.stderr[-3000:]
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def simulated() -> dict[str, Any]:
+    found: dict[str, Any] = json.loads(run([str(SCRIPT)], NUMBA_ENABLE_CUDASIM="1").splitlines()[-1])
+    return found
+
+
+def pair(simulated: dict[str, Any], verb: str, name: str) -> tuple[np.ndarray, np.ndarray]:
+    both = simulated["results"][verb]
+    return np.array(both["cpu"][name]), np.array(both["cuda"][name])
+
+
+@pytest.mark.parametrize("verb", ["chart", "every_period", "stop"])
+def test_a_chart_has_the_labels_and_extremes_of_the_processor(simulated: dict[str, Any], verb: str) -> None:
+    for name in ("period_number", "status", "crossings_per_period", "contacts_per_period"):
+        np.testing.assert_array_equal(*pair(simulated, verb, name), err_msg=name)
+    if verb != "every_period":
+        cpu, gpu = pair(simulated, verb, "maximum")
+        periodic = pair(simulated, verb, "period_number")[0] > 0
+        assert periodic.any()
+        np.testing.assert_allclose(gpu[periodic], cpu[periodic], rtol=0, atol=1e-9)
+
+
+def test_starts_beyond_a_stop_fail_as_they_do_on_the_processor(simulated: dict[str, Any]) -> None:
+    status, other = pair(simulated, "stop", "status")
+    assert len(set(status.ravel().tolist())) > 1
+    np.testing.assert_array_equal(status, other)
+
+
+def test_a_chart_has_the_exponents_of_the_processor(simulated: dict[str, Any]) -> None:
+    cpu, gpu = pair(simulated, "chart", "lyapunov")
+    assert np.isfinite(cpu).all()
+    np.testing.assert_allclose(gpu, cpu, atol=1e-6)
+
+
+def test_basins_have_the_labels_and_attractors_of_the_processor(simulated: dict[str, Any]) -> None:
+    np.testing.assert_array_equal(*pair(simulated, "basins", "label"))
+    assert pair(simulated, "basins", "label")[0].max() > 0
+    np.testing.assert_allclose(*pair(simulated, "basins", "section_points"), rtol=0, atol=1e-9)
+
+
+def test_a_sweep_has_the_periodic_points_of_the_processor(simulated: dict[str, Any]) -> None:
+    np.testing.assert_array_equal(*pair(simulated, "sweep", "period_number"))
+    np.testing.assert_array_equal(*pair(simulated, "sweep", "status"))
+    cpu, gpu = pair(simulated, "sweep", "section")
+    periodic = pair(simulated, "sweep", "period_number")[0] > 0
+    assert periodic.any()
+    np.testing.assert_allclose(gpu[periodic], cpu[periodic], rtol=0, atol=1e-9)
+    for name in ("maximum", "minimum", "clearance", "contact_force_maximum"):
+        a, b = pair(simulated, "sweep", name)
+        np.testing.assert_allclose(b[periodic], a[periodic], rtol=1e-9, atol=1e-9, err_msg=name)
+
+
+def test_spectra_are_those_of_the_processor(simulated: dict[str, Any]) -> None:
+    for name in ("exponents", "standard_error", "kaplan_yorke", "trace_defect"):
+        np.testing.assert_allclose(*pair(simulated, "lyapunov", name), rtol=1e-9, atol=1e-11, err_msg=name)
+
+
+@pytest.mark.skipif(not COMPILER[1], reason="the compiler of numba-cuda (nvidia-nvvm) is not installed")
+@pytest.mark.parametrize(
+    "entries", [ENTRIES - {"neighbours"}, pytest.param({"neighbours"}, marks=pytest.mark.slow)], ids=["most", "rest"]
+)
+def test_every_kernel_compiles_for_the_types_it_is_launched_with(simulated: dict[str, Any], entries: set[str]) -> None:
+    printed = run(["-c", COMPILE], json.dumps({name: simulated["launched"][name] for name in sorted(entries)}))
+    assert json.loads(printed) == {name: [1, True] for name in entries}
+
+
+def test_no_kernel_is_left_out(simulated: dict[str, Any]) -> None:
+    assert set(simulated["launched"]) == ENTRIES
+
+
+PLANE = {"omega": [3.2, 3.69], "rho": [0.15, 0.3]}
+
+
+def test_what_a_gpu_does_not_take_is_said_at_the_door() -> None:
+    oscillator = ns.models.discontinuous_support()
+    with pytest.raises(ValueError, match="device = 'gpu' does not exist; allowed: 'cpu', 'cuda'"):
+        ns.chart(oscillator, PLANE, device="gpu")
+    with pytest.raises(ValueError, match="none can go on from the state of another.*leave carry out"):
+        ns.chart(oscillator, PLANE, carry={"rho": "up"}, device="cuda")
+    with pytest.raises(ValueError, match="direction=None"):
+        ns.sweep(oscillator, "rho", [0.1, 0.2], device="cuda")
+    with pytest.raises(ValueError, match='runs by method="taylor"'):
+        ns.chart(oscillator, PLANE, method="taylor", device="cuda")
+    with pytest.raises(ValueError, match="stroboscopic sections only"):
+        ns.chart(oscillator, PLANE, section=ns.Poincare("penetration"), device="cuda")
+
+
+def test_without_the_package_the_door_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    with pytest.raises(ImportError, match=r'pip install "nonsmooth\[cuda\]"'):
+        ns.sweep(ns.models.discontinuous_support(), "rho", [0.1, 0.2], direction=None, device="cuda")
+
+
+def test_threads_and_clusters_are_those_of_the_processor(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NUMBA_ENABLE_CUDASIM", "1")
+    with pytest.raises(ValueError, match="leave threads out"):
+        ns.chart(ns.models.discontinuous_support(), PLANE, device="cuda", threads=2)
+    with pytest.raises(ValueError, match="leave client out"):
+        ns.chart(ns.models.discontinuous_support(), PLANE, device="cuda", client=object())
+    with pytest.raises(ValueError, match="a single trajectory is one thread"):
+        ns.lyapunov(ns.models.discontinuous_support(), device="cuda")
+
+
+def test_a_machine_without_a_gpu_says_so() -> None:
+    from numba import cuda
+
+    if cuda.is_available():
+        pytest.skip("there is a GPU")
+    with pytest.raises(RuntimeError, match="found no GPU on this machine.*use device=\"cpu\""):
+        ns.chart(ns.models.discontinuous_support(), PLANE, device="cuda")

@@ -1,0 +1,84 @@
+"""The forced Coulomb oscillator x'' + x = cos(w t) - F sgn(x'): Den Hartog's closed forms, and sticking."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import nonsmooth as ns
+
+
+def coulomb(w: float, F: float) -> ns.System:
+    return ns.System(
+        states=["x", "v"], parameters={"w": w, "F": F},
+        modes={
+            "forward": lambda t, u, p: (u.v, np.cos(p.w * t) - u.x - p.F),
+            "backward": lambda t, u, p: (u.v, np.cos(p.w * t) - u.x + p.F),
+            "stick": lambda t, u, p: (0 * u.v, 0 * u.v),
+        },
+        indicators={
+            "speed": lambda t, u, p: u.v,
+            "push": lambda t, u, p: np.cos(p.w * t) - u.x - p.F,
+            "pull": lambda t, u, p: np.cos(p.w * t) - u.x + p.F,
+        },
+        transitions=[
+            ns.Transition("forward", "backward", when="speed < 0 and pull < 0"),
+            ns.Transition("backward", "forward", when="speed > 0 and push > 0"),
+            ns.Transition("forward", "stick", when="speed < 0 and pull > 0", reset=lambda t, u, p: (u.x, 0 * u.v)),
+            ns.Transition("backward", "stick", when="speed > 0 and push < 0", reset=lambda t, u, p: (u.x, 0 * u.v)),
+            ns.Transition("stick", "forward", when="push > 0"),
+            ns.Transition("stick", "backward", when="pull < 0"),
+        ],
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("r", [0.6, 0.8, 1.3, 2.0])
+@pytest.mark.parametrize("F", [0.1, 0.3])
+def test_den_hartogs_amplitude(r: float, F: float) -> None:
+    """Without a stop: sqrt(V^2 - (F U)^2), V = 1 / (1 - r^2), U = sin(pi / r) / (r (1 + cos(pi / r)))."""
+    V, U = 1 / (1 - r * r), np.sin(np.pi / r) / (r * (1 + np.cos(np.pi / r)))
+    orbit = ns.find_orbit(coulomb(r, F))
+    amplitude = np.sqrt(V * V - (F * U) ** 2)
+    assert [orbit.maximum[0], -orbit.minimum[0]] == pytest.approx([amplitude, amplitude], abs=1e-11)
+
+
+def slip(t0: float, x0: float, w: float, F: float) -> tuple[float, float]:
+    """Next instant and place of rest of a slip against the friction F from rest at (t0, x0), in closed form."""
+    V = 1 / (1 - w * w)
+    a, b = x0 + F - V * np.cos(w * t0), V * w * np.sin(w * t0)
+
+    def x(s: float) -> float:
+        return float(V * np.cos(w * (t0 + s)) - F + a * np.cos(s) + b * np.sin(s))
+
+    def v(s: float) -> float:
+        return float(-V * w * np.sin(w * (t0 + s)) - a * np.sin(s) + b * np.cos(s))
+
+    grid = np.linspace(1e-3, 20.0, 20001)
+    speeds = np.array([v(s) for s in grid])
+    i = int(np.flatnonzero(speeds[:-1] * speeds[1:] < 0)[0])
+    s = float(brentq(v, grid[i], grid[i + 1], xtol=1e-15))
+    return t0 + s, x(s)
+
+
+def test_a_cycle_that_sticks_twice() -> None:
+    """w = 0.4, F = 0.3: one slip each way. The place x of rest gives the next one, -x, in closed form; its slope too."""
+    w, F = 0.4, 0.3
+
+    def next_rest(x: float) -> float:  # from rest at x it goes backward once cos(w t) - x = -F, t < pi / w
+        t = np.arccos(x - F) / w
+        return slip(t, x, w, -F)[1]
+
+    x = float(brentq(lambda x: next_rest(x) + x, 0.8, 1.25, xtol=1e-14))
+    orbit = ns.find_orbit(coulomb(w, F))
+    assert orbit.maximum[0] == pytest.approx(x, abs=1e-11)
+    slope = (next_rest(x + 1e-6) - next_rest(x - 1e-6)) / 2e-6
+    assert np.sort(orbit.floquet_multipliers.real) == pytest.approx([0.0, slope**2], abs=1e-8)
+
+
+@pytest.mark.parametrize("method", ["exact", "taylor"])
+@pytest.mark.parametrize(("w", "F", "each"), [(0.5, 0.1, 3), (0.4, 0.3, 4), (0.3, 0.1, 8), (0.5, 0.3, 3)])
+def test_leaving_the_stick_is_no_return_to_it(method: str, w: float, F: float, each: int) -> None:
+    """A slip begins with no speed and no acceleration: rounding of either must not stop it again."""
+    run = ns.simulate(coulomb(w, F), periods=40, transient=40, method=method)
+    assert len(run["crossing_time"]) == each * 40
