@@ -34,9 +34,8 @@ def main() -> Axes:
         above.set_xlabel("")
         above.get_legend().remove()
         ns.plot.basin_fractions(shares, below)
-        names = below.get_legend()
-        names.remove()
-        figure.legend(handles=names.legend_handles, loc="outside upper center", ncols=2)
+        below.get_legend().remove()
+        figure.legend(*below.get_legend_handles_labels(), loc="outside upper center", ncols=2)
     return below
 
 

@@ -88,7 +88,7 @@ def test_a_model_may_come_from_a_file_and_be_smoothed(write, tmp_path: Path) -> 
         (SYSTEM + SWEEP + "[outputs]\n", r"study\.toml: `outputs` is not a table .*nearest: output"),
         (SYSTEM.replace("model", "models") + SWEEP, r"table \[system\]: `models` is not a key .*nearest: model"),
         (SYSTEM.replace("omega", "omegaa") + SWEEP, r"`omegaa` is not a parameter of 'discontinuous .*nearest: omega"),
-        (SYSTEM + SWEEP + '[output]\ncsv = "a"\n', r"table \[output\]: `csv` is not a key .*all: data, figure, x, y"),
+        (SYSTEM + SWEEP + '[output]\ncsv = "a"\n', r"table \[output\]: `csv` is not a key .*data, figure, store, x, y"),
         (SYSTEM, "exactly one verb, this one has none"),
         (SYSTEM + SWEEP + "[simulate]\nperiods = 3\n", r"exactly one verb, this one has \['sweep', 'simulate'\]"),
         (SWEEP, r"needs a table \[system\]"),
