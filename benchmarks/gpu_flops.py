@@ -41,7 +41,7 @@ def _operation(name: str) -> Any:
 
 for _name in ("add", "radd", "sub", "rsub", "mul", "rmul", "truediv", "rtruediv"):
     setattr(Counted, f"__{_name}__", _operation(f"__{_name}__"))
-Counted.__neg__ = lambda self: Counted(-float(self))  # type: ignore[method-assign]  # an operand's sign is free
+Counted.__neg__ = lambda self: Counted(-float(self))
 
 
 def counted(array: Any) -> Any:

@@ -16,15 +16,15 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(name, "1")
 sys.path.insert(0, str(Path(__file__).parent))
 
-import branch  # noqa: E402
-import chart  # noqa: E402
-import chart_size  # noqa: E402
-import diagram  # noqa: E402
-import lyapunov  # noqa: E402
-import machine  # noqa: E402
-import oscillator  # noqa: E402
-import valve  # noqa: E402
-import valve_scan  # noqa: E402
+import branch
+import chart
+import chart_size
+import diagram
+import lyapunov
+import machine
+import oscillator
+import valve
+import valve_scan
 
 
 def main() -> int:

@@ -41,7 +41,7 @@ def launch(self: Any, entry: Any, jobs: Any, *arguments: Any) -> None:
     plain_launch(self, entry, jobs, *arguments)
 
 
-planar_cuda.PlanarOnGpu.launch = launch  # type: ignore[method-assign]  # to see what is launched
+planar_cuda.PlanarOnGpu.launch = launch
 
 
 def both(verb: Any, *arguments: Any, **options: Any) -> dict[str, Any]:

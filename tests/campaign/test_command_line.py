@@ -36,7 +36,7 @@ def program(*words: str, **options: object) -> subprocess.Popen[str]:
     command = [sys.executable, "-m", "nonsmooth.cli.main", *words]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     pipe = subprocess.PIPE
-    return subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, env=environment, **options)  # type: ignore[call-overload]  # of Popen's options
+    return subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, env=environment, **options)
 
 
 def finished(process: subprocess.Popen[str], code: int) -> str:
@@ -87,7 +87,7 @@ class Cluster:
     """A scheduler and two workers, as three commands would start them."""
 
     def __init__(self, port: int) -> None:
-        self.port, self.processes = port, []  # type: ignore[var-annotated]  # filled by start
+        self.port, self.processes = port, []
         self.address = f"tcp://127.0.0.1:{port}"
 
     def start(self) -> None:

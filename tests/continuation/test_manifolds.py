@@ -159,7 +159,7 @@ def test_phases_of_a_linear_saddle() -> None:
     off = found["section"].values - found["orbit_section"].values[0]
     assert np.abs(off @ np.array([-1.0, 1.0])).max() < 1e-9 * np.abs(off).max()
     with pytest.raises(TypeError, match="Stroboscopic"):
-        ns.manifolds(orbit, section=0.3)  # type: ignore[arg-type]
+        ns.manifolds(orbit, section=0.3)
 
 
 def test_what_has_no_manifolds_is_refused(tmp_path: Any) -> None:

@@ -34,7 +34,7 @@ class OtherPathError(Exception):
     """The neighbour's transitions are not those of the run."""
 
 
-def exact_end(system, state, duration, path=None):  # type: ignore[no-untyped-def]
+def exact_end(system, state, duration, path=None):
     """(u, memory) after the duration, and the transitions taken."""
     method = "auto" if not system.is_smoothed else "taylor"
     engine = engine_for(system, method)
@@ -48,7 +48,7 @@ def exact_end(system, state, duration, path=None):  # type: ignore[no-untyped-de
     return np.concatenate([state.u, state.memory]), taken
 
 
-def differenced(end, size):  # type: ignore[no-untyped-def]
+def differenced(end, size):
     """d end / d x at x = 0 by Ridders' extrapolated central differences, and how well it is known."""
     best, error = None, np.inf
     table: list[np.ndarray] = []
@@ -72,14 +72,14 @@ def differenced(end, size):  # type: ignore[no-untyped-def]
     return best, error
 
 
-def finite_differences(system, state, duration, active):  # type: ignore[no-untyped-def]
+def finite_differences(system, state, duration, active):
     """Phi and P by differences of the flow, and the error of each column."""
     _, path = exact_end(system, state, duration)
     columns, errors = [], []
     n_u = len(state.u)
     for j in range(n_u + len(state.memory)):
 
-        def moved(h, j=j):  # type: ignore[no-untyped-def]
+        def moved(h, j=j):
             other = state.copy()
             (other.u if j < n_u else other.memory)[j if j < n_u else j - n_u] += h
             return exact_end(system, other, duration, path)[0]
@@ -88,7 +88,7 @@ def finite_differences(system, state, duration, active):  # type: ignore[no-unty
         errors.append(columns[-1][1])
     for name in active:
 
-        def changed(h, name=name):  # type: ignore[no-untyped-def]
+        def changed(h, name=name):
             other = system.with_parameters({name: system.values[name] + h})
             return exact_end(other, state, duration, path)[0]
 
@@ -99,7 +99,7 @@ def finite_differences(system, state, duration, active):  # type: ignore[no-unty
     return np.stack([column for column, _ in columns], axis=1), np.array(errors)
 
 
-def mismatch(computed, differences):  # type: ignore[no-untyped-def]
+def mismatch(computed, differences):
     """The largest difference of an entry, relative to it or to a thousandth of its column's largest."""
     size = np.abs(differences)
     floor = np.maximum(np.maximum(size, 1e-3 * size.max(axis=0)), 1e-6 * size.max())
@@ -109,7 +109,7 @@ def mismatch(computed, differences):  # type: ignore[no-untyped-def]
 class Case:
     """One random system with a run that has transitions, none of them near to grazing."""
 
-    def __init__(self, system, start, duration, active):  # type: ignore[no-untyped-def]
+    def __init__(self, system, start, duration, active):
         self.system, self.active = system, active
         self.flow = VariationalFlow.of(system, active)
         self.state = State(start.copy(), system.memory_vector())
@@ -119,7 +119,7 @@ class Case:
             raise OtherPathError
         self.nearest = min(jump.transversality for jump in self.variation.jumps)
 
-    def products(self, matrix, column):  # type: ignore[no-untyped-def]
+    def products(self, matrix, column):
         """Phi and P put together with saltation as the two functions of a jump give it."""
         legs = self.variation.legs
         phi, p = legs.Phi[0], legs.P[0]
@@ -131,7 +131,7 @@ class Case:
         return np.hstack([phi, p])
 
 
-def cases(name: str):  # type: ignore[no-untyped-def]
+def cases(name: str):
     """Systems of one template, and how many draws were discarded for a crossing near to grazing."""
     template = TEMPLATES[name]()
     rng = np.random.default_rng(sorted(TEMPLATES).index(name) + 2024)
@@ -150,7 +150,7 @@ def cases(name: str):  # type: ignore[no-untyped-def]
 
 
 @cache
-def compared(name: str):  # type: ignore[no-untyped-def]
+def compared(name: str):
     """(case, differences of the flow, how well they are known) for every system of a template, and the discards."""
     kept, discarded = cases(name)
     return [(c, *finite_differences(c.system, c.state, c.duration, c.active)) for c in kept], discarded
@@ -372,13 +372,13 @@ def test_memory_written_at_the_start_counts() -> None:
     assert (run.Phi[:, 2] == 0.0).all()  # what the memory held before is forgotten
 
 
-def scaled_differences(system, state, duration, active):  # type: ignore[no-untyped-def]
+def scaled_differences(system, state, duration, active):
     """Differences of a system whose states are of the size of millimetres."""
     _, path = exact_end(system, state, duration)
     found = []
     for j, size in ((0, 1e-5), (1, 1e-4)):
 
-        def moved(h, j=j):  # type: ignore[no-untyped-def]
+        def moved(h, j=j):
             other = state.copy()
             other.u[j] += h
             return exact_end(system, other, duration, path)[0]
@@ -387,7 +387,7 @@ def scaled_differences(system, state, duration, active):  # type: ignore[no-unty
     for name in active:
         size = 1e-2 * system.values[name]
 
-        def changed(h, name=name):  # type: ignore[no-untyped-def]
+        def changed(h, name=name):
             other = system.with_parameters({name: system.values[name] + h})
             return exact_end(other, state, duration, path)[0]
 

@@ -109,7 +109,8 @@ def test_the_unstable_branch_is_in_the_report(quick: Reproduction) -> None:
 
 
 def test_branches_are_drawn_over_the_response(quick: Reproduction) -> None:
-    plt = pytest.importorskip("matplotlib.pyplot")
+    import matplotlib.pyplot as plt
+
     swept, branch = quick.data["fig09"]["exact"], quick.data["fig09"]["branch"]
     ax = plot.frequency_response(swept, branch, plt.figure().add_subplot())
     half = 0.5 * (branch["maximum"] - branch["minimum"]).sel(state="x").values

@@ -118,7 +118,7 @@ def test_what_is_not_there_is_said() -> None:
     with pytest.raises(ValueError, match="made no finding 'crank_force'"):
         the_finding(nothing, "crank_force")
     with pytest.raises(ValueError, match="measured in a laboratory"):
-        Settings().bench  # noqa: B018
+        _ = Settings().bench
 
 
 def test_single_runs_with_period_two_make_no_range() -> None:

@@ -242,8 +242,8 @@ def _dataset(
     counted = next(iter(slots.values())).counted
     if counted is not None:
         del arrays["section"]
-        arrays["density"] = gather(lambda s: s.counted.counter.counts)  # type: ignore[union-attr]  # all slots are alike
-        arrays["outside"] = gather(lambda s: s.counted.counter.outside)  # type: ignore[union-attr]  # likewise
+        arrays["density"] = gather(lambda s: s.counter.counts)
+        arrays["outside"] = gather(lambda s: s.counter.outside)
     labels = labels_of(system)
     return build(
         labels, provenance(labels, "sweep", options, method=method), parameter, numbers, arrays,

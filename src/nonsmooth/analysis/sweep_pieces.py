@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from nonsmooth.analysis.classify import Verdict
-from nonsmooth.analysis.density import CountedSlot
+from nonsmooth.analysis.density import CountedSlot, Counter
 from nonsmooth.analysis.settle import Attractors
 from nonsmooth.flow.engine import Chain, FloatArray
 from nonsmooth.kernels import codes
@@ -36,6 +36,12 @@ class Slot:
         self.period_number = np.zeros(n_points, dtype=np.int64)
         self.residual = np.full(n_points, np.nan)
         self.status = np.full(n_points, codes.INTERRUPTED, dtype=np.int8)
+
+    @property
+    def counter(self) -> Counter:
+        """The histograms of a sweep with ``density``."""
+        assert self.counted is not None
+        return self.counted.counter
 
     def places(self, order: Sequence[int]) -> Iterable[tuple[int, int, Attractors, Chain]]:
         """For each point of ``order``: its number, its row in a buffer, what runs it, that buffer."""

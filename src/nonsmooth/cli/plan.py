@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -24,8 +25,8 @@ def add(commands: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    import netCDF4  # noqa: F401  (what the run itself loads counts in its memory)
-    import xarray  # noqa: F401
+    for library in ("netCDF4", "xarray"):  # what the run itself loads counts in its memory
+        import_module(library)
 
     from nonsmooth.analysis.chart import plan_chart
     from nonsmooth.analysis.chart_work import STORED
