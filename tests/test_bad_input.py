@@ -418,9 +418,9 @@ def test_ctrl_c_in_a_long_sweep(direction: str, tmp_path: Path) -> None:
     code = (
         "import signal, sys, nonsmooth.analysis.sweep as s\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # a job in the background inherits "ignore"
-        "run = s._run\n"
+        "run = s.run_pieces\n"
         "def told(*a):\n    print('running', flush=True)\n    return run(*a)\n"
-        "s._run = told\n"
+        "s.run_pieces = told\n"
         "from nonsmooth.cli.main import main\n"
         f"sys.exit(main(['run', {str(path)!r}]))"
     )

@@ -81,7 +81,7 @@ def locate(curve: Curve, a: Point, b: Point, number: Callable[[Point], float]) -
     if number(a) * number(b) > 0.0 and abs(number(a)) < BEGUN * abs(number(b)):
         return 0.0, a  # the branch begins at the event itself
     found: dict[float, Point] = {}
-    nothing = ROUNDING * max(abs(limited(number(a))), abs(limited(number(b))))
+    nothing = ROUNDING * max((abs(x) for x in (number(a), number(b)) if np.isfinite(x)), default=1.0)
 
     class _Lost(Exception):
         pass

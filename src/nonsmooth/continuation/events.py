@@ -22,6 +22,7 @@ TURN = 1e-5  # along the branch: a fold nearer to a crossing of branches than th
 EXPLAINS = ("short", "slow", "own", "touch", "others", "landed")
 BESIDE = 1e-6  # along the branch: nearer to a change of signature than this is the change itself
 ABOUT = 1e-2  # along the branch: steps are short beside a crossing of branches, and its first place is rough
+ROUNDING = 1e-13  # numbers below this are zero, however short the step
 SAME = 1e-9  # of the numbers at both ends: smaller than this at the place of another event is the same event
 POLE = 1e-2  # of a multiplier from 1 or -1: farther off it is no fold, no flip, but a contact of no length
 ENDS = 1e-4  # of the period: a maximum as near to a crossing belongs to it
@@ -40,7 +41,7 @@ def first_met(curve: Curve, a: Point, b: Point, tests: Tests, crossed: list[str]
         known = [(number(point), s, point) for _, s, point in located]
         # Both are infinite where a visit has turned negative: it is not followed.
         largest = max((abs(x) for x in (number(a), number(b)) if np.isfinite(x)), default=0.0)
-        same = [(kind, s, point) for value, s, point in known if abs(value) < SAME * largest]
+        same = [(kind, s, point) for value, s, point in known if abs(value) < max(SAME * largest, ROUNDING)]
         if same or any(value > 0.0 for value, _, _ in known):  # met at the same place, or farther on
             located += same[:1]
             continue
