@@ -46,6 +46,7 @@ def test_both_directions_agree(figure: str, c_s: float) -> None:
     a, b = table(one), table(other)
     assert [kind for kind, _ in a] == [kind for kind, _ in b]
     assert [value for _, value in a] == pytest.approx([value for _, value in b], abs=1e-9)
+    apart = []
     # Orbits at equal parameters: those of one branch, solved from its own points, are points of the other.
     folds = [value for kind, value in b if kind == "fold"]
     for i in np.linspace(1, other.sizes["point"] - 2, 20).astype(int):
@@ -53,7 +54,10 @@ def test_both_directions_agree(figure: str, c_s: float) -> None:
         if min((abs(float(row["omega"]) - fold) for fold in folds), default=1.0) < 1e-6:
             continue  # no orbit is solved at the parameter of a fold; these are compared above
         gaps = [np.abs(u - row["section"].values).max() for u in solved_at(one, float(row["omega"]))]
-        assert min(gaps) < 1e-8
+        apart.append(min(gaps))
+    special = max(abs(x - y) for (_, x), (_, y) in zip(a, b, strict=True))
+    print(f"\n{figure}, c_s {c_s}: special points {special:.1e}, {len(apart)} branch points {max(apart):.1e} apart")
+    assert max(apart) < 1e-8
 
 
 def solved_at(branch: xr.Dataset, omega: float) -> list[np.ndarray]:
@@ -98,7 +102,9 @@ def test_multipliers_just_past_the_graze(side: str) -> None:
     shallow = depths < 1.2e-10
     assert shallow.any() and errors[shallow].max() < 1e-2
     rates = errors / np.sqrt(depths)
-    assert rates.max() < 3 * rates.min()
+    low, high = rates.min(), rates.max()
+    print(f"\n{side}: error {errors[shallow].max():.1e} at 1e-10 m; error / sqrt(depth) {low:.0f} to {high:.0f}")
+    assert high < 3 * low
 
 
 def sorted_by_imag(mu: np.ndarray) -> np.ndarray:
@@ -125,6 +131,7 @@ def test_jump_of_the_multipliers_is_proportional_to_the_damper() -> None:
         special = ns.special_points(ns.continue_orbit(ns.find_orbit(system), "omega", (limits[0], 3.7)))
         row = special.isel(special=int(np.flatnonzero(special["kind"].values == "grazing")[0]))
         jumps[c_s] = (row["contact_multipliers"].sum() - row["floquet_multipliers"].sum()).values.real
+    print("\njump of the trace", jumps[0.0], "and over c_s", [jumps[c_s] / c_s for c_s in (0.02, 0.04, 0.08)])
     assert abs(jumps[0.0]) < 1e-6
     assert [jumps[c_s] / c_s for c_s in (0.02, 0.04)] == pytest.approx([jumps[0.08] / 0.08] * 2, rel=1e-4)
 

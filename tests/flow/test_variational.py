@@ -168,6 +168,8 @@ def column(jump: Jump) -> np.ndarray:
 def test_derivatives_of_random_systems(name: str) -> None:
     found, discarded = compared(name)
     assert discarded <= 0.1 * (len(found) + discarded)
+    worst = max(mismatch(case.products(saltation, column), differences) for case, differences, _ in found)
+    print(f"\n{name}: {len(found)} systems, {discarded} discarded, worst relative difference {worst:.1e}")
     for case, differences, error in found:
         assert error.max() < 1e-8 * np.abs(differences).max()  # the differences themselves are good enough
         assert mismatch(case.products(saltation, column), differences) < TOLERANCE, case.system.values
@@ -196,6 +198,7 @@ def test_the_test_sees_a_broken_saltation_matrix(how: str) -> None:
         for case, differences, _ in found:
             failed += mismatch(case.products(*BROKEN[how]), differences) > TOLERANCE
             total += 1
+    print(f"\nS {how}: {failed} of {total} fail")
     assert total == PER_TEMPLATE * len(TEMPLATES)
     assert failed >= 0.9 * total
 
