@@ -91,3 +91,12 @@ def test_errors_at_the_door() -> None:
         correlation_dimension(ns.simulate(ns.models.discontinuous_support(), periods=1))
     with pytest.raises(ValueError, match="must rise"):
         correlation_dimension(henon(300), range=(0.5, 0.1))
+
+
+def test_the_error_knows_of_a_drifting_slope() -> None:
+    """The density 1 / (pi sqrt(x (1 - x))) of the logistic map at r = 4 has the dimension 1, reached like 1 / log r."""
+    x = np.sin(0.5 * np.pi * np.random.default_rng(1).random(20_000)) ** 2  # that density, drawn
+    found = ns.correlation_dimension(x)
+    even = ns.correlation_dimension(np.random.default_rng(1).random(20_000))
+    assert abs(even.dimension - 1.0) < 3 * even.standard_error + 0.01
+    assert found.dimension < 0.95 and found.standard_error > 3 * even.standard_error
