@@ -51,10 +51,11 @@ def correlation_dimension(
     Returns
     -------
     xarray.Dataset
-        ``dimension``, ``standard_error`` (of the fit, and half of what the slope drifts by), ``range_low``, ``range_high``, ``decades``, ``slope_spread``
-        (standard deviation of the local slopes in the range), ``n_points``; over ``radius``: ``correlation_sum``,
-        ``n_pairs`` and ``local_slope``. ``scaling`` is 1 where the slope is constant (spread below 6 %) over 0.8
-        decades or more, else 0: the dimension is then only the steadiest part of a curve without a scaling range.
+        ``dimension``, ``standard_error`` (of the fit, and half of what the slope drifts by), ``range_low``,
+        ``range_high``, ``decades``, ``slope_spread`` (standard deviation of the local slopes in the range),
+        ``n_points``; over ``radius``: ``correlation_sum``, ``n_pairs`` and ``local_slope``. ``scaling`` is 1 where
+        the slope is constant (spread below 6 %) over 0.8 decades or more, else 0: the dimension is then only the
+        steadiest part of a curve without a scaling range.
 
     Notes
     -----

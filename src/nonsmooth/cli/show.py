@@ -71,7 +71,10 @@ def summary(result: xr.Dataset) -> str:
         system = record["system"]
         lines = [
             f"{record['verb']} of {system['name']!r} (nonsmooth {record['version']}, method {record['method']})",
-            "parameters  " + ", ".join(f"{name} = {_number(value)}" for name, value in system["parameters"].items()),
+            "parameters  " + ", ".join(
+                f"{name} = {_number(None if name in result.dims else value)}"
+                for name, value in system["parameters"].items()
+            ),
             "options     " + ", ".join(f"{name} = {_short(value)}" for name, value in record["options"].items()),
         ]
     else:  # a recording: made from a file, not from a system
