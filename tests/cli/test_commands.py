@@ -100,9 +100,10 @@ def test_a_fault_of_the_package_keeps_its_traceback(monkeypatch: pytest.MonkeyPa
 
 
 def test_show_says_what_a_chart_varies() -> None:
+    from nonsmooth.analysis.chart import chart
     from nonsmooth.cli.show import summary
 
-    system = ns.models.discontinuous_support(g=0.02)
-    found = ns.chart(system, {"omega": [3.0, 4.0], "rho": [0.1, 0.2]}, transient=20, keep=20, progress=False)
+    system = models.discontinuous_support(g=0.02)
+    found = chart(system, {"omega": [3.0, 4.0], "rho": [0.1, 0.2]}, transient=20, keep=20, progress=False)
     text = summary(found)
     assert "omega = varied" in text and "rho = varied" in text and "g = 0.02" in text
