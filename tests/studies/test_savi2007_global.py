@@ -76,6 +76,7 @@ def test_curves_of_the_chart_over_the_frequency() -> None:
     assert {str(one["kind"].values) for one in found} == {"fold", "flip", "grazing"}
 
 
+@pytest.mark.slow
 def test_a_full_run_goes_on_from_its_store(tmp_path: Path) -> None:
     """Over (g, rho) every boundary is a ray, because the system is piecewise linear; stores are gone on with."""
     figure = FULL["chart13"]
