@@ -78,9 +78,27 @@ def test_every_name_of_the_front_door_is_there() -> None:
         run("import nonsmooth as ns; ns.simulte")
 
 
-def test_a_new_nonlinear_system_in_a_cold_process_takes_less_than_three_seconds() -> None:
+LIBRARIES = """
+import numba, numpy, sympy
+
+@numba.njit
+def convolution(x, n):
+    s = 0.0
+    for i in range(n):
+        s += x[i] * x[n - i - 1]
+    return s
+
+convolution(numpy.ones(8), 8)
+"""
+
+
+def test_a_new_nonlinear_system_in_a_cold_process_costs_little_more_than_its_libraries() -> None:
+    """Against the same machine at the same time: seconds differ by half between one hour and another.
+
+    Loading the libraries and compiling ten lines takes 1.1 to 1.5 s, so three times that is what 3 to 4 s were."""
     run(NEW_SYSTEM.format(number=1e-4))  # the package's own kernels are compiled by now
-    assert best_of_three(NEW_SYSTEM) < 3.0
+    run(LIBRARIES)
+    assert best_of_three(NEW_SYSTEM) < 3.0 * best_of_three(LIBRARIES)
 
 
 def test_a_second_process_with_a_new_model_compiles_no_kernel() -> None:
