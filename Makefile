@@ -30,7 +30,7 @@ slow: $(VENV)/.installed-test $(VENV)/.installed-cluster  ## run the long campai
 	$(BIN)/python -m pytest -m slow -s
 
 fuzz: $(VENV)/.installed-test  ## read 100 000 damaged recordings with every reader
-	NONSMOOTH_FUZZ=1 $(BIN)/python -m pytest -m slow tests/experiment/test_fuzz.py -s
+	$(BIN)/python -m pytest -m slow tests/experiment/test_fuzz.py -s
 
 coverage: $(VENV)/.installed-run  ## identify 40 virtual rigs; writes docs/measured_coverage.md
 	$(BIN)/python -m nonsmooth.identification.coverage --seeds 0-39 --out docs/measured_coverage.md

@@ -32,7 +32,7 @@ def disk(tmp_path: Path) -> Iterator[Path]:
     place = tmp_path / "disk"
     place.mkdir()
     if not mount("-t", "tmpfs", "-o", "size=200k", "none", str(place)):
-        pytest.skip("this user may not mount a disk")
+        pytest.skip("a full disk is a small one that is mounted, and only an administrator may mount")
     yield place
     subprocess.run(["umount", str(place)], check=True)
 

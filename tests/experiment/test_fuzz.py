@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import io
-import os
 import resource
 import struct
 import sys
@@ -234,7 +233,6 @@ def test_damaged_files(name: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.skipif("NONSMOOTH_FUZZ" not in os.environ, reason="takes a while: make fuzz")
 @pytest.mark.parametrize("name", SEEDS)
 def test_very_many_damaged_files(name: str) -> None:
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

@@ -37,8 +37,10 @@ def xml(content: bytes) -> bytes:
 )
 def test_cost_is_that_of_the_file(data: bytes) -> None:
     begin = time.process_time()
+    said = ""  # both outcomes are right: what is tested is the time, and that an error is short
     try:
         parse_recording(data, "x")
     except DataFileError as error:
-        assert len(str(error)) < 2000  # noqa: PT017 - both outcomes are right, the time is what is tested
+        said = str(error)
+    assert len(said) < 2000
     assert time.process_time() - begin < 8

@@ -63,5 +63,6 @@ class Archive:
                     yield piece
         except DataFileError:
             raise
+        # zipfile raises NotImplementedError for a compression or a version of the format that it does not know.
         except (zipfile.BadZipFile, zlib.error, EOFError, OSError, ValueError, NotImplementedError) as error:
             raise self._source.error(name, f"cannot be unpacked, it is damaged or cut short ({error})") from error

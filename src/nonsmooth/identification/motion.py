@@ -104,7 +104,7 @@ def march(time, phase, x, v, touching, oscillator, drive, contact, out):
     for i in range(1, len(time)):
         dt = time[i] - time[i - 1]
         turning = (phase[i] - phase[i - 1]) / dt
-        n = int(ceil(dt / _STEP))  # noqa: RUF046 - a float to the compiler
+        n = ceil(dt / _STEP)
         h = dt / n
         for j in range(n):
             done = 0.0

@@ -161,7 +161,7 @@ def _file_stamp(path: str) -> str:
     return _source_stamp(Path(path).read_text(encoding="utf-8"))
 
 
-class _ContentCache(_Cache):  # type: ignore[misc,unused-ignore]  # Numba has no types
+class _ContentCache(_Cache):
     """Numba's cache protocol over one immutable file per function, signature, source, version and CPU."""
 
     def __init__(self, function: Callable[..., Any]) -> None:

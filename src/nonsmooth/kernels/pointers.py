@@ -48,7 +48,7 @@ def function_at(function_type: Any) -> Any:
         value.c_addr, value.py_addr, value.jit_addr = null, null, pointer
         return value._getvalue()
 
-    @intrinsic  # type: ignore[misc,unused-ignore]  # Numba has no types
+    @intrinsic
     def from_address(typing_context: Any, address: Any) -> Any:
         return function_type(numba.types.int64), generate
 
