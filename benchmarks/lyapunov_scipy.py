@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from oscillator_scipy import ATOL, RTOL
+from oscillator_scipy import ATOL, RTOL, boundaries
 
 UNITS = 10.0  # the frame's velocities are counted in cm/s, its positions in mm
 
@@ -30,17 +30,7 @@ def exponents(p: Mapping[str, float], u: NDArray[np.float64], n_periods: int) ->
 
         return augmented
 
-    def entry(_t: float, z: NDArray[np.float64]) -> float:
-        return z[0] - g
-
-    def separation(_t: float, z: NDArray[np.float64]) -> float:
-        return g - z[0] - tau * z[1]
-
-    def second_entry(t: float, z: NDArray[np.float64]) -> float:
-        return -separation(t, z) if z[0] > g else -1.0
-
-    for event in (entry, separation, second_entry):
-        event.terminal, event.direction = True, 1
+    entry, separation, second_entry = boundaries(g, tau)
     saltation = np.array([[1.0, 0.0], [-c_s / m / UNITS, 1.0]])
     q, sums = np.eye(2), np.zeros(2)
     inside = u[0] > g and separation(0.0, u) < 0

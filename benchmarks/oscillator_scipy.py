@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from math import cos, pi
 
 import numpy as np
@@ -11,6 +11,24 @@ from scipy.integrate import solve_ivp
 
 #: Absolute tolerance: rtol times the size of the states (millimetres).
 RTOL, ATOL = 1e-8, 1e-11
+Event = Callable[[float, NDArray[np.float64]], float]
+
+
+def boundaries(g: float, tau: float) -> tuple[Event, Event, Event]:
+    """Terminal events of a state that begins with x, v: entry, separation, entry from beyond the gap; tau = c_s/k_s."""
+
+    def entry(_t: float, u: NDArray[np.float64]) -> float:
+        return u[0] - g
+
+    def separation(_t: float, u: NDArray[np.float64]) -> float:
+        return g - u[0] - tau * u[1]
+
+    def second_entry(t: float, u: NDArray[np.float64]) -> float:
+        return -separation(t, u) if u[0] > g else -1.0
+
+    for event in (entry, separation, second_entry):
+        event.terminal, event.direction = True, 1
+    return entry, separation, second_entry
 
 
 def march(
@@ -32,17 +50,7 @@ def march(
         x, v = u
         return v, (rho * cos(omega * t) - 2 * k * x - c * v - k_s * (x - g) - c_s * v) / m
 
-    def entry(_t: float, u: NDArray[np.float64]) -> float:
-        return u[0] - g
-
-    def separation(_t: float, u: NDArray[np.float64]) -> float:
-        return g - u[0] - tau * u[1]
-
-    def second_entry(t: float, u: NDArray[np.float64]) -> float:
-        return -separation(t, u) if u[0] > g else -1.0
-
-    for event in (entry, separation, second_entry):
-        event.terminal, event.direction = True, 1
+    entry, separation, second_entry = boundaries(g, tau)
     inside = u[0] > g and separation(0.0, u) < 0
     t, end = 0.0, n_periods * period
     while t < end:

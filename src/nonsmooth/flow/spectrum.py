@@ -66,10 +66,10 @@ class _PlanarFrame:
     """One kernel for the trajectory and its frame."""
 
     def __init__(self, engine: PlanarEngine, tables: Any, i: int, scale: FloatArray) -> None:
-        from nonsmooth.kernels.planar_spectrum_module import planar_spectrum_module
+        from nonsmooth.kernels.planar_module import spectrum_module
 
         self.engine, self.tables, self.i, self.scale = engine, tables, i, scale
-        module = planar_spectrum_module(len(engine.form.multiples))
+        module = spectrum_module(len(engine.form.multiples))
         self.spectrum, self.scratch = module.spectrum, module.scratch(*tables.sizes)
         self.Q, self.active = np.diag(scale), np.ones(2, dtype=bool)
 

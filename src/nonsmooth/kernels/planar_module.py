@@ -1,4 +1,4 @@
-"""The planar kernels for a given number of harmonics.
+"""The planar kernels for a given number of harmonics; the spectrum is a module of its own, compiled where it is used.
 
 The planar files are written once, with the number of harmonics a constant at the top; here their text is
 joined into one module with that constant set, so that every inner loop has constant bounds (a factor of two).
@@ -13,23 +13,27 @@ from types import ModuleType
 
 from nonsmooth.kernels.cache import load_module
 
-__all__ = ["planar_module", "settle_module"]
+__all__ = ["planar_module", "settle_module", "spectrum_module"]
 
 PARTS = (
     "planar_tables", "planar_polynomial", "planar_search", "planar_march", "planar_extremes", "planar_layout",
     "planar_chain", "planar_record",
 )  # fmt: skip
+SPECTRUM = ("planar_tables", "planar_polynomial", "planar_search", "planar_march", "planar_layout", "planar_spectrum")
+
+
+def _joined(parts: tuple[str, ...], harmonics: int) -> str:
+    folder = Path(__file__).parent
+    text = "\n".join((folder / f"{part}.py").read_text(encoding="utf-8") for part in parts)
+    text = re.sub(r"^from \.planar_\w+ import (\([^)]*\).*|[^(\n]*)$", "", text, flags=re.MULTILINE)
+    text = re.sub(r"^from \.(\w+) import", r"from nonsmooth.kernels.\1 import", text, flags=re.MULTILINE)
+    return re.sub(r"^HARMONICS = 1$", f"HARMONICS = {harmonics}", text, flags=re.MULTILINE)
 
 
 @cache
 def planar_module(harmonics: int) -> ModuleType:
     """The module with ``chain``, ``record`` and ``scratch`` for forcing with ``harmonics`` >= 0 harmonics."""
-    folder = Path(__file__).parent
-    text = "\n".join((folder / f"{part}.py").read_text(encoding="utf-8") for part in PARTS)
-    text = re.sub(r"^from \.planar_\w+ import (\([^)]*\).*|[^(\n]*)$", "", text, flags=re.MULTILINE)
-    text = re.sub(r"^from \.(\w+) import", r"from nonsmooth.kernels.\1 import", text, flags=re.MULTILINE)
-    text = re.sub(r"^HARMONICS = 1$", f"HARMONICS = {harmonics}", text, flags=re.MULTILINE)
-    return load_module(text, f"planar_{harmonics}")
+    return load_module(_joined(PARTS, harmonics), f"planar_{harmonics}")
 
 
 @cache
@@ -40,3 +44,9 @@ def settle_module(harmonics: int) -> ModuleType:
     text = re.sub(r"^from \.planar_\w+ import", f"from {below} import", text, flags=re.MULTILINE)
     text = re.sub(r"^from \.(\w+) import", r"from nonsmooth.kernels.\1 import", text, flags=re.MULTILINE)
     return load_module(text, f"planar_settle_{harmonics}")
+
+
+@cache
+def spectrum_module(harmonics: int) -> ModuleType:
+    """The module with ``spectrum`` for forcing with ``harmonics`` >= 0 harmonics."""
+    return load_module(_joined(SPECTRUM, harmonics), f"planar_spectrum_{harmonics}")

@@ -22,6 +22,23 @@ _f1, _f2, _i1, _i2 = _f[::1], _f[:, ::1], _i[::1], _i[:, ::1]
 
 
 @device
+def upright(Q, c):
+    """Column c of Q without its parts along the columns before, taken out twice; its length."""
+    n = Q.shape[0]
+    for _ in range(2):
+        for d in range(c):
+            dot = 0.0
+            for i in range(n):
+                dot += Q[i, d] * Q[i, c]
+            for i in range(n):
+                Q[i, c] -= dot * Q[i, d]
+    length = 0.0
+    for i in range(n):
+        length += Q[i, c] * Q[i, c]
+    return sqrt(length)
+
+
+@device
 def orthonormal(Q, growth, singular):
     """Gram-Schmidt on the columns of Q, twice; ``growth`` gains the logarithms of their lengths.
 
@@ -32,18 +49,7 @@ def orthonormal(Q, growth, singular):
         before = 0.0
         for i in range(n):
             before += Q[i, c] * Q[i, c]
-        length = before
-        for _ in range(2):
-            for d in range(c):
-                dot = 0.0
-                for i in range(n):
-                    dot += Q[i, d] * Q[i, c]
-                for i in range(n):
-                    Q[i, c] -= dot * Q[i, d]
-            length = 0.0
-            for i in range(n):
-                length += Q[i, c] * Q[i, c]
-        length = sqrt(length)
+        length = upright(Q, c)
         if singular and length <= 1e-11 * max(sqrt(before), 1e-300):
             growth[c] = -inf
             best, which = -1.0, 0
@@ -55,17 +61,7 @@ def orthonormal(Q, growth, singular):
                     best, which = rest, i
             for i in range(n):
                 Q[i, c] = 1.0 if i == which else 0.0
-            length = 0.0
-            for _ in range(2):
-                for d in range(c):
-                    dot = 0.0
-                    for i in range(n):
-                        dot += Q[i, d] * Q[i, c]
-                    for i in range(n):
-                        Q[i, c] -= dot * Q[i, d]
-            for i in range(n):
-                length += Q[i, c] * Q[i, c]
-            length = sqrt(length)
+            length = upright(Q, c)
         else:
             growth[c] += log(length)
         for i in range(n):
