@@ -201,6 +201,14 @@ def test_an_autonomous_cycle_has_the_multiplier_of_its_radius(a: float) -> None:
     assert float(found["lyapunov"][0]) == pytest.approx(-2 * a, rel=1e-3)
 
 
+def test_returns_that_are_passed_over_are_refused() -> None:
+    """Every other return of a cycle with two of them: which one, depends on the start; that is no basin."""
+    with pytest.raises(ValueError, match="leave `every` out"):
+        ns.basins(
+            ns.models.relief_valve(), {"y1": [1.0], "y3": [5.0]}, section=ns.Poincare("lift_velocity", every=2), **QUIET
+        )
+
+
 def test_starts_beyond_a_stop_say_so() -> None:
     found = ns.basins(ns.models.impact_oscillator(), {"x": [0.0, 2.0], "v": [0.0, 0.7]}, **QUIET)
     assert found["label"].values.tolist() == [[0, 0], [-1, -1]]

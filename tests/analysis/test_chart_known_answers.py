@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -104,3 +106,25 @@ def test_a_value_that_cannot_be_is_told_before_anything_is_computed(tmp_path) ->
     with pytest.raises(SystemDefinitionError, match="m = 0"):
         ns.chart(system, {"g": np.linspace(0, 0.01, 50), "m": np.linspace(1, 0, 50)}, store=store, **QUIET)
     assert not store.exists()
+
+
+@pytest.mark.parametrize(("rising", "every", "period"), [(None, 1, 2), (None, 2, 1), (None, 3, 2), (True, 3, 1)])
+def test_returns_that_are_passed_over_change_the_count_only(rising: bool | None, every: int, period: int) -> None:
+    """r' = a r (1 - r^2) (4 - r^2) (9 - r^2): circles r = 1 and 3, at r = 1 with the exponent -48 a."""
+
+    def field(t: Any, u: Any, p: Any) -> Any:
+        r2 = u.x**2 + u.y**2
+        rate = p.a * (1 - r2) * (4 - r2) * (9 - r2)
+        return u.x * rate - p.w * u.y, u.y * rate + p.w * u.x
+
+    system = ns.System(
+        states=["x", "y"], parameters={"a": 0.02, "w": 1.0}, modes={"only": field},
+        indicators={"height": lambda t, u, p: u.y},
+    )  # fmt: skip
+    plane = ns.chart(
+        system, {"a": [0.01, 0.02], "w": [1.0]}, start=[{"x": 1.5}, {"x": 0.2, "y": -1.2}, {"x": -0.5, "y": 0.3}],
+        section=ns.Poincare("height", rising=rising, every=every), lyapunov=400, **QUIET,
+    )  # fmt: skip
+    assert (plane["period_number"] == period).all() and (plane["n_attractors"] == 1).all()
+    np.testing.assert_allclose(plane["lyapunov"].values[:, 0], [[-0.48] * 3, [-0.96] * 3], rtol=1e-3)
+    np.testing.assert_allclose(plane["maximum"], 1.0, rtol=1e-8)

@@ -16,11 +16,11 @@ import numpy as np
 
 from nonsmooth.analysis.attractors_compiled import exponents_compiled, load, run_compiled
 from nonsmooth.analysis.attractors_cuda import exponents_on_gpu, run_on_gpu
-from nonsmooth.analysis.attractors_parting import exponent_of
+from nonsmooth.analysis.attractors_parting import exponent_of, parting_sizes
 from nonsmooth.analysis.attractors_trace import Trace, period_of, place_of, state_at, trace
 from nonsmooth.analysis.classify import TOLERANCE, Verdict
-from nonsmooth.analysis.settle import LEAST, LONGER, Attractors
-from nonsmooth.analysis.settled import Settled, usable
+from nonsmooth.analysis.settle import LONGER, Attractors
+from nonsmooth.analysis.settled import Settled, least_sizes, usable
 from nonsmooth.flow.engine import Chain, Engine, FloatArray, IntArray, SectionPlan, State
 from nonsmooth.flow.methods import RTOL, engine_for
 from nonsmooth.flow.planar import PlanarEngine
@@ -134,7 +134,12 @@ class Settler:
     @property
     def least(self) -> FloatArray:
         """The least size of a motion in each state: what is smaller has come to rest."""
-        return LEAST * self.system.scale_vector()
+        return least_sizes(self.engine.name, self.system.scale_vector())[0]
+
+    def least_at(self, maximum: FloatArray, minimum: FloatArray) -> FloatArray:
+        """The least size of a motion with these extremes (..., n)."""
+        least, rounded = least_sizes(self.engine.name, self.system.scale_vector())
+        return np.maximum(least, rounded * np.maximum(np.abs(maximum), np.abs(minimum)))
 
     @property
     def section_phase(self) -> float:
@@ -146,27 +151,39 @@ class Settler:
         return trace(self.system, self.engine, self.plan, point, place, mode, transient, keep, self.width)
 
     def exponents(
-        self, points: FloatArray, rows: Any, starts: FloatArray, modes: Any, n_returns: int
-    ) -> tuple[FloatArray, FloatArray]:
+        self, points: FloatArray, rows: Any, starts: FloatArray, modes: Any, n_returns: int, maximum: FloatArray,
+        minimum: FloatArray,
+    ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
         """Largest Lyapunov exponents (per unit time) of J jobs that begin on the section, and their errors.
 
-        Two neighbours over ``n_returns`` returns, put back to a small distance after each; NaN where one failed.
+        Two neighbours over ``n_returns`` returns, put back to a small distance after each, in units of the motion's
+        size by its extremes (J, n); NaN where one failed.
         """
         points = np.ascontiguousarray(points, dtype=float)
         rows = np.ascontiguousarray(rows, dtype=np.int64)
         starts = np.ascontiguousarray(starts, dtype=float)
         modes = np.array(modes, dtype=np.int64)
+        sizes = parting_sizes(maximum, minimum, self.system.scale_vector())
+        largest, error = np.full(len(rows), np.nan), np.full(len(rows), np.nan)
+        for size in np.unique(sizes, axis=0):
+            jobs = np.flatnonzero((sizes == size).all(axis=1))
+            largest[jobs], error[jobs] = self._parted(points, rows[jobs], starts[jobs], modes[jobs], n_returns, size)
+        return largest, error
+
+    def _parted(
+        self, points: FloatArray, rows: IntArray, starts: FloatArray, modes: IntArray, n_returns: int, size: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Exponents of jobs whose motions are of one size."""
         if self.planar is not None and self.device == "cuda":
-            return exponents_on_gpu(
-                self.planar, points, rows, starts, modes, n_returns, self.plan.phase, self.system.scale_vector()
-            )
+            return exponents_on_gpu(self.planar, points, rows, starts, modes, n_returns, self.plan.phase, size)
         if self.planar is not None:
             return exponents_compiled(
-                self.planar, points, rows, starts, modes, n_returns, self.plan.phase, self.system.scale_vector(),
-                self.max_period,
-            )  # fmt: skip
+                self.planar, points, rows, starts, modes, n_returns, self.plan.phase, size, self.max_period
+            )
         found = [
-            exponent_of(self.system, self.engine, self.plan, points[i : i + 1], starts[j], int(modes[j]), n_returns)
+            exponent_of(
+                self.system, self.engine, self.plan, points[i : i + 1], starts[j], int(modes[j]), n_returns, size
+            )
             for j, i in enumerate(rows)
         ]
         largest, error = np.array(found).reshape(-1, 2).T

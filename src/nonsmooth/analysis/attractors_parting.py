@@ -8,29 +8,52 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth.analysis.attractors_trace import period_of, state_at
+from nonsmooth.analysis.settled import ROUNDED
 from nonsmooth.flow.engine import Chain, Engine, FloatArray, SectionPlan
 from nonsmooth.kernels import codes
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["exponent_of"]
+__all__ = ["exponent_of", "parting_sizes"]
+
+USUAL = 1.5  # powers of ten: a motion this near to its scale is taken to have that size
+SLENDER = 1e-6  # a state whose motion is smaller than this, beside the largest of the others, is at rest
+RESTING = 1e-9  # in units of the scales: a motion that has come to rest in all states
+AT_REST = 1e-3
+
+
+def parting_sizes(maximum: FloatArray, minimum: FloatArray, scale: FloatArray) -> FloatArray:
+    """Sizes (J, n) by which neighbours of J motions are told apart: those of the motions, in powers of ten.
+
+    The states' ``scale`` will not do: neighbours of a motion in micrometres would be as far apart as it is wide, and
+    those of a motion in pascals equal within rounding. Extremes that are not known (NaN) give the scale.
+    """
+    half = np.nan_to_num(0.5 * (maximum - minimum)) / scale
+    value = np.nan_to_num(np.maximum(np.abs(maximum), np.abs(minimum))) / scale
+    widest = half.max(axis=1, keepdims=True, initial=0.0)
+    size = np.maximum(half, SLENDER * widest)
+    size = np.maximum(np.where(widest < RESTING, AT_REST, size), ROUNDED * value)
+    power = np.log10(size)
+    power = np.where((np.abs(power) < USUAL) | np.isnan(maximum).all(axis=1, keepdims=True), 0.0, np.rint(power))
+    return np.asarray(scale * 10.0**power)
 
 
 def exponent_of(
-    system: System, engine: Engine, plan: SectionPlan, point: FloatArray, start: FloatArray, mode: int, n_returns: int
-) -> tuple[float, float]:
+    system: System, engine: Engine, plan: SectionPlan, point: FloatArray, start: FloatArray, mode: int, n_returns: int,
+    scale: FloatArray,
+) -> tuple[float, float]:  # fmt: skip
     """Exponent per unit time of a run that begins on the section, and its standard error; NaN where a run failed.
 
-    The neighbour is put back to a small distance after each of ``n_returns`` returns; the error is that of the mean of
-    ten batches, and a quarter of one before them is left out. A forced system is looked at once per period, whatever
-    the section: neighbours must be compared at equal phase. On a Poincare section of an autonomous system the result
+    The neighbour is put back to a small distance, in units of ``scale`` (n,), after each of ``n_returns`` returns; the
+    error is that of the mean of ten batches, and a quarter of one before them is left out. A forced system is looked at
+    once per period, whatever the section: neighbours must be compared at equal phase. On a Poincare section of an autonomous system the result
     is the largest exponent beside the zero along the flow.
     """
-    tables, traced, scale = engine.prepare(point), system.traced, system.scale_vector()
+    tables, traced = engine.prepare(point), system.traced
     period = period_of(tables)
     state = state_at(system, start, mode, plan.phase * period if plan.indicator < 0 else 0.0, period)
-    quiet = replace(plan, extremes=False)
+    quiet = replace(plan, extremes=False, every=1)  # a neighbour's count of returns may be one off
     if period < np.inf and plan.indicator >= 0:
         quiet = SectionPlan(phase=float(state.clock[0] / period % 1.0), extremes=False)
     out = Chain.empty(1, 1, len(traced.u), len(traced.indicators), len(traced.outputs))

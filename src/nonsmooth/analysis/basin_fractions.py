@@ -15,6 +15,7 @@ from nonsmooth.analysis.basins_measures import share_errors, starts_needed
 from nonsmooth.analysis.basins_work import StartsWork, settled_from
 from nonsmooth.analysis.chart import described
 from nonsmooth.analysis.chart_work import CHUNK, STORED
+from nonsmooth.analysis.settle import warn_if_small
 from nonsmooth.analysis.sweep import swept_values
 from nonsmooth.campaign.run import run
 from nonsmooth.flow.arguments import check_options, check_system, whole_number
@@ -106,6 +107,7 @@ def basin_fractions(
         any_cpu=any_cpu,
     )  # fmt: skip
     runs = settled_from(columns)
+    warn_if_small(system, starts, runs.maximum, runs.minimum)
     rising = [int(i) for i in np.argsort(numbers, kind="stable")]
     per_value: list[dict[int, Attractor]] = [{} for _ in numbers]
     labels = np.full((len(numbers), n_starts), -1, dtype=np.int64)

@@ -21,6 +21,7 @@ from nonsmooth.analysis.basins_work import StartsWork, settled_from
 from nonsmooth.analysis.chart import described
 from nonsmooth.analysis.chart_work import CHUNK, STORED
 from nonsmooth.analysis.classify import longest_period
+from nonsmooth.analysis.settle import warn_if_small
 from nonsmooth.analysis.settled import usable
 from nonsmooth.campaign.run import run
 from nonsmooth.flow.arguments import check_options, check_system, float_array, real_number, whole_number
@@ -149,7 +150,9 @@ def basins(
         work, threads=threads, progress=progress, label=f"basins over {x_name} and {y_name}", store=store,
         client=client, any_cpu=any_cpu,
     )  # fmt: skip
-    found, labels, status = find_attractors(settler, point, settled_from(columns), Patience())
+    runs = settled_from(columns)
+    warn_if_small(system, starts, runs.maximum, runs.minimum)
+    found, labels, status = find_attractors(settler, point, runs, Patience())
     found, labels = by_share(found, labels)
     label = labels.reshape(len(x), len(y))
     from nonsmooth.results.global_schema import basins as build
@@ -198,6 +201,11 @@ def settler_of(
             "one too: section=ns.Stroboscopic(phase)"
         )
     engine = engine_for(system, method, rtol, atol, **expert)
+    if plan.every > 1:
+        raise ValueError(
+            f"section with every = {plan.every}: the returns that are passed over make several attractors of one "
+            "cycle, by the one at which a run begins; leave `every` out"
+        )
     on_gpu(device, "basins", engine, plan)
     settler = Settler(
         system, engine, plan, transient, keep, max_period, rtol=rtol, atol=atol, expert=expert, device=device

@@ -112,7 +112,8 @@ def _cycle(settler: Settler, point: FloatArray, run: Settled) -> Attractor:
     """The attractor of one run that ended on a cycle."""
     p, place, mode = int(run.period_number[0]), run.last[0], int(run.mode[0])
     n = run.maximum.shape[1]
-    size = np.maximum(0.5 * (run.maximum[0] - run.minimum[0]), settler.least)
+    least = settler.least_at(run.maximum[0], run.minimum[0])
+    size = np.maximum(0.5 * (run.maximum[0] - run.minimum[0]), least)
     cycle = confirmed_cycle(settler, point, place, mode, p, size)
     confirmed = cycle is not None
     if cycle is None:
@@ -125,7 +126,7 @@ def _cycle(settler: Settler, point: FloatArray, run: Settled) -> Attractor:
             cycle = Cycle(place[None, :n], run.mode[:1], float(run.multiplier[0]), np.nan, place, mode)
     return Attractor(
         p, cycle.points, cycle.modes, cycle.end, cycle.mode, run.maximum[0], run.minimum[0], cycle.multiplier,
-        exponent_on(cycle), 0.0, settler.least, confirmed,
+        exponent_on(cycle), 0.0, least, confirmed,
     )  # fmt: skip
 
 

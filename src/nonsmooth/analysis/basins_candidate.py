@@ -79,12 +79,13 @@ class Search:
         checked = wide.run(point, [0], long.end[None], modes=[long.mode], begin=settler.section_phase)
         if checked.status[0] != codes.NOT_PERIODIC or not _recurrent(long.points):
             return None
-        exponents, errors = settler.exponents(
-            point, [0], long.end[None], np.array([long.mode]), self.patience.exponent
-        )
         maximum = np.maximum(checked.maximum[0], long.points.max(axis=0))
         minimum = np.minimum(checked.minimum[0], long.points.min(axis=0))
-        exponent, error, least = float(exponents[0]), float(errors[0]), settler.least
+        exponents, errors = settler.exponents(
+            point, [0], long.end[None], np.array([long.mode]), self.patience.exponent, maximum[None], minimum[None]
+        )
+        exponent, error = float(exponents[0]), float(errors[0])
+        least = settler.least_at(maximum, minimum)
         size = np.maximum(0.5 * (maximum - minimum), least)
         end, last = long.end, long.mode
         doubt = 3.0 * error + LEAST_EXPONENT * len(long.points) / long.times[-1]

@@ -53,5 +53,5 @@ class Attractor:
 
     @property
     def size(self) -> FloatArray:
-        """Half the range of each state on it, and no less than a small part of the states' scales."""
+        """Half the range of each state on it, and no less than the least size."""
         return np.maximum(0.5 * (self.maximum - self.minimum), self.least)

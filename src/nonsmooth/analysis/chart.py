@@ -11,6 +11,7 @@ import numpy as np
 from nonsmooth.analysis.attractors import Settler
 from nonsmooth.analysis.chart_work import CHUNK, STORED, ChartWork
 from nonsmooth.analysis.classify import longest_period
+from nonsmooth.analysis.settle import warn_if_small
 from nonsmooth.analysis.sweep import swept_values
 from nonsmooth.campaign.run import run
 from nonsmooth.flow.arguments import check_options, check_system, whole_number
@@ -137,6 +138,8 @@ def chart(
             work, threads=threads, progress=progress, label=label, store=store, client=client, any_cpu=any_cpu
         )
         arrays = {name: planned.order(column) for name, column in flat.items()}
+    if "maximum" in arrays:
+        warn_if_small(system, work.starts, arrays["maximum"], arrays["minimum"])
     from nonsmooth.results.global_schema import chart as build
     from nonsmooth.results.labels import labels_of
     from nonsmooth.results.provenance import provenance
@@ -178,7 +181,8 @@ def plan_chart(
     n_exponent = whole_number(n_exponent, "lyapunov", 0)
     if 0 < n_exponent < 40:
         raise ValueError(f"lyapunov = {lyapunov} returns are too few for an exponent; at least 40")
-    extremes = bool(extremes) or len(starts) > 1  # attractors are told apart by them
+    # attractors are told apart by them; neighbours are as near as the motion is wide
+    extremes = bool(extremes) or len(starts) > 1 or n_exponent > 0
     engine = engine_for(system, method, rtol, atol, **expert)
     gpu = on_gpu(device, "chart", engine, plan, carried=along is not None)
     settler = Settler(

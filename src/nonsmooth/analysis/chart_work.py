@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -108,7 +108,8 @@ class ChartWork:
             exponent, error = np.full(len(found.status), np.nan), np.full(len(found.status), np.nan)
             rows = np.repeat(np.arange(n_places), n_starts)[good]
             exponent[good], error[good] = self.settler.exponents(
-                points, rows, found.last[good], found.mode[good], self.lyapunov
+                points, rows, found.last[good], found.mode[good], self.lyapunov, found.maximum[good],
+                found.minimum[good],
             )
             arrays |= {"lyapunov": exponent, "lyapunov_error": error}
         kept = {
@@ -143,10 +144,12 @@ def attractors_among(
     period = found.period_number.reshape(n_places, n_starts)
     wandering = found.status.reshape(n_places, n_starts) == codes.NOT_PERIODIC
     extremes = np.concatenate([found.maximum, found.minimum], axis=1).reshape(n_places, n_starts, -1)
-    size = np.maximum(found.maximum - found.minimum, settler.least).reshape(n_places, n_starts, -1)
+    least = settler.least_at(found.maximum, found.minimum)
+    size = np.maximum(found.maximum - found.minimum, least).reshape(n_places, n_starts, -1)
     n = size.shape[2]
     last, mode = found.last.reshape(n_places, n_starts, -1)[..., :n], found.mode.reshape(n_places, n_starts)
     count = wandering.any(axis=1).astype(np.int64)
+    every, whole = settler.plan.every, replace(settler, plan=replace(settler.plan, every=1))
     for k in range(n_starts):
         new = period[:, k] > 0
         for j in range(k):
@@ -155,8 +158,8 @@ def attractors_among(
             apart = np.abs(last[:, k] - last[:, j]) > POINT * size[:, k]
             apart = apart.any(axis=1) | (mode[:, k] != mode[:, j])
             for i in np.flatnonzero(alike & apart):
-                run = settler.trace(
-                    points[i : i + 1], found.last[i * n_starts + j], int(mode[i, j]), 0, int(period[i, j])
+                run = whole.trace(
+                    points[i : i + 1], found.last[i * n_starts + j], int(mode[i, j]), 0, every * int(period[i, j])
                 )
                 at = (np.abs(run.points - last[i, k]) <= POINT * size[i, k]).all(axis=1) & (run.modes == mode[i, k])
                 alike[i] = at.any() or not len(run.points)

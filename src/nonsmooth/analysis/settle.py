@@ -6,24 +6,53 @@ settling is run on, or pushed off an unstable orbit on which a carried state may
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nonsmooth.analysis.classify import Verdict, judge
 from nonsmooth.flow.engine import Chain, Engine, FloatArray, SectionPlan, State
+from nonsmooth.analysis.settled import LEAST, least_sizes, size_of
 from nonsmooth.flow.poincare import result_status
 from nonsmooth.kernels import codes
 
-__all__ = ["Attractors"]
+if TYPE_CHECKING:
+    from nonsmooth.system.system import System
 
+__all__ = ["Attractors", "warn_if_small"]
+
+RESTING = 1e-7  # in units of the scales: smaller values of a state are rounding beside the others
+NOTHING = 1e-15  # and beside none
 LONGER = (1, 2, 4)  # further transients for a point that is still settling, in units of the first
 KICK = 1e-3  # what pushes a state off an unstable orbit, in units of the motion's size
 NUDGE = 1e-6  # finite differences of the return map, in units of the motion's size
-LEAST = 1e-3  # the least size of a motion, in units of the states' scales
 FAILED = (codes.DIVERGED, codes.CHATTER, codes.TOO_MANY_CROSSINGS, codes.NO_CONVERGENCE, codes.BEYOND_STOP)
+
+
+def warn_if_small(system: System, *sizes: FloatArray) -> None:
+    """Warn of states that never leave the size below which a motion counts as rest.
+
+    Parameters
+    ----------
+    *sizes : array (..., n)
+        Values of the states: starts, extremes.
+    """
+    scale = system.scale_vector()
+    largest = np.max([np.nanmax(np.abs(one).reshape(-1, len(scale)), axis=0, initial=0.0) for one in sizes], axis=0)
+    small = np.flatnonzero((largest > RESTING * scale) & (largest < LEAST * scale))
+    if not small.size and (largest < LEAST * scale).all():  # nothing moves much: not at rest beside a motion
+        small = np.flatnonzero(largest > NOTHING * scale)
+    if small.size:
+        names = list(system.states)
+        told = ", ".join(f"{names[j]!r}: {largest[j]:.2g}" for j in small)
+        warnings.warn(
+            f"{system.name!r}: these states stay below {LEAST:g} of their scale, where a motion counts as rest, so "
+            f"attractors may not be told apart or found; give System(scale={{{told}}})",
+            stacklevel=3,
+        )
 
 
 @dataclass(frozen=True)
@@ -81,12 +110,12 @@ class Attractors:
         self.engine.chain(self.tables, i, i + 1, state, None, self.plan, transient, keep, out)
 
     def _probe(self, i: int, state: State, transient: int, keep: int, out: Chain) -> None:
-        plan = replace(self.plan, extremes=False)
+        plan = replace(self.plan, extremes=False, every=1)
         self.engine.chain(self.tables, i, i + 1, state, None, plan, transient, keep, out)
 
     def _size(self, i: int, out: Chain) -> FloatArray:
         """Half the range of each state, and no less than a part of its scale: a motion that dies out comes to rest."""
-        return np.maximum(0.5 * (out.maximum[i] - out.minimum[i]), LEAST * self.scale)
+        return size_of(out.maximum[i], out.minimum[i], *least_sizes(self.engine.name, self.scale))
 
     def _judge(self, i: int, state: State, out: Chain) -> Verdict:
         size = self._size(i, out)
@@ -118,10 +147,15 @@ class Attractors:
         """The factor by which a nudged state nears the cycle on a Poincare section per p returns.
 
         A nudge moves the state off the surface, which may shift the count of returns by one; so the distance to the
-        whole cycle is measured, over several rounds."""
+        whole cycle is measured, at all of its returns, over several rounds."""
         rounds = 8
-        keep = rounds * p + 2
         cycle = out.section[i, -p:] / size
+        if self.plan.every > 1:
+            p *= self.plan.every
+            own = _rows_of(out, i, p)
+            self._probe(i, state.copy(), 0, p, own)
+            cycle = own.section[i] / size
+        keep = rounds * p + 2
         moved = state.copy()
         moved.u += max(NUDGE, 1e2 * self.tolerance) * size
         moved.settled = False

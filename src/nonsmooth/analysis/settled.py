@@ -12,7 +12,10 @@ from numpy.typing import NDArray
 from nonsmooth.flow.engine import FloatArray, IntArray
 from nonsmooth.kernels import codes
 
-__all__ = ["Settled", "usable"]
+__all__ = ["LEAST", "ROUNDED", "Settled", "least_sizes", "size_of", "usable"]
+
+LEAST = 1e-3  # the least size of a motion, in units of the states' scales
+ROUNDED = 1e-4  # of a state's value: what is smaller cannot be told from rounding where returns are to be nil
 
 USABLE = (codes.OK, codes.SLOW, codes.NOT_PERIODIC, codes.NOT_GUARANTEED)
 
@@ -20,6 +23,24 @@ USABLE = (codes.OK, codes.SLOW, codes.NOT_PERIODIC, codes.NOT_GUARANTEED)
 def usable(status: Any) -> NDArray[np.bool_]:
     """Where a run came to its end, so that its extremes and last point mean something."""
     return np.isin(status, USABLE)
+
+
+def size_of(
+    maximum: FloatArray, minimum: FloatArray, least: FloatArray, rounded: float = ROUNDED
+) -> FloatArray:
+    """Size of a motion in each state: half its range, no less than ``least``, nor than a part of a large value.
+
+    A pressure that rests at 1e5 Pa returns to 1e-11 Pa at best: rounding must not be taken for a motion."""
+    value = np.maximum(np.abs(maximum), np.abs(minimum))
+    return np.asarray(np.maximum(np.maximum(0.5 * (maximum - minimum), least), rounded * value))
+
+
+def least_sizes(method: str, scale: FloatArray) -> tuple[FloatArray, float]:
+    """The least size of a motion (n,), and as a part of the states' values, where a method integrates.
+
+    A Runge-Kutta pair does not come to rest: its steps grow until its error, ``rtol`` of the value and the scale, holds
+    them, and a return cannot be smaller. The others settle to rounding."""
+    return (scale, 1.0) if method == "rkf45" else (LEAST * scale, ROUNDED)
 
 
 @dataclass

@@ -9,7 +9,7 @@ import numpy as np
 
 from nonsmooth.analysis.classify import TOLERANCE
 from nonsmooth.analysis.density import bin_edges, coarse_values, given_ranges
-from nonsmooth.analysis.settle import Attractors
+from nonsmooth.analysis.settle import Attractors, warn_if_small
 from nonsmooth.analysis.sweep_pieces import Report, Slot, ended, largest_of, pieces_of, run_on_gpu, run_pieces
 from nonsmooth.flow.arguments import check_options, check_system, float_array, whole_number
 from nonsmooth.flow.devices import on_gpu, workers_of
@@ -169,7 +169,9 @@ def sweep(
             report.advance(1)
 
     run_pieces(march, pieces_of(directions, len(starts), numbers), threads, progress, parameter)
-    warn_if_coarse(system, engine, largest_of(starts, slots.values()))
+    largest = largest_of(starts, slots.values())
+    warn_if_coarse(system, engine, largest)
+    warn_if_small(system, largest)
     return _dataset(system, engine.name, parameter, numbers, directions, starts, slots, options, squeeze)
 
 

@@ -8,7 +8,7 @@ from numba import float64
 
 from .codes import OK, SLOW
 from .cuda_target import cuda, entry
-from .planar_settle import candidate, certain, modulus
+from .planar_settle import candidate, certain, modulus, size_of
 
 
 @entry
@@ -21,7 +21,7 @@ def judge(
         return
     j = jobs[k]
     for c in range(2):
-        sizes[j, c] = max(0.5 * (top[j, c] - bottom[j, c]), least[c])
+        sizes[j, c] = size_of(top[j, c], bottom[j, c], least[c])
     p, code, gap = candidate(section, j, keep, sizes[j], max_period, tolerance, returns[j])
     period_number[j] = p
     status[j] = code

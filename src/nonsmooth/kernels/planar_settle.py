@@ -37,6 +37,7 @@ MARGIN = 2e-3
 APART = 10.0
 KICK = 1e-3
 NUDGE = 1e-6
+ROUNDED = 1e-4
 
 
 @device
@@ -47,6 +48,12 @@ def go(i, u, clock, counters, linear, net, plan, phase, t_max, transient, keep, 
     tail = (phase, plan, t_max, transient, keep, limit)
     chain(*(head + linear + net + tail + out + scratch))
     return out[12][i]
+
+
+@inline
+def size_of(top, bottom, least):
+    """Half the range of a state, no less than the least size, nor than what rounding leaves of a large value."""
+    return max(0.5 * (top - bottom), least, ROUNDED * max(fabs(top), fabs(bottom)))
 
 
 @inline
@@ -241,7 +248,7 @@ def settle_many(
                     break
                 used += todo + keep + 1
                 for k in range(2):
-                    size[k] = max(0.5 * (probe[1][i, k] - probe[2][i, k]), norms[1 + k])
+                    size[k] = size_of(probe[1][i, k], probe[2][i, k], norms[1 + k])
                 p, verdict, gap, mu = verdict_of(
                     i, keep, size, max_period, tolerance, linear, net, quiet, phase, t_max, limit, out, probe,
                     scratch, rest, moved, moved_clock, moved_counters, images, returns,
