@@ -166,6 +166,40 @@ def test_two_chaotic_attractors_by_symmetry(hasty) -> None:
     np.testing.assert_allclose(found["maximum"][0, 0], -found["minimum"][1, 0], atol=5e-3)
 
 
+def test_chaos_and_tori_in_four_dimensions(hasty) -> None:
+    """A chaotic map and three states that follow it: an attractor for either sign; two circles with angles of their
+    own: one."""
+    names = ["x", "y", "z", "w"]
+
+    def rest(t: Any, u: Any, p: Any) -> Any:
+        return 0 * u.x, 0 * u.y, 0 * u.z, 0 * u.w
+
+    def system(kick: Any, **parameters: float) -> ns.System:
+        return ns.System(
+            states=names, parameters=parameters, modes={"rest": rest}, period=1.0,
+            transitions=[ns.Transition("rest", "rest", at=0.5, reset=kick)],
+        )  # fmt: skip
+
+    chaos = system(
+        lambda t, u, p: (p.a * u.x - u.x**3, 0.3 * u.y + 0.2 * u.x, 0.5 * u.z + 0.3 * u.x, 0.8 * u.w + 0.2 * u.x), a=2.4
+    )
+    found = ns.basins(chaos, {"x": [-0.9, 0.4], "y": [-0.5, 0.5]}, **QUIET)
+    assert found["label"].values.tolist() == [[0, 0], [1, 1]] and found["chaotic"].values.tolist() == [1, 1]
+
+    def turn(t: Any, u: Any, p: Any) -> Any:
+        f, g = 1.5 - 0.5 * (u.x**2 + u.y**2), 1.5 - 0.5 * (u.z**2 + u.w**2)
+        return (
+            f * (p.c * u.x - p.s * u.y), f * (p.s * u.x + p.c * u.y),
+            g * (p.c2 * u.z - p.s2 * u.w), g * (p.s2 * u.z + p.c2 * u.w),
+        )  # fmt: skip
+
+    a, b = np.pi * (np.sqrt(5.0) - 1.0), 2 * np.pi * np.sqrt(2.0)
+    torus = system(turn, c=np.cos(a), s=np.sin(a), c2=np.cos(b), s2=np.sin(b))
+    found = ns.basins(torus, {"x": [0.3, 1.2], "y": [0.1, 0.7]}, fixed={"z": 0.5}, **QUIET)
+    assert (found["label"] == 0).all() and found["chaotic"].values.tolist() == [0]
+    assert abs(float(found["lyapunov"][0])) < 1e-3
+
+
 def test_motion_that_escapes_late_is_no_attractor() -> None:
     """x -> r x (1 - x) above r = 4 leaves after some hundred kicks from almost every start."""
     system = kicked(lambda t, u, p: (p.r * u.x * (1 - u.x), 0.3 * u.y), r=4.0001)

@@ -1,8 +1,8 @@
 """Motion without a short period: when it is an attractor, and when it is only on its way, or drawn in by nothing.
 
-A candidate is followed for a long time. It must neither settle nor leave the places it has visited (recurrence, in
-cells of the section), and it must attract: runs that begin beside it come back to it. Motion without damping is
-recurrent too, but neighbours stay on orbits of their own, or (in a chaotic sea) keep the area between them.
+A candidate is followed for a long time. It must neither settle nor leave the places it has visited (recurrence), and
+it must attract: runs that begin beside it come back to it. Motion without damping is recurrent too, but neighbours stay
+on orbits of their own, or (in a chaotic sea) keep the area between them.
 """
 
 from __future__ import annotations
@@ -20,8 +20,10 @@ from nonsmooth.kernels import codes
 
 __all__ = ["Search", "among"]
 
-CELLS = 40  # cells along the section's extent in which recurrence is judged
 MOSTLY = 0.95
+NEARLY_THERE = 0.02  # of the section's extent: points nearer than this have come back
+SPREAD = 3.0  # and those nearer than this many times the distance that nearly all points keep from each other
+FARTHEST = 0.1
 LEAST_EXPONENT = 1e-3  # per return: contraction faster than this ends on a cycle, expansion is chaos
 LONGEST = 1024  # period number looked for where the exponent says that there is a cycle
 LONG_RETURN = 1e-8
@@ -105,7 +107,7 @@ class Search:
         half = len(long.points) // 2
         points, tree = long.points[half:], cKDTree(long.points[half:] / size)
         gap, _ = tree.query(long.points[:half] / size, p=np.inf)
-        near = float(np.clip(3.0 * np.quantile(gap, MOSTLY), 1e-9, NEAR))
+        near = float(np.clip(SPREAD * np.quantile(gap, MOSTLY), 1e-9, NEAR if points.shape[1] < 3 else FARTHEST))
         item = Attractor(
             0, points, long.modes[half:], end, last, maximum, minimum, np.nan, exponent, error, least,
             chaotic=exponent > doubt, near=near, tree=tree,
@@ -163,13 +165,21 @@ class Search:
 
 
 def _recurrent(points: FloatArray) -> bool:
-    """Whether either half of a run visits, nearly always, the cells that the other half has visited."""
+    """Whether either half of a run comes nearly always near to where the other half has been.
+
+    Near is a small part of the range, or as near as a half comes to itself: in many dimensions that is farther off."""
+    from scipy.spatial import cKDTree
+
     half = len(points) // 2
-    low, width = points.min(axis=0), np.maximum(np.ptp(points, axis=0), 1e-300)
-    cells = np.minimum(((points - low) / width * CELLS).astype(np.int64), CELLS - 1)
-    keys = cells @ (CELLS ** np.arange(points.shape[1]))
-    first, second = keys[:half], keys[half:]
-    return bool(np.isin(second, first).mean() >= MOSTLY and np.isin(first, second).mean() >= MOSTLY)
+    scaled = points / np.maximum(np.ptp(points, axis=0), 1e-300)
+    first, second = scaled[:half], scaled[half:]
+    for one, other in ((first, second), (second, first)):
+        tree = cKDTree(one)
+        own = np.quantile(tree.query(one, k=2, p=np.inf)[0][:, 1], MOSTLY)
+        near = np.clip(SPREAD * own, NEARLY_THERE, FARTHEST)
+        if (tree.query(other, p=np.inf, distance_upper_bound=2 * near)[0] <= near).mean() < MOSTLY:
+            return False
+    return True
 
 
 def _long_period(points: FloatArray, size: FloatArray) -> int:

@@ -11,7 +11,7 @@ from nonsmooth.flow.engine import FloatArray, IntArray
 
 __all__ = ["NEAR", "Attractor", "Patience"]
 
-NEAR = 0.02  # of the attractor's size: section points farther than this from all of its own never belong to it
+NEAR = 0.02  # of the attractor's size: section points farther than this from all of its own never belong to it (in one or two dimensions)
 
 
 @dataclass(frozen=True)
