@@ -166,6 +166,17 @@ def test_two_chaotic_attractors_by_symmetry(hasty) -> None:
     np.testing.assert_allclose(found["maximum"][0, 0], -found["minimum"][1, 0], atol=5e-3)
 
 
+def test_chaos_that_fills_an_area_is_counted_once(hasty) -> None:
+    """Two such maps beside each other fill squares thinly: one for each pair of signs, however many starts."""
+    system = kicked(lambda t, u, p: (p.a * u.x - u.x**3, p.a * u.y - u.y**3), a=2.4)
+    x, y = np.array([-0.9, -0.7, -0.2, 0.3, 0.5, 1.1]), np.array([-0.8, -0.4, 0.9])
+    found = ns.basins(system, {"x": x, "y": y}, **QUIET)
+    assert found.sizes["attractor"] == 4
+    signs = np.sign(found["section"].values[found["label"].values])
+    np.testing.assert_array_equal(signs[..., 0], np.sign(x)[:, None] + 0 * y)
+    np.testing.assert_array_equal(signs[..., 1], np.sign(y) + 0 * x[:, None])
+
+
 def test_chaos_and_tori_in_four_dimensions(hasty) -> None:
     """A chaotic map and three states that follow it: an attractor for either sign; two circles with angles of their
     own: one."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from nonsmooth.analysis.attractors import Settler
 from nonsmooth.analysis.attractors_trace import Trace
-from nonsmooth.analysis.basins_found import NEAR, Attractor, Patience
+from nonsmooth.analysis.basins_found import Attractor, Patience
 from nonsmooth.analysis.basins_newton import confirmed_cycle, exponent_on
 from nonsmooth.flow.engine import FloatArray
 from nonsmooth.kernels import codes
@@ -107,7 +107,10 @@ class Search:
         half = len(long.points) // 2
         points, tree = long.points[half:], cKDTree(long.points[half:] / size)
         gap, _ = tree.query(long.points[:half] / size, p=np.inf)
-        near = float(np.clip(SPREAD * np.quantile(gap, MOSTLY), 1e-9, NEAR if points.shape[1] < 3 else FARTHEST))
+        spread = float(np.quantile(gap, MOSTLY))
+        if spread > 2.0 * FARTHEST:
+            return None  # so many points do not show where it is
+        near = float(np.clip(SPREAD * spread, 1e-9, 2.0 * FARTHEST))
         item = Attractor(
             0, points, long.modes[half:], end, last, maximum, minimum, np.nan, exponent, error, least,
             chaotic=exponent > doubt, near=near, tree=tree,

@@ -9,9 +9,7 @@ import numpy as np
 
 from nonsmooth.flow.engine import FloatArray, IntArray
 
-__all__ = ["NEAR", "Attractor", "Patience"]
-
-NEAR = 0.02  # of the attractor's size: section points farther than this from all of its own never belong to it (in one or two dimensions)
+__all__ = ["Attractor", "Patience"]
 
 
 @dataclass(frozen=True)
@@ -48,7 +46,7 @@ class Attractor:
     least: FloatArray  # (n,): a motion smaller than this is one that has come to rest
     confirmed: bool = False
     chaotic: bool = False  # its exponent is above zero beyond doubt
-    near: float = NEAR  # of its size: section points nearer than this belong to it
+    near: float = 0.0  # of its size: section points nearer than this belong to it
     tree: Any = field(default=None, repr=False, compare=False)
 
     @property
