@@ -18,7 +18,8 @@ from nonsmooth.analysis.chart_work import CHUNK, STORED
 from nonsmooth.analysis.settle import warn_if_small
 from nonsmooth.analysis.sweep import swept_values
 from nonsmooth.campaign.run import run
-from nonsmooth.flow.arguments import check_options, check_system, whole_number
+from nonsmooth.flow.arguments import check_options, check_system, real_number, whole_number
+from nonsmooth.flow.memory import room_for
 from nonsmooth.flow.sections import Poincare, Stroboscopic
 from nonsmooth.flow.starts import random_starts, start_states
 
@@ -90,6 +91,8 @@ def basin_fractions(
     check_options(system, expert, basin_fractions)
     numbers = swept_values(system, parameter, values)
     n_starts = whole_number(n_starts, "n_starts", 1)
+    # a start is named, state by state; of each run at each value a row is kept
+    room_for((500.0 + 64.0 * len(numbers)) * n_starts, f"{n_starts} starts at {len(numbers)} values", "take fewer")
     starts = start_states(system, _starts(system, box, n_starts, seed))
     section, settler = settler_of(
         system, section, transient, keep, max_period, method, rtol, atol, expert, threads=threads
@@ -137,7 +140,7 @@ def _starts(system: System, box: Any, n_starts: int, seed: int) -> Any:
     for name, ends in box.items():
         if np.shape(ends) != (2,):
             raise ValueError(f"box[{name!r}] = {ends!r}: give its lowest and highest value; box={{{form}}}")
-    low, high = ({name: float(ends[k]) for name, ends in box.items()} for k in (0, 1))
+    low, high = ({name: real_number(ends[k], f"box[{name!r}]") for name, ends in box.items()} for k in (0, 1))
     return random_starts(n_starts, low, high, whole_number(seed, "seed", 0))
 
 

@@ -26,6 +26,7 @@ from nonsmooth.analysis.settled import usable
 from nonsmooth.campaign.run import run
 from nonsmooth.flow.arguments import check_options, check_system, float_array, real_number, whole_number
 from nonsmooth.flow.devices import BATCH, on_gpu, workers_of
+from nonsmooth.flow.memory import room_for
 from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.kernels import codes
@@ -135,6 +136,7 @@ def basins(
     gpu, threads = device == "cuda", workers_of(device, threads, client)
     names = list(system.states)
     (x_name, x), (y_name, y) = values.items()
+    room_for(16.0 * len(names) * len(x) * len(y), f"a plane of {len(x)} x {len(y)} starts", "take fewer")
     starts = np.tile(rest, (len(x) * len(y), 1))
     starts[:, names.index(x_name)] = np.repeat(x, len(y))
     starts[:, names.index(y_name)] = np.tile(y, len(x))

@@ -14,7 +14,7 @@ from nonsmooth.analysis.classify import longest_period
 from nonsmooth.analysis.settle import warn_if_small
 from nonsmooth.analysis.sweep import swept_values
 from nonsmooth.campaign.run import run
-from nonsmooth.flow.arguments import check_options, check_system, whole_number
+from nonsmooth.flow.arguments import check_options, check_system, whole_number, yes_or_no
 from nonsmooth.flow.devices import BATCH, on_gpu, workers_of
 from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
@@ -127,7 +127,7 @@ def chart(
         threads = whole_number(threads, "threads", 1)
     threads = workers_of(device, threads, client)
     work, label = planned.work, f"chart over {' and '.join(planned.values)}"
-    if refine is not False:
+    if refine is not False and not (isinstance(refine, np.bool_) and not refine):
         from nonsmooth.analysis.chart_refine import refined
 
         if store is not None or client is not None:
@@ -177,22 +177,23 @@ def plan_chart(
     section, plan = section_plan(system, section)
     along = _carry(values, carry)
     starts = start_states(system, start)
-    n_exponent = {True: EXPONENT_RETURNS, False: 0}[lyapunov] if isinstance(lyapunov, bool) else lyapunov
+    n_exponent = (EXPONENT_RETURNS if lyapunov else 0) if isinstance(lyapunov, bool | np.bool_) else lyapunov
     n_exponent = whole_number(n_exponent, "lyapunov", 0)
     if 0 < n_exponent < 40:
         raise ValueError(f"lyapunov = {lyapunov} returns are too few for an exponent; at least 40")
     # attractors are told apart by them; neighbours are as near as the motion is wide
-    extremes = bool(extremes) or len(starts) > 1 or n_exponent > 0
+    stop_early = yes_or_no(stop_early, "stop_early")
+    extremes = yes_or_no(extremes, "extremes") or len(starts) > 1 or n_exponent > 0
     engine = engine_for(system, method, rtol, atol, **expert)
     gpu = on_gpu(device, "chart", engine, plan, carried=along is not None)
     settler = Settler(
-        system, engine, plan, transient, keep, max_period, bool(stop_early), extremes, rtol, atol, expert, device
+        system, engine, plan, transient, keep, max_period, stop_early, extremes, rtol, atol, expert, device
     )
     settler.load()
     options = {
         "grid": values, "start": plain_start(system, start), "carry": None if carry is None else dict(carry),
         "section": section, "transient": transient, "keep": keep, "max_period": max_period,
-        "stop_early": bool(stop_early), "extremes": extremes, "lyapunov": n_exponent, "refine": refine,
+        "stop_early": stop_early, "extremes": extremes, "lyapunov": n_exponent, "refine": refine,
         "method": method, "rtol": rtol, "atol": atol, **({"device": device} if gpu else {}), **expert,
     }  # fmt: skip
     axes, order = _axes(values, along)

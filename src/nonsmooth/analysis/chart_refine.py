@@ -60,8 +60,8 @@ def refined(
     ValueError
         A part outside 0..1, or a chart whose points are not independent: carried states, several starts.
     """
-    share = LARGEST_PART if part is True else float(part)
-    if not 0.0 < share <= 1.0:
+    share = LARGEST_PART if isinstance(part, bool | np.bool_) else part
+    if not isinstance(share, int | float | np.number) or not 0.0 < share <= 1.0:
         raise ValueError(
             f"refine = {part!r}: the part of the points to compute, above 0 and at most 1; True: a quarter"
         )

@@ -14,6 +14,7 @@ from nonsmooth.analysis.sweep_pieces import Report, Slot, ended, largest_of, pie
 from nonsmooth.flow.arguments import check_options, check_system, float_array, whole_number
 from nonsmooth.flow.devices import on_gpu, workers_of
 from nonsmooth.flow.engine import FloatArray, State
+from nonsmooth.flow.memory import room_for
 from nonsmooth.flow.methods import RTOL, engine_for, warn_if_coarse
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.flow.starts import is_one_start, plain_start, start_states
@@ -141,6 +142,11 @@ def sweep(
                 threads=threads, progress=False, **expert,
             )["section"].transpose(..., "state").values  # fmt: skip
         edges = bin_edges(system, ranges, n_bins, coarse)
+    width = keep * (len(traced.u) + 2) if edges is None else edges.size // 2
+    room_for(
+        16.0 * width * len(points) * len(directions) * len(starts), f"a sweep over {len(points)} values",
+        "take fewer values, starts or bins, keep fewer returns, or count them with density=True",
+    )  # fmt: skip
     slots = {
         (d, k): Slot(attractors, points, sizes, edges) for d in range(len(directions)) for k in range(len(starts))
     }

@@ -9,10 +9,13 @@ from typing import Any
 from numpy.typing import NDArray
 
 from nonsmooth.campaign.threads import on_threads
-from nonsmooth.campaign.work import Work, empty_columns
+from nonsmooth.campaign.work import Work, bytes_of, empty_columns
+from nonsmooth.flow.memory import room_for
 from nonsmooth.results.progress import progress as progress_bar
 
 __all__ = ["run"]
+
+LISTED = 40  # bytes of a chunk's number in a list
 
 
 def run(
@@ -34,6 +37,7 @@ def run(
     any_cpu : bool
         See :func:`nonsmooth.campaign.store.open_store`.
     """
+    room_for(bytes_of(work) + LISTED * work.n_chunks(), label or "the result", "ask for fewer points")
     keeper = None
     if store is not None:
         from nonsmooth.campaign.store import open_store

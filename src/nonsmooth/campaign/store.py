@@ -98,11 +98,9 @@ class ChunkStore:
             A chunk that is marked as done is damaged; its mark is taken away, so that the next run computes it again.
         """
         group = _results(self.path, "r")
-        try:
-            columns = {name: np.asarray(array[...]) for name, array in group.arrays()}
-        except Exception:  # damaged bytes come up as almost anything from the codecs
-            columns = {}
-        damaged = [mark["chunk"] for mark in _marks(self.path) if not self._is_whole(work, mark, columns)]
+        with _told(self.path):
+            columns = _whole(group)
+            damaged = [mark["chunk"] for mark in _marks(self.path) if not self._is_whole(work, mark, columns or group)]
         if damaged:
             for chunk in damaged:
                 (self.path / "run" / f"{chunk:06d}.json").unlink(missing_ok=True)
@@ -110,14 +108,15 @@ class ChunkStore:
             raise DataFileError(
                 f"{self.path}: {len(damaged)} chunks are damaged ({some}); run it again, they will be computed anew"
             )
-        return columns
+        return columns or {name: np.asarray(array[...]) for name, array in group.arrays()}
 
-    def _is_whole(self, work: Work, mark: Mapping[str, Any], columns: Mapping[str, NDArray[Any]]) -> bool:
+    def _is_whole(self, work: Work, mark: Mapping[str, Any], columns: Any) -> bool:
         """Whether a chunk's arrays are those that were written."""
         first, last = work.bounds(mark["chunk"])
         try:
-            group = columns or _results(self.path, "r")
-            digest = _content({name: np.asarray(group[name][first:last]) for name in work.columns()})
+            digest = _content({name: np.asarray(columns[name][first:last]) for name in work.columns()})
+        except (OSError, MemoryError):
+            raise  # the machine's trouble: the chunk may be whole
         except Exception:
             return False
         return bool(digest == mark.get("content"))
@@ -142,6 +141,8 @@ def open_store(path: str | os.PathLike[str], work: Work, *, any_cpu: bool = Fals
         The store of another work, or of another type of processor; something else that stands there; a folder that
         does not exist or may not be written. Nothing is changed then.
     """
+    if not isinstance(path, str | os.PathLike):
+        raise TypeError(f"store = {path!r}; give the name of a folder that ends in .zarr")
     target = Path(path)
     if target.suffix != ".zarr":
         raise ValueError(f"{target}: the name of a store must end in .zarr")
@@ -284,6 +285,16 @@ def _results(path: Path, mode: Any) -> Any:
 
     with zarr.config.set({"array.write_empty_chunks": True, "threading.max_workers": 1}):
         return zarr.open_group(path / "results", mode=mode)
+
+
+def _whole(group: Any) -> dict[str, NDArray[Any]]:
+    """All columns; none where a chunk is damaged: that comes up as almost anything from the codecs."""
+    try:
+        return {name: np.asarray(array[...]) for name, array in group.arrays()}
+    except (OSError, MemoryError):
+        raise
+    except Exception:
+        return {}
 
 
 def _marks(path: Path) -> Iterator[dict[str, Any]]:

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Column", "Work", "empty_columns"]
+__all__ = ["Column", "Work", "bytes_of", "empty_columns"]
 
 
 @dataclass(frozen=True)
@@ -36,6 +36,13 @@ class Work(Protocol):
     def compute(self, chunk: int) -> Mapping[str, NDArray[Any]]: ...
 
     def describe(self) -> Mapping[str, Any]: ...
+
+
+def bytes_of(work: Work) -> int:
+    """Bytes of a work's columns over all places."""
+    chunks = work.n_chunks()
+    width = sum(np.dtype(item.dtype).itemsize * int(np.prod(item.shape)) for item in work.columns().values())
+    return width * (work.bounds(chunks - 1)[1] if chunks else 0)
 
 
 def empty_columns(work: Work) -> dict[str, NDArray[Any]]:

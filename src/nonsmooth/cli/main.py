@@ -19,7 +19,7 @@ __all__ = ["main"]
 
 _COMMANDS = (run, plan, identify, compare, reproduce, models, show, rig)
 #: What a user can have caused and mend. Anything else is a fault of the package and keeps its traceback.
-_USER_ERRORS = (ValueError, TypeError, OSError, SolveError)
+_USER_ERRORS = (ValueError, TypeError, OSError, MemoryError, SolveError)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

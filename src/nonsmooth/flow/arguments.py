@@ -13,7 +13,7 @@ from nonsmooth.flow.engine import FloatArray
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["check_options", "check_system", "float_array", "real_number", "whole_number"]
+__all__ = ["check_options", "check_system", "float_array", "real_number", "whole_number", "yes_or_no"]
 
 
 def check_system(system: Any, verb: str) -> None:
@@ -68,6 +68,13 @@ def whole_number(value: Any, name: str, least: int) -> int:
     if number != int(number) or number < least:
         raise ValueError(f"{name} = {value!r} must be a whole number, at least {least}")
     return int(number)
+
+
+def yes_or_no(value: Any, name: str) -> bool:
+    """``value`` as a bool: a word would pass for True, whatever it says."""
+    if not isinstance(value, bool | np.bool_) and value not in (0, 1):
+        raise TypeError(f"{name} = {value!r}; allowed: True, False")
+    return bool(value)
 
 
 def float_array(values: Any, name: str) -> FloatArray:
