@@ -87,6 +87,35 @@ def test_the_store_of_another_work_is_refused(tmp_path: Path, monkeypatch: pytes
     assert hashes(path) == before
 
 
+def test_other_rules_of_judgement_are_another_version(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Labels are decided by analysis as much as by the kernels."""
+    version, read = stores._kernel_version.__wrapped__, Path.read_bytes
+    now = version()
+    for changed in ("analysis/classify.py", "flow/planar.py", "kernels/planar_march.py"):
+        with monkeypatch.context() as patched:
+            patched.setattr(
+                Path, "read_bytes", lambda file, end=changed: read(file) + (b"#" if file.as_posix().endswith(end) else b"")
+            )
+            assert version() != now
+    assert version() == now
+
+
+def test_trouble_while_reading_takes_no_mark_away(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Chunks that cannot be read for want of memory, or by a fault of the disk, are not damaged."""
+    path = tmp_path / "squares.zarr"
+    run(Squares(), store=path, **QUIET)
+    before = hashes(path)
+    for trouble in (MemoryError("no room"), OSError(errno.EIO, "the cable is loose")):
+        def fail(*_: object, error: BaseException = trouble) -> None:
+            raise error
+
+        with monkeypatch.context() as patched:
+            patched.setattr(stores, "_content", fail)
+            with pytest.raises(type(trouble)):
+                run(Squares(), store=path, **QUIET)
+        assert hashes(path) == before and len(stores.open_store(path, Squares()).done()) == Squares().n_chunks()
+
+
 def test_places_that_cannot_be_a_store(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"\.zarr"):
         run(Squares(), store=tmp_path / "squares.nc", **QUIET)

@@ -11,6 +11,7 @@ import xarray as xr
 import nonsmooth as ns
 from nonsmooth.cli import main as cli
 from nonsmooth.cli.study import read_study
+from nonsmooth.errors import DataFileError
 from nonsmooth.results.provenance import read_provenance
 
 SYSTEM = """
@@ -111,3 +112,64 @@ def test_what_is_wrong_is_named(text: str, message: str, write, capsys) -> None:
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"none\.toml: no such study file"):
         read_study(tmp_path / "none.toml")
+
+
+CHART = """[system]
+model = "discontinuous_support"
+[chart]
+grid = { omega = [9.0, 9.5], rho = [0.2, 0.3] }
+transient = 20
+keep = 20
+[output]
+"""
+
+
+@pytest.mark.parametrize(
+    ("output", "message"),
+    [
+        ('store = "a.zarr"\ndata = "a.zarr"', "replace the chunks"),
+        ('store = "a"', "must end in .zarr"),
+        ("store = 3", "a name in quotes"),
+        ('data = "a.csv"', "must end in .nc, .zarr"),
+        ('figure = "a.doc"', "must end in .pdf"),
+        ('data = "taken/a.nc"', "nothing may be written"),
+    ],
+)
+def test_what_would_fail_after_the_run_is_told_before(output: str, message: str, write, tmp_path: Path, capsys) -> None:
+    (tmp_path / "taken").write_text("a file")
+    assert cli.main(["run", str(write(CHART + output))]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_a_result_never_replaces_chunks(write, tmp_path: Path, capsys) -> None:
+    """Neither by a study, nor by save; nor does it replace a Zarr store of somebody else."""
+    study = str(write(CHART + 'data = "a.nc"'))
+    store = tmp_path / "a.zarr"
+    assert cli.main(["run", study, "--quiet", "--store", str(store)]) == 0
+    there = sorted(file.name for file in store.rglob("*"))
+    result = ns.load(tmp_path / "a.nc")
+    with pytest.raises(DataFileError, match="left alone"):
+        ns.save(result, store)
+    data = str(write(CHART + 'data = "a.zarr"'))
+    assert cli.main(["run", data, "--quiet", "--store", str(store)]) == 2
+    assert "another name" in capsys.readouterr().err
+    assert sorted(file.name for file in store.rglob("*")) == there
+    ns.save(result, tmp_path / "b.zarr")
+    assert ns.save(result, tmp_path / "b.zarr") == tmp_path / "b.zarr"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("x = 1\ny = x / 0\n", "line 2: ZeroDivisionError"),
+        ("def osc(:\n", "line 1: SyntaxError"),
+        ("import nonsmoth\n", "line 1: ModuleNotFoundError"),
+        ("def osc(a):\n    return a\n", "missing 1 required"),
+        ("import sys\ndef osc():\n    sys.exit(3)\n", "line 3: SystemExit"),
+    ],
+)
+def test_a_model_file_with_an_error_is_one_sentence(text: str, message: str, write, tmp_path: Path, capsys) -> None:
+    (tmp_path / "mine.py").write_text(text)
+    assert cli.main(["run", str(write(CHART.replace("discontinuous_support", "mine.py:osc")))]) == 2
+    said = capsys.readouterr().err
+    assert "mine.py" in said and message in said and "Traceback" not in said

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Attractors", "warn_if_small"]
 
-RESTING = 1e-7  # in units of the scales: smaller values of a state are rounding beside the others
+RESTING = 5e-7  # in units of the scales: smaller values of a state are rounding beside the others
 NOTHING = 1e-15  # and beside none
 LONGER = (1, 2, 4)  # further transients for a point that is still settling, in units of the first
 KICK = 1e-3  # what pushes a state off an unstable orbit, in units of the motion's size

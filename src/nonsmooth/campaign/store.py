@@ -7,9 +7,9 @@
         run/000017.json      chunk 17 is done: its key and the hash of its content, by whom, when, processor time
         run/started.log      which chunks were begun: one begun twice was lost with its worker
 
-A chunk's key is a hash of the model, the parameters, the options, the kernels' source, and the chunk's place. Its
-mark is written after its arrays, so that a chunk cut short counts as missing. Arrays hold results only: facts about
-the run (which machine, how long) stay in ``run``, so that equal work gives equal files.
+A chunk's key is a hash of the model, the parameters, the options, the source of kernels and rules, and the chunk's
+place. Its mark is written after its arrays, so that a chunk cut short counts as missing. Arrays hold results only:
+facts about the run (which machine, how long) stay in ``run``, so that equal work gives equal files.
 """
 
 from __future__ import annotations
@@ -39,6 +39,7 @@ __all__ = ["ChunkStore", "cpu_type", "describe_store", "open_store", "stored_byt
 
 ATTRIBUTE = "nonsmooth_campaign"
 LEVEL = 3  # of the compression
+ROOMS = ("kernels", "system", "flow", "analysis")  # whose text decides what a chunk holds
 FACTS = 360  # bytes of the facts about the run that are kept for each chunk
 
 
@@ -226,14 +227,16 @@ def cpu_type() -> str:
 
 @cache
 def _kernel_version() -> str:
-    """Hash of everything compiled: a store of older kernels is another work."""
+    """Hash of all that decides a number: a store of older kernels, or of older rules of judgement, is another work."""
     import numba
 
-    import nonsmooth.kernels as room
+    import nonsmooth
 
     digest = hashlib.sha256(numba.__version__.encode())
-    for file in sorted(Path(str(room.__file__)).parent.glob("*.py")):
-        digest.update(file.read_bytes())
+    package = Path(str(nonsmooth.__file__)).parent
+    for room in ROOMS:
+        for file in sorted((package / room).glob("*.py")):
+            digest.update(file.read_bytes())
     return digest.hexdigest()[:16]
 
 

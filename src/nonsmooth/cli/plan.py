@@ -33,6 +33,10 @@ def _run(options: argparse.Namespace) -> int:
     from nonsmooth.campaign.plan import plan
     from nonsmooth.cli.study import read_study
 
+    if options.workers is not None and options.workers < 1:
+        raise ValueError(f"--workers {options.workers}: give the number of cores, at least 1")
+    if not options.seconds > 0:
+        raise ValueError(f"--seconds {options.seconds}: give a positive time")
     study = read_study(options.study)
     if study.verb != "chart":
         raise ValueError(f"{options.study}: plan is for charts, this study runs {study.verb}")

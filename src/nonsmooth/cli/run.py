@@ -39,6 +39,8 @@ def _run(options: argparse.Namespace) -> int:
     study = read_study(options.study)
     began = time.perf_counter()
     store = options.store or study.store
+    if store and "data" in study.output and store.resolve() == (study.path.parent / study.output["data"]).resolve():
+        raise ValueError(f"--store {store} is where the result is to be written (data): give another name")
     with _connected(options.scheduler) as client:
         try:
             result = study.compute(progress=not options.quiet, store=store, client=client)

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import importlib.util
 import inspect
-from collections.abc import Mapping
+import os
+import traceback
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,6 +27,7 @@ __all__ = ["Study", "load_model", "named_model", "read_study"]
 VERBS = ("simulate", "sweep", "frequency_response", "poincare", "chart", "basins", "basin_fractions")
 _SYSTEM_KEYS = ("model", "parameters", "smoothed")
 _OUTPUT_KEYS = ("data", "figure", "store", "x", "y")
+_FORMATS = (".pdf", ".png", ".svg", ".eps", ".ps", ".pgf", ".jpg", ".jpeg", ".tif", ".tiff", ".webp")
 #: Arguments of verbs that belong to the command line, or that a file cannot hold.
 _NOT_IN_FILES = ("progress", "client", "store")
 #: Verbs whose work is cut into chunks.
@@ -124,6 +127,7 @@ def read_study(path: Path) -> Study:
         raise ValueError(f'{where}: needs a table [system] with at least model = "..."')
     output = document.get("output", {})
     check_keys(output, _OUTPUT_KEYS, f"{where}, table [output]", "a key")
+    _check_output(output, path)
     system = _system(document["system"], path)
     options = _options(verbs[0], document[verbs[0]], where)
     return Study(path, system, verbs[0], options, output)
@@ -155,15 +159,56 @@ def load_model(text: str, folder: Path) -> Any:
     if spec is None or spec.loader is None:
         raise ValueError(f"{source}: is not a Python file (model = {text!r})")
     module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    _told(source, lambda: spec.loader.exec_module(module))
     if not hasattr(module, name):
         raise ValueError(f"{source}: {unknown(name, 'an object', source.name, _public(module))}")
     found = getattr(module, name)
-    system = found() if callable(found) and not isinstance(found, System) else found
+    system = _told(source, found) if callable(found) and not isinstance(found, System) else found
     if not isinstance(system, System):
         what = type(system).__name__
         raise ValueError(f"{source}: {name!r} is of type {what}; it must be a System or a function that returns one")
     return system
+
+
+def _told(source: Path, call: Callable[[], Any]) -> Any:
+    """What a user's file does wrong, as one sentence with the line."""
+    try:
+        return call()
+    except ValueError as error:  # the package's own sentences among them
+        raise ValueError(f"{source}: {error}") from error
+    except (Exception, SystemExit) as error:
+        frames = traceback.extract_tb(error.__traceback__)
+        lines = [frame.lineno for frame in frames if Path(frame.filename).resolve() == source.resolve()]
+        what: object = error
+        if isinstance(error, SyntaxError):
+            lines, what = [error.lineno], error.msg
+        where = f", line {lines[-1]}" if lines else ""
+        raise ValueError(f"{source}{where}: {type(error).__name__}: {what}") from error
+
+
+def _check_output(output: Mapping[str, Any], path: Path) -> None:
+    """What would fail after hours of computing is told before."""
+    place = f"{path}, table [output]"
+    for name, value in output.items():
+        if not isinstance(value, str):
+            raise ValueError(f"{place}: {name} is {value!r}; give a name in quotes")
+    for name, endings in (("data", (".nc", ".zarr")), ("figure", _FORMATS), ("store", (".zarr",))):
+        if name not in output:
+            continue
+        target = path.parent / output[name]
+        if target.suffix.lower() not in endings:
+            raise ValueError(f"{place}: {name} = {output[name]!r} must end in {', '.join(endings)}")
+        folder = next((one for one in target.parents if one.exists()), path.parent)
+        if not (folder.is_dir() and os.access(folder, os.W_OK)):
+            raise ValueError(f"{place}: {name} = {output[name]!r}: nothing may be written into {folder}")
+    if "store" in output and "data" in output and _same(path.parent / output["store"], path.parent / output["data"]):
+        raise ValueError(
+            f"{place}: data and store are both {output['data']!r}: the result would replace the chunks; give two names"
+        )
+
+
+def _same(one: Path, other: Path) -> bool:
+    return one.resolve() == other.resolve()
 
 
 def _system(table: Mapping[str, Any], path: Path) -> Any:

@@ -37,7 +37,7 @@ def save(result: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     ValueError
         If the path ends in neither ``.nc`` nor ``.zarr``.
     DataFileError
-        If the folder does not exist, or something that is not a Zarr store stands at a ``.zarr`` path.
+        If the folder does not exist, or something other than a saved result stands at a ``.zarr`` path.
     """
     if not isinstance(result, xr.Dataset):
         raise TypeError(f"save takes an xarray.Dataset, got {type(result).__name__}")
@@ -55,8 +55,11 @@ def save(result: xr.Dataset, path: str | os.PathLike[str]) -> Path:
             # Every chunk is written, empty or not, so that `load` can tell a missing one from zeros.
             encoded.to_zarr(fresh, zarr_format=2, consolidated=True, write_empty_chunks=True)
             if target.exists():
-                if not _is_zarr(target):
-                    raise DataFileError(f"{target}: something that is not a Zarr store stands there; it was left alone")
+                if not _is_result(target):
+                    raise DataFileError(
+                        f"{target}: what stands there is no saved result of this package (a store of chunks, another "
+                        "Zarr store, a file); it was left alone: give another name"
+                    )
                 os.replace(target, Path(folder) / "old.zarr")
             os.replace(fresh, target)
     return target
@@ -99,6 +102,20 @@ def _suffix(path: Path) -> str:
 
 def _is_zarr(path: Path) -> bool:
     return path.is_dir() and any((path / name).exists() for name in (".zgroup", "zarr.json"))
+
+
+def _is_result(path: Path) -> bool:
+    """Whether a Zarr store holds a result that :func:`save` has written."""
+    import json
+
+    for name in (".zattrs", "zarr.json"):
+        try:
+            attributes = json.loads((path / name).read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            continue
+        if ATTRIBUTE in attributes.get("attributes", attributes):
+            return True
+    return False
 
 
 def _read_netcdf(source: Path) -> xr.Dataset:
