@@ -212,6 +212,23 @@ def test_a_point_that_fails_keeps_its_status() -> None:
         ns.lyapunov(system.with_parameters(a=5.0), periods=64)
 
 
+def test_a_stop_that_moves_past_a_carried_state_begins_anew() -> None:
+    """Below the graze at A = 1 the motion keeps away from the stop: -c / 2, twice. The carried state does not fit."""
+    system = ns.models.impact_oscillator().with_parameters(A=0.01)
+    c, far = system.values["c"], 5.0
+    found = ns.lyapunov(
+        system, parameter="d", values=[far, 4.0, 1.0], direction="down", start={"x": 0.99}, periods=40, transient=0,
+        progress=False,
+    )  # fmt: skip
+    assert found["status"].values.tolist() == [0, 0, 0]
+    np.testing.assert_allclose(found["exponents"].sum("exponent"), -c, rtol=1e-6)
+    moved = ns.lyapunov(
+        ns.models.impact_oscillator(), parameter="d", values=[-1.0, 0.5, 1.0], direction="down", periods=40,
+        progress=False,
+    )  # fmt: skip
+    assert moved["status"].values.tolist()[1:] == [0, 0]
+
+
 def test_kaplan_yorke_dimension() -> None:
     assert kaplan_yorke(np.array([0.5, -1.0])) == 1.5
     assert kaplan_yorke(np.array([-0.1, -1.0])) == 0.0

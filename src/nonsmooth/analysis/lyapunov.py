@@ -69,7 +69,7 @@ def lyapunov(
         A parameter that is varied, and its values.
     direction : {"up", "down", None}
         Carry the state along with rising or falling values (at equal phase of the forcing), or begin every point at
-        ``start``.
+        ``start``. Where a stop has moved past a carried state, that point begins at ``start`` too.
     periods, duration : int, float
         Length in forcing periods (10 000 where neither is given), or in time: needed where there is no period.
     transient : float, optional
@@ -156,12 +156,18 @@ def lyapunov(
     state: State | None = None
     with progress_bar(len(points), "lyapunov", progress and numbers is not None) as advance:
         for i in order:
+            carried = state is not None and direction is not None
             if state is None or direction is None:
                 state = first_state(system, start, mode)
             kept = state.copy()
             here = system.period_at(points[i]) if forced else None
             unit = length if here is None or duration is not None else here
-            found[i] = one = _spectrum(system, engine, tables, int(i), state, here, unit, count, wait)
+            one = _spectrum(system, engine, tables, int(i), state, here, unit, count, wait)
+            if carried and one.status == codes.BEYOND_STOP:  # a stop has moved past it: as in a sweep, begin anew
+                state = first_state(system, start, mode)
+                kept = state.copy()
+                one = _spectrum(system, engine, tables, int(i), state, here, unit, count, wait)
+            found[i] = one
             if one.status not in GOOD:
                 state = kept if i != order[0] else None
             advance(1)
