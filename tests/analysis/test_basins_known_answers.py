@@ -12,6 +12,7 @@ import pytest
 import nonsmooth as ns
 from nonsmooth.analysis import basin_fractions, basins
 from nonsmooth.analysis.basins_found import Patience
+from nonsmooth.flow.sections import Stroboscopic
 
 QUIET = {"progress": False}
 
@@ -122,6 +123,29 @@ def test_memory_goes_on_where_a_run_goes_on() -> None:
     assert found["confirmed"].values.tolist() == [1, 1]
     np.testing.assert_allclose(found["section"].sel(state="x"), [-1.0, 1.0], atol=1e-9)
     assert found["label"].values[:, 0].tolist() == [0, 0, 1]
+
+
+@pytest.mark.parametrize("stiffening", [0.0, 1.0])
+def test_a_start_late_in_the_period_is_on_the_force_of_that_time(stiffening: float) -> None:
+    """A force +A, then -A in the second half: half a period later all is mirrored, x -> -x, v -> -v. Exact, Taylor."""
+    system = ns.System(
+        states=["x", "v"], parameters={"w": 1.05, "a": 6.0, "s": stiffening},
+        modes={
+            "plus": lambda t, u, p: (u.v, -u.x - stiffening * u.x**3 - 0.2 * u.v + p.a),
+            "minus": lambda t, u, p: (u.v, -u.x - stiffening * u.x**3 - 0.2 * u.v - p.a),
+        },
+        transitions=[ns.Transition("plus", "minus", at=0.5), ns.Transition("minus", "plus", at=0.0)],
+        period=lambda p: 2 * np.pi / p.w,
+    )  # fmt: skip
+    axis = np.linspace(-2.0, 2.0, 5)
+    for phase in (0.0, 0.2):
+        one, other = (
+            ns.basins(system, {"x": axis, "v": axis}, section=Stroboscopic(phase + half), **QUIET) for half in (0, 0.5)
+        )
+        assert one.sizes["attractor"] == (2 if stiffening else 1)
+        ends = one["section"].values[one["label"].values]
+        mirrored = -other["section"].values[other["label"].values][::-1, ::-1]
+        np.testing.assert_allclose(ends, mirrored, atol=1e-6)
 
 
 def test_motion_without_damping_has_no_attractor(hasty) -> None:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 import nonsmooth as ns
 from nonsmooth.errors import SystemDefinitionError
@@ -128,3 +129,41 @@ def test_returns_that_are_passed_over_change_the_count_only(rising: bool | None,
     assert (plane["period_number"] == period).all() and (plane["n_attractors"] == 1).all()
     np.testing.assert_allclose(plane["lyapunov"].values[:, 0], [[-0.48] * 3, [-0.96] * 3], rtol=1e-3)
     np.testing.assert_allclose(plane["maximum"], 1.0, rtol=1e-8)
+
+
+@pytest.mark.parametrize("method", ["exact", "taylor"])
+@pytest.mark.parametrize("phase", [0.0, 0.3, 0.5])
+def test_a_section_at_the_phase_of_a_transition_lies_behind_it(method: str, phase: float) -> None:
+    """x'' = -k x, turned into -(x, v) / 2 once per period at phase 1/2: multipliers of modulus 1/2; and a
+    force that changes its sign at phases 0 and 1/2: its extremes do not depend on the phase of the section."""
+    section = ns.Stroboscopic(phase)
+    kicked = ns.System(
+        states=["x", "v"], parameters={"k": 1.3, "w": 1.0}, modes={"free": lambda t, u, p: (u.v, -p.k * u.x)},
+        transitions=[ns.Transition("free", "free", at=0.5, reset=lambda t, u, p: (1.0 - u.x / 2, -u.v / 2))],
+        period=lambda p: 2 * np.pi / p.w,
+    )  # fmt: skip
+    grid = {"k": [1.3], "w": [0.9, 1.1]}
+    plane = ns.chart(kicked, grid, section=section, method=method, lyapunov=200, **QUIET)
+    assert (plane["period_number"] == 1).all() and (plane["crossings_per_period"] == 1).all()
+    np.testing.assert_allclose(plane["lyapunov"][0], np.log(0.5) * np.array([0.9, 1.1]) / (2 * np.pi), rtol=2e-2)
+
+    force = ns.System(
+        states=["x", "v"], parameters={"a": 6.0, "w": 1.05},
+        modes={
+            "plus": lambda t, u, p: (u.v, -u.x - 0.2 * u.v + p.a), "minus": lambda t, u, p: (u.v, -u.x - 0.2 * u.v - p.a)
+        },
+        transitions=[ns.Transition("plus", "minus", at=0.5), ns.Transition("minus", "plus", at=0.0)],
+        period=lambda p: 2 * np.pi / p.w,
+    )  # fmt: skip
+    matrix, rest, half = np.array([[0.0, 1.0], [-1.0, -0.2]]), np.array([6.0, 0.0]), np.pi / 1.05
+    there = expm(half * matrix)
+    begin = np.linalg.solve(np.eye(2) + there, there @ rest - rest)  # half a period on: rest + there (u - rest) = -u
+    swing = np.array([rest + expm(s * matrix) @ (begin - rest) for s in np.linspace(0.0, half, 501)])
+    most = np.abs(swing).max(axis=0)
+    plane = ns.chart(force, {"a": [6.0], "w": [1.05]}, section=section, method=method, **QUIET)
+    assert plane["period_number"].item() == 1 and plane["crossings_per_period"].item() == 2
+    np.testing.assert_allclose(plane["maximum"].values[0, 0], most, rtol=1e-3)
+    points = ns.poincare(force, section=section, n=3, transient=200, method=method)
+    if phase in (0.0, 0.5):
+        np.testing.assert_allclose(points["section"].values[-1], begin if phase == 0.0 else -begin, rtol=1e-8)
+        assert (points["mode"] == (0 if phase == 0.0 else 1)).all()

@@ -17,7 +17,7 @@ import numpy as np
 from nonsmooth.analysis.attractors_compiled import exponents_compiled, load, run_compiled
 from nonsmooth.analysis.attractors_cuda import exponents_on_gpu, run_on_gpu
 from nonsmooth.analysis.attractors_parting import exponent_of, parting_sizes
-from nonsmooth.analysis.attractors_trace import Trace, period_of, place_of, state_at, trace
+from nonsmooth.analysis.attractors_trace import Trace, mode_at, period_of, place_of, state_at, trace
 from nonsmooth.analysis.classify import TOLERANCE, Verdict
 from nonsmooth.analysis.settle import LONGER, Attractors
 from nonsmooth.analysis.settled import Settled, least_sizes, usable
@@ -111,7 +111,7 @@ class Settler:
         carried : bool
             Job j goes on from where job j - 1 ended (from its own start where that failed).
         modes : array (J,) of int, optional
-            Mode at the start; the first where not given.
+            Mode at the start; that of the phase (:func:`.mode_at`) where not given.
         begin : float
             Phase of the forcing at the starts, in periods, where they do not say it themselves.
         attempts : int
@@ -119,7 +119,9 @@ class Settler:
         """
         rows = np.ascontiguousarray(rows, dtype=np.int64)
         starts = np.ascontiguousarray(starts, dtype=float)
-        modes = np.zeros(len(rows), dtype=np.int64) if modes is None else np.array(modes, dtype=np.int64)
+        if modes is None:
+            modes = np.full(len(rows), mode_at(self.system, begin))
+        modes = np.array(modes, dtype=np.int64)
         points = np.ascontiguousarray(points, dtype=float)
         if self.planar is None:
             return self._run_one_by_one(points, rows, starts, carried, modes, begin, attempts)

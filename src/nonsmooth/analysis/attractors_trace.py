@@ -18,7 +18,7 @@ from nonsmooth.kernels import codes
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["Trace", "period_of", "place_of", "state_at", "trace"]
+__all__ = ["Trace", "mode_at", "period_of", "place_of", "state_at", "trace"]
 
 
 @dataclass(frozen=True)
@@ -35,6 +35,19 @@ class Trace:
 def period_of(tables: Any, row: int = 0) -> float:
     """Period of the forcing at one row of an engine's tables; infinite where there is none."""
     return float((tables.period if hasattr(tables, "period") else tables.periods)[row])
+
+
+def mode_at(system: System, phase: float) -> int:
+    """The mode in which a run begins at a phase of the forcing: the first, and where transitions at earlier phases lead.
+
+    A start says nothing of the mode. At phase 0 it is the first; a run that begins later in the period, on a bang-bang
+    force say, must not begin on the branch that is over by then."""
+    mode = 0
+    jumps = [jump for jump in system.traced.transitions if jump.at is not None and 0.0 < jump.at <= phase]
+    for jump in sorted(jumps, key=lambda jump: float(jump.at or 0.0)):
+        if jump.source == mode:
+            mode = jump.target
+    return mode
 
 
 def state_at(system: System, place: FloatArray, mode: int, clock: float, period: float) -> State:

@@ -70,7 +70,8 @@ def basins(
     fixed : mapping, optional
         Values of the other states at the start; zero where not given.
     section : Stroboscopic or Poincare, optional
-        ``Stroboscopic(0)`` where the system has a period. With another phase the runs start at that phase.
+        ``Stroboscopic(0)`` where the system has a period. With another phase the runs start at that phase,
+        in the mode to which transitions at earlier phases (``at=``) have led.
     transient, keep : int
         Section returns passed over, then judged; a run ends earlier where its cycle is certain, and is followed for
         20 000 returns and more where it has no period.

@@ -145,9 +145,12 @@ def chain(
             a = 0.0
             b_ = step
             is_open = returns >= transient
+            late = False  # a transition at the section's own phase comes first: a run that ends here goes on behind it
             if surface < 0:
                 r = stroboscopic_hit(s, s1, target, T)
-                if r >= 0.0:
+                if r >= step and t >= 0 and t == timed:
+                    late = True
+                elif r >= 0.0:
                     r = min(r, step)
                     returns += 1
                     n_here = 0
@@ -246,6 +249,16 @@ def chain(
                             section[i, k, 1] = w[1] if after != 0 else before1
                             section_mode[i, k] = mode if after != 0 else before_mode
                             section_time[i, k] = (whole * T if T < 1e300 else 0.0) + s
+            if late and code == OK:
+                s = target
+                returns += 1
+                n_here = 0
+                if returns > transient:
+                    k = returns - transient - 1
+                    section[i, k, 0] = w[0]
+                    section[i, k, 1] = w[1]
+                    section_mode[i, k] = mode
+                    section_time[i, k] = whole * T + target
             if surface >= 0:
                 if t >= 0:
                     found[3] = sign_after(fun, tay, mode, w, surface, zero)
