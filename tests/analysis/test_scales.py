@@ -13,7 +13,7 @@ QUIET = {"progress": False}
 
 
 def cubic(unit: float) -> ns.System:
-    """x -> a x - x^3 / unit^2 once per period: x in units of its own, x / unit follows the same map whatever they are."""
+    """x -> a x - x^3 / unit^2 once per period: x / unit follows one map, whatever the unit."""
     return ns.System(
         states=["x"], parameters={"a": 2.1, "unit": unit}, modes={"rest": lambda t, u, p: 0 * u.x},
         transitions=[ns.Transition("rest", "rest", at=0.5, reset=lambda t, u, p: p.a * u.x - u.x**3 / p.unit**2)],
@@ -58,7 +58,7 @@ def test_states_far_below_their_scale_are_named() -> None:
 @pytest.mark.parametrize("method", ["exact", "taylor", "rkf45"])
 @pytest.mark.filterwarnings("ignore:.*where a motion counts as rest")
 def test_motion_about_a_large_value_has_its_period(method: str) -> None:
-    """A linear oscillator about x = x0, driven or at rest: period 1, whatever rounding or steps leave of its returns."""
+    """A linear oscillator about x = x0, driven or at rest: period 1, whatever rounding or steps leave of it."""
     system = ns.System(
         states=["x", "v"], parameters={"omega": 1.3, "force": 0.0, "x0": 1.0},
         modes={"only": lambda t, u, p: (u.v, -(u.x - p.x0) - 0.3 * u.v + p.force * np.cos(p.omega * t))},

@@ -93,9 +93,10 @@ def test_other_rules_of_judgement_are_another_version(monkeypatch: pytest.Monkey
     now = version()
     for changed in ("analysis/classify.py", "flow/planar.py", "kernels/planar_march.py"):
         with monkeypatch.context() as patched:
-            patched.setattr(
-                Path, "read_bytes", lambda file, end=changed: read(file) + (b"#" if file.as_posix().endswith(end) else b"")
-            )
+            def edited(file: Path, end: str = changed) -> bytes:
+                return read(file) + (b"#" if file.as_posix().endswith(end) else b"")
+
+            patched.setattr(Path, "read_bytes", edited)
             assert version() != now
     assert version() == now
 

@@ -13,6 +13,7 @@ import os
 import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -159,7 +160,7 @@ def load_model(text: str, folder: Path) -> Any:
     if spec is None or spec.loader is None:
         raise ValueError(f"{source}: is not a Python file (model = {text!r})")
     module = importlib.util.module_from_spec(spec)
-    _told(source, lambda: spec.loader.exec_module(module))
+    _told(source, partial(spec.loader.exec_module, module))
     if not hasattr(module, name):
         raise ValueError(f"{source}: {unknown(name, 'an object', source.name, _public(module))}")
     found = getattr(module, name)
