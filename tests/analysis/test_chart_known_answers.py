@@ -150,7 +150,8 @@ def test_a_section_at_the_phase_of_a_transition_lies_behind_it(method: str, phas
     force = ns.System(
         states=["x", "v"], parameters={"a": 6.0, "w": 1.05},
         modes={
-            "plus": lambda t, u, p: (u.v, -u.x - 0.2 * u.v + p.a), "minus": lambda t, u, p: (u.v, -u.x - 0.2 * u.v - p.a)
+            "plus": lambda t, u, p: (u.v, -u.x - 0.2 * u.v + p.a),
+            "minus": lambda t, u, p: (u.v, -u.x - 0.2 * u.v - p.a),
         },
         transitions=[ns.Transition("plus", "minus", at=0.5), ns.Transition("minus", "plus", at=0.0)],
         period=lambda p: 2 * np.pi / p.w,

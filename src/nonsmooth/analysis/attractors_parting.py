@@ -47,8 +47,8 @@ def exponent_of(
 
     The neighbour is put back to a small distance, in units of ``scale`` (n,), after each of ``n_returns`` returns; the
     error is that of the mean of ten batches, and a quarter of one before them is left out. A forced system is looked at
-    once per period, whatever the section: neighbours must be compared at equal phase. On a Poincare section of an autonomous system the result
-    is the largest exponent beside the zero along the flow.
+    once per period, whatever the section: neighbours must be compared at equal phase. On a Poincare section of an
+    autonomous system the result is the largest exponent beside the zero along the flow.
     """
     tables, traced = engine.prepare(point), system.traced
     period = period_of(tables)

@@ -38,7 +38,7 @@ def period_of(tables: Any, row: int = 0) -> float:
 
 
 def mode_at(system: System, phase: float) -> int:
-    """The mode in which a run begins at a phase of the forcing: the first, and where transitions at earlier phases lead.
+    """The mode in which a run begins at a phase of the forcing: the first, or where transitions before it lead.
 
     A start says nothing of the mode. At phase 0 it is the first; a run that begins later in the period, on a bang-bang
     force say, must not begin on the branch that is over by then."""

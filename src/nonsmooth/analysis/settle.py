@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.analysis.classify import Verdict, judge
-from nonsmooth.flow.engine import Chain, Engine, FloatArray, SectionPlan, State
 from nonsmooth.analysis.settled import LEAST, least_sizes, size_of
+from nonsmooth.flow.engine import Chain, Engine, FloatArray, SectionPlan, State
 from nonsmooth.flow.poincare import result_status
 from nonsmooth.kernels import codes
 
