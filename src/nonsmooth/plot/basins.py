@@ -45,9 +45,9 @@ def basins(result: xr.Dataset, ax: Axes | None = None, *, size: float = 3.0) -> 
     x, y = result[first].values, result[second].values
     with style.axes(ax, ratio=0.85) as drawn:
         drawn.pcolormesh(
-            cell_edges(x), cell_edges(y), np.maximum(labels, -1), shading="flat", rasterized=True,
-            vmin=-1.5, vmax=n - 0.5,
-            cmap=ListedColormap([palette.UNKNOWN, *(palette.attractor_color(k) for k in range(n))]),
+            cell_edges(x), cell_edges(y), np.maximum(labels, -2), shading="flat", rasterized=True,
+            vmin=-2.5, vmax=n - 0.5,
+            cmap=ListedColormap([palette.DIVERGED, palette.UNKNOWN, *(palette.attractor_color(k) for k in range(n))]),
         )  # fmt: skip
         xlim, ylim = drawn.get_xlim(), drawn.get_ylim()
         handles: list[Any] = []
@@ -65,8 +65,9 @@ def basins(result: xr.Dataset, ax: Axes | None = None, *, size: float = 3.0) -> 
                 facecolor=palette.attractor_color(k), edgecolor="black", linewidth=0.4,
                 label=f"{kind_of(int(result['period_number'][k]), bool(result['chaotic'][k]))}: {share:.3g} %",
             ))  # fmt: skip
-        if (labels < 0).any():
-            handles.append(Patch(facecolor="white", edgecolor="black", linewidth=0.4, label="none reached"))
+        for fate, color, name in ((-1, palette.UNKNOWN, "none reached"), (-2, palette.DIVERGED, "diverged")):
+            if (labels == fate).any():
+                handles.append(Patch(facecolor=color, edgecolor="black", linewidth=0.4, label=name))
         if n:
             handles.append(Line2D([], [], marker="o", color="black", linestyle="", markersize=size, label="attractor"))
         drawn.legend(

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-__all__ = ["LONGER", "NO_PERIOD", "PERIODS", "UNKNOWN", "attractor_color"]
+__all__ = ["DIVERGED", "LONGER", "NO_PERIOD", "PERIODS", "UNKNOWN", "attractor_color"]
 
 #: Period numbers 1 ... 8, told apart by all common colour visions: light and dark alternate (after Paul Tol's schemes).
 PERIODS = ("#DDDDDD", "#4477AA", "#EE6677", "#228833", "#CCBB44", "#66CCEE", "#AA3377", "#EE8866")
 LONGER = "#8C6D31"
 NO_PERIOD = "#000000"
 UNKNOWN = "#FFFFFF"
+DIVERGED = "#8C8C8C"
 
 _ATTRACTORS = ("#88CCEE", "#CC6677", "#DDCC77", "#117733", "#332288", "#AA4499", "#44AA99", "#999933", "#882255")
 
