@@ -30,7 +30,7 @@ def cuda_planar_module(
     folder = Path(__file__).parent
     text = "\n".join((folder / f"{part}.py").read_text(encoding="utf-8") for part in PARTS)
     text = re.sub(r"^from \.(?:planar|cuda)_(?!target)\w+ import (\([^)]*\).*|[^(\n]*)$", "", text, flags=re.MULTILINE)
-    text = re.sub(r"^from \.cache import", "from nonsmooth.kernels.cuda_target import", text, flags=re.MULTILINE)
+    text = re.sub(r"^from \.(?:cache|lanes) import", "from nonsmooth.kernels.cuda_target import", text, flags=re.MULTILINE)
     text = re.sub(r"^from \.(\w+) import", r"from nonsmooth.kernels.\1 import", text, flags=re.MULTILINE)
     sizes = {
         "HARMONICS": harmonics, "N_MODES": modes, "N_INDICATORS": indicators, "N_OUTPUTS": outputs,
