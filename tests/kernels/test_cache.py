@@ -34,15 +34,15 @@ def drive(f, g, u, n):
 '''
 
 MODEL = '''
-from nonsmooth.kernels.cache import kernel
+from nonsmooth.kernels.cache import callback
 
 
-@kernel("void(int64, float64, float64[::1])")
+@callback("void(int64, float64, float64[::1])")
 def f(mode, t, u):
     u[0] += {0!r} + mode * t
 
 
-@kernel("void(int64, float64, float64[::1])")
+@callback("void(int64, float64, float64[::1])")
 def g(mode, t, u):
     u[0] *= {0!r}
 '''
