@@ -126,7 +126,7 @@ print(json.dumps([before, refused, values, len(driver.twice.signatures), statist
 
 
 def test_a_kernel_is_compiled_when_it_is_first_called(tmp_path):
-    """Not at import, once for all threads, alone, and for its own signature even where the first call is a wrong one."""
+    """Not at import, once for all threads, alone, and for its own signature even where the first call is wrong."""
     before, refused, values, versions, after = run(tmp_path, 2.0, script=LAZY)
     assert before == {"twice": [0, 0], "drive": [0, 0]}
     assert "No matching definition" in refused

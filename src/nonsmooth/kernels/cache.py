@@ -6,7 +6,8 @@ run stale code, and it cannot write beside a read-only install. Here one file pe
 ever stale, entries never change, and several processes need no lock.
 
 Everything that leans on private parts of Numba (a dispatcher's ``_cache`` and ``_compile_for_args``,
-``CompileResult._reduce``) stands in this file; ``tests/kernels/test_cache.py`` covers it. Checked with Numba 0.62 and 0.68.
+``CompileResult._reduce``) stands in this file; ``tests/kernels/test_cache.py`` covers it. Checked with Numba 0.62 and
+0.68, calls that compile with 0.68.
 """
 
 from __future__ import annotations
