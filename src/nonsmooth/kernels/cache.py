@@ -38,7 +38,7 @@ from numba.core.caching import _Cache
 from numba.core.compiler import CompileResult
 from numba.core.compiler_lock import global_compiler_lock
 
-__all__ = ["cache_folder", "cache_statistics", "callback", "device", "inline", "kernel", "load_module"]
+__all__ = ["cache_folder", "cache_statistics", "callback", "compiled", "device", "inline", "kernel", "load_module"]
 
 # Kernels allocate nothing (scratch is an argument), so they need no reference counts: "_nrt" off saves a third.
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}, "_nrt": False}
@@ -257,6 +257,7 @@ def kernel(signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any
                 _compile_once(dispatcher, signature)
                 return plain_template(arguments, named)
 
+            dispatcher.compile_now = lambda: _compile_once(dispatcher, signature)
             dispatcher._compile_for_args = compile_for_arguments
             dispatcher.get_call_template = get_call_template
         return dispatcher
@@ -274,6 +275,13 @@ def callback(signature: Any, **options: Any) -> Callable[[Callable[..., Any]], A
         return dispatcher
 
     return decorate
+
+
+def compiled(function: Any) -> Any:
+    """The kernel itself, compiled now: before threads begin, because Ctrl-C cannot stop a compile in one of them."""
+    if hasattr(function, "compile_now"):
+        function.compile_now()
+    return function
 
 
 def _cached(function: Callable[..., Any], options: dict[str, Any]) -> Any:
