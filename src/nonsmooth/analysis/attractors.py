@@ -86,7 +86,9 @@ class Settler:
     def load(self) -> None:
         """Compile or load the kernel now, before threads ask for it."""
         if self.planar is not None and self.device == "cpu":
-            load(self.planar)
+            from nonsmooth.kernels.cache import compiled
+
+            compiled(load(self.planar).settle_many)
 
     def run(
         self,
