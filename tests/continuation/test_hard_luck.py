@@ -10,6 +10,8 @@ import reference_values as known
 
 import nonsmooth as ns
 from nonsmooth.continuation.arclength import Curve
+from nonsmooth.continuation.equilibrium import Equilibria
+from nonsmooth.continuation.locus import Locus
 from nonsmooth.continuation.marches import ENDINGS
 
 support = ns.models.discontinuous_support
@@ -52,20 +54,46 @@ def test_a_branch_that_is_interrupted(monkeypatch: pytest.MonkeyPatch) -> None:
     """Ctrl-C returns what was found, which goes on from there to the same ends."""
     orbit = ns.find_orbit(support(rho=0.14, g=0.02, omega=3.3))
     whole = ns.continue_orbit(orbit, "omega", (3.0, 3.5))
-    steps, step = iter(range(5)), Curve.step
-
-    def interrupted(*arguments: Any, **options: Any) -> Any:
-        if next(steps, None) is None:
-            raise KeyboardInterrupt
-        return step(*arguments, **options)
-
-    monkeypatch.setattr(Curve, "step", interrupted)
+    _interrupt_after(5, Curve, monkeypatch)
     part = ns.continue_orbit(orbit, "omega", (3.0, 3.5))
     monkeypatch.undo()
     assert ends(part) == ["interrupted", "interrupted"] and 3 < part.sizes["point"] < whole.sizes["point"]
     rest = ns.continue_orbit(part)
     assert ends(rest) == ends(whole) and rest["omega"].values[[0, -1]] == pytest.approx(whole["omega"].values[[0, -1]])
     assert ns.special_points(rest)["omega"].values == pytest.approx(ns.special_points(whole)["omega"].values, abs=1e-9)
+
+
+def test_a_curve_that_is_interrupted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ctrl-C returns what was found, and the end says so."""
+    branch = ns.continue_orbit(ns.find_orbit(support(rho=0.14, g=0.02, omega=4.5)), "omega", (3.9, 5.0))
+    row = ns.special_points(branch).isel(special=0)
+    assert str(row["kind"].values) == "flip"
+    _interrupt_after(5, Locus, monkeypatch)
+    curve = ns.continue_curve(row, {"omega": (3.9, 5.0), "rho": (0.1, 0.2)})
+    assert curve.sizes["point"] == 6  # the first, and one for each step
+    assert [str(text)[:11] for text in curve["ended_because"].values] == ["Interrupted"] * 2
+
+
+def test_a_branch_of_equilibria_that_is_interrupted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """x^2 = a has equilibria at x = -sqrt(a) and sqrt(a)."""
+    system = ns.System(states=["x"], parameters={"a": 1.0}, modes={"one": lambda t, u, p: p.a - u.x * u.x})
+    _interrupt_after(4, Equilibria, monkeypatch)
+    branch = ns.continue_equilibrium(system, "a", (0.5, 2.0), start={"x": 0.9})
+    assert branch.sizes["point"] == 5
+    assert branch["u"].values[:, 0] == pytest.approx(np.sqrt(branch["a"].values), abs=1e-12)
+    assert [str(text)[:11] for text in branch["ended_because"].values] == ["Interrupted"] * 2
+
+
+def _interrupt_after(n: int, owner: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ctrl-C at the step after the n-th."""
+    steps, step = iter(range(n)), owner.step
+
+    def interrupted(*arguments: Any, **options: Any) -> Any:
+        if next(steps, None) is None:
+            raise KeyboardInterrupt
+        return step(*arguments, **options)
+
+    monkeypatch.setattr(owner, "step", interrupted)
 
 
 def test_a_start_beyond_a_stop() -> None:

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.continuation.anchor import plane_across
+from nonsmooth.continuation.multipliers import multipliers_of
 from nonsmooth.continuation.path import Walk
 from nonsmooth.continuation.solve import determinant, solve
 
@@ -143,7 +145,7 @@ class Curve:
         path = self.walk.along(solved, self.shooting.split(solved.X)[1])
         if path is None:
             return None
-        return Point(Y, found[0], solved, M, self.shooting.multipliers(M), path, found[1], iterations)
+        return Point(Y, found[0], solved, M, multipliers_of(M), path, found[1], iterations)
 
     def predicted(self, point: Point, ds: float, before: Point | None) -> FloatArray:
         """A guess at distance ds along the tangent: straight, or on the cubic through both last points and tangents."""
@@ -169,8 +171,7 @@ class Curve:
     def anchored_anew(self, point: Point) -> Point:
         """The same point with the phase condition of an orbit without transitions put through it."""
         shooting, z = self.shooting, point.X[: self.shooting.n]
-        field = point.solved.legs.f_begin[0] / self.size**2
-        shooting.reference = z.copy(), field / max(float(np.abs(field * self.size).max()), 1e-300)
+        shooting.reference = plane_across(z, point.solved.legs.f_begin[0], self.size)
         row = point.solved.jacobian[-1]
         row[:] = 0.0
         row[: shooting.n] = shooting.reference[1]

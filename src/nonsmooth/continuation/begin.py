@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.continuation.anchor import anchor_at
 from nonsmooth.continuation.arclength import Curve
 from nonsmooth.continuation.marches import ENDINGS, Limits, March
 from nonsmooth.continuation.orbit import Orbit
 from nonsmooth.continuation.records import BranchRecord, PointRecord
 from nonsmooth.continuation.shooting import Shooting
+from nonsmooth.continuation.surfaces import look_at_surfaces
 from nonsmooth.flow.arguments import real_number
 
 if TYPE_CHECKING:
@@ -68,20 +70,17 @@ def size_of(maximum: FloatArray, minimum: FloatArray, system: System) -> FloatAr
     return np.concatenate([half, np.ones(len(system.memory))])
 
 
-def curve_of(
-    system: System, signature: Any, period_number: int, name: str, orbit: Orbit, size: FloatArray, width: float
-) -> tuple[Curve, FloatArray]:
+def curve_of(orbit: Orbit, name: str, width: float) -> tuple[Curve, FloatArray]:
     """The curve through an orbit, and its unknowns."""
-    shooting = Shooting(system, signature, period_number, (name,))
+    system = orbit.system
+    shooting = Shooting(system, orbit.signature, orbit.period_number, (name,))
+    size = size_of(orbit.maximum, orbit.minimum, system)
     section = np.concatenate([orbit.u, orbit.memory])
-    if not shooting.forced and not shooting.m:
-        from nonsmooth.continuation.anchor import free_anchor
-
-        shooting.reference = free_anchor(shooting.flow, shooting.values, shooting.at_section, section, size)
+    anchor_at(shooting, shooting.values, section, size)
     X = shooting.join(
         orbit.crossing_times, np.vstack([section, orbit.crossing_states]), orbit.period, [system.values[name]]
     )
-    shooting.look_at_surfaces(X)
+    look_at_surfaces(shooting, X)
     return Curve(shooting, size, orbit.period, width), X
 
 
@@ -102,11 +101,6 @@ def resumed_at(
     """The curve through a recorded point."""
     shooting = Shooting(system, point.signature, record.period_number, (name,))
     size = size_of(point.maximum, point.minimum, system)
-    if not shooting.forced and not shooting.m:
-        from nonsmooth.continuation.anchor import free_anchor
-
-        shooting.reference = free_anchor(
-            shooting.flow, shooting.parameters(point.X), shooting.at_section, point.X[: shooting.n], size
-        )
-    shooting.look_at_surfaces(point.X)
+    anchor_at(shooting, shooting.parameters(point.X), point.X[: shooting.n], size)
+    look_at_surfaces(shooting, point.X)
     return Curve(shooting, size, point.period, width), point.X

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.continuation.anchor import free_anchor
+from nonsmooth.continuation.anchor import anchor_at
 from nonsmooth.continuation.arclength import Curve, Point
 from nonsmooth.continuation.equilibrium import Equilibria
 from nonsmooth.continuation.shooting import Shooting
@@ -55,7 +55,7 @@ def first_cycle(
     curve = Curve(shooting, scale, period, width)
     for amplitude in (SMALL, 0.3 * SMALL, 3 * SMALL):
         z = rested + amplitude * own.real
-        shooting.reference = free_anchor(shooting.flow, shooting.values, mode, z, scale)
+        anchor_at(shooting, shooting.values, z, scale)
         Y = shooting.join(np.empty(0), z[None, :], period, [value]) / curve.scale
         border = np.zeros(curve.n)
         border[: shooting.n] = own.real / scale

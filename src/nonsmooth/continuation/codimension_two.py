@@ -25,7 +25,9 @@ from numpy.typing import NDArray
 
 from nonsmooth.continuation.change import changed
 from nonsmooth.continuation.grazing import both_sides
+from nonsmooth.continuation.multipliers import product_of_pairs, without_own
 from nonsmooth.continuation.normal_form import flip_coefficient, torus_coefficient
+from nonsmooth.continuation.roots import zero_on
 
 if TYPE_CHECKING:
     from nonsmooth.continuation.locus import Locus, Place
@@ -80,9 +82,7 @@ def _of_multipliers(locus: Locus, place: Place) -> dict[str, float]:
         total = float((mu[i] + mu[j]).real)
         found = {"resonance_1_1": total - 2.0, "resonance_1_2": total + 2.0, "resonance_1_3": total + 1.0,
                  "resonance_1_4": total}  # fmt: skip
-        rest = np.delete(mu, [i, j])
-        if not forced and len(rest):
-            rest = np.delete(rest, np.abs(rest - 1.0).argmin())
+        rest = without_own(np.delete(mu, [i, j]), forced)
         if len(rest):
             found["fold_neimark_sacker"] = float(np.prod(1.0 - rest).real)
             found["flip_neimark_sacker"] = float(np.prod(1.0 + rest).real)
@@ -114,12 +114,8 @@ def _derivative(p: Any, x: float, order: int) -> float:
 def _others(locus: Locus, place: Place, own: float) -> float:
     """prod (mu_i mu_j - 1) of the multipliers without the critical one; NaN without a complex pair."""
     mu = np.delete(place.multipliers, np.abs(place.multipliers - own).argmin())
-    if not locus.shooting.forced:
-        mu = np.delete(mu, np.abs(mu - 1.0).argmin())
-    if len(mu) < 2 or not (np.abs(mu.imag) > PAIR).any():
-        return np.nan
-    i, j = np.triu_indices(len(mu), 1)
-    return float(np.prod(mu[i] * mu[j] - 1.0).real)
+    mu = without_own(mu, locus.shooting.forced)
+    return product_of_pairs(mu) if (np.abs(mu.imag) > PAIR).any() else np.nan
 
 
 def _pair(place: Place, forced: bool) -> tuple[int, int]:
@@ -191,25 +187,5 @@ class Second:
 
 def root(locus: Locus, a: Place, b: Place, number: Callable[[Place], float]) -> tuple[float, Place] | None:
     """The zero of ``number`` on the curve between two of its places: its distance from the first, and the place."""
-    from scipy.optimize import brentq
-
     end = float(a.tangent @ (b.Y - a.Y))
-    known: dict[float, Place] = {}
-
-    def value(s: float) -> float:
-        place = a if s == 0.0 else b if s == end else locus.between(a, b, s)
-        if place is None:
-            raise ArithmeticError
-        known[s] = place
-        x = number(place)
-        if x != x:
-            raise ArithmeticError
-        return x
-
-    try:
-        s = float(brentq(value, 0.0, end, xtol=1e-15, rtol=1e-14, maxiter=100))
-        if s not in known:
-            value(s)
-    except (ArithmeticError, ValueError, RuntimeError):
-        return None
-    return s, known[s]
+    return zero_on(lambda s: a if s == 0.0 else b if s == end else locus.between(a, b, s), end, number)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.continuation.arclength import Curve, Point
-from nonsmooth.continuation.begin import Asked, curve_of, limits, resumed_at, sentence, size_of
+from nonsmooth.continuation.begin import Asked, curve_of, limits, resumed_at, sentence
 from nonsmooth.continuation.branch import march
 from nonsmooth.continuation.detection import Tests
 from nonsmooth.continuation.events import BESIDE
@@ -111,8 +111,7 @@ def _from_orbit(orbit: Orbit, name: str | None, given: Any, asked: Asked) -> xr.
     low, high = limits(system, name, given, system.values.get(name))
     if orbit.virtual:
         raise ValueError("this orbit is virtual: its path goes through a boundary that it should obey")
-    size = size_of(orbit.maximum, orbit.minimum, system)
-    curve, X = curve_of(system, orbit.signature, orbit.period_number, name, orbit, size, high - low)
+    curve, X = curve_of(orbit, name, high - low)
     first = curve.at_parameter(X / curve.scale, system.values[name]) or _near(curve, X)
     if first is None:
         raise SolveError("Newton's method did not converge at the orbit itself: give its parameter another value",

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.continuation.anchor import free_anchor
+from nonsmooth.continuation.anchor import anchor_at
 from nonsmooth.continuation.orbit import Orbit, orbit_of
 from nonsmooth.continuation.path import Walk
 from nonsmooth.continuation.primitive import primitive
@@ -124,8 +124,7 @@ def _polished(system: System, guesses: list[Guess], given: bool, unstable: bool)
         X = shooting.join(guess.times, guess.states, guess.period)
         size = np.concatenate([guess.size, np.ones(shooting.n - len(guess.size))])
         name = _name(guess.period_number)
-        if not shooting.forced and not shooting.m:
-            shooting.reference = free_anchor(shooting.flow, shooting.values, shooting.at_section, X[: shooting.n], size)
+        anchor_at(shooting, shooting.values, X[: shooting.n], size)
         left = shooting.evaluate(X).residual[: shooting.n]  # what the guess lacks to close
         solved = shooting.newton(X, _scale(shooting, size, guess.period))
         shorter = None if solved is None else primitive(shooting, solved, size)

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.continuation.multipliers import multipliers_of, product_of_pairs, without_own
 from nonsmooth.continuation.path import Path, Walk
 from nonsmooth.continuation.solve import determinant
 
@@ -79,7 +80,7 @@ class Locus:
         self.n = shooting.size + 2
         self._eye = np.eye(shooting.n)
         self._unit = 1.0  # of psi
-        self._touched: tuple[int, int] | None = None
+        self.touched: tuple[int, int] | None = None  # (visit, transition) of a grazing curve
 
     def psi(self, solved: Solved) -> float:
         """The number that vanishes on the locus."""
@@ -91,22 +92,13 @@ class Locus:
             path = self.walk.along(solved, self.shooting.split(solved.X)[1])
             if path is None:
                 return np.nan
-            if self._touched is None:
-                self._touched = path.touched
-            return float(path.inner[self._touched]) / self._unit
+            if self.touched is None:
+                self.touched = path.touched
+            return float(path.inner[self.touched]) / self._unit
         M = solved.monodromy
         if self.kind == "flip":
             return float(np.linalg.det(M + self._eye))
-        return self.torus(self.shooting.multipliers(M))
-
-    def torus(self, mu: NDArray[np.complex128]) -> float:
-        """prod (mu_i mu_j - 1) over pairs, without an autonomous orbit's own 1."""
-        if not self.shooting.forced:
-            mu = mu[np.argsort(np.abs(mu - 1.0), kind="stable")[1:]]
-        if len(mu) < 2:
-            return np.nan
-        i, j = np.triu_indices(len(mu), 1)
-        return float(np.prod(mu[i] * mu[j] - 1.0).real)
+        return product_of_pairs(without_own(multipliers_of(M), self.shooting.forced))
 
     def calibrate(self, Y: FloatArray) -> None:
         """Choose the unit of psi so that its gradient is of order one."""
@@ -174,7 +166,7 @@ class Locus:
         if not np.isfinite(length) or path is None:
             return None
         M = solved.monodromy
-        return Place(Y, np.asarray(t / length, dtype=float), solved, M, self.shooting.multipliers(M), path, iterations)
+        return Place(Y, np.asarray(t / length, dtype=float), solved, M, multipliers_of(M), path, iterations)
 
     def first(self, X: FloatArray) -> Place | None:
         """The locus at a special point: the shortest correction, and a tangent of either sense."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.continuation.multipliers import multipliers_of, stable_by
 from nonsmooth.continuation.signature import Signature
 
 if TYPE_CHECKING:
@@ -17,10 +18,9 @@ if TYPE_CHECKING:
     from nonsmooth.continuation.shooting import Shooting, Solved
     from nonsmooth.system.system import System
 
-__all__ = ["Orbit", "orbit_of", "stable_by"]
+__all__ = ["Orbit", "orbit_of"]
 
 FloatArray = NDArray[np.float64]
-EDGE = 1e-9  # a modulus within this of 1 counts as neither
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -146,13 +146,6 @@ def _needs_tolerance(system: Any) -> bool:
     return engine_for(system).name != "exact"
 
 
-def stable_by(multipliers: NDArray[np.complex128], forced: bool) -> bool:
-    """Whether all multipliers (of an autonomous orbit: all but its own 1) lie inside the unit circle."""
-    if not forced:
-        multipliers = multipliers[np.argsort(np.abs(multipliers - 1.0), kind="stable")[1:]]
-    return bool(not len(multipliers) or np.abs(multipliers).max() < 1.0 - EDGE)
-
-
 def orbit_of(shooting: Shooting, solved: Solved, path: Path, clearance: FloatArray, virtual: bool) -> Orbit:
     """The record of a solved orbit."""
     X = solved.X
@@ -162,7 +155,7 @@ def orbit_of(shooting: Shooting, solved: Solved, path: Path, clearance: FloatArr
     times, states = shooting.split(X)
     n_u = len(system.states)
     M = solved.monodromy
-    multipliers = shooting.multipliers(M)
+    multipliers = multipliers_of(M)
     return Orbit(
         system=system, u=states[0, :n_u].copy(), mode=system.modes[shooting.at_section],
         memory=states[0, n_u:].copy(), period=float(solved.times[-1]), period_number=shooting.period_number,

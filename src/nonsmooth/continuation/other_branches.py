@@ -12,6 +12,7 @@ from nonsmooth.continuation.arclength import Curve, Point
 from nonsmooth.continuation.begin import Asked, limits, resumed_at, sentence
 from nonsmooth.continuation.branch import march
 from nonsmooth.continuation.files import branch_dataset, special_row
+from nonsmooth.continuation.multipliers import multipliers_of
 from nonsmooth.continuation.physical import allowed_range
 from nonsmooth.continuation.records import BranchRecord, PointRecord, SpecialRecord, from_march, joined, point_record
 from nonsmooth.errors import SolveError
@@ -141,4 +142,4 @@ def _origin(curve: Curve, Y: FloatArray, direction: FloatArray) -> PointRecord:
     path = curve.walk.along(solved, curve.shooting.split(solved.X)[1])
     assert path is not None
     M = solved.monodromy
-    return point_record(curve, Point(Y, direction, solved, M, curve.shooting.multipliers(M), path, 0.0, 0))
+    return point_record(curve, Point(Y, direction, solved, M, multipliers_of(M), path, 0.0, 0))
