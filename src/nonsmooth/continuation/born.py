@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,22 +12,10 @@ from nonsmooth.continuation.shooting import Shooting
 from nonsmooth.continuation.signature import Signature, Visit
 from nonsmooth.system.system import System
 
-__all__ = ["first_cycle", "hopf_row"]
+__all__ = ["first_cycle"]
 
 FloatArray = NDArray[np.float64]
 SMALL = 1e-2  # amplitude of the first cycle, in units of the states' scales
-
-
-def hopf_row(start: Any) -> tuple[System, str, float, int, FloatArray, tuple[float, float]]:
-    """System, parameter, its value, mode, equilibrium and range of one Hopf point of ``continue_equilibrium``."""
-    from nonsmooth.results.provenance import read_provenance
-
-    source = read_provenance(start)
-    system = System.from_text(source["system"]["text"]).with_parameters(source["system"]["parameters"])
-    name = str(start.attrs["parameter"])
-    value = float(start[name])
-    low, high = source["options"]["range"]
-    return system.with_parameters({name: value}), name, value, int(start["mode"]), start["u"].values, (low, high)
 
 
 def first_cycle(

@@ -11,9 +11,9 @@ import numpy as np
 from nonsmooth.continuation.anchor import anchor_at
 from nonsmooth.continuation.begin import size_of
 from nonsmooth.continuation.curve_march import ENDS, CurveMarch, march_curve
-from nonsmooth.continuation.files import special_row
 from nonsmooth.continuation.locus import KINDS, Locus, Place
 from nonsmooth.continuation.physical import allowed_range
+from nonsmooth.continuation.reading import special_row
 from nonsmooth.continuation.shooting import Shooting
 from nonsmooth.continuation.surfaces import look_at_surfaces
 from nonsmooth.errors import SolveError

@@ -12,11 +12,12 @@ from nonsmooth.continuation.begin import Asked, curve_of, limits, resumed_at, se
 from nonsmooth.continuation.branch import march
 from nonsmooth.continuation.detection import Tests
 from nonsmooth.continuation.events import BESIDE
-from nonsmooth.continuation.files import branch_dataset, read_branch
+from nonsmooth.continuation.files import branch_dataset
 from nonsmooth.continuation.marches import ENDINGS, March
 from nonsmooth.continuation.orbit import Orbit
 from nonsmooth.continuation.other_branches import born, straight_on, switched
 from nonsmooth.continuation.physical import allowed_range
+from nonsmooth.continuation.reading import read_branch
 from nonsmooth.continuation.records import BranchRecord, PointRecord, SpecialRecord, from_march, joined, point_record
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.arguments import real_number, whole_number

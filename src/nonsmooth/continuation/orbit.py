@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["Orbit", "orbit_of"]
 
 FloatArray = NDArray[np.float64]
+AT_SECTION = 1e-14  # of the period: a transition nearer to the section than rounding tells
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -91,25 +92,31 @@ class Orbit:
         return sum(jumps[v.transition].contact for v in self.signature.crossings) / max(self.period_number, 1)
 
     def trajectory(self, samples: int | None = None) -> xr.Dataset:
-        """The orbit once round, as a result of ``simulate``."""
+        """The orbit once round, as a result of ``simulate``; begun behind the transitions that lie on the section."""
         from nonsmooth.flow.simulate import simulate
 
+        u, memory, mode = self.u, self.memory, self.mode
+        n, visits = len(self.u), self.signature.visits
+        for i in np.flatnonzero(self.crossing_times <= AT_SECTION * self.period):  # a start cannot lead into a stop
+            u, memory = np.split(self.crossing_states[i], [n])
+            mode = self.system.modes[visits[i + 1].mode]
         rtol = 1e-13 if _needs_tolerance(self.system) else None
         return simulate(
-            self.system, duration=self.period, start=self._start(), mode=self.mode, samples=samples or 1025, rtol=rtol
-        )
+            self.system, duration=self.period, start=self._start(u, memory), mode=mode, samples=samples or 1025,
+            rtol=rtol,
+        )  # fmt: skip
 
-    def _start(self) -> Any:
-        """The state at the section as a start; with the memory, where the system has one."""
-        if not len(self.memory):
-            return self.u
+    def _start(self, u: FloatArray, memory: FloatArray) -> Any:
+        """A state as a start; with the memory, where the system has one."""
+        if not len(memory):
+            return u
         import xarray as xr
 
         variables: dict[str, Any] = {
-            "u": (("time", "state"), self.u[None, :]),
+            "u": (("time", "state"), u[None, :]),
             "mode": ("time", np.zeros(1, dtype=int), {"flag_meanings": "-"}),  # given by name beside it
         }
-        variables |= {name: ("time", [value]) for name, value in zip(self.system.memory, self.memory, strict=True)}
+        variables |= {name: ("time", [value]) for name, value in zip(self.system.memory, memory, strict=True)}
         return xr.Dataset(variables, {"state": list(self.system.states)})
 
     def __repr__(self) -> str:
@@ -135,7 +142,7 @@ class Orbit:
     @classmethod
     def from_dataset(cls, dataset: xr.Dataset) -> Orbit:
         """Read `to_dataset` back, from memory or from a file."""
-        from nonsmooth.continuation.files import read_orbit
+        from nonsmooth.continuation.reading import read_orbit
 
         return read_orbit(dataset)
 
