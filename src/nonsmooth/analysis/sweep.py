@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.analysis.classify import TOLERANCE
+from nonsmooth.analysis.classify import TOLERANCE, longest_period
 from nonsmooth.analysis.density import bin_edges, coarse_values, given_ranges
 from nonsmooth.analysis.settle import Attractors
 from nonsmooth.analysis.sweep_pieces import Report, Slot, ended, largest_of, pieces_of, run_on_gpu, run_pieces
@@ -71,7 +71,7 @@ def sweep(
         Section returns passed over, then recorded, at each value. A point that is still settling gets up to eight
         transients; what is not settled then has the status ``slow``.
     max_period : int
-        Longest period number looked for (and no longer than ``keep`` - 1).
+        Longest period number looked for, less than ``keep``.
     density : bool or mapping
         Store a histogram of each state's section points instead of the points. A mapping gives ranges,
         ``{"x": (lowest, highest)}``; where none is given it is that of a coarse sweep and a twentieth more either side.
@@ -114,7 +114,7 @@ def sweep(
     numbers = swept_values(system, parameter, values)
     directions = _directions(direction)
     transient, keep = whole_number(transient, "transient", 0), whole_number(keep, "keep", 2)
-    max_period = whole_number(max_period, "max_period", 1)
+    max_period = longest_period(keep, max_period)
     if threads is not None:
         threads = whole_number(threads, "threads", 1)
     section, plan = section_plan(system, section)
