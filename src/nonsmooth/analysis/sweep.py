@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.analysis.classify import TOLERANCE, longest_period
+from nonsmooth.analysis.classify import longest_period
 from nonsmooth.analysis.density import bin_edges, coarse_values, given_ranges
-from nonsmooth.analysis.settle import Attractors
+from nonsmooth.analysis.settle import Attractors, tolerance_of
 from nonsmooth.analysis.sweep_pieces import Report, Slot, ended, largest_of, pieces_of, run_on_gpu, run_pieces
 from nonsmooth.flow.arguments import check_options, check_system, float_array, whole_number
 from nonsmooth.flow.devices import on_gpu, workers_of
 from nonsmooth.flow.engine import FloatArray, State
-from nonsmooth.flow.methods import RTOL, engine_for, warn_if_coarse
+from nonsmooth.flow.methods import engine_for, warn_if_coarse
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.flow.starts import is_one_start, plain_start, start_states
 
@@ -125,9 +125,10 @@ def sweep(
     threads = workers_of(device, threads)
     starts = start_states(system, start)
     points = system.parameter_points({parameter: numbers})
-    noise = TOLERANCE if engine.name == "exact" else max(TOLERANCE, 10.0 * (RTOL if rtol is None else rtol))
-    attractors = Attractors(engine, engine.prepare(points), plan, transient, keep, max_period, noise,
-                            system.scale_vector())  # fmt: skip
+    attractors = Attractors(
+        engine, engine.prepare(points), plan, transient, keep, max_period, tolerance_of(engine, rtol),
+        system.scale_vector(),
+    )  # fmt: skip
     traced = system.traced
     sizes = len(traced.u), len(traced.indicators), len(traced.outputs)
     edges = None

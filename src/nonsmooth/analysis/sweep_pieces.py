@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
@@ -13,6 +12,8 @@ import numpy as np
 from nonsmooth.analysis.classify import Verdict
 from nonsmooth.analysis.density import CountedSlot, Counter
 from nonsmooth.analysis.settle import Attractors
+from nonsmooth.analysis.settled import usable
+from nonsmooth.campaign.threads import cores
 from nonsmooth.flow.engine import Chain, FloatArray
 from nonsmooth.kernels import codes
 from nonsmooth.results.progress import progress as progress_bar
@@ -20,7 +21,6 @@ from nonsmooth.results.progress import progress as progress_bar
 __all__ = ["Report", "Slot", "ended", "largest_of", "pieces_of", "run_on_gpu", "run_pieces"]
 
 PIECE = 16  # points of one piece of independent work
-USABLE = (codes.OK, codes.SLOW, codes.NOT_PERIODIC, codes.NOT_GUARANTEED)  # the run came to its end
 
 
 class Slot:
@@ -53,7 +53,7 @@ class Slot:
         self.period_number[i] = verdict.period_number
         self.residual[i] = verdict.residual
         self.status[i] = verdict.status
-        if self.counted is not None and verdict.status in USABLE:
+        if self.counted is not None and usable(verdict.status):
             self.counted.count(i, row, chain)
 
 
@@ -87,8 +87,7 @@ def run_pieces(
     label: str,
 ) -> None:
     """All pieces on a pool of threads (the kernels release the lock); Ctrl-C stops them after their present point."""
-    workers = min(threads or len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1,
-                  len(pieces))  # fmt: skip
+    workers = min(threads or cores(), len(pieces))
     total = sum(len(order) for _, order in pieces)
     with progress_bar(total, f"sweep over {label}", progress) as advance:
         report = Report(advance)
@@ -135,4 +134,5 @@ def largest_of(starts: FloatArray, slots: Iterable[Slot]) -> FloatArray:
 
 
 def ended(slot: Slot) -> np.ndarray:
-    return np.isin(slot.status, USABLE)
+    """Which runs came to their end."""
+    return usable(slot.status)

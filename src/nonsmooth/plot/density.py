@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth.plot import style
+from nonsmooth.plot.cells import cell_edges
 from nonsmooth.plot.labels import first_states, label, variable_along
 
 if TYPE_CHECKING:
@@ -59,17 +60,9 @@ def density(result: xr.Dataset, ax: Axes | None = None, *, y: str | None = None,
         there = share[np.isfinite(share)]
         lowest, highest = (float(there.min()), float(there.max())) if len(there) else (1.0, 100.0)
         mesh = drawn.pcolormesh(
-            _borders(one[parameter].values), one["bin_edge"].values, share, rasterized=True, cmap=cmap,
+            cell_edges(one[parameter].values), one["bin_edge"].values, share, rasterized=True, cmap=cmap,
             norm=LogNorm(lowest, max(highest, 1.01 * lowest)),
         )  # fmt: skip
         drawn.figure.colorbar(mesh, ax=drawn, label="share of the points (%)")
         drawn.set(xlabel=label(result, parameter), ylabel=label(result, name))
     return drawn
-
-
-def _borders(values: np.ndarray) -> np.ndarray:
-    """Half way between a parameter's values, the outer ones as far out again."""
-    if len(values) == 1:
-        return np.array([values[0] - 0.5, values[0] + 0.5])
-    middle = 0.5 * (values[1:] + values[:-1])
-    return np.concatenate([[2 * values[0] - middle[0]], middle, [2 * values[-1] - middle[-1]]])

@@ -2,8 +2,8 @@
 
 A plot function given no axes draws on its own, in this style. Given axes, it leaves the caller's style alone, but for
 what it adds itself: a legend has no frame and letters in proportion to the axes' labels, unless the caller's own
-settings say otherwise. Keep a ``with nonsmooth.plot.journal():`` block around making the figure and drawing on it to get
-the whole style.
+settings say otherwise. Keep a ``with nonsmooth.plot.journal():`` block around making the figure and drawing on it to
+get the whole style.
 """
 
 from __future__ import annotations
@@ -94,9 +94,11 @@ def _own_legend(ax: Axes) -> Iterator[None]:
     """Legends in the package's style on a caller's axes; what the caller has set stays."""
     import matplotlib as mpl
 
-    letters = _RC["legend.fontsize"] / _RC["axes.labelsize"] * ax.xaxis.label.get_size()
-    wanted = {"legend.frameon": _RC["legend.frameon"], "legend.fontsize": letters}
-    free = {key: value for key, value in wanted.items() if mpl.rcParams[key] == mpl.rcParamsDefault[key]}
+    letters = _RC["legend.fontsize"] / _RC["axes.labelsize"] * ax.xaxis.label.get_fontsize()
+    wanted: Any = {"legend.frameon": _RC["legend.frameon"], "legend.fontsize": letters}
+    now: Any = mpl.rcParams
+    plain: Any = mpl.rcParamsDefault
+    free: Any = {key: value for key, value in wanted.items() if now[key] == plain[key]}
     with mpl.rc_context(free):
         yield
 
