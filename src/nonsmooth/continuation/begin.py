@@ -20,7 +20,7 @@ from nonsmooth.flow.arguments import real_number
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["FIRST", "Asked", "curve_of", "limits", "resumed_at", "sentence", "size_of"]
+__all__ = ["FIRST", "Asked", "curve_of", "largest_step", "limits", "resumed_at", "sentence", "size_of"]
 
 FloatArray = NDArray[np.float64]
 FIRST = 1e-3  # step
@@ -49,18 +49,28 @@ class Asked:
                 **more}  # fmt: skip
 
 
-def limits(system: System, name: Any, given: Any, here: float | None) -> tuple[float, float]:
-    """The range given, checked."""
+def largest_step(step: Any) -> float:
+    """The largest step, checked."""
+    largest = real_number(step, "step")
+    if not 0 < largest <= 1:
+        raise ValueError(f"step = {step!r}: the largest step is above 0 and at most 1 (the branch's own size is 1)")
+    return largest
+
+
+def limits(
+    system: System, name: Any, given: Any, here: float | None, *, word: str = "range", what: str = "the orbit"
+) -> tuple[float, float]:
+    """The range given for a parameter, checked; ``here``: where ``what`` lies, which must be within it."""
     if not isinstance(name, str) or name not in system.values:
         system.with_parameters({str(name): 0.0})  # raises with the names there are
     try:
         low, high = (real_number(x, "an end of the range") for x in given)
     except (TypeError, ValueError):
-        raise ValueError(f"range = {given!r}: give its two ends, (low, high)") from None
+        raise ValueError(f"{word} = {given!r}: give its two ends, (low, high)") from None
     if not low < high:
-        raise ValueError(f"range = {given!r}: the first end must be below the second")
+        raise ValueError(f"{word} = {given!r}: the first end must be below the second")
     if here is not None and not low <= here <= high:
-        raise ValueError(f"the orbit lies at {name} = {here!r}, outside the range {low!r} ... {high!r}")
+        raise ValueError(f"{what} lies at {name} = {here!r}, outside the range {low!r} ... {high!r}")
     return low, high
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.continuation.anchor import anchor_at
-from nonsmooth.continuation.begin import size_of
+from nonsmooth.continuation.begin import largest_step, limits, size_of
 from nonsmooth.continuation.curve_march import ENDS, CurveMarch, march_curve
 from nonsmooth.continuation.locus import KINDS, Locus, Place
 from nonsmooth.continuation.physical import allowed_range
@@ -17,7 +17,7 @@ from nonsmooth.continuation.reading import special_row
 from nonsmooth.continuation.shooting import Shooting
 from nonsmooth.continuation.surfaces import look_at_surfaces
 from nonsmooth.errors import SolveError
-from nonsmooth.flow.arguments import real_number, whole_number
+from nonsmooth.flow.arguments import whole_number
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -61,15 +61,12 @@ def continue_curve(
     SolveError
         The curve could not be begun.
     """
-    largest, most = real_number(step, "step"), whole_number(points, "points", 1)
+    largest, most = largest_step(step), whole_number(points, "points", 1)
     system, kind, own, point, period_number, _ = special_row(special_point, "continue_curve")
     if kind not in KINDS:
         raise ValueError(f"a {kind} has no curve here; possible: {', '.join(KINDS)}")
-    names, box = _box(system, ranges)
     start = system.with_parameters({own: point.value})
-    for name, (low, high) in zip(names, box, strict=True):
-        if not low <= start.values[name] <= high:
-            raise ValueError(f"the special point lies at {name} = {start.values[name]!r}, outside {low!r} ... {high!r}")
+    names, box = _box(start, ranges)
     shooting = Shooting(start, point.signature, period_number, names)
     size = size_of(point.maximum, point.minimum, system)
     anchor_at(shooting, start.parameter_vector(), point.X[: shooting.n], size)
@@ -95,18 +92,15 @@ def continue_curve(
 
 
 def _box(system: System, ranges: Any) -> tuple[tuple[str, str], list[tuple[float, float]]]:
+    """The two parameters and their ranges, which hold the system's own values."""
     if not isinstance(ranges, Mapping) or len(ranges) != 2:
         raise ValueError(
             f'ranges names two parameters with their ends, {{"omega": (3, 7), "rho": (0.1, 0.3)}}; not {ranges!r}'
         )
-    box = []
-    for name, ends in ranges.items():
-        if name not in system.values:
-            system.with_parameters({str(name): 0.0})  # raises with the names there are
-        low, high = (real_number(x, f"an end of the range of {name}") for x in ends)
-        if not low < high:
-            raise ValueError(f"the range of {name}, {ends!r}: the first end must be below the second")
-        box.append((low, high))
+    box = [
+        limits(system, name, ends, system.values.get(name), word=f"the range of {name}", what="the special point")
+        for name, ends in ranges.items()
+    ]
     first, second = ranges
     return (str(first), str(second)), box
 

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nonsmooth.continuation.begin import largest_step, limits
 from nonsmooth.continuation.equilibrium import Equilibria, Rest
 from nonsmooth.continuation.equilibrium_march import ENDS, RestMarch, march_rest
 from nonsmooth.continuation.physical import allowed_range
 from nonsmooth.errors import SolveError
-from nonsmooth.flow.arguments import check_system, real_number, whole_number
+from nonsmooth.flow.arguments import check_system, whole_number
 from nonsmooth.flow.starts import first_state
 
 if TYPE_CHECKING:
@@ -67,13 +68,9 @@ def continue_equilibrium(
     check_system(system, "continue_equilibrium")
     if system.depends_on_time:
         raise ValueError(f"{system.name!r} depends on time: it has no equilibria; find_orbit finds its periodic orbits")
-    if parameter not in system.values:
-        system.with_parameters({str(parameter): 0.0})  # raises with the names there are
-    low, high = (real_number(x, "an end of the range") for x in range)
+    low, high = limits(system, parameter, range, system.values.get(parameter), what="the system")
     here = system.values[parameter]
-    if not low < high or not low <= here <= high:
-        raise ValueError(f"range = {range!r} must rise and hold the present value {parameter} = {here!r}")
-    largest, most = real_number(step, "step"), whole_number(points, "points", 1)
+    largest, most = largest_step(step), whole_number(points, "points", 1)
     state = first_state(system, start, mode)
     curves = {
         i: Equilibria(system, i, parameter, high - low)

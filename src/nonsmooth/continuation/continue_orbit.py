@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.continuation.arclength import Curve, Point
-from nonsmooth.continuation.begin import Asked, curve_of, limits, resumed_at, sentence
+from nonsmooth.continuation.begin import Asked, curve_of, largest_step, limits, resumed_at, sentence
 from nonsmooth.continuation.branch import march
 from nonsmooth.continuation.detection import Tests
 from nonsmooth.continuation.events import BESIDE
@@ -20,7 +20,7 @@ from nonsmooth.continuation.physical import allowed_range
 from nonsmooth.continuation.reading import read_branch
 from nonsmooth.continuation.records import BranchRecord, PointRecord, SpecialRecord, from_march, joined, point_record
 from nonsmooth.errors import SolveError
-from nonsmooth.flow.arguments import real_number, whole_number
+from nonsmooth.flow.arguments import whole_number
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -82,10 +82,7 @@ def continue_orbit(
     Pseudo-arclength continuation of the multiple-shooting equations in scaled unknowns. Special points are zeros of
     functions along the branch, found by Brent's method on orbits corrected to rounding.
     """
-    largest, most = real_number(step, "step"), whole_number(points, "points", 1)
-    if not 0 < largest <= 1:
-        raise ValueError(f"step = {step!r}: the largest step lies between 0 and 1")
-    asked = Asked(largest, most, bool(virtual))
+    asked = Asked(largest_step(step), whole_number(points, "points", 1), bool(virtual))
     if isinstance(start, Orbit):
         return _from_orbit(start, parameter, range, asked)
     if hasattr(start, "data_vars"):

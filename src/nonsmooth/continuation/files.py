@@ -79,10 +79,10 @@ def branch_dataset(system: System, record: BranchRecord, options: dict[str, Any]
         "grazing": [s.grazing for s in special],
         "bounded": np.array([s.bounded for s in special], dtype=bool),
         "doubled": np.array([s.doubled for s in special], dtype=bool),
-        "contact": np.array([np.full(n_mu, np.nan + 0j) if s.contact is None else s.contact for s in special]).reshape(
-            len(special), n_mu
-        ),
-        "determinants": np.array([s.determinants for s in special]).reshape(len(special), 4),
+        "contact": np.array(
+            [np.full(n_mu, np.nan) if s.contact is None else s.contact for s in special], dtype=complex
+        ).reshape(len(special), n_mu),
+        "determinants": np.array([s.determinants for s in special], dtype=float).reshape(len(special), 4),
     }
     labels = labels_of(system)
     attrs = provenance(labels, "continue_orbit", options, method="multiple shooting")
