@@ -69,6 +69,16 @@ def test_a_result_of_another_verb_is_refused(figure: str, name: str) -> None:
         getattr(plot, figure)(xr.Dataset({"u2": 1.0}))
 
 
+@pytest.mark.parametrize(
+    "figure",
+    ["branch", "curve", "chart", "basins", "basin_fractions", "manifolds", "density", "multipliers", "orbit",
+     "time_history"],
+)  # fmt: skip
+def test_what_is_no_result_is_refused(figure: str) -> None:
+    with pytest.raises(TypeError, match="not (from )?float"):
+        getattr(plot, figure)(3.0)
+
+
 def test_a_diagram_shows_every_finite_point_up_and_down(swept: xr.Dataset) -> None:
     ax = plot.bifurcation(swept, y="v")
     up, down = ax.lines

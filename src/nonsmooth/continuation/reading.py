@@ -50,6 +50,8 @@ def recorded(dataset: xr.Dataset, what: str) -> tuple[dict[str, Any], System]:
     from nonsmooth.results.provenance import read_provenance
     from nonsmooth.system.system import System
 
+    if not hasattr(dataset, "data_vars"):
+        raise TypeError(f"this {what} is read from its Dataset, not from {type(dataset).__name__}")
     source = read_provenance(dataset)
     with _undamaged(what):
         system = System.from_text(source["system"]["text"]).with_parameters(source["system"]["parameters"])

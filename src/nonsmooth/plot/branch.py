@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth.plot import style
-from nonsmooth.plot.labels import first_states, label, variable_along
+from nonsmooth.plot.labels import label, only_states, variable_along
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -63,7 +63,7 @@ def branch(
     with style.axes(ax) as drawn:
         draw_branch(drawn, result, y=y, quantity=quantity, special=special, color=color)
         parameter = _parameter(result)
-        (name,) = first_states(result, y)
+        (name,) = only_states(result, y)
         drawn.set(xlabel=label(result, parameter), ylabel=_ordinate(result, name, quantity))
         if special and result.sizes.get("special", 0):
             drawn.legend(loc="best")
@@ -84,7 +84,7 @@ def draw_branch(
     variable_along(result, "stable", "continue_orbit")
     if quantity not in _WORDS:
         raise ValueError(f"quantity = {quantity!r}; allowed: {', '.join(map(repr, _WORDS))}")
-    (name,) = first_states(result, y)
+    (name,) = only_states(result, y)
     values = result[_parameter(result)].values
     ordinates = _ordinates(result, name, quantity)
     shade = color or style.COLORS["first"]

@@ -8,7 +8,7 @@ import numpy as np
 
 from nonsmooth.plot import style
 from nonsmooth.plot.cells import cell_edges
-from nonsmooth.plot.labels import first_states, label, variable_along
+from nonsmooth.plot.labels import label, only_states, variable_along
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,12 +41,9 @@ def density(result: xr.Dataset, ax: Axes | None = None, *, y: str | None = None,
     The colour is the share of a parameter value's points in one bin, in per cent. A point that failed has none.
     """
     variable_along(result, "density", "sweep(..., density=True)")
-    (name,) = first_states(result, y)
-    states = [str(one) for one in result["state"].values]
-    if name not in states:
-        raise ValueError(f"y = {name!r} is not a state; states: {states}")
+    (name,) = only_states(result, y)
     parameter = str(result["density"].dims[0])
-    one = result.sortby(parameter).isel(state=states.index(name))
+    one = result.sortby(parameter).sel(state=name)
     counts = one["density"].sum([dim for dim in ("direction", "start") if dim in one["density"].dims])
     table = counts.transpose("bin", parameter).values.astype(float)
     total = table.sum(axis=0)
