@@ -235,9 +235,8 @@ def _system_from(text: str) -> System:
 
 def _remade(text: str, values: Mapping[str, float], method: str, given: Mapping[str, Any]) -> Settler:
     system = _system_from(text).with_parameters(values)
-    exact = method == "exact"
+    # "auto" takes tolerances that the exact flow has no use for
     engine = engine_for(
-        system, "auto" if exact else method, None if exact else given["rtol"], None if exact else given["atol"],
-        **given["expert"],
-    )  # fmt: skip
+        system, "auto" if method == "exact" else method, given["rtol"], given["atol"], **given["expert"]
+    )
     return Settler(system, engine, **given)

@@ -26,15 +26,13 @@ from nonsmooth.analysis.spectrum import (
     spectrum_along,
 )
 from nonsmooth.analysis.sweep import DIRECTIONS, swept_values
-from nonsmooth.errors import SolveError
 from nonsmooth.flow.arguments import check_options, check_system, real_number, whole_number
 from nonsmooth.flow.devices import on_gpu
 from nonsmooth.flow.engine import FloatArray, State
+from nonsmooth.flow.failure import solve_error
 from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.poincare import result_status
-from nonsmooth.flow.simulate import BEYOND_STOP
 from nonsmooth.flow.starts import first_state, is_one_start, plain_start
-from nonsmooth.kernels import codes
 from nonsmooth.results.progress import progress as progress_bar
 
 if TYPE_CHECKING:
@@ -172,12 +170,7 @@ def lyapunov(
             advance(1)
     done = [one for one in found if one is not None]
     if numbers is None and done[0].status not in GOOD:
-        from nonsmooth.results.statuses import by_code
-
-        if done[0].status == codes.BEYOND_STOP:
-            raise SolveError(BEYOND_STOP, status="beyond_stop")
-        status = by_code(result_status(done[0].status))
-        raise SolveError(status.sentence, status=status.name)
+        raise solve_error(done[0].status)
     return _dataset(system, engine.name, options, parameter, numbers, done)
 
 

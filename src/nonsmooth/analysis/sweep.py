@@ -136,10 +136,11 @@ def sweep(
         ranges, n_bins = given_ranges(system, density, bins)
         coarse = None
         if len(ranges) < len(system.states):
+            few = min(keep, 1000)
             coarse = sweep(
                 system, parameter, coarse_values(numbers), direction=direction, start=start, section=section,
-                transient=transient, keep=min(keep, 1000), max_period=max_period, method=method, rtol=rtol, atol=atol,
-                threads=threads, progress=False, **expert,
+                transient=transient, keep=few, max_period=min(max_period, few - 1), method=method, rtol=rtol,
+                atol=atol, threads=threads, progress=False, **expert,
             )["section"].transpose(..., "state").values  # fmt: skip
         edges = bin_edges(system, ranges, n_bins, coarse)
     slots = {
@@ -175,6 +176,13 @@ def sweep(
 
 
 def swept_values(system: System, parameter: str, values: Any) -> FloatArray:
+    """The values of a parameter that is varied, as an array.
+
+    Raises
+    ------
+    ValueError, TypeError
+        A parameter that does not exist; values that are no list of finite numbers, each there once.
+    """
     if parameter not in system.values:
         system.with_parameters({parameter: 0.0})  # raises with the names there are
     numbers = float_array(values, f"values of {parameter!r}")

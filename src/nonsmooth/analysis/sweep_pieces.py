@@ -50,6 +50,7 @@ class Slot:
         return ((i, i, self.attractors, self.chain) for i in order)
 
     def keep(self, i: int, row: int, verdict: Verdict, chain: Chain) -> None:
+        """The verdict on parameter value i, whose run stands in a row of a buffer."""
         self.period_number[i] = verdict.period_number
         self.residual[i] = verdict.residual
         self.status[i] = verdict.status

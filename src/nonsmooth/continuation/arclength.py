@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from nonsmooth.continuation.path import Path
     from nonsmooth.continuation.shooting import Shooting, Solved
 
-__all__ = ["Curve", "Point", "chordal"]
+__all__ = ["Curve", "Point", "chordal", "passes_through"]
 
 FloatArray = NDArray[np.float64]
 MOST = 8  # Newton iterations
@@ -215,6 +215,13 @@ class Curve:
         if not len(null):
             return None
         return self.point(solved, Y, null[-1], iterations)
+
+
+def passes_through(Y: FloatArray, a: FloatArray, b: FloatArray) -> bool:
+    """Whether the step from a to b goes through Y, as nearly as a chord follows a curve."""
+    step = b - a
+    x = float(step @ (Y - a)) / float(step @ step)
+    return 1e-9 < x <= 1.0 and float(np.abs(Y - a - x * step).max()) < 0.3 * float(np.abs(step).max())
 
 
 def chordal(a: NDArray[np.complex128], b: NDArray[np.complex128]) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.continuation.anchor import plane_across
+from nonsmooth.continuation.arclength import passes_through
 from nonsmooth.continuation.codimension_two import ENDED, root, sign_changes
 from nonsmooth.continuation.codimension_two import numbers as numbers_of
 from nonsmooth.continuation.locus import Locus, Place
@@ -129,7 +130,7 @@ def _follow(
         if ended:
             break
         found.places.append(new)
-        if begin is not None and len(found.places) > 3 and _met(begin, place, new):
+        if begin is not None and len(found.places) > 3 and passes_through(begin.Y, place.Y, new.Y):
             found.ending = "closed"
             break
         ds = min(ds * (1.7 if new.iterations <= 4 else 1.0), largest)
@@ -178,10 +179,3 @@ class _Turning:
 
     def __call__(self, place: Place) -> float:
         return float(place.tangent[-2:] @ self.before.tangent[-2:])
-
-
-def _met(begin: Place, a: Place, b: Place) -> bool:
-    step = b.Y - a.Y
-    x = float(step @ (begin.Y - a.Y)) / float(step @ step)
-    near = float(np.abs(begin.Y - a.Y - x * step).max())
-    return 1e-9 < x <= 1.0 and near < 0.3 * float(np.abs(step).max())

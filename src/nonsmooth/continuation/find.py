@@ -15,6 +15,7 @@ from nonsmooth.continuation.settled import CLOSED, NEAR, Guess, forced_guesses, 
 from nonsmooth.continuation.shooting import Shooting
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.arguments import check_system, whole_number
+from nonsmooth.flow.failure import solve_error
 from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.starts import first_state
 from nonsmooth.kernels import codes
@@ -22,11 +23,11 @@ from nonsmooth.kernels import codes
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["failed", "find_orbit"]
+__all__ = ["find_orbit"]
 
 FloatArray = NDArray[np.float64]
 GOOD = (codes.OK, codes.NOT_GUARANTEED)
-RTOL = 1e-12  # of the runs from which orbits are read
+RTOL = 1e-12  # of the runs from which orbits are read, where the flow is not exact
 NOISE = 1e-11  # of the motion's size: beyond a boundary by less than this is on it
 FAR = 30.0  # how far from the motion, in units of its gap, the orbit may lie
 SLOW = 3.0  # or of the distance that its multipliers give for that gap
@@ -76,8 +77,7 @@ def find_orbit(
     if period_number is not None:
         period_number = whole_number(period_number, "period_number", 1)
     transient, max_period = whole_number(transient, "transient", 0), whole_number(max_period, "max_period", 1)
-    exact = engine_for(system).name == "exact"
-    engine = engine_for(system, rtol=None if exact else RTOL)
+    engine = engine_for(system, rtol=RTOL)
     state = first_state(system, start)
     if system.period() is None:
         from nonsmooth.continuation.settled_autonomous import autonomous_guesses
@@ -91,7 +91,7 @@ def find_orbit(
             # The motion leaves an unstable orbit and fails later: its first rounds are enough.
             settled = settle_forced(system, engine, begun, 0, period_number + 1)
         if settled.status not in GOOD:
-            raise failed(settled.status)
+            raise solve_error(settled.status)
         guesses = forced_guesses(system, settled, period_number, max_period)
     if not guesses:
         raise SolveError(
@@ -101,19 +101,6 @@ def find_orbit(
             status="not_periodic",
         )
     return _polished(system, guesses, given=period_number is not None, unstable=transient == 0)
-
-
-def failed(code: int) -> SolveError:
-    """The error for a simulation that stopped with a kernel's code."""
-    if code == codes.BEYOND_STOP:
-        return SolveError(
-            "the start lies beyond a stop: a transition with a reset holds there already; start on the admissible "
-            "side of its indicator", status="beyond_stop",
-        )  # fmt: skip
-    from nonsmooth.results.statuses import by_code
-
-    status = by_code(code)
-    return SolveError(status.sentence, status=status.name)
 
 
 def _polished(system: System, guesses: list[Guess], given: bool, unstable: bool) -> Orbit:

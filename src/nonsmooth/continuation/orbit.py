@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["Orbit", "orbit_of"]
 
 FloatArray = NDArray[np.float64]
+RTOL = 1e-13  # of the trajectory, where the flow is not exact
 AT_SECTION = 1e-14  # of the period: a transition nearer to the section than rounding tells
 
 
@@ -100,10 +101,9 @@ class Orbit:
         for i in np.flatnonzero(self.crossing_times <= AT_SECTION * self.period):  # a start cannot lead into a stop
             u, memory = np.split(self.crossing_states[i], [n])
             mode = self.system.modes[visits[i + 1].mode]
-        rtol = 1e-13 if _needs_tolerance(self.system) else None
         return simulate(
             self.system, duration=self.period, start=self._start(u, memory), mode=mode, samples=samples or 1025,
-            rtol=rtol,
+            rtol=RTOL,
         )  # fmt: skip
 
     def _start(self, u: FloatArray, memory: FloatArray) -> Any:
@@ -145,12 +145,6 @@ class Orbit:
         from nonsmooth.continuation.reading import read_orbit
 
         return read_orbit(dataset)
-
-
-def _needs_tolerance(system: Any) -> bool:
-    from nonsmooth.flow.methods import engine_for
-
-    return engine_for(system).name != "exact"
 
 
 def orbit_of(shooting: Shooting, solved: Solved, path: Path, clearance: FloatArray, virtual: bool) -> Orbit:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from nonsmooth.results.labels import Labels
 from nonsmooth.results.schema import floats, parameter_coords, quantity_attributes, state_coords, strings, varied
@@ -82,10 +82,7 @@ def branch(
         column = marks[name]
         array = strings(column) if name in ("kind", "indicator", "grazing") else np.asarray(column)
         variables[stem] = (("special", *dims), array, {"long_name": long_name})
-    variables["special_value"] = (
-        "special", along[np.asarray(marks["place"], dtype=np.int64)],
-        quantity_attributes(parameter, d.parameters[parameter]),
-    )  # fmt: skip
+    variables["special_value"] = _special_value(d, parameter, along, marks["place"])
     variables["period_number"] = ((), np.int64(period_number), {"long_name": "forcing periods (0: autonomous)"})
     coords = _coords(d, {parameter: values})
     coords["indicator"] = ("indicator", strings(d.indicators), {"long_name": "indicator"})
@@ -142,6 +139,7 @@ def equilibria(
         "mode": ("point", np.asarray(arrays["mode"], np.int16), {"long_name": "mode", **modes}),
         "special_kind": ("special", strings(kind for kind, _ in special), {"long_name": "kind of the special point"}),
         "special_point": _places(special),
+        "special_value": _special_value(d, parameter, floats(values), [place for _, place in special]),
         **_ends(list(endings), ended, [endings[word] for word in ended]),
     }
     return xr.Dataset(variables, _coords(d, {parameter: values}), dict(attrs))
@@ -150,6 +148,10 @@ def equilibria(
 def _places(special: Sequence[tuple[str, int]]) -> tuple[Any, ...]:
     places = np.array([place for _, place in special], dtype=np.int64)
     return "special", places, {"long_name": "its place among the points"}
+
+
+def _special_value(d: Labels, parameter: str, along: NDArray[np.float64], places: Any) -> tuple[Any, ...]:
+    return "special", along[np.asarray(places, dtype=np.int64)], quantity_attributes(parameter, d.parameters[parameter])
 
 
 def _ends(endings: Sequence[str], ended: Sequence[str], sentences: Sequence[str]) -> dict[str, Any]:
