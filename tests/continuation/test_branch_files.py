@@ -49,6 +49,8 @@ def test_orbit_there_and_back(tmp_path: Path) -> None:
         assert back.system == orbit.system and back.signature == orbit.signature
         assert np.array_equal(back.u, orbit.u) and np.array_equal(back.monodromy_matrix, orbit.monodromy_matrix)
         assert back.stable == orbit.stable and back.mode == orbit.mode
+        again = ns.find_orbit(back.system, **back.options)  # the record of how it was found finds it again
+        assert np.array_equal(again.u, orbit.u)
 
 
 def test_trajectory_closes() -> None:

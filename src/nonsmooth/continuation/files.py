@@ -104,7 +104,7 @@ def orbit_dataset(orbit: Orbit) -> xr.Dataset:
     from nonsmooth.results.schema import parameter_coords, state_coords
 
     labels = labels_of(orbit.system)
-    attrs: dict[str, Any] = dict(provenance(labels, "find_orbit", {}, method="multiple shooting"))
+    attrs: dict[str, Any] = dict(provenance(labels, "find_orbit", orbit.options, method="multiple shooting"))
     attrs["layouts"] = json.dumps([signature_data(orbit.signature)])
     unit = {"units": labels.time_unit}
     names = [*orbit.system.states, *orbit.system.memory]

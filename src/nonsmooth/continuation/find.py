@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from nonsmooth.errors import SolveError
 from nonsmooth.flow.arguments import check_system, whole_number
 from nonsmooth.flow.failure import solve_error
 from nonsmooth.flow.methods import engine_for
-from nonsmooth.flow.starts import first_state
+from nonsmooth.flow.starts import first_state, plain_start
 from nonsmooth.kernels import codes
 
 if TYPE_CHECKING:
@@ -100,7 +101,12 @@ def find_orbit(
             "another start, a longer transient or max_period, or period_number= for an unstable orbit within it",
             status="not_periodic",
         )
-    return _polished(system, guesses, given=period_number is not None, unstable=transient == 0)
+    orbit = _polished(system, guesses, given=period_number is not None, unstable=transient == 0)
+    options = {
+        "start": plain_start(system, start), "period_number": period_number, "transient": transient,
+        "max_period": max_period,
+    }  # fmt: skip
+    return replace(orbit, options=options)
 
 
 def _polished(system: System, guesses: list[Guess], given: bool, unstable: bool) -> Orbit:

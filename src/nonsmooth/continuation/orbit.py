@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -61,6 +62,8 @@ class Orbit:
         Least distance to a transition that does not happen; NaN where none comes near.
     virtual : bool
         Whether the path goes through a boundary it should have obeyed: no orbit of the system then.
+    options : mapping
+        Arguments of :func:`nonsmooth.find_orbit`, as they were given.
     """
 
     system: System
@@ -80,6 +83,7 @@ class Orbit:
     clearance: dict[str, float]
     virtual: bool = False
     reference: tuple[FloatArray, FloatArray] | None = field(default=None)
+    options: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def crossings_per_period(self) -> float:

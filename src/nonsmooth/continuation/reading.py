@@ -130,7 +130,7 @@ def read_orbit(dataset: xr.Dataset) -> Orbit:
             monodromy_matrix=get("monodromy_matrix"), floquet_multipliers=get("floquet_multipliers"),
             stable=bool(get("stable")), maximum=get("maximum"), minimum=get("minimum"),
             clearance={str(k): float(v) for k, v in zip(dataset["indicator"].values, get("clearance"), strict=True)},
-            virtual=bool(get("virtual")),
+            virtual=bool(get("virtual")), options=source["options"],
         )  # fmt: skip
 
 
@@ -142,8 +142,10 @@ def special_row(start: Any, verb: str) -> tuple[System, str, str, PointRecord, i
     TypeError, ValueError
         Something else, several rows, or a row that is damaged.
     """
-    if not hasattr(start, "data_vars") or "kind" not in start or "unknowns" not in start:
+    if not hasattr(start, "data_vars") or "kind" not in start:
         raise TypeError(f"{verb} takes one row of special_points, not {type(start).__name__}")
+    if "unknowns" not in start:
+        raise TypeError(f"{verb} takes a special point of orbits (of continue_orbit), not one of equilibria")
     start = one_row(start, verb)
     source, system = recorded(start, "special point")
     with _undamaged("special point"):
