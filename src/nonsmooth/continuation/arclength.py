@@ -36,12 +36,12 @@ class Point:
     M: FloatArray
     multipliers: NDArray[np.complex128]
     path: Path
-    orientation: float  # sign of the bordered determinant
     iterations: int
+    orientation: float = 0.0  # sign of the bordered determinant (a curve in two parameters asks for none)
 
     @property
     def X(self) -> FloatArray:
-        """The unknowns."""
+        """The unknowns, the parameters last."""
         return self.solved.X
 
 
@@ -145,7 +145,7 @@ class Curve:
         path = self.walk.along(solved, self.shooting.split(solved.X)[1])
         if path is None:
             return None
-        return Point(Y, found[0], solved, M, multipliers_of(M), path, found[1], iterations)
+        return Point(Y, found[0], solved, M, multipliers_of(M), path, iterations, found[1])
 
     def predicted(self, point: Point, ds: float, before: Point | None) -> FloatArray:
         """A guess at distance ds along the tangent: straight, or on the cubic through both last points and tangents."""

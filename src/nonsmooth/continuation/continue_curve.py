@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.continuation.anchor import anchor_at
+from nonsmooth.continuation.arclength import Point
 from nonsmooth.continuation.begin import largest_step, limits, size_of
 from nonsmooth.continuation.curve_march import ENDS, CurveMarch, march_curve
-from nonsmooth.continuation.locus import KINDS, Locus, Place
+from nonsmooth.continuation.locus import KINDS, Locus
 from nonsmooth.continuation.physical import allowed_range
 from nonsmooth.continuation.reading import special_row
 from nonsmooth.continuation.shooting import Shooting
@@ -106,7 +107,7 @@ def _box(system: System, ranges: Any) -> tuple[tuple[str, str], list[tuple[float
 
 
 def _dataset(
-    system: System, locus: Locus, names: tuple[str, str], places: list[Place], special: list[tuple[str, int]],
+    system: System, locus: Locus, names: tuple[str, str], places: list[Point], special: list[tuple[str, int]],
     ended: tuple[str, str], options: dict[str, Any],
 ) -> xr.Dataset:  # fmt: skip
     from nonsmooth.results.branches import curve

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.continuation.anchor import plane_across
-from nonsmooth.continuation.arclength import passes_through
+from nonsmooth.continuation.arclength import Point, passes_through
 from nonsmooth.continuation.codimension_two import ENDED, root, sign_changes
 from nonsmooth.continuation.codimension_two import numbers as numbers_of
-from nonsmooth.continuation.locus import Locus, Place
+from nonsmooth.continuation.locus import Locus
 from nonsmooth.continuation.path import VIOLATIONS
 
 __all__ = ["ENDS", "CurveMarch", "march_curve"]
@@ -42,12 +42,12 @@ BESIDE = 1e-6
 class CurveMarch:
     """Places in the order of the march, points of codimension two with their places, and the ending (of ``ENDS``)."""
 
-    places: list[Place] = field(default_factory=list)
+    places: list[Point] = field(default_factory=list)
     special: list[tuple[str, int]] = field(default_factory=list)
     ending: str = "points"
 
 
-def _violation(locus: Locus, place: Place) -> FloatArray:
+def _violation(locus: Locus, place: Point) -> FloatArray:
     """How far the path is from leaving its signature; on a grazing curve by another touch than its own."""
     path = place.path
     if locus.kind == "grazing":
@@ -58,7 +58,7 @@ def _violation(locus: Locus, place: Place) -> FloatArray:
 
 
 def march_curve(
-    locus: Locus, place: Place, box: Any, largest: float, most: int, begin: Place | None = None
+    locus: Locus, place: Point, box: Any, largest: float, most: int, begin: Point | None = None
 ) -> CurveMarch:
     """Follow a curve from a place along its tangent until it ends; ``begin``: where it would close."""
     found = CurveMarch()
@@ -70,7 +70,7 @@ def march_curve(
 
 
 def _follow(
-    found: CurveMarch, locus: Locus, place: Place, box: Any, largest: float, most: int, begin: Place | None
+    found: CurveMarch, locus: Locus, place: Point, box: Any, largest: float, most: int, begin: Point | None
 ) -> None:
     """March on, place by place, into ``found``."""
     ds = min(FIRST, largest)
@@ -85,7 +85,7 @@ def _follow(
                 found.ending = "no_convergence"
                 break
             continue
-        events: list[tuple[float, str, Place]] = []
+        events: list[tuple[float, str, Point]] = []
         for i, (low, high) in enumerate(box):
             value = float(new.X[-2 + i])
             if not low <= value <= high:
@@ -139,7 +139,7 @@ def _follow(
             _anchor_anew(locus, place)
 
 
-def _anchor_anew(locus: Locus, place: Place) -> None:
+def _anchor_anew(locus: Locus, place: Point) -> None:
     """Put the phase condition of an orbit without transitions through the last point."""
     locus.shooting.reference = plane_across(
         place.X[: locus.shooting.n], place.solved.legs.f_begin[0], locus.size
@@ -156,7 +156,7 @@ class _Edge:
     which: int
     edge: float
 
-    def __call__(self, place: Place) -> float:
+    def __call__(self, place: Point) -> float:
         return float(place.X[-2 + self.which]) - self.edge
 
 
@@ -167,7 +167,7 @@ class _Leaving:
     locus: Locus
     way: int
 
-    def __call__(self, place: Place) -> float:
+    def __call__(self, place: Point) -> float:
         return float(np.clip(_violation(self.locus, place)[self.way], -1e3, 1e3))
 
 
@@ -175,7 +175,7 @@ class _Leaving:
 class _Turning:
     """How the parameters move, against how they did."""
 
-    before: Place
+    before: Point
 
-    def __call__(self, place: Place) -> float:
+    def __call__(self, place: Point) -> float:
         return float(place.tangent[-2:] @ self.before.tangent[-2:])

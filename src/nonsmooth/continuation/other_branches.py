@@ -140,4 +140,4 @@ def _origin(curve: Curve, Y: FloatArray, direction: FloatArray) -> PointRecord:
     path = curve.walk.along(solved, curve.shooting.split(solved.X)[1])
     assert path is not None
     M = solved.monodromy
-    return point_record(curve, Point(Y, direction, solved, M, multipliers_of(M), path, 0.0, 0))
+    return point_record(curve, Point(Y, direction, solved, M, multipliers_of(M), path, 0))
