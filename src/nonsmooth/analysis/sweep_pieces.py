@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from nonsmooth.analysis.classify import Verdict
 from nonsmooth.analysis.density import CountedSlot, Counter
 from nonsmooth.analysis.settle import Attractors
 from nonsmooth.analysis.settled import usable
-from nonsmooth.campaign.threads import cores
+from nonsmooth.campaign.threads import cores, over_items
 from nonsmooth.flow.engine import Chain, FloatArray
 from nonsmooth.kernels import codes
 from nonsmooth.results.progress import progress as progress_bar
@@ -92,20 +91,7 @@ def run_pieces(
     total = sum(len(order) for _, order in pieces)
     with progress_bar(total, f"sweep over {label}", progress) as advance:
         report = Report(advance)
-        if workers == 1:
-            for slot, order in pieces:
-                march(slot, order, report)
-            return
-        with ThreadPoolExecutor(workers) as pool:
-            futures = [pool.submit(march, slot, order, report) for slot, order in pieces]
-            try:
-                for future in as_completed(futures):
-                    future.result()
-            except BaseException:
-                report.stop.set()
-                for future in futures:
-                    future.cancel()
-                raise
+        over_items(pieces, lambda piece: march(*piece, report), lambda *_: None, workers, report.stop)
 
 
 def run_on_gpu(
