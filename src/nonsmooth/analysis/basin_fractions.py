@@ -17,7 +17,7 @@ from nonsmooth.analysis.chart import described
 from nonsmooth.analysis.chart_work import CHUNK, STORED
 from nonsmooth.analysis.sweep import swept_values
 from nonsmooth.campaign.run import run
-from nonsmooth.flow.arguments import check_options, check_system, whole_number
+from nonsmooth.flow.arguments import check_options, check_system, real_number, whole_number
 from nonsmooth.flow.sections import Poincare, Stroboscopic
 from nonsmooth.flow.starts import random_starts, start_states
 
@@ -135,7 +135,7 @@ def _starts(system: System, box: Any, n_starts: int, seed: int) -> Any:
     for name, ends in box.items():
         if np.shape(ends) != (2,):
             raise ValueError(f"box[{name!r}] = {ends!r}: give its lowest and highest value; box={{{form}}}")
-    low, high = ({name: float(ends[k]) for name, ends in box.items()} for k in (0, 1))
+    low, high = ({name: real_number(ends[k], f"box[{name!r}]") for name, ends in box.items()} for k in (0, 1))
     return random_starts(n_starts, low, high, whole_number(seed, "seed", 0))
 
 

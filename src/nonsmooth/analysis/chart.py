@@ -114,7 +114,7 @@ def chart(
 
     Notes
     -----
-    No section points are stored: a chart of N points takes about 24 bytes per point without extremes.
+    No section points are stored: without extremes a chart takes 19 bytes per point.
     With ``refine`` a coarse grid is computed, cells whose corners differ are halved down to single points, and so are
     those beside them where a point in between disagrees; see :mod:`nonsmooth.analysis.chart_refine`.
     """

@@ -32,7 +32,12 @@ def _run(options: argparse.Namespace) -> int:
     from nonsmooth.analysis.chart_work import STORED
     from nonsmooth.campaign.plan import plan
     from nonsmooth.cli.study import read_study
+    from nonsmooth.flow.arguments import real_number, whole_number
 
+    if options.workers is not None:
+        whole_number(options.workers, "--workers", 1)
+    if not real_number(options.seconds, "--seconds") > 0:
+        raise ValueError(f"--seconds {options.seconds:g}: the time to spend on the sample must be positive")
     study = read_study(options.study)
     if study.verb != "chart":
         raise ValueError(f"{options.study}: plan is for charts, this study runs {study.verb}")
