@@ -76,6 +76,10 @@ results = {
         ns.basins, oscillator.with_parameters(g=0.0014, omega=11.15, rho=0.33),
         {"x": [-0.006, 0.0, 0.006], "v": [-0.1, 0.1]}, transient=60, keep=20, max_period=6,
     ),
+    "basin_fractions": both(
+        ns.basin_fractions, oscillator.with_parameters(g=0.0014, omega=11.15), "rho", [0.3, 0.33], n_starts=6,
+        box={"x": (-0.02, 0.02), "v": (-0.2, 0.2)}, seed=1, transient=60, keep=20, max_period=6,
+    ),
     "sweep": both(
         ns.sweep, oscillator.with_parameters(g=-0.0045, omega=3.69), "rho", [0.2, 0.3, 0.47], direction=None,
         transient=20, keep=20,

@@ -85,6 +85,14 @@ def test_basins_have_the_labels_and_attractors_of_the_processor(simulated: dict[
     np.testing.assert_allclose(*pair(simulated, "basins", "section_points"), rtol=0, atol=1e-9)
 
 
+def test_basin_fractions_are_those_of_the_processor(simulated: dict[str, Any]) -> None:
+    for name in ("fraction", "fraction_error", "period_number", "not_converged", "diverged", "n_starts_99"):
+        np.testing.assert_array_equal(*pair(simulated, "basin_fractions", name), err_msg=name)
+    assert (pair(simulated, "basin_fractions", "fraction")[0] > 0).sum() == 3  # one attractor, then two
+    for name in ("section", "maximum", "minimum"):
+        np.testing.assert_allclose(*pair(simulated, "basin_fractions", name), rtol=0, atol=1e-9, err_msg=name)
+
+
 def test_a_sweep_has_the_periodic_points_of_the_processor(simulated: dict[str, Any]) -> None:
     np.testing.assert_array_equal(*pair(simulated, "sweep", "period_number"))
     np.testing.assert_array_equal(*pair(simulated, "sweep", "status"))
@@ -128,6 +136,8 @@ def test_what_a_gpu_does_not_take_is_said_at_the_door() -> None:
         ns.sweep(oscillator, "rho", [0.1, 0.2], device="cuda")
     with pytest.raises(ValueError, match='runs by method="taylor"'):
         ns.chart(oscillator, PLANE, method="taylor", device="cuda")
+    with pytest.raises(ValueError, match='basin_fractions with device="cuda".*runs by method="rkf45"'):
+        ns.basin_fractions(oscillator, "rho", [0.1, 0.2], box={"x": (0.0, 0.1)}, method="rkf45", device="cuda")
     with pytest.raises(ValueError, match="stroboscopic sections only"):
         ns.chart(oscillator, PLANE, section=ns.Poincare("penetration"), device="cuda")
 
@@ -144,6 +154,10 @@ def test_threads_and_clusters_are_those_of_the_processor(monkeypatch: pytest.Mon
         ns.chart(ns.models.discontinuous_support(), PLANE, device="cuda", threads=2)
     with pytest.raises(ValueError, match="leave client out"):
         ns.chart(ns.models.discontinuous_support(), PLANE, device="cuda", client=object())
+    with pytest.raises(ValueError, match="leave threads out"):
+        ns.basin_fractions(
+            ns.models.discontinuous_support(), "rho", [0.1], box={"x": (0.0, 0.1)}, device="cuda", threads=2
+        )
     with pytest.raises(ValueError, match="a single trajectory is one thread"):
         ns.lyapunov(ns.models.discontinuous_support(), device="cuda")
 

@@ -184,7 +184,7 @@ def basins(
 
 def settler_of(
     system: System, section: Any, transient: Any, keep: Any, max_period: Any, method: str, rtol: Any, atol: Any,
-    expert: Mapping[str, Any], *, threads: Any = None, device: str = "cpu",
+    expert: Mapping[str, Any], *, threads: Any = None, device: str = "cpu", verb: str = "basins",
 ) -> tuple[Any, Settler]:  # fmt: skip
     """Check the options that basins share, and the settler they describe."""
     transient, keep = whole_number(transient, "transient", 0), whole_number(keep, "keep", 2)
@@ -198,7 +198,7 @@ def settler_of(
             "one too: section=ns.Stroboscopic(phase)"
         )
     engine = engine_for(system, method, rtol, atol, **expert)
-    on_gpu(device, "basins", engine, plan)
+    on_gpu(device, verb, engine, plan)
     settler = Settler(
         system, engine, plan, transient, keep, max_period, rtol=rtol, atol=atol, expert=expert, device=device
     )  # fmt: skip
