@@ -86,7 +86,7 @@ def basins(
     client : dask.distributed.Client, optional
         Computes the chunks on its workers.
     any_cpu : bool
-        Go on with a store that was begun on another type of processor.
+        Go on with a store that was begun on another type of processor, or of GPU with ``device="cuda"``.
     progress : bool
         A bar on a terminal.
 

@@ -61,6 +61,10 @@ class ChartWork:
         least = max(1, self.chunk // len(self.starts))
         return -(-least // row) * row if self.carried else least
 
+    @property
+    def device(self) -> str:
+        return self.settler.device
+
     def columns(self) -> dict[str, Column]:
         many = () if len(self.starts) == 1 else (len(self.starts),)
         n = self.starts.shape[1]
