@@ -73,6 +73,7 @@ mark.unlink()
 found["one lost"] = study("cuda", "cuda")
 found["same files"] = hashes(PATH) == before
 found["show"] = command("show", "cuda.zarr")
+found["plan"] = command("plan", "study.toml", "--seconds", "0.01")
 found["processor"] = study("cpu", "cpu")
 found["gpu's store, processor"] = study("cpu", "cuda", any_cpu=True)
 found["processor's store, gpu"] = study("cuda", "cpu", any_cpu=True)

@@ -48,6 +48,13 @@ def test_the_stores_facts_are_those_of_the_gpu(found: dict[str, Any]) -> None:
     assert "2 of 2 chunks are there" in found["show"]["out"]
 
 
+def test_a_plan_measures_a_sample_on_the_gpu(found: dict[str, Any]) -> None:
+    assert found["plan"]["launches"] > 0
+    lines = {line.split()[0]: line for line in found["plan"]["out"].splitlines()}
+    assert "of one core" in lines["work"]
+    assert lines["gpu"].endswith("s on Numba's CUDA simulator (all 4 points were run)")
+
+
 def test_results_are_the_processors(found: dict[str, Any]) -> None:
     assert found["processor"]["code"] == 0
     assert found["processor"]["launches"] == 0

@@ -9,7 +9,7 @@ from typing import Any
 from nonsmooth.flow.engine import Engine, SectionPlan
 from nonsmooth.flow.planar import PlanarEngine
 
-__all__ = ["BATCH", "DEVICES", "batch_size", "check_device", "on_gpu", "workers_of"]
+__all__ = ["BATCH", "DEVICES", "batch_size", "check_device", "gpu_name", "on_gpu", "workers_of"]
 
 DEVICES = ("cpu", "cuda")
 BATCH = 65536  # trajectories of one chunk of work on a GPU
@@ -23,6 +23,16 @@ def batch_size() -> int:
     if _simulated():
         return BATCH
     return min(BATCH, PER_MULTIPROCESSOR * int(cuda.get_current_device().MULTIPROCESSOR_COUNT))
+
+
+def gpu_name() -> str:
+    """What the present GPU calls itself."""
+    from numba import cuda
+
+    if _simulated():
+        return "Numba's CUDA simulator"
+    name = cuda.get_current_device().name
+    return name.decode() if isinstance(name, bytes) else str(name)
 
 
 def _simulated() -> bool:
