@@ -36,7 +36,7 @@ def planned(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Any:
 
 
 @pytest.mark.parametrize("device", ["cpu", "cuda"])
-def test_without_the_package_it_says_what_to_install(planned: Any, monkeypatch: pytest.MonkeyPatch, device: str) -> None:
+def test_without_the_package_it_says_so(planned: Any, monkeypatch: pytest.MonkeyPatch, device: str) -> None:
     """Also for a study that is to run on a GPU elsewhere."""
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     found = planned(*PAPER, f'device = "{device}"')

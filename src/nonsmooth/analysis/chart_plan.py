@@ -1,8 +1,8 @@
 """What a chart would take on the GPU of this machine: a sample of its points, spread over the plane, run there.
 
 Nothing is reckoned from operations and peaks: the part of its peak that a GPU reaches is what nobody knows before it is
-measured. A sample fills the GPU as a launch of the chart itself does, because a GPU that is half empty is no faster, and
-its threads stand beside those of neighbouring points, as they do there.
+measured. A sample fills the GPU as a launch of the chart itself does, because a GPU that is half empty is no faster,
+and its threads stand beside those of neighbouring points, as they do there.
 """
 
 from __future__ import annotations
@@ -53,7 +53,8 @@ def plan_on_gpu(work: ChartWork, *, seconds: float = 5.0, seed: int = 0) -> GpuP
     size = min(max(batch_size() // len(work.starts), 1), n)
     blocks, begin = -(-n // BLOCK), float(np.random.default_rng(seed).random())
     _took(work, _sample(n, begin, range(1)))  # compiles and loads what all need
-    count, spent, per_place, sampled = -(-size // BLOCK), 0.0, [], 0
+    count, spent, sampled = -(-size // BLOCK), 0.0, 0
+    per_place: list[float] = []
     for first in range(0, blocks, count):
         if len(per_place) >= 2 and spent > seconds:
             break
