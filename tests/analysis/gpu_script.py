@@ -72,6 +72,10 @@ results = {
         ns.chart, ns.models.impact_oscillator(), {"omega": [1.0, 2.7], "A": [0.05, 1.0]}, transient=30, keep=12,
         max_period=4, start=[{"x": 0.0}, {"x": 5.0}],
     ),
+    "carried": both(
+        ns.chart, ns.models.impact_oscillator(), {"d": [0.4, 0.7, 1.0], "omega": [0.9, 2.7]}, carry={"d": "down"},
+        transient=30, keep=12, max_period=4,
+    ),
     "basins": both(
         ns.basins, oscillator.with_parameters(g=0.0014, omega=11.15, rho=0.33),
         {"x": [-0.006, 0.0, 0.006], "v": [-0.1, 0.1]}, transient=60, keep=20, max_period=6,

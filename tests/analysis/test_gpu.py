@@ -56,7 +56,7 @@ def pair(simulated: dict[str, Any], verb: str, name: str) -> tuple[np.ndarray, n
     return np.array(both["cpu"][name]), np.array(both["cuda"][name])
 
 
-@pytest.mark.parametrize("verb", ["chart", "every_period", "stop"])
+@pytest.mark.parametrize("verb", ["chart", "every_period", "stop", "carried"])
 def test_a_chart_has_the_labels_and_extremes_of_the_processor(simulated: dict[str, Any], verb: str) -> None:
     for name in ("period_number", "status", "crossings_per_period", "contacts_per_period"):
         np.testing.assert_array_equal(*pair(simulated, verb, name), err_msg=name)
@@ -130,8 +130,6 @@ def test_what_a_gpu_does_not_take_is_said_at_the_door() -> None:
     oscillator = ns.models.discontinuous_support()
     with pytest.raises(ValueError, match="device = 'gpu' does not exist; allowed: 'cpu', 'cuda'"):
         ns.chart(oscillator, PLANE, device="gpu")
-    with pytest.raises(ValueError, match="none can go on from the state of another.*leave carry out"):
-        ns.chart(oscillator, PLANE, carry={"rho": "up"}, device="cuda")
     with pytest.raises(ValueError, match="direction=None"):
         ns.sweep(oscillator, "rho", [0.1, 0.2], device="cuda")
     with pytest.raises(ValueError, match='runs by method="taylor"'):

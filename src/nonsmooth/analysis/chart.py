@@ -16,6 +16,7 @@ from nonsmooth.campaign.run import run
 from nonsmooth.flow.arguments import check_options, check_system, whole_number
 from nonsmooth.flow.devices import BATCH, on_gpu, workers_of
 from nonsmooth.flow.methods import engine_for
+from nonsmooth.flow.planar import PlanarEngine
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.flow.starts import is_one_start, plain_start, start_states
 
@@ -65,7 +66,8 @@ def chart(
     start : state or list of states, optional
         Every point begins there; zeros where not given. Several starts add the dim ``start`` and ``n_attractors``.
     carry : mapping, optional
-        ``{"rho": "up"}`` or ``{"rho": "down"}``: along this parameter the state is carried from point to point.
+        ``{"rho": "up"}`` or ``{"rho": "down"}``: along this parameter the state is carried from point to point. On a
+        GPU the rows run side by side, so it needs many of them.
     section : Stroboscopic or Poincare, optional
         ``Stroboscopic(0)`` where the system has a period.
     transient, keep : int
@@ -180,7 +182,7 @@ def plan_chart(
         raise ValueError(f"lyapunov = {lyapunov} returns are too few for an exponent; at least 40")
     extremes = bool(extremes) or len(starts) > 1  # attractors are told apart by them
     engine = engine_for(system, method, rtol, atol, **expert)
-    gpu = on_gpu(device, "chart", engine, plan, carried=along is not None)
+    gpu = on_gpu(device, "chart", engine, plan, carried=along is not None and not isinstance(engine, PlanarEngine))
     settler = Settler(
         system, engine, plan, transient, keep, max_period, bool(stop_early), extremes, rtol, atol, expert, device
     )

@@ -20,11 +20,12 @@ from nonsmooth.flow.engine import IntArray
 __all__ = ["GpuPlan", "plan_on_gpu"]
 
 BLOCK = 64  # neighbouring points that stay together
+POINTS = 16  # of each carried row
 
 
 @dataclass(frozen=True)
 class GpuPlan:
-    """Seconds on the wall for all points of a chart on one GPU, with their standard error (0: all were run)."""
+    """Seconds on the wall for all points of a chart on one GPU, with their standard error (0: all were run; NaN: not known)."""
 
     name: str
     places: int
@@ -37,7 +38,8 @@ class GpuPlan:
         if self.sampled == self.places:
             how = f"all {self.places} points were run"
         else:
-            how = f"+- {duration(self.error)}; sampled {self.sampled} points"
+            error = "" if np.isnan(self.error) else f"+- {duration(self.error)}; "
+            how = f"{error}sampled {self.sampled} points"
         return f"gpu         {duration(self.seconds)} on {self.name} ({how})"
 
 
@@ -50,6 +52,8 @@ def plan_on_gpu(work: ChartWork, *, seconds: float = 5.0, seed: int = 0) -> GpuP
         With ``device="cuda"``, over the whole plane.
     """
     n = work.bounds(work.n_chunks() - 1)[1]
+    if work.carried:
+        return _carried(work, n)
     size = min(max(batch_size() // len(work.starts), 1), n)
     blocks, begin = -(-n // BLOCK), float(np.random.default_rng(seed).random())
     _took(work, _sample(n, begin, range(1)))  # compiles and loads what all need
@@ -67,6 +71,18 @@ def plan_on_gpu(work: ChartWork, *, seconds: float = 5.0, seed: int = 0) -> GpuP
     return GpuPlan(gpu_name(), n, min(sampled, n), n * float(np.mean(per_place)), error)
 
 
+def _carried(work: ChartWork, n: int) -> GpuPlan:
+    """The rows of one chunk over a few of their points."""
+    (outer, rows), (inner, values) = work.grid.items()
+    few = values[np.unique(np.linspace(0, len(values) - 1, POINTS).astype(int))]
+    at_once = work.bounds(0)[1] // len(values)
+    _took(replace(work, grid={outer: rows[:1], inner: few[:1]}), None)
+    took = _took(replace(work, grid={outer: rows[:at_once], inner: few}), None)
+    sampled = min(at_once, len(rows)) * len(few)
+    seconds = took * len(values) / len(few) * work.n_chunks()
+    return GpuPlan(gpu_name(), n, sampled, seconds, np.nan if sampled < n else 0.0)
+
+
 def _sample(n: int, begin: float, which: range) -> IntArray:
     """Places of some blocks out of n places; every beginning of the blocks' order lies evenly over the whole."""
     blocks = -(-n // BLOCK)
@@ -75,9 +91,9 @@ def _sample(n: int, begin: float, which: range) -> IntArray:
     return places[places < n]
 
 
-def _took(work: ChartWork, places: IntArray) -> float:
-    """Seconds on the wall for some places in one chunk."""
-    sample = replace(work, where=places, chunk=len(places) * len(work.starts))
+def _took(work: ChartWork, places: IntArray | None) -> float:
+    """Seconds on the wall for some places (None: all) in one chunk."""
+    sample = work if places is None else replace(work, where=places, chunk=len(places) * len(work.starts))
     began = time.perf_counter()
     sample.compute(0)
     return time.perf_counter() - began
