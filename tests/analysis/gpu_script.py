@@ -12,9 +12,9 @@ import numpy as np
 
 import nonsmooth as ns
 from nonsmooth.flow import planar_cuda
+from nonsmooth.kernels.cuda_module import cuda_planar_module
 
 LAUNCHED: dict[str, str] = {}
-SHAPES: dict[str, list[int]] = {}
 
 
 def type_of(value: Any) -> str:
@@ -45,8 +45,9 @@ planar_cuda.PlanarOnGpu.launch = launch
 
 
 def both(verb: Any, *arguments: Any, **options: Any) -> dict[str, Any]:
-    """The numbers of a verb's result on both devices."""
-    found = {}
+    """The numbers of a verb's result on both devices, and how many tables the GPU built."""
+    found: dict[str, Any] = {}
+    before = built
     for device in ("cpu", "cuda"):
         result = verb(*arguments, device=device, progress=False, **options)
         found[device] = {
@@ -54,9 +55,20 @@ def both(verb: Any, *arguments: Any, **options: Any) -> dict[str, Any]:
             for name in result.data_vars
             if result[name].dtype.kind in "fiu"
         }
-    return found
+    return found | {"built": built - before}
 
 
+paper = cuda_planar_module(1, 2, 2, 1, 2, 5)
+plain_fill, built = paper.fill, 0
+
+
+def fill(*arguments: Any) -> None:
+    global built
+    built += 1
+    plain_fill(*arguments)
+
+
+paper.fill = fill
 oscillator = ns.models.discontinuous_support()
 planar_cuda.SLICE = 16  # so that a transient takes several launches
 results = {

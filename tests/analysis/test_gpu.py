@@ -34,7 +34,7 @@ for name, signature in json.load(sys.stdin).items():
     found[name] = [text.count(".visible .entry"), ".target sm_90" in text]
 print(json.dumps(found))
 """
-ENTRIES = {"judge", "beside", "decide", "frames", "advance", "neighbours"}
+ENTRIES = {"tabulate", "judge", "beside", "decide", "frames", "advance", "neighbours"}
 
 
 def run(code: list[str], given: str = "", **environment: str) -> str:
@@ -117,6 +117,12 @@ def test_spectra_are_those_of_the_processor(simulated: dict[str, Any]) -> None:
 def test_every_kernel_compiles_for_the_types_it_is_launched_with(simulated: dict[str, Any], entries: set[str]) -> None:
     printed = run(["-c", COMPILE], json.dumps({name: simulated["launched"][name] for name in sorted(entries)}))
     assert json.loads(printed) == {name: [1, True] for name in entries}
+
+
+def test_tables_are_built_once_for_each_point(simulated: dict[str, Any]) -> None:
+    """Six points of a chart and of its exponents, three of a sweep, two of spectra; whatever launches and starts."""
+    built = {verb: simulated["results"][verb]["built"] for verb in ("chart", "every_period", "sweep", "lyapunov")}
+    assert built == {"chart": 12, "every_period": 2, "sweep": 3, "lyapunov": 2}
 
 
 def test_no_kernel_is_left_out(simulated: dict[str, Any]) -> None:

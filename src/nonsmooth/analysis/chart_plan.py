@@ -25,7 +25,9 @@ POINTS = 16  # of each carried row
 
 @dataclass(frozen=True)
 class GpuPlan:
-    """Seconds on the wall for all points of a chart on one GPU, with their standard error (0: all were run; NaN: not known)."""
+    """Seconds on the wall for all points of a chart on one GPU, with their standard error.
+
+    The error is 0 where all points were run, NaN where it is not known."""
 
     name: str
     places: int

@@ -45,8 +45,8 @@ def along_rows(settler: Settler, points: FloatArray, length: int, starts: FloatA
 def side_by_side(settler: Settler, points: FloatArray, length: int, starts: FloatArray) -> Settled:
     """The same, all rows together from point to point, by the exact flow of planar systems.
 
-    A run goes on from where the one at the point before has ended; from its start where that one failed, or where a stop
-    has moved over its state."""
+    A run goes on from where the one at the point before has ended; from its start where that one failed, or where a
+    stop has moved over its state."""
     n_rows, n_starts = len(points) // length, len(starts)
     begin = np.tile(starts, (n_rows, 1))
     first = np.repeat(np.arange(n_rows) * length, n_starts)

@@ -73,7 +73,9 @@ class PlanarOnGpu:
         self.cuda, self.threads, self.phase = cuda, THREADS, float(phase)
         self.period: FloatArray = tables.period
         multiples = tables.linear[4] if len(tables.linear[4]) else np.ones(1, dtype=np.int64)
-        self.tables = cuda.to_device(_packed(tables.linear)), cuda.to_device(multiples)
+        given = cuda.to_device(_packed(tables.linear)), cuda.to_device(multiples)
+        self.tables = *given, cuda.device_array((self.module.TABLE, len(points)))
+        self.launch(self.module.tabulate, np.arange(len(points)), *self.tables)
         self.net = tuple(cuda.to_device(_not_empty(part)) for part in engine.net)
         self.limit = cuda.to_device(DIVERGENCE * engine.scale)
         self.plans = [cuda.to_device(np.array([-1, 1, -1, 1, 1, extremes], dtype=np.int64)) for extremes in (0, 1)]
