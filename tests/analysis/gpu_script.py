@@ -15,6 +15,7 @@ from nonsmooth.flow import planar_cuda
 from nonsmooth.kernels.cuda_module import cuda_planar_module
 
 LAUNCHED: dict[str, str] = {}
+SHAPES: dict[str, list[int]] = {}
 
 
 def type_of(value: Any) -> str:
@@ -45,9 +46,8 @@ planar_cuda.PlanarOnGpu.launch = launch
 
 
 def both(verb: Any, *arguments: Any, **options: Any) -> dict[str, Any]:
-    """The numbers of a verb's result on both devices, and how many tables the GPU built."""
-    found: dict[str, Any] = {}
-    before = built
+    """The numbers of a verb's result on both devices."""
+    found = {}
     for device in ("cpu", "cuda"):
         result = verb(*arguments, device=device, progress=False, **options)
         found[device] = {
@@ -55,7 +55,7 @@ def both(verb: Any, *arguments: Any, **options: Any) -> dict[str, Any]:
             for name in result.data_vars
             if result[name].dtype.kind in "fiu"
         }
-    return found | {"built": built - before}
+    return found
 
 
 paper = cuda_planar_module(1, 2, 2, 1, 2, 5)
@@ -68,15 +68,21 @@ def fill(*arguments: Any) -> None:
     plain_fill(*arguments)
 
 
+def counted(*arguments: Any, **options: Any) -> dict[str, Any]:
+    """Both devices, and how many tables the GPU built."""
+    before = built
+    return both(*arguments, **options) | {"built": built - before}
+
+
 paper.fill = fill
 oscillator = ns.models.discontinuous_support()
 planar_cuda.SLICE = 16  # so that a transient takes several launches
 results = {
-    "chart": both(
+    "chart": counted(
         ns.chart, oscillator.with_parameters(g=-0.0045), {"omega": [3.2, 3.69], "rho": [0.15, 0.3, 0.45]}, transient=40,
         keep=12, max_period=4, lyapunov=40,
     ),
-    "every_period": both(
+    "every_period": counted(
         ns.chart, oscillator.with_parameters(g=-0.0045), {"omega": [3.69], "rho": [0.3, 0.47]}, transient=20, keep=12,
         max_period=4, stop_early=False, extremes=False, start=[{"x": 0.0}, {"x": 0.01, "v": 0.05}],
     ),
@@ -96,11 +102,11 @@ results = {
         ns.basin_fractions, oscillator.with_parameters(g=0.0014, omega=11.15), "rho", [0.3, 0.33], n_starts=6,
         box={"x": (-0.02, 0.02), "v": (-0.2, 0.2)}, seed=1, transient=60, keep=20, max_period=6,
     ),
-    "sweep": both(
+    "sweep": counted(
         ns.sweep, oscillator.with_parameters(g=-0.0045, omega=3.69), "rho", [0.2, 0.3, 0.47], direction=None,
         transient=20, keep=20,
     ),
-    "lyapunov": both(
+    "lyapunov": counted(
         ns.lyapunov, oscillator.with_parameters(g=-0.0045, omega=3.69), parameter="rho", values=[0.25, 0.33],
         direction=None, periods=64, transient=20,
     ),

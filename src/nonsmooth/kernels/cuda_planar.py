@@ -26,8 +26,8 @@ def row_of(buffers, row):
 
 @entry
 def advance(
-    jobs, rows, packed, multiples, built, net, u, clock, counters, transient, keep, plan, full, legs, apart, phase, limit,
-    out, other,
+    jobs, rows, packed, multiples, built, net, u, clock, counters, transient, keep, plan, full, legs, apart, phase,
+    limit, out, other,
 ):  # fmt: skip
     """Thread k: march the state of job j = jobs[k] under parameter row rows[j] by transient[j] section returns, then
     keep[j] more into row j of ``out``. (One number for all jobs where these arrays are short.)
