@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -47,3 +48,17 @@ def test_a_chart_that_fits_into_a_launch_is_run_whole(monkeypatch: pytest.Monkey
     assert found.error == 0.0
     assert found.seconds == pytest.approx(2e-3 * 49.5)
     assert found.text() == "gpu         0.099 s on a GPU (all 100 points were run)"
+
+
+def test_carried_rows_by_a_few_of_their_points(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each point of a row costs 10 ms whatever the number of rows: 100 points in one chunk, 1 s."""
+    grid = {"omega": np.linspace(3.0, 7.0, 100), "rho": np.linspace(0.1, 0.3, 30)}
+    work = plan_chart(ns.models.discontinuous_support(), grid, carry={"omega": "up"}).work
+    monkeypatch.setattr(chart_plan, "_took", lambda work, places: 1e-2 * len(work.grid["omega"]))
+    monkeypatch.setattr(chart_plan, "gpu_name", lambda: "a GPU")
+    work = replace(work, settler=replace(work.settler, device="cuda"), chunk=65536)
+    assert work.n_chunks() == 1
+    found = chart_plan.plan_on_gpu(work)
+    assert found.seconds == pytest.approx(1.0)
+    assert found.sampled == 16 * 30
+    assert found.text() == "gpu         1 s on a GPU (sampled 480 points)"
