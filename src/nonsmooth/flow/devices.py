@@ -105,7 +105,7 @@ def on_gpu(device: Any, verb: str, engine: Engine, plan: SectionPlan | None, *, 
     if carried:
         raise ValueError(
             f'{verb} with device="cuda" runs all points at once, so none can go on from the state of another: begin '
-            'each at start (direction=None), or use device="cpu"'
+            'each at start (chart: leave carry out; sweep, lyapunov: direction=None), or use device="cpu"'
         )
     if importlib.util.find_spec("numba_cuda") is None:
         raise ImportError(
