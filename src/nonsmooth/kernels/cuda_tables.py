@@ -67,8 +67,8 @@ def tabulate(jobs, packed, multiples, built):
 fill = build
 
 
-@device
-def build(*_):  # type: ignore[no-redef] # the joined text's other functions shall find this one from here on
+@device  # type: ignore[no-redef] # the joined text's other functions shall find this one from here on
+def build(*_):
     """Nothing, from here on: where ``chain`` and ``spectrum`` would build tables, they stand already."""
 
 
