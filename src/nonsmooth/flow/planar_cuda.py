@@ -14,6 +14,7 @@ from nonsmooth.kernels import codes
 
 __all__ = ["SLICE", "Buffers", "PlanarOnGpu", "States"]
 
+TABLES = 6  # of a thread's work arrays, the first ones: what ``build`` fills (see ``kernels.planar_layout``)
 SLICE = 256  # section returns of one launch, at most: below a second also on a small GPU
 
 
@@ -74,7 +75,8 @@ class PlanarOnGpu:
         self.period: FloatArray = tables.period
         multiples = tables.linear[4] if len(tables.linear[4]) else np.ones(1, dtype=np.int64)
         given = cuda.to_device(_packed(tables.linear)), cuda.to_device(multiples)
-        self.tables = *given, cuda.device_array((self.module.TABLE, len(points)))
+        of_point = sum(part.size for part in self.module.scratch(n_modes, *self.sizes, n_rows)[:TABLES])
+        self.tables = *given, cuda.device_array((of_point, len(points)))
         self.launch(self.module.tabulate, np.arange(len(points)), *self.tables)
         self.net = tuple(cuda.to_device(_not_empty(part)) for part in engine.net)
         self.limit = cuda.to_device(DIVERGENCE * engine.scale)

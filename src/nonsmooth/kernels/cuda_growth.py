@@ -6,7 +6,7 @@ of time; both go on from where the launch before left them, so that a launch sta
 
 from numba import float64, int64
 
-from .cuda_arrays import N_INDICATORS, N_OUTPUTS
+from .cuda_planar import N_INDICATORS, N_OUTPUTS
 from .cuda_tables import tabled
 from .cuda_target import cuda, entry, local
 from .planar_settle import part

@@ -18,7 +18,7 @@ __all__ = ["cuda_planar_module"]
 
 PARTS = (
     "planar_tables", "planar_polynomial", "planar_search", "planar_march", "planar_extremes", "planar_layout",
-    "planar_chain", "planar_settle", "planar_spectrum", "cuda_arrays", "cuda_tables", "cuda_planar", "cuda_judge",
+    "planar_chain", "planar_settle", "planar_spectrum", "cuda_planar", "cuda_tables", "cuda_advance", "cuda_judge",
     "cuda_growth",
 )  # fmt: skip
 

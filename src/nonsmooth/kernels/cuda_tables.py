@@ -5,13 +5,9 @@ arrays, because arrays of constant shape are what its code is compiled for. Neig
 numbers; where all have one point, as for basins, a read serves a whole warp.
 """
 
-from .cuda_arrays import N_FUNCTIONALS, N_MODES, N_NODES, N_SUMS, N_TURNS, arrays_of_thread
+from .cuda_planar import N_MODES, arrays_of_thread
 from .cuda_target import cuda, device, entry, local
-from .planar_search import WIDTH
-from .planar_tables import HARMONICS, M, build
-
-# Numbers of one point.
-TABLE = N_MODES * (N_NODES * (2 * M + N_TURNS) + N_FUNCTIONALS * (N_SUMS + M * WIDTH) + 2 * M + 4)
+from .planar_tables import HARMONICS, build
 
 
 @device
