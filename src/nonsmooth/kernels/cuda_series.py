@@ -17,6 +17,7 @@ from .codes import PAUSED
 from .cuda_target import cuda, entry, local
 from .polynomial import stack_size
 from .series import march
+from .series_places import N_CHOICE, N_CONTROL, N_TALLY
 
 # Set for each system and method.
 METHOD, ORDER, CHECKED, CORNERS, NONLINEAR_ROWS, N_GUARDS = 0, 16, 0, 0, 0, 0
@@ -42,7 +43,7 @@ WIDTH = max(ORDER, 6) + 1
 N_SCRATCH_ROWS = max(N_SCRATCH, 1)  # of the model
 STACK = stack_size(WIDTH)
 N_MEMO = place.N_MEMO + N_U
-N_WHOLE = place.N_TALLY + N_SIDES  # numbers kept between launches
+N_WHOLE = N_TALLY + N_SIDES  # numbers kept between launches
 N_REAL = N_MEMO + 2 * N_SIDES + 2 * N_MODES
 
 
@@ -111,15 +112,15 @@ def advance(
     j = jobs[k]
     i = rows[j]
     work = arrays_of_thread()
-    choice = cuda.local.array(place.N_CHOICE, int64)
-    control = cuda.local.array(place.N_CONTROL, float64)
-    tally = cuda.local.array(place.N_TALLY, int64)
+    choice = cuda.local.array(N_CHOICE, int64)
+    control = cuda.local.array(N_CONTROL, float64)
+    tally = cuda.local.array(N_TALLY, int64)
     memo = cuda.local.array(N_MEMO, float64)
     state = cuda.local.array(N_U, float64)
     q = cuda.local.array(N_Q, float64)
     time = cuda.local.array(3, float64)
     window = cuda.local.array((2, SEEN_ROWS), float64)
-    for n in range(place.N_CHOICE):
+    for n in range(N_CHOICE):
         choice[n] = 0
     choice[place.METHOD], choice[place.ORDER], choice[place.LOCATE], choice[place.CHECKED] = METHOD, ORDER, 1, CHECKED
     choice[place.CORNERS], choice[place.NONLINEAR_ROWS], choice[place.N_GUARDS] = CORNERS, NONLINEAR_ROWS, N_GUARDS
@@ -142,19 +143,19 @@ def advance(
         time[n] = clock[j, n]
     scale, measured, side, usual, dwell = work[11], work[12], work[13], work[16], work[22]
     if fresh == 1:
-        for n in range(place.N_TALLY):
+        for n in range(N_TALLY):
             tally[n] = 0
         for n in range(N_MEMO):
             memo[n] = 0.0
         tally[place.SETTLED] = settled[j]
     else:
         choice[place.PAUSE] += whole[place.STEPS, j]
-        for n in range(place.N_TALLY):
+        for n in range(N_TALLY):
             tally[n] = whole[n, j]
         for n in range(N_MEMO):
             memo[n] = real[n, j]
         for n in range(N_SIDES):
-            side[n] = whole[place.N_TALLY + n, j]
+            side[n] = whole[N_TALLY + n, j]
             scale[n] = real[N_MEMO + n, j]
             measured[n] = real[N_MEMO + N_SIDES + n, j]
         for n in range(N_MODES):
@@ -177,12 +178,12 @@ def advance(
         extremes[j, 0, n] = window[0, n]
         extremes[j, 1, n] = window[1, n]
     if code == PAUSED:
-        for n in range(place.N_TALLY):
+        for n in range(N_TALLY):
             whole[n, j] = tally[n]
         for n in range(N_MEMO):
             real[n, j] = memo[n]
         for n in range(N_SIDES):
-            whole[place.N_TALLY + n, j] = side[n]
+            whole[N_TALLY + n, j] = side[n]
             real[N_MEMO + n, j] = scale[n]
             real[N_MEMO + N_SIDES + n, j] = measured[n]
         for n in range(N_MODES):
