@@ -151,10 +151,10 @@ def sweep(
         "method": method, "rtol": rtol, "atol": atol, **({"device": device} if gpu else {}), **expert,
     }  # fmt: skip
     squeeze = (() if direction == "both" else ("direction",)) + (("start",) if is_one_start(start) else ())
-    if gpu:
-        run_on_gpu(engine, points, starts, attractors, slots, progress, parameter)
-        return _dataset(system, engine.name, parameter, numbers, directions, starts, slots, options, squeeze)
     memory = system.memory_vector()
+    if gpu:
+        run_on_gpu(engine, points, starts, memory, attractors, slots, progress, parameter)
+        return _dataset(system, engine.name, parameter, numbers, directions, starts, slots, options, squeeze)
 
     def march(slot: tuple[int, int], order: Sequence[int], report: Report) -> None:
         d, k = slot

@@ -35,6 +35,29 @@ class States:
     def all(self) -> tuple[Any, ...]:
         return self.u, self.memory, self.clock, self.counters
 
+    def taken(self, cuda: Any, which: IntArray, moved: FloatArray) -> States:
+        """New states beside some of these: ``moved`` is added to their u."""
+        parts = [part.copy_to_host()[which] for part in (*self.all(), self.rows)]
+        parts[0] = parts[0] + moved
+        return States(*map(cuda.to_device, parts))
+
+    def copy(self, cuda: Any) -> States:
+        return self.taken(cuda, np.arange(len(self.rows)), np.zeros((1, 1)))
+
+    def push(self, which: IntArray, moved: FloatArray) -> None:
+        """Add ``moved`` to some of the states."""
+        if len(which):
+            u = self.u.copy_to_host()
+            u[which] += moved
+            self.u.copy_to_device(u)
+
+    def restore(self, other: States, which: IntArray) -> None:
+        """Put some of them where they are in ``other``."""
+        for mine, its in zip(self.all(), other.all(), strict=True):
+            found = mine.copy_to_host()
+            found[which] = its.copy_to_host()[which]
+            mine.copy_to_device(found)
+
 
 @dataclass
 class Buffers:
@@ -93,6 +116,7 @@ class SeriesOnGpu:
         self.rows = self.n + len(traced.indicators) + len(traced.outputs)
         self.module, self.cuda, self.threads, self.plan = module_of(engine, tables), cuda, THREADS, plan
         self.period: FloatArray = tables.periods
+        self.repeats = engine.repeats
         columns = points.T if points.shape[1] else np.zeros((1, len(points)))
         phase = plan.phase if plan.indicator < 0 else 0.0
         step = 0.0 if engine.step is None else engine.step
@@ -126,6 +150,13 @@ class SeriesOnGpu:
             array((module.N_WHOLE, n), whole), array((module.N_REAL, n)), array((n, max(keep, 1), self.n + 2)),
             array((n, 2, self.rows)), array(n, whole), array(n, whole), array(n), array(n, whole),
         )  # fmt: skip
+
+    def extremes(self, out: Buffers) -> FloatArray:
+        """Maxima and minima (2, N, rows) of states, indicators and outputs over the kept window."""
+        found: FloatArray = out.extremes.copy_to_host()
+        for row, original in self.repeats.items():
+            found[:, :, row] = found[:, :, original]
+        return found.transpose(1, 0, 2)
 
     def run(
         self, jobs: IntArray, states: States, transient: Any, keep: Any, out: Buffers, settled: Any = False
