@@ -27,6 +27,7 @@ FOLDER = Path(__file__).parent
 COMPILE = """
 import json, sys
 import nonsmooth as ns
+from gpu_series_systems import filtered, two_wells
 from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.series_cuda import module_of
 from nonsmooth.kernels.cuda_ptx import ptx_of_module
