@@ -194,7 +194,8 @@ def main() -> int:
     parser.add_argument("--out", type=Path, help="a file for the page that is printed")
     options = parser.parse_args()
     flops, valve = counted(), gpu_valve.counted()
-    text = ["# The GPU", "", *(f"- {fact}" for fact in machine.facts() if fact), "", *page(flops), *gpu_valve.page(valve)]
+    text = ["# The GPU", "", *(f"- {fact}" for fact in machine.facts() if fact), ""]
+    text += [*page(flops), *gpu_valve.page(valve)]
     if options.compiler:
         text += [*compiled(), *gpu_valve.compiled()]
     else:

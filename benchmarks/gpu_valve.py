@@ -19,8 +19,10 @@ import numpy as np
 
 import nonsmooth as ns
 from nonsmooth.analysis.attractors import Settler
+from nonsmooth.flow.devices import batch_size
 from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.sections import section_plan
+from nonsmooth.flow.series_cuda import PER_MULTIPROCESSOR
 from nonsmooth.kernels import codes
 
 HERE = Path(__file__).parent
@@ -92,15 +94,15 @@ def compiled() -> list[str]:
 
 def page(flops: dict[str, float]) -> list[str]:
     return [
-        f"- the relief valve: {flops['per_return']:.0f} operations and {flops['steps_per_return']:.1f} steps per section "
-        "return (mean over 8 inflows)", "",
+        f"- the relief valve: {flops['per_return']:.0f} operations and {flops['steps_per_return']:.1f} steps per"
+        " section return (mean over 8 inflows)", "",
     ]  # fmt: skip
 
 
 def scan(inflows: np.ndarray, **options: Any) -> Any:
     return ns.sweep(
-        ns.models.relief_valve(), "q", inflows, direction=None, start=START, section=TOP, transient=TRANSIENT, keep=KEEP,
-        method="taylor", rtol=TOLERANCE, progress=False, **options,
+        ns.models.relief_valve(), "q", inflows, direction=None, start=START, section=TOP, transient=TRANSIENT,
+        keep=KEEP, method="taylor", rtol=TOLERANCE, progress=False, **options,
     )  # fmt: skip
 
 
@@ -126,9 +128,9 @@ def compared(n: int = 400) -> list[str]:
     worst = float(gap.max()) if len(gap) else np.nan
     met = worst <= 1e-9 and differs.mean() < 0.002
     return [
-        f"- relief valve, {n} inflows: {differs.mean():.3%} of the labels differ, {int((differs & ~doubtful).sum())} of "
-        f"them neither slow nor chaotic; {int(good.sum())} periodic points with |multiplier| < 0.95, farthest apart "
-        f"{worst:.1e} of the motion's size: {'met' if met else '**not met**'}",
+        f"- relief valve, {n} inflows: {differs.mean():.3%} of the labels differ, {int((differs & ~doubtful).sum())}"
+        f" of them neither slow nor chaotic; {int(good.sum())} periodic points with |multiplier| < 0.95, farthest "
+        f"apart {worst:.1e} of the motion's size: {'met' if met else '**not met**'}",
         f"- the processor's scan beside it, one thread: {rate:.3g} returns/s", "",
     ]  # fmt: skip
 
@@ -160,7 +162,7 @@ def timed(flops: dict[str, float], peak: float) -> list[str]:
         "|---|---|---|---|---|",
     ]  # fmt: skip
     best = 0.0
-    for n in (30720, 65536):
+    for n in (30720, batch_size(PER_MULTIPROCESSOR), 65536):
         inflows = np.linspace(LOWEST, HIGHEST, n)
         ended, seconds = march(inflows, TRANSIENT, KEEP)
         rate = np.isin(ended, (codes.OK, codes.NOT_GUARANTEED)).sum() * (TRANSIENT + KEEP) / seconds.min()

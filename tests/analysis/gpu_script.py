@@ -6,6 +6,7 @@ Prints one JSON object: the arrays of both, and the argument types with which ev
 from __future__ import annotations
 
 import json
+
 from gpu_both import both, launches_of
 
 import nonsmooth as ns

@@ -126,8 +126,8 @@ def test_what_a_gpu_does_not_take_is_said_at_the_door() -> None:
         ns.chart(oscillator, PLANE, carry={"rho": "up"}, device="cuda")
     with pytest.raises(ValueError, match="direction=None"):
         ns.sweep(oscillator, "rho", [0.1, 0.2], device="cuda")
-    with pytest.raises(ValueError, match='runs by method="taylor"'):
-        ns.chart(oscillator, PLANE, method="taylor", device="cuda")
+    with pytest.raises(ValueError, match='asks for method="rkf45"'):
+        ns.chart(oscillator, PLANE, method="rkf45", device="cuda")
     with pytest.raises(ValueError, match="stroboscopic sections only"):
         ns.chart(oscillator, PLANE, section=ns.Poincare("penetration"), device="cuda")
 

@@ -1,4 +1,4 @@
-"""The series methods on a GPU without one: Numba's simulator against the processor, and the kernel through the compiler.
+"""The series methods on a GPU without one: Numba's simulator against the processor, the kernel through the compiler.
 
 A run is the same sequence of steps on both devices, however it is cut into launches; so whatever does not stretch small
 differences is equal to rounding.
@@ -106,7 +106,7 @@ def test_basins_have_the_labels_and_attractors_of_the_processor(simulated: dict[
     np.testing.assert_allclose(*pair(simulated, "basins", "section_points"), rtol=0, atol=1e-9)
 
 
-@pytest.mark.slow  # half a minute each
+@pytest.mark.slow  # half a minute of processor time each
 @pytest.mark.skipif(not COMPILER[1], reason="NVIDIA's compiler (nvidia-nvvm) is made for Linux only (extra `test`)")
 @pytest.mark.parametrize("name", ["valve", "two wells", "filtered"])
 def test_the_kernel_compiles_for_the_types_it_is_launched_with(simulated: dict[str, Any], name: str) -> None:

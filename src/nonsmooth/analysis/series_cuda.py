@@ -14,18 +14,18 @@ from nonsmooth.analysis.settled import Settled, usable
 from nonsmooth.flow.devices import batch_size
 from nonsmooth.flow.engine import Chain, FloatArray, IntArray
 from nonsmooth.flow.series import SeriesEngine
-from nonsmooth.flow.series_cuda import SeriesOnGpu, States
+from nonsmooth.flow.series_cuda import PER_MULTIPROCESSOR, SeriesOnGpu, States
 from nonsmooth.kernels import codes
 
 if TYPE_CHECKING:
     from nonsmooth.analysis.attractors import Settler
 
-__all__ = ["settle_series_on_gpu", "series_exponents_on_gpu", "sweep_series_on_gpu"]
+__all__ = ["series_exponents_on_gpu", "settle_series_on_gpu", "sweep_series_on_gpu"]
 
 
 def batches(points: FloatArray, rows: IntArray) -> Iterator[tuple[slice, FloatArray, IntArray]]:
     """Jobs in batches: which, the parameter points that they need, and their rows among these."""
-    size = batch_size()
+    size = batch_size(PER_MULTIPROCESSOR)
     for first in range(0, len(rows), size):
         some = slice(first, first + size)
         needed, own = np.unique(rows[some], return_inverse=True)
@@ -39,7 +39,7 @@ def sweep_series_on_gpu(
     """Every parameter point from one start: the rules of ``analysis.settle``, whose buffers ``chain`` is filled."""
     parts = []
     for some, own, rows in batches(points, np.arange(len(points))):
-        gpu = SeriesOnGpu(rules.engine, own, rules.plan)
+        gpu = SeriesOnGpu(engine_of(rules), own, rules.plan)
         jobs = np.arange(len(rows))
         states = states_at(gpu, np.tile(start, (len(rows), 1)), memory, rows, np.zeros(len(rows), dtype=np.int64), 0.0)
         settling = Settling(gpu, states, rules.keep, rules.max_period, rules.tolerance, rules.scale)
@@ -143,9 +143,9 @@ def _closed(settling: Settling, gpu: SeriesOnGpu, spent: IntArray, width: int) -
     return replace(found, last=last, returns=spent)
 
 
-def engine_of(settler: Settler) -> SeriesEngine:
-    assert isinstance(settler.engine, SeriesEngine)  # the door has seen to it
-    return settler.engine
+def engine_of(rules: Settler | Attractors) -> SeriesEngine:
+    assert isinstance(rules.engine, SeriesEngine)  # the door has seen to it
+    return rules.engine
 
 
 def series_exponents_on_gpu(

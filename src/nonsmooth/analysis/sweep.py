@@ -82,8 +82,8 @@ def sweep(
     threads : int, optional
         Threads for independent work; the result does not depend on it. Default: one per core.
     device : {"cpu", "cuda"}
-        ``"cuda"`` runs the points on an NVIDIA GPU, one per thread, with ``direction=None``: see the guide "A chart on
-        a GPU".
+        ``"cuda"`` runs the points on an NVIDIA GPU, one per thread, with ``direction=None`` and without
+        ``density``: by the exact flow or by ``method="taylor"``. See the guide "A chart on a GPU".
     progress : bool
         A bar on a terminal.
 

@@ -18,13 +18,13 @@ SERIES = ("taylor", "exact")  # methods of the series kernels that a GPU runs
 PER_MULTIPROCESSOR = 512  # of one launch: twice what its registers hold, so that a small GPU is not busy for long
 
 
-def batch_size() -> int:
+def batch_size(per_multiprocessor: int = PER_MULTIPROCESSOR) -> int:
     """Trajectories of one launch on the present GPU; results do not depend on it."""
     from numba import cuda
 
     if _simulated():
         return BATCH
-    return min(BATCH, PER_MULTIPROCESSOR * int(cuda.get_current_device().MULTIPROCESSOR_COUNT))
+    return min(BATCH, per_multiprocessor * int(cuda.get_current_device().MULTIPROCESSOR_COUNT))
 
 
 def _simulated() -> bool:

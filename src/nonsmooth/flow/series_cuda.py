@@ -14,9 +14,10 @@ from nonsmooth.flow.series_tables import Tables
 from nonsmooth.kernels import codes
 from nonsmooth.kernels import series_places as place
 
-__all__ = ["STEPS", "Buffers", "SeriesOnGpu", "States", "module_of"]
+__all__ = ["PER_MULTIPROCESSOR", "STEPS", "Buffers", "SeriesOnGpu", "States", "module_of"]
 
 STEPS = 1024  # of one launch, at most: below a second also on a small GPU
+PER_MULTIPROCESSOR = 384  # trajectories of one launch: what the registers hold by the compiler's choice (168 of each)
 CONSTANTS = (
     "METHOD", "ORDER", "CHECKED", "CORNERS", "NONLINEAR_ROWS", "N_GUARDS", "N_PARAMETERS", "N_INDICATORS", "N_OUTPUTS",
 )  # fmt: skip
@@ -83,7 +84,9 @@ def module_of(engine: SeriesEngine, tables: Tables) -> Any:
 
     first, outgoing, transitions, rows, at = engine.net
     choice = engine.choice(tables)
-    sizes = {name: int(choice[getattr(place, name)]) for name in CONSTANTS} | {"N_MEMORY": len(engine.traced.m)}
+    sizes = {name: int(choice[getattr(place, name)]) for name in CONSTANTS} | {
+        "N_MEMORY": len(engine.traced.m), "N_SCRATCH_ROWS": engine.model.n_scratch,
+    }  # fmt: skip
     arrays = {
         "FIRST": first, "OUTGOING": _filled(outgoing, (1,)), "TRANSITIONS": _filled(transitions, (1, 6)),
         "ROWS": _filled(rows, (1, 3)), "AT": at if len(at) else np.full(1, -1.0), "LACKING": engine.lacking,

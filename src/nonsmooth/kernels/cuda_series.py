@@ -21,7 +21,7 @@ from .series_places import N_CHOICE, N_CONTROL, N_TALLY
 
 # Set for each system and method.
 METHOD, ORDER, CHECKED, CORNERS, NONLINEAR_ROWS, N_GUARDS = 0, 16, 0, 0, 0, 0
-N_PARAMETERS, N_MEMORY, N_INDICATORS, N_OUTPUTS = 1, 0, 1, 0
+N_PARAMETERS, N_MEMORY, N_INDICATORS, N_OUTPUTS, N_SCRATCH_ROWS = 1, 0, 1, 0, 1
 FIRST = np.array([0, 1])
 OUTGOING = np.array([0])
 TRANSITIONS = np.array([[0, 0, 0, 1, 0, 0]])
@@ -40,7 +40,6 @@ N_Q = max(N_PARAMETERS + N_MEMORY, 1)
 N_SIDES = max(N_INDICATORS, 1)
 N_VALUES = max(ALL_ROWS - N_U, 1)
 WIDTH = max(ORDER, 6) + 1
-N_SCRATCH_ROWS = max(N_SCRATCH, 1)  # of the model
 STACK = stack_size(WIDTH)
 N_MEMO = place.N_MEMO + N_U
 N_WHOLE = N_TALLY + N_SIDES  # numbers kept between launches
@@ -165,7 +164,8 @@ def advance(
             window[0, n] = extremes[j, 0, n]
             window[1, n] = extremes[j, 1, n]
     code = march(
-        field, jet, values, jump, (FIRST, OUTGOING, TRANSITIONS, ROWS, AT), LACKING, KINDS, choice, control, norms,
+        field, jet, values, jump,  # noqa: F821 - of the model, whose text stands before this one
+        (FIRST, OUTGOING, TRANSITIONS, ROWS, AT), LACKING, KINDS, choice, control, norms,
         exact_steps[i], state, q, time, counters[j], work, sections[j], window, tally, memo, no_log(),
     )  # fmt: skip
     for n in range(N_U):

@@ -37,7 +37,7 @@ def cuda_series_source(model: str, sizes: Mapping[str, int], tables: Mapping[str
     """
     text = joined(PARTS, model)
     for names in (("METHOD", "ORDER", "CHECKED", "CORNERS", "NONLINEAR_ROWS", "N_GUARDS"),
-                  ("N_PARAMETERS", "N_MEMORY", "N_INDICATORS", "N_OUTPUTS")):  # fmt: skip
+                  ("N_PARAMETERS", "N_MEMORY", "N_INDICATORS", "N_OUTPUTS", "N_SCRATCH_ROWS")):  # fmt: skip
         line = f"{', '.join(names)} = {', '.join(str(int(sizes[name])) for name in names)}"
         text, found = re.subn(rf"^{', '.join(names)} = [\d, ]+$", line, text, flags=re.MULTILINE)
         assert found == 1, names
