@@ -73,10 +73,10 @@ def test_a_sweep_is_that_of_the_processor(simulated: dict[str, Any], verb: str) 
 
 
 def test_the_valve_hits_its_seat(simulated: dict[str, Any]) -> None:
-    """At q = 4 and 6.5 each orbit has impacts, at q = 8, above the grazing at 7.56, none."""
+    """At q = 6.5 the orbit has impacts, at q = 8, above the grazing at 7.56, none."""
     contacts = pair(simulated, "sweep", "contacts_per_period")[1]
-    assert (contacts[:2] > 0).all()
-    assert contacts[2] == 0
+    assert contacts[0] > 0
+    assert contacts[1] == 0
 
 
 def test_a_run_that_meets_no_section_ends_with_its_status(simulated: dict[str, Any]) -> None:
@@ -86,17 +86,13 @@ def test_a_run_that_meets_no_section_ends_with_its_status(simulated: dict[str, A
 
 
 def test_a_chart_has_the_labels_and_exponents_of_the_processor(simulated: dict[str, Any]) -> None:
-    """One point is a cycle, the other chaos: there the runs part, and the exponents agree within their errors."""
     for name in ("period_number", "status", "crossings_per_period", "contacts_per_period"):
         np.testing.assert_array_equal(*pair(simulated, "chart", name), err_msg=name)
-    periodic = pair(simulated, "chart", "period_number")[0] > 0
-    assert periodic.any() and not periodic.all()
-    cpu, gpu = pair(simulated, "chart", "maximum")
-    np.testing.assert_allclose(gpu[periodic], cpu[periodic], rtol=0, atol=1e-9)
+    assert pair(simulated, "chart", "period_number")[0] > 0
+    np.testing.assert_allclose(*pair(simulated, "chart", "maximum"), rtol=0, atol=1e-9)
     cpu, gpu = pair(simulated, "chart", "lyapunov")
-    error = pair(simulated, "chart", "lyapunov_error")[0]
-    assert (np.abs(gpu - cpu) <= 3 * error + 1e-6).all()
-    assert cpu[periodic] < 0 < gpu[~periodic]
+    assert cpu < 0
+    np.testing.assert_allclose(gpu, cpu, atol=1e-6)
 
 
 def test_basins_have_the_labels_and_attractors_of_the_processor(simulated: dict[str, Any]) -> None:
