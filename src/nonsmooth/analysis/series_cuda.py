@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +11,7 @@ import numpy as np
 from nonsmooth.analysis.settle import LONGER, Attractors
 from nonsmooth.analysis.settle_cuda import Settling
 from nonsmooth.analysis.settled import Settled, usable
-from nonsmooth.flow.devices import batch_size
+from nonsmooth.flow.devices import batch_size, batches
 from nonsmooth.flow.engine import Chain, FloatArray, IntArray
 from nonsmooth.flow.series import SeriesEngine
 from nonsmooth.flow.series_cuda import PER_MULTIPROCESSOR, SeriesOnGpu, States
@@ -23,22 +23,13 @@ if TYPE_CHECKING:
 __all__ = ["series_exponents_on_gpu", "settle_series_on_gpu", "sweep_series_on_gpu"]
 
 
-def batches(points: FloatArray, rows: IntArray) -> Iterator[tuple[slice, FloatArray, IntArray]]:
-    """Jobs in batches: which, the parameter points that they need, and their rows among these."""
-    size = batch_size(PER_MULTIPROCESSOR)
-    for first in range(0, len(rows), size):
-        some = slice(first, first + size)
-        needed, own = np.unique(rows[some], return_inverse=True)
-        yield some, points[needed], own.astype(np.int64)
-
-
 def sweep_series_on_gpu(
     points: FloatArray, start: FloatArray, memory: FloatArray, rules: Attractors, chain: Chain,
     advance: Callable[[int], Any],
 ) -> Settled:  # fmt: skip
     """Every parameter point from one start: the rules of ``analysis.settle``, whose buffers ``chain`` is filled."""
     parts = []
-    for some, own, rows in batches(points, np.arange(len(points))):
+    for some, own, rows in batches(points, np.arange(len(points)), batch_size(PER_MULTIPROCESSOR)):
         gpu = SeriesOnGpu(engine_of(rules), own, rules.plan)
         jobs = np.arange(len(rows))
         states = states_at(gpu, np.tile(start, (len(rows), 1)), memory, rows, np.zeros(len(rows), dtype=np.int64), 0.0)
@@ -83,7 +74,7 @@ def settle_series_on_gpu(
 ) -> Settled:  # fmt: skip
     """Jobs settled and judged, as ``Settler`` does one by one."""
     found = Settled.empty(len(rows), len(settler.system.traced.u), settler.width)
-    for some, own, own_rows in batches(points, rows):
+    for some, own, own_rows in batches(points, rows, batch_size(PER_MULTIPROCESSOR)):
         part = _settle(settler, own, own_rows, starts[some], modes[some], begin, LONGER[:attempts], first_look)
         for item in fields(found):
             getattr(found, item.name)[some] = getattr(part, item.name)
@@ -153,7 +144,7 @@ def series_exponents_on_gpu(
 ) -> tuple[FloatArray, FloatArray]:
     """Largest exponents of jobs and their standard errors, as ``attractors_parting.exponent_of``."""
     largest, error = np.full(len(rows), np.nan), np.full(len(rows), np.nan)
-    for some, own, own_rows in batches(points, rows):
+    for some, own, own_rows in batches(points, rows, batch_size(PER_MULTIPROCESSOR)):
         largest[some], error[some] = _exponents(settler, own, own_rows, starts[some], modes[some], n_returns)
     return largest, error
 

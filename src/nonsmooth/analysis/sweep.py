@@ -154,6 +154,7 @@ def sweep(
     memory = system.memory_vector()
     if gpu:
         run_on_gpu(engine, points, starts, memory, attractors, slots, progress, parameter)
+        warn_if_coarse(system, engine, largest_of(starts, slots.values()))
         return _dataset(system, engine.name, parameter, numbers, directions, starts, slots, options, squeeze)
 
     def march(slot: tuple[int, int], order: Sequence[int], report: Report) -> None:

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import warnings
+from collections.abc import Iterator
 from typing import Any
 
-from nonsmooth.flow.engine import Engine, SectionPlan
+import numpy as np
+
+from nonsmooth.flow.engine import Engine, FloatArray, IntArray, SectionPlan
 from nonsmooth.flow.planar import PlanarEngine
 from nonsmooth.flow.series import SeriesEngine
 
-__all__ = ["BATCH", "DEVICES", "batch_size", "check_device", "on_gpu", "workers_of"]
+__all__ = ["BATCH", "DEVICES", "batch_size", "batches", "check_device", "launch", "on_gpu", "workers_of"]
 
 DEVICES = ("cpu", "cuda")
 BATCH = 65536  # trajectories of one chunk of work on a GPU
@@ -25,6 +29,24 @@ def batch_size(per_multiprocessor: int = PER_MULTIPROCESSOR) -> int:
     if _simulated():
         return BATCH
     return min(BATCH, per_multiprocessor * int(cuda.get_current_device().MULTIPROCESSOR_COUNT))
+
+
+def batches(points: FloatArray, rows: IntArray, size: int) -> Iterator[tuple[slice, FloatArray, IntArray]]:
+    """Jobs in batches: which, the parameter points that they need, and their rows among these."""
+    for first in range(0, len(rows), size):
+        some = slice(first, first + size)
+        needed, own = np.unique(rows[some], return_inverse=True)
+        yield some, points[needed], own.astype(np.int64)
+
+
+def launch(entry: Any, threads: int, jobs: Any, *arguments: Any) -> None:
+    """One thread for each job; waits for nothing."""
+    from numba.core.errors import NumbaPerformanceWarning
+
+    with warnings.catch_warnings():  # a few threads on a large GPU: Numba warns of it
+        warnings.simplefilter("ignore", NumbaPerformanceWarning)
+        configured = entry[-(-len(jobs) // threads), threads]
+    configured(jobs, *arguments)
 
 
 def _simulated() -> bool:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from nonsmooth.flow.devices import launch
 from nonsmooth.flow.engine import FloatArray, IntArray, SectionPlan
 from nonsmooth.flow.series import SeriesEngine
 from nonsmooth.flow.series_tables import Tables
@@ -132,12 +132,7 @@ class SeriesOnGpu:
 
     def launch(self, entry: Any, jobs: IntArray, *arguments: Any) -> None:
         """One thread for each job; waits for nothing."""
-        from numba.core.errors import NumbaPerformanceWarning
-
-        with warnings.catch_warnings():  # a few threads on a large GPU: Numba warns of it
-            warnings.simplefilter("ignore", NumbaPerformanceWarning)
-            configured = entry[-(-len(jobs) // self.threads), self.threads]
-        configured(self.cuda.to_device(jobs), *arguments)
+        launch(entry, self.threads, self.cuda.to_device(jobs), *arguments)
 
     def states(self, rows: IntArray, u: FloatArray, memory: FloatArray, modes: IntArray, clock: FloatArray) -> States:
         """States of N trajectories with their clocks (see :class:`engine.State`)."""
