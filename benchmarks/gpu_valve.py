@@ -22,7 +22,7 @@ from nonsmooth.analysis.attractors import Settler
 from nonsmooth.flow.devices import batch_size
 from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.sections import section_plan
-from nonsmooth.flow.series_cuda import PER_MULTIPROCESSOR
+from nonsmooth.flow.series_cuda import PART
 from nonsmooth.kernels import codes
 
 HERE = Path(__file__).parent
@@ -162,7 +162,7 @@ def timed(flops: dict[str, float], peak: float) -> list[str]:
         "|---|---|---|---|---|",
     ]  # fmt: skip
     best = 0.0
-    for n in (30720, batch_size(PER_MULTIPROCESSOR), 65536):
+    for n in (30720, int(PART * batch_size()), 65536):
         inflows = np.linspace(LOWEST, HIGHEST, n)
         ended, seconds = march(inflows, TRANSIENT, KEEP)
         rate = np.isin(ended, (codes.OK, codes.NOT_GUARANTEED)).sum() * (TRANSIENT + KEEP) / seconds.min()

@@ -123,6 +123,7 @@ class Settler:
         modes = np.zeros(len(rows), dtype=np.int64) if modes is None else np.array(modes, dtype=np.int64)
         points = np.ascontiguousarray(points, dtype=float)
         if self.planar is None and self.device == "cuda":
+            assert not carried  # refused at the door
             return settle_series_on_gpu(self, points, rows, starts, modes, begin, attempts, FIRST_LOOK)
         if self.planar is None:
             return self._run_one_by_one(points, rows, starts, carried, modes, begin, attempts)

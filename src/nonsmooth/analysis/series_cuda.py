@@ -11,10 +11,11 @@ import numpy as np
 from nonsmooth.analysis.settle import LONGER, Attractors
 from nonsmooth.analysis.settle_cuda import Settling
 from nonsmooth.analysis.settled import Settled, usable
-from nonsmooth.flow.devices import batch_size, batches
+from nonsmooth.flow.devices import batch_size
 from nonsmooth.flow.engine import Chain, FloatArray, IntArray
+from nonsmooth.flow.launches import batches
 from nonsmooth.flow.series import SeriesEngine
-from nonsmooth.flow.series_cuda import PER_MULTIPROCESSOR, SeriesOnGpu, States
+from nonsmooth.flow.series_cuda import PART, SeriesOnGpu, States
 from nonsmooth.kernels import codes
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ def sweep_series_on_gpu(
 ) -> Settled:  # fmt: skip
     """Every parameter point from one start: the rules of ``analysis.settle``, whose buffers ``chain`` is filled."""
     parts = []
-    for some, own, rows in batches(points, np.arange(len(points)), batch_size(PER_MULTIPROCESSOR)):
+    for some, own, rows in batches(points, np.arange(len(points)), int(PART * batch_size())):
         gpu = SeriesOnGpu(engine_of(rules), own, rules.plan)
         jobs = np.arange(len(rows))
         states = states_at(gpu, np.tile(start, (len(rows), 1)), memory, rows, np.zeros(len(rows), dtype=np.int64), 0.0)
@@ -74,7 +75,7 @@ def settle_series_on_gpu(
 ) -> Settled:  # fmt: skip
     """Jobs settled and judged, as ``Settler`` does one by one."""
     found = Settled.empty(len(rows), len(settler.system.traced.u), settler.width)
-    for some, own, own_rows in batches(points, rows, batch_size(PER_MULTIPROCESSOR)):
+    for some, own, own_rows in batches(points, rows, int(PART * batch_size())):
         part = _settle(settler, own, own_rows, starts[some], modes[some], begin, LONGER[:attempts], first_look)
         for item in fields(found):
             getattr(found, item.name)[some] = getattr(part, item.name)
@@ -144,7 +145,7 @@ def series_exponents_on_gpu(
 ) -> tuple[FloatArray, FloatArray]:
     """Largest exponents of jobs and their standard errors, as ``attractors_parting.exponent_of``."""
     largest, error = np.full(len(rows), np.nan), np.full(len(rows), np.nan)
-    for some, own, own_rows in batches(points, rows, batch_size(PER_MULTIPROCESSOR)):
+    for some, own, own_rows in batches(points, rows, int(PART * batch_size())):
         largest[some], error[some] = _exponents(settler, own, own_rows, starts[some], modes[some], n_returns)
     return largest, error
 

@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import importlib.util
 import os
-import warnings
-from collections.abc import Iterator
 from typing import Any
 
-import numpy as np
-
-from nonsmooth.flow.engine import Engine, FloatArray, IntArray, SectionPlan
+from nonsmooth.flow.engine import Engine, SectionPlan
 from nonsmooth.flow.planar import PlanarEngine
 from nonsmooth.flow.series import SeriesEngine
 
-__all__ = ["BATCH", "DEVICES", "batch_size", "batches", "check_device", "launch", "on_gpu", "workers_of"]
+__all__ = ["BATCH", "DEVICES", "batch_size", "check_device", "on_gpu", "workers_of"]
 
 DEVICES = ("cpu", "cuda")
 BATCH = 65536  # trajectories of one chunk of work on a GPU
@@ -22,31 +18,13 @@ SERIES = ("taylor", "exact")  # methods of the series kernels that a GPU runs
 PER_MULTIPROCESSOR = 512  # of one launch: twice what its registers hold, so that a small GPU is not busy for long
 
 
-def batch_size(per_multiprocessor: int = PER_MULTIPROCESSOR) -> int:
+def batch_size() -> int:
     """Trajectories of one launch on the present GPU; results do not depend on it."""
     from numba import cuda
 
     if _simulated():
         return BATCH
-    return min(BATCH, per_multiprocessor * int(cuda.get_current_device().MULTIPROCESSOR_COUNT))
-
-
-def batches(points: FloatArray, rows: IntArray, size: int) -> Iterator[tuple[slice, FloatArray, IntArray]]:
-    """Jobs in batches: which, the parameter points that they need, and their rows among these."""
-    for first in range(0, len(rows), size):
-        some = slice(first, first + size)
-        needed, own = np.unique(rows[some], return_inverse=True)
-        yield some, points[needed], own.astype(np.int64)
-
-
-def launch(entry: Any, threads: int, jobs: Any, *arguments: Any) -> None:
-    """One thread for each job; waits for nothing."""
-    from numba.core.errors import NumbaPerformanceWarning
-
-    with warnings.catch_warnings():  # a few threads on a large GPU: Numba warns of it
-        warnings.simplefilter("ignore", NumbaPerformanceWarning)
-        configured = entry[-(-len(jobs) // threads), threads]
-    configured(jobs, *arguments)
+    return min(BATCH, PER_MULTIPROCESSOR * int(cuda.get_current_device().MULTIPROCESSOR_COUNT))
 
 
 def _simulated() -> bool:

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.flow.devices import launch
 from nonsmooth.flow.engine import FloatArray, IntArray
+from nonsmooth.flow.launches import launch
 from nonsmooth.flow.planar import DIVERGENCE, PlanarEngine
 from nonsmooth.kernels import codes
 

@@ -7,17 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.flow.devices import launch
 from nonsmooth.flow.engine import FloatArray, IntArray, SectionPlan
+from nonsmooth.flow.launches import launch
 from nonsmooth.flow.series import SeriesEngine
 from nonsmooth.flow.series_tables import Tables
 from nonsmooth.kernels import codes
 from nonsmooth.kernels import series_places as place
 
-__all__ = ["PER_MULTIPROCESSOR", "STEPS", "Buffers", "SeriesOnGpu", "States", "module_of"]
+__all__ = ["PART", "STEPS", "Buffers", "SeriesOnGpu", "States", "module_of"]
 
 STEPS = 1024  # of one launch, at most: below a second also on a small GPU
-PER_MULTIPROCESSOR = 384  # trajectories of one launch: what the registers hold by the compiler's choice (168 of each)
+PART = 0.75  # of ``devices.batch_size`` in one launch: what the registers hold by the compiler's choice (168 of each)
 CONSTANTS = (
     "METHOD", "ORDER", "CHECKED", "CORNERS", "NONLINEAR_ROWS", "N_GUARDS", "N_PARAMETERS", "N_INDICATORS", "N_OUTPUTS",
 )  # fmt: skip
