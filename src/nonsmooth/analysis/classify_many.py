@@ -35,13 +35,13 @@ def shrinks(points: FloatArray, size: FloatArray, max_period: int) -> NDArray[np
     points (J, keep, n) and size (J, n) give (J,)."""
     scaled = points / size[:, None, :]
     found = np.zeros(len(points), dtype=bool)
-    for p in range(1, max_period + 1):
-        returns = np.abs(scaled[:, p:] - scaled[:, :-p]).max(axis=2)[:, -STRETCH - p :]
+    for p in range(1, min(max_period, points.shape[1] - 1) + 1):
+        last = np.abs(scaled[:, -1] - scaled[:, -1 - p]).max(axis=1)
+        some = np.flatnonzero(~found & (last < SHRINKING))  # few in chaos
+        returns = np.abs(scaled[some, p:] - scaled[some, :-p]).max(axis=2)[:, -STRETCH - p :]
         if returns.shape[1] >= 2 * p + 8:
             small = returns.max(axis=1) < SHRINKING
-            found |= small & (returns[:, p:] < returns[:, :-p]).all(axis=1)
-            if found.all():
-                break
+            found[some] = small & (returns[:, p:] < returns[:, :-p]).all(axis=1)
     return found
 
 
