@@ -79,8 +79,8 @@ def basins(
     threads : int, optional
         Threads for independent work; the result does not depend on it. Default: one per core.
     device : {"cpu", "cuda"}
-        ``"cuda"`` runs the starts on an NVIDIA GPU, one per thread: see the guide "A chart on a GPU". What a few
-        single runs decide stays on the processor.
+        ``"cuda"`` runs the starts on an NVIDIA GPU, one per thread, by the exact flow or by
+        ``method="taylor"``: see the guide "A chart on a GPU". What a few single runs decide stays on the processor.
     store : path, optional
         A Zarr store for finished chunks; what is there already is not computed again.
     client : dask.distributed.Client, optional

@@ -90,7 +90,8 @@ def chart(
     threads : int, optional
         Threads for independent work; the result does not depend on it. Default: one per core.
     device : {"cpu", "cuda"}
-        ``"cuda"`` runs the points on an NVIDIA GPU, one per thread: see the guide "A chart on a GPU".
+        ``"cuda"`` runs the points on an NVIDIA GPU, one per thread, without ``carry``: by the exact flow or by
+        ``method="taylor"``. See the guide "A chart on a GPU".
     store : path, optional
         A Zarr store for finished chunks; what is there already is not computed again.
     client : dask.distributed.Client, optional

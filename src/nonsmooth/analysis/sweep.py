@@ -82,8 +82,8 @@ def sweep(
     threads : int, optional
         Threads for independent work; the result does not depend on it. Default: one per core.
     device : {"cpu", "cuda"}
-        ``"cuda"`` runs the points on an NVIDIA GPU, one per thread, with ``direction=None``: see the guide "A chart on
-        a GPU".
+        ``"cuda"`` runs the points on an NVIDIA GPU, one per thread, with ``direction=None`` and without
+        ``density``: by the exact flow or by ``method="taylor"``. See the guide "A chart on a GPU".
     progress : bool
         A bar on a terminal.
 
@@ -151,10 +151,11 @@ def sweep(
         "method": method, "rtol": rtol, "atol": atol, **({"device": device} if gpu else {}), **expert,
     }  # fmt: skip
     squeeze = (() if direction == "both" else ("direction",)) + (("start",) if is_one_start(start) else ())
-    if gpu:
-        run_on_gpu(engine, points, starts, attractors, slots, progress, parameter)
-        return _dataset(system, engine.name, parameter, numbers, directions, starts, slots, options, squeeze)
     memory = system.memory_vector()
+    if gpu:
+        run_on_gpu(engine, points, starts, memory, attractors, slots, progress, parameter)
+        warn_if_coarse(system, engine, largest_of(starts, slots.values()))
+        return _dataset(system, engine.name, parameter, numbers, directions, starts, slots, options, squeeze)
 
     def march(slot: tuple[int, int], order: Sequence[int], report: Report) -> None:
         d, k = slot

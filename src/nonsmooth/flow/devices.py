@@ -8,11 +8,13 @@ from typing import Any
 
 from nonsmooth.flow.engine import Engine, SectionPlan
 from nonsmooth.flow.planar import PlanarEngine
+from nonsmooth.flow.series import SeriesEngine
 
 __all__ = ["BATCH", "DEVICES", "batch_size", "check_device", "gpu_name", "on_gpu", "workers_of"]
 
 DEVICES = ("cpu", "cuda")
 BATCH = 65536  # trajectories of one chunk of work on a GPU
+SERIES = ("taylor", "exact")  # methods of the series kernels that a GPU runs
 PER_MULTIPROCESSOR = 512  # of one launch: twice what its registers hold, so that a small GPU is not busy for long
 
 
@@ -92,15 +94,23 @@ def on_gpu(device: Any, verb: str, engine: Engine, plan: SectionPlan | None, *, 
     """
     if check_device(device) == "cpu":
         return False
-    if not isinstance(engine, PlanarEngine):
+    planar = isinstance(engine, PlanarEngine)
+    if not planar and verb == "lyapunov":
         raise ValueError(
-            f'{verb} with device="cuda" takes systems of two states whose modes are linear with harmonic forcing, '
+            'lyapunov with device="cuda" takes systems of two states whose modes are linear with harmonic forcing, '
             f'whose indicators and resets are affine, by their exact flow; this one runs by method="{engine.name}": '
-            'use device="cpu"'
+            'use device="cpu", or chart with lyapunov'
         )
-    if plan is not None and plan.indicator >= 0:
+    if not planar and not (isinstance(engine, SeriesEngine) and engine.name in SERIES and engine.locate):
         raise ValueError(
-            f'{verb} with device="cuda" takes stroboscopic sections only; with ns.Poincare use device="cpu"'
+            f'{verb} with device="cuda" runs by method="exact" or method="taylor" with crossings located; this call '
+            f'asks for method="{engine.name}"{"" if engine.name not in SERIES else ", locate=False"}: choose one of '
+            'them, or use device="cpu"'
+        )
+    if planar and plan is not None and plan.indicator >= 0:
+        raise ValueError(
+            f'{verb} with device="cuda" and the exact flow takes stroboscopic sections only; with ns.Poincare use '
+            'method="taylor" or device="cpu"'
         )
     if carried:
         raise ValueError(

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from nonsmooth.flow.engine import FloatArray, IntArray
+from nonsmooth.flow.launches import launch
 from nonsmooth.flow.planar import DIVERGENCE, PlanarEngine
 from nonsmooth.kernels import codes
 
@@ -85,12 +85,7 @@ class PlanarOnGpu:
 
     def launch(self, entry: Any, jobs: IntArray, *arguments: Any) -> None:
         """One thread for each job; waits for nothing."""
-        from numba.core.errors import NumbaPerformanceWarning
-
-        with warnings.catch_warnings():  # a few threads on a large GPU: Numba warns of it
-            warnings.simplefilter("ignore", NumbaPerformanceWarning)
-            configured = entry[-(-len(jobs) // self.threads), self.threads]
-        configured(self.cuda.to_device(jobs), *arguments)
+        launch(entry, self.threads, self.cuda.to_device(jobs), *arguments)
 
     def states(self, rows: IntArray, u: FloatArray, modes: IntArray, phase: float) -> States:
         """States at a phase of the forcing."""
