@@ -142,8 +142,6 @@ def test_what_a_gpu_does_not_take_is_said_at_the_door() -> None:
         ns.chart(oscillator, PLANE, method="rkf45", device="cuda")
     with pytest.raises(ValueError, match='basin_fractions with device="cuda".*method="rkf45"'):
         ns.basin_fractions(oscillator, "rho", [0.1, 0.2], box={"x": (0.0, 0.1)}, method="rkf45", device="cuda")
-    with pytest.raises(ValueError, match="stroboscopic sections only"):
-        ns.chart(oscillator, PLANE, section=ns.Poincare("penetration"), device="cuda")
 
 
 def test_without_the_package_the_door_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

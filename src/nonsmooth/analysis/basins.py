@@ -24,7 +24,7 @@ from nonsmooth.analysis.classify import longest_period
 from nonsmooth.analysis.settled import usable
 from nonsmooth.campaign.run import run
 from nonsmooth.flow.arguments import check_options, check_system, float_array, real_number, whole_number
-from nonsmooth.flow.devices import BATCH, on_gpu, workers_of
+from nonsmooth.flow.devices import BATCH, engine_on, on_gpu, workers_of
 from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.kernels import codes
@@ -197,7 +197,7 @@ def settler_of(
             f"{system.name!r} is forced: its fate depends on the phase at which a run starts, so its section must be "
             "one too: section=ns.Stroboscopic(phase)"
         )
-    engine = engine_for(system, method, rtol, atol, **expert)
+    engine = engine_on(device, engine_for(system, method, rtol, atol, **expert), plan)
     on_gpu(device, verb, engine, plan)
     settler = Settler(
         system, engine, plan, transient, keep, max_period, rtol=rtol, atol=atol, expert=expert, device=device

@@ -14,7 +14,7 @@ from nonsmooth.analysis.classify import longest_period
 from nonsmooth.analysis.sweep import swept_values
 from nonsmooth.campaign.run import run
 from nonsmooth.flow.arguments import check_options, check_system, whole_number
-from nonsmooth.flow.devices import BATCH, on_gpu, workers_of
+from nonsmooth.flow.devices import BATCH, engine_on, on_gpu, workers_of
 from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.planar import PlanarEngine
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
@@ -182,7 +182,7 @@ def plan_chart(
     if 0 < n_exponent < 40:
         raise ValueError(f"lyapunov = {lyapunov} returns are too few for an exponent; at least 40")
     extremes = bool(extremes) or len(starts) > 1  # attractors are told apart by them
-    engine = engine_for(system, method, rtol, atol, **expert)
+    engine = engine_on(device, engine_for(system, method, rtol, atol, **expert), plan)
     gpu = on_gpu(device, "chart", engine, plan, carried=along is not None and not isinstance(engine, PlanarEngine))
     settler = Settler(
         system, engine, plan, transient, keep, max_period, bool(stop_early), extremes, rtol, atol, expert, device

@@ -12,7 +12,7 @@ from nonsmooth.analysis.density import bin_edges, coarse_values, given_ranges
 from nonsmooth.analysis.settle import Attractors
 from nonsmooth.analysis.sweep_pieces import Report, Slot, ended, largest_of, pieces_of, run_on_gpu, run_pieces
 from nonsmooth.flow.arguments import check_options, check_system, float_array, whole_number
-from nonsmooth.flow.devices import on_gpu, workers_of
+from nonsmooth.flow.devices import engine_on, on_gpu, workers_of
 from nonsmooth.flow.engine import FloatArray, State
 from nonsmooth.flow.methods import RTOL, engine_for, warn_if_coarse
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
@@ -118,7 +118,7 @@ def sweep(
     if threads is not None:
         threads = whole_number(threads, "threads", 1)
     section, plan = section_plan(system, section)
-    engine = engine_for(system, method, rtol, atol, **expert)
+    engine = engine_on(device, engine_for(system, method, rtol, atol, **expert), plan)
     gpu = on_gpu(device, "sweep", engine, plan, carried=direction is not None)
     if gpu and density is not False:
         raise ValueError("section points are counted on the processor: leave out density, or device=\"cuda\"")
