@@ -77,7 +77,7 @@ def test_the_store_of_another_work_is_refused(tmp_path: Path, monkeypatch: pytes
         with pytest.raises(DataFileError, match=message):
             run(other, store=path, **QUIET)
     with monkeypatch.context() as patched:
-        patched.setattr(stores, "cpu_type", lambda: "another")
+        patched.setattr(stores, "processor_type", lambda device: "another")
         with pytest.raises(DataFileError, match="any_cpu=True"):
             run(Squares(), store=path, **QUIET)
         assert right(run(Squares(), store=path, any_cpu=True, **QUIET), Squares())

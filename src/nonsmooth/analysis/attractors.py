@@ -19,6 +19,7 @@ from nonsmooth.analysis.attractors_cuda import exponents_on_gpu, run_on_gpu
 from nonsmooth.analysis.attractors_parting import exponent_of
 from nonsmooth.analysis.attractors_trace import Trace, period_of, place_of, state_at, trace
 from nonsmooth.analysis.classify import Verdict
+from nonsmooth.analysis.series_cuda import series_exponents_on_gpu, settle_series_on_gpu
 from nonsmooth.analysis.settle import LEAST, LONGER, Attractors, tolerance_of
 from nonsmooth.analysis.settled import Settled, usable
 from nonsmooth.flow.engine import Chain, Engine, FloatArray, IntArray, SectionPlan, State
@@ -120,6 +121,9 @@ class Settler:
         starts = np.ascontiguousarray(starts, dtype=float)
         modes = np.zeros(len(rows), dtype=np.int64) if modes is None else np.array(modes, dtype=np.int64)
         points = np.ascontiguousarray(points, dtype=float)
+        if self.planar is None and self.device == "cuda":
+            assert not carried  # refused at the door
+            return settle_series_on_gpu(self, points, rows, starts, modes, begin, attempts, FIRST_LOOK)
         if self.planar is None:
             return self._run_one_by_one(points, rows, starts, carried, modes, begin, attempts)
         choice = (
@@ -164,6 +168,8 @@ class Settler:
                 self.planar, points, rows, starts, modes, n_returns, self.plan.phase, self.system.scale_vector(),
                 self.max_period,
             )  # fmt: skip
+        if self.device == "cuda" and self.width == len(self.system.traced.u) + len(self.system.traced.m):
+            return series_exponents_on_gpu(self, points, rows, starts, modes, n_returns)
         found = [
             exponent_of(self.system, self.engine, self.plan, points[i : i + 1], starts[j], int(modes[j]), n_returns)
             for j, i in enumerate(rows)

@@ -82,8 +82,8 @@ def lyapunov(
     method, rtol, atol
         Of the trajectory; see :func:`nonsmooth.flow.methods.engine_for`. Its derivatives are accurate to rounding.
     device : {"cpu", "cuda"}
-        ``"cuda"`` runs a sweep with ``direction=None`` on an NVIDIA GPU, one point per thread: see the guide "A chart
-        on a GPU".
+        ``"cuda"`` runs a sweep with ``direction=None`` on an NVIDIA GPU, one point per thread, for
+        systems with the planar exact flow: see the guide "A chart on a GPU".
     progress : bool
         A bar on a terminal.
 

@@ -23,6 +23,7 @@ __all__ = ["Attractors", "tolerance_of"]
 LONGER = (1, 2, 4)  # further transients for a point that is still settling, in units of the first
 KICK = 1e-3  # what pushes a state off an unstable orbit, in units of the motion's size
 NUDGE = 1e-6  # finite differences of the return map, in units of the motion's size
+ROUNDS = 8  # of a cycle, over which the contraction on a Poincare section is measured
 LEAST = 1e-3  # the least size of a motion, in units of the states' scales
 FAILED = (codes.DIVERGED, codes.CHATTER, codes.TOO_MANY_CROSSINGS, codes.NO_CONVERGENCE, codes.BEYOND_STOP)
 
@@ -120,8 +121,7 @@ class Attractors:
 
         A nudge moves the state off the surface, which may shift the count of returns by one; so the distance to the
         whole cycle is measured, over several rounds."""
-        rounds = 8
-        keep = rounds * p + 2
+        keep = ROUNDS * p + 2
         cycle = out.section[i, -p:] / size
         moved = state.copy()
         moved.u += max(NUDGE, 1e2 * self.tolerance) * size
@@ -135,7 +135,7 @@ class Attractors:
         first, last = gap[1 : p + 1].max(), gap[-p:].max()
         if last <= self.tolerance:
             return 0.5
-        return float((last / first) ** (1.0 / (rounds - 1)))
+        return float((last / first) ** (1.0 / (ROUNDS - 1)))
 
 
 def tolerance_of(engine: Engine, rtol: float | None) -> float:

@@ -12,7 +12,7 @@ from nonsmooth.analysis.density import bin_edges, coarse_values, given_ranges
 from nonsmooth.analysis.settle import Attractors, tolerance_of
 from nonsmooth.analysis.sweep_pieces import Report, Slot, ended, largest_of, pieces_of, run_on_gpu, run_pieces
 from nonsmooth.flow.arguments import check_options, check_system, float_array, whole_number
-from nonsmooth.flow.devices import on_gpu, workers_of
+from nonsmooth.flow.devices import engine_on, on_gpu, workers_of
 from nonsmooth.flow.engine import FloatArray, State
 from nonsmooth.flow.methods import engine_for, warn_if_coarse
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
@@ -82,8 +82,8 @@ def sweep(
     threads : int, optional
         Threads for independent work; the result does not depend on it. Default: one per core.
     device : {"cpu", "cuda"}
-        ``"cuda"`` runs the points on an NVIDIA GPU, one per thread, with ``direction=None``: see the guide "A chart on
-        a GPU".
+        ``"cuda"`` runs the points on an NVIDIA GPU, one per thread, with ``direction=None`` and without
+        ``density``: by the exact flow or by ``method="taylor"``. See the guide "A chart on a GPU".
     progress : bool
         A bar on a terminal.
 
@@ -118,7 +118,7 @@ def sweep(
     if threads is not None:
         threads = whole_number(threads, "threads", 1)
     section, plan = section_plan(system, section)
-    engine = engine_for(system, method, rtol, atol, **expert)
+    engine = engine_on(device, engine_for(system, method, rtol, atol, **expert), plan)
     gpu = on_gpu(device, "sweep", engine, plan, carried=direction is not None)
     if gpu and density is not False:
         raise ValueError("section points are counted on the processor: leave out density, or device=\"cuda\"")
@@ -153,10 +153,11 @@ def sweep(
         "method": method, "rtol": rtol, "atol": atol, **({"device": device} if gpu else {}), **expert,
     }  # fmt: skip
     squeeze = (() if direction == "both" else ("direction",)) + (("start",) if is_one_start(start) else ())
-    if gpu:
-        run_on_gpu(engine, points, starts, attractors, slots, progress, parameter)
-        return _dataset(system, engine.name, parameter, numbers, directions, starts, slots, options, squeeze)
     memory = system.memory_vector()
+    if gpu:
+        run_on_gpu(engine, points, starts, memory, attractors, slots, progress, parameter)
+        warn_if_coarse(system, engine, largest_of(starts, slots.values()))
+        return _dataset(system, engine.name, parameter, numbers, directions, starts, slots, options, squeeze)
 
     def march(slot: tuple[int, int], order: Sequence[int], report: Report) -> None:
         d, k = slot

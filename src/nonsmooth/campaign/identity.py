@@ -1,9 +1,8 @@
-"""What makes a work the same work: model, parameters, options, the kernels' source, and the type of processor."""
+"""What makes a work the same work: model, parameters, options, the kernels' source."""
 
 from __future__ import annotations
 
 import hashlib
-import platform
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
@@ -11,16 +10,7 @@ from typing import Any
 
 from nonsmooth.campaign.work import Work
 
-__all__ = ["cpu_type", "described", "difference"]
-
-
-@cache
-def cpu_type() -> str:
-    """The processor as the compiler sees it: its name and instruction sets decide the last digits."""
-    from llvmlite import binding
-
-    features = binding.get_host_cpu_features().flatten()
-    return f"{platform.machine()} {binding.get_host_cpu_name()} {hashlib.sha256(features.encode()).hexdigest()[:8]}"
+__all__ = ["described", "difference"]
 
 
 @cache

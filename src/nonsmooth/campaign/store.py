@@ -4,7 +4,7 @@
 
     chart.zarr/              a Zarr group; the attribute ``nonsmooth_campaign`` says what the work is
         results/             one array per column, one file per chunk (Zstandard, one thread, fixed level)
-        run/000017.json      chunk 17 is done: its key and the hash of its content, by whom, when, processor time
+        run/000017.json      chunk 17 is done: its key and the hash of its content, by whom, when, time worked
         run/started.log      which chunks were begun: one begun twice was lost with its worker
 
 A chunk's key is a hash of the model, the parameters, the options, the kernels' source, and the chunk's place. Its
@@ -28,8 +28,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.campaign.identity import cpu_type, described, difference
+from nonsmooth.campaign.identity import described, difference
 from nonsmooth.campaign.marks import mark_in, marks_of, started, told, write_whole
+from nonsmooth.campaign.processors import processor_type
 from nonsmooth.campaign.work import Work
 from nonsmooth.errors import DataFileError
 
@@ -81,9 +82,9 @@ class ChunkStore:
             kept = {name: np.ascontiguousarray(arrays[name], item.dtype) for name, item in work.columns().items()}
             _put(group, kept, first, last)
             mark = {
-                "chunk": chunk, "key": self._key(chunk), "content": _content(kept), "cpu": cpu_type(),
-                "host": socket.gethostname(), "process": os.getpid(), "seconds": round(seconds, 4),
-                "ended": time.time(),
+                "chunk": chunk, "key": self._key(chunk), "content": _content(kept),
+                "cpu": processor_type(work.device), "host": socket.gethostname(), "process": os.getpid(),
+                "seconds": round(seconds, 4), "ended": time.time(),
             }  # fmt: skip
             write_whole(self.path / "run" / f"{chunk:06d}.json", json.dumps(mark).encode())
 
@@ -130,7 +131,8 @@ def open_store(path: str | os.PathLike[str], work: Work, *, any_cpu: bool = Fals
     Parameters
     ----------
     any_cpu : bool
-        Go on with a store that was begun on another type of processor: its numbers may differ in the last digits.
+        Go on with a store that was begun on another type of processor (or of GPU): its numbers may differ in the last
+        digits.
 
     Raises
     ------
@@ -153,9 +155,10 @@ def open_store(path: str | os.PathLike[str], work: Work, *, any_cpu: bool = Fals
     if record["key"] != key:
         why = difference(record, wanted)
         raise DataFileError(f"{target}: is the store of another work: {why}; give another name")
-    if record["cpu"] != cpu_type() and not any_cpu:
+    here = processor_type(work.device)
+    if record["cpu"] != here and not any_cpu:
         raise DataFileError(
-            f"{target}: was begun on a processor of type {record['cpu']!r}, this is {cpu_type()!r}; results may "
+            f"{target}: was begun on a processor of type {record['cpu']!r}, this is {here!r}; results may "
             "differ in the last digits. Go on with any_cpu=True, or begin another store"
         )
     return ChunkStore(target, key)
@@ -212,7 +215,8 @@ def _make(target: Path, work: Work, wanted: Mapping[str, Any], key: str) -> None
     with told(target), tempfile.TemporaryDirectory(prefix=f".{target.name}-", dir=target.parent) as folder:
         fresh = Path(folder) / "new.zarr"
         root = zarr.open_group(fresh, mode="w", zarr_format=3)
-        root.attrs[ATTRIBUTE] = json.dumps({**wanted, "key": key, "cpu": cpu_type(), "made": time.time()})
+        facts = {"key": key, "device": work.device, "cpu": processor_type(work.device), "made": time.time()}
+        root.attrs[ATTRIBUTE] = json.dumps({**wanted, **facts})
         results = root.create_group("results")
         first, last = work.bounds(0)
         _create(results, work, wanted["places"], last - first)
