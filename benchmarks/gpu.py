@@ -1,4 +1,5 @@
-"""`make gpu`: a GPU against the processor on the paper's chart, and how fast it is; `make gpu-compiler` without a GPU.
+"""`make gpu`: a GPU against the processor on the paper's chart and the valve's scan, and how fast it is; `make
+gpu-compiler` without a GPU.
 
 With a GPU: every label of a 200 x 200 chart and every periodic point against the processor's, then forcing periods
 per second of one launch and of whole charts, with the part of the FP64 peak that a counted number of operations per
@@ -22,11 +23,13 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+import gpu_valve
 import machine
 import nonsmooth as ns
 from gpu_flops import PLANES
 from nonsmooth.analysis.chart import plan_chart
 from nonsmooth.analysis.chart_refine import labels_of_points
+from nonsmooth.flow.devices import gpu_name
 from nonsmooth.kernels import codes
 
 HERE = Path(__file__).parent
@@ -92,8 +95,7 @@ def peak() -> tuple[str, float]:
 
     gpu = cuda.get_current_device()
     units = UNITS.get(tuple(gpu.compute_capability), np.nan)
-    name = gpu.name.decode() if isinstance(gpu.name, bytes) else str(gpu.name)
-    return name, 2.0 * units * gpu.MULTIPROCESSOR_COUNT * gpu.CLOCK_RATE * 1e3
+    return gpu_name(), 2.0 * units * gpu.MULTIPROCESSOR_COUNT * gpu.CLOCK_RATE * 1e3
 
 
 def settlers(side: int, plane: str, **options: Any) -> tuple[Any, Any, Any, Any]:
@@ -191,15 +193,16 @@ def main() -> int:
     parser.add_argument("--side", type=int, default=200, help="points along each side of the compared charts")
     parser.add_argument("--out", type=Path, help="a file for the page that is printed")
     options = parser.parse_args()
-    flops = counted()
-    text = ["# The GPU", "", *(f"- {fact}" for fact in machine.facts() if fact), "", *page(flops)]
+    flops, valve = counted(), gpu_valve.counted()
+    text = ["# The GPU", "", *(f"- {fact}" for fact in machine.facts() if fact), ""]
+    text += [*page(flops), *gpu_valve.page(valve)]
     if options.compiler:
-        text += compiled()
+        text += [*compiled(), *gpu_valve.compiled()]
     else:
         text += ["## Against the processor", ""]
         for plane in PLANES:
             text += compared(plane, options.side)
-        text += ["", *timed(flops)]
+        text += [*gpu_valve.compared(), "", *timed(flops), *gpu_valve.timed(valve, peak()[1])]
     print("\n".join(text))
     if options.out is not None:
         options.out.write_text("\n".join(text) + "\n", encoding="utf-8")

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from nonsmooth.analysis.classify import MARGIN, judge, residuals
+from nonsmooth.analysis.classify_many import candidates, certain
 from nonsmooth.kernels import codes
 
 SIZE = np.array([1.0, 10.0])
@@ -71,3 +72,26 @@ def test_points_that_are_not_finite_have_no_period() -> None:
     points = cycle(1, 20)
     points[-1] = np.nan
     assert judge(points, SIZE, 16, lambda _: 0.5).period_number == 0
+
+
+def test_many_at_once_are_judged_like_one() -> None:
+    """Cycles near and far from settled, all that shrinks, chaos, what is not finite; multipliers of every kind."""
+    k, rng = np.arange(600, 700), np.random.default_rng(3)
+    shrinking = cycle(2, 100)
+    shrinking[:, 0] += (-1.0) ** (k // 2) / np.sqrt(k)
+    lost = cycle(2, 100)
+    lost[50, 0] = np.nan
+    kinds = [cycle(p, 100, decay, mu) for p in (1, 2, 4, 17) for decay, mu in ((0, 0.5), (1e-8, 0.99), (0.01, 0.99))]
+    kinds += [cycle(4, 100) * [1, 0] + cycle(2, 100) * 1e-12, shrinking, lost, rng.normal(size=(100, 2))]
+    for mu in (0.1, 0.9, 1.0 - 0.5 * MARGIN, 1.5, np.nan):
+        for keep in (100, 12):
+            points = np.array([one[-keep:] for one in kinds])
+            size = np.tile(SIZE, (len(points), 1))
+            period, status, residual, returns = candidates(points, size, 16, 1e-9)
+            found = certain(period, np.full(len(points), mu), residual, returns) & (period > 0)
+            one_by_one = [judge(p, SIZE, 16, lambda _, mu=mu: mu) for p in points]
+            assert [v.period_number for v in one_by_one] == np.where(found, period, 0).tolist()
+            assert [v.status for v in one_by_one] == np.where(
+                period > 0, np.where(found, codes.OK, codes.SLOW), status
+            ).tolist()
+            np.testing.assert_array_equal([v.residual for v in one_by_one], residual)

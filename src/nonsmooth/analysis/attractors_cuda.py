@@ -6,7 +6,6 @@ are still under way are marched together, judged together, and those that are do
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import fields
 from typing import Any
 
@@ -15,6 +14,7 @@ import numpy as np
 from nonsmooth.analysis.settled import Settled, usable
 from nonsmooth.flow.devices import batch_size
 from nonsmooth.flow.engine import FloatArray, IntArray
+from nonsmooth.flow.launches import batches
 from nonsmooth.flow.planar import PlanarEngine
 from nonsmooth.flow.planar_cuda import SLICE, Buffers, PlanarOnGpu, States
 from nonsmooth.flow.poincare import result_status
@@ -29,22 +29,13 @@ def run_on_gpu(
 ) -> Settled:  # fmt: skip
     """Jobs settled and judged; arguments and result as in :func:`.attractors_compiled.run_compiled`."""
     found = Settled.empty(len(rows), 2)
-    for some, own, own_rows in _batches(points, rows):
+    for some, own, own_rows in batches(points, rows, batch_size()):
         part = _settle(
             PlanarOnGpu(engine, own, phase), own_rows, starts[some], modes[some], begin, choice, tolerance, least
         )
         for item in fields(found):
             getattr(found, item.name)[some] = getattr(part, item.name)
     return found
-
-
-def _batches(points: FloatArray, rows: IntArray) -> Iterator[tuple[slice, FloatArray, IntArray]]:
-    """Jobs in batches: which, the parameter points that they need, and their rows among these."""
-    size = batch_size()
-    for first in range(0, len(rows), size):
-        some = slice(first, first + size)
-        needed, own = np.unique(rows[some], return_inverse=True)
-        yield some, points[needed], own.astype(np.int64)
 
 
 def _settle(
@@ -177,7 +168,7 @@ def exponents_on_gpu(
 ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
     """Largest exponents of jobs and their standard errors, as :func:`.attractors_compiled.exponents_compiled`."""
     largest, error = np.full(len(rows), np.nan), np.full(len(rows), np.nan)
-    for some, own, own_rows in _batches(points, rows):
+    for some, own, own_rows in batches(points, rows, batch_size()):
         gpu = PlanarOnGpu(engine, own, phase)
         largest[some], error[some] = _exponents(gpu, own_rows, starts[some], modes[some], n_returns, scale)
     return largest, error

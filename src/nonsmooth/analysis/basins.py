@@ -25,7 +25,7 @@ from nonsmooth.analysis.settle import warn_if_small
 from nonsmooth.analysis.settled import usable
 from nonsmooth.campaign.run import run
 from nonsmooth.flow.arguments import check_options, check_system, float_array, real_number, whole_number
-from nonsmooth.flow.devices import BATCH, on_gpu, workers_of
+from nonsmooth.flow.devices import BATCH, engine_on, on_gpu, workers_of
 from nonsmooth.flow.memory import room_for
 from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
@@ -82,14 +82,14 @@ def basins(
     threads : int, optional
         Threads for independent work; the result does not depend on it. Default: one per core.
     device : {"cpu", "cuda"}
-        ``"cuda"`` runs the starts on an NVIDIA GPU, one per thread: see the guide "A chart on a GPU". What a few
-        single runs decide stays on the processor.
+        ``"cuda"`` runs the starts on an NVIDIA GPU, one per thread, by the exact flow or by
+        ``method="taylor"``: see the guide "A chart on a GPU". What a few single runs decide stays on the processor.
     store : path, optional
         A Zarr store for finished chunks; what is there already is not computed again.
     client : dask.distributed.Client, optional
         Computes the chunks on its workers.
     any_cpu : bool
-        Go on with a store that was begun on another type of processor.
+        Go on with a store that was begun on another type of processor, or of GPU with ``device="cuda"``.
     progress : bool
         A bar on a terminal.
 
@@ -190,7 +190,7 @@ def basins(
 
 def settler_of(
     system: System, section: Any, transient: Any, keep: Any, max_period: Any, method: str, rtol: Any, atol: Any,
-    expert: Mapping[str, Any], *, threads: Any = None, device: str = "cpu",
+    expert: Mapping[str, Any], *, threads: Any = None, device: str = "cpu", verb: str = "basins",
 ) -> tuple[Any, Settler]:  # fmt: skip
     """Check the options that basins share, and the settler they describe."""
     transient, keep = whole_number(transient, "transient", 0), whole_number(keep, "keep", 2)
@@ -203,13 +203,13 @@ def settler_of(
             f"{system.name!r} is forced: its fate depends on the phase at which a run starts, so its section must be "
             "one too: section=ns.Stroboscopic(phase)"
         )
-    engine = engine_for(system, method, rtol, atol, **expert)
     if plan.every > 1:
         raise ValueError(
             f"section with every = {plan.every}: the returns that are passed over make several attractors of one "
             "cycle, by the one at which a run begins; leave `every` out"
         )
-    on_gpu(device, "basins", engine, plan)
+    engine = engine_on(device, engine_for(system, method, rtol, atol, **expert), plan)
+    on_gpu(device, verb, engine, plan)
     settler = Settler(
         system, engine, plan, transient, keep, max_period, rtol=rtol, atol=atol, expert=expert, device=device
     )  # fmt: skip

@@ -15,8 +15,9 @@ from nonsmooth.analysis.settle import warn_if_small
 from nonsmooth.analysis.sweep import swept_values
 from nonsmooth.campaign.run import run
 from nonsmooth.flow.arguments import check_options, check_system, whole_number, yes_or_no
-from nonsmooth.flow.devices import BATCH, on_gpu, workers_of
+from nonsmooth.flow.devices import BATCH, engine_on, on_gpu, workers_of
 from nonsmooth.flow.methods import engine_for
+from nonsmooth.flow.planar import PlanarEngine
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.flow.starts import is_one_start, plain_start, start_states
 
@@ -66,7 +67,8 @@ def chart(
     start : state or list of states, optional
         Every point begins there; zeros where not given. Several starts add the dim ``start`` and ``n_attractors``.
     carry : mapping, optional
-        ``{"rho": "up"}`` or ``{"rho": "down"}``: along this parameter the state is carried from point to point.
+        ``{"rho": "up"}`` or ``{"rho": "down"}``: along this parameter the state is carried from point to point. On a
+        GPU the rows run side by side, so it needs many of them.
     section : Stroboscopic or Poincare, optional
         ``Stroboscopic(0)`` where the system has a period.
     transient, keep : int
@@ -89,13 +91,14 @@ def chart(
     threads : int, optional
         Threads for independent work; the result does not depend on it. Default: one per core.
     device : {"cpu", "cuda"}
-        ``"cuda"`` runs the points on an NVIDIA GPU, one per thread: see the guide "A chart on a GPU".
+        ``"cuda"`` runs the points on an NVIDIA GPU, one per thread, without ``carry``: by the exact flow or by
+        ``method="taylor"``. See the guide "A chart on a GPU".
     store : path, optional
         A Zarr store for finished chunks; what is there already is not computed again.
     client : dask.distributed.Client, optional
         Computes the chunks on its workers.
     any_cpu : bool
-        Go on with a store that was begun on another type of processor.
+        Go on with a store that was begun on another type of processor, or of GPU with ``device="cuda"``.
     progress : bool
         A bar on a terminal.
 
@@ -115,7 +118,7 @@ def chart(
 
     Notes
     -----
-    No section points are stored: a chart of N points takes about 24 bytes per point without extremes.
+    No section points are stored: without extremes a chart takes 19 bytes per point.
     With ``refine`` a coarse grid is computed, cells whose corners differ are halved down to single points, and so are
     those beside them where a point in between disagrees; see :mod:`nonsmooth.analysis.chart_refine`.
     """
@@ -184,8 +187,8 @@ def plan_chart(
     # attractors are told apart by them; neighbours are as near as the motion is wide
     stop_early = yes_or_no(stop_early, "stop_early")
     extremes = yes_or_no(extremes, "extremes") or len(starts) > 1 or n_exponent > 0
-    engine = engine_for(system, method, rtol, atol, **expert)
-    gpu = on_gpu(device, "chart", engine, plan, carried=along is not None)
+    engine = engine_on(device, engine_for(system, method, rtol, atol, **expert), plan)
+    gpu = on_gpu(device, "chart", engine, plan, carried=along is not None and not isinstance(engine, PlanarEngine))
     settler = Settler(
         system, engine, plan, transient, keep, max_period, stop_early, extremes, rtol, atol, expert, device
     )

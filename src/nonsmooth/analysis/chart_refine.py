@@ -85,7 +85,6 @@ class _Refinement:
         }
         self.spent = 0
         self.rng = np.random.default_rng(0)
-        self.probed = np.zeros(self.shape, dtype=bool)
 
     def result(self) -> dict[str, NDArray[Any]]:
         step = self._coarse_step()

@@ -13,22 +13,24 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.analysis.classify import Verdict, judge
+from nonsmooth.analysis.classify import TOLERANCE, Verdict, judge
 from nonsmooth.analysis.settled import LEAST, least_sizes, size_of
 from nonsmooth.flow.engine import Chain, Engine, FloatArray, SectionPlan, State
+from nonsmooth.flow.methods import RTOL
 from nonsmooth.flow.poincare import result_status
 from nonsmooth.kernels import codes
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["Attractors", "warn_if_small"]
+__all__ = ["Attractors", "tolerance_of", "warn_if_small"]
 
 RESTING = 5e-7  # in units of the scales: smaller values of a state are rounding beside the others
 NOTHING = 1e-15  # and beside none
 LONGER = (1, 2, 4)  # further transients for a point that is still settling, in units of the first
 KICK = 1e-3  # what pushes a state off an unstable orbit, in units of the motion's size
 NUDGE = 1e-6  # finite differences of the return map, in units of the motion's size
+ROUNDS = 8  # of a cycle, over which the contraction on a Poincare section is measured
 FAILED = (codes.DIVERGED, codes.CHATTER, codes.TOO_MANY_CROSSINGS, codes.NO_CONVERGENCE, codes.BEYOND_STOP)
 
 
@@ -148,14 +150,13 @@ class Attractors:
 
         A nudge moves the state off the surface, which may shift the count of returns by one; so the distance to the
         whole cycle is measured, at all of its returns, over several rounds."""
-        rounds = 8
         cycle = out.section[i, -p:] / size
         if self.plan.every > 1:
             p *= self.plan.every
             own = _rows_of(out, i, p)
             self._probe(i, state.copy(), 0, p, own)
             cycle = own.section[i] / size
-        keep = rounds * p + 2
+        keep = ROUNDS * p + 2
         moved = state.copy()
         moved.u += max(NUDGE, 1e2 * self.tolerance) * size
         moved.settled = False
@@ -168,7 +169,12 @@ class Attractors:
         first, last = gap[1 : p + 1].max(), gap[-p:].max()
         if last <= self.tolerance:
             return 0.5
-        return float((last / first) ** (1.0 / (rounds - 1)))
+        return float((last / first) ** (1.0 / (ROUNDS - 1)))
+
+
+def tolerance_of(engine: Engine, rtol: float | None) -> float:
+    """What counts as a return, in units of the motion's size: no less than the engine's own tolerance shows."""
+    return TOLERANCE if engine.name == "exact" else max(TOLERANCE, 10.0 * (RTOL if rtol is None else rtol))
 
 
 def _rows_of(out: Chain, i: int, keep: int) -> Chain:

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from nonsmooth.analysis.attractors_cuda import Judging, fail
-from nonsmooth.analysis.settle import LEAST, LONGER
-from nonsmooth.analysis.settled import Settled, usable
+from nonsmooth.analysis.settle import LONGER
+from nonsmooth.analysis.settled import LEAST, Settled, usable
 from nonsmooth.flow.devices import batch_size
 from nonsmooth.flow.engine import Chain, FloatArray
 from nonsmooth.flow.planar import PlanarEngine

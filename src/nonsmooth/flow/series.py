@@ -152,7 +152,7 @@ class SeriesEngine:
         """See :class:`nonsmooth.flow.engine.Engine`."""
         traced = self.traced
         n, n_p, n_i = len(traced.u), len(traced.p), len(traced.indicators)
-        choice = self._choice(tables)
+        choice = self.choice(tables)
         choice[[at.TRANSIENT, at.KEEP, at.SECTION, at.RISING]] = transient, keep, plan.indicator, plan.rising
         choice[[at.SECTION_MODE, at.AFTER, at.EVERY]] = plan.mode, plan.after, plan.every
         control = self._control(-1.0, plan.t_max, -1.0)
@@ -202,7 +202,7 @@ class SeriesEngine:
         n, n_memory, n_p = len(traced.u), len(traced.m), len(traced.p)
         rows = n + len(traced.indicators) + len(traced.outputs)
         samples = np.ascontiguousarray(samples, dtype=float)
-        choice, control = self._choice(tables), self._control(-1.0, np.inf, until)
+        choice, control = self.choice(tables), self._control(-1.0, np.inf, until)
         choice[at.RECORD], choice[at.SECTION] = 1, -1
         control[at.PERIOD] = tables.periods[0]
         tally, memo = np.zeros(at.N_TALLY, dtype=np.int64), np.zeros(at.N_MEMO + len(self.traced.u))
@@ -244,13 +244,14 @@ class SeriesEngine:
             touched[:, 0].copy(), touched[:, 1].astype(np.int64), touched[:, 3:].copy(), touched[:, 2].copy(), status,
         )  # fmt: skip
 
-    def _choice(self, tables: Tables) -> np.ndarray:
+    def choice(self, tables: Tables) -> np.ndarray:
+        """What is asked of the kernel, at the places of ``series_places``; the section and the counts are left open."""
         traced = self.traced
         choice = np.zeros(at.N_CHOICE, dtype=np.int64)
         choice[at.METHOD] = METHODS[self.name]
         choice[at.ORDER] = self._order()
         choice[at.LOCATE] = self.locate
-        choice[at.EVERY] = 1
+        choice[at.EVERY], choice[at.PAUSE] = 1, at.NEVER
         choice[[at.N_PARAMETERS, at.N_INDICATORS, at.N_OUTPUTS]] = (
             len(traced.p), len(traced.indicators), len(traced.outputs),
         )  # fmt: skip

@@ -12,4 +12,5 @@ INTERRUPTED = 8
 
 # Only between a kernel and the driver that called it, never in a result.
 LOG_FULL = -1  # a log buffer is full: grow it and call again with the same state
+PAUSED = -3  # as many steps as were asked for have been made: call again with the same state
 BEYOND_STOP = -2  # the start satisfies the condition of a transition with a reset

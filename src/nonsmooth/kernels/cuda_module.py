@@ -8,17 +8,19 @@ from __future__ import annotations
 
 import hashlib
 import re
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from types import ModuleType
 
 from nonsmooth.kernels.cache import load_module
 
-__all__ = ["cuda_planar_module"]
+__all__ = ["cuda_planar_module", "joined", "stamp"]
 
 PARTS = (
     "planar_tables", "planar_polynomial", "planar_search", "planar_march", "planar_extremes", "planar_layout",
-    "planar_chain", "planar_settle", "planar_spectrum", "cuda_planar", "cuda_judge", "cuda_growth",
+    "planar_chain", "planar_settle", "planar_spectrum", "cuda_planar", "cuda_tables", "cuda_advance", "cuda_judge",
+    "cuda_growth",
 )  # fmt: skip
 
 
@@ -27,11 +29,7 @@ def cuda_planar_module(
     harmonics: int, modes: int, indicators: int, outputs: int, transitions: int, rows: int
 ) -> ModuleType:
     """The module with the entries of the ``cuda_*`` texts; ``rows`` counts those of the section too."""
-    folder = Path(__file__).parent
-    text = "\n".join((folder / f"{part}.py").read_text(encoding="utf-8") for part in PARTS)
-    text = re.sub(r"^from \.(?:planar|cuda)_(?!target)\w+ import (\([^)]*\).*|[^(\n]*)$", "", text, flags=re.MULTILINE)
-    text = re.sub(r"^from \.cache import", "from nonsmooth.kernels.cuda_target import", text, flags=re.MULTILINE)
-    text = re.sub(r"^from \.(\w+) import", r"from nonsmooth.kernels.\1 import", text, flags=re.MULTILINE)
+    text = joined(PARTS)
     sizes = {
         "HARMONICS": harmonics, "N_MODES": modes, "N_INDICATORS": indicators, "N_OUTPUTS": outputs,
         "N_TRANSITIONS": transitions, "N_ROWS": rows,
@@ -39,7 +37,26 @@ def cuda_planar_module(
     for name, size in sizes.items():
         text, found = re.subn(rf"^{name} = \d+$", f"{name} = {size}", text, flags=re.MULTILINE)
         assert found == 1, name
-    # Numba's disk cache goes by this text alone, and the header decides how it is compiled
-    header = (folder / "cuda_target.py").read_text(encoding="utf-8")
-    text += f"\nHEADER = {hashlib.sha256(header.encode()).hexdigest()!r}\n"
-    return load_module(text, "cuda_planar_" + "_".join(str(size) for size in sizes.values()))
+    return load_module(text + stamp(), "cuda_planar_" + "_".join(str(size) for size in sizes.values()))
+
+
+def joined(parts: Sequence[str], before: str = "") -> str:
+    """The text of some kernel files in one, behind ``before``: what they import of each other is there already, and
+    the markers are those of the GPU."""
+    folder = Path(__file__).parent
+    text = "\n".join([before, *((folder / f"{part}.py").read_text(encoding="utf-8") for part in parts)])
+    own = "|".join(parts)
+    text = re.sub(
+        rf"^from (?:\.|nonsmooth\.kernels\.)(?:{own}) import (\([^)]*\).*|[^(\n]*)$", "", text, flags=re.MULTILINE
+    )
+    text = re.sub(r"^from \. import", "from nonsmooth.kernels import", text, flags=re.MULTILINE)
+    text = re.sub(r"^from \.(\w+) import", r"from nonsmooth.kernels.\1 import", text, flags=re.MULTILINE)
+    return re.sub(r"from nonsmooth\.kernels\.(?:cache|lanes) import", "from nonsmooth.kernels.cuda_target import", text)
+
+
+def stamp() -> str:
+    """A line that stands for the header: Numba's disk cache goes by the module's text alone, and the header decides how
+    it is compiled."""
+    folder = Path(__file__).parent
+    header = "".join((folder / f"{name}.py").read_text(encoding="utf-8") for name in ("cuda_target", "lanes"))
+    return f"\nHEADER = {hashlib.sha256(header.encode()).hexdigest()!r}\n"

@@ -12,10 +12,10 @@ import subprocess
 import sysconfig
 import tempfile
 from pathlib import Path
-from types import SimpleNamespace
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
-__all__ = ["ptx_of", "resources_of"]
+__all__ = ["ptx_of", "ptx_of_module", "resources_of"]
 
 CAPABILITY = (9, 0)
 
@@ -30,15 +30,23 @@ def ptx_of(entry: str, signature: str, shape: tuple[int, ...], capability: tuple
     shape : tuple of int
         Arguments of :func:`nonsmooth.kernels.cuda_module.cuda_planar_module`.
     """
+    from nonsmooth.kernels.cuda_module import cuda_planar_module
+
+    return ptx_of_module(cuda_planar_module(*shape), entry, signature, capability)
+
+
+def ptx_of_module(
+    module: ModuleType, entry: str, signature: str, capability: tuple[int, int] = CAPABILITY
+) -> str:
+    """The same for an entry of any module with the GPU's header."""
     from numba.cuda import compile, dispatcher
 
-    from nonsmooth.kernels.cuda_module import cuda_planar_module
     from nonsmooth.kernels.cuda_target import THREADS
 
     before = dispatcher.get_current_device
     dispatcher.get_current_device = lambda: SimpleNamespace(compute_capability=capability)
     try:
-        function = getattr(cuda_planar_module(*shape), entry).py_func
+        function = getattr(module, entry).py_func
         text, _ = compile(function, signature, device=False, abi="numba", cc=capability, launch_bounds=THREADS)
     finally:
         dispatcher.get_current_device = before

@@ -15,7 +15,9 @@ from typing import Any
 
 from numba import config, cuda
 
-__all__ = ["REGISTERS", "THREADS", "cuda", "device", "entry", "inline", "kernel", "local"]
+from nonsmooth.kernels.lanes import plain
+
+__all__ = ["REGISTERS", "THREADS", "cuda", "device", "entry", "inline", "kernel", "local", "mix_rows", "sum_rows"]
 
 THREADS = 64  # in a block: few, because a trajectory fills a thread's registers
 REGISTERS = None  # of a thread, at most; None: as many as the compiler takes (255)
@@ -30,6 +32,7 @@ def device(function: Callable[..., Any]) -> Any:
 
 
 inline = device
+sum_rows, mix_rows = device(plain.sum_rows), device(plain.mix_rows)
 
 
 def local(function: Callable[..., Any]) -> Any:

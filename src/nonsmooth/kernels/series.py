@@ -16,7 +16,7 @@ from numpy import float32
 
 from . import series_places as place
 from .cache import kernel
-from .codes import DIVERGED, LOG_FULL, NO_CONVERGENCE, NOT_GUARANTEED, OK
+from .codes import DIVERGED, LOG_FULL, NO_CONVERGENCE, NOT_GUARANTEED, OK, PAUSED
 from .crossing import NOISE, earliest, sides_at
 from .polynomial import NONE, row_bounds
 from .rkf45 import hermite, quiet, stages, transit
@@ -57,7 +57,7 @@ def march(
 ):  # fmt: skip
     """Run one trajectory until its section returns are counted, or its time is reached. Returns a status.
 
-    LOG_FULL asks for larger logs and to be called again with the same arrays."""
+    LOG_FULL asks for larger logs, PAUSED for nothing, and to be called again with the same arrays."""
     times, samples, crossings, touch_log = log
     C, W, J0, J1, K, powers, a, d, vals, u_new, q_new = work[:11]
     scale, measured, side, side_next, rise, usual, visited, stack, found, u_dense, u_before, dwell, near = work[11:]
@@ -71,7 +71,8 @@ def march(
     phase, until, t_max = control[place.PHASE], control[place.UNTIL], control[place.T_MAX]
     checked = choice[place.CHECKED] == 1 and method == place.TAYLOR and fixed <= 0.0
     log_rtol, tail, forced = ln(max(0.1 * rtol, 1e-16)), (1.0 if method == place.TAYLOR else 0.0), period < inf
-    mode, t, status, zero_row, take = counters[0], clock[0], OK, -1, False
+    mode, t, status = counters[0], clock[0], OK
+    zero_row, take = tally[place.ZERO_ROW] - 1, tally[place.TAKE] == 1  # from before a pause
     timed = False
     for k in range(net[4].shape[0]):
         timed = timed or net[4][k] >= 0.0
@@ -105,6 +106,9 @@ def march(
             status = LOG_FULL
             break
         if not ready:
+            if tally[place.STEPS] >= choice[place.PAUSE]:
+                status = PAUSED
+                break
             jet(mode, 2 if rkf else order, t, u, q, J, W)
             for i in range(n_indicators):
                 scale[i] = max(scale[i], fabs(J[n + i, 0]))
@@ -360,7 +364,7 @@ def march(
             break
 
     counters[0], clock[0] = mode, t
-    tally[place.READY] = 1 if ready else 0
+    tally[place.READY], tally[place.ZERO_ROW], tally[place.TAKE] = 1 if ready else 0, zero_row + 1, 1 if take else 0
     if status == OK and tally[place.DOUBTFUL] == 1:
         status = NOT_GUARANTEED
     return status

@@ -1,0 +1,54 @@
+"""The series kernels for CUDA: a model's generated functions, the text of the CPU's files, and ``cuda_series``.
+
+One module for each system, method and order, because the model is part of it and a thread's arrays have constant
+shapes; tolerances, sections and parameters are arguments.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from functools import cache
+from types import ModuleType
+from typing import Any
+
+from nonsmooth.kernels.cache import load_module
+from nonsmooth.kernels.cuda_module import joined, stamp
+
+__all__ = ["cuda_series_module", "cuda_series_source"]
+
+PARTS = (
+    "circular", "polynomial", "crossing", "rkf45", "taylor", "trust", "watch", "series_step", "series_node", "series",
+    "cuda_series",
+)  # fmt: skip
+
+
+def cuda_series_source(model: str, sizes: Mapping[str, int], tables: Mapping[str, Any]) -> str:
+    """Text of the module.
+
+    Parameters
+    ----------
+    model : str
+        Text of the model's module (``system.generate.model_source``).
+    sizes : mapping
+        The numbers at the top of ``cuda_series``.
+    tables : mapping
+        The arrays there.
+    """
+    text = joined(PARTS, model)
+    for names in (("METHOD", "ORDER", "CHECKED", "CORNERS", "NONLINEAR_ROWS", "N_GUARDS"),
+                  ("N_PARAMETERS", "N_MEMORY", "N_INDICATORS", "N_OUTPUTS", "N_SCRATCH_ROWS")):  # fmt: skip
+        line = f"{', '.join(names)} = {', '.join(str(int(sizes[name])) for name in names)}"
+        text, found = re.subn(rf"^{', '.join(names)} = [\d, ]+$", line, text, flags=re.MULTILINE)
+        assert found == 1, names
+    for name, table in tables.items():
+        line = f"{name} = np.array({table.tolist()!r}, dtype=np.{table.dtype}).reshape({table.shape})"
+        text, found = re.subn(rf"^{name} = np\.array.*$", line, text, flags=re.MULTILINE)
+        assert found == 1, name
+    return text + stamp()
+
+
+@cache
+def cuda_series_module(source: str) -> ModuleType:
+    """The module of a text made by :func:`cuda_series_source`."""
+    return load_module(source, "cuda_series")
