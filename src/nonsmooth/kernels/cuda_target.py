@@ -17,7 +17,9 @@ from numba import config, cuda
 
 from nonsmooth.kernels.lanes import plain
 
-__all__ = ["REGISTERS", "THREADS", "cuda", "device", "entry", "inline", "kernel", "local", "mix_rows", "sum_rows"]
+__all__ = [
+    "REGISTERS", "THREADS", "callback", "cuda", "device", "entry", "inline", "kernel", "local", "mix_rows", "sum_rows",
+]  # fmt: skip
 
 THREADS = 64  # in a block: few, because a trajectory fills a thread's registers
 REGISTERS = None  # of a thread, at most; None: as many as the compiler takes (255)
@@ -43,6 +45,9 @@ def local(function: Callable[..., Any]) -> Any:
 def kernel(signature: Any) -> Callable[[Callable[..., Any]], Any]:
     """A kernel of the CPU is a function inside an entry here; its types follow from the call."""
     return device
+
+
+callback = kernel
 
 
 def entry(function: Callable[..., Any]) -> Any:
