@@ -8,7 +8,8 @@ PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 OUT    ?= out/savi2007
 # Matrices are tiny: threads of the linear algebra only wait for each other and for a core.
 export OPENBLAS_NUM_THREADS ?= 1
-PYTEST_ARGS ?= -n auto --dist loadfile
+# The order of the files is that of tests/conftest.py.
+PYTEST_ARGS ?= -n auto --dist loadfile --no-loadscope-reorder
 
 .DEFAULT_GOAL := help
 .PHONY: help reproduce reproduce-full test slow fuzz coverage rig-against-model check bench gpu gpu-compiler docs clean \

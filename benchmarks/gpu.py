@@ -29,6 +29,7 @@ import nonsmooth as ns
 from gpu_flops import PLANES
 from nonsmooth.analysis.chart import plan_chart
 from nonsmooth.analysis.chart_refine import labels_of_points
+from nonsmooth.flow.devices import gpu_name
 from nonsmooth.kernels import codes
 
 HERE = Path(__file__).parent
@@ -94,8 +95,7 @@ def peak() -> tuple[str, float]:
 
     gpu = cuda.get_current_device()
     units = UNITS.get(tuple(gpu.compute_capability), np.nan)
-    name = gpu.name.decode() if isinstance(gpu.name, bytes) else str(gpu.name)
-    return name, 2.0 * units * gpu.MULTIPROCESSOR_COUNT * gpu.CLOCK_RATE * 1e3
+    return gpu_name(), 2.0 * units * gpu.MULTIPROCESSOR_COUNT * gpu.CLOCK_RATE * 1e3
 
 
 def settlers(side: int, plane: str, **options: Any) -> tuple[Any, Any, Any, Any]:

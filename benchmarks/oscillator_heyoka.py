@@ -64,6 +64,19 @@ class _Second:
         return True
 
 
+def equations() -> tuple[list[Any], Any, Any]:
+    """The equations of motion, and what rises through zero at an entry or a release, and at an entry through h_b.
+
+    The second is minus h_b while free and the constant -1 in contact: h_b falling is this rising.
+    """
+    x, v = hy.make_vars("x", "v")
+    stiffness, damping, force, omega, gap, support, dashpot, tau, on = (hy.par[i] for i in range(9))
+    depth = x - gap
+    free = force * hy.cos(omega * hy.time) - stiffness * x - damping * v
+    motion = [(x, v), (v, free - on * (support * depth + dashpot * v))]
+    return motion, (1.0 - on) * depth - on * (depth + tau * v), (1.0 - on) * (depth + tau * v) - on
+
+
 class Oscillator:
     """A compiled integrator; `start` sets parameters and state, the rest marches on from there.
 
@@ -71,20 +84,13 @@ class Oscillator:
     """
 
     def __init__(self, events: str = "complete", tolerance: float = 1e-14) -> None:
-        x, v = hy.make_vars("x", "v")
-        stiffness, damping, force, omega, gap, support, dashpot, tau, on = (hy.par[i] for i in range(9))
-        depth = x - gap
-        free = force * hy.cos(omega * hy.time) - stiffness * x - damping * v
+        motion, change, entry = equations()
         rising = hy.event_direction.positive
         self._toggle, self._second = _Toggle(), _Second()
-        watched = [hy.t_event((1.0 - on) * depth - on * (depth + tau * v), callback=self._toggle, direction=rising)]
+        watched = [hy.t_event(change, callback=self._toggle, direction=rising)]
         if events == "complete":
-            # Minus h_b while free, the constant -1 in contact: h_b falling is this rising.
-            watched.append(hy.t_event((1.0 - on) * (depth + tau * v) - on, callback=self._second, direction=rising))
-        self.ta = hy.taylor_adaptive(
-            [(x, v), (v, free - on * (support * depth + dashpot * v))],
-            [0.0, 0.0], pars=[0.0] * 9, tol=tolerance, t_events=watched,
-        )  # fmt: skip
+            watched.append(hy.t_event(entry, callback=self._second, direction=rising))
+        self.ta = hy.taylor_adaptive(motion, [0.0, 0.0], pars=[0.0] * 9, tol=tolerance, t_events=watched)
         for callback in (self._toggle, self._second):
             callback.pars = memoryview(self.ta.pars)
         self._second.state = memoryview(self.ta.state)

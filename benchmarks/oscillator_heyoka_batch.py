@@ -14,7 +14,7 @@ import heyoka as hy
 import numpy as np
 from numpy.typing import NDArray
 
-from oscillator_heyoka import ON
+from oscillator_heyoka import ON, equations
 
 
 class _Toggle:
@@ -48,20 +48,14 @@ class Batch:
 
     def __init__(self, lanes: int | None = None, tolerance: float = 1e-14) -> None:
         self.lanes = hy.recommended_simd_size() if lanes is None else lanes
-        x, v = hy.make_vars("x", "v")
-        stiffness, damping, force, omega, gap, support, dashpot, tau, on = (hy.par[i] for i in range(9))
-        depth = x - gap
-        free = force * hy.cos(omega * hy.time) - stiffness * x - damping * v
+        motion, change, entry = equations()
         rising = hy.event_direction.positive
         self._toggle, self._second = _Toggle(), _Second()
         self.ta = hy.taylor_adaptive_batch(
-            [(x, v), (v, free - on * (support * depth + dashpot * v))],
-            np.zeros((2, self.lanes)), pars=np.zeros((9, self.lanes)), tol=tolerance,
+            motion, np.zeros((2, self.lanes)), pars=np.zeros((9, self.lanes)), tol=tolerance,
             t_events=[
-                hy.t_event_batch(
-                    (1.0 - on) * depth - on * (depth + tau * v), callback=self._toggle, direction=rising
-                ),
-                hy.t_event_batch((1.0 - on) * (depth + tau * v) - on, callback=self._second, direction=rising),
+                hy.t_event_batch(change, callback=self._toggle, direction=rising),
+                hy.t_event_batch(entry, callback=self._second, direction=rising),
             ],
         )  # fmt: skip
         self._toggle.pars = self._second.pars = memoryview(self.ta.pars)

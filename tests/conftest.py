@@ -6,6 +6,8 @@ import os
 
 os.environ.setdefault("MPLBACKEND", "Agg")
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -15,8 +17,38 @@ from nonsmooth.results.labels import Labels, Quantity
 from nonsmooth.results.provenance import provenance
 from nonsmooth.results.statuses import by_name
 
+# With a cold cache most of a run is compiling. Files that bring a large kernel come first, in this order, so that two
+# workers with a file each do not compile the same one at the same time; then what takes long for other reasons.
+FIRST = (
+    "flow/test_planar.py",  # record, for 3, 0 and 1 harmonics
+    "flow/test_series.py",  # march
+    "analysis/test_chart_known_answers.py",  # settle_many
+    "flow/test_variational.py",  # march_legs, many models
+    "analysis/test_lyapunov.py",  # spectrum without a harmonic
+    "experiment/rig/test_virtual_rig.py",  # the models of the rig
+    "analysis/test_correlation_dimension.py",  # spectrum
+    "flow/test_poincare.py",  # chain without a harmonic
+    "analysis/test_sweep.py",  # chain
+    "analysis/test_gpu.py",
+    "continuation/test_codimension_two.py",
+    "flow/test_simulate.py",
+    "system/test_jet.py",
+    "examples/test_pages.py",
+    "examples/test_examples.py",
+    "studies/test_savi2007_global.py",
+    "studies/test_savi2007_claims.py",
+    "test_import.py",
+    "test_bad_input.py",
+)
 GAP = 0.5
 JUMP_UP, JUMP_DOWN = 5.9, 5.2
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    folder = Path(__file__).parent
+    rank = {folder / name: i for i, name in enumerate(FIRST)}
+    assert all(path.is_file() for path in rank), "a file of FIRST has been moved"
+    items.sort(key=lambda item: rank.get(item.path, len(FIRST)))
 
 
 @pytest.fixture(scope="session")

@@ -12,6 +12,7 @@ import numpy as np
 
 import nonsmooth as ns
 from nonsmooth.flow import planar_cuda
+from nonsmooth.kernels.cuda_module import cuda_planar_module
 
 LAUNCHED: dict[str, str] = {}
 SHAPES: dict[str, list[int]] = {}
@@ -57,14 +58,31 @@ def both(verb: Any, *arguments: Any, **options: Any) -> dict[str, Any]:
     return found
 
 
+paper = cuda_planar_module(1, 2, 2, 1, 2, 5)
+plain_fill, built = paper.fill, 0
+
+
+def fill(*arguments: Any) -> None:
+    global built
+    built += 1
+    plain_fill(*arguments)
+
+
+def counted(*arguments: Any, **options: Any) -> dict[str, Any]:
+    """Both devices, and how many tables the GPU built."""
+    before = built
+    return both(*arguments, **options) | {"built": built - before}
+
+
+paper.fill = fill
 oscillator = ns.models.discontinuous_support()
 planar_cuda.SLICE = 16  # so that a transient takes several launches
 results = {
-    "chart": both(
+    "chart": counted(
         ns.chart, oscillator.with_parameters(g=-0.0045), {"omega": [3.2, 3.69], "rho": [0.15, 0.3, 0.45]}, transient=40,
         keep=12, max_period=4, lyapunov=40,
     ),
-    "every_period": both(
+    "every_period": counted(
         ns.chart, oscillator.with_parameters(g=-0.0045), {"omega": [3.69], "rho": [0.3, 0.47]}, transient=20, keep=12,
         max_period=4, stop_early=False, extremes=False, start=[{"x": 0.0}, {"x": 0.01, "v": 0.05}],
     ),
@@ -72,15 +90,23 @@ results = {
         ns.chart, ns.models.impact_oscillator(), {"omega": [1.0, 2.7], "A": [0.05, 1.0]}, transient=30, keep=12,
         max_period=4, start=[{"x": 0.0}, {"x": 5.0}],
     ),
+    "carried": both(
+        ns.chart, ns.models.impact_oscillator(), {"d": [0.4, 0.7, 1.0], "omega": [0.9, 2.7]}, carry={"d": "down"},
+        transient=30, keep=12, max_period=4,
+    ),
     "basins": both(
         ns.basins, oscillator.with_parameters(g=0.0014, omega=11.15, rho=0.33),
         {"x": [-0.006, 0.0, 0.006], "v": [-0.1, 0.1]}, transient=60, keep=20, max_period=6,
     ),
-    "sweep": both(
+    "basin_fractions": both(
+        ns.basin_fractions, oscillator.with_parameters(g=0.0014, omega=11.15), "rho", [0.3, 0.33], n_starts=6,
+        box={"x": (-0.02, 0.02), "v": (-0.2, 0.2)}, seed=1, transient=60, keep=20, max_period=6,
+    ),
+    "sweep": counted(
         ns.sweep, oscillator.with_parameters(g=-0.0045, omega=3.69), "rho", [0.2, 0.3, 0.47], direction=None,
         transient=20, keep=20,
     ),
-    "lyapunov": both(
+    "lyapunov": counted(
         ns.lyapunov, oscillator.with_parameters(g=-0.0045, omega=3.69), parameter="rho", values=[0.25, 0.33],
         direction=None, periods=64, transient=20,
     ),

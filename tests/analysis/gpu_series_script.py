@@ -9,7 +9,7 @@ import json
 from typing import Any
 
 from gpu_both import both, launches_of
-from gpu_series_systems import START, TOP, filtered, two_wells
+from gpu_series_systems import START, TOP, filtered, grows_to_a_stop, two_wells
 
 import nonsmooth as ns
 from nonsmooth.flow import series_cuda
@@ -34,5 +34,13 @@ results = {
     "basins": both(ns.basins, two_wells(), {"x": [-1.0, 1.2], "v": [-0.5, 0.5]}, **SHORT | {"transient": 60}),
     "memory": both(ns.sweep, two_wells(), "F", [0.1, 0.27], direction=None, **SHORT),
     "exact": both(ns.sweep, filtered(), "F", [0.2, 0.3], direction=None, **SHORT | {"method": "auto"}),
+    "planar": both(
+        ns.sweep, grows_to_a_stop(), "c", [0.1, 0.2], direction=None, start={"x": 0.5},
+        section=ns.Poincare("speed", rising=True), **SHORT | {"method": "auto"},
+    ),
+    "forced": both(
+        ns.chart, ns.models.discontinuous_support(g=-0.0045), {"omega": [3.2, 3.69], "rho": [0.15, 0.3]},
+        section=ns.Poincare("penetration", rising=True), **SHORT | {"method": "auto"},
+    ),
 }  # fmt: skip
 print(json.dumps({"results": results, "launched": LAUNCHED}))

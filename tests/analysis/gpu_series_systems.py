@@ -28,6 +28,16 @@ def two_wells() -> ns.System:
     )  # fmt: skip
 
 
+def grows_to_a_stop() -> ns.System:
+    """Two states, linear, without forcing: oscillations grow until they meet a stop."""
+    return ns.System(
+        name="grows to a stop", states=["x", "v"], parameters={"c": 0.2, "r": 0.5},
+        modes={"open": lambda t, u, p: (u.v, p.c * u.v - u.x)},
+        indicators={"stop": lambda t, u, p: u.x - 1.0, "speed": lambda t, u, p: u.v},
+        transitions=[ns.Transition("open", "open", when="stop > 0", reset=lambda t, u, p: (u.x, -p.r * u.v))],
+    )  # fmt: skip
+
+
 def filtered() -> ns.System:
     """Three states, linear in both modes: the exact flow by series."""
 

@@ -34,7 +34,7 @@ for name, signature in json.load(sys.stdin).items():
     found[name] = [text.count(".visible .entry"), ".target sm_90" in text]
 print(json.dumps(found))
 """
-ENTRIES = {"judge", "beside", "decide", "frames", "advance", "neighbours"}
+ENTRIES = {"tabulate", "judge", "beside", "decide", "frames", "advance", "neighbours"}
 
 
 def run(code: list[str], given: str = "", **environment: str) -> str:
@@ -56,7 +56,7 @@ def pair(simulated: dict[str, Any], verb: str, name: str) -> tuple[np.ndarray, n
     return np.array(both["cpu"][name]), np.array(both["cuda"][name])
 
 
-@pytest.mark.parametrize("verb", ["chart", "every_period", "stop"])
+@pytest.mark.parametrize("verb", ["chart", "every_period", "stop", "carried"])
 def test_a_chart_has_the_labels_and_extremes_of_the_processor(simulated: dict[str, Any], verb: str) -> None:
     for name in ("period_number", "status", "crossings_per_period", "contacts_per_period"):
         np.testing.assert_array_equal(*pair(simulated, verb, name), err_msg=name)
@@ -85,6 +85,14 @@ def test_basins_have_the_labels_and_attractors_of_the_processor(simulated: dict[
     np.testing.assert_allclose(*pair(simulated, "basins", "section_points"), rtol=0, atol=1e-9)
 
 
+def test_basin_fractions_are_those_of_the_processor(simulated: dict[str, Any]) -> None:
+    for name in ("fraction", "fraction_error", "period_number", "not_converged", "diverged", "n_starts_99"):
+        np.testing.assert_array_equal(*pair(simulated, "basin_fractions", name), err_msg=name)
+    assert (pair(simulated, "basin_fractions", "fraction")[0] > 0).sum() == 3  # one attractor, then two
+    for name in ("section", "maximum", "minimum"):
+        np.testing.assert_allclose(*pair(simulated, "basin_fractions", name), rtol=0, atol=1e-9, err_msg=name)
+
+
 def test_a_sweep_has_the_periodic_points_of_the_processor(simulated: dict[str, Any]) -> None:
     np.testing.assert_array_equal(*pair(simulated, "sweep", "period_number"))
     np.testing.assert_array_equal(*pair(simulated, "sweep", "status"))
@@ -111,6 +119,12 @@ def test_every_kernel_compiles_for_the_types_it_is_launched_with(simulated: dict
     assert json.loads(printed) == {name: [1, True] for name in entries}
 
 
+def test_tables_are_built_once_for_each_point(simulated: dict[str, Any]) -> None:
+    """Six points of a chart and of its exponents, three of a sweep, two of spectra; whatever launches and starts."""
+    built = {verb: simulated["results"][verb]["built"] for verb in ("chart", "every_period", "sweep", "lyapunov")}
+    assert built == {"chart": 12, "every_period": 2, "sweep": 3, "lyapunov": 2}
+
+
 def test_no_kernel_is_left_out(simulated: dict[str, Any]) -> None:
     assert set(simulated["launched"]) == ENTRIES
 
@@ -122,14 +136,12 @@ def test_what_a_gpu_does_not_take_is_said_at_the_door() -> None:
     oscillator = ns.models.discontinuous_support()
     with pytest.raises(ValueError, match="device = 'gpu' does not exist; allowed: 'cpu', 'cuda'"):
         ns.chart(oscillator, PLANE, device="gpu")
-    with pytest.raises(ValueError, match="none can go on from the state of another.*leave carry out"):
-        ns.chart(oscillator, PLANE, carry={"rho": "up"}, device="cuda")
     with pytest.raises(ValueError, match="direction=None"):
         ns.sweep(oscillator, "rho", [0.1, 0.2], device="cuda")
     with pytest.raises(ValueError, match='asks for method="rkf45"'):
         ns.chart(oscillator, PLANE, method="rkf45", device="cuda")
-    with pytest.raises(ValueError, match="stroboscopic sections only"):
-        ns.chart(oscillator, PLANE, section=ns.Poincare("penetration"), device="cuda")
+    with pytest.raises(ValueError, match='basin_fractions with device="cuda".*method="rkf45"'):
+        ns.basin_fractions(oscillator, "rho", [0.1, 0.2], box={"x": (0.0, 0.1)}, method="rkf45", device="cuda")
 
 
 def test_without_the_package_the_door_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -144,6 +156,10 @@ def test_threads_and_clusters_are_those_of_the_processor(monkeypatch: pytest.Mon
         ns.chart(ns.models.discontinuous_support(), PLANE, device="cuda", threads=2)
     with pytest.raises(ValueError, match="leave client out"):
         ns.chart(ns.models.discontinuous_support(), PLANE, device="cuda", client=object())
+    with pytest.raises(ValueError, match="leave threads out"):
+        ns.basin_fractions(
+            ns.models.discontinuous_support(), "rho", [0.1], box={"x": (0.0, 0.1)}, device="cuda", threads=2
+        )
     with pytest.raises(ValueError, match="a single trajectory is one thread"):
         ns.lyapunov(ns.models.discontinuous_support(), device="cuda")
 

@@ -62,14 +62,23 @@ def pair(simulated: dict[str, Any], verb: str, name: str) -> tuple[np.ndarray, n
     return np.array(both["cpu"][name], dtype=float), np.array(both["cuda"][name], dtype=float)
 
 
-@pytest.mark.parametrize("verb", ["sweep", "memory", "exact"])
+@pytest.mark.parametrize("verb", ["sweep", "memory", "exact", "planar"])
 def test_a_sweep_is_that_of_the_processor(simulated: dict[str, Any], verb: str) -> None:
-    """The valve on its maxima of the lift; a forced system with steep layers, memory and corners; three linear states.
+    """The valve on its maxima of the lift; a forced system with steep layers, memory and corners; three linear
+    states; two without forcing.
     """
     assert pair(simulated, verb, "period_number")[0].max() > 0
     for name in simulated["results"][verb]["cpu"]:
         cpu, gpu = pair(simulated, verb, name)
         np.testing.assert_allclose(gpu, cpu, rtol=1e-12, atol=1e-12, err_msg=name)
+
+
+def test_a_forced_planar_system_on_a_surface(simulated: dict[str, Any]) -> None:
+    """The planar kernels of a GPU have no such section; the processor's have."""
+    assert pair(simulated, "forced", "period_number")[0].max() > 0
+    for name in simulated["results"]["forced"]["cpu"]:
+        cpu, gpu = pair(simulated, "forced", name)
+        np.testing.assert_allclose(gpu, cpu, rtol=1e-9, atol=1e-9, err_msg=name)
 
 
 def test_the_valve_hits_its_seat(simulated: dict[str, Any]) -> None:

@@ -13,7 +13,7 @@ def test_the_amplitude_of_the_linear_oscillator() -> None:
     """a = rho / |2 k - m w^2 + i c w|, half the true range, up and down alike; no jump."""
     system = ns.models.discontinuous_support(g=1.0, rho=0.2)
     omega = np.linspace(3.5, 5.5, 21)
-    response = ns.frequency_response(system, omega, transient=150, keep=4, progress=False)
+    response = ns.frequency_response(system, omega, transient=150, keep=4, max_period=3, progress=False)
     p = system.values
     a = p["rho"] / np.hypot(2 * p["k"] - p["m"] * omega**2, p["c"] * omega)
     assert response["amplitude"].dims == ("omega", "direction", "state")
@@ -33,7 +33,7 @@ def test_jumps_of_a_bistable_motion() -> None:
     )
     a = np.linspace(-0.6, 0.6, 61)
     response = ns.frequency_response(
-        system, a, parameter="a", start={"x": -1.2}, transient=200, keep=4, rtol=1e-10, progress=False
+        system, a, parameter="a", start={"x": -1.2}, transient=200, keep=4, max_period=3, rtol=1e-10, progress=False
     )
     assert response["jump_direction"].values.tolist() == ["up", "down"]
     fold = 2 / (3 * np.sqrt(3))
@@ -62,10 +62,10 @@ def test_jumps_stand_out_from_their_neighbours(amplitude: np.ndarray, found: lis
 
 def test_directions_and_starts_of_a_response() -> None:
     system = ns.models.discontinuous_support(g=1.0, rho=0.2)
-    one = ns.frequency_response(system, [3.0, 3.5], direction="up", transient=50, keep=4, progress=False)
+    one = ns.frequency_response(system, [3.0, 3.5], direction="up", transient=50, keep=4, max_period=3, progress=False)
     assert one["amplitude"].dims == ("omega", "state")
     starts = [{"x": 0.0}, {"x": 0.01}]
-    many = ns.frequency_response(system, [3.0, 3.5], start=starts, transient=150, keep=4, progress=False)
+    many = ns.frequency_response(system, [3.0, 3.5], start=starts, transient=150, keep=4, max_period=3, progress=False)
     assert many["amplitude"].dims == ("omega", "direction", "start", "state")
     p = system.values
     a = p["rho"] / np.hypot(2 * p["k"] - p["m"] * 9.0, p["c"] * 3.0)

@@ -21,6 +21,7 @@ class Squares:
     name: str = "squares"
     seconds: float = 0.0
     fails_at: int = -1
+    device: str = "cpu"
 
     def columns(self) -> dict[str, Column]:
         return {"square": Column("f8"), "pair": Column("i4", (2,))}

@@ -14,6 +14,7 @@ from simple_work import Squares, hashes, right
 import nonsmooth as ns
 from nonsmooth.analysis.basins import basins
 from nonsmooth.analysis.chart import chart, plan_chart
+from nonsmooth.campaign import identity
 from nonsmooth.campaign import store as stores
 from nonsmooth.campaign.plan import plan
 from nonsmooth.campaign.run import run
@@ -76,12 +77,12 @@ def test_the_store_of_another_work_is_refused(tmp_path: Path, monkeypatch: pytes
         with pytest.raises(DataFileError, match=message):
             run(other, store=path, **QUIET)
     with monkeypatch.context() as patched:
-        patched.setattr(stores, "cpu_type", lambda: "another")
+        patched.setattr(stores, "processor_type", lambda device: "another")
         with pytest.raises(DataFileError, match="any_cpu=True"):
             run(Squares(), store=path, **QUIET)
         assert right(run(Squares(), store=path, any_cpu=True, **QUIET), Squares())
     with monkeypatch.context() as patched:
-        patched.setattr(stores, "_kernel_version", lambda: "older")
+        patched.setattr(identity, "_kernel_version", lambda: "older")
         with pytest.raises(DataFileError, match="another version"):
             run(Squares(), store=path, **QUIET)
     assert hashes(path) == before
@@ -111,7 +112,7 @@ def test_trouble_with_the_disk_is_one_sentence(
         def refuse(*_: object) -> None:
             raise OSError(number, os.strerror(number))
 
-        patched.setattr(stores, "_write_whole", refuse)
+        patched.setattr(stores, "write_whole", refuse)
         with pytest.raises(DataFileError, match=words):
             store.write(work, 1, work.compute(1), 0.0)
     assert store.done() == {0}

@@ -24,6 +24,7 @@ parameter = "rho"
 values = { from = 0.42, to = 0.46, n = 5 }
 transient = 60
 keep = 8
+max_period = 4
 """
 
 
@@ -42,7 +43,7 @@ def test_a_file_computes_what_the_call_computes(write, tmp_path: Path, capsys) -
     assert cli.main(["run", str(path)]) == 0
     assert "sweep of" in capsys.readouterr().out
     system = ns.models.discontinuous_support().with_parameters(omega=3.69, g=-0.0045)
-    expected = ns.sweep(system, "rho", np.linspace(0.42, 0.46, 5), transient=60, keep=8, progress=False)
+    expected = ns.sweep(system, "rho", np.linspace(0.42, 0.46, 5), transient=60, keep=8, max_period=4, progress=False)
     found = ns.load(tmp_path / "out" / "a.nc")
     xr.testing.assert_equal(found, expected)
     assert ns.System.from_text(read_provenance(found)["system"]["text"]) == system
@@ -54,7 +55,7 @@ def test_a_file_computes_what_the_call_computes(write, tmp_path: Path, capsys) -
     [
         ("[simulate]\nperiods = 3\n", "u"),
         ("[poincare]\nn = 5\ntransient = 10\nsection = { phase = 0.25 }\n", "section"),
-        ("[frequency_response]\nvalues = [3.0, 3.1, 3.2]\ntransient = 20\nkeep = 4\n", "amplitude"),
+        ("[frequency_response]\nvalues = [3.0, 3.1, 3.2]\ntransient = 20\nkeep = 4\nmax_period = 3\n", "amplitude"),
     ],
 )
 def test_every_verb_is_a_table(verb: str, figure_of: str, write, tmp_path: Path) -> None:

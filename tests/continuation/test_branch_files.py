@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import systems
+import xarray as xr
 
 import nonsmooth as ns
 
@@ -48,6 +49,8 @@ def test_orbit_there_and_back(tmp_path: Path) -> None:
         assert back.system == orbit.system and back.signature == orbit.signature
         assert np.array_equal(back.u, orbit.u) and np.array_equal(back.monodromy_matrix, orbit.monodromy_matrix)
         assert back.stable == orbit.stable and back.mode == orbit.mode
+        again = ns.find_orbit(back.system, **back.options)  # the record of how it was found finds it again
+        assert np.array_equal(again.u, orbit.u)
 
 
 def test_trajectory_closes() -> None:
@@ -56,6 +59,25 @@ def test_trajectory_closes() -> None:
     assert run["u"].values[-1] == pytest.approx(orbit.u, abs=1e-12)
     assert run["crossing_time"].values == pytest.approx(orbit.crossing_times, abs=1e-12)
     assert run["u"].max("time").values == pytest.approx(orbit.maximum, abs=1e-5)  # samples miss the peaks
+
+
+def test_trajectory_from_an_impact() -> None:
+    """The forcing shifted by the instant of the impact puts the impact on the section: the motion begins behind it."""
+    system = ns.models.impact_oscillator()
+    at = float(ns.find_orbit(system).crossing_times[0])
+    shifted = ns.System(
+        states=["x", "v"], parameters={"A": 1.0, "c": 0.1, "e": 0.8, "phi": at},
+        modes={"motion": lambda t, u, p: (u.v, p.A * np.cos(t + p.phi) - u.x - p.c * u.v)},
+        indicators={"stop": lambda t, u, p: u.x - 1.0},
+        transitions=[ns.Transition("motion", "motion", when="stop > 0", reset=lambda t, u, p: (u.x, -p.e * u.v))],
+    )  # fmt: skip
+    orbit = ns.find_orbit(shifted)
+    run = orbit.trajectory()
+    assert orbit.crossing_times == pytest.approx([0.0], abs=1e-12) and orbit.u[0] == pytest.approx(1.0, abs=1e-12)
+    assert run["u"].values[0, 1] == pytest.approx(-0.8 * orbit.u[1], abs=1e-12)
+    before = run["u"].values[run["time"].values < orbit.period][-1]
+    assert before == pytest.approx(orbit.u, abs=2 * orbit.period / 1024)  # a sample before the next impact
+    assert float(run["u"].max()) == pytest.approx(float(orbit.maximum.max()), abs=1e-5)
 
 
 def test_orbit_of_the_smoothed_switch() -> None:
@@ -68,10 +90,43 @@ def test_orbit_of_the_smoothed_switch() -> None:
     assert run["u"].values[-1] == pytest.approx(near.u, abs=1e-10)
 
 
-def test_schema() -> None:
-    """Dims and variables that scripts may rely on."""
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("layout", 7), ("layout", -1), ("mode", 5), ("unknowns", np.nan), ("tangent", np.nan), ("ended", 99),
+        ("special_point", -3), ("special_indicator", "elsewhere"), ("clearance", None), ("stable", None),
+    ],
+)  # fmt: skip
+def test_damaged_branch(branch: xr.Dataset, name: str, value: object) -> None:
+    """An index that points nowhere, a number that is lost, a variable that is gone: refused, never read as another."""
+    edited = branch.drop_vars(name) if value is None else branch.assign({name: xr.full_like(branch[name], value)})
+    with pytest.raises(ValueError, match="damaged and cannot be read back"):
+        ns.continue_orbit(edited, range=(0.1, 0.6))
+
+
+@pytest.mark.parametrize(
+    "layouts", ["[]", "[[[0, 0, 0, 0], [0, -1, -1, 0]]]", "[[[1, 9, 0, 0], [0, -1, -1, 0]]]", "no list"]
+)
+def test_damaged_signature(branch: xr.Dataset, layouts: str) -> None:
+    """A signature that the system's transitions do not allow."""
+    edited = branch.assign_attrs(layouts=layouts)
+    with pytest.raises(ValueError, match="this branch is damaged"):
+        ns.continue_orbit(edited, range=(0.1, 0.6))
+    with pytest.raises(ValueError, match="this special point is damaged"):
+        ns.continue_orbit(ns.special_points(edited).isel(special=0))
     orbit = ns.find_orbit(ns.models.discontinuous_support(rho=0.45, omega=3.69, g=-0.0045))
-    branch = ns.continue_orbit(orbit, "rho", (0.2, 0.5))
+    with pytest.raises(ValueError, match="this orbit is damaged"):
+        ns.Orbit.from_dataset(orbit.to_dataset().assign_attrs(layouts=layouts))
+
+
+@pytest.fixture(scope="module")
+def branch() -> xr.Dataset:
+    orbit = ns.find_orbit(ns.models.discontinuous_support(rho=0.45, omega=3.69, g=-0.0045))
+    return ns.continue_orbit(orbit, "rho", (0.2, 0.5))
+
+
+def test_schema(branch: xr.Dataset) -> None:
+    """Dims and variables that scripts may rely on."""
     assert {"point", "state", "multiplier", "special"} <= set(branch.dims)
     for name in ("section", "maximum", "minimum", "period", "floquet_multipliers", "stable", "signature", "clearance",
                  "status"):  # fmt: skip

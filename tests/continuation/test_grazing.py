@@ -11,7 +11,7 @@ import xarray as xr
 
 import nonsmooth as ns
 from nonsmooth.continuation.begin import resumed_at
-from nonsmooth.continuation.files import read_branch
+from nonsmooth.continuation.reading import read_branch
 
 support = ns.models.discontinuous_support
 

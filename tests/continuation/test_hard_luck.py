@@ -7,9 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 import reference_values as known
+import xarray as xr
 
 import nonsmooth as ns
 from nonsmooth.continuation.arclength import Curve
+from nonsmooth.continuation.equilibrium import Equilibria
+from nonsmooth.continuation.locus import Locus
 from nonsmooth.continuation.marches import ENDINGS
 
 support = ns.models.discontinuous_support
@@ -52,20 +55,43 @@ def test_a_branch_that_is_interrupted(monkeypatch: pytest.MonkeyPatch) -> None:
     """Ctrl-C returns what was found, which goes on from there to the same ends."""
     orbit = ns.find_orbit(support(rho=0.14, g=0.02, omega=3.3))
     whole = ns.continue_orbit(orbit, "omega", (3.0, 3.5))
-    steps, step = iter(range(5)), Curve.step
-
-    def interrupted(*arguments: Any, **options: Any) -> Any:
-        if next(steps, None) is None:
-            raise KeyboardInterrupt
-        return step(*arguments, **options)
-
-    monkeypatch.setattr(Curve, "step", interrupted)
+    _interrupt_after(5, Curve, monkeypatch)
     part = ns.continue_orbit(orbit, "omega", (3.0, 3.5))
     monkeypatch.undo()
     assert ends(part) == ["interrupted", "interrupted"] and 3 < part.sizes["point"] < whole.sizes["point"]
     rest = ns.continue_orbit(part)
     assert ends(rest) == ends(whole) and rest["omega"].values[[0, -1]] == pytest.approx(whole["omega"].values[[0, -1]])
     assert ns.special_points(rest)["omega"].values == pytest.approx(ns.special_points(whole)["omega"].values, abs=1e-9)
+
+
+def test_a_curve_that_is_interrupted(flip: xr.Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ctrl-C returns what was found, and the end says so."""
+    _interrupt_after(5, Locus, monkeypatch)
+    curve = ns.continue_curve(flip, {"omega": (3.9, 5.0), "rho": (0.1, 0.2)})
+    assert curve.sizes["point"] == 6  # the first, and one for each step
+    assert [str(text)[:11] for text in curve["ended_because"].values] == ["Interrupted"] * 2
+
+
+def test_a_branch_of_equilibria_that_is_interrupted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """x^2 = a has equilibria at x = -sqrt(a) and sqrt(a)."""
+    system = ns.System(states=["x"], parameters={"a": 1.0}, modes={"one": lambda t, u, p: p.a - u.x * u.x})
+    _interrupt_after(4, Equilibria, monkeypatch)
+    branch = ns.continue_equilibrium(system, "a", (0.5, 2.0), start={"x": 0.9})
+    assert branch.sizes["point"] == 5
+    assert branch["u"].values[:, 0] == pytest.approx(np.sqrt(branch["a"].values), abs=1e-12)
+    assert [str(text)[:11] for text in branch["ended_because"].values] == ["Interrupted"] * 2
+
+
+def _interrupt_after(n: int, owner: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ctrl-C at the step after the n-th."""
+    steps, step = iter(range(n)), owner.step
+
+    def interrupted(*arguments: Any, **options: Any) -> Any:
+        if next(steps, None) is None:
+            raise KeyboardInterrupt
+        return step(*arguments, **options)
+
+    monkeypatch.setattr(owner, "step", interrupted)
 
 
 def test_a_start_beyond_a_stop() -> None:
@@ -135,6 +161,44 @@ def test_wrong_arguments(arguments: tuple[object, ...], words: str) -> None:
     orbit = ns.find_orbit(support(rho=0.14, g=0.02, omega=3.3))
     with pytest.raises((ValueError, TypeError), match=words):
         ns.continue_orbit(orbit, *arguments)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"range": 3.0}, "two ends"), ({"range": (0.5, 1.5, 2.0)}, "two ends"), ({"range": (2.0, 0.5)}, "below"),
+        ({"range": (2.0, 3.0)}, "the system lies at a = 1.0, outside"), ({"step": 0}, "above 0"),
+        ({"step": -0.1}, "above 0"),
+    ],
+)  # fmt: skip
+def test_wrong_arguments_of_an_equilibrium(options: dict[str, Any], words: str) -> None:
+    system = ns.System(states=["x"], parameters={"a": 1.0}, modes={"one": lambda t, u, p: p.a - u.x * u.x})
+    with pytest.raises(ValueError, match=words):
+        ns.continue_equilibrium(system, "a", **{"range": (0.5, 2.0), "start": {"x": 0.9}, **options})
+
+
+@pytest.mark.parametrize(
+    ("ranges", "options", "words"),
+    [
+        ({"omega": (3.9, 5.0), "rho": 0.2}, {}, "the range of rho = 0.2: give its two ends"),
+        ({"omega": (3.9, 5.0), "rho": (0.2, 0.1)}, {}, "below"),
+        ({"omega": (3.9, 5.0), "rho": (0.2, 0.3)}, {}, "the special point lies at rho = 0.14, outside"),
+        ({"omega": (3.9, 5.0), "roh": (0.1, 0.3)}, {}, "nearest: rho"),
+        ({"omega": (3.9, 5.0)}, {}, "two parameters"),
+        ({"omega": (3.9, 5.0), "rho": (0.1, 0.3)}, {"step": 0}, "above 0"),
+    ],
+)  # fmt: skip
+def test_wrong_arguments_of_a_curve(ranges: Any, options: dict[str, Any], words: str, flip: xr.Dataset) -> None:
+    with pytest.raises(ValueError, match=words):
+        ns.continue_curve(flip, ranges, **options)
+
+
+@pytest.fixture(scope="module")
+def flip() -> xr.Dataset:
+    branch = ns.continue_orbit(ns.find_orbit(support(rho=0.14, g=0.02, omega=4.5)), "omega", (3.9, 5.0))
+    row = ns.special_points(branch).isel(special=0)
+    assert str(row["kind"].values) == "flip"
+    return row
 
 
 def test_what_is_no_orbit() -> None:

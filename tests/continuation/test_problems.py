@@ -87,27 +87,26 @@ def test_a_fold_of_the_impacting_orbit() -> None:
 # B: bang-bang Duffing
 
 
-def duffing_map(omega: float, u: np.ndarray) -> np.ndarray:
-    """One period by SciPy."""
-    T = 2 * np.pi / omega
-    for sign in (-1.0, 1.0):
-        u = solve_ivp(
-            lambda t, y, a=26.0 * sign: [y[1], a - 0.2 * y[1] - y[0] - y[0] ** 3], (0.0, T / 2), u,
-            method="DOP853", rtol=1e-13, atol=1e-13,
-        ).y[:, -1]  # fmt: skip
-    return np.asarray(u)
+def duffing_map(omega: float, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """One period and its derivative, by the equation and its variations in SciPy."""
+
+    def field(t: float, y: np.ndarray, force: float) -> list[float]:
+        stiffness = 1.0 + 3.0 * y[0] ** 2
+        return [
+            y[1], force - 0.2 * y[1] - y[0] - y[0] ** 3,
+            y[4], y[5], -0.2 * y[4] - stiffness * y[2], -0.2 * y[5] - stiffness * y[3],
+        ]  # fmt: skip
+
+    half, y = np.pi / omega, np.array([*u, 1.0, 0.0, 0.0, 1.0])
+    for force in (-26.0, 26.0):
+        y = solve_ivp(field, (0.0, half), y, args=(force,), method="DOP853", rtol=1e-13, atol=1e-13).y[:, -1]
+    return y[:2], y[2:].reshape(2, 2)
 
 
 def duffing_condition(kind: str, omega: float, u: np.ndarray) -> np.ndarray:
-    h = 1e-4
-    D = np.empty((2, 2))
-    for j in range(2):
-        e = np.eye(2)[j] * h
-        near = duffing_map(omega, u + e) - duffing_map(omega, u - e)
-        far = duffing_map(omega, u + 2 * e) - duffing_map(omega, u - 2 * e)
-        D[:, j] = (8 * near - far) / (12 * h)
+    end, D = duffing_map(omega, u)
     sign = 1.0 if kind == "flip" else -1.0
-    return np.append(duffing_map(omega, u) - u, np.linalg.det(D + sign * np.eye(2)))
+    return np.append(end - u, np.linalg.det(D + sign * np.eye(2)))
 
 
 @pytest.fixture(scope="module")

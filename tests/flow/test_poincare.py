@@ -181,3 +181,10 @@ def test_a_slow_drift_is_no_rest() -> None:
     system = ns.System(states={"x": "m"}, parameters={}, modes={"only": drift}, indicators={"level": level})
     points = ns.poincare(system, section=ns.Poincare("level"), n=1, start={"x": 0.0}, method="taylor")
     assert np.isclose(float(points["time"][0]), 1e4, rtol=1e-6)
+
+
+def test_a_start_beyond_a_stop_is_said_to_be_one() -> None:
+    """Not that the section was not met again: the run never began."""
+    with pytest.raises(ns.SolveError, match="beyond a stop") as caught:
+        ns.poincare(ns.models.impact_oscillator(), n=3, start={"x": 2.0})
+    assert caught.value.status == "beyond_stop"

@@ -355,4 +355,4 @@ def test_a_motion_as_small_as_the_tolerance_is_warned_of() -> None:
     exact = 1e-9 / 3 * (np.cos(t) - np.cos(2 * t))
     np.testing.assert_allclose(run.u.sel(state="x"), exact, atol=1e-16)
     with pytest.warns(UserWarning, match="below a hundred times atol"):
-        ns.sweep(system(), "F", [1e-9, 2e-9], transient=2, keep=4, method="rkf45", progress=False)
+        ns.sweep(system(), "F", [1e-9, 2e-9], transient=2, keep=4, max_period=3, method="rkf45", progress=False)

@@ -49,7 +49,7 @@ def test_the_last_state_of_a_run_is_a_start(system: ns.System) -> None:
     assert start_states(system, run).tolist() == [run["u"].values[-1].tolist()]
     again = ns.simulate(system, periods=1, start=run["u"].isel(time=-1))
     assert again["u"].values[0].tolist() == run["u"].values[-1].tolist()
-    swept = ns.sweep(system, "rho", [0.4], transient=2, keep=2, start=run)
+    swept = ns.sweep(system, "rho", [0.4], transient=2, keep=2, max_period=1, start=run)
     assert swept["start_state"].values.tolist() == run["u"].values[-1].tolist()
     other = ns.models.relief_valve()
     with pytest.raises(ValueError, match=r"must be a result of simulate with the states y1, y2, y3"):

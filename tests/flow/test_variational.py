@@ -235,7 +235,7 @@ def test_legs_are_exponentials_of_linear_modes() -> None:
 def test_a_leg_and_its_way_back_cancel() -> None:
     """Of a nonlinear mode, with parameters: z returns, the matrices are inverse, and P of the way back undoes P."""
     template = TEMPLATES["shell"]()
-    flow = VariationalFlow.of(template.system, ("n", "b"))
+    flow = VariationalFlow.of(template.system, template.active)
     values = template.system.parameter_vector()
     there = flow.legs(values, [1], [0.4], [2.5], [[0.4, -0.3, 0.5]])
     back = flow.legs(values, [1], [2.9], [-2.5], there.z)
@@ -247,8 +247,8 @@ def test_a_leg_and_its_way_back_cancel() -> None:
 
 def test_derivative_in_the_beginning() -> None:
     """dz/dt0 = f_end - Phi f_begin, against differences."""
-    system = TEMPLATES["pendula"]().system
-    flow, values = VariationalFlow.of(system), system.parameter_vector()
+    template = TEMPLATES["pendula"]()
+    flow, values = VariationalFlow.of(template.system, template.active), template.system.parameter_vector()
     z0 = np.array([[0.3, -0.2, 0.1, 0.4]])
 
     def end(h: float) -> np.ndarray:
@@ -261,8 +261,7 @@ def test_derivative_in_the_beginning() -> None:
 
 def test_an_indicator_and_its_lie_derivatives() -> None:
     """L_f h and L_f^2 h are derivatives along the motion; gradients against differences."""
-    system = TEMPLATES["pendula"]().system
-    active = ("g", "w", "s")
+    system, active = TEMPLATES["pendula"]().system, TEMPLATES["pendula"]().active
     flow, values = VariationalFlow.of(system, active), system.parameter_vector()
     t, z = 0.7, np.array([0.3, -0.2, 0.1, 0.4])
     touch = flow.indicator(values, 0, 1, t, z)

@@ -21,7 +21,9 @@ ORBITS = {
 def one_point(p: dict[str, float], start: np.ndarray, **options: object):
     system = ns.models.discontinuous_support().with_parameters(p)
     begin = {"x": float(start[0]), "v": float(start[1])}
-    return ns.sweep(system, "rho", [p["rho"]], start=begin, transient=100, keep=16, progress=False, **options).squeeze()
+    return ns.sweep(
+        system, "rho", [p["rho"]], start=begin, transient=100, keep=16, max_period=15, progress=False, **options
+    ).squeeze()
 
 
 @pytest.mark.parametrize("name", ORBITS)

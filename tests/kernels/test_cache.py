@@ -34,15 +34,15 @@ def drive(f, g, u, n):
 '''
 
 MODEL = '''
-from nonsmooth.kernels.cache import kernel
+from nonsmooth.kernels.cache import callback
 
 
-@kernel("void(int64, float64, float64[::1])")
+@callback("void(int64, float64, float64[::1])")
 def f(mode, t, u):
     u[0] += {0!r} + mode * t
 
 
-@kernel("void(int64, float64, float64[::1])")
+@callback("void(int64, float64, float64[::1])")
 def g(mode, t, u):
     u[0] *= {0!r}
 '''
@@ -99,6 +99,39 @@ def test_second_process_compiles_nothing_and_a_new_model_only_itself(tmp_path):
     assert all((hits, misses) == (0, 1) for _, hits, misses in other["model"])
     # The functions came in as first-class function types: no second version of the driver was made for them.
     assert other["overloads"] == 1
+
+
+LAZY = '''
+import json, threading
+from nonsmooth.kernels import cache
+import driver
+
+def statistics():
+    return {name: [loads, compiles] for name, loads, compiles in cache.cache_statistics(driver)}
+
+before = statistics()
+refused = ""
+try:
+    driver.twice("text")
+except TypeError as error:
+    refused = str(error)
+values = []
+threads = [threading.Thread(target=lambda: values.append(driver.twice(1.5))) for _ in range(4)]
+for thread in threads:
+    thread.start()
+for thread in threads:
+    thread.join()
+print(json.dumps([before, refused, values, len(driver.twice.signatures), statistics()]))
+'''
+
+
+def test_a_kernel_is_compiled_when_it_is_first_called(tmp_path):
+    """Not at import, once for all threads, alone, and for its own signature even where the first call is wrong."""
+    before, refused, values, versions, after = run(tmp_path, 2.0, script=LAZY)
+    assert before == {"twice": [0, 0], "drive": [0, 0]}
+    assert "No matching definition" in refused
+    assert values == [3.0] * 4 and versions == 1
+    assert after == {"twice": [0, 1], "drive": [0, 0]}
 
 
 def test_damaged_entries_are_compiled_anew(tmp_path):

@@ -52,10 +52,31 @@ def test_given_axes_are_used_and_the_callers_style_kept(
     assert len(plt.get_fignums()) == 1
 
 
+def test_a_legend_on_given_axes_has_the_packages_style(swept: xr.Dataset) -> None:
+    """No frame, letters of 7/8 of the axes' labels; a setting of the caller's own stays."""
+    _, mine = plt.subplots()
+    mine.xaxis.label.set_size(16)
+    legend = plot.bifurcation(swept, mine).get_legend()
+    assert not legend.get_frame_on()
+    assert legend.get_texts()[0].get_size() == pytest.approx(14)
+    with mpl.rc_context({"legend.fontsize": 5}):
+        assert plot.bifurcation(swept, plt.subplots()[1]).get_legend().get_texts()[0].get_size() == pytest.approx(5)
+
+
 @pytest.mark.parametrize(("figure", "name"), CASES)
 def test_a_result_of_another_verb_is_refused(figure: str, name: str) -> None:
     with pytest.raises(ValueError, match="it is not the result of"):
         getattr(plot, figure)(xr.Dataset({"u2": 1.0}))
+
+
+@pytest.mark.parametrize(
+    "figure",
+    ["branch", "curve", "chart", "basins", "basin_fractions", "manifolds", "density", "multipliers", "orbit",
+     "time_history"],
+)  # fmt: skip
+def test_what_is_no_result_is_refused(figure: str) -> None:
+    with pytest.raises(TypeError, match="not (from )?float"):
+        getattr(plot, figure)(3.0)
 
 
 def test_a_diagram_shows_every_finite_point_up_and_down(swept: xr.Dataset) -> None:

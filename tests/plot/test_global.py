@@ -46,7 +46,7 @@ def test_a_chart_shows_each_period_once_with_its_colour(support: ns.System) -> N
         expected = plane[show].isel(state=0) if "state" in plane[show].dims else plane[show]
         np.testing.assert_allclose(values, expected.transpose("rho", "g").values.ravel())
     with pytest.raises(ValueError, match="chart"):
-        draw_chart(ns.sweep(support, "g", [0.001], keep=4, **QUIET))
+        draw_chart(ns.sweep(support, "g", [0.001], keep=17, **QUIET))
 
 
 def test_basins_show_their_attractors(support: ns.System) -> None:
@@ -97,6 +97,6 @@ def test_a_density_diagram_shows_the_shares_of_the_bins() -> None:
     with pytest.raises(ValueError, match=r"plot\.density"):
         ns.plot.bifurcation(swept)
     with pytest.raises(ValueError, match="density=True"):
-        density(ns.sweep(system, "rho", [0.3], keep=4, **QUIET))
+        density(ns.sweep(system, "rho", [0.3], keep=17, **QUIET))
     with pytest.raises(ValueError, match="not a state"):
         density(swept, y="z")

@@ -113,3 +113,18 @@ def test_manifolds_start_at_the_saddle(orbit: ns.Orbit, branch: xr.Dataset) -> N
 def test_a_result_of_another_verb_is_refused(figure: str) -> None:
     with pytest.raises(ValueError, match="it is not the result of"):
         getattr(plot, figure)(xr.Dataset({"u2": 1.0}))
+
+
+def test_a_branch_of_equilibria() -> None:
+    """x^2 = a: the fold at the origin is marked, one arm is stable; an equilibrium is its own maximum."""
+    system = ns.System(states=["x"], parameters={"a": 1.0}, modes={"one": lambda t, u, p: p.a - u.x * u.x})
+    rest = ns.continue_equilibrium(system, "a", (-0.5, 1.5), start={"x": 0.9})
+    assert float(rest["special_value"][0]) == pytest.approx(0.0, abs=1e-9)
+    for quantity in ("section", "maximum"):
+        ax = plot.branch(rest, quantity=quantity)
+        lines = [line for line in ax.get_lines() if len(line.get_xdata()) > 1]
+        assert [line.get_linestyle() for line in lines] == ["-", "--"]
+        a, x = (np.asarray(part, dtype=float) for part in lines[0].get_data())
+        good = np.isfinite(x)
+        assert x[good] == pytest.approx(np.sqrt(a[good]), abs=1e-6)
+        assert words(ax) == ["fold"]

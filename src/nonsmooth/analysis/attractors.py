@@ -18,12 +18,12 @@ from nonsmooth.analysis.attractors_compiled import exponents_compiled, load, run
 from nonsmooth.analysis.attractors_cuda import exponents_on_gpu, run_on_gpu
 from nonsmooth.analysis.attractors_parting import exponent_of
 from nonsmooth.analysis.attractors_trace import Trace, period_of, place_of, state_at, trace
-from nonsmooth.analysis.classify import TOLERANCE, Verdict
+from nonsmooth.analysis.classify import Verdict
 from nonsmooth.analysis.series_cuda import series_exponents_on_gpu, settle_series_on_gpu
-from nonsmooth.analysis.settle import LEAST, LONGER, Attractors
+from nonsmooth.analysis.settle import LEAST, LONGER, Attractors, tolerance_of
 from nonsmooth.analysis.settled import Settled, usable
 from nonsmooth.flow.engine import Chain, Engine, FloatArray, IntArray, SectionPlan, State
-from nonsmooth.flow.methods import RTOL, engine_for
+from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.planar import PlanarEngine
 from nonsmooth.kernels import codes
 
@@ -65,10 +65,7 @@ class Settler:
     width: int = field(init=False)  # numbers that say where a run stands on the section (``attractors_trace``)
 
     def __post_init__(self) -> None:
-        noise = TOLERANCE
-        if self.engine.name != "exact":
-            noise = max(TOLERANCE, 10.0 * (RTOL if self.rtol is None else self.rtol))
-        object.__setattr__(self, "tolerance", noise)
+        object.__setattr__(self, "tolerance", tolerance_of(self.engine, self.rtol))
         u, m, forced = self.system.traced.u, self.system.traced.m, self.system.traced.period is not None
         object.__setattr__(self, "width", len(u) + len(m) + int(forced and self.plan.indicator >= 0))
 
@@ -87,7 +84,9 @@ class Settler:
     def load(self) -> None:
         """Compile or load the kernel now, before threads ask for it."""
         if self.planar is not None and self.device == "cpu":
-            load(self.planar)
+            from nonsmooth.kernels.cache import compiled
+
+            compiled(load(self.planar).settle_many)
 
     def run(
         self,
@@ -244,9 +243,8 @@ def _system_from(text: str) -> System:
 
 def _remade(text: str, values: Mapping[str, float], method: str, given: Mapping[str, Any]) -> Settler:
     system = _system_from(text).with_parameters(values)
-    exact = method == "exact"
+    # "auto" takes tolerances that the exact flow has no use for
     engine = engine_for(
-        system, "auto" if exact else method, None if exact else given["rtol"], None if exact else given["atol"],
-        **given["expert"],
-    )  # fmt: skip
+        system, "auto" if method == "exact" else method, given["rtol"], given["atol"], **given["expert"]
+    )
     return Settler(system, engine, **given)

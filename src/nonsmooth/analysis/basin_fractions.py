@@ -17,7 +17,8 @@ from nonsmooth.analysis.chart import described
 from nonsmooth.analysis.chart_work import CHUNK, STORED
 from nonsmooth.analysis.sweep import swept_values
 from nonsmooth.campaign.run import run
-from nonsmooth.flow.arguments import check_options, check_system, whole_number
+from nonsmooth.flow.arguments import check_options, check_system, real_number, whole_number
+from nonsmooth.flow.devices import BATCH, workers_of
 from nonsmooth.flow.sections import Poincare, Stroboscopic
 from nonsmooth.flow.starts import random_starts, start_states
 
@@ -46,6 +47,7 @@ def basin_fractions(
     rtol: float | None = None,
     atol: Any = None,
     threads: int | None = None,
+    device: str = "cpu",
     store: Any = None,
     client: Any = None,
     any_cpu: bool = False,
@@ -66,7 +68,7 @@ def basin_fractions(
         Lowest and highest value of each state at the start; states that are not named start at zero.
     seed : int
         Seed of the starts.
-    section, transient, keep, max_period, method, rtol, atol, threads, store, client, any_cpu, progress
+    section, transient, keep, max_period, method, rtol, atol, threads, device, store, client, any_cpu, progress
         See :func:`nonsmooth.basins`.
 
     Returns
@@ -84,6 +86,8 @@ def basin_fractions(
     ------
     ValueError, TypeError
         Arguments that do not fit.
+    ImportError, RuntimeError
+        ``device="cuda"`` without the package numba-cuda, or without a GPU.
     """
     check_system(system, "basin_fractions")
     check_options(system, expert, basin_fractions)
@@ -91,15 +95,17 @@ def basin_fractions(
     n_starts = whole_number(n_starts, "n_starts", 1)
     starts = start_states(system, _starts(system, box, n_starts, seed))
     section, settler = settler_of(
-        system, section, transient, keep, max_period, method, rtol, atol, expert, threads=threads
-    )
+        system, section, transient, keep, max_period, method, rtol, atol, expert, threads=threads, device=device,
+        verb="basin_fractions",
+    )  # fmt: skip
+    gpu, threads = device == "cuda", workers_of(device, threads, client)
     options = {
         "parameter": parameter, "values": numbers, "n_starts": n_starts, "box": box and dict(box), "seed": seed,
         "section": section, "transient": transient, "keep": keep, "max_period": max_period, "method": method,
-        "rtol": rtol, "atol": atol, **expert,
+        "rtol": rtol, "atol": atol, **({"device": device} if gpu else {}), **expert,
     }  # fmt: skip
     points = system.parameter_points({parameter: numbers})
-    chunk = CHUNK if store is None and client is None else STORED
+    chunk = BATCH if gpu else CHUNK if store is None and client is None else STORED
     work = StartsWork(settler, points, starts, chunk, described(system, "basin_fractions", options))
     columns = run(
         work, threads=threads, progress=progress, label=f"basins over {parameter}", store=store, client=client,
@@ -111,13 +117,14 @@ def basin_fractions(
     labels = np.full((len(numbers), n_starts), -1, dtype=np.int64)
     seen: dict[int, Attractor] = {}
     last: dict[int, Attractor] = {}
+    single = replace(settler, device="cpu")  # a few runs from one value to the next
     status, before = np.zeros_like(labels), points[rising[0] : rising[0] + 1]
     for i in rising:
         point = points[i : i + 1]
         found, label, status[i] = find_attractors(
             settler, point, runs[i * n_starts : (i + 1) * n_starts], Patience()
         )
-        ids = numbered(settler, point, found, before, last, seen)
+        ids = numbered(single, point, found, before, last, seen)
         before = point
         last = dict(zip(ids, found, strict=True))
         seen |= {k: replace(item, tree=None) for k, item in last.items()}
@@ -135,7 +142,7 @@ def _starts(system: System, box: Any, n_starts: int, seed: int) -> Any:
     for name, ends in box.items():
         if np.shape(ends) != (2,):
             raise ValueError(f"box[{name!r}] = {ends!r}: give its lowest and highest value; box={{{form}}}")
-    low, high = ({name: float(ends[k]) for name, ends in box.items()} for k in (0, 1))
+    low, high = ({name: real_number(ends[k], f"box[{name!r}]") for name, ends in box.items()} for k in (0, 1))
     return random_starts(n_starts, low, high, whole_number(seed, "seed", 0))
 
 

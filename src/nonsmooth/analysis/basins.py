@@ -24,7 +24,7 @@ from nonsmooth.analysis.classify import longest_period
 from nonsmooth.analysis.settled import usable
 from nonsmooth.campaign.run import run
 from nonsmooth.flow.arguments import check_options, check_system, float_array, real_number, whole_number
-from nonsmooth.flow.devices import BATCH, on_gpu, workers_of
+from nonsmooth.flow.devices import BATCH, engine_on, on_gpu, workers_of
 from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.kernels import codes
@@ -86,7 +86,7 @@ def basins(
     client : dask.distributed.Client, optional
         Computes the chunks on its workers.
     any_cpu : bool
-        Go on with a store that was begun on another type of processor.
+        Go on with a store that was begun on another type of processor, or of GPU with ``device="cuda"``.
     progress : bool
         A bar on a terminal.
 
@@ -184,7 +184,7 @@ def basins(
 
 def settler_of(
     system: System, section: Any, transient: Any, keep: Any, max_period: Any, method: str, rtol: Any, atol: Any,
-    expert: Mapping[str, Any], *, threads: Any = None, device: str = "cpu",
+    expert: Mapping[str, Any], *, threads: Any = None, device: str = "cpu", verb: str = "basins",
 ) -> tuple[Any, Settler]:  # fmt: skip
     """Check the options that basins share, and the settler they describe."""
     transient, keep = whole_number(transient, "transient", 0), whole_number(keep, "keep", 2)
@@ -197,8 +197,8 @@ def settler_of(
             f"{system.name!r} is forced: its fate depends on the phase at which a run starts, so its section must be "
             "one too: section=ns.Stroboscopic(phase)"
         )
-    engine = engine_for(system, method, rtol, atol, **expert)
-    on_gpu(device, "basins", engine, plan)
+    engine = engine_on(device, engine_for(system, method, rtol, atol, **expert), plan)
+    on_gpu(device, verb, engine, plan)
     settler = Settler(
         system, engine, plan, transient, keep, max_period, rtol=rtol, atol=atol, expert=expert, device=device
     )  # fmt: skip

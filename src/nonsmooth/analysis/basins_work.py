@@ -27,6 +27,10 @@ class StartsWork:
     chunk: int = CHUNK
     described: Mapping[str, Any] = field(default_factory=dict)
 
+    @property
+    def device(self) -> str:
+        return self.settler.device
+
     def columns(self) -> dict[str, Column]:
         n = self.starts.shape[1]
         kinds = {"period_number": "i8", "status": "i8", "mode": "i8", "returns": "i8"}

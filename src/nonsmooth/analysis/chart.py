@@ -14,8 +14,9 @@ from nonsmooth.analysis.classify import longest_period
 from nonsmooth.analysis.sweep import swept_values
 from nonsmooth.campaign.run import run
 from nonsmooth.flow.arguments import check_options, check_system, whole_number
-from nonsmooth.flow.devices import BATCH, on_gpu, workers_of
+from nonsmooth.flow.devices import BATCH, engine_on, on_gpu, workers_of
 from nonsmooth.flow.methods import engine_for
+from nonsmooth.flow.planar import PlanarEngine
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.flow.starts import is_one_start, plain_start, start_states
 
@@ -65,7 +66,8 @@ def chart(
     start : state or list of states, optional
         Every point begins there; zeros where not given. Several starts add the dim ``start`` and ``n_attractors``.
     carry : mapping, optional
-        ``{"rho": "up"}`` or ``{"rho": "down"}``: along this parameter the state is carried from point to point.
+        ``{"rho": "up"}`` or ``{"rho": "down"}``: along this parameter the state is carried from point to point. On a
+        GPU the rows run side by side, so it needs many of them.
     section : Stroboscopic or Poincare, optional
         ``Stroboscopic(0)`` where the system has a period.
     transient, keep : int
@@ -95,7 +97,7 @@ def chart(
     client : dask.distributed.Client, optional
         Computes the chunks on its workers.
     any_cpu : bool
-        Go on with a store that was begun on another type of processor.
+        Go on with a store that was begun on another type of processor, or of GPU with ``device="cuda"``.
     progress : bool
         A bar on a terminal.
 
@@ -115,7 +117,7 @@ def chart(
 
     Notes
     -----
-    No section points are stored: a chart of N points takes about 24 bytes per point without extremes.
+    No section points are stored: without extremes a chart takes 19 bytes per point.
     With ``refine`` a coarse grid is computed, cells whose corners differ are halved down to single points, and so are
     those beside them where a point in between disagrees; see :mod:`nonsmooth.analysis.chart_refine`.
     """
@@ -180,8 +182,8 @@ def plan_chart(
     if 0 < n_exponent < 40:
         raise ValueError(f"lyapunov = {lyapunov} returns are too few for an exponent; at least 40")
     extremes = bool(extremes) or len(starts) > 1  # attractors are told apart by them
-    engine = engine_for(system, method, rtol, atol, **expert)
-    gpu = on_gpu(device, "chart", engine, plan, carried=along is not None)
+    engine = engine_on(device, engine_for(system, method, rtol, atol, **expert), plan)
+    gpu = on_gpu(device, "chart", engine, plan, carried=along is not None and not isinstance(engine, PlanarEngine))
     settler = Settler(
         system, engine, plan, transient, keep, max_period, bool(stop_early), extremes, rtol, atol, expert, device
     )

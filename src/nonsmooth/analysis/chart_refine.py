@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from nonsmooth.analysis.chart_work import ChartWork
 from nonsmooth.campaign.run import run
+from nonsmooth.flow.arguments import real_number
 from nonsmooth.flow.engine import IntArray
 from nonsmooth.kernels import codes
 
@@ -60,7 +61,7 @@ def refined(
     ValueError
         A part outside 0..1, or a chart whose points are not independent: carried states, several starts.
     """
-    share = LARGEST_PART if part is True else float(part)
+    share = LARGEST_PART if part is True else real_number(part, "refine")
     if not 0.0 < share <= 1.0:
         raise ValueError(
             f"refine = {part!r}: the part of the points to compute, above 0 and at most 1; True: a quarter"
@@ -85,7 +86,6 @@ class _Refinement:
         }
         self.spent = 0
         self.rng = np.random.default_rng(0)
-        self.probed = np.zeros(self.shape, dtype=bool)
 
     def result(self) -> dict[str, NDArray[Any]]:
         step = self._coarse_step()

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from nonsmooth.analysis.attractors import Settler
+from nonsmooth.analysis.chart_rows import along_rows
 from nonsmooth.analysis.settled import Settled, usable
 from nonsmooth.campaign.work import Column
 from nonsmooth.flow.engine import FloatArray, IntArray
@@ -18,6 +19,7 @@ __all__ = ["CHUNK", "STORED", "ChartWork", "attractors_among"]
 
 CHUNK = 256  # runs of one chunk, at least: a tenth of a second
 STORED = 4096  # and of one that is kept in a store or sent to a cluster: a second
+SIDE_BY_SIDE = 1 << 21  # places of one chunk of carried rows on a GPU, at most: a gigabyte while it is computed
 SAME = 1e-6  # extremes that agree to this part of the motion's size belong to one attractor
 POINT = 1e-5  # and section points that agree to this part
 
@@ -59,7 +61,13 @@ class ChartWork:
     def _step(self) -> int:
         row = self._shape[1]
         least = max(1, self.chunk // len(self.starts))
-        return -(-least // row) * row if self.carried else least
+        if self.carried:  # whole rows; on a GPU many, side by side
+            return (min(least, max(1, SIDE_BY_SIDE // row)) if self.device == "cuda" else -(-least // row)) * row
+        return least
+
+    @property
+    def device(self) -> str:
+        return self.settler.device
 
     def columns(self) -> dict[str, Column]:
         many = () if len(self.starts) == 1 else (len(self.starts),)
@@ -94,7 +102,7 @@ class ChartWork:
         points = self.settler.system.parameter_points({a: values_a[row], b: values_b[column]})
         n_places, n_starts = len(places), len(self.starts)
         if self.carried:
-            found = self._along_rows(points, n_starts)
+            found = along_rows(self.settler, points, self._shape[1], self.starts)
         else:
             rows = np.repeat(np.arange(n_places), n_starts)
             found = self.settler.run(points, rows, np.tile(self.starts, (n_places, 1)))
@@ -117,18 +125,6 @@ class ChartWork:
         if n_starts > 1:
             kept["n_attractors"] = attractors_among(found, n_places, n_starts, self.settler, points)
         return kept
-
-    def _along_rows(self, points: FloatArray, n_starts: int) -> Settled:
-        """Each row from each start, the state carried along it; in the order (place, start)."""
-        length = self._shape[1]
-        parts = []
-        for first in range(0, len(points), length):
-            rows = np.arange(first, first + length)
-            for start in self.starts:
-                parts.append(self.settler.run(points, rows, np.tile(start, (length, 1)), carried=True))
-        joined = Settled.joined(parts)
-        order = np.arange(len(points) * n_starts).reshape(-1, n_starts, length)
-        return joined[order.transpose(0, 2, 1).ravel()]
 
 
 def attractors_among(

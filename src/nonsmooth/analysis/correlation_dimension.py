@@ -181,7 +181,10 @@ def _range(radius: FloatArray, slope: FloatArray, pairs: FloatArray, extent: flo
 
 
 def _given(limits: Any, radius: FloatArray) -> tuple[float, float]:
-    low, high = (real_number(value, "range") for value in limits)
+    try:
+        low, high = (real_number(value, "an end of the range") for value in limits)
+    except (TypeError, ValueError):
+        raise ValueError(f"range = {limits!r}: give its two ends, (low, high)") from None
     if not radius[0] <= low < high <= radius[-1] * (1 + 1e-9):
         raise ValueError(f"range = {limits!r} must rise and lie within {radius[0]:.3g} ... {radius[-1]:.3g}")
     return low, high

@@ -12,12 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.analysis.classify import Verdict, judge
+from nonsmooth.analysis.classify import TOLERANCE, Verdict, judge
 from nonsmooth.flow.engine import Chain, Engine, FloatArray, SectionPlan, State
+from nonsmooth.flow.methods import RTOL
 from nonsmooth.flow.poincare import result_status
 from nonsmooth.kernels import codes
 
-__all__ = ["Attractors"]
+__all__ = ["Attractors", "tolerance_of"]
 
 LONGER = (1, 2, 4)  # further transients for a point that is still settling, in units of the first
 KICK = 1e-3  # what pushes a state off an unstable orbit, in units of the motion's size
@@ -135,6 +136,11 @@ class Attractors:
         if last <= self.tolerance:
             return 0.5
         return float((last / first) ** (1.0 / (ROUNDS - 1)))
+
+
+def tolerance_of(engine: Engine, rtol: float | None) -> float:
+    """What counts as a return, in units of the motion's size: no less than the engine's own tolerance shows."""
+    return TOLERANCE if engine.name == "exact" else max(TOLERANCE, 10.0 * (RTOL if rtol is None else rtol))
 
 
 def _rows_of(out: Chain, i: int, keep: int) -> Chain:

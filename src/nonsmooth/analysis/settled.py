@@ -44,6 +44,7 @@ class Settled:
 
     @classmethod
     def empty(cls, jobs: int, n: int, width: int | None = None) -> Settled:
+        """Room for so many jobs of n states."""
         def whole() -> IntArray:
             return np.zeros(jobs, dtype=np.int64)
 
@@ -60,6 +61,7 @@ class Settled:
 
     @classmethod
     def joined(cls, parts: Sequence[Settled]) -> Settled:
+        """The jobs of all parts, one after the other."""
         return cls(*(np.concatenate([getattr(part, item.name) for part in parts]) for item in fields(cls)))
 
     def __getitem__(self, which: Any) -> Settled:

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.analysis.classify import TOLERANCE
+from nonsmooth.analysis.classify import longest_period
 from nonsmooth.analysis.density import bin_edges, coarse_values, given_ranges
-from nonsmooth.analysis.settle import Attractors
+from nonsmooth.analysis.settle import Attractors, tolerance_of
 from nonsmooth.analysis.sweep_pieces import Report, Slot, ended, largest_of, pieces_of, run_on_gpu, run_pieces
 from nonsmooth.flow.arguments import check_options, check_system, float_array, whole_number
-from nonsmooth.flow.devices import on_gpu, workers_of
+from nonsmooth.flow.devices import engine_on, on_gpu, workers_of
 from nonsmooth.flow.engine import FloatArray, State
-from nonsmooth.flow.methods import RTOL, engine_for, warn_if_coarse
+from nonsmooth.flow.methods import engine_for, warn_if_coarse
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.flow.starts import is_one_start, plain_start, start_states
 
@@ -71,7 +71,7 @@ def sweep(
         Section returns passed over, then recorded, at each value. A point that is still settling gets up to eight
         transients; what is not settled then has the status ``slow``.
     max_period : int
-        Longest period number looked for (and no longer than ``keep`` - 1).
+        Longest period number looked for, less than ``keep``.
     density : bool or mapping
         Store a histogram of each state's section points instead of the points. A mapping gives ranges,
         ``{"x": (lowest, highest)}``; where none is given it is that of a coarse sweep and a twentieth more either side.
@@ -114,20 +114,21 @@ def sweep(
     numbers = swept_values(system, parameter, values)
     directions = _directions(direction)
     transient, keep = whole_number(transient, "transient", 0), whole_number(keep, "keep", 2)
-    max_period = whole_number(max_period, "max_period", 1)
+    max_period = longest_period(keep, max_period)
     if threads is not None:
         threads = whole_number(threads, "threads", 1)
     section, plan = section_plan(system, section)
-    engine = engine_for(system, method, rtol, atol, **expert)
+    engine = engine_on(device, engine_for(system, method, rtol, atol, **expert), plan)
     gpu = on_gpu(device, "sweep", engine, plan, carried=direction is not None)
     if gpu and density is not False:
         raise ValueError("section points are counted on the processor: leave out density, or device=\"cuda\"")
     threads = workers_of(device, threads)
     starts = start_states(system, start)
     points = system.parameter_points({parameter: numbers})
-    noise = TOLERANCE if engine.name == "exact" else max(TOLERANCE, 10.0 * (RTOL if rtol is None else rtol))
-    attractors = Attractors(engine, engine.prepare(points), plan, transient, keep, max_period, noise,
-                            system.scale_vector())  # fmt: skip
+    attractors = Attractors(
+        engine, engine.prepare(points), plan, transient, keep, max_period, tolerance_of(engine, rtol),
+        system.scale_vector(),
+    )  # fmt: skip
     traced = system.traced
     sizes = len(traced.u), len(traced.indicators), len(traced.outputs)
     edges = None
@@ -135,10 +136,11 @@ def sweep(
         ranges, n_bins = given_ranges(system, density, bins)
         coarse = None
         if len(ranges) < len(system.states):
+            few = min(keep, 1000)
             coarse = sweep(
                 system, parameter, coarse_values(numbers), direction=direction, start=start, section=section,
-                transient=transient, keep=min(keep, 1000), max_period=max_period, method=method, rtol=rtol, atol=atol,
-                threads=threads, progress=False, **expert,
+                transient=transient, keep=few, max_period=min(max_period, few - 1), method=method, rtol=rtol,
+                atol=atol, threads=threads, progress=False, **expert,
             )["section"].transpose(..., "state").values  # fmt: skip
         edges = bin_edges(system, ranges, n_bins, coarse)
     slots = {
@@ -175,6 +177,13 @@ def sweep(
 
 
 def swept_values(system: System, parameter: str, values: Any) -> FloatArray:
+    """The values of a parameter that is varied, as an array.
+
+    Raises
+    ------
+    ValueError, TypeError
+        A parameter that does not exist; values that are no list of finite numbers, each there once.
+    """
     if parameter not in system.values:
         system.with_parameters({parameter: 0.0})  # raises with the names there are
     numbers = float_array(values, f"values of {parameter!r}")

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
 from typing import Any
 
 import numpy as np
@@ -13,6 +11,8 @@ import numpy as np
 from nonsmooth.analysis.classify import Verdict
 from nonsmooth.analysis.density import CountedSlot, Counter
 from nonsmooth.analysis.settle import Attractors
+from nonsmooth.analysis.settled import usable
+from nonsmooth.campaign.threads import cores, over_items
 from nonsmooth.flow.engine import Chain, FloatArray
 from nonsmooth.kernels import codes
 from nonsmooth.results.progress import progress as progress_bar
@@ -20,7 +20,6 @@ from nonsmooth.results.progress import progress as progress_bar
 __all__ = ["Report", "Slot", "ended", "largest_of", "pieces_of", "run_on_gpu", "run_pieces"]
 
 PIECE = 16  # points of one piece of independent work
-USABLE = (codes.OK, codes.SLOW, codes.NOT_PERIODIC, codes.NOT_GUARANTEED)  # the run came to its end
 
 
 class Slot:
@@ -50,10 +49,11 @@ class Slot:
         return ((i, i, self.attractors, self.chain) for i in order)
 
     def keep(self, i: int, row: int, verdict: Verdict, chain: Chain) -> None:
+        """The verdict on parameter value i, whose run stands in a row of a buffer."""
         self.period_number[i] = verdict.period_number
         self.residual[i] = verdict.residual
         self.status[i] = verdict.status
-        if self.counted is not None and verdict.status in USABLE:
+        if self.counted is not None and usable(verdict.status):
             self.counted.count(i, row, chain)
 
 
@@ -87,25 +87,11 @@ def run_pieces(
     label: str,
 ) -> None:
     """All pieces on a pool of threads (the kernels release the lock); Ctrl-C stops them after their present point."""
-    workers = min(threads or len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1,
-                  len(pieces))  # fmt: skip
+    workers = min(threads or cores(), len(pieces))
     total = sum(len(order) for _, order in pieces)
     with progress_bar(total, f"sweep over {label}", progress) as advance:
         report = Report(advance)
-        if workers == 1:
-            for slot, order in pieces:
-                march(slot, order, report)
-            return
-        with ThreadPoolExecutor(workers) as pool:
-            futures = [pool.submit(march, slot, order, report) for slot, order in pieces]
-            try:
-                for future in as_completed(futures):
-                    future.result()
-            except BaseException:
-                report.stop.set()
-                for future in futures:
-                    future.cancel()
-                raise
+        over_items(pieces, lambda piece: march(*piece, report), lambda *_: None, workers, report.stop)
 
 
 def run_on_gpu(
@@ -140,4 +126,5 @@ def largest_of(starts: FloatArray, slots: Iterable[Slot]) -> FloatArray:
 
 
 def ended(slot: Slot) -> np.ndarray:
-    return np.isin(slot.status, USABLE)
+    """Which runs came to their end."""
+    return usable(slot.status)

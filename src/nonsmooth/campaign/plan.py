@@ -12,7 +12,7 @@ import numpy as np
 from nonsmooth.campaign.threads import cores
 from nonsmooth.campaign.work import Work
 
-__all__ = ["Plan", "plan"]
+__all__ = ["GOLDEN", "Plan", "duration", "plan"]
 
 SECONDS = 5.0  # of sampling
 LEAST = 8  # chunks, where there are so many
@@ -51,11 +51,11 @@ class Plan:
         here = cores()
         lines = [
             f"{self.places} points in {self.chunks} chunks; sampled {self.sampled} chunks",
-            f"work        {_time(self.core_seconds)} of one core (+- {_time(self.error)})",
-            f"here        {_time(self.seconds(here))} on {here} cores",
+            f"work        {duration(self.core_seconds)} of one core (+- {duration(self.error)})",
+            f"here        {duration(self.seconds(here))} on {here} cores",
         ]
         if workers is not None:
-            lines.append(f"cluster     {_time(self.seconds(workers))} on {workers} cores of this kind")
+            lines.append(f"cluster     {duration(self.seconds(workers))} on {workers} cores of this kind")
         process = f"{_size(self.memory_bytes)} for the process, " if self.process_bytes else ""
         lines.append(f"memory      {process}{_size(self.result_bytes)} of it for the result")
         lines.append(f"store       {_size(self.stored_bytes)}, compressed")
@@ -122,7 +122,8 @@ def _resident() -> int:
     return int(most) * (1 if sys.platform == "darwin" else 1024)
 
 
-def _time(seconds: float) -> str:
+def duration(seconds: float) -> str:
+    """Seconds in the unit that a person would use."""
     for unit, length in (("d", 86400.0), ("h", 3600.0), ("min", 60.0)):
         if seconds >= 2 * length:
             return f"{seconds / length:.3g} {unit}"

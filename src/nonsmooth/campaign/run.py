@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping
 from typing import Any
 
 from numpy.typing import NDArray
 
+from nonsmooth.campaign.processors import clock
 from nonsmooth.campaign.threads import on_threads
 from nonsmooth.campaign.work import Work, empty_columns
 from nonsmooth.results.progress import progress as progress_bar
@@ -74,13 +74,14 @@ class _Kept:
     """A work whose chunks go into a store as soon as they are computed, in the thread that computed them."""
 
     def __init__(self, work: Work, keeper: Any) -> None:
-        self.work, self.keeper = work, keeper
+        self.work, self.keeper, self.device = work, keeper, work.device
         self.columns, self.n_chunks, self.bounds = work.columns, work.n_chunks, work.bounds
         self.describe = work.describe
 
     def compute(self, chunk: int) -> Mapping[str, NDArray[Any]]:
         self.keeper.note_start(chunk)
-        began = time.thread_time()
+        now = clock(self.device)
+        began = now()
         arrays = self.work.compute(chunk)
-        self.keeper.write(self.work, chunk, arrays, time.thread_time() - began)
+        self.keeper.write(self.work, chunk, arrays, now() - began)
         return arrays

@@ -4,7 +4,7 @@
 
     chart.zarr/              a Zarr group; the attribute ``nonsmooth_campaign`` says what the work is
         results/             one array per column, one file per chunk (Zstandard, one thread, fixed level)
-        run/000017.json      chunk 17 is done: its key and the hash of its content, by whom, when, processor time
+        run/000017.json      chunk 17 is done: its key and the hash of its content, by whom, when, time worked
         run/started.log      which chunks were begun: one begun twice was lost with its worker
 
 A chunk's key is a hash of the model, the parameters, the options, the kernels' source, and the chunk's place. Its
@@ -14,28 +14,27 @@ the run (which machine, how long) stay in ``run``, so that equal work gives equa
 
 from __future__ import annotations
 
-import errno
 import hashlib
 import json
 import os
-import platform
 import socket
 import tempfile
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.campaign.identity import described, difference
+from nonsmooth.campaign.marks import mark_in, marks_of, started, told, write_whole
+from nonsmooth.campaign.processors import processor_type
 from nonsmooth.campaign.work import Work
 from nonsmooth.errors import DataFileError
 
-__all__ = ["ChunkStore", "cpu_type", "describe_store", "open_store", "stored_bytes"]
+__all__ = ["ChunkStore", "describe_store", "open_store", "stored_bytes"]
 
 ATTRIBUTE = "nonsmooth_campaign"
 LEVEL = 3  # of the compression
@@ -51,22 +50,22 @@ class ChunkStore:
 
     def done(self) -> set[int]:
         """Chunks that are there, whole."""
-        return {mark["chunk"] for mark in _marks(self.path) if mark["key"] == self._key(mark["chunk"])}
+        return {mark["chunk"] for mark in marks_of(self.path) if mark["key"] == self._key(mark["chunk"])}
 
     def has(self, chunk: int) -> bool:
         """Whether a chunk is there, whole."""
-        mark = _mark(self.path / "run" / f"{chunk:06d}.json")
+        mark = mark_in(self.path / "run" / f"{chunk:06d}.json")
         return mark is not None and mark["key"] == self._key(chunk)
 
     def begun(self) -> set[int]:
         """Chunks that somebody has begun, whether they are there by now or not."""
         log = self.path / "run" / "started.log"
-        return set(_started(log)) if log.exists() else set()
+        return set(started(log)) if log.exists() else set()
 
     def note_start(self, chunk: int) -> None:
         """Write into the log that the work on a chunk begins: what was begun more often than once was lost before."""
         line = json.dumps({"chunk": chunk, "host": socket.gethostname(), "process": os.getpid(), "began": time.time()})
-        with _told(self.path), open(self.path / "run" / "started.log", "a", encoding="utf-8") as log:
+        with told(self.path), open(self.path / "run" / "started.log", "a", encoding="utf-8") as log:
             log.write(line + "\n")
 
     def write(self, work: Work, chunk: int, arrays: Mapping[str, NDArray[Any]], seconds: float) -> None:
@@ -78,16 +77,16 @@ class ChunkStore:
             The disk is full, or may not be written; what was there before is whole.
         """
         first, last = work.bounds(chunk)
-        with _told(self.path):
+        with told(self.path):
             group = _results(self.path, "r+")
             kept = {name: np.ascontiguousarray(arrays[name], item.dtype) for name, item in work.columns().items()}
             _put(group, kept, first, last)
             mark = {
-                "chunk": chunk, "key": self._key(chunk), "content": _content(kept), "cpu": cpu_type(),
-                "host": socket.gethostname(), "process": os.getpid(), "seconds": round(seconds, 4),
-                "ended": time.time(),
+                "chunk": chunk, "key": self._key(chunk), "content": _content(kept),
+                "cpu": processor_type(work.device), "host": socket.gethostname(), "process": os.getpid(),
+                "seconds": round(seconds, 4), "ended": time.time(),
             }  # fmt: skip
-            _write_whole(self.path / "run" / f"{chunk:06d}.json", json.dumps(mark).encode())
+            write_whole(self.path / "run" / f"{chunk:06d}.json", json.dumps(mark).encode())
 
     def read(self, work: Work) -> dict[str, NDArray[Any]]:
         """All columns, over all places.
@@ -102,7 +101,7 @@ class ChunkStore:
             columns = {name: np.asarray(array[...]) for name, array in group.arrays()}
         except Exception:  # damaged bytes come up as almost anything from the codecs
             columns = {}
-        damaged = [mark["chunk"] for mark in _marks(self.path) if not self._is_whole(work, mark, columns)]
+        damaged = [mark["chunk"] for mark in marks_of(self.path) if not self._is_whole(work, mark, columns)]
         if damaged:
             for chunk in damaged:
                 (self.path / "run" / f"{chunk:06d}.json").unlink(missing_ok=True)
@@ -132,7 +131,8 @@ def open_store(path: str | os.PathLike[str], work: Work, *, any_cpu: bool = Fals
     Parameters
     ----------
     any_cpu : bool
-        Go on with a store that was begun on another type of processor: its numbers may differ in the last digits.
+        Go on with a store that was begun on another type of processor (or of GPU): its numbers may differ in the last
+        digits.
 
     Raises
     ------
@@ -145,19 +145,20 @@ def open_store(path: str | os.PathLike[str], work: Work, *, any_cpu: bool = Fals
     target = Path(path)
     if target.suffix != ".zarr":
         raise ValueError(f"{target}: the name of a store must end in .zarr")
-    described = _described(work)
-    key = hashlib.sha256(json.dumps(described, sort_keys=True).encode()).hexdigest()
+    wanted = described(work)
+    key = hashlib.sha256(json.dumps(wanted, sort_keys=True).encode()).hexdigest()
     if not target.exists():
         if not target.parent.is_dir():
             raise DataFileError(f"{target}: the folder {target.parent} does not exist; create it first")
-        _make(target, work, described, key)
+        _make(target, work, wanted, key)
     record = describe_store(target)
     if record["key"] != key:
-        why = _difference(record, described)
+        why = difference(record, wanted)
         raise DataFileError(f"{target}: is the store of another work: {why}; give another name")
-    if record["cpu"] != cpu_type() and not any_cpu:
+    here = processor_type(work.device)
+    if record["cpu"] != here and not any_cpu:
         raise DataFileError(
-            f"{target}: was begun on a processor of type {record['cpu']!r}, this is {cpu_type()!r}; results may "
+            f"{target}: was begun on a processor of type {record['cpu']!r}, this is {here!r}; results may "
             "differ in the last digits. Go on with any_cpu=True, or begin another store"
         )
     return ChunkStore(target, key)
@@ -178,11 +179,11 @@ def describe_store(path: str | os.PathLike[str]) -> dict[str, Any]:
         record: dict[str, Any] = dict(json.loads(str(zarr.open_group(target, mode="r").attrs[ATTRIBUTE])))
     except Exception as error:
         raise DataFileError(f"{target}: is not a store of chunks ({error})") from error
-    marks = list(_marks(target))
+    marks = list(marks_of(target))
     record["done"] = len({mark["chunk"] for mark in marks})
     record["seconds"] = sum(mark["seconds"] for mark in marks)
     log = target / "run" / "started.log"
-    record["started"] = len(_started(log)) if log.exists() else record["done"]
+    record["started"] = len(started(log)) if log.exists() else record["done"]
     return record
 
 
@@ -202,59 +203,23 @@ def stored_bytes(work: Work, samples: Sequence[Mapping[str, NDArray[Any]]], kept
     _put(group, columns, 0, there)
     places = work.bounds(work.n_chunks() - 1)[1]
     heads = sum(len(data) for name, data in taken.items() if name.endswith("zarr.json"))
-    heads += len(json.dumps(json.dumps(_described(work))))
+    heads += len(json.dumps(json.dumps(described(work))))
     chunks = sum(len(data) for name, data in taken.items() if not name.endswith("zarr.json"))
     return heads + round(chunks * places / there) + -(-places // kept) * FACTS
 
 
-def _content(arrays: Mapping[str, NDArray[Any]]) -> str:
-    digest = hashlib.sha256()
-    for name in sorted(arrays):
-        digest.update(name.encode() + np.ascontiguousarray(arrays[name]).tobytes())
-    return digest.hexdigest()
-
-
-@cache
-def cpu_type() -> str:
-    """The processor as the compiler sees it: its name and instruction sets decide the last digits."""
-    from llvmlite import binding
-
-    features = binding.get_host_cpu_features().flatten()
-    return f"{platform.machine()} {binding.get_host_cpu_name()} {hashlib.sha256(features.encode()).hexdigest()[:8]}"
-
-
-@cache
-def _kernel_version() -> str:
-    """Hash of everything compiled: a store of older kernels is another work."""
-    import numba
-
-    import nonsmooth.kernels as room
-
-    digest = hashlib.sha256(numba.__version__.encode())
-    for file in sorted(Path(str(room.__file__)).parent.glob("*.py")):
-        digest.update(file.read_bytes())
-    return digest.hexdigest()[:16]
-
-
-def _described(work: Work) -> dict[str, Any]:
-    columns = {name: [item.dtype, list(item.shape)] for name, item in work.columns().items()}
-    return {
-        **work.describe(), "columns": columns, "chunks": work.n_chunks(), "places": work.bounds(work.n_chunks() - 1)[1],
-        "kernels": _kernel_version(),
-    }  # fmt: skip
-
-
-def _make(target: Path, work: Work, described: Mapping[str, Any], key: str) -> None:
+def _make(target: Path, work: Work, wanted: Mapping[str, Any], key: str) -> None:
     """A whole empty store, or none."""
     import zarr
 
-    with _told(target), tempfile.TemporaryDirectory(prefix=f".{target.name}-", dir=target.parent) as folder:
+    with told(target), tempfile.TemporaryDirectory(prefix=f".{target.name}-", dir=target.parent) as folder:
         fresh = Path(folder) / "new.zarr"
         root = zarr.open_group(fresh, mode="w", zarr_format=3)
-        root.attrs[ATTRIBUTE] = json.dumps({**described, "key": key, "cpu": cpu_type(), "made": time.time()})
+        facts = {"key": key, "device": work.device, "cpu": processor_type(work.device), "made": time.time()}
+        root.attrs[ATTRIBUTE] = json.dumps({**wanted, **facts})
         results = root.create_group("results")
         first, last = work.bounds(0)
-        _create(results, work, described["places"], last - first)
+        _create(results, work, wanted["places"], last - first)
         (fresh / "run").mkdir()
         try:
             os.replace(fresh, target)
@@ -286,66 +251,8 @@ def _results(path: Path, mode: Any) -> Any:
         return zarr.open_group(path / "results", mode=mode)
 
 
-def _marks(path: Path) -> Iterator[dict[str, Any]]:
-    for file in sorted((path / "run").glob("*.json")):
-        mark = _mark(file)
-        if mark is not None:
-            yield mark
-
-
-def _started(log: Path) -> list[int]:
-    """The chunks that were begun, in their order; a line cut short by a crash of the machine is passed over."""
-    found = []
-    for line in log.read_text(encoding="utf-8").splitlines():
-        with suppress(ValueError, KeyError, TypeError):
-            found.append(int(json.loads(line)["chunk"]))
-    return found
-
-
-def _mark(file: Path) -> dict[str, Any] | None:
-    """A mark; None where there is none, or it was cut short by a crash of the machine."""
-    try:
-        mark = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return None
-    return mark if isinstance(mark, dict) and {"chunk", "key", "seconds"} <= set(mark) else None
-
-
-def _write_whole(path: Path, data: bytes) -> None:
-    """Another process sees the whole file or none."""
-    handle, unfinished = tempfile.mkstemp(prefix=f".{path.name}-", dir=path.parent)
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-        os.replace(unfinished, path)
-    except BaseException:
-        Path(unfinished).unlink(missing_ok=True)
-        raise
-
-
-def _difference(record: Mapping[str, Any], described: Mapping[str, Any]) -> str:
-    keys = [name for name in described if record.get(name) != described[name]]
-    if keys == ["kernels"]:
-        return "it was computed by another version of the package"
-    for name in keys:
-        a, b = record.get(name), described[name]
-        if isinstance(a, dict) and isinstance(b, dict):
-            inner = [one for one in {**a, **b} if a.get(one) != b.get(one)]
-            return f"its {name} differ in {', '.join(map(str, inner[:4]))}"
-    return f"it differs in {', '.join(keys)}"
-
-
-@contextmanager
-def _told(path: Path) -> Iterator[None]:
-    """Trouble with the disk as one sentence."""
-    try:
-        yield
-    except OSError as error:
-        why = {
-            errno.ENOSPC: "the disk is full", errno.EDQUOT: "the quota of the disk is used up",
-            errno.EROFS: "the disk is read-only", errno.EACCES: "it may not be written",
-            errno.EPERM: "it may not be written",
-        }.get(error.errno or 0)  # fmt: skip
-        if why is None:
-            raise
-        raise DataFileError(f"{path}: {why} ({error}); finished chunks are whole, run it again to go on") from error
+def _content(arrays: Mapping[str, NDArray[Any]]) -> str:
+    digest = hashlib.sha256()
+    for name in sorted(arrays):
+        digest.update(name.encode() + np.ascontiguousarray(arrays[name]).tobytes())
+    return digest.hexdigest()

@@ -1,19 +1,23 @@
-"""Chunks on the threads of this process. The compiled kernels release the interpreter's lock."""
+"""Work on the threads of this process. The compiled kernels release the interpreter's lock."""
 
 from __future__ import annotations
 
 import os
 import threading
 from collections.abc import Callable, Iterable, Mapping
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from concurrent.futures import ThreadPoolExecutor
 from itertools import islice
-from typing import Any
+from queue import SimpleQueue
+from typing import Any, TypeVar
 
 from numpy.typing import NDArray
 
 from nonsmooth.campaign.work import Work
 
-__all__ = ["cores", "on_threads"]
+__all__ = ["cores", "on_threads", "over_items"]
+
+T = TypeVar("T")
+R = TypeVar("R")
 
 
 def cores() -> int:
@@ -27,34 +31,52 @@ def on_threads(
     done: Callable[[int, Mapping[str, NDArray[Any]]], None],
     threads: int | None = None,
 ) -> None:
-    """Compute chunks and hand each to ``done(chunk, arrays)``, in the calling thread, in any order.
+    """Compute chunks and hand each to ``done(chunk, arrays)``: see :func:`over_items`."""
+    over_items(chunks, work.compute, done, threads)
 
-    Ctrl-C (or an error) lets the chunks in hand end and starts no other. At most two chunks per thread wait, so that
-    memory does not grow with the number of chunks.
+
+def over_items(
+    items: Iterable[T],
+    compute: Callable[[T], R],
+    done: Callable[[T, R], None],
+    threads: int | None = None,
+    stop: threading.Event | None = None,
+) -> None:
+    """Compute every item and hand it to ``done(item, result)``, in the calling thread, in any order.
+
+    Ctrl-C (or an error) sets ``stop``, lets the items in hand end and starts no other. At most two items per thread
+    wait, so that memory does not grow with their number.
     """
-    order = iter(chunks)
+    order = iter(items)
     workers = threads or cores()
     if workers == 1:
-        for chunk in order:
-            done(chunk, work.compute(chunk))
+        for item in order:
+            done(item, compute(item))
         return
-    stop = threading.Event()
+    halt = threading.Event() if stop is None else stop
+    # A queue, not the futures: Ctrl-C in the midst of a wait for futures can leave their locks in disorder.
+    came: SimpleQueue[tuple[Any, Any, BaseException | None]] = SimpleQueue()
 
-    def compute(chunk: int) -> Mapping[str, NDArray[Any]]:
-        return {} if stop.is_set() else work.compute(chunk)
+    def run(item: T) -> None:
+        try:
+            came.put((item, None if halt.is_set() else compute(item), None))
+        except BaseException as error:
+            came.put((item, None, error))
 
     with ThreadPoolExecutor(workers) as pool:
-        pending: dict[Future[Any], int] = {}
+        waiting = 0
         try:
             while True:
-                for chunk in islice(order, 2 * workers - len(pending)):
-                    pending[pool.submit(compute, chunk)] = chunk
-                if not pending:
+                for item in islice(order, 2 * workers - waiting):
+                    pool.submit(run, item)
+                    waiting += 1
+                if not waiting:
                     return
-                for future in wait(pending, return_when=FIRST_COMPLETED).done:
-                    done(pending.pop(future), future.result())
+                item, result, error = came.get()
+                waiting -= 1
+                if error is not None:
+                    raise error
+                done(item, result)
         except BaseException:
-            stop.set()
-            for future in pending:
-                future.cancel()
+            halt.set()
             raise

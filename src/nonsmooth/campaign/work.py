@@ -21,11 +21,14 @@ class Column:
 
 
 class Work(Protocol):
-    """``size`` places, cut into chunks; chunk k holds the places ``bounds(k)`` and is computed from k alone.
+    """Places, cut into chunks; chunk k holds the places from ``bounds(k)[0]`` up to ``bounds(k)[1]``, from k alone.
 
     ``describe`` is everything that the outcome depends on, as plain data (JSON): two works with equal descriptions
-    give equal results. A work can be pickled and sent to another process.
+    give equal results. A work can be pickled and sent to another process. ``device`` is ``"cpu"`` or ``"cuda"``.
     """
+
+    @property
+    def device(self) -> str: ...
 
     def columns(self) -> Mapping[str, Column]: ...
 

@@ -52,10 +52,11 @@ def progress_of(path: Path) -> str:
     done, chunks = record["done"], record["chunks"]
     each = record["seconds"] / done if done else 0.0
     part, places = 100 * done / chunks, record["places"]
+    whose = "a GPU" if record.get("device") == "cuda" else "one core"
     lines = [
         f"{record['verb']}: {done} of {chunks} chunks are there ({part:.3g} %), {places} points",
-        f"worked      {record['seconds']:.3g} s of one core, on a processor of type {record['cpu']}",
-        f"remains     about {each * (chunks - done):.3g} s of one core" if done < chunks else "remains     nothing",
+        f"worked      {record['seconds']:.3g} s of {whose}, on a processor of type {record['cpu']}",
+        f"remains     about {each * (chunks - done):.3g} s of {whose}" if done < chunks else "remains     nothing",
     ]
     if record["started"] > done:
         lines.append(f"begun       {record['started']}: some chunks are under way, or were lost with their worker")

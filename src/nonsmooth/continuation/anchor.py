@@ -1,4 +1,4 @@
-"""Where the section of an autonomous orbit lies: in the middle of its longest visit."""
+"""Where the section of an autonomous orbit lies: in the middle of its longest visit, or across the flow."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from nonsmooth.continuation.signature import Signature, Visit
 
 if TYPE_CHECKING:
+    from nonsmooth.continuation.shooting import Shooting
     from nonsmooth.flow.variational import VariationalFlow
 
-__all__ = ["anchored", "free_anchor"]
+__all__ = ["anchor_at", "anchored", "plane_across"]
 
 FloatArray = NDArray[np.float64]
 
@@ -36,10 +37,15 @@ def anchored(
     return Signature(visits), moved, np.concatenate([z, states[1:][order]])
 
 
-def free_anchor(
-    flow: VariationalFlow, values: FloatArray, mode: int, z: FloatArray, size: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """(z_ref, f_ref) for an orbit without transitions: the plane through z across the flow, in scaled states."""
-    field = flow.legs(values, [mode], [0.0], [0.0], z[None, :]).f_begin[0]
+def anchor_at(shooting: Shooting, values: FloatArray, z: FloatArray, size: FloatArray) -> None:
+    """Put the phase condition of an orbit without forcing and transitions through z; others need none."""
+    if shooting.forced or shooting.m:
+        return
+    field = shooting.flow.legs(values, [shooting.at_section], [0.0], [0.0], z[None, :]).f_begin[0]
+    shooting.reference = plane_across(z, field, size)
+
+
+def plane_across(z: FloatArray, field: FloatArray, size: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(z_ref, f_ref) of the plane f_ref . (u - z_ref) = 0 through z across the flow, in states divided by ``size``."""
     weighted = field / size**2
     return z.copy(), weighted / max(float(np.abs(weighted * size).max()), 1e-300)

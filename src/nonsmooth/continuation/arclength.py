@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.continuation.anchor import plane_across
+from nonsmooth.continuation.multipliers import multipliers_of
 from nonsmooth.continuation.path import Walk
 from nonsmooth.continuation.solve import determinant, solve
 
@@ -15,7 +17,7 @@ if TYPE_CHECKING:
     from nonsmooth.continuation.path import Path
     from nonsmooth.continuation.shooting import Shooting, Solved
 
-__all__ = ["Curve", "Point", "chordal"]
+__all__ = ["Curve", "Point", "chordal", "passes_through"]
 
 FloatArray = NDArray[np.float64]
 MOST = 8  # Newton iterations
@@ -34,12 +36,12 @@ class Point:
     M: FloatArray
     multipliers: NDArray[np.complex128]
     path: Path
-    orientation: float  # sign of the bordered determinant
     iterations: int
+    orientation: float = 0.0  # sign of the bordered determinant (a curve in two parameters asks for none)
 
     @property
     def X(self) -> FloatArray:
-        """The unknowns."""
+        """The unknowns, the parameters last."""
         return self.solved.X
 
 
@@ -143,7 +145,7 @@ class Curve:
         path = self.walk.along(solved, self.shooting.split(solved.X)[1])
         if path is None:
             return None
-        return Point(Y, found[0], solved, M, self.shooting.multipliers(M), path, found[1], iterations)
+        return Point(Y, found[0], solved, M, multipliers_of(M), path, iterations, found[1])
 
     def predicted(self, point: Point, ds: float, before: Point | None) -> FloatArray:
         """A guess at distance ds along the tangent: straight, or on the cubic through both last points and tangents."""
@@ -169,8 +171,7 @@ class Curve:
     def anchored_anew(self, point: Point) -> Point:
         """The same point with the phase condition of an orbit without transitions put through it."""
         shooting, z = self.shooting, point.X[: self.shooting.n]
-        field = point.solved.legs.f_begin[0] / self.size**2
-        shooting.reference = z.copy(), field / max(float(np.abs(field * self.size).max()), 1e-300)
+        shooting.reference = plane_across(z, point.solved.legs.f_begin[0], self.size)
         row = point.solved.jacobian[-1]
         row[:] = 0.0
         row[: shooting.n] = shooting.reference[1]
@@ -214,6 +215,13 @@ class Curve:
         if not len(null):
             return None
         return self.point(solved, Y, null[-1], iterations)
+
+
+def passes_through(Y: FloatArray, a: FloatArray, b: FloatArray) -> bool:
+    """Whether the step from a to b goes through Y, as nearly as a chord follows a curve."""
+    step = b - a
+    x = float(step @ (Y - a)) / float(step @ step)
+    return 1e-9 < x <= 1.0 and float(np.abs(Y - a - x * step).max()) < 0.3 * float(np.abs(step).max())
 
 
 def chordal(a: NDArray[np.complex128], b: NDArray[np.complex128]) -> float:

@@ -8,17 +8,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.continuation.anchor import anchor_at
 from nonsmooth.continuation.arclength import Curve
 from nonsmooth.continuation.marches import ENDINGS, Limits, March
 from nonsmooth.continuation.orbit import Orbit
 from nonsmooth.continuation.records import BranchRecord, PointRecord
 from nonsmooth.continuation.shooting import Shooting
+from nonsmooth.continuation.surfaces import look_at_surfaces
 from nonsmooth.flow.arguments import real_number
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["FIRST", "Asked", "curve_of", "limits", "resumed_at", "sentence", "size_of"]
+__all__ = ["FIRST", "Asked", "curve_of", "largest_step", "limits", "resumed_at", "sentence", "size_of"]
 
 FloatArray = NDArray[np.float64]
 FIRST = 1e-3  # step
@@ -47,18 +49,28 @@ class Asked:
                 **more}  # fmt: skip
 
 
-def limits(system: System, name: Any, given: Any, here: float | None) -> tuple[float, float]:
-    """The range given, checked."""
+def largest_step(step: Any) -> float:
+    """The largest step, checked."""
+    largest = real_number(step, "step")
+    if not 0 < largest <= 1:
+        raise ValueError(f"step = {step!r}: the largest step is above 0 and at most 1 (the branch's own size is 1)")
+    return largest
+
+
+def limits(
+    system: System, name: Any, given: Any, here: float | None, *, word: str = "range", what: str = "the orbit"
+) -> tuple[float, float]:
+    """The range given for a parameter, checked; ``here``: where ``what`` lies, which must be within it."""
     if not isinstance(name, str) or name not in system.values:
         system.with_parameters({str(name): 0.0})  # raises with the names there are
     try:
         low, high = (real_number(x, "an end of the range") for x in given)
     except (TypeError, ValueError):
-        raise ValueError(f"range = {given!r}: give its two ends, (low, high)") from None
+        raise ValueError(f"{word} = {given!r}: give its two ends, (low, high)") from None
     if not low < high:
-        raise ValueError(f"range = {given!r}: the first end must be below the second")
+        raise ValueError(f"{word} = {given!r}: the first end must be below the second")
     if here is not None and not low <= here <= high:
-        raise ValueError(f"the orbit lies at {name} = {here!r}, outside the range {low!r} ... {high!r}")
+        raise ValueError(f"{what} lies at {name} = {here!r}, outside the range {low!r} ... {high!r}")
     return low, high
 
 
@@ -68,20 +80,17 @@ def size_of(maximum: FloatArray, minimum: FloatArray, system: System) -> FloatAr
     return np.concatenate([half, np.ones(len(system.memory))])
 
 
-def curve_of(
-    system: System, signature: Any, period_number: int, name: str, orbit: Orbit, size: FloatArray, width: float
-) -> tuple[Curve, FloatArray]:
+def curve_of(orbit: Orbit, name: str, width: float) -> tuple[Curve, FloatArray]:
     """The curve through an orbit, and its unknowns."""
-    shooting = Shooting(system, signature, period_number, (name,))
+    system = orbit.system
+    shooting = Shooting(system, orbit.signature, orbit.period_number, (name,))
+    size = size_of(orbit.maximum, orbit.minimum, system)
     section = np.concatenate([orbit.u, orbit.memory])
-    if not shooting.forced and not shooting.m:
-        from nonsmooth.continuation.anchor import free_anchor
-
-        shooting.reference = free_anchor(shooting.flow, shooting.values, shooting.at_section, section, size)
+    anchor_at(shooting, shooting.values, section, size)
     X = shooting.join(
         orbit.crossing_times, np.vstack([section, orbit.crossing_states]), orbit.period, [system.values[name]]
     )
-    shooting.look_at_surfaces(X)
+    look_at_surfaces(shooting, X)
     return Curve(shooting, size, orbit.period, width), X
 
 
@@ -102,11 +111,6 @@ def resumed_at(
     """The curve through a recorded point."""
     shooting = Shooting(system, point.signature, record.period_number, (name,))
     size = size_of(point.maximum, point.minimum, system)
-    if not shooting.forced and not shooting.m:
-        from nonsmooth.continuation.anchor import free_anchor
-
-        shooting.reference = free_anchor(
-            shooting.flow, shooting.parameters(point.X), shooting.at_section, point.X[: shooting.n], size
-        )
-    shooting.look_at_surfaces(point.X)
+    anchor_at(shooting, shooting.parameters(point.X), point.X[: shooting.n], size)
+    look_at_surfaces(shooting, point.X)
     return Curve(shooting, size, point.period, width), point.X

@@ -2,34 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.continuation.anchor import free_anchor
+from nonsmooth.continuation.anchor import anchor_at
 from nonsmooth.continuation.arclength import Curve, Point
 from nonsmooth.continuation.equilibrium import Equilibria
 from nonsmooth.continuation.shooting import Shooting
 from nonsmooth.continuation.signature import Signature, Visit
 from nonsmooth.system.system import System
 
-__all__ = ["first_cycle", "hopf_row"]
+__all__ = ["first_cycle"]
 
 FloatArray = NDArray[np.float64]
 SMALL = 1e-2  # amplitude of the first cycle, in units of the states' scales
-
-
-def hopf_row(start: Any) -> tuple[System, str, float, int, FloatArray, tuple[float, float]]:
-    """System, parameter, its value, mode, equilibrium and range of one Hopf point of ``continue_equilibrium``."""
-    from nonsmooth.results.provenance import read_provenance
-
-    source = read_provenance(start)
-    system = System.from_text(source["system"]["text"]).with_parameters(source["system"]["parameters"])
-    name = str(start.attrs["parameter"])
-    value = float(start[name])
-    low, high = source["options"]["range"]
-    return system.with_parameters({name: value}), name, value, int(start["mode"]), start["u"].values, (low, high)
 
 
 def first_cycle(
@@ -55,7 +41,7 @@ def first_cycle(
     curve = Curve(shooting, scale, period, width)
     for amplitude in (SMALL, 0.3 * SMALL, 3 * SMALL):
         z = rested + amplitude * own.real
-        shooting.reference = free_anchor(shooting.flow, shooting.values, mode, z, scale)
+        anchor_at(shooting, shooting.values, z, scale)
         Y = shooting.join(np.empty(0), z[None, :], period, [value]) / curve.scale
         border = np.zeros(curve.n)
         border[: shooting.n] = own.real / scale

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.continuation.arclength import Curve, Point, chordal
+from nonsmooth.continuation.arclength import Curve, Point, chordal, passes_through
 from nonsmooth.continuation.detection import Tests
 from nonsmooth.continuation.events import (
     BESIDE,
@@ -190,11 +190,7 @@ def _closed(begin: tuple[Curve, Point], curve: Curve, a: Point, b: Point) -> boo
     curve0, first = begin
     if curve0.shooting.signature != curve.shooting.signature or len(first.Y) != len(b.Y):
         return False
-    first_Y = first.X / curve.scale
-    step = b.Y - a.Y
-    x = float(step @ (first_Y - a.Y)) / float(step @ step)
-    near = float(np.abs(first_Y - a.Y - x * step).max())
-    return 1e-9 < x <= 1.0 and near < 0.3 * float(np.abs(step).max()) and np.abs(step).max() < 0.2
+    return passes_through(first.X / curve.scale, a.Y, b.Y) and float(np.abs(b.Y - a.Y).max()) < 0.2
 
 
 def _reason(curve: Curve, point: Point) -> str:

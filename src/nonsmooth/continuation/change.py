@@ -1,31 +1,23 @@
 """Where a path leaves its signature: which signature comes next, and its first unknowns.
 
 At the boundary itself one orbit satisfies the equations of both signatures: a visit of no length, or an impact of no
-speed, is put in or taken out. From that common point the branch goes on along the new equations' own null vector, on
-the side where the path is admissible.
+speed, is put in or taken out. How the branch goes on from that common orbit stands in ``resuming``.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.continuation.arclength import Curve, Point
 from nonsmooth.continuation.corners import other_ways, short_run
-from nonsmooth.continuation.shooting import Shooting
 from nonsmooth.continuation.signature import AT_ONCE, Signature, Visit
 
-if TYPE_CHECKING:
-    from nonsmooth.system.system import System
-
-__all__ = ["Change", "changed", "common_point", "resumed"]
+__all__ = ["Change", "changed"]
 
 FloatArray = NDArray[np.float64]
-COMMON = 1e-6  # scaled residual of the common orbit in the new equations
-STEPS = (2e-6, 1e-6, 1e-7, 1e-5, 1e-4, 1e-8)  # first steps after a change
 
 
 @dataclass
@@ -229,94 +221,3 @@ def _around(curve: Curve, point: Point, first: int, last: int) -> list[Change]:
         z_new = np.concatenate([states[: first + 1], np.array(after), states[last + 1 :]])
         found.append(Change("corner", signature, t_new, z_new, indicator))
     return found
-
-
-def resumed(curve: Curve, point: Point, change: Change, active: tuple[str, ...]) -> tuple[Curve, Point, float] | None:
-    """The curve of the new signature, its first admissible point, and the step that led there."""
-    new = _curve(curve, change, point, active)
-    if new is None:
-        return None
-    fresh, X = new
-    Y = X / fresh.scale
-    border = np.zeros(fresh.n)
-    border[-1] = 1.0
-    solved = fresh.shooting.evaluate(X)
-    if not np.isfinite(solved.residual).all() or np.abs(solved.residual * fresh.rows).max() > COMMON:
-        return None
-    if change.kind == "section":
-        return _same_way(fresh, Y, curve, point)
-    null = fresh.null_vectors(solved)
-    for ds in STEPS:
-        for direction in _directions(null):
-            guess = Y + ds * direction
-            found = fresh.correct(guess, direction, float(direction @ guess))
-            if found is None:
-                continue
-            first = fresh.point(found[0], found[1], direction)
-            if first is not None and (first.path.violation() > 0.0).all():
-                return fresh, first, ds
-    return None
-
-
-def common_point(curve: Curve, point: Point, change: Change) -> Point | None:
-    """The common orbit as a point of the new signature."""
-    new = _curve(curve, change, point, curve.shooting.active)
-    if new is None:
-        return None
-    fresh, X = new
-    solved = fresh.shooting.evaluate(X)
-    null = fresh.null_vectors(solved)
-    return fresh.point(solved, X / fresh.scale, null[-1]) if len(null) else None
-
-
-def _directions(null: FloatArray) -> list[FloatArray]:
-    """Both ways along each null vector."""
-    return [sign * vector for vector in null for sign in (1.0, -1.0)]
-
-
-def _same_way(fresh: Curve, Y: FloatArray, curve: Curve, point: Point) -> tuple[Curve, Point, float] | None:
-    """Go on in the same direction: the parameter's, or that of the state at the section near a fold."""
-    border = np.zeros(fresh.n)
-    border[-1] = 1.0
-    found = fresh.correct(Y, border, float(Y[-1]))
-    null = None
-    if found is None:
-        solved = fresh.shooting.evaluate(Y * fresh.scale)
-        null = fresh.null_vectors(solved)
-        if len(null) != 1:
-            return None
-        found = fresh.correct(Y, null[0], float(null[0] @ Y))
-        if found is None:
-            return None
-    null = fresh.null_vectors(found[0])
-    if not len(null):
-        return None
-    tangent = null[-1]
-    old = point.tangent
-    # The tangents of both live in different unknowns; the parameter and the later instants are common to them.
-    if abs(old[-1]) > 1e-3:
-        tangent = tangent * np.sign(tangent[-1] * old[-1])
-    else:
-        tangent = tangent * np.sign(float(tangent[: fresh.shooting.n] @ old[: fresh.shooting.n]) or 1.0)
-    first = fresh.point(found[0], found[1], tangent)
-    return None if first is None else (fresh, first, 0.0)
-
-
-def _curve(curve: Curve, change: Change, point: Point, active: tuple[str, ...]) -> tuple[Curve, FloatArray] | None:
-    old = curve.shooting
-    system: System = old.system
-    signature, times, states = change.signature, change.times, change.states
-    period = None if old.forced else float(point.solved.times[-1])
-    if not old.forced and len(times):
-        from nonsmooth.continuation.anchor import anchored
-
-        around = float(point.solved.times[-1])
-        signature, times, states = anchored(old.flow, point.solved.values, signature, times, states, around)
-    shooting = Shooting(system, signature, old.period_number, active)
-    if not old.forced and not shooting.m:
-        from nonsmooth.continuation.anchor import free_anchor
-
-        shooting.reference = free_anchor(shooting.flow, point.solved.values, shooting.at_section, states[0], curve.size)
-    X = shooting.join(times, states, period, point.X[old.size :])
-    shooting.look_at_surfaces(X)
-    return Curve(shooting, curve.size, curve.period, curve.width), X

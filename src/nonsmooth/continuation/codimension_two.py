@@ -25,10 +25,13 @@ from numpy.typing import NDArray
 
 from nonsmooth.continuation.change import changed
 from nonsmooth.continuation.grazing import both_sides
+from nonsmooth.continuation.multipliers import product_of_pairs, without_own
 from nonsmooth.continuation.normal_form import flip_coefficient, torus_coefficient
+from nonsmooth.continuation.roots import zero_on
 
 if TYPE_CHECKING:
-    from nonsmooth.continuation.locus import Locus, Place
+    from nonsmooth.continuation.arclength import Point
+    from nonsmooth.continuation.locus import Locus
 
 __all__ = ["ENDED", "Second", "name_of", "numbers", "root", "sign_changes"]
 
@@ -48,7 +51,7 @@ def name_of(number: str) -> str:
     return _NAMES.get(number, number)
 
 
-def numbers(locus: Locus, place: Place) -> dict[str, float]:
+def numbers(locus: Locus, place: Point) -> dict[str, float]:
     """The numbers at one place of a curve, in the order of the table above."""
     found = _of_multipliers(locus, place)
     if locus.shooting.forced and locus.kind == "flip":
@@ -58,7 +61,7 @@ def numbers(locus: Locus, place: Place) -> dict[str, float]:
     return found
 
 
-def _of_multipliers(locus: Locus, place: Place) -> dict[str, float]:
+def _of_multipliers(locus: Locus, place: Point) -> dict[str, float]:
     M, forced = place.M, locus.shooting.forced
     at_one = 0 if forced else 1  # derivatives of p that vanish at 1 anyway
     p = np.poly(M)
@@ -80,9 +83,7 @@ def _of_multipliers(locus: Locus, place: Place) -> dict[str, float]:
         total = float((mu[i] + mu[j]).real)
         found = {"resonance_1_1": total - 2.0, "resonance_1_2": total + 2.0, "resonance_1_3": total + 1.0,
                  "resonance_1_4": total}  # fmt: skip
-        rest = np.delete(mu, [i, j])
-        if not forced and len(rest):
-            rest = np.delete(rest, np.abs(rest - 1.0).argmin())
+        rest = without_own(np.delete(mu, [i, j]), forced)
         if len(rest):
             found["fold_neimark_sacker"] = float(np.prod(1.0 - rest).real)
             found["flip_neimark_sacker"] = float(np.prod(1.0 + rest).real)
@@ -94,7 +95,7 @@ def _of_multipliers(locus: Locus, place: Place) -> dict[str, float]:
     return found
 
 
-def _coefficient(locus: Locus, place: Place) -> tuple[float, float]:
+def _coefficient(locus: Locus, place: Point) -> tuple[float, float]:
     """The normal form's coefficient and its balance, on a curve of flips or of Neimark-Sacker points; NaN: none."""
     try:
         if locus.kind == "flip":
@@ -111,18 +112,14 @@ def _derivative(p: Any, x: float, order: int) -> float:
     return float(np.polyval(np.polyder(p, order), x)) if order else float(np.polyval(p, x))
 
 
-def _others(locus: Locus, place: Place, own: float) -> float:
+def _others(locus: Locus, place: Point, own: float) -> float:
     """prod (mu_i mu_j - 1) of the multipliers without the critical one; NaN without a complex pair."""
     mu = np.delete(place.multipliers, np.abs(place.multipliers - own).argmin())
-    if not locus.shooting.forced:
-        mu = np.delete(mu, np.abs(mu - 1.0).argmin())
-    if len(mu) < 2 or not (np.abs(mu.imag) > PAIR).any():
-        return np.nan
-    i, j = np.triu_indices(len(mu), 1)
-    return float(np.prod(mu[i] * mu[j] - 1.0).real)
+    mu = without_own(mu, locus.shooting.forced)
+    return product_of_pairs(mu) if (np.abs(mu.imag) > PAIR).any() else np.nan
 
 
-def _pair(place: Place, forced: bool) -> tuple[int, int]:
+def _pair(place: Point, forced: bool) -> tuple[int, int]:
     """The two multipliers whose product is 1."""
     mu = place.multipliers
     i, j = np.triu_indices(len(mu), 1)
@@ -135,11 +132,10 @@ def _pair(place: Place, forced: bool) -> tuple[int, int]:
     return (int(i[at]), int(j[at])) if mu[i[at]].imag >= 0.0 else (int(j[at]), int(i[at]))
 
 
-def _with_contact(locus: Locus, place: Place) -> dict[str, float]:
+def _with_contact(locus: Locus, place: Point) -> dict[str, float]:
     """det(I -+ M+); where M+ is unbounded (a rigid impact), its leading coefficient."""
     as_curve: Any = locus  # what is asked of a curve here is its shooting and its walk
-    as_point: Any = place
-    for change in changed(as_curve, as_point, "touch"):
+    for change in changed(as_curve, place, "touch"):
         M, far, near = both_sides(locus.shooting, place.solved, change)
         if not (np.isfinite(far).all() and np.isfinite(near).all()):
             continue
@@ -156,10 +152,10 @@ def _with_contact(locus: Locus, place: Place) -> dict[str, float]:
     return {}
 
 
-def sign_changes(locus: Locus, a: Place, b: Place, before: dict[str, float], after: dict[str, float],
-                 stop: float) -> list[tuple[float, str, Place]]:  # fmt: skip
+def sign_changes(locus: Locus, a: Point, b: Point, before: dict[str, float], after: dict[str, float],
+                 stop: float) -> list[tuple[float, str, Point]]:  # fmt: skip
     """Points of codimension two between two places of a curve, nearer to the first than ``stop``."""
-    found: list[tuple[float, str, Place]] = []
+    found: list[tuple[float, str, Point]] = []
     for name, was in before.items():
         now = after.get(name, np.nan)
         if not was * now < 0.0:
@@ -183,33 +179,13 @@ class Second:
     locus: Locus
     name: str
 
-    def __call__(self, place: Place) -> float:
+    def __call__(self, place: Point) -> float:
         if self.name in COEFFICIENTS:
             return _coefficient(self.locus, place)[0]
         return _of_multipliers(self.locus, place).get(self.name, np.nan)
 
 
-def root(locus: Locus, a: Place, b: Place, number: Callable[[Place], float]) -> tuple[float, Place] | None:
+def root(locus: Locus, a: Point, b: Point, number: Callable[[Point], float]) -> tuple[float, Point] | None:
     """The zero of ``number`` on the curve between two of its places: its distance from the first, and the place."""
-    from scipy.optimize import brentq
-
     end = float(a.tangent @ (b.Y - a.Y))
-    known: dict[float, Place] = {}
-
-    def value(s: float) -> float:
-        place = a if s == 0.0 else b if s == end else locus.between(a, b, s)
-        if place is None:
-            raise ArithmeticError
-        known[s] = place
-        x = number(place)
-        if x != x:
-            raise ArithmeticError
-        return x
-
-    try:
-        s = float(brentq(value, 0.0, end, xtol=1e-15, rtol=1e-14, maxiter=100))
-        if s not in known:
-            value(s)
-    except (ArithmeticError, ValueError, RuntimeError):
-        return None
-    return s, known[s]
+    return zero_on(lambda s: a if s == 0.0 else b if s == end else locus.between(a, b, s), end, number)

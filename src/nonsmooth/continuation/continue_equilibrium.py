@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.continuation.equilibrium import Equilibria, Rest, hopf_number
+from nonsmooth.continuation.begin import largest_step, limits
+from nonsmooth.continuation.equilibrium import Equilibria, Rest
+from nonsmooth.continuation.equilibrium_march import ENDS, RestMarch, march_rest
 from nonsmooth.continuation.physical import allowed_range
 from nonsmooth.errors import SolveError
-from nonsmooth.flow.arguments import check_system, real_number, whole_number
+from nonsmooth.flow.arguments import check_system, whole_number
 from nonsmooth.flow.starts import first_state
 
 if TYPE_CHECKING:
@@ -19,25 +20,7 @@ if TYPE_CHECKING:
 
     from nonsmooth.system.system import System
 
-__all__ = ["ENDS", "continue_equilibrium"]
-
-ENDS = {
-    "range": "The branch reached the edge of the range.",
-    "points": "The largest number of points was reached.",
-    "no_convergence": "Newton's method did not converge, however small the step.",
-    "boundary": (
-        "The equilibrium meets the boundary of its mode, and no equilibrium of the mode beyond continues it: on the "
-        "other side it is virtual."
-    ),
-}
-FIRST, LEAST, COSINE = 1e-3, 1e-9, 0.98
-
-
-@dataclass
-class _March:
-    rests: list[tuple[Equilibria, Rest]] = field(default_factory=list)
-    special: list[tuple[str, int]] = field(default_factory=list)
-    ending: str = "points"
+__all__ = ["continue_equilibrium"]
 
 
 def continue_equilibrium(
@@ -72,7 +55,8 @@ def continue_equilibrium(
     xarray.Dataset
         Over ``point``: the parameter, ``u(point, state)``, ``eigenvalues``, ``stable``, ``mode``; special points as in
         :func:`nonsmooth.special_points`: ``fold``, ``branch_point``, ``hopf`` (a row given to ``continue_orbit`` gives
-        the cycles born there), ``boundary_equilibrium``.
+        the cycles born there), ``boundary_equilibrium``. Over ``end`` how the branch ends: ``ended`` and, in a
+        sentence, ``ended_because``; Ctrl-C ends it with what was found until then.
 
     Raises
     ------
@@ -84,13 +68,9 @@ def continue_equilibrium(
     check_system(system, "continue_equilibrium")
     if system.depends_on_time:
         raise ValueError(f"{system.name!r} depends on time: it has no equilibria; find_orbit finds its periodic orbits")
-    if parameter not in system.values:
-        system.with_parameters({str(parameter): 0.0})  # raises with the names there are
-    low, high = (real_number(x, "an end of the range") for x in range)
+    low, high = limits(system, parameter, range, system.values.get(parameter), what="the system")
     here = system.values[parameter]
-    if not low < high or not low <= here <= high:
-        raise ValueError(f"range = {range!r} must rise and hold the present value {parameter} = {here!r}")
-    largest, most = real_number(step, "step"), whole_number(points, "points", 1)
+    largest, most = largest_step(step), whole_number(points, "points", 1)
     state = first_state(system, start, mode)
     curves = {
         i: Equilibria(system, i, parameter, high - low)
@@ -111,8 +91,10 @@ def continue_equilibrium(
     bounds = allowed_range(system, parameter, low, high)
     curve, rest = first
     rest = _facing(rest, 1.0)
-    up = _march(curve, rest, bounds, largest, most)
-    down = _march(curve, _facing(rest, -1.0), bounds, largest, most)
+    up = march_rest(curve, rest, bounds, largest, most)
+    down = RestMarch(ending=up.ending)
+    if up.ending != "interrupted":
+        down = march_rest(curve, _facing(rest, -1.0), bounds, largest, most)
     n = len(down.rests)
     rests = [*down.rests[::-1], (curve, rest), *up.rests]
     special = [(kind, n - 1 - i) for kind, i in down.special[::-1]] + [(kind, n + 1 + i) for kind, i in up.special]
@@ -126,124 +108,6 @@ def _facing(rest: Rest, sign: float) -> Rest:
     if rest.tangent[-1] * sign >= 0:
         return rest
     return replace(rest, tangent=-rest.tangent, orientation=-rest.orientation)
-
-
-def _numbers(rest: Rest) -> dict[str, float]:
-    return {
-        "fold": float(rest.tangent[-1]), "branch_point": rest.orientation, "hopf": hopf_number(rest.eigenvalues),
-        "boundary": -float(rest.margins.max(initial=-np.inf)),
-    }  # fmt: skip
-
-
-def _march(curve: Equilibria, rest: Rest, bounds: tuple[float, float], largest: float, most: int) -> _March:
-    found, ds = _March(), min(FIRST, largest)
-    while len(found.rests) < most:
-        new = curve.step(rest, ds)
-        if new is None or (ds > LEAST and float(new.tangent @ rest.tangent) < COSINE):
-            ds *= 0.5
-            if ds < LEAST:
-                found.ending = "no_convergence"
-                break
-            continue
-        before, after = _numbers(rest), _numbers(new)
-        events: list[tuple[float, str, Rest]] = []
-        for kind, was in before.items():
-            if was * after[kind] < 0.0 or (np.isinf(was) and after[kind] < 0.0):
-                there = _root(curve, rest, new, ds, _Number(kind))
-                if there is not None and (kind != "hopf" or _oscillates(there[1])):
-                    events.append((there[0], kind, there[1]))
-        edge = bounds[0] if new.value < bounds[0] else bounds[1]
-        if not bounds[0] <= new.value <= bounds[1]:
-            there = _root(curve, rest, new, ds, _Edge(edge))
-            if there is not None:
-                events.append((there[0], "range", there[1]))
-        folds = [s for s, kind, _ in events if kind == "branch_point"]
-        ended = False
-        for s, kind, place in sorted(events, key=lambda event: event[0]):
-            if kind == "fold" and any(abs(s - other) < 1e-6 for other in folds):
-                continue
-            found.rests.append((curve, place))
-            if kind == "range":
-                found.ending, ended = "range", True
-                break
-            found.special.append(("boundary_equilibrium" if kind == "boundary" else kind, len(found.rests) - 1))
-            if kind == "boundary":
-                beyond = _beyond(curve, place)
-                if beyond is None:
-                    found.ending, ended = "boundary", True
-                    break
-                curve, new = beyond
-                found.rests.append((curve, new))
-                break
-        else:
-            found.rests.append((curve, new))
-        if ended:
-            break
-        rest, ds = new, min(1.5 * ds, largest)
-    return found
-
-
-@dataclass
-class _Number:
-    """One of the numbers that are watched."""
-
-    kind: str
-
-    def __call__(self, rest: Rest) -> float:
-        return float(np.clip(_numbers(rest)[self.kind], -1e3, 1e3))
-
-
-@dataclass
-class _Edge:
-    """The parameter's distance from the edge of its range."""
-
-    edge: float
-
-    def __call__(self, rest: Rest) -> float:
-        return rest.value - self.edge
-
-
-def _oscillates(rest: Rest) -> bool:
-    """Whether a pair +-i omega makes the sum of two eigenvalues vanish, and not two real ones."""
-    nearest = rest.eigenvalues[np.argmin(np.abs(rest.eigenvalues.real))]
-    return bool(abs(nearest.imag) > 1e-9)
-
-
-def _beyond(curve: Equilibria, rest: Rest) -> tuple[Equilibria, Rest] | None:
-    """The equilibrium of the mode behind the boundary, where the two meet; None where there is none."""
-    jump = curve.system.transitions[int(rest.margins.argmax())]
-    if jump.reset is not None or jump.target == curve.mode:
-        return None
-    width = float(curve.scale[-1])
-    other = Equilibria(curve.system, jump.target, curve.parameter, width)
-    common = other.at(rest.u, rest.value)
-    if common is None or np.abs((common.u - rest.u) / curve.system.scale_vector()).max() > 1e-8:
-        return None
-    for sign in (1.0, -1.0):
-        first = other.step(replace(common, tangent=sign * common.tangent), 1e-6)
-        if first is not None and (first.margins <= 0.0).all():
-            return other, first
-    return None
-
-
-def _root(curve: Equilibria, a: Rest, b: Rest, ds: float, number: Callable[[Rest], float]) -> tuple[float, Rest] | None:
-    """The zero of ``number`` between two points of the branch."""
-    from scipy.optimize import brentq
-
-    known: dict[float, Rest] = {}
-
-    def value(s: float) -> float:
-        rest = a if s == 0.0 else b if s == ds else curve.step(a, s)
-        if rest is None:
-            raise ArithmeticError
-        known[s] = rest
-        return number(rest)
-
-    try:
-        s = float(brentq(value, 0.0, ds, xtol=1e-16, rtol=1e-15))
-    except (ArithmeticError, ValueError, RuntimeError):
-        return None
-    return s, known[s]
 
 
 def _dataset(

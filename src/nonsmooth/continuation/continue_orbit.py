@@ -8,18 +8,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.continuation.arclength import Curve, Point
-from nonsmooth.continuation.begin import Asked, curve_of, limits, resumed_at, sentence, size_of
+from nonsmooth.continuation.begin import Asked, curve_of, largest_step, limits, resumed_at, sentence
 from nonsmooth.continuation.branch import march
 from nonsmooth.continuation.detection import Tests
 from nonsmooth.continuation.events import BESIDE
-from nonsmooth.continuation.files import branch_dataset, read_branch
+from nonsmooth.continuation.files import branch_dataset
 from nonsmooth.continuation.marches import ENDINGS, March
 from nonsmooth.continuation.orbit import Orbit
 from nonsmooth.continuation.other_branches import born, straight_on, switched
 from nonsmooth.continuation.physical import allowed_range
+from nonsmooth.continuation.reading import read_branch
 from nonsmooth.continuation.records import BranchRecord, PointRecord, SpecialRecord, from_march, joined, point_record
 from nonsmooth.errors import SolveError
-from nonsmooth.flow.arguments import real_number, whole_number
+from nonsmooth.flow.arguments import whole_number
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -81,10 +82,7 @@ def continue_orbit(
     Pseudo-arclength continuation of the multiple-shooting equations in scaled unknowns. Special points are zeros of
     functions along the branch, found by Brent's method on orbits corrected to rounding.
     """
-    largest, most = real_number(step, "step"), whole_number(points, "points", 1)
-    if not 0 < largest <= 1:
-        raise ValueError(f"step = {step!r}: the largest step lies between 0 and 1")
-    asked = Asked(largest, most, bool(virtual))
+    asked = Asked(largest_step(step), whole_number(points, "points", 1), bool(virtual))
     if isinstance(start, Orbit):
         return _from_orbit(start, parameter, range, asked)
     if hasattr(start, "data_vars"):
@@ -111,8 +109,7 @@ def _from_orbit(orbit: Orbit, name: str | None, given: Any, asked: Asked) -> xr.
     low, high = limits(system, name, given, system.values.get(name))
     if orbit.virtual:
         raise ValueError("this orbit is virtual: its path goes through a boundary that it should obey")
-    size = size_of(orbit.maximum, orbit.minimum, system)
-    curve, X = curve_of(system, orbit.signature, orbit.period_number, name, orbit, size, high - low)
+    curve, X = curve_of(orbit, name, high - low)
     first = curve.at_parameter(X / curve.scale, system.values[name]) or _near(curve, X)
     if first is None:
         raise SolveError("Newton's method did not converge at the orbit itself: give its parameter another value",

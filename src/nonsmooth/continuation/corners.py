@@ -3,7 +3,7 @@
 Where two surfaces meet, their order changes: a visit between two crossings shrinks to nothing, and beyond it the second
 one comes first. Or a crossing reaches the surface of another transition, and beyond the corner that one fires first.
 At the corner itself all these ways take no time and lead to the same state, so each is tried as the common orbit of a
-new signature; what is admissible beside it is the branch (``change.resumed``).
+new signature; what is admissible beside it is the branch (``resuming.resumed``).
 """
 
 from __future__ import annotations

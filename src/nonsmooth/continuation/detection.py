@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.continuation.multipliers import product_of_pairs, without_own
 from nonsmooth.continuation.path import VIOLATIONS
 
 if TYPE_CHECKING:
@@ -39,7 +40,7 @@ class Tests:
 
     def __init__(self, curve: Curve) -> None:
         shooting = curve.shooting
-        self.n, self.forced = shooting.n, shooting.forced
+        self.forced = shooting.forced
         self.eye = np.eye(shooting.n)
 
     def smooth(self, point: Point) -> NDArray[np.float64]:
@@ -50,19 +51,8 @@ class Tests:
             flip = 1.0 + M[0, 0] + M[1, 1] + det
         else:
             flip = np.linalg.det(M + self.eye)
-        return np.array([point.tangent[-1], point.orientation, flip, self.torus(point)])
-
-    def torus(self, point: Point) -> float:
-        """prod (mu_i mu_j - 1) over pairs, without an autonomous orbit's own 1; NaN where there is no pair."""
-        mu = point.multipliers
-        if not self.forced:
-            mu = mu[np.argsort(np.abs(mu - 1.0), kind="stable")[1:]]
-        if len(mu) < 2:
-            return np.nan
-        if len(mu) == 2:
-            return float((mu[0] * mu[1]).real) - 1.0
-        i, j = np.triu_indices(len(mu), 1)
-        return float(np.prod(mu[i] * mu[j] - 1.0).real)
+        torus = product_of_pairs(without_own(point.multipliers, self.forced))
+        return np.array([point.tangent[-1], point.orientation, flip, torus])
 
     def one(self, kind: str) -> Callable[[Point], float]:
         """The number of one kind."""

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from nonsmooth.continuation.arclength import Curve, Point
 from nonsmooth.continuation.detection import SMOOTH, Tests, locate
+from nonsmooth.continuation.multipliers import multipliers_of
 from nonsmooth.continuation.path import VIOLATIONS
 from nonsmooth.continuation.solve import determinant
 from nonsmooth.continuation.switching import branch_point, is_doubled
@@ -163,7 +164,7 @@ def _branch_point(curve: Curve, a: Point, b: Point, tests: Tests) -> tuple[float
         return there
     # Any direction in the plane of both branches is null here, and the border is singular: keep that of the branch.
     M = solved.monodromy
-    point = replace(there[1], Y=Y, solved=solved, M=M, multipliers=shooting.multipliers(M), path=path)
+    point = replace(there[1], Y=Y, solved=solved, M=M, multipliers=multipliers_of(M), path=path)
     return float(a.tangent @ (Y - a.Y)), point
 
 

@@ -1,4 +1,4 @@
-"""Orbits and branches as Datasets, and back.
+"""Orbits and branches as Datasets; ``reading`` takes them back.
 
 The text of the system, the table of signatures and the unknowns of every point stand in the Dataset, so that a branch
 read from a file goes on from where it stopped.
@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.continuation.marches import ENDINGS
-from nonsmooth.continuation.records import BranchRecord, PointRecord, SpecialRecord
-from nonsmooth.continuation.signature import Signature, Visit
+from nonsmooth.continuation.records import BranchRecord
+from nonsmooth.continuation.signature import Signature
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -21,18 +21,12 @@ if TYPE_CHECKING:
     from nonsmooth.continuation.orbit import Orbit
     from nonsmooth.system.system import System
 
-__all__ = ["branch_dataset", "orbit_dataset", "read_branch", "read_orbit", "signature_data", "signature_from",
-           "special_row"]  # fmt: skip
+__all__ = ["branch_dataset", "orbit_dataset", "signature_data"]
 
 
 def signature_data(signature: Signature) -> list[list[int]]:
     """Visits as lists of integers."""
     return [[v.mode, v.transition, v.row, v.turn] for v in signature.visits]
-
-
-def signature_from(data: Any) -> Signature:
-    """Read `signature_data` back."""
-    return Signature(tuple(Visit(*map(int, visit)) for visit in data))
 
 
 def branch_dataset(system: System, record: BranchRecord, options: dict[str, Any]) -> xr.Dataset:
@@ -85,10 +79,10 @@ def branch_dataset(system: System, record: BranchRecord, options: dict[str, Any]
         "grazing": [s.grazing for s in special],
         "bounded": np.array([s.bounded for s in special], dtype=bool),
         "doubled": np.array([s.doubled for s in special], dtype=bool),
-        "contact": np.array([np.full(n_mu, np.nan + 0j) if s.contact is None else s.contact for s in special]).reshape(
-            len(special), n_mu
-        ),
-        "determinants": np.array([s.determinants for s in special]).reshape(len(special), 4),
+        "contact": np.array(
+            [np.full(n_mu, np.nan) if s.contact is None else s.contact for s in special], dtype=complex
+        ).reshape(len(special), n_mu),
+        "determinants": np.array([s.determinants for s in special], dtype=float).reshape(len(special), 4),
     }
     labels = labels_of(system)
     attrs = provenance(labels, "continue_orbit", options, method="multiple shooting")
@@ -101,53 +95,6 @@ def branch_dataset(system: System, record: BranchRecord, options: dict[str, Any]
     )  # fmt: skip
 
 
-def read_branch(dataset: xr.Dataset) -> tuple[System, BranchRecord]:
-    """The system and the record of a branch."""
-    from nonsmooth.results.provenance import read_provenance
-    from nonsmooth.system.system import System
-
-    source = read_provenance(dataset)
-    system = System.from_text(source["system"]["text"]).with_parameters(source["system"]["parameters"])
-    name = str(dataset.attrs["parameter"])
-    layouts = [signature_from(data) for data in json.loads(dataset.attrs["layouts"])]
-    indicators = ["", *system.indicators]
-    get = {key: dataset[key].values for key in (
-        name, "layout", "unknowns", "tangent", "mode", "section", "maximum", "minimum", "period",
-        "floquet_multipliers", "stable", "clearance", "virtual",
-    )}  # fmt: skip
-    points = []
-    for i in range(dataset.sizes["point"]):
-        known = ~np.isnan(get["unknowns"][i])
-        points.append(
-            PointRecord(
-                float(get[name][i]), layouts[int(get["layout"][i])], get["unknowns"][i][known],
-                get["tangent"][i][known], int(get["mode"][i]), get["section"][i], get["maximum"][i],
-                get["minimum"][i], float(get["period"][i]), get["floquet_multipliers"][i], bool(get["stable"][i]),
-                get["clearance"][i], bool(get["virtual"][i]),
-            )
-        )  # fmt: skip
-    special = [
-        SpecialRecord(
-            str(dataset["special_kind"].values[i]), int(dataset["special_point"].values[i]),
-            indicators.index(str(dataset["special_indicator"].values[i])) - 1,
-            str(dataset["special_grazing"].values[i]), bool(dataset["special_bounded"].values[i]),
-            bool(dataset["special_doubled"].values[i]),
-            None if np.isnan(dataset["special_contact_multipliers"].values[i]).all()
-            else dataset["special_contact_multipliers"].values[i],
-            dataset["special_determinant"].values[i],
-        )
-        for i in range(dataset.sizes["special"])
-    ]  # fmt: skip
-    words = list(ENDINGS)
-    ended = dataset["ended"].values
-    sentences = dataset["ended_because"].values
-    low, high = source["options"]["range"]
-    return system, BranchRecord(
-        name, (float(low), float(high)), int(dataset["period_number"]), points, special,
-        (words[int(ended[0])], words[int(ended[1])]), (str(sentences[0]), str(sentences[1])),
-    )  # fmt: skip
-
-
 def orbit_dataset(orbit: Orbit) -> xr.Dataset:
     """An orbit as a Dataset."""
     import xarray as xr
@@ -157,7 +104,7 @@ def orbit_dataset(orbit: Orbit) -> xr.Dataset:
     from nonsmooth.results.schema import parameter_coords, state_coords
 
     labels = labels_of(orbit.system)
-    attrs: dict[str, Any] = dict(provenance(labels, "find_orbit", {}, method="multiple shooting"))
+    attrs: dict[str, Any] = dict(provenance(labels, "find_orbit", orbit.options, method="multiple shooting"))
     attrs["layouts"] = json.dumps([signature_data(orbit.signature)])
     unit = {"units": labels.time_unit}
     names = [*orbit.system.states, *orbit.system.memory]
@@ -187,58 +134,3 @@ def orbit_dataset(orbit: Orbit) -> xr.Dataset:
         "indicator": ("indicator", np.array(list(orbit.clearance), dtype=str)),
     }  # fmt: skip
     return xr.Dataset(variables, coords, attrs)
-
-
-def read_orbit(dataset: xr.Dataset) -> Orbit:
-    """Read `orbit_dataset` back."""
-    from nonsmooth.continuation.orbit import Orbit
-    from nonsmooth.results.provenance import read_provenance
-    from nonsmooth.system.system import System
-
-    source = read_provenance(dataset)
-    if source["verb"] != "find_orbit":
-        raise ValueError(f"this Dataset was made by {source['verb']!r}; Orbit.from_dataset reads those of find_orbit")
-    system = System.from_text(source["system"]["text"]).with_parameters(source["system"]["parameters"])
-
-    def get(name: str) -> Any:
-        return dataset[name].values
-
-    signature = signature_from(json.loads(dataset.attrs["layouts"])[0])
-    n = len(system.states) + len(system.memory)
-    return Orbit(
-        system=system, u=get("section"), mode=str(get("mode")), memory=get("memory"), period=float(get("period")),
-        period_number=int(get("period_number")), signature=signature, crossing_times=get("crossing_time"),
-        crossing_states=get("crossing_state").reshape(-1, n), monodromy_matrix=get("monodromy_matrix"),
-        floquet_multipliers=get("floquet_multipliers"), stable=bool(get("stable")), maximum=get("maximum"),
-        minimum=get("minimum"),
-        clearance={str(k): float(v) for k, v in zip(dataset["indicator"].values, get("clearance"), strict=True)},
-        virtual=bool(get("virtual")),
-    )  # fmt: skip
-
-
-def special_row(start: Any, verb: str) -> tuple[System, str, str, PointRecord, int, Any]:
-    """One row of ``special_points`` as data: system, kind, parameter, point, period number and the branch's range."""
-    from nonsmooth.results.provenance import read_provenance
-    from nonsmooth.system.system import System
-
-    if not hasattr(start, "data_vars") or "kind" not in start or "unknowns" not in start:
-        raise TypeError(f"{verb} takes one row of special_points, not {type(start).__name__}")
-    if "special" in start.dims:
-        if start.sizes["special"] != 1:
-            raise ValueError(
-                f"{verb} takes one special point, not {start.sizes['special']}: choose it, "
-                "special_points(branch).isel(special=0)"
-            )
-        start = start.isel(special=0)
-    source = read_provenance(start)
-    system = System.from_text(source["system"]["text"]).with_parameters(source["system"]["parameters"])
-    own = str(start.attrs["parameter"])
-    signature = signature_from(json.loads(start.attrs["layouts"])[int(start["layout"])])
-    X = start["unknowns"].values
-    known = ~np.isnan(X)
-    point = PointRecord(
-        float(start[own]), signature, X[known], start["tangent"].values[known], int(start["mode"]),
-        start["section"].values, start["maximum"].values, start["minimum"].values, float(start["period"]),
-        start["floquet_multipliers"].values, bool(start["stable"]), start["clearance"].values,
-    )  # fmt: skip
-    return system, str(start["kind"].values), own, point, int(start["period_number"]), source["options"]["range"]

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.continuation.anchor import free_anchor
+from nonsmooth.continuation.anchor import anchor_at
 from nonsmooth.continuation.orbit import Orbit, orbit_of
 from nonsmooth.continuation.path import Walk
 from nonsmooth.continuation.primitive import primitive
@@ -15,18 +16,19 @@ from nonsmooth.continuation.settled import CLOSED, NEAR, Guess, forced_guesses, 
 from nonsmooth.continuation.shooting import Shooting
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.arguments import check_system, whole_number
+from nonsmooth.flow.failure import solve_error
 from nonsmooth.flow.methods import engine_for
-from nonsmooth.flow.starts import first_state
+from nonsmooth.flow.starts import first_state, plain_start
 from nonsmooth.kernels import codes
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["failed", "find_orbit"]
+__all__ = ["find_orbit"]
 
 FloatArray = NDArray[np.float64]
 GOOD = (codes.OK, codes.NOT_GUARANTEED)
-RTOL = 1e-12  # of the runs from which orbits are read
+RTOL = 1e-12  # of the runs from which orbits are read, where the flow is not exact
 NOISE = 1e-11  # of the motion's size: beyond a boundary by less than this is on it
 FAR = 30.0  # how far from the motion, in units of its gap, the orbit may lie
 SLOW = 3.0  # or of the distance that its multipliers give for that gap
@@ -76,8 +78,7 @@ def find_orbit(
     if period_number is not None:
         period_number = whole_number(period_number, "period_number", 1)
     transient, max_period = whole_number(transient, "transient", 0), whole_number(max_period, "max_period", 1)
-    exact = engine_for(system).name == "exact"
-    engine = engine_for(system, rtol=None if exact else RTOL)
+    engine = engine_for(system, rtol=RTOL)
     state = first_state(system, start)
     if system.period() is None:
         from nonsmooth.continuation.settled_autonomous import autonomous_guesses
@@ -91,7 +92,7 @@ def find_orbit(
             # The motion leaves an unstable orbit and fails later: its first rounds are enough.
             settled = settle_forced(system, engine, begun, 0, period_number + 1)
         if settled.status not in GOOD:
-            raise failed(settled.status)
+            raise solve_error(settled.status)
         guesses = forced_guesses(system, settled, period_number, max_period)
     if not guesses:
         raise SolveError(
@@ -100,20 +101,12 @@ def find_orbit(
             "another start, a longer transient or max_period, or period_number= for an unstable orbit within it",
             status="not_periodic",
         )
-    return _polished(system, guesses, given=period_number is not None, unstable=transient == 0)
-
-
-def failed(code: int) -> SolveError:
-    """The error for a simulation that stopped with a kernel's code."""
-    if code == codes.BEYOND_STOP:
-        return SolveError(
-            "the start lies beyond a stop: a transition with a reset holds there already; start on the admissible "
-            "side of its indicator", status="beyond_stop",
-        )  # fmt: skip
-    from nonsmooth.results.statuses import by_code
-
-    status = by_code(code)
-    return SolveError(status.sentence, status=status.name)
+    orbit = _polished(system, guesses, given=period_number is not None, unstable=transient == 0)
+    options = {
+        "start": plain_start(system, start), "period_number": period_number, "transient": transient,
+        "max_period": max_period,
+    }  # fmt: skip
+    return replace(orbit, options=options)
 
 
 def _polished(system: System, guesses: list[Guess], given: bool, unstable: bool) -> Orbit:
@@ -124,8 +117,7 @@ def _polished(system: System, guesses: list[Guess], given: bool, unstable: bool)
         X = shooting.join(guess.times, guess.states, guess.period)
         size = np.concatenate([guess.size, np.ones(shooting.n - len(guess.size))])
         name = _name(guess.period_number)
-        if not shooting.forced and not shooting.m:
-            shooting.reference = free_anchor(shooting.flow, shooting.values, shooting.at_section, X[: shooting.n], size)
+        anchor_at(shooting, shooting.values, X[: shooting.n], size)
         left = shooting.evaluate(X).residual[: shooting.n]  # what the guess lacks to close
         solved = shooting.newton(X, _scale(shooting, size, guess.period))
         shorter = None if solved is None else primitive(shooting, solved, size)

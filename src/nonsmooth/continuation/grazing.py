@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.continuation.multipliers import multipliers_of
 from nonsmooth.continuation.signature import AT_ONCE
 from nonsmooth.flow.saltation import chained
 
@@ -64,7 +65,7 @@ def graze(curve: Curve, point: Point, first: Point, change: Change) -> Graze | N
     doubled = bool(np.linalg.det(one + M) * np.linalg.det(one + M_plus) < 0)
     return Graze(
         "persistence" if same else "non_smooth_fold", bounded, M, M_plus,
-        shooting.multipliers(M), shooting.multipliers(M_plus), doubled,
+        multipliers_of(M), multipliers_of(M_plus), doubled,
     )  # fmt: skip
 
 

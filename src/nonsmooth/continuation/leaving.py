@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from nonsmooth.continuation.arclength import Curve, Point
-from nonsmooth.continuation.change import Change, changed, common_point, resumed
+from nonsmooth.continuation.change import Change, changed
 from nonsmooth.continuation.events import Event
 from nonsmooth.continuation.grazing import graze
 from nonsmooth.continuation.marches import March
+from nonsmooth.continuation.resuming import common_point, resumed
 from nonsmooth.continuation.switching import is_doubled
 
 __all__ = ["change_of_signature", "passed_by"]
@@ -15,7 +16,7 @@ __all__ = ["change_of_signature", "passed_by"]
 def passed_by(found: March, curve: Curve, kind: str, point: Point) -> None:
     """Record a boundary that a virtual branch passes with its signature."""
     for change in changed(curve, point, kind):
-        after = resumed(curve, point, change, curve.shooting.active)
+        after = resumed(curve, point, change)
         if after is None:
             continue
         if change.kind == "grazing":
@@ -47,7 +48,7 @@ def change_of_signature(found: March, curve: Curve, met: list[Event]) -> tuple[C
     """Record a change of signature and begin anew behind it; None where the branch ends."""
     for kind, _, point in met:
         for change in changed(curve, point, kind):
-            after = resumed(curve, point, change, curve.shooting.active)
+            after = resumed(curve, point, change)
             if after is None:
                 continue
             fresh, first, ds = after

@@ -14,19 +14,20 @@ psi is differentiated by central differences, in the unknowns and in both parame
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.continuation.path import Path, Walk
+from nonsmooth.continuation.arclength import Point
+from nonsmooth.continuation.multipliers import multipliers_of, product_of_pairs, without_own
+from nonsmooth.continuation.path import Walk
 from nonsmooth.continuation.solve import determinant
 
 if TYPE_CHECKING:
     from nonsmooth.continuation.shooting import Shooting, Solved
 
-__all__ = ["KINDS", "Locus", "Place"]
+__all__ = ["KINDS", "Locus"]
 
 FloatArray = NDArray[np.float64]
 KINDS = ("fold", "flip", "neimark_sacker", "grazing")
@@ -34,24 +35,6 @@ STEP = 1e-6  # of central differences, in scaled unknowns
 MOST = 8
 DONE = 1e-11
 CLOSE = 2e-12
-
-
-@dataclass
-class Place:
-    """A solved point of a locus."""
-
-    Y: FloatArray
-    tangent: FloatArray
-    solved: Solved
-    M: FloatArray
-    multipliers: NDArray[np.complex128]
-    path: Path
-    iterations: int
-
-    @property
-    def X(self) -> FloatArray:
-        """The unknowns, the two parameters last."""
-        return self.solved.X
 
 
 class Locus:
@@ -79,7 +62,7 @@ class Locus:
         self.n = shooting.size + 2
         self._eye = np.eye(shooting.n)
         self._unit = 1.0  # of psi
-        self._touched: tuple[int, int] | None = None
+        self.touched: tuple[int, int] | None = None  # (visit, transition) of a grazing curve
 
     def psi(self, solved: Solved) -> float:
         """The number that vanishes on the locus."""
@@ -91,22 +74,13 @@ class Locus:
             path = self.walk.along(solved, self.shooting.split(solved.X)[1])
             if path is None:
                 return np.nan
-            if self._touched is None:
-                self._touched = path.touched
-            return float(path.inner[self._touched]) / self._unit
+            if self.touched is None:
+                self.touched = path.touched
+            return float(path.inner[self.touched]) / self._unit
         M = solved.monodromy
         if self.kind == "flip":
             return float(np.linalg.det(M + self._eye))
-        return self.torus(self.shooting.multipliers(M))
-
-    def torus(self, mu: NDArray[np.complex128]) -> float:
-        """prod (mu_i mu_j - 1) over pairs, without an autonomous orbit's own 1."""
-        if not self.shooting.forced:
-            mu = mu[np.argsort(np.abs(mu - 1.0), kind="stable")[1:]]
-        if len(mu) < 2:
-            return np.nan
-        i, j = np.triu_indices(len(mu), 1)
-        return float(np.prod(mu[i] * mu[j] - 1.0).real)
+        return product_of_pairs(without_own(multipliers_of(M), self.shooting.forced))
 
     def calibrate(self, Y: FloatArray) -> None:
         """Choose the unit of psi so that its gradient is of order one."""
@@ -159,7 +133,7 @@ class Locus:
             last = length
         return None
 
-    def place(self, found: tuple[Solved, FloatArray, FloatArray, int], border: FloatArray) -> Place | None:
+    def place(self, found: tuple[Solved, FloatArray, FloatArray, int], border: FloatArray) -> Point | None:
         """A solved point with its tangent (along ``border``), multipliers and path."""
         solved, Y, _, iterations = found
         gradient = self.gradient(Y)
@@ -174,9 +148,9 @@ class Locus:
         if not np.isfinite(length) or path is None:
             return None
         M = solved.monodromy
-        return Place(Y, np.asarray(t / length, dtype=float), solved, M, self.shooting.multipliers(M), path, iterations)
+        return Point(Y, np.asarray(t / length, dtype=float), solved, M, multipliers_of(M), path, iterations)
 
-    def first(self, X: FloatArray) -> Place | None:
+    def first(self, X: FloatArray) -> Point | None:
         """The locus at a special point: the shortest correction, and a tangent of either sense."""
         Y = X / self.scale
         self.calibrate(Y)
@@ -197,13 +171,13 @@ class Locus:
         solved = self.shooting.evaluate(Y * self.scale)
         return self.place((solved, Y, gradient, 0), vectors[-1])
 
-    def step(self, place: Place, ds: float) -> Place | None:
+    def step(self, place: Point, ds: float) -> Point | None:
         """The point at distance ds along the tangent."""
         Y = place.Y + ds * place.tangent
         found = self.correct(Y, place.tangent, float(place.tangent @ Y))
         return None if found is None else self.place(found, place.tangent)
 
-    def between(self, a: Place, b: Place, s: float) -> Place | None:
+    def between(self, a: Point, b: Point, s: float) -> Point | None:
         """The point at distance s from ``a`` towards ``b``, to the last digits."""
         end = float(a.tangent @ (b.Y - a.Y))
         Y = a.Y + s / end * (b.Y - a.Y)

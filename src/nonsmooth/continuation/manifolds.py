@@ -32,7 +32,8 @@ from numpy.typing import NDArray
 
 from nonsmooth.continuation.arcs import BEGIN, Arc, grow
 from nonsmooth.continuation.begin import size_of
-from nonsmooth.continuation.orbit import EDGE, Orbit
+from nonsmooth.continuation.multipliers import EDGE
+from nonsmooth.continuation.orbit import Orbit
 from nonsmooth.continuation.section_map import SectionMap
 from nonsmooth.flow.arguments import real_number, whole_number
 from nonsmooth.flow.sections import Stroboscopic

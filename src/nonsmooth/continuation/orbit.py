@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.continuation.multipliers import multipliers_of, stable_by
 from nonsmooth.continuation.signature import Signature
 
 if TYPE_CHECKING:
@@ -17,10 +19,11 @@ if TYPE_CHECKING:
     from nonsmooth.continuation.shooting import Shooting, Solved
     from nonsmooth.system.system import System
 
-__all__ = ["Orbit", "orbit_of", "stable_by"]
+__all__ = ["Orbit", "orbit_of"]
 
 FloatArray = NDArray[np.float64]
-EDGE = 1e-9  # a modulus within this of 1 counts as neither
+RTOL = 1e-13  # of the trajectory, where the flow is not exact
+AT_SECTION = 1e-14  # of the period: a transition nearer to the section than rounding tells
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -59,6 +62,8 @@ class Orbit:
         Least distance to a transition that does not happen; NaN where none comes near.
     virtual : bool
         Whether the path goes through a boundary it should have obeyed: no orbit of the system then.
+    options : mapping
+        Arguments of :func:`nonsmooth.find_orbit`, as they were given.
     """
 
     system: System
@@ -78,6 +83,7 @@ class Orbit:
     clearance: dict[str, float]
     virtual: bool = False
     reference: tuple[FloatArray, FloatArray] | None = field(default=None)
+    options: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def crossings_per_period(self) -> float:
@@ -91,25 +97,30 @@ class Orbit:
         return sum(jumps[v.transition].contact for v in self.signature.crossings) / max(self.period_number, 1)
 
     def trajectory(self, samples: int | None = None) -> xr.Dataset:
-        """The orbit once round, as a result of ``simulate``."""
+        """The orbit once round, as a result of ``simulate``; begun behind the transitions that lie on the section."""
         from nonsmooth.flow.simulate import simulate
 
-        rtol = 1e-13 if _needs_tolerance(self.system) else None
+        u, memory, mode = self.u, self.memory, self.mode
+        n, visits = len(self.u), self.signature.visits
+        for i in np.flatnonzero(self.crossing_times <= AT_SECTION * self.period):  # a start cannot lead into a stop
+            u, memory = np.split(self.crossing_states[i], [n])
+            mode = self.system.modes[visits[i + 1].mode]
         return simulate(
-            self.system, duration=self.period, start=self._start(), mode=self.mode, samples=samples or 1025, rtol=rtol
-        )
+            self.system, duration=self.period, start=self._start(u, memory), mode=mode, samples=samples or 1025,
+            rtol=RTOL,
+        )  # fmt: skip
 
-    def _start(self) -> Any:
-        """The state at the section as a start; with the memory, where the system has one."""
-        if not len(self.memory):
-            return self.u
+    def _start(self, u: FloatArray, memory: FloatArray) -> Any:
+        """A state as a start; with the memory, where the system has one."""
+        if not len(memory):
+            return u
         import xarray as xr
 
         variables: dict[str, Any] = {
-            "u": (("time", "state"), self.u[None, :]),
+            "u": (("time", "state"), u[None, :]),
             "mode": ("time", np.zeros(1, dtype=int), {"flag_meanings": "-"}),  # given by name beside it
         }
-        variables |= {name: ("time", [value]) for name, value in zip(self.system.memory, self.memory, strict=True)}
+        variables |= {name: ("time", [value]) for name, value in zip(self.system.memory, memory, strict=True)}
         return xr.Dataset(variables, {"state": list(self.system.states)})
 
     def __repr__(self) -> str:
@@ -135,22 +146,9 @@ class Orbit:
     @classmethod
     def from_dataset(cls, dataset: xr.Dataset) -> Orbit:
         """Read `to_dataset` back, from memory or from a file."""
-        from nonsmooth.continuation.files import read_orbit
+        from nonsmooth.continuation.reading import read_orbit
 
         return read_orbit(dataset)
-
-
-def _needs_tolerance(system: Any) -> bool:
-    from nonsmooth.flow.methods import engine_for
-
-    return engine_for(system).name != "exact"
-
-
-def stable_by(multipliers: NDArray[np.complex128], forced: bool) -> bool:
-    """Whether all multipliers (of an autonomous orbit: all but its own 1) lie inside the unit circle."""
-    if not forced:
-        multipliers = multipliers[np.argsort(np.abs(multipliers - 1.0), kind="stable")[1:]]
-    return bool(not len(multipliers) or np.abs(multipliers).max() < 1.0 - EDGE)
 
 
 def orbit_of(shooting: Shooting, solved: Solved, path: Path, clearance: FloatArray, virtual: bool) -> Orbit:
@@ -162,7 +160,7 @@ def orbit_of(shooting: Shooting, solved: Solved, path: Path, clearance: FloatArr
     times, states = shooting.split(X)
     n_u = len(system.states)
     M = solved.monodromy
-    multipliers = shooting.multipliers(M)
+    multipliers = multipliers_of(M)
     return Orbit(
         system=system, u=states[0, :n_u].copy(), mode=system.modes[shooting.at_section],
         memory=states[0, n_u:].copy(), period=float(solved.times[-1]), period_number=shooting.period_number,

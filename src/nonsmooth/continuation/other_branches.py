@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 from nonsmooth.continuation.arclength import Curve, Point
 from nonsmooth.continuation.begin import Asked, limits, resumed_at, sentence
 from nonsmooth.continuation.branch import march
-from nonsmooth.continuation.files import branch_dataset, special_row
+from nonsmooth.continuation.files import branch_dataset
+from nonsmooth.continuation.multipliers import multipliers_of
 from nonsmooth.continuation.physical import allowed_range
+from nonsmooth.continuation.reading import hopf_row, one_row, special_row
 from nonsmooth.continuation.records import BranchRecord, PointRecord, SpecialRecord, from_march, joined, point_record
 from nonsmooth.errors import SolveError
 
@@ -30,8 +32,7 @@ def switched(start: xr.Dataset, name: str | None, given: Any, asked: Asked) -> x
     from nonsmooth.continuation.switching import emanating
 
     system, kind, own, point, period_number, before = special_row(start, "continue_orbit")
-    if name is not None and name != own:
-        raise ValueError(f"this special point lies on a branch in {own!r}, not in {name!r}")
+    _check_parameter(name, own)
     low, high = limits(system, own, before if given is None else given, None)
     bounds = allowed_range(system, own, low, high)
     if kind not in ("flip", "pitchfork", "branch_point"):
@@ -79,8 +80,7 @@ def switched(start: xr.Dataset, name: str | None, given: Any, asked: Asked) -> x
 def straight_on(start: xr.Dataset, name: str | None, given: Any, asked: Asked) -> xr.Dataset:
     """The branch through a graze or a corner with the signature of the row, both ways."""
     system, kind, own, point, period_number, before = special_row(start, "continue_orbit")
-    if name is not None and name != own:
-        raise ValueError(f"this special point lies on a branch in {own!r}, not in {name!r}")
+    _check_parameter(name, own)
     low, high = limits(system, own, before if given is None else given, point.value)
     bounds = allowed_range(system, own, low, high)
     curve, X = resumed_at(system, BranchRecord(own, (low, high), period_number, [point], []), point, own, high - low)
@@ -93,7 +93,7 @@ def straight_on(start: xr.Dataset, name: str | None, given: Any, asked: Asked) -
     back = replace(first, tangent=-first.tangent, orientation=-first.orientation)
     marches = [march(curve, one, asked.limits(bounds), asked.first) for one in (back, first)]
     points, special = joined(from_march(marches[0]), [point_record(curve, first)], from_march(marches[1]))
-    here = start.isel(special=0) if "special" in start.dims else start
+    here = one_row(start, "continue_orbit")
     mark = SpecialRecord(
         kind, len(marches[0].rows), ["", *system.indicators].index(str(here["touched"].values)) - 1,
         str(here["grazing"].values), bool(here["bounded"]), bool(here["doubled"]),
@@ -108,20 +108,14 @@ def straight_on(start: xr.Dataset, name: str | None, given: Any, asked: Asked) -
 
 def born(start: xr.Dataset, name: str | None, given: Any, asked: Asked) -> xr.Dataset:
     """The cycles that are born at a Hopf point."""
-    from nonsmooth.continuation.born import first_cycle, hopf_row
+    from nonsmooth.continuation.born import first_cycle
 
-    if "special" in start.dims:
-        if start.sizes["special"] != 1:
-            raise ValueError(
-                "continue_orbit takes one special point: choose it, special_points(branch).isel(special=0)"
-            )
-        start = start.isel(special=0)
+    start = one_row(start, "continue_orbit")
     kind = str(start["kind"].values)
     if kind != "hopf":
         raise ValueError(f"no cycle is born at a {kind}: that happens at a hopf point")
     system, own, value, mode, u, before = hopf_row(start)
-    if name is not None and name != own:
-        raise ValueError(f"this special point lies on a branch in {own!r}, not in {name!r}")
+    _check_parameter(name, own)
     low, high = limits(system, own, before if given is None else given, value)
     bounds = allowed_range(system, own, low, high)
     begun = first_cycle(system, own, value, mode, u, high - low)
@@ -135,10 +129,15 @@ def born(start: xr.Dataset, name: str | None, given: Any, asked: Asked) -> xr.Da
     return branch_dataset(system, record, asked.options(own, (low, high), **{"from": kind}))
 
 
+def _check_parameter(name: str | None, own: str) -> None:
+    if name is not None and name != own:
+        raise ValueError(f"this special point lies on a branch in {own!r}, not in {name!r}")
+
+
 def _origin(curve: Curve, Y: FloatArray, direction: FloatArray) -> PointRecord:
     """The special point itself, as a point of the branch that leaves it."""
     solved = curve.shooting.evaluate(Y * curve.scale)
     path = curve.walk.along(solved, curve.shooting.split(solved.X)[1])
     assert path is not None
     M = solved.monodromy
-    return point_record(curve, Point(Y, direction, solved, M, curve.shooting.multipliers(M), path, 0.0, 0))
+    return point_record(curve, Point(Y, direction, solved, M, multipliers_of(M), path, 0))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.continuation.shooting import Shooting, Solved
-from nonsmooth.continuation.signature import Signature, Visit
+from nonsmooth.continuation.signature import Signature
 
 __all__ = ["primitive"]
 
@@ -32,12 +32,8 @@ def primitive(shooting: Shooting, solved: Solved, size: FloatArray) -> tuple[Sho
         if p % rounds or m % rounds:
             continue
         few, turns = m // rounds, p // rounds
-        first = visits[:few]
-        shifted = tuple(
-            Visit(v.mode, v.transition, v.row, v.turn + turns * i if v.row == -1 else 0)
-            for i in range(rounds) for v in first
-        )  # fmt: skip
-        if shifted != visits[:-1]:
+        once = Signature((*visits[:few], visits[-1]))
+        if once.repeated(rounds, turns) != shooting.signature:
             continue
         begin = float(times[few - 1]) if few else 0.0
         there = shooting.flow.legs(
@@ -45,7 +41,7 @@ def primitive(shooting: Shooting, solved: Solved, size: FloatArray) -> tuple[Sho
         ).z[0]
         if not np.abs((there - states[0]) / size).max() < SAME:
             continue
-        short = Shooting(shooting.system, Signature((*first, visits[-1])), turns, shooting.active)
+        short = Shooting(shooting.system, once, turns, shooting.active)
         short.reference = shooting.reference
         X = short.join(times[:few], states[: few + 1], end / rounds, shooting.parameters(solved.X)[shooting.places])
         return short, X

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.continuation.orbit import stable_by
+from nonsmooth.continuation.multipliers import stable_by
 from nonsmooth.continuation.signature import Signature
 
 if TYPE_CHECKING:

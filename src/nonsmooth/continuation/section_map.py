@@ -42,7 +42,7 @@ class SectionMap:
 
     def __init__(self, system: System, size: FloatArray, periods: int) -> None:
         self.system, self.size, self.periods = system, size, periods
-        self.engine = engine_for(system, rtol=None if engine_for(system).name == "exact" else RTOL)
+        self.engine = engine_for(system, rtol=RTOL)
         self.tables = self.engine.prepare(np.tile(system.parameter_vector(), (CHUNK, 1)))
         self.plan = SectionPlan(extremes=False)
         self.shape = (len(size), len(system.indicators), len(system.outputs))

@@ -16,6 +16,7 @@ from nonsmooth.continuation.settled import NEAR, Guess, fired_row
 from nonsmooth.continuation.signature import Signature, Visit
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.engine import Log, State
+from nonsmooth.flow.failure import solve_error
 from nonsmooth.flow.variational import VariationalFlow
 from nonsmooth.kernels import codes
 
@@ -43,9 +44,7 @@ def autonomous_guesses(
         instants = begin + np.linspace(0.0, duration, SAMPLES)
         log = engine.record(tables, state, begin + duration, instants)
         if log.status not in (codes.OK, codes.NOT_GUARANTEED):
-            from nonsmooth.continuation.find import failed
-
-            raise failed(log.status)
+            raise solve_error(log.status)
         return log, instants
 
     duration = 64.0

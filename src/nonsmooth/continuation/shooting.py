@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from nonsmooth.continuation.signature import AT_ONCE, Signature
 from nonsmooth.continuation.solve import solve
+from nonsmooth.continuation.surfaces import divide
 from nonsmooth.flow.saltation import chained
 from nonsmooth.flow.variational import VariationalFlow
 
@@ -195,7 +196,7 @@ class Shooting:
                 if a:
                     J[r, size:] += jump.h_p
                 if self.divided[i]:
-                    self._divide(i, F, J, r, values, times, z)
+                    divide(self, i, F, J, r, values, times, z)
             else:
                 F[r] = t[i] - (turn + at) * T
                 J[r, ti] = 1.0
@@ -243,64 +244,6 @@ class Shooting:
         F[last] = f_ref @ (z0 - z_ref)
         J[last, : self.n] = f_ref
 
-    def _divide(
-        self, i: int, F: FloatArray, J: FloatArray, r: int, values: FloatArray, times: FloatArray, z: FloatArray
-    ) -> None:
-        """Divide the equation of an exit through the surface of the entry by the length of the visit.
-
-        h(end) / tau = (h(end) - h(begin)) / tau, with h(begin) = 0 by the entry's own equation: the root tau = 0, where
-        the visit has not begun, is taken out. For a short visit it is the series L_f h + tau L_f^2 h / 2.
-        """
-        k, row, _, _ = self.jumps[i]
-        indicator = self.system.traced.transitions[k].rows[row].indicator
-        mode, t0, tau = int(self.modes[i]), float(times[i]), float(times[i + 1] - times[i])
-        touch = self.flow.indicator(values, indicator, mode, t0, z[i])
-        ti, tb, zb = self.t_at[i], self.t_at[i - 1], self.z_at[i]
-        if abs(tau) < 1e-6 * (times[-1] or 1.0):
-            F[r] = touch.L + 0.5 * tau * touch.L2
-            J[r] = 0.0
-            J[r, zb : zb + self.n] = touch.L_z
-            J[r, tb] = touch.L_t - 0.5 * touch.L2
-            J[r, ti] = 0.5 * touch.L2
-            J[r, self.size :] = touch.L_p
-            return
-        F[r] = (F[r] - touch.h) / tau
-        J[r, zb : zb + self.n] -= touch.h_z
-        J[r, tb] -= touch.h_t
-        J[r, self.size :] -= touch.h_p
-        J[r] /= tau
-        J[r, ti] -= F[r] / tau
-        J[r, tb] += F[r] / tau
-
-    def look_at_surfaces(self, X: FloatArray) -> None:
-        """Find surfaces that coincide, as those of a support without damper do.
-
-        Exits through the surface of the entry are divided: a visit of no length solves their equations too. Rows of one
-        condition that vanish together leave the crossing alone: they are no corner of it.
-        """
-        visits = self.signature.visits
-        times, z = self.split(X)
-        values = self.parameters(X)
-        traced = self.system.traced
-        for i, (k, row, at, _) in enumerate(self.jumps):
-            n_rows = len(traced.transitions[k].rows)
-            if at is None and n_rows > 1 and not self.at_once[i]:
-                found = [self.flow.jump(values, k, float(times[i]), z[i + 1], r) for r in range(n_rows)]
-                signs = [r.sign for r in traced.transitions[k].rows]
-                self.alone[i] = all(
-                    _coincide(signs[row] * found[row].h_z, signs[row] * found[row].h, signs[r] * one.h_z,
-                              signs[r] * one.h, z[i + 1])
-                    for r, one in enumerate(found) if r != row
-                )  # fmt: skip
-        for i in range(1, self.m):
-            k, row, at, _ = self.jumps[i]
-            k0, row0, at0, _ = self.jumps[i - 1]
-            if at is not None or at0 is not None or self.at_once[i] or visits[i].mode == visits[i - 1].mode:
-                continue
-            entry = self.flow.jump(values, k0, float(times[i - 1]), z[i], row0)
-            leave = self.flow.jump(values, k, float(times[i - 1]), z[i], row)
-            self.divided[i] = _coincide(entry.h_z, entry.h, -leave.h_z, -leave.h, z[i])
-
     def newton(self, X: FloatArray, scale: FloatArray, *, tolerance: float = 1e-12, most: int = 30) -> Solved | None:
         """Solve at fixed parameters; None where it does not converge."""
         X = X.copy()
@@ -325,29 +268,7 @@ class Shooting:
             last = length
         return None
 
-    def multipliers(self, M: FloatArray) -> NDArray[np.complex128]:
-        """Eigenvalues of the monodromy matrix, largest modulus first."""
-        if M.shape == (2, 2):
-            half, det = 0.5 * (M[0, 0] + M[1, 1]), M[0, 0] * M[1, 1] - M[0, 1] * M[1, 0]
-            root = np.sqrt(complex(0.25 * (M[0, 0] - M[1, 1]) ** 2 + M[0, 1] * M[1, 0]))
-            if root.imag:
-                return np.array([half + root, half - root])
-            first = half + (root.real if half >= 0 else -root.real)
-            other = det / first if first else 0.0
-            return np.array([first, other], dtype=complex)
-        found = np.linalg.eigvals(M).astype(complex)
-        return found[np.argsort(-np.abs(found), kind="stable")]
-
     @property
     def at_section(self) -> int:
         """The mode at the section."""
         return self.signature.visits[0].mode
-
-
-def _coincide(a: FloatArray, h: float, b: FloatArray, g: float, z: FloatArray) -> bool:
-    """Whether two indicators with gradients a, b and values h, g near z are one, but for a positive factor."""
-    size = float(np.sqrt((a @ a) * (b @ b)))
-    if size == 0.0 or float(a @ b) < (1.0 - 1e-12) * size:
-        return False
-    ratio = float(np.sqrt((b @ b) / (a @ a)))
-    return bool(abs(g - ratio * h) <= 1e-12 * (np.abs(b * z).max() + abs(g)))

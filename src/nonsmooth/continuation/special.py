@@ -27,8 +27,9 @@ def special_points(branch: Any) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        Over ``special``: ``kind`` (fold, flip, neimark_sacker, pitchfork, branch_point, grazing, corner), the
-        parameter, ``section``, ``floquet_multipliers`` and the orbit's other properties. At a graze
+        Over ``special``: ``kind`` (fold, flip, neimark_sacker, pitchfork, branch_point, grazing, corner, hopf), the
+        parameter, ``section``, ``floquet_multipliers`` and the orbit's other properties. Of equilibria (fold,
+        branch_point, hopf, boundary_equilibrium): ``u``, ``eigenvalues``, ``stable``, ``mode``. At a graze
         ``floquet_multipliers`` are those without the contact, ``contact_multipliers`` those with it in the limit,
         ``grazing`` says ``persistence`` or ``non_smooth_fold``, ``determinant`` holds det(I - M-), det(I - M+),
         det(I + M-), det(I + M+). One row, ``.isel(special=0)``, can be given to ``continue_orbit``.

@@ -1,8 +1,7 @@
 """A session: one folder with the recordings of an experiment and the notebook that says what each run was.
 
 What an experimenter has, and all that ``identify`` and ``compare`` may see: the recorded files, and ``session.toml``
-with the procedure and the settings of each run, and what is known of the apparatus. Keys are strict: a misspelt
-setting that is silently ignored makes a wrong parameter.
+with the procedure and the settings of each run, and what is known of the apparatus (``notebook``).
 """
 
 from __future__ import annotations
@@ -13,64 +12,27 @@ import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from nonsmooth.errors import DataFileError
 from nonsmooth.experiment.load import load_recording
+from nonsmooth.experiment.notebook import (
+    APPARATUS,
+    NOTEBOOK,
+    PROCEDURES,
+    SETTINGS,
+    Entry,
+    Quantity,
+    apparatus_of,
+    entry_of,
+    table_of,
+)
 from nonsmooth.experiment.recording import Recording, RecordingWarning
 from nonsmooth.system.names import check_keys, unknown
 
 __all__ = ["APPARATUS", "NOTEBOOK", "PROCEDURES", "SETTINGS", "Quantity", "RecordedRun", "Session", "load_session"]
 
-NOTEBOOK = "session.toml"
-
-#: What may stand in ``[apparatus]``: unit and meaning.
-APPARATUS: Mapping[str, tuple[str, str]] = MappingProxyType({
-    "distance_per_turn": ("m", "travel of the car per turn of the rotary sensor's wheel"),
-    "counts_per_turn": ("", "counts of the rotary sensor per turn"),
-    "sample_rate": ("Hz", "rate of the sensors"),
-    "turn_resolution": ("s", "resolution of the photogate's times"),
-    "force_gain_limit": ("", "the force sensor's gain lies within 1 +- this (uniform, type B)"),
-    "force_resolution": ("N", "step of the force sensor"),
-    "force_range": ("N", "the force sensor saturates at +- this"),
-    "mass": ("kg", "mass of the car, weighed"),
-    "test_mass": ("kg", "mass hung on the support's spring in the drop test, weighed"),
-    "string_length": ("m", "string between crank and driven spring"),
-})  # fmt: skip
-
-#: Each procedure, and the settings that its runs must state.
-PROCEDURES: Mapping[str, tuple[str, ...]] = MappingProxyType({
-    "springs": (), "support": (), "impulse": (), "drop": (),
-    "response": ("crank_length",), "voltage": ("voltage",), "crank": ("crank_length",),
-    "grazing": ("crank_length", "gap"), "contact": ("crank_length", "gap"),
-    "rise": ("crank_length", "crank_length_end", "gap"), "section": ("crank_length", "gap"),
-})  # fmt: skip
-
-#: What may be set in a run: the type, the unit, the meaning.
-SETTINGS: Mapping[str, tuple[type, str, str]] = MappingProxyType({
-    "voltage": (float, "V", "motor voltage"),
-    "crank_length": (float, "m", "length of the crank (at the beginning, where it changes)"),
-    "crank_length_end": (float, "m", "length of the crank at the end of a slow rise"),
-    "gap": (float, "m", "gap of the support as read at its screw"),
-    "direction": (str, "", "up or down: how the steps follow one another"),
-    "figure": (int, "", "number of the published figure whose setting this is"),
-    "note": (str, "", "a remark"),
-})  # fmt: skip
-
-_READ = ("format", "columns", "axis", "rate", "units", "delimiter", "decimal")
 _DATA_SUFFIXES = (".csv", ".tsv", ".txt", ".cap", ".lvm", ".tdms", ".mat")
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """A number from the notebook with its standard uncertainty; 0 where none was stated."""
-
-    value: float
-    uncertainty: float = 0.0
-
-    def __float__(self) -> float:
-        return self.value
 
 
 class RecordedRun(NamedTuple):
@@ -79,16 +41,6 @@ class RecordedRun(NamedTuple):
     recording: Recording
     run: str
     settings: Mapping[str, Any]
-
-
-@dataclass(frozen=True)
-class _Entry:
-    """One ``[[recording]]`` of the notebook."""
-
-    file: str
-    procedure: str
-    runs: tuple[tuple[str, Mapping[str, Any]], ...]
-    read: Mapping[str, Any]
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +61,7 @@ class Session:
     title: str
     synthetic: bool
     apparatus: Mapping[str, Quantity]
-    entries: tuple[_Entry, ...] = ()
+    entries: tuple[Entry, ...] = ()
     _read: dict[str, Recording] = field(default_factory=dict, repr=False)
 
     @property
@@ -144,7 +96,7 @@ class Session:
                 found += [RecordedRun(recording, run, settings) for run, settings in entry.runs]
         return found
 
-    def _recording(self, entry: _Entry) -> Recording:
+    def _recording(self, entry: Entry) -> Recording:
         if entry.file in self._read:
             return self._read[entry.file]
         recording = load_recording(self.folder / entry.file, **entry.read)
@@ -209,16 +161,16 @@ def load_session(folder: str | os.PathLike[str]) -> Session:
         raise DataFileError(f"{notebook}: is not a TOML file: {error}") from None
     where = str(notebook)
     check_keys(document, ("session", "apparatus", "recording"), where, "a table")
-    head = _table(document.get("session", {}), f"{where}, [session]")
+    head = table_of(document.get("session", {}), f"{where}, [session]")
     check_keys(head, ("title", "synthetic"), f"{where}, [session]", "a key")
     title, synthetic = head.get("title", place.name), head.get("synthetic", False)
     if not isinstance(title, str) or not isinstance(synthetic, bool):
         raise TypeError(f"{where}, [session]: title is a text and synthetic true or false, got {dict(head)!r}")
-    apparatus = _apparatus(document.get("apparatus", {}), f"{where}, [apparatus]")
+    apparatus = apparatus_of(document.get("apparatus", {}), f"{where}, [apparatus]")
     listed = document.get("recording", [])
     if not isinstance(listed, list) or not listed:
         raise ValueError(f"{where}: needs at least one [[recording]] with file, procedure and runs")
-    entries = tuple(_entry(item, place, f"{where}, recording {i}") for i, item in enumerate(listed, 1))
+    entries = tuple(entry_of(item, place, f"{where}, recording {i}") for i, item in enumerate(listed, 1))
     files = [entry.file for entry in entries]
     if twice := sorted({file for file in files if files.count(file) > 1}):
         raise ValueError(f"{where}: {', '.join(twice)} is named twice; put all of its runs under one [[recording]]")
@@ -226,82 +178,3 @@ def load_session(folder: str | os.PathLike[str]) -> Session:
     if unnamed:
         warnings.warn(f"{where} does not name {', '.join(unnamed)}; not used", RecordingWarning, stacklevel=2)
     return Session(place, title, synthetic, apparatus, entries)
-
-
-def _apparatus(given: Any, where: str) -> Mapping[str, Quantity]:
-    table = _table(given, where)
-    check_keys(table, APPARATUS, where, "a key")
-    known = {}
-    for name, value in table.items():
-        stated = value if isinstance(value, dict) else {"value": value}
-        check_keys(stated, ("value", "uncertainty"), f"{where}, {name}", "a key")
-        if "value" not in stated:
-            raise ValueError(f"{where}, {name}: needs `value`")
-        numbers = [_number(stated.get(key, 0.0), f"{where}, {name}: {key}") for key in ("value", "uncertainty")]
-        quantity = Quantity(*numbers)
-        if quantity.value <= 0 or quantity.uncertainty < 0:
-            raise ValueError(f"{where}, {name} = {value!r}: must be positive, an uncertainty zero or more")
-        known[name] = quantity
-    return MappingProxyType(known)
-
-
-def _entry(given: Any, folder: Path, where: str) -> _Entry:
-    table = _table(given, where)
-    check_keys(table, ("file", "procedure", "runs", "read"), where, "a key")
-    for key in ("file", "procedure", "runs"):
-        if key not in table:
-            raise ValueError(f"{where}: needs `{key}`")
-    file, procedure = table["file"], table["procedure"]
-    if not isinstance(file, str) or file != Path(file).name or file in ("", ".", ".."):
-        raise ValueError(f"{where}: file = {file!r} must be the name of a file in the folder of the notebook")
-    if not (folder / file).is_file():
-        raise DataFileError(f"{folder / file}: no such file (named in {where})")
-    if not isinstance(procedure, str) or procedure not in PROCEDURES:
-        raise ValueError(f"{where}: {unknown(procedure, 'a procedure', 'a session', PROCEDURES.keys())}")
-    if not isinstance(table["runs"], list) or not table["runs"]:
-        raise ValueError(f'{where}: runs must be a list of tables as {{ run = "Run #1", voltage = 4.2 }}')
-    runs: dict[str, Mapping[str, Any]] = {}
-    for i, item in enumerate(table["runs"], 1):
-        name, settings = _run(item, procedure, f"{where} ({file}), run {i}")
-        if name in runs:
-            raise ValueError(f"{where}: run {name!r} is named twice")
-        runs[name] = settings
-    read = _table(table.get("read", {}), f"{where}, read")
-    check_keys(read, _READ, f"{where}, read", "an option of load_recording")
-    options = dict(read)
-    if isinstance(options.get("columns"), dict):  # TOML has lists where load_recording takes (column, unit)
-        options["columns"] = {k: tuple(v) if isinstance(v, list) else v for k, v in options["columns"].items()}
-    return _Entry(file, procedure, tuple(runs.items()), options)
-
-
-def _run(given: Any, procedure: str, where: str) -> tuple[str, Mapping[str, Any]]:
-    table = dict(_table(given, where))
-    check_keys(table, ("run", *SETTINGS), where, "a setting")
-    name = table.pop("run", None)
-    if not isinstance(name, str) or not name:
-        raise ValueError(f'{where}: needs run = "..." with the name of the run in the file')
-    if missing := [key for key in PROCEDURES[procedure] if key not in table]:
-        raise ValueError(f"{where}: a run of {procedure!r} must state {', '.join(missing)}")
-    for key, value in table.items():
-        kind = SETTINGS[key][0]
-        if kind is float:
-            table[key] = _number(value, f"{where}: {key}")
-        elif not isinstance(value, kind) or isinstance(value, bool):
-            raise TypeError(f"{where}: {key} = {value!r} must be of type {kind.__name__}")
-    if table.get("direction", "up") not in ("up", "down"):
-        raise ValueError(f"{where}: direction = {table['direction']!r} must be 'up' or 'down'")
-    return name, MappingProxyType(table)
-
-
-def _number(value: Any, what: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise TypeError(f"{what} = {value!r} must be a number")
-    if value - value != 0:
-        raise ValueError(f"{what} = {value!r} must be finite")
-    return float(value)
-
-
-def _table(value: Any, where: str) -> Mapping[str, Any]:
-    if not isinstance(value, dict):
-        raise ValueError(f"{where} must be a table with keys, got {value!r}")
-    return value

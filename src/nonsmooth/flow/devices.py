@@ -10,7 +10,7 @@ from nonsmooth.flow.engine import Engine, SectionPlan
 from nonsmooth.flow.planar import PlanarEngine
 from nonsmooth.flow.series import SeriesEngine
 
-__all__ = ["BATCH", "DEVICES", "batch_size", "check_device", "on_gpu", "workers_of"]
+__all__ = ["BATCH", "DEVICES", "batch_size", "check_device", "engine_on", "gpu_name", "on_gpu", "workers_of"]
 
 DEVICES = ("cpu", "cuda")
 BATCH = 65536  # trajectories of one chunk of work on a GPU
@@ -25,6 +25,16 @@ def batch_size() -> int:
     if _simulated():
         return BATCH
     return min(BATCH, PER_MULTIPROCESSOR * int(cuda.get_current_device().MULTIPROCESSOR_COUNT))
+
+
+def gpu_name() -> str:
+    """What the present GPU calls itself."""
+    from numba import cuda
+
+    if _simulated():
+        return "Numba's CUDA simulator"
+    name = cuda.get_current_device().name
+    return name.decode() if isinstance(name, bytes) else str(name)
 
 
 def _simulated() -> bool:
@@ -59,6 +69,18 @@ def workers_of(device: str, threads: int | None, client: Any = None) -> int | No
     if threads is not None:
         raise ValueError('threads are those of device="cpu": leave threads out with device="cuda"')
     return 1
+
+
+def engine_on(device: Any, engine: Engine, plan: SectionPlan | None) -> Engine:
+    """The engine for a device.
+
+    The planar kernels of a GPU know stroboscopic sections only: with a Poincare section the same flow goes there by the
+    series kernels."""
+    if device != "cuda" or not isinstance(engine, PlanarEngine) or plan is None or plan.indicator < 0:
+        return engine
+    from nonsmooth.flow.methods import RTOL
+
+    return SeriesEngine(engine.traced, engine.scale, "exact", RTOL, None)
 
 
 def on_gpu(device: Any, verb: str, engine: Engine, plan: SectionPlan | None, *, carried: bool = False) -> bool:
@@ -96,11 +118,6 @@ def on_gpu(device: Any, verb: str, engine: Engine, plan: SectionPlan | None, *, 
             f'{verb} with device="cuda" runs by method="exact" or method="taylor" with crossings located; this call '
             f'asks for method="{engine.name}"{"" if engine.name not in SERIES else ", locate=False"}: choose one of '
             'them, or use device="cpu"'
-        )
-    if planar and plan is not None and plan.indicator >= 0:
-        raise ValueError(
-            f'{verb} with device="cuda" and the exact flow takes stroboscopic sections only; with ns.Poincare use '
-            'method="taylor" or device="cpu"'
         )
     if carried:
         raise ValueError(

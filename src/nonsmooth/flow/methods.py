@@ -88,7 +88,7 @@ def engine_for(
             )
         if rtol is not None or atol is not None or step is not None:
             raise ValueError('method="exact" has no tolerance and no step; leave rtol, atol and step out')
-    # A smoothed system is run by its series, also where its bands happen to be linear: design section 2.
+    # A smoothed system runs by its series, also where its bands happen to be linear: one method for all of them.
     # A step or an order asks for a method that has one.
     if form is not None and not system.is_smoothed and step is None and "order" not in expert:
         from nonsmooth.flow.planar import PlanarEngine, is_planar

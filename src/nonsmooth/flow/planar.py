@@ -84,9 +84,13 @@ class PlanarEngine:
             t.A, t.b, t.c, t.s, multiples, t.omega, period,
             t.ia, t.ib, t.ic, t.is_, *outputs, t.ra, t.rb, t.rc, t.rs,
         )  # fmt: skip
+        from nonsmooth.kernels.cache import compiled
         from nonsmooth.kernels.planar_module import planar_module
 
-        return Tables(linear, period, planar_module(n_h), (n_modes, n_i, outputs[0].shape[1], len(self.net[1])))
+        module = planar_module(n_h)
+        if n_points > 1:  # threads may share them
+            compiled(module.chain)
+        return Tables(linear, period, module, (n_modes, n_i, outputs[0].shape[1], len(self.net[1])))
 
     def chain(
         self, tables: Tables, first: int, last: int, state: State, starts: FloatArray | None,

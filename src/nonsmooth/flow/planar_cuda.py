@@ -14,6 +14,7 @@ from nonsmooth.kernels import codes
 
 __all__ = ["SLICE", "Buffers", "PlanarOnGpu", "States"]
 
+TABLES = 6  # of a thread's work arrays, the first ones: what ``build`` fills (see ``kernels.planar_layout``)
 SLICE = 256  # section returns of one launch, at most: below a second also on a small GPU
 
 
@@ -73,7 +74,10 @@ class PlanarOnGpu:
         self.cuda, self.threads, self.phase = cuda, THREADS, float(phase)
         self.period: FloatArray = tables.period
         multiples = tables.linear[4] if len(tables.linear[4]) else np.ones(1, dtype=np.int64)
-        self.tables = cuda.to_device(_packed(tables.linear)), cuda.to_device(multiples)
+        given = cuda.to_device(_packed(tables.linear)), cuda.to_device(multiples)
+        of_point = sum(part.size for part in self.module.scratch(n_modes, *self.sizes, n_rows)[:TABLES])
+        self.tables = *given, cuda.device_array((of_point, len(points)))
+        self.launch(self.module.tabulate, np.arange(len(points)), *self.tables)
         self.net = tuple(cuda.to_device(_not_empty(part)) for part in engine.net)
         self.limit = cuda.to_device(DIVERGENCE * engine.scale)
         self.plans = [cuda.to_device(np.array([-1, 1, -1, 1, 1, extremes], dtype=np.int64)) for extremes in (0, 1)]

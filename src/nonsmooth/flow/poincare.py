@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.errors import SolveError
 from nonsmooth.flow.arguments import check_options, check_system, whole_number
 from nonsmooth.flow.engine import Chain, State
+from nonsmooth.flow.failure import solve_error
 from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.flow.starts import is_one_start, plain_start, start_states
@@ -79,10 +79,7 @@ def poincare(
     state = State(starts[0].copy(), system.memory_vector())
     engine.chain(tables, 0, len(starts), state, starts, plan, transient, n, out)
     if is_one_start(start) and out.status[0] not in (codes.OK, codes.NOT_GUARANTEED):
-        from nonsmooth.results.statuses import by_code
-
-        status = by_code(result_status(out.status[0]))
-        raise SolveError(status.sentence, status=status.name)
+        raise solve_error(int(out.status[0]))
     from nonsmooth.results.labels import labels_of
     from nonsmooth.results.provenance import provenance
     from nonsmooth.results.schema import section_points

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Variation", "sensitivity", "variation"]
 
-RTOL = 1e-15
+RTOL = 1e-15  # where the flow is not exact
 
 
 class Variation:
@@ -113,9 +113,7 @@ def settled(
     raise AssertionError("a run begins in a mode that no transitions lead to")
 
 
-def variation(
-    system: System, flow: VariationalFlow, state: State, t_end: float, method: str = "auto"
-) -> tuple[Variation, Log]:
+def variation(system: System, flow: VariationalFlow, state: State, t_end: float) -> tuple[Variation, Log]:
     """Run from ``state`` (t = 0) to ``t_end`` and take the run apart.
 
     Raises
@@ -123,18 +121,12 @@ def variation(
     SolveError
         The run could not be completed.
     """
-    engine = engine_for(system, method, None if _is_exact(system, method) else RTOL)
+    engine = engine_for(system, rtol=RTOL)
     values = system.parameter_vector()
     start = int(state.counters[0]), np.concatenate([state.u, state.memory])
     log = engine.record(engine.prepare(values[None, :]), state, t_end, np.zeros(1))
     check_complete(log, system, state, system.period())
     return Variation(flow, values, log, start, 0.0, t_end), log
-
-
-def _is_exact(system: System, method: str) -> bool:
-    from nonsmooth.system.linear import linear_form
-
-    return method != "taylor" and not system.is_smoothed and linear_form(system.traced) is not None
 
 
 def sensitivity(

@@ -37,11 +37,12 @@ class Scratch:
     def of(
         cls, n: int, n_indicators: int, rows: int, n_modes: int, n_rows: int, n_q: int, order: int, n_scratch: int
     ) -> Scratch:
+        from nonsmooth.kernels.block import one_block
         from nonsmooth.kernels.polynomial import stack_size
 
         width = max(order, 6) + 1
         vector, integers = np.zeros, lambda size: np.zeros(size, dtype=np.int64)
-        return cls((
+        return cls(one_block(
             np.zeros((rows, width)), np.zeros((n_scratch, width)), np.zeros((rows, width)), np.zeros((rows, width)),
             tuple(vector(n) for _ in range(8)), vector(width), vector(width), vector(width), vector(rows - n),
             vector(n), vector(n_q), vector(n_indicators), vector(n_indicators), integers(n_indicators),

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.errors import SolveError
 from nonsmooth.flow.arguments import check_options, check_system, float_array, real_number, whole_number
 from nonsmooth.flow.engine import FloatArray, Log, State
+from nonsmooth.flow.failure import solve_error
 from nonsmooth.flow.methods import engine_for, warn_if_coarse
 from nonsmooth.flow.starts import first_state, is_one_start, plain_start
 from nonsmooth.kernels import codes
@@ -19,14 +19,10 @@ if TYPE_CHECKING:
 
     from nonsmooth.system.system import System
 
-__all__ = ["BEYOND_STOP", "check_complete", "run_length", "simulate"]
+__all__ = ["check_complete", "run_length", "simulate"]
 
 SAMPLES_PER_PERIOD = 256
 SAMPLES = 4096
-BEYOND_STOP = (
-    "the start lies beyond a stop: a transition with a reset holds there already; "
-    "start on the admissible side of its indicator"
-)
 
 
 def simulate(
@@ -155,16 +151,9 @@ def check_complete(log: Log, system: System, state: State, period: float | None)
     """Raise for a run that stopped early, with the place where it did."""
     if log.status in (codes.OK, codes.NOT_GUARANTEED):
         return
-    from nonsmooth.results.statuses import by_code
-
-    if log.status == codes.BEYOND_STOP:
-        message, name = BEYOND_STOP, "beyond_stop"
-    else:
-        status = by_code(log.status)
-        message, name = status.sentence, status.name
     time = state.clock[0] + (state.clock[1] * period if period is not None else 0.0)
     where = dict(zip(system.states, map(float, state.u), strict=True))
-    raise SolveError(message, time=float(time), state=where, mode=system.modes[int(state.counters[0])], status=name)
+    raise solve_error(log.status, time=float(time), state=where, mode=system.modes[int(state.counters[0])])
 
 
 def _dataset(

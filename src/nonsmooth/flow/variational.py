@@ -206,10 +206,11 @@ class VariationalFlow:
         """The thread's scratch memory."""
         found: tuple[FloatArray, ...] | None = getattr(self._local, "work", None)
         if found is None:
+            from nonsmooth.kernels.block import one_block
             from nonsmooth.kernels.legs import ORDER
 
             columns, width = self.n + self.n_active, ORDER + 1
-            found = self._local.work = (
+            found = self._local.work = one_block(
                 np.zeros((self.n_u + len(self.model.entries), width)), np.zeros((self.model.n_scratch, width)),
                 np.zeros((self.n_u, columns, width)), np.zeros((self.n_u, columns)), np.zeros((self.n_u, columns)),
                 np.zeros((self.n_u, columns)), np.zeros(width), np.zeros(self.n_u),

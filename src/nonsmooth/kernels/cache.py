@@ -5,13 +5,15 @@ run stale code, and it cannot write beside a read-only install. Here one file pe
 ``cache_folder()``; its name is a hash of the source, the signature, the versions and the CPU, so nothing is
 ever stale, entries never change, and several processes need no lock.
 
-Everything that leans on private parts of Numba (a dispatcher's ``_cache``, ``CompileResult._reduce``) stands
-in this file; ``tests/kernels/test_cache.py`` covers it. Checked with Numba 0.62 and 0.68.
+Everything that leans on private parts of Numba (a dispatcher's ``_cache`` and ``_compile_for_args``,
+``CompileResult._reduce``) stands in this file; ``tests/kernels/test_cache.py`` covers it. Checked with Numba 0.62 and
+0.68, calls that compile with 0.68.
 """
 
 from __future__ import annotations
 
 import contextlib
+import gc
 import getpass
 import hashlib
 import importlib.util
@@ -34,8 +36,9 @@ import llvmlite
 import numba
 from numba.core.caching import _Cache
 from numba.core.compiler import CompileResult
+from numba.core.compiler_lock import global_compiler_lock
 
-__all__ = ["cache_folder", "cache_statistics", "device", "inline", "kernel", "load_module"]
+__all__ = ["cache_folder", "cache_statistics", "callback", "compiled", "device", "inline", "kernel", "load_module"]
 
 # Kernels allocate nothing (scratch is an argument), so they need no reference counts: "_nrt" off saves a third.
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}, "_nrt": False}
@@ -222,7 +225,10 @@ class _ContentCache(_Cache):
 
 
 def kernel(signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """Compile a function for exactly one signature when its module is imported, through the disk cache.
+    """Compile a function for exactly one signature when it is first called, through the disk cache.
+
+    A module may hold kernels that a session never asks for, and a large one takes many seconds: only what is called is
+    compiled. Threads that call at once wait for one compile.
 
     Parameters
     ----------
@@ -239,14 +245,71 @@ def kernel(signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any
     """
 
     def decorate(function: Callable[..., Any]) -> Any:
-        dispatcher = numba.njit(**{**_OPTIONS, **options})(function)
+        dispatcher = _cached(function, options)
         if dispatcher is not function:
-            dispatcher._cache = _ContentCache(function)
-            dispatcher.compile(signature)
-            dispatcher.disable_compile()
+            plain_template = dispatcher.get_call_template
+
+            def compile_for_arguments(*arguments: Any, **named: Any) -> Any:
+                _compile_once(dispatcher, signature)
+                return dispatcher  # Numba calls it with the same arguments; what does not fit is refused there
+
+            def get_call_template(arguments: Any, named: Any) -> Any:  # another kernel calls this one
+                _compile_once(dispatcher, signature)
+                return plain_template(arguments, named)
+
+            dispatcher.compile_now = lambda: _compile_once(dispatcher, signature)
+            dispatcher._compile_for_args = compile_for_arguments
+            dispatcher.get_call_template = get_call_template
         return dispatcher
 
     return decorate
+
+
+def callback(signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any]:
+    """Like :func:`kernel`, but compiled at once: for functions that kernels are given as arguments, by address."""
+
+    def decorate(function: Callable[..., Any]) -> Any:
+        dispatcher = _cached(function, options)
+        if dispatcher is not function:
+            _compile_once(dispatcher, signature)
+        return dispatcher
+
+    return decorate
+
+
+def compiled(function: Any) -> Any:
+    """The kernel itself, compiled now: before threads begin, because Ctrl-C cannot stop a compile in one of them."""
+    if hasattr(function, "compile_now"):
+        function.compile_now()
+    return function
+
+
+def _cached(function: Callable[..., Any], options: dict[str, Any]) -> Any:
+    dispatcher = numba.njit(**{**_OPTIONS, **options})(function)
+    if dispatcher is not function:
+        dispatcher._cache = _ContentCache(function)
+    return dispatcher
+
+
+def _compile_once(dispatcher: Any, signature: Any) -> None:
+    # Numba's own lock: a compile in another thread may hold it and ask for this function.
+    with global_compiler_lock:
+        if not dispatcher.signatures:
+            with _collector_at_rest():
+                dispatcher.compile(signature)
+            dispatcher.disable_compile()
+
+
+@contextlib.contextmanager
+def _collector_at_rest() -> Iterator[None]:
+    """A compile makes millions of objects and hardly a cycle: looking for these takes a sixth of its time."""
+    running = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if running:
+            gc.enable()
 
 
 def device(function: Callable[..., Any]) -> Any:
@@ -272,7 +335,7 @@ def load_module(source: str, stem: str) -> ModuleType:
     Parameters
     ----------
     source
-        Text of the module. Its kernels are decorated with :func:`kernel`.
+        Text of the module. Its functions are decorated with :func:`kernel` or :func:`callback`.
     stem
         Beginning of the file's name: an identifier.
 

@@ -6,7 +6,8 @@ of time; both go on from where the launch before left them, so that a launch sta
 
 from numba import float64, int64
 
-from .cuda_planar import N_INDICATORS, N_OUTPUTS, arrays_of_thread
+from .cuda_planar import N_INDICATORS, N_OUTPUTS
+from .cuda_tables import tabled
 from .cuda_target import cuda, entry, local
 from .planar_settle import part
 from .planar_spectrum import spectrum
@@ -35,15 +36,15 @@ def single():
 
 @entry
 def neighbours(
-    jobs, rows, packed, multiples, net, u, clock, counters, begin, end, batch, size, apart, sums, plan, phase, limit,
-    status,
+    jobs, rows, packed, multiples, built, net, u, clock, counters, begin, end, batch, size, apart, sums, plan, phase,
+    limit, status,
 ):  # fmt: skip
     """Returns begin <= n < end of each job and its neighbour: see ``part``."""
     k = cuda.grid(1)
     if k >= jobs.shape[0]:
         return
     j = jobs[k]
-    linear, scratch = arrays_of_thread(packed, multiples, rows[j])
+    linear, scratch = tabled(packed, multiples, built, rows[j])
     moved = cuda.local.array(2, float64)
     moved_clock = cuda.local.array(3, float64)
     moved_counters = cuda.local.array(4, int64)
@@ -55,14 +56,14 @@ def neighbours(
 
 @entry
 def frames(
-    jobs, rows, packed, multiples, net, u, clock, counters, count, units, limit, scale, Q, growth, sums, status
+    jobs, rows, packed, multiples, built, net, u, clock, counters, count, units, limit, scale, Q, growth, sums, status
 ):  # fmt: skip
     """``count`` units of time of each job with its frame: see ``spectrum``. ``growth[j]`` gains the logarithms."""
     k = cuda.grid(1)
     if k >= jobs.shape[0]:
         return
     j = jobs[k]
-    linear, scratch = arrays_of_thread(packed, multiples, rows[j])
+    linear, scratch = tabled(packed, multiples, built, rows[j])
     X = cuda.local.array((4, 2), float64)
     logarithms = cuda.local.array((UNITS, 2), float64)
     lengths = cuda.local.array(2, float64)

@@ -19,7 +19,8 @@ __all__ = ["cuda_planar_module", "joined", "stamp"]
 
 PARTS = (
     "planar_tables", "planar_polynomial", "planar_search", "planar_march", "planar_extremes", "planar_layout",
-    "planar_chain", "planar_settle", "planar_spectrum", "cuda_planar", "cuda_judge", "cuda_growth",
+    "planar_chain", "planar_settle", "planar_spectrum", "cuda_planar", "cuda_tables", "cuda_advance", "cuda_judge",
+    "cuda_growth",
 )  # fmt: skip
 
 
@@ -50,11 +51,12 @@ def joined(parts: Sequence[str], before: str = "") -> str:
     )
     text = re.sub(r"^from \. import", "from nonsmooth.kernels import", text, flags=re.MULTILINE)
     text = re.sub(r"^from \.(\w+) import", r"from nonsmooth.kernels.\1 import", text, flags=re.MULTILINE)
-    return text.replace("from nonsmooth.kernels.cache import", "from nonsmooth.kernels.cuda_target import")
+    return re.sub(r"from nonsmooth\.kernels\.(?:cache|lanes) import", "from nonsmooth.kernels.cuda_target import", text)
 
 
 def stamp() -> str:
     """A line that stands for the header: Numba's disk cache goes by the module's text alone, and the header decides how
     it is compiled."""
-    header = (Path(__file__).parent / "cuda_target.py").read_text(encoding="utf-8")
+    folder = Path(__file__).parent
+    header = "".join((folder / f"{name}.py").read_text(encoding="utf-8") for name in ("cuda_target", "lanes"))
     return f"\nHEADER = {hashlib.sha256(header.encode()).hexdigest()!r}\n"

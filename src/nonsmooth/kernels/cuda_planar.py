@@ -1,21 +1,14 @@
-"""Trajectories of planar systems on a GPU, one per thread.
+"""What a thread works with on a GPU: its parameter row and its scratch memory, in arrays of constant shape.
 
-This file is text of a generated module (``cuda_module``), behind the planar files of the CPU. ``advance`` is the one
-heavy kernel: it marches every trajectory by its own number of section returns with ``chain``. What becomes of the
-returns is decided outside, so that all threads do the same thing at the same time, finished trajectories are left out
-of the next launch, and a launch stays short.
-
-A thread copies its parameter row into arrays of constant shape and builds its tables anew in each launch, which costs
-as much as some 18 forcing periods. ``packed`` holds the rows as columns, so that neighbouring threads read neighbouring
-numbers; what a thread works with lies in its local memory, which the GPU interleaves in the same way.
+This file is text of a generated module (``cuda_module``), behind the planar files of the CPU. ``packed`` holds the
+parameter rows as columns, so that neighbouring threads read neighbouring numbers; what a thread works with lies in its
+local memory, which the GPU interleaves in the same way.
 """
 
 from numba import float64, int64
 
-from .codes import OK
-from .cuda_target import cuda, device, entry, local
+from .cuda_target import cuda, device, local
 from .planar_search import WIDTH
-from .planar_settle import go
 from .planar_tables import HARMONICS, NODES, TERMS, M
 
 # Set for each system; none is below 1, so that no array is empty.
@@ -119,45 +112,3 @@ def arrays_of_thread(packed, multiples, i):
         integers[n] = 0
     linear = (A, b, c, s, multiples, omega, period, ia, ib, ic, is_, oa, ob, oc, os_, ra, rb, rc, rs)
     return linear, (prop, rot, fun, tay, field, info, row, vectors, scr, points, rates, integers)
-
-
-@device
-def row_of(buffers, row):
-    """What ``chain`` writes for one trajectory, from the buffers of all."""
-    section, maximum, minimum, i_max, i_min, o_max, o_min, crossings, contacts, elapsed, times, modes, status = buffers
-    return (
-        section[row : row + 1], maximum[row : row + 1], minimum[row : row + 1], i_max[row : row + 1],
-        i_min[row : row + 1], o_max[row : row + 1], o_min[row : row + 1], crossings[row : row + 1],
-        contacts[row : row + 1], elapsed[row : row + 1], times[row : row + 1], modes[row : row + 1],
-        status[row : row + 1],
-    )  # fmt: skip
-
-
-@entry
-def advance(
-    jobs, rows, packed, multiples, net, u, clock, counters, transient, keep, plan, full, legs, apart, phase, limit, out,
-    other,
-):  # fmt: skip
-    """Thread k: march the state of job j = jobs[k] under parameter row rows[j] by transient[j] section returns, then
-    keep[j] more into row j of ``out``. (One number for all jobs where these arrays are short.)
-
-    With two legs the tables serve twice: ``apart`` = 0, one more return with extremes (the plan ``full``), into row j
-    of ``other``; else the same for the state j + apart, into that row of ``other``. A state is left at its last
-    return; statuses stand in the buffers, and the second leg is left out where the first one failed."""
-    k = cuda.grid(1)
-    if k >= jobs.shape[0]:
-        return
-    j = jobs[k]
-    linear, scratch = arrays_of_thread(packed, multiples, rows[j])
-    n_transient = transient[min(j, transient.shape[0] - 1)]
-    n_keep = keep[min(j, keep.shape[0] - 1)]
-    for leg in range(legs):
-        row = j + leg * apart
-        again = leg > 0 and apart == 0
-        code = go(
-            0, u[row], clock[row], counters[row], linear, net, full if again else plan, phase, 1e300,
-            0 if again else n_transient, 1 if again else n_keep, limit, row_of(other if leg > 0 else out, row), scratch,
-            u[row : row + 1],
-        )  # fmt: skip
-        if code != OK:
-            break

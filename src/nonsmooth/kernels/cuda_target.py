@@ -15,7 +15,11 @@ from typing import Any
 
 from numba import config, cuda
 
-__all__ = ["REGISTERS", "THREADS", "cuda", "device", "entry", "inline", "kernel", "local"]
+from nonsmooth.kernels.lanes import plain
+
+__all__ = [
+    "REGISTERS", "THREADS", "callback", "cuda", "device", "entry", "inline", "kernel", "local", "mix_rows", "sum_rows",
+]  # fmt: skip
 
 THREADS = 64  # in a block: few, because a trajectory fills a thread's registers
 REGISTERS = None  # of a thread, at most; None: as many as the compiler takes (255)
@@ -30,6 +34,7 @@ def device(function: Callable[..., Any]) -> Any:
 
 
 inline = device
+sum_rows, mix_rows = device(plain.sum_rows), device(plain.mix_rows)
 
 
 def local(function: Callable[..., Any]) -> Any:
@@ -40,6 +45,9 @@ def local(function: Callable[..., Any]) -> Any:
 def kernel(signature: Any) -> Callable[[Callable[..., Any]], Any]:
     """A kernel of the CPU is a function inside an entry here; its types follow from the call."""
     return device
+
+
+callback = kernel
 
 
 def entry(function: Callable[..., Any]) -> Any:

@@ -14,7 +14,7 @@ from .cache import device, kernel
 from .codes import DIVERGED, NO_CONVERGENCE, OK
 from .pointers import function_at
 
-__all__ = ["ORDER", "cross", "march_legs"]
+__all__ = ["ORDER", "cross", "march_legs", "put"]
 
 ORDER = 24
 ACCURACY = 1e-17  # of the last two terms of a series against its largest one
@@ -180,6 +180,17 @@ def march_one(jet, mode, t0, tau, entries, kinds, n_u, u, q, total, work, guess)
     return (OK if done >= length else NO_CONVERGENCE), divergence, guess
 
 
+@device
+def put(z, n, n_p, u, q):
+    """The first n numbers of z as the states u, and as the memory behind the n_p parameters in q."""
+    n_u = u.shape[0]
+    for i in range(n):
+        if i < n_u:
+            u[i] = z[i]
+        else:
+            q[n_p + i - n_u] = z[i]
+
+
 @kernel(
     types.void(
         _i1, _i2, _i2, _i1, _f1, _f1, _f2, _f1, _f2, _f3, _f3, _f2, _f2, _f1, _i1, WORK
@@ -199,10 +210,8 @@ def march_legs(
         q[j] = values[j]
     for leg in range(modes.shape[0]):
         mode = modes[leg]
-        for i in range(n_u):
-            u[i] = z0[leg, i]
+        put(z0[leg], n, n_p, u, q)
         for i in range(n_u, n):
-            q[n_p + i - n_u] = z0[leg, i]
             f_begin[leg, i], f_end[leg, i] = 0.0, 0.0
         field(mode, t0[leg], u, q, f_begin[leg])
         if guess == inf or guess == 0.0:  # a leg of no length says nothing of the next
@@ -235,17 +244,10 @@ def cross(functions, k, source, target, n_rows, row, t, z, values, timing, scale
         q[j] = values[j]
     for i in range(n):
         result[i], result[n + i] = 0.0, 0.0
-        if i < n_u:
-            u[i] = z[i]
-        else:
-            q[n_p + i - n_u] = z[i]
+    put(z, n, n_p, u, q)
     switch(k, t, u, q, out)
     field(source, t, u, q, result)
-    for i in range(n):
-        if i < n_u:
-            u[i] = out[i]
-        else:
-            q[n_p + i - n_u] = out[i]
+    put(out, n, n_p, u, q)
     field(target, t, u, q, result[n : n + n_u])
     r_z, r_t = n, n + n * n
     r_p = r_t + n

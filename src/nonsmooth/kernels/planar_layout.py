@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from .block import one_block
 from .planar_search import WIDTH
 from .planar_tables import DEGREE, HARMONICS, NODES, TERMS, M
 
@@ -26,7 +27,7 @@ def scratch(n_modes, n_indicators, n_outputs, n_rows):
 
     The last integer is the point for which the tables stand there already, plus one."""
     n_f = n_indicators + 2 + n_outputs
-    return (
+    return one_block(
         np.zeros((n_modes, NODES + 1, 2, M)), np.zeros((n_modes, NODES + 1, 2 * HARMONICS + 1)),
         np.zeros((n_modes, n_f, 2 * M + 6)), np.zeros((n_modes, n_f, M, DEGREE + 1)), np.zeros((n_modes, 2, M)),
         np.zeros((n_modes, 4)), np.zeros((TERMS + 1, M)), np.zeros((7, M)), np.zeros((n_rows + 3, WIDTH)),

@@ -14,6 +14,7 @@ and several crossings in one step, and stays sharp when the step starts on the s
 from math import fabs
 
 from .cache import device, inline
+from .lanes import mix_rows, sum_rows
 from .planar_polynomial import (
     NEVER,
     ONCE,
@@ -32,20 +33,20 @@ WIDTH = DEGREE + 1
 
 @inline
 def value_of(fun, mode, f, w):
-    """Functional f at w."""
-    total = fun[mode, f, 0] * w[0] + fun[mode, f, 1] * w[1] + fun[mode, f, 2]
+    """Functional f at w. (Here and below the states come last: they are known later than the harmonics.)"""
+    total = fun[mode, f, 2]
     for j in range(3, M):
         total += fun[mode, f, j] * w[j]
-    return total
+    return total + fun[mode, f, 1] * w[1] + fun[mode, f, 0] * w[0]
 
 
 @inline
 def slope_of(fun, mode, f, w):
     """Slope of functional f along the mode at w."""
-    total = fun[mode, f, M] * w[0] + fun[mode, f, M + 1] * w[1] + fun[mode, f, M + 2]
+    total = fun[mode, f, M + 2]
     for j in range(3, M):
         total += fun[mode, f, M + j] * w[j]
-    return total
+    return total + fun[mode, f, M + 1] * w[1] + fun[mode, f, M] * w[0]
 
 
 @inline
@@ -59,11 +60,13 @@ def bound_at(fun, info, mode, f, w):
 @inline
 def to_node(prop, rot, mode, node, w, out):
     """w at a node of the step, from w at its start."""
-    x = prop[mode, node, 0, 0] * w[0] + prop[mode, node, 0, 1] * w[1] + prop[mode, node, 0, 2]
-    v = prop[mode, node, 1, 0] * w[0] + prop[mode, node, 1, 1] * w[1] + prop[mode, node, 1, 2]
+    x = prop[mode, node, 0, 2]
+    v = prop[mode, node, 1, 2]
     for j in range(3, M):
         x += prop[mode, node, 0, j] * w[j]
         v += prop[mode, node, 1, j] * w[j]
+    x = x + prop[mode, node, 0, 1] * w[1] + prop[mode, node, 0, 0] * w[0]
+    v = v + prop[mode, node, 1, 1] * w[1] + prop[mode, node, 1, 0] * w[0]
     for h in range(HARMONICS):
         c = rot[mode, node, 2 * h]
         s = rot[mode, node, 2 * h + 1]
@@ -77,11 +80,7 @@ def to_node(prop, rot, mode, node, w, out):
 @inline
 def compose(tay, mode, f, wn, scr, row):
     """Taylor coefficients of functional f at a node where w is ``wn``, into a row of scr."""
-    for k in range(WIDTH):
-        total = tay[mode, f, 0, k] * wn[0] + tay[mode, f, 1, k] * wn[1] + tay[mode, f, 2, k]
-        for j in range(3, M):
-            total += tay[mode, f, j, k] * wn[j]
-        scr[row, k] = total
+    sum_rows(scr, row, tay, mode, f, wn, M)
 
 
 @inline
@@ -103,8 +102,7 @@ def combine(fun, tay, mode, f, n_i, wn, scr, row):
     for j in range(3, M):
         plain = plain and fun[mode, f, j] == 0.0
     if plain:
-        for k in range(WIDTH):
-            scr[row, k] = fun[mode, f, 0] * scr[0, k] + fun[mode, f, 1] * scr[1, k]
+        mix_rows(scr, row, fun[mode, f, 0], fun[mode, f, 1])
         scr[row, 0] += fun[mode, f, 2]
     else:
         compose(tay, mode, f, wn, scr, row)
@@ -123,9 +121,9 @@ def turn(angle, c, s):
 def dense(prop, rot, tay, info, mode, n_i, rates, w, tau, wn, scr, found, out):
     """w at any instant of the step."""
     spacing = info[mode, 1]
-    node = min(int(tau / spacing + 0.5), NODES)
-    if found[1] >= 0 and fabs(tau - found[1] * spacing) <= 0.75 * spacing:
-        node = found[1]
+    node = found[1]
+    if node < 0 or fabs(tau - node * spacing) > 0.75 * spacing:
+        node = min(int(tau / spacing + 0.5), NODES)
     place(prop, rot, tay, mode, n_i, w, node, wn, scr, found)
     local = tau - node * spacing
     out[0] = horner(scr, 0, local)

@@ -11,7 +11,7 @@ from numba import types
 
 from .cache import device, kernel
 from .codes import DIVERGED, NO_CONVERGENCE, OK
-from .legs import MOST_STEPS, WORK, field_at, fundamental, jet_at, step_end, step_for, switch_at
+from .legs import MOST_STEPS, WORK, field_at, fundamental, jet_at, put, step_end, step_for, switch_at
 
 __all__ = ["grow"]
 
@@ -158,11 +158,7 @@ def grow(
         q[j] = values[j]
     for m in range(modes.shape[0]):
         row = unit[m]
-        for i in range(n):
-            if i < n_u:
-                u[i] = z0[m, i]
-            else:
-                q[n_p + i - n_u] = z0[m, i]
+        put(z0[m], n, n_p, u, q)
         if guess == inf and tau[m] > 0.0:
             guess = tau[m]
         status, part, guess = frame_along(
@@ -182,12 +178,9 @@ def grow(
         f_minus, f_plus, t_z = rates[2 : 2 + n], rates[2 + n : 2 + 2 * n], rates[2 + 2 * n : 2 + 3 * n]
         for i in range(n):
             f_minus[i], f_plus[i] = 0.0, 0.0
-            if i < n_u:
-                u[i] = before[m, i]
-            else:
-                q[n_p + i - n_u] = before[m, i]
             for c in range(n):
                 S[i, c] = 1.0 if i == c else 0.0
+        put(before[m], n, n_p, u, q)
         for at in range(first_jump[m], first_jump[m + 1]):
             k = jumps[at]
             switch(k, t, u, q, out)
@@ -211,11 +204,7 @@ def grow(
                         distance = fabs(rate) / sqrt(norm * speed) if speed > 0.0 else inf
                 if best < inf:
                     rates[0] = min(rates[0], distance)
-            for i in range(n):
-                if i < n_u:
-                    u[i] = out[i]
-                else:
-                    q[n_p + i - n_u] = out[i]
+            put(out, n, n_p, u, q)
             field(transitions[k, 1], t, u, q, f_plus)
             for i in range(n):
                 slip = out[n + n * n + i] - f_plus[i]

@@ -8,7 +8,7 @@ import numpy as np
 
 from nonsmooth.plot import palette, style
 from nonsmooth.plot.basins import kind_of
-from nonsmooth.plot.labels import label, variable_along
+from nonsmooth.plot.labels import label, only_states, variable_along
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,8 +39,8 @@ def basin_fractions(result: xr.Dataset, ax: Axes | None = None, *, y: str | None
     """
     variable_along(result, "n_starts_99", "basin_fractions")
     parameter = str(result["n_starts_99"].dims[0])
-    if y is not None and y not in result["state"].values:
-        raise ValueError(f"y = {y!r} is not a state; states: {result['state'].values.tolist()}")
+    if y is not None:
+        only_states(result, y)
     result = result.sortby(parameter)
     with style.axes(ax, ratio=0.85) as drawn:
         values = result[parameter].values

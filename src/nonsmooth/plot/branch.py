@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth.plot import style
-from nonsmooth.plot.labels import first_states, label, variable_along
+from nonsmooth.plot.labels import label, only_states, variable_along
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -53,7 +53,7 @@ def branch(
         The state of the ordinate; by default the first.
     quantity : {"section", "maximum", "minimum", "amplitude"}
         Section points (all of a period-n orbit where the branch has ``returns``), extremes over the orbit, or half
-        their distance.
+        their distance. Of an equilibrium the state itself, and 0.
     special
         Mark the special points, each kind with its own sign, named in the legend.
     color
@@ -63,7 +63,7 @@ def branch(
     with style.axes(ax) as drawn:
         draw_branch(drawn, result, y=y, quantity=quantity, special=special, color=color)
         parameter = _parameter(result)
-        (name,) = first_states(result, y)
+        (name,) = only_states(result, y)
         drawn.set(xlabel=label(result, parameter), ylabel=_ordinate(result, name, quantity))
         if special and result.sizes.get("special", 0):
             drawn.legend(loc="best")
@@ -84,7 +84,7 @@ def draw_branch(
     variable_along(result, "stable", "continue_orbit")
     if quantity not in _WORDS:
         raise ValueError(f"quantity = {quantity!r}; allowed: {', '.join(map(repr, _WORDS))}")
-    (name,) = first_states(result, y)
+    (name,) = only_states(result, y)
     values = result[_parameter(result)].values
     ordinates = _ordinates(result, name, quantity)
     shade = color or style.COLORS["first"]
@@ -103,7 +103,10 @@ def draw_branch(
 
 
 def _ordinates(result: xr.Dataset, name: str, quantity: str) -> NDArray[np.float64]:
-    """One line for each section point of the orbit, (lines, point)."""
+    """One line for each section point of the orbit, (lines, point); an equilibrium is its own maximum and minimum."""
+    if "eigenvalues" in result:
+        rest = result["u"].sel(state=name).values.astype(float)
+        return np.zeros((1, len(rest))) if quantity == "amplitude" else rest[None, :]
     if quantity == "amplitude":
         chosen = 0.5 * (result["maximum"] - result["minimum"]).sel(state=name)
     else:
@@ -117,7 +120,7 @@ def _mark(ax: Axes, result: xr.Dataset, ordinates: NDArray[np.float64]) -> None:
     """The special points on each of the lines."""
     if not result.sizes.get("special", 0):
         return
-    values = result["special_value"].values
+    values = result[_parameter(result)].values[result["special_point"].values]
     kinds = [str(kind) for kind in result["special_kind"].values]
     heights = ordinates[:, result["special_point"].values]
     known = ax.get_legend_handles_labels()[1]

@@ -8,7 +8,7 @@ import numpy as np
 
 from nonsmooth.plot import palette, style
 from nonsmooth.plot.cells import cell_edges
-from nonsmooth.plot.labels import first_states, label, variable_along
+from nonsmooth.plot.labels import label, only_states, variable_along
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -56,7 +56,7 @@ def chart(
         else:
             values = one[show]
             if "state" in values.dims:
-                (name,) = first_states(result, y)
+                (name,) = only_states(result, y)
                 values = values.sel(state=name)
             _numbers(values, drawn, first, second, show)
         drawn.set(xlabel=label(result, first), ylabel=label(result, second))

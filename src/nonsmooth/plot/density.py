@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth.plot import style
-from nonsmooth.plot.labels import first_states, label, variable_along
+from nonsmooth.plot.cells import cell_edges
+from nonsmooth.plot.labels import label, only_states, variable_along
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -40,12 +41,9 @@ def density(result: xr.Dataset, ax: Axes | None = None, *, y: str | None = None,
     The colour is the share of a parameter value's points in one bin, in per cent. A point that failed has none.
     """
     variable_along(result, "density", "sweep(..., density=True)")
-    (name,) = first_states(result, y)
-    states = [str(one) for one in result["state"].values]
-    if name not in states:
-        raise ValueError(f"y = {name!r} is not a state; states: {states}")
+    (name,) = only_states(result, y)
     parameter = str(result["density"].dims[0])
-    one = result.sortby(parameter).isel(state=states.index(name))
+    one = result.sortby(parameter).sel(state=name)
     counts = one["density"].sum([dim for dim in ("direction", "start") if dim in one["density"].dims])
     table = counts.transpose("bin", parameter).values.astype(float)
     total = table.sum(axis=0)
@@ -59,17 +57,9 @@ def density(result: xr.Dataset, ax: Axes | None = None, *, y: str | None = None,
         there = share[np.isfinite(share)]
         lowest, highest = (float(there.min()), float(there.max())) if len(there) else (1.0, 100.0)
         mesh = drawn.pcolormesh(
-            _borders(one[parameter].values), one["bin_edge"].values, share, rasterized=True, cmap=cmap,
+            cell_edges(one[parameter].values), one["bin_edge"].values, share, rasterized=True, cmap=cmap,
             norm=LogNorm(lowest, max(highest, 1.01 * lowest)),
         )  # fmt: skip
         drawn.figure.colorbar(mesh, ax=drawn, label="share of the points (%)")
         drawn.set(xlabel=label(result, parameter), ylabel=label(result, name))
     return drawn
-
-
-def _borders(values: np.ndarray) -> np.ndarray:
-    """Half way between a parameter's values, the outer ones as far out again."""
-    if len(values) == 1:
-        return np.array([values[0] - 0.5, values[0] + 0.5])
-    middle = 0.5 * (values[1:] + values[:-1])
-    return np.concatenate([[2 * values[0] - middle[0]], middle, [2 * values[-1] - middle[-1]]])

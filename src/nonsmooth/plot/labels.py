@@ -9,7 +9,7 @@ from nonsmooth.system.parameter import latex_name
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["column", "first_states", "label", "name_with_unit", "variable_along", "words_of_flags"]
+__all__ = ["column", "first_states", "label", "name_with_unit", "only_states", "variable_along", "words_of_flags"]
 
 
 def label(result: xr.Dataset, name: str) -> str:
@@ -50,7 +50,9 @@ def column(result: xr.Dataset, variable: str, name: str) -> xr.DataArray:
 
 
 def variable_along(result: xr.Dataset, variable: str, verb: str) -> None:
-    """Check that ``result`` is of the kind a plot needs; ValueError naming the verb that makes such results."""
+    """Check that ``result`` is of the kind a plot needs; an error names the verb that makes such results."""
+    if not hasattr(result, "data_vars"):
+        raise TypeError(f"this plot draws the result of {verb}, not {type(result).__name__}")
     if variable not in result:
         held = sorted(map(str, result.data_vars))
         raise ValueError(f"this result has no {variable!r}: it is not the result of {verb}; it holds {held}")
@@ -68,6 +70,22 @@ def first_states(result: xr.Dataset, *names: str | None) -> list[str]:
     if len(states) < len(names):
         raise ValueError(f"this plot needs {len(names)} states; the system has {states}")
     return [name if name is not None else states[i] for i, name in enumerate(names)]
+
+
+def only_states(result: xr.Dataset, *names: str | None) -> list[str]:
+    """The same for a result that holds nothing but states.
+
+    Raises
+    ------
+    ValueError
+        If the system has fewer states than needed, or none of that name.
+    """
+    states = [str(name) for name in result["state"].values]
+    found = first_states(result, *names)
+    for name in found:
+        if name not in states:
+            raise ValueError(f"{name!r} is not a state of this result; states: {states}")
+    return found
 
 
 def words_of_flags(array: xr.DataArray) -> list[str]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth.plot import style
-from nonsmooth.plot.labels import first_states, label, variable_along, words_of_flags
+from nonsmooth.plot.labels import label, only_states, variable_along, words_of_flags
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,7 +35,7 @@ def manifolds(
         In typographic points.
     """
     variable_along(result, "arc_length", "manifolds")
-    names = first_states(result, x, y)
+    names = only_states(result, x, y)
     kinds = words_of_flags(result["manifold"])
     columns = [result["section"].sel(state=name).values for name in names]
     saddle = [result["orbit_section"].sel(state=name).values for name in names]

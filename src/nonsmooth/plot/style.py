@@ -1,7 +1,9 @@
 """How every figure looks: journal column widths, small fonts, colours that colour-blind readers can tell apart.
 
-A plot function given no axes draws on its own, in this style. Given axes, it leaves the caller's style alone;
-keep a ``with nonsmooth.plot.journal():`` block around making the figure and drawing on it to get it.
+A plot function given no axes draws on its own, in this style. Given axes, it leaves the caller's style alone, but for
+what it adds itself: a legend has no frame and letters in proportion to the axes' labels, unless the caller's own
+settings say otherwise. Keep a ``with nonsmooth.plot.journal():`` block around making the figure and drawing on it to
+get the whole style.
 """
 
 from __future__ import annotations
@@ -76,14 +78,29 @@ def journal() -> Iterator[None]:
 
 @contextmanager
 def axes(ax: Axes | None, *, width: float = COLUMN, ratio: float = 0.72) -> Iterator[Axes]:
-    """The axes to draw on: the given ones as they are, or a new figure of one column in the journal style."""
+    """The axes to draw on: the given ones (legends in the package's style), or a new figure of one column."""
     if ax is not None:
-        yield ax
+        with _own_legend(ax):
+            yield ax
         return
     import matplotlib.pyplot as plt
 
     with journal():
         yield plt.figure(figsize=(width, width * ratio)).add_subplot()
+
+
+@contextmanager
+def _own_legend(ax: Axes) -> Iterator[None]:
+    """Legends in the package's style on a caller's axes; what the caller has set stays."""
+    import matplotlib as mpl
+
+    letters = _RC["legend.fontsize"] / _RC["axes.labelsize"] * ax.xaxis.label.get_fontsize()
+    wanted: Any = {"legend.frameon": _RC["legend.frameon"], "legend.fontsize": letters}
+    now: Any = mpl.rcParams
+    plain: Any = mpl.rcParamsDefault
+    free: Any = {key: value for key, value in wanted.items() if now[key] == plain[key]}
+    with mpl.rc_context(free):
+        yield
 
 
 def save_figure(figure: Figure | Axes, path: str | os.PathLike[str]) -> Path:

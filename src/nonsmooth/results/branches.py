@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from nonsmooth.results.labels import Labels
-from nonsmooth.results.schema import parameter_coords, quantity_attributes, state_coords
+from nonsmooth.results.schema import floats, parameter_coords, quantity_attributes, state_coords, strings, varied
 from nonsmooth.results.statuses import flag_attributes, status_attributes
 
 __all__ = ["branch", "curve", "equilibria"]
@@ -76,28 +76,17 @@ def branch(
     variables["signature"] = ("point", np.asarray(arrays["signature"], np.int32), {
         "long_name": "signature", **flag_attributes(signatures, dtype=np.int32)})  # fmt: skip
     variables["layout"] = ("point", np.asarray(arrays["layout"], np.int32), variables["layout"][2])
-    variables["status"] = ("point", np.zeros(len(np.array(values, dtype=np.float64)), np.int8), status_attributes())
+    along = floats(values)
+    variables["status"] = ("point", np.zeros(len(along), np.int8), status_attributes())
     for name, (stem, dims, long_name) in _MARKS.items():
         column = marks[name]
-        array = _words(column) if name in ("kind", "indicator", "grazing") else np.asarray(column)
+        array = strings(column) if name in ("kind", "indicator", "grazing") else np.asarray(column)
         variables[stem] = (("special", *dims), array, {"long_name": long_name})
-    variables["special_value"] = (
-        "special", np.array(values, dtype=np.float64)[np.asarray(marks["place"], dtype=np.int64)],
-        quantity_attributes(parameter, d.parameters[parameter]),
-    )  # fmt: skip
+    variables["special_value"] = _special_value(d, parameter, along, marks["place"])
     variables["period_number"] = ((), np.int64(period_number), {"long_name": "forcing periods (0: autonomous)"})
-    codes = np.array([list(endings).index(word) for word in ended], dtype=np.int8)
-    variables["ended"] = ("end", codes, {"long_name": "how the branch ends", **flag_attributes(endings)})
-    variables["ended_because"] = ("end", _words(sentences), {"long_name": "sentence"})
-    own = quantity_attributes(parameter, d.parameters[parameter])
-    coords: dict[str, Any] = {
-        parameter: ("point", np.array(values, dtype=np.float64), own),
-        **state_coords(d),
-        **parameter_coords(d, without=parameter),
-        "indicator": ("indicator", _words(d.indicators), {"long_name": "indicator"}),
-        "end": ("end", _words(["first", "last"]), {"long_name": "end of the branch"}),
-    }
-    return xr.Dataset(variables, coords, dict(attrs))
+    coords = _coords(d, {parameter: values})
+    coords["indicator"] = ("indicator", strings(d.indicators), {"long_name": "indicator"})
+    return xr.Dataset(variables | _ends(endings, ended, sentences), coords, dict(attrs))
 
 
 def curve(
@@ -123,19 +112,10 @@ def curve(
     variables["kind"] = ((), kind, {"long_name": "kind of the special point that is followed"})
     variables["period_number"] = ((), np.int64(period_number), {"long_name": "forcing periods (0: autonomous)"})
     variables["signature"] = ((), signature, {"long_name": "signature"})
-    variables["special_kind"] = ("special", _words(name for name, _ in special), {"long_name": "codimension two"})
-    places = np.array([place for _, place in special], dtype=np.int64)
-    variables["special_point"] = ("special", places, {"long_name": "its place among the points"})
-    codes = np.array([list(endings).index(word) for word in ended], dtype=np.int8)
-    variables["ended"] = ("end", codes, {"long_name": "how the curve ends", **flag_attributes(list(endings))})
-    variables["ended_because"] = ("end", _words(endings[word] for word in ended), {"long_name": "sentence"})
-    coords: dict[str, Any] = {
-        name: ("point", np.array(values, dtype=np.float64), quantity_attributes(name, d.parameters[name]))
-        for name, values in parameters.items()
-    }
-    fixed = {name: value for name, value in parameter_coords(d).items() if name not in parameters}
-    coords |= {**state_coords(d), **fixed, "end": ("end", _words(["first", "last"]), {"long_name": "end"})}
-    return xr.Dataset(variables, coords, dict(attrs))
+    variables["special_kind"] = ("special", strings(name for name, _ in special), {"long_name": "codimension two"})
+    variables["special_point"] = _places(special)
+    variables |= _ends(list(endings), ended, [endings[word] for word in ended])
+    return xr.Dataset(variables, _coords(d, parameters), dict(attrs))
 
 
 def equilibria(
@@ -152,27 +132,41 @@ def equilibria(
     """The result of ``continue_equilibrium``: equilibria over ``point``, marks over ``special``."""
     d = labels
     modes = flag_attributes(d.modes, dtype=np.int16)
-    places = np.array([place for _, place in special], dtype=np.int64)
-    codes = np.array([list(endings).index(word) for word in ended], dtype=np.int8)
     variables: dict[str, Any] = {
         "u": (("point", "state"), np.asarray(arrays["u"]), {"long_name": "equilibrium"}),
         "eigenvalues": (("point", "eigenvalue"), np.asarray(arrays["eigenvalues"]), {"long_name": "eigenvalues"}),
         "stable": ("point", np.asarray(arrays["stable"]), {"long_name": "all real parts negative"}),
         "mode": ("point", np.asarray(arrays["mode"], np.int16), {"long_name": "mode", **modes}),
-        "special_kind": ("special", _words(kind for kind, _ in special), {"long_name": "kind of the special point"}),
-        "special_point": ("special", places, {"long_name": "its place among the points"}),
-        "ended": ("end", codes, {"long_name": "how the branch ends", **flag_attributes(list(endings))}),
-        "ended_because": ("end", _words(endings[word] for word in ended), {"long_name": "sentence"}),
+        "special_kind": ("special", strings(kind for kind, _ in special), {"long_name": "kind of the special point"}),
+        "special_point": _places(special),
+        "special_value": _special_value(d, parameter, floats(values), [place for _, place in special]),
+        **_ends(list(endings), ended, [endings[word] for word in ended]),
     }
-    coords: dict[str, Any] = {
-        parameter: (
-            "point", np.array(values, dtype=np.float64), quantity_attributes(parameter, d.parameters[parameter]),
-        ),
-        **state_coords(d), **parameter_coords(d, without=parameter),
-        "end": ("end", _words(["first", "last"]), {"long_name": "end of the branch"}),
-    }  # fmt: skip
-    return xr.Dataset(variables, coords, dict(attrs))
+    return xr.Dataset(variables, _coords(d, {parameter: values}), dict(attrs))
 
 
-def _words(words: Any) -> np.ndarray:
-    return np.array(list(words), dtype=str)
+def _places(special: Sequence[tuple[str, int]]) -> tuple[Any, ...]:
+    places = np.array([place for _, place in special], dtype=np.int64)
+    return "special", places, {"long_name": "its place among the points"}
+
+
+def _special_value(d: Labels, parameter: str, along: NDArray[np.float64], places: Any) -> tuple[Any, ...]:
+    return "special", along[np.asarray(places, dtype=np.int64)], quantity_attributes(parameter, d.parameters[parameter])
+
+
+def _ends(endings: Sequence[str], ended: Sequence[str], sentences: Sequence[str]) -> dict[str, Any]:
+    """How both ends came about: one of ``endings``, and a sentence."""
+    codes = np.array([endings.index(word) for word in ended], dtype=np.int8)
+    return {
+        "ended": ("end", codes, {"long_name": "how it ends", **flag_attributes(endings)}),
+        "ended_because": ("end", strings(sentences), {"long_name": "sentence"}),
+    }
+
+
+def _coords(d: Labels, parameters: Mapping[str, ArrayLike]) -> dict[str, Any]:
+    """The parameters that vary over ``point``, the states, the other parameters, and the two ends."""
+    coords: dict[str, Any] = {}
+    for name, values in parameters.items():
+        coords |= varied(d, name, values, "point")
+    coords |= state_coords(d) | parameter_coords(d, without=tuple(parameters))
+    return coords | {"end": ("end", strings(["first", "last"]), {"long_name": "end"})}

@@ -16,12 +16,20 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from nonsmooth.results.labels import Labels
-from nonsmooth.results.schema import _floats, _start_coords, parameter_coords, quantity_attributes, state_coords
+from nonsmooth.results.schema import (
+    floats,
+    parameter_coords,
+    quantity_attributes,
+    start_coords,
+    state_coords,
+    varied,
+)
 from nonsmooth.results.statuses import status_attributes
 
-__all__ = ["attractor_variables", "basins", "chart"]
+__all__ = ["attractor_variables", "basin_fractions", "basins", "chart"]
 
 SHOWN = 4000  # section points kept of one attractor
+LABEL = "attractor (-1: not converged, -2: diverged)"
 
 _LONG_NAMES = {
     "period_number": "period number (0: none found)",
@@ -77,11 +85,11 @@ def chart(
         else:
             attributes = {"long_name": _LONG_NAMES[name]}
         variables[name] = (dims, array, attributes)
-    coords: dict[str, Any] = parameter_coords(labels)
+    coords: dict[str, Any] = parameter_coords(labels, without=plane)
     for name, values in grid.items():
-        coords[name] = (name, _floats(values), quantity_attributes(name, labels.parameters[name]))
+        coords |= varied(labels, name, values)
     coords |= state_coords(labels)
-    result = xr.Dataset(variables, coords | _start_coords(starts), dict(attrs))
+    result = xr.Dataset(variables, coords | start_coords(starts), dict(attrs))
     return result.squeeze("start") if one_start else result
 
 
@@ -100,7 +108,7 @@ def basins(
 ) -> xr.Dataset:
     """The result of ``basins``. ``attractors`` have the fields of ``analysis.basins_attractors.Attractor``."""
     plane = tuple(grid)
-    variables: dict[str, Any] = {"label": (plane, np.asarray(label, np.int32), _label_attributes())}
+    variables: dict[str, Any] = {"label": (plane, np.asarray(label, np.int32), {"long_name": LABEL})}
     variables["status"] = (plane, np.asarray(status, np.int8), status_attributes())
     variables |= attractor_variables(labels, attractors)
     for name, values in per_attractor.items():
@@ -110,7 +118,7 @@ def basins(
     variables["uncertain"] = ("distance", uncertain[1], {"long_name": _LONG_NAMES["uncertain"]})
     coords: dict[str, Any] = parameter_coords(labels) | state_coords(labels)
     for name, values in grid.items():
-        coords[name] = (name, _floats(values), quantity_attributes(name, labels.states[name]))
+        coords[name] = (name, floats(values), quantity_attributes(name, labels.states[name]))
     for name, value in fixed.items():
         coords[name] = ((), float(value), quantity_attributes(name, labels.states[name]))
     coords["distance"] = ("distance", uncertain[0], {"long_name": "distance in grid steps"})
@@ -171,10 +179,6 @@ def attractor_variables(labels: Labels, attractors: Sequence[Any]) -> dict[str, 
     }  # fmt: skip
 
 
-def _label_attributes() -> dict[str, Any]:
-    return {"long_name": "attractor (-1: not converged, -2: diverged)"}
-
-
 def basin_fractions(
     labels: Labels, attrs: Mapping[str, str], parameter: str, values: ArrayLike, arrays: Mapping[str, Any]
 ) -> xr.Dataset:
@@ -187,6 +191,6 @@ def basin_fractions(
     for name in ("lyapunov", "lyapunov_error"):
         variables[name][2]["units"] = f"1/{labels.time_unit}"
     coords: dict[str, Any] = parameter_coords(labels, without=parameter) | state_coords(labels)
-    coords[parameter] = (parameter, _floats(values), quantity_attributes(parameter, labels.parameters[parameter]))
+    coords |= varied(labels, parameter, values)
     coords["attractor"] = ("attractor", np.arange(np.shape(arrays["fraction"])[1]), {"long_name": "attractor"})
     return xr.Dataset(variables, coords, dict(attrs))

@@ -37,7 +37,8 @@ from nonsmooth.results.labels import Labels, Quantity
 from nonsmooth.results.statuses import flag_attributes, status_attributes
 
 __all__ = [
-    "parameter_coords", "quantity_attributes", "response", "section_points", "state_coords", "sweep", "trajectory",
+    "floats", "parameter_coords", "quantity_attributes", "response", "section_points", "start_coords", "state_coords",
+    "strings", "sweep", "trajectory", "varied",
 ]  # fmt: skip
 
 #: Trailing dims of each array a sweep may bring, after (direction, start, parameter).
@@ -98,28 +99,28 @@ def trajectory(
     transitions = flag_attributes(d.transition_labels, dtype=np.int16)
     indicators = flag_attributes(d.indicators, dtype=np.int16)
     variables: dict[str, Any] = {
-        "u": (("time", "state"), _floats(u), {"long_name": "state"}),
+        "u": (("time", "state"), floats(u), {"long_name": "state"}),
         "mode": ("time", np.asarray(mode, np.int16), {"long_name": "mode", **modes}),
-        "crossing_time": ("crossing", _floats(crossing_time), {"long_name": "time of the crossing", **t_unit}),
+        "crossing_time": ("crossing", floats(crossing_time), {"long_name": "time of the crossing", **t_unit}),
         "crossing_transition": (
             "crossing", np.asarray(crossing_transition, np.int16), {"long_name": "transition", **transitions},
         ),
-        "u_before": (("crossing", "state"), _floats(u_before), {"long_name": "state before the crossing"}),
-        "u_after": (("crossing", "state"), _floats(u_after), {"long_name": "state after the crossing"}),
-        "touch_time": ("touch", _floats(touch_time), {"long_name": "time of the touch", **t_unit}),
+        "u_before": (("crossing", "state"), floats(u_before), {"long_name": "state before the crossing"}),
+        "u_after": (("crossing", "state"), floats(u_after), {"long_name": "state after the crossing"}),
+        "touch_time": ("touch", floats(touch_time), {"long_name": "time of the touch", **t_unit}),
         "touch_indicator": ("touch", np.asarray(touch_indicator, np.int16), {"long_name": "indicator", **indicators}),
-        "touch_u": (("touch", "state"), _floats(touch_u), {"long_name": "state at the touch"}),
-        "touch_clearance": ("touch", _floats(touch_clearance), {"long_name": "distance left to the crossing"}),
+        "touch_u": (("touch", "state"), floats(touch_u), {"long_name": "state at the touch"}),
+        "touch_clearance": ("touch", floats(touch_clearance), {"long_name": "distance left to the crossing"}),
         "status": ((), np.int8(status), status_attributes()),
     }  # fmt: skip
     for names, columns in ((d.outputs, outputs), (d.memory, memory)):
         if columns is None:
             continue
-        table = _floats(columns)
+        table = floats(columns)
         for i, (name, quantity) in enumerate(names.items()):
             variables[name] = ("time", table[:, i], quantity_attributes(name, quantity))
     coords: dict[str, Any] = {
-        "time": ("time", _floats(time), {"long_name": "time", **t_unit}),
+        "time": ("time", floats(time), {"long_name": "time", **t_unit}),
         "segment": ("time", np.asarray(segment, np.int64), {"long_name": "number of crossings before this sample"}),
         **state_coords(d),
         **parameter_coords(d),
@@ -161,16 +162,16 @@ def sweep(
         else:
             variables[name] = (dims, _own(array), {"long_name": _LONG_NAMES[name]})
     coords: dict[str, Any] = {
-        parameter: (parameter, _floats(values), quantity_attributes(parameter, d.parameters[parameter])),
-        "direction": ("direction", _strings(directions), {"long_name": "direction of the sweep"}),
-        **_start_coords(starts),
+        **varied(d, parameter, values),
+        "direction": ("direction", strings(directions), {"long_name": "direction of the sweep"}),
+        **start_coords(starts),
         **state_coords(d),
         **parameter_coords(d, without=parameter),
     }
     if edges is not None:
-        variables["bin_edge"] = (("state", "edge"), _floats(edges), {"long_name": "edges of the bins, per state"})
+        variables["bin_edge"] = (("state", "edge"), floats(edges), {"long_name": "edges of the bins, per state"})
     if "clearance" in arrays:
-        coords["indicator"] = ("indicator", _strings(d.indicators), {"long_name": "indicator"})
+        coords["indicator"] = ("indicator", strings(d.indicators), {"long_name": "indicator"})
     result = xr.Dataset(variables, coords, dict(attrs))
     order = (parameter, "direction", "start", ...)
     return result.transpose(*order).squeeze(list(squeeze))
@@ -186,7 +187,7 @@ def response(swept: xr.Dataset, *, amplitude: ArrayLike, jumps: Mapping[str, Arr
     maximum = swept["maximum"]
     parameter = str(maximum.dims[0])
     full = ("direction", "start", parameter, "state")
-    amplitudes = _floats(amplitude)
+    amplitudes = floats(amplitude)
     dropped = tuple(i for i, dim in enumerate(full) if dim not in maximum.dims)
     labelled = xr.DataArray(amplitudes.squeeze(dropped), dims=[dim for dim in full if dim in maximum.dims])
     variables: dict[str, Any] = {
@@ -195,10 +196,10 @@ def response(swept: xr.Dataset, *, amplitude: ArrayLike, jumps: Mapping[str, Arr
     for name, values in jumps.items():
         if name == "direction":
             attributes = {"long_name": "direction in which the jump is met"}
-            variables["jump_direction"] = ("jump", _strings(np.asarray(values, dtype=str)), attributes)
+            variables["jump_direction"] = ("jump", strings(np.asarray(values, dtype=str)), attributes)
         elif name == "value":
             attributes = {"long_name": f"{parameter} at the jump", "units": swept[parameter].attrs.get("units", "1")}
-            variables["jump_value"] = ("jump", _floats(values), attributes)
+            variables["jump_value"] = ("jump", floats(values), attributes)
         else:
             variables[f"jump_{name}"] = ("jump", np.asarray(values))
     return swept.assign(variables)
@@ -219,43 +220,50 @@ def section_points(
     d = labels
     modes = flag_attributes(d.modes, dtype=np.int16)
     variables: dict[str, Any] = {
-        "section": (("start", "iterate", "state"), _floats(section), {"long_name": _LONG_NAMES["section"]}),
-        "time": (("start", "iterate"), _floats(time), {"long_name": "time of the return", "units": d.time_unit}),
+        "section": (("start", "iterate", "state"), floats(section), {"long_name": _LONG_NAMES["section"]}),
+        "time": (("start", "iterate"), floats(time), {"long_name": "time of the return", "units": d.time_unit}),
         "mode": (("start", "iterate"), np.asarray(mode, np.int16), {"long_name": "mode", **modes}),
         "status": ("start", np.asarray(status, np.int8), status_attributes()),
     }
-    coords = {**_start_coords(starts), **state_coords(d), **parameter_coords(d)}
+    coords = {**start_coords(starts), **state_coords(d), **parameter_coords(d)}
     return xr.Dataset(variables, coords, dict(attrs)).squeeze(list(squeeze))
 
 
 @lru_cache(maxsize=64)
 def _state_index(names: tuple[str, ...]) -> xr.IndexVariable:
     """The index of the states' names, made once: a Dataset takes a copy whose attributes are its own."""
-    return xr.IndexVariable("state", _strings(names), {"long_name": "state"})
+    return xr.IndexVariable("state", strings(names), {"long_name": "state"})
 
 
 def state_coords(d: Labels) -> dict[str, Any]:
     """The states' names, with their units and symbols beside them (each state has its own)."""
     coords: dict[str, Any] = {
         "state": _state_index(tuple(d.states)),
-        "state_unit": ("state", _strings(q.unit for q in d.states.values()), {"long_name": "unit"}),
+        "state_unit": ("state", strings(q.unit for q in d.states.values()), {"long_name": "unit"}),
     }
     if any(q.symbol for q in d.states.values()):
-        symbols = _strings(q.symbol or name for name, q in d.states.items())
+        symbols = strings(q.symbol or name for name, q in d.states.items())
         coords["state_symbol"] = ("state", symbols, {"long_name": "symbol"})
     return coords
 
 
-def parameter_coords(d: Labels, without: str = "") -> dict[str, Any]:
+def parameter_coords(d: Labels, without: str | Sequence[str] = ()) -> dict[str, Any]:
+    """The parameters that are not varied, as scalars with their units."""
+    left_out = (without,) if isinstance(without, str) else without
     return {
         name: ((), np.float64(np.nan if q.value is None else q.value), quantity_attributes(name, q))
         for name, q in d.parameters.items()
-        if name != without
+        if name not in left_out
     }
 
 
-def _start_coords(starts: ArrayLike) -> dict[str, Any]:
-    states = np.atleast_2d(_floats(starts))
+def varied(d: Labels, name: str, values: ArrayLike, dim: str | None = None) -> dict[str, Any]:
+    """The coordinate of a parameter that is varied, over the dim of its own name or another one."""
+    return {name: (dim or name, floats(values), quantity_attributes(name, d.parameters[name]))}
+
+
+def start_coords(starts: ArrayLike) -> dict[str, Any]:
+    states = np.atleast_2d(floats(starts))
     return {
         "start": ("start", np.arange(len(states)), {"long_name": "index of the start"}),
         "start_state": (("start", "state"), states, {"long_name": "state at the start"}),
@@ -268,11 +276,12 @@ def quantity_attributes(name: str, quantity: Quantity) -> dict[str, str]:
     return attributes | ({"symbol": quantity.symbol} if quantity.symbol else {})
 
 
-def _strings(words: Any) -> NDArray[np.str_]:
+def strings(words: Any) -> NDArray[np.str_]:
+    """Words as an array of text, also where there are none."""
     return np.array(list(words), dtype=str)
 
 
-def _floats(values: ArrayLike) -> NDArray[np.float64]:
+def floats(values: ArrayLike) -> NDArray[np.float64]:
     """A copy, so that a kernel's buffer that is used again does not change a result."""
     return np.array(values, dtype=np.float64)
 

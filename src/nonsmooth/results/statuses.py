@@ -62,8 +62,10 @@ STATUSES: tuple[Status, ...] = (
     ),
     Status(
         codes.NO_CONVERGENCE, "no_convergence",
-        "The trajectory did not return to the section (it may have come to rest), or an equation did not converge.",
-        "Check that the motion meets the section's surface in the direction asked for; otherwise lower `rtol`.",
+        "The trajectory did not return to the section (it may have come to rest), it began beyond a stop, or an "
+        "equation did not converge.",
+        "Check that the start lies on the admissible side of every stop, and that the motion meets the section's "
+        "surface in the direction asked for; otherwise lower `rtol`.",
     ),
     Status(
         codes.INTERRUPTED, "interrupted",

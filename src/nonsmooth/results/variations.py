@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from nonsmooth.results.labels import Labels
-from nonsmooth.results.schema import parameter_coords
+from nonsmooth.results.schema import floats, parameter_coords, varied
 from nonsmooth.results.statuses import flag_attributes, status_attributes
 
 __all__ = ["derivatives_of_run", "spectrum"]
@@ -30,15 +30,15 @@ def derivatives_of_run(
     matrix = ("crossing", "state", "initial_state")
     defect = 0.0 if log_det == trace else log_det - trace  # both may be minus infinity
     variables: dict[str, Any] = {
-        "Phi": (("state", "initial_state"), _floats(Phi), {"long_name": "derivative of the end in the start"}),
-        "P": (("state", "parameter"), _floats(P), {"long_name": "derivative of the end in the parameters"}),
-        "end": ("state", _floats(end), {"long_name": "state at the end"}),
-        "crossing_time": ("crossing", _floats(crossing_time), {"long_name": "time of the crossing",
+        "Phi": (("state", "initial_state"), floats(Phi), {"long_name": "derivative of the end in the start"}),
+        "P": (("state", "parameter"), floats(P), {"long_name": "derivative of the end in the parameters"}),
+        "end": ("state", floats(end), {"long_name": "state at the end"}),
+        "crossing_time": ("crossing", floats(crossing_time), {"long_name": "time of the crossing",
                                                                "units": d.time_unit}),
         "crossing_transition": ("crossing", jumps, {"long_name": "transition", **transitions}),
-        "saltation": (matrix, _floats(saltation), {"long_name": "saltation matrix"}),
-        "log_det_saltation": ("crossing", _floats(log_det_saltation), {"long_name": "log|det S|"}),
-        "transversality": ("crossing", _floats(transversality), {"long_name": "|h'| / (|h_z| |f|)"}),
+        "saltation": (matrix, floats(saltation), {"long_name": "saltation matrix"}),
+        "log_det_saltation": ("crossing", floats(log_det_saltation), {"long_name": "log|det S|"}),
+        "transversality": ("crossing", floats(transversality), {"long_name": "|h'| / (|h_z| |f|)"}),
         "log_det": ((), log_det, {"long_name": "log|det Phi|"}),
         "divergence": ((), divergence, {"long_name": "integral of div f"}),
         "trace_defect": ((), defect, {"long_name": "log|det Phi| less what the trace identity demands"}),
@@ -62,16 +62,16 @@ def spectrum(
     d = labels
     rate = {"units": f"1/{d.time_unit}" if d.time_unit != "1" else "1"}
     point = parameter or "point"
-    table = _floats(running)
+    table = floats(running)
     graze = "least |h'| / (|h_u| |u'|) of all crossings"
     variables: dict[str, Any] = {
-        "exponents": ((point, "exponent"), _floats(exponents), {"long_name": "Lyapunov exponent", **rate}),
-        "standard_error": ((point, "exponent"), _floats(standard_error), {"long_name": "standard error", **rate}),
+        "exponents": ((point, "exponent"), floats(exponents), {"long_name": "Lyapunov exponent", **rate}),
+        "standard_error": ((point, "exponent"), floats(standard_error), {"long_name": "standard error", **rate}),
         "running": ((point, "batch", "exponent"), table, {"long_name": "estimate after each batch", **rate}),
-        "trace_defect": (point, _floats(trace_defect), {"long_name": "sum less what the trace demands", **rate}),
-        "kaplan_yorke": (point, _floats(kaplan_yorke), {"long_name": "Kaplan-Yorke dimension"}),
-        "nearest_graze": (point, _floats(nearest_graze), {"long_name": graze}),
-        "elapsed": (point, _floats(elapsed), {"long_name": "length of the run", "units": d.time_unit}),
+        "trace_defect": (point, floats(trace_defect), {"long_name": "sum less what the trace demands", **rate}),
+        "kaplan_yorke": (point, floats(kaplan_yorke), {"long_name": "Kaplan-Yorke dimension"}),
+        "nearest_graze": (point, floats(nearest_graze), {"long_name": graze}),
+        "elapsed": (point, floats(elapsed), {"long_name": "length of the run", "units": d.time_unit}),
         "status": (point, np.asarray(status, np.int8), status_attributes()),
     }
     coords: dict[str, Any] = {
@@ -80,13 +80,4 @@ def spectrum(
     }
     if parameter is None:
         return xr.Dataset(variables, coords, dict(attrs)).isel(point=0)
-    swept = d.parameters[parameter]
-    symbol = {"symbol": swept.symbol} if swept.symbol else {}
-    coords[parameter] = (parameter, _floats(() if values is None else values),
-                         {"long_name": parameter, "units": swept.unit, **symbol})  # fmt: skip
-    return xr.Dataset(variables, coords, dict(attrs))
-
-
-def _floats(values: ArrayLike) -> NDArray[np.float64]:
-    """A copy, so that a buffer that is used again does not change a result."""
-    return np.array(values, dtype=np.float64)
+    return xr.Dataset(variables, coords | varied(d, parameter, () if values is None else values), dict(attrs))

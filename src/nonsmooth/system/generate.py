@@ -114,7 +114,7 @@ def model_source(traced: Traced) -> str:
     n_indicators = len(traced.indicators)
     smooth = tuple(all(jet.smooth[n_indicators + i] for jet in jets) for i in range(len(traced.outputs)))
     parts = [
-        "from nonsmooth.kernels.cache import kernel",
+        "from nonsmooth.kernels.cache import callback",
         f"from math import {', '.join(sorted(functions))}" if functions else "",
         f"from nonsmooth.kernels.circular import {', '.join(inlined)}" if inlined else "",
         f"N_SCRATCH = {max([1, *(jet.n_scratch for jet in jets)])}",
@@ -142,7 +142,7 @@ def _function(name: str, branches: list[list[str]], constants: list[str], always
         lines.append(f"{'el' if i else ''}if {selector} == {i}:")
         lines += [f"    {line}" for line in branch or ["pass"]]
     body = "".join(f"    {line}\n" for line in lines or ["pass"])
-    return f'\n\n@kernel("{SIGNATURES[name]}")\ndef {name}({_ARGUMENTS[name]}):\n{body}'.rstrip("\n")
+    return f'\n\n@callback("{SIGNATURES[name]}")\ndef {name}({_ARGUMENTS[name]}):\n{body}'.rstrip("\n")
 
 
 def _constants(traced: Traced) -> dict[Basic, str]:

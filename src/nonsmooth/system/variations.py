@@ -80,7 +80,7 @@ def variational_model(traced: Traced, active: tuple[int, ...]) -> VariationalMod
     switches = [_code(traced, _switch(traced, jump, wanted)) for jump in traced.transitions]
     functions = set().union(*(jet.functions for jet in jets), *(used for _, used in [*fields, *switches]))
     parts = [
-        "from nonsmooth.kernels.cache import kernel",
+        "from nonsmooth.kernels.cache import callback",
         f"from math import {', '.join(sorted(functions))}" if functions else "",
         _function("jet", SIGNATURES["jet"], "mode, order, t, u, q, C, W", traced, [jet.lines for jet in jets]),
         _function("field", SIGNATURES["field"], "mode, t, u, q, du", traced, [lines for lines, _ in fields]),
@@ -167,4 +167,4 @@ def _function(name: str, signature: str, arguments: str, traced: Traced, branche
         lines.append(f"{'el' if i else ''}if {selector} == {i}:")
         lines += [f"    {line}" for line in branch or ["pass"]]
     body = "".join(f"    {line}\n" for line in lines or ["pass"])
-    return f'\n\n@kernel("{signature}")\ndef {name}({arguments}):\n{body}'.rstrip("\n")
+    return f'\n\n@callback("{signature}")\ndef {name}({arguments}):\n{body}'.rstrip("\n")

@@ -129,7 +129,7 @@ def test_a_response_with_its_jumps(tmp_path: Path) -> None:
     """Fig. 9: jumps of the model at 5.8 (rising) and 5.16 (falling), from steps as coarse as an experiment's."""
     settings = {"rho": 0.14, "g": 0.02}
     system = MODEL.with_parameters(settings)
-    swept = ns.frequency_response(system, np.arange(4.5, 6.5, 0.05), transient=200, keep=16, progress=False)
+    swept = ns.frequency_response(system, np.arange(4.5, 6.5, 0.05), transient=200, keep=17, progress=False)
     runs = swept["amplitude"].sel(state="x").stack(run=("direction", "omega")).reset_index("run")
     measured = xr.Dataset(
         {"amplitude": ("run", runs.values), "amplitude_error": ("run", np.full(runs.size, 1e-5))},

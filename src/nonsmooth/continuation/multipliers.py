@@ -1,0 +1,52 @@
+r"""Floquet multipliers: eigenvalues of a monodromy matrix, and what is read off them.
+
+An orbit without forcing has one multiplier 1 of its own, that along the flow; it says nothing of the orbit's neighbours
+and is left out where ``forced`` is False.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["EDGE", "multipliers_of", "product_of_pairs", "stable_by", "without_own"]
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+EDGE = 1e-9  # a modulus within this of 1 counts as neither
+
+
+def multipliers_of(M: FloatArray) -> ComplexArray:
+    """Eigenvalues (n,) of a monodromy matrix (n, n), largest modulus first.
+
+    Two are taken from trace and determinant: the smaller one as det / larger, so that it keeps its digits.
+    """
+    if M.shape == (2, 2):
+        half, det = 0.5 * (M[0, 0] + M[1, 1]), M[0, 0] * M[1, 1] - M[0, 1] * M[1, 0]
+        root = np.sqrt(complex(0.25 * (M[0, 0] - M[1, 1]) ** 2 + M[0, 1] * M[1, 0]))
+        if root.imag:
+            return np.array([half + root, half - root])
+        first = half + (root.real if half >= 0 else -root.real)
+        other = det / first if first else 0.0
+        return np.array([first, other], dtype=complex)
+    found = np.linalg.eigvals(M).astype(complex)
+    return found[np.argsort(-np.abs(found), kind="stable")]
+
+
+def without_own(mu: ComplexArray, forced: bool) -> ComplexArray:
+    """The multipliers but for the orbit's own 1."""
+    return mu if forced or not len(mu) else np.delete(mu, int(np.abs(mu - 1.0).argmin()))
+
+
+def stable_by(mu: ComplexArray, forced: bool) -> bool:
+    """Whether all multipliers (but the orbit's own 1) lie inside the unit circle."""
+    others = without_own(mu, forced)
+    return bool(not len(others) or np.abs(others).max() < 1.0 - EDGE)
+
+
+def product_of_pairs(mu: ComplexArray) -> float:
+    r""":math:`\prod_{i<j} (\mu_i \mu_j - 1)`, zero where a pair reaches the unit circle; NaN where there is no pair."""
+    if len(mu) < 2:
+        return np.nan
+    i, j = np.triu_indices(len(mu), 1)
+    return float(np.prod(mu[i] * mu[j] - 1.0).real)

@@ -1,0 +1,54 @@
+"""Trajectories of planar systems on a GPU, one per thread.
+
+This file is text of a generated module (``cuda_module``), behind the planar files of the CPU. ``advance`` is the one
+heavy kernel: it marches every trajectory by its own number of section returns with ``chain``. What becomes of the
+returns is decided outside, so that all threads do the same thing at the same time, finished trajectories are left out
+of the next launch, and a launch stays short.
+"""
+
+from .codes import OK
+from .cuda_tables import tabled
+from .cuda_target import cuda, device, entry
+from .planar_settle import go
+
+
+@device
+def row_of(buffers, row):
+    """What ``chain`` writes for one trajectory, from the buffers of all."""
+    section, maximum, minimum, i_max, i_min, o_max, o_min, crossings, contacts, elapsed, times, modes, status = buffers
+    return (
+        section[row : row + 1], maximum[row : row + 1], minimum[row : row + 1], i_max[row : row + 1],
+        i_min[row : row + 1], o_max[row : row + 1], o_min[row : row + 1], crossings[row : row + 1],
+        contacts[row : row + 1], elapsed[row : row + 1], times[row : row + 1], modes[row : row + 1],
+        status[row : row + 1],
+    )  # fmt: skip
+
+
+@entry
+def advance(
+    jobs, rows, packed, multiples, built, net, u, clock, counters, transient, keep, plan, full, legs, apart, phase,
+    limit, out, other,
+):  # fmt: skip
+    """Thread k: march the state of job j = jobs[k] under parameter row rows[j] by transient[j] section returns, then
+    keep[j] more into row j of ``out``. (One number for all jobs where these arrays are short.)
+
+    With two legs the tables serve twice: ``apart`` = 0, one more return with extremes (the plan ``full``), into row j
+    of ``other``; else the same for the state j + apart, into that row of ``other``. A state is left at its last
+    return; statuses stand in the buffers, and the second leg is left out where the first one failed."""
+    k = cuda.grid(1)
+    if k >= jobs.shape[0]:
+        return
+    j = jobs[k]
+    linear, scratch = tabled(packed, multiples, built, rows[j])
+    n_transient = transient[min(j, transient.shape[0] - 1)]
+    n_keep = keep[min(j, keep.shape[0] - 1)]
+    for leg in range(legs):
+        row = j + leg * apart
+        again = leg > 0 and apart == 0
+        code = go(
+            0, u[row], clock[row], counters[row], linear, net, full if again else plan, phase, 1e300,
+            0 if again else n_transient, 1 if again else n_keep, limit, row_of(other if leg > 0 else out, row), scratch,
+            u[row : row + 1],
+        )  # fmt: skip
+        if code != OK:
+            break
