@@ -8,56 +8,13 @@ from __future__ import annotations
 import json
 from typing import Any
 
-import numpy as np
+from gpu_both import both, launches_of
 
 import nonsmooth as ns
 from nonsmooth.flow import planar_cuda
 from nonsmooth.kernels.cuda_module import cuda_planar_module
 
-LAUNCHED: dict[str, str] = {}
-SHAPES: dict[str, list[int]] = {}
-
-
-def type_of(value: Any) -> str:
-    """An argument's type as the text of a Numba signature."""
-    if isinstance(value, tuple):
-        return f"Tuple(({', '.join(map(type_of, value))},))"
-    if isinstance(value, bool | np.bool_):
-        return "boolean"
-    if isinstance(value, int | np.integer):
-        return "int64"
-    if isinstance(value, float | np.floating):
-        return "float64"
-    assert value.flags.c_contiguous, "a kernel takes arrays in C order only"
-    return f"{value.dtype}[{', '.join([':'] * (value.ndim - 1) + ['::1'])}]"
-
-
-plain_launch = planar_cuda.PlanarOnGpu.launch
-
-
-def launch(self: Any, entry: Any, jobs: Any, *arguments: Any) -> None:
-    signature = f"void({', '.join(map(type_of, (jobs, *arguments)))})"
-    name = entry.py_func.__name__
-    assert LAUNCHED.setdefault(name, signature) == signature, "one set of types for each kernel"
-    plain_launch(self, entry, jobs, *arguments)
-
-
-planar_cuda.PlanarOnGpu.launch = launch
-
-
-def both(verb: Any, *arguments: Any, **options: Any) -> dict[str, Any]:
-    """The numbers of a verb's result on both devices."""
-    found = {}
-    for device in ("cpu", "cuda"):
-        result = verb(*arguments, device=device, progress=False, **options)
-        found[device] = {
-            name: np.asarray(result[name].values, dtype=float).tolist()
-            for name in result.data_vars
-            if result[name].dtype.kind in "fiu"
-        }
-    return found
-
-
+LAUNCHED = launches_of(planar_cuda.PlanarOnGpu)
 paper = cuda_planar_module(1, 2, 2, 1, 2, 5)
 plain_fill, built = paper.fill, 0
 

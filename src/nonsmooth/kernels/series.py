@@ -71,8 +71,7 @@ def march(
     phase, until, t_max = control[place.PHASE], control[place.UNTIL], control[place.T_MAX]
     checked = choice[place.CHECKED] == 1 and method == place.TAYLOR and fixed <= 0.0
     log_rtol, tail, forced = ln(max(0.1 * rtol, 1e-16)), (1.0 if method == place.TAYLOR else 0.0), period < inf
-    mode, t, status = counters[0], clock[0], OK
-    zero_row, take = tally[place.ZERO_ROW] - 1, tally[place.TAKE] == 1  # from before a pause
+    mode, t, status, zero_row, take = counters[0], clock[0], OK, -1, False
     timed = False
     for k in range(net[4].shape[0]):
         timed = timed or net[4][k] >= 0.0
@@ -106,7 +105,7 @@ def march(
             status = LOG_FULL
             break
         if not ready:
-            if tally[place.STEPS] >= choice[place.PAUSE]:
+            if tally[place.STEPS] >= choice[place.PAUSE] and zero_row < 0 and not take:  # all it knows is in the arrays
                 status = PAUSED
                 break
             jet(mode, 2 if rkf else order, t, u, q, J, W)
@@ -364,7 +363,7 @@ def march(
             break
 
     counters[0], clock[0] = mode, t
-    tally[place.READY], tally[place.ZERO_ROW], tally[place.TAKE] = 1 if ready else 0, zero_row + 1, 1 if take else 0
+    tally[place.READY] = 1 if ready else 0
     if status == OK and tally[place.DOUBTFUL] == 1:
         status = NOT_GUARANTEED
     return status

@@ -16,8 +16,7 @@ N_CONTROL = 6
 # tally: what has been counted; kept when the kernel returns to be called again (a full log, a pause)
 BEGUN, SETTLED, RETURNS, PASSES, SAMPLES, CROSSINGS, TOUCHES, JUMPS, WINDOW = range(9)
 KEPT_CROSSINGS, KEPT_CONTACTS, RAPID, DOUBTFUL, STEPS, STEPS_IN_RETURN, SEGMENT, READY, RESTING = range(9, 18)
-ZERO_ROW, TAKE = range(18, 20)
-N_TALLY = 20
+N_TALLY = 18
 
 # memo: times that go with them
 SINCE_RETURN, SINCE_CROSSING, LONGEST, WINDOW_FRACTION, WINDOW_PERIODS, ELAPSED = range(6)
