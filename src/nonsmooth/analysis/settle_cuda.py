@@ -13,7 +13,7 @@ import numpy as np
 from nonsmooth.analysis.classify import MARGIN
 from nonsmooth.analysis.classify_many import candidates, certain
 from nonsmooth.analysis.settle import KICK, NUDGE, ROUNDS
-from nonsmooth.analysis.settled import LEAST, Settled, usable
+from nonsmooth.analysis.settled import LEAST, Settled, size_of, usable
 from nonsmooth.flow.engine import FloatArray, IntArray
 from nonsmooth.flow.poincare import result_status
 from nonsmooth.flow.series_cuda import Buffers, SeriesOnGpu, States
@@ -93,7 +93,7 @@ class Settling:
         gpu, found = self.gpu, self.found
         points = self.kept.sections.copy_to_host()[jobs][:, :, : gpu.n]
         high, low = gpu.extremes(self.kept)
-        size = np.maximum(0.5 * (high[jobs, : gpu.n] - low[jobs, : gpu.n]), self.least)
+        size = size_of(high[jobs, : gpu.n], low[jobs, : gpu.n], self.least)
         period, status, residual, returns = candidates(points, size, self.max_period, self.tolerance)
         self.size[jobs] = size
         found.residual[jobs], found.status[jobs] = residual, status
