@@ -172,18 +172,18 @@ def test_stamp_follows_imports_through_kernel_files(monkeypatch):
 
 
 def test_old_entries_are_pruned(tmp_path):
-    from nonsmooth.kernels import cache
+    from nonsmooth.kernels.folder import prune
 
     for name, age_days in (("old", 200), ("new", 1)):
         (tmp_path / name).write_text("")
         stat = (tmp_path / name).stat()
         os.utime(tmp_path / name, (stat.st_atime, stat.st_mtime - 86400 * age_days))
-    cache._prune(tmp_path)
+    prune(tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["new"]
 
 
 def test_cache_folder(tmp_path, monkeypatch):
-    from nonsmooth.kernels.cache import cache_folder
+    from nonsmooth.kernels.folder import cache_folder
 
     monkeypatch.setenv("NONSMOOTH_CACHE_DIR", str(tmp_path / "a" / "b"))
     assert cache_folder() == tmp_path / "a" / "b"
@@ -196,17 +196,17 @@ def test_cache_folder(tmp_path, monkeypatch):
 
 @pytest.mark.skipif(sys.platform in ("win32", "darwin"), reason="XDG folders")
 def test_unwritable_user_folder_falls_back_to_a_private_one(tmp_path, monkeypatch):
-    from nonsmooth.kernels import cache
+    from nonsmooth.kernels.folder import cache_folder, usable_folder
 
     (tmp_path / "file").write_text("")
     monkeypatch.delenv("NONSMOOTH_CACHE_DIR", raising=False)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    cache._usable_folder.cache_clear()
-    folder = cache.cache_folder()
+    usable_folder.cache_clear()
+    folder = cache_folder()
     assert folder.parent == tmp_path
     assert Path(folder).stat().st_mode & 0o077 == 0
-    cache._usable_folder.cache_clear()
+    usable_folder.cache_clear()
 
 
 def test_one_signature_only(tmp_path, monkeypatch):

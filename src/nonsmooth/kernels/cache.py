@@ -14,18 +14,13 @@ from __future__ import annotations
 
 import contextlib
 import gc
-import getpass
 import hashlib
 import importlib.util
 import inspect
-import os
 import pickle
 import re
 import sys
-import tempfile
 import threading
-import time
-import uuid
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
@@ -38,96 +33,15 @@ from numba.core.caching import _Cache
 from numba.core.compiler import CompileResult
 from numba.core.compiler_lock import global_compiler_lock
 
-__all__ = ["cache_folder", "cache_statistics", "callback", "compiled", "device", "inline", "kernel", "load_module"]
+from nonsmooth.kernels.folder import cache_folder, mark_used, prune, write_atomically
+
+__all__ = ["cache_statistics", "callback", "compiled", "device", "inline", "kernel", "load_module"]
 
 # Kernels allocate nothing (scratch is an argument), so they need no reference counts: "_nrt" off saves a third.
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}, "_nrt": False}
 # What only kernels call needs no way in from Python.
 _INNER: dict[str, Any] = {**_OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-_UNUSED_DAYS = 90.0
 _lock = threading.Lock()
-
-
-# --------------------------------------------------------------------------------------------------------------
-# Folders and files
-
-
-def cache_folder() -> Path:
-    """The folder of compiled code; it is made if need be.
-
-    Returns
-    -------
-    Path
-        The environment variable ``NONSMOOTH_CACHE_DIR`` where set, else the user's cache folder of the
-        platform, else (neither can be written) a private folder among the temporary files.
-
-    Raises
-    ------
-    PermissionError
-        ``NONSMOOTH_CACHE_DIR`` is set and cannot be written.
-    """
-    return _usable_folder(os.environ.get("NONSMOOTH_CACHE_DIR", ""))
-
-
-@cache
-def _usable_folder(chosen: str) -> Path:
-    if chosen:
-        folder = Path(chosen).expanduser().absolute()
-        if not _writable(folder):
-            raise PermissionError(f"NONSMOOTH_CACHE_DIR={chosen} cannot be written: choose another folder or unset it")
-        return folder
-    if sys.platform == "win32":
-        base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
-    elif sys.platform == "darwin":
-        base = Path.home() / "Library" / "Caches"
-    else:
-        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    folder = base / "nonsmooth"
-    if _writable(folder):
-        return folder
-    # Compiled code is executed, so a folder that somebody else could have made must not be trusted.
-    folder = Path(tempfile.gettempdir()) / f"nonsmooth-{getpass.getuser()}"
-    if _writable(folder, mode=0o700) and (not hasattr(os, "getuid") or folder.stat().st_uid == os.getuid()):
-        return folder
-    return Path(tempfile.mkdtemp(prefix="nonsmooth-"))
-
-
-def _writable(folder: Path, mode: int = 0o777) -> bool:
-    try:
-        folder.mkdir(parents=True, exist_ok=True, mode=mode)
-        tempfile.TemporaryFile(dir=folder).close()
-    except OSError:
-        return False
-    return True
-
-
-def _write_atomically(path: Path, data: bytes) -> None:
-    """Another process sees the whole file or none; the last of several writers of the same content wins."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = path.with_name(f"{path.name}.{uuid.uuid4().hex[:12]}.tmp")
-    try:
-        unfinished.write_bytes(data)
-        os.replace(unfinished, path)
-    except OSError:
-        with contextlib.suppress(OSError):
-            unfinished.unlink()
-        if not path.exists():  # Windows refuses to replace a file that another process reads
-            raise
-
-
-def _mark_used(path: Path) -> None:
-    with contextlib.suppress(OSError):
-        if time.time() - path.stat().st_mtime > 86400.0:
-            os.utime(path)
-
-
-def _prune(folder: Path) -> None:
-    """Remove what no process has used for a long time: edits of the source leave entries behind."""
-    oldest = time.time() - 86400.0 * _UNUSED_DAYS
-    for path in folder.iterdir():
-        with contextlib.suppress(OSError):
-            if path.is_file() and path.stat().st_mtime < oldest:
-                path.unlink()
 
 
 # --------------------------------------------------------------------------------------------------------------
@@ -196,7 +110,7 @@ class _ContentCache(_Cache):
             return None
         except Exception:  # a damaged entry (full disk, lost power) is compiled anew and replaced
             return None
-        _mark_used(path)
+        mark_used(path)
         return CompileResult._rebuild(target_context, *payload)
 
     def save_overload(self, sig: Any, data: CompileResult) -> None:
@@ -207,8 +121,8 @@ class _ContentCache(_Cache):
             )
         path = self._path(sig, data.codegen)
         with contextlib.suppress(OSError):  # a full disk costs a compile in the next process, not this run
-            _write_atomically(path, numba.core.serialize.dumps(data._reduce()))
-            _prune(path.parent)
+            write_atomically(path, numba.core.serialize.dumps(data._reduce()))
+            prune(path.parent)
 
     def enable(self) -> None:
         """Always enabled."""
@@ -352,9 +266,9 @@ def load_module(source: str, stem: str) -> ModuleType:
         path = cache_folder() / "generated" / f"{name}.py"
         data = source.encode()
         if not path.exists() or path.read_bytes() != data:
-            _write_atomically(path, data)
-            _prune(path.parent)
-        _mark_used(path)
+            write_atomically(path, data)
+            prune(path.parent)
+        mark_used(path)
         spec = importlib.util.spec_from_file_location(full_name, path)
         assert spec is not None and spec.loader is not None
         module = importlib.util.module_from_spec(spec)
