@@ -21,7 +21,7 @@ import pytest
 import nonsmooth as ns
 
 COMPILER = [importlib.util.find_spec(name) is not None for name in ("numba_cuda", "nvidia")]
-pytestmark = pytest.mark.skipif(not COMPILER[0], reason="numba-cuda is made for Linux only (extra `test`)")
+pytestmark = pytest.mark.skipif(not COMPILER[0], reason="numba-cuda is not installed (extra `test`, Linux only)")
 SCRIPT = Path(__file__).with_name("gpu_script.py")
 
 COMPILE = """
@@ -110,7 +110,7 @@ def test_spectra_are_those_of_the_processor(simulated: dict[str, Any]) -> None:
         np.testing.assert_allclose(*pair(simulated, "lyapunov", name), rtol=1e-9, atol=1e-11, err_msg=name)
 
 
-@pytest.mark.skipif(not COMPILER[1], reason="NVIDIA's compiler (nvidia-nvvm) is made for Linux only (extra `test`)")
+@pytest.mark.skipif(not COMPILER[1], reason="nvidia-nvvm is not installed (extra `test`, Linux only)")
 @pytest.mark.parametrize(
     "entries", [ENTRIES - {"neighbours"}, pytest.param({"neighbours"}, marks=pytest.mark.slow)], ids=["most", "rest"]
 )

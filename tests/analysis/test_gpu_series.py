@@ -21,7 +21,7 @@ from gpu_series_systems import START, TOP, two_wells
 import nonsmooth as ns
 
 COMPILER = [importlib.util.find_spec(name) is not None for name in ("numba_cuda", "nvidia")]
-pytestmark = pytest.mark.skipif(not COMPILER[0], reason="numba-cuda is made for Linux only (extra `test`)")
+pytestmark = pytest.mark.skipif(not COMPILER[0], reason="numba-cuda is not installed (extra `test`, Linux only)")
 FOLDER = Path(__file__).parent
 
 COMPILE = """
@@ -112,7 +112,7 @@ def test_basins_have_the_labels_and_attractors_of_the_processor(simulated: dict[
 
 
 @pytest.mark.slow  # half a minute of processor time each
-@pytest.mark.skipif(not COMPILER[1], reason="NVIDIA's compiler (nvidia-nvvm) is made for Linux only (extra `test`)")
+@pytest.mark.skipif(not COMPILER[1], reason="nvidia-nvvm is not installed (extra `test`, Linux only)")
 @pytest.mark.parametrize("name", ["valve", "two wells", "filtered"])
 def test_the_kernel_compiles_for_the_types_it_is_launched_with(simulated: dict[str, Any], name: str) -> None:
     printed = run(["-c", COMPILE], json.dumps([name, simulated["launched"]["advance"]]))

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 pytestmark = pytest.mark.skipif(
-    importlib.util.find_spec("numba_cuda") is None, reason="numba-cuda is made for Linux only (extra `test`)"
+    importlib.util.find_spec("numba_cuda") is None, reason="numba-cuda is not installed (extra `test`, Linux only)"
 )
 HERE = Path(__file__).parent
 
