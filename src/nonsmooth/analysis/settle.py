@@ -91,7 +91,8 @@ class Attractors:
                 break
             if verdict.unstable:
                 kicked = state.copy()
-                kicked.u += KICK * self._size(i, out)
+                # by its own size: where Runge-Kutta errors set the least size, a kick of it would be a new motion
+                kicked.u += KICK * size_of(out.maximum[i], out.minimum[i], LEAST * self.scale, 0.0)
                 kicked.settled = False
                 _replace(state, kicked)
             self._chain(i, state, factor * max(self.transient, 1), self.keep, out)
@@ -129,7 +130,9 @@ class Attractors:
     def _multiplier(self, i: int, p: int, state: State, size: FloatArray, out: Chain) -> float:
         """Largest |multiplier| of the p-th return map of a stroboscopic section, by differences at the last point."""
         n = len(size)
-        nudge = max(NUDGE, 1e2 * self.tolerance) * size
+        # at rest a Runge-Kutta pair errs by atol: a nudge must stand well above that for its growth to mean something
+        clear = min(1e3 * self.tolerance, 1e-4) if self.engine.name == "rkf45" else NUDGE
+        nudge = max(NUDGE, 1e2 * self.tolerance, clear) * size
         probe = _rows_of(out, i, 1)
         images = []
         for j in range(-1, n):
