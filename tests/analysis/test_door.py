@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from typing import Any
 
@@ -30,10 +29,8 @@ MANY = np.linspace(9.0, 10.0, 10**5)
 )
 def test_memory_is_asked_for_before_it_is_taken(call: Callable[[], Any], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(memory, "free_memory", lambda: 10**9)
-    began = time.process_time()
     with pytest.raises(MemoryError, match="GiB are free"):
         call()
-    assert time.process_time() - began < 10.0  # of hours
 
 
 def test_free_memory_is_that_of_the_machine_or_the_container(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
