@@ -47,6 +47,8 @@ def test_a_chart_shows_each_period_once_with_its_colour(support: ns.System) -> N
         np.testing.assert_allclose(values, expected.transpose("rho", "g").values.ravel())
     with pytest.raises(ValueError, match="chart"):
         draw_chart(ns.sweep(support, "g", [0.001], keep=17, **QUIET))
+    with pytest.raises(TypeError, match="ax = 'lyapunov' is no matplotlib Axes"):
+        draw_chart(plane, "lyapunov")
 
 
 def test_basins_show_their_attractors(support: ns.System) -> None:

@@ -78,7 +78,17 @@ def journal() -> Iterator[None]:
 
 @contextmanager
 def axes(ax: Axes | None, *, width: float = COLUMN, ratio: float = 0.72) -> Iterator[Axes]:
-    """The axes to draw on: the given ones (legends in the package's style), or a new figure of one column."""
+    """The axes to draw on: the given ones (legends in the package's style), or a new figure of one column.
+
+    Raises
+    ------
+    TypeError
+        Something else was given, such as the name of a quantity.
+    """
+    from matplotlib.axes import Axes as Drawable
+
+    if ax is not None and not isinstance(ax, Drawable):
+        raise TypeError(f"ax = {ax!r} is no matplotlib Axes: what to draw is given by name, as in show=...")
     if ax is not None:
         with _own_legend(ax):
             yield ax
