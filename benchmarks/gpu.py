@@ -11,8 +11,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
-import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -31,6 +29,7 @@ from nonsmooth.analysis.chart import plan_chart
 from nonsmooth.analysis.chart_refine import labels_of_points
 from nonsmooth.flow.devices import gpu_name
 from nonsmooth.kernels import codes
+from own_process import SCRIPTS, printed
 
 HERE = Path(__file__).parent
 # FP64 units of a multiprocessor, by compute capability; each makes a multiplication and an addition per clock.
@@ -47,11 +46,7 @@ def page(flops: dict[str, Any]) -> list[str]:
 
 
 def counted() -> dict[str, Any]:
-    done = subprocess.run(
-        [sys.executable, str(HERE / "gpu_flops.py")], capture_output=True, text=True, check=True,
-        env={**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": os.pathsep.join([*sys.path, str(HERE)])},
-    )  # fmt: skip
-    found: dict[str, Any] = json.loads(done.stdout)
+    found: dict[str, Any] = json.loads(printed(str(HERE / "gpu_flops.py"), NUMBA_DISABLE_JIT="1"))
     return found
 
 
@@ -59,12 +54,8 @@ def compiled() -> list[str]:
     """What the compiler makes of every kernel, for the argument types of a simulated run."""
     from nonsmooth.kernels.cuda_ptx import resources_of
 
-    script = HERE.parent / "tests" / "analysis" / "gpu_script.py"
-    done = subprocess.run(
-        [sys.executable, str(script)], capture_output=True, text=True, check=True,
-        env={**os.environ, "NUMBA_ENABLE_CUDASIM": "1", "PYTHONPATH": os.pathsep.join(sys.path)},
-    )  # fmt: skip
-    launched = json.loads(done.stdout.splitlines()[-1])["launched"]
+    simulated = printed(str(SCRIPTS / "gpu_script.py"), NUMBA_ENABLE_CUDASIM="1")
+    launched = json.loads(simulated.splitlines()[-1])["launched"]
     lines = [
         "## Kernels for compute capability 9.0, shape of the paper's oscillator", "",
         "| kernel | registers | stack, bytes | spills (store, load), bytes | object, kB | seconds to PTX |",
@@ -73,10 +64,7 @@ def compiled() -> list[str]:
     code = "import json, sys; from nonsmooth.kernels.cuda_ptx import ptx_of; print(ptx_of(*json.load(sys.stdin)))"
     for name, signature in launched.items():
         began = perf_counter()
-        ptx = subprocess.run(
-            [sys.executable, "-c", code], input=json.dumps([name, signature, SHAPE]), capture_output=True, text=True,
-            check=True, env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
-        ).stdout  # fmt: skip
+        ptx = printed("-c", code, given=json.dumps([name, signature, SHAPE]))
         seconds = perf_counter() - began
         used = resources_of(ptx)
         if not used:

@@ -7,9 +7,6 @@ inflow, tolerance 1e-10.
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter, process_time
@@ -24,6 +21,7 @@ from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.sections import section_plan
 from nonsmooth.flow.series_cuda import PART
 from nonsmooth.kernels import codes
+from own_process import printed
 
 HERE = Path(__file__).parent
 TRANSIENT, KEEP, TOLERANCE = 1024, 32, 1e-10
@@ -36,11 +34,7 @@ TOP = ns.Poincare("lift_velocity", rising=False)
 
 def counted() -> dict[str, float]:
     """Operations and steps per return."""
-    done = subprocess.run(
-        [sys.executable, str(HERE / "gpu_flops_valve.py")], capture_output=True, text=True, check=True,
-        env={**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": os.pathsep.join([*sys.path, str(HERE)])},
-    )  # fmt: skip
-    found: dict[str, float] = json.loads(done.stdout)
+    found: dict[str, float] = json.loads(printed(str(HERE / "gpu_flops_valve.py"), NUMBA_DISABLE_JIT="1"))
     return found
 
 
@@ -51,7 +45,6 @@ def engine_and_points(inflows: np.ndarray) -> tuple[Any, Any]:
 
 def launched() -> str:
     """Types with which the kernel is launched, by a run of one trajectory under Numba's simulator."""
-    folder = HERE.parent / "tests" / "analysis"
     code = (
         "import json, numpy as np, gpu_both, gpu_valve\n"
         "from nonsmooth.flow.series_cuda import SeriesOnGpu\n"
@@ -59,11 +52,7 @@ def launched() -> str:
         "gpu_valve.march(np.array([5.0]), 2, 1)\n"
         "print(types['advance'])"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True,
-        env={**os.environ, "NUMBA_ENABLE_CUDASIM": "1", "PYTHONPATH": os.pathsep.join([*sys.path, str(folder)])},
-    )  # fmt: skip
-    return done.stdout.splitlines()[-1]
+    return printed("-c", code, NUMBA_ENABLE_CUDASIM="1").splitlines()[-1]
 
 
 def ptx(signature: str) -> str:

@@ -132,5 +132,8 @@ def test_what_a_gpu_does_not_take_is_said_at_the_door() -> None:
         ns.sweep(valve, "q", [5.0, 6.0], direction=None, method="taylor", locate=False, **common)
     with pytest.raises(ValueError, match="direction=None"):
         ns.sweep(valve, "q", [5.0, 6.0], method="taylor", **common)
+    second = ns.Poincare("lift_velocity", rising=False, every=2)
+    with pytest.raises(ValueError, match=r"takes every return of a section.*every = 2"):
+        ns.sweep(valve, "q", [5.0, 6.0], direction=None, method="taylor", **(common | {"section": second}))
     with pytest.raises(ValueError, match="lyapunov with device.*or chart with lyapunov"):
         ns.lyapunov(two_wells(), parameter="F", values=[0.1, 0.2], direction=None, periods=50, device="cuda")

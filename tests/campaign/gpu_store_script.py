@@ -10,6 +10,7 @@ import io
 import json
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 from simple_work import hashes
 
@@ -46,7 +47,7 @@ def launch(*arguments: Any) -> None:
     plain_launch(*arguments)
 
 
-planar_cuda.PlanarOnGpu.launch = launch  # type: ignore[method-assign] # counts what is really computed
+mock.patch.object(planar_cuda.PlanarOnGpu, "launch", launch).start()  # counts what is really computed
 chart_module.BATCH = 2  # so that the four points make two chunks
 PATH = Path("cuda.zarr")
 
@@ -77,7 +78,7 @@ found["plan"] = command("plan", "study.toml", "--seconds", "0.01")
 found["processor"] = study("cpu", "cpu")
 found["gpu's store, processor"] = study("cpu", "cuda", any_cpu=True)
 found["processor's store, gpu"] = study("cuda", "cpu", any_cpu=True)
-processors.gpu_type = lambda: "another"  # type: ignore[assignment] # as on a machine with another GPU
+mock.patch.object(processors, "gpu_type", return_value="another").start()  # as on a machine with another GPU
 found["another gpu"] = study("cuda", "cuda")
 found["any"] = study("cuda", "cuda", any_cpu=True)
 cpu, cuda = ns.load("cpu.nc"), ns.load("cuda.nc")

@@ -15,8 +15,9 @@ from nonsmooth.kernels import codes
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["exponent_of", "parting_sizes"]
+__all__ = ["BESIDE", "exponent_of", "parting_sizes"]
 
+BESIDE = 1e-6  # where a neighbour begins, in units of the motion's size
 USUAL = 1.5  # powers of ten: a motion this near to its scale is taken to have that size
 SLENDER = 1e-6  # a state whose motion is smaller than this, beside the largest of the others, is at rest
 RESTING = 1e-9  # in units of the scales: a motion that has come to rest in all states
@@ -57,7 +58,7 @@ def exponent_of(
     if period < np.inf and plan.indicator >= 0:
         quiet = SectionPlan(phase=float(state.clock[0] / period % 1.0), extremes=False)
     out = Chain.empty(1, 1, len(traced.u), len(traced.indicators), len(traced.outputs))
-    offset = np.full(len(state.u), 1e-6) * scale
+    offset = np.full(len(state.u), BESIDE) * scale
     first = float(np.linalg.norm(offset / scale))
     batch = n_returns // 10
     logs, times = [], []
@@ -79,7 +80,7 @@ def exponent_of(
         if apart > 0.0:
             offset *= first / apart
         else:
-            apart, offset = 1e-16 * first, np.full(len(state.u), 1e-6) * scale
+            apart, offset = 1e-16 * first, np.full(len(state.u), BESIDE) * scale
         logs.append(np.log(apart / first))
     grown = np.array(logs[batch // 4 :]).reshape(10, batch).sum(axis=1)
     rates = grown / np.array(times[batch // 4 :]).reshape(10, batch).sum(axis=1)

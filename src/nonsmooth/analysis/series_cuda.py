@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nonsmooth.analysis.attractors_parting import BESIDE
 from nonsmooth.analysis.settle import LONGER, Attractors
 from nonsmooth.analysis.settle_cuda import Settling
 from nonsmooth.analysis.settled import Settled, usable
@@ -159,7 +160,7 @@ def _exponents(
     gpu = SeriesOnGpu(engine_of(settler), points, replace(plan, extremes=False))
     phase = plan.phase if plan.indicator < 0 else 0.0
     states = states_at(gpu, starts, settler.system.memory_vector(), rows, modes, phase)
-    offset = np.tile(1e-6 * scale, (n, 1))
+    offset = np.tile(BESIDE * scale, (n, 1))
     first, batch = float(np.linalg.norm(offset[0] / scale)), n_returns // 10
     logs, times = [], []
     jobs, out = np.arange(n), gpu.buffers(n, 1)
@@ -178,7 +179,7 @@ def _exponents(
         apart = np.linalg.norm(offset / scale, axis=1)
         fallen = ~(apart > 0.0)
         offset *= np.where(fallen, 1.0, first / np.where(fallen, 1.0, apart))[:, None]
-        offset[fallen], apart[fallen] = 1e-6 * scale, 1e-16 * first
+        offset[fallen], apart[fallen] = BESIDE * scale, 1e-16 * first
         logs.append(np.log(apart / first))
     grown = np.array(logs[batch // 4 :]).reshape(10, batch, n).sum(axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):

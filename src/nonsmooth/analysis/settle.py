@@ -91,8 +91,8 @@ class Attractors:
                 break
             if verdict.unstable:
                 kicked = state.copy()
-                # by its own size: where Runge-Kutta errors set the least size, a kick of it would be a new motion
-                kicked.u += KICK * size_of(out.maximum[i], out.minimum[i], LEAST * self.scale, 0.0)
+                # where Runge-Kutta errors set the least size, a kick by that size would be a new motion
+                kicked.u += KICK * size_of(out.maximum[i], out.minimum[i], LEAST * self.scale)
                 kicked.settled = False
                 _replace(state, kicked)
             self._chain(i, state, factor * max(self.transient, 1), self.keep, out)

@@ -98,7 +98,8 @@ def on_gpu(device: Any, verb: str, engine: Engine, plan: SectionPlan | None, *, 
     Raises
     ------
     ValueError
-        A device that does not exist; a system, method or section without a path to a GPU; a carried state.
+        A device that does not exist; a system, method or section without a path to a GPU; passed-over returns; a
+        carried state.
     ImportError
         The package numba-cuda is not installed.
     RuntimeError
@@ -118,6 +119,11 @@ def on_gpu(device: Any, verb: str, engine: Engine, plan: SectionPlan | None, *, 
             f'{verb} with device="cuda" runs by method="exact" or method="taylor" with crossings located; this call '
             f'asks for method="{engine.name}"{"" if engine.name not in SERIES else ", locate=False"}: choose one of '
             'them, or use device="cpu"'
+        )
+    if plan is not None and plan.every > 1:
+        raise ValueError(
+            f'{verb} with device="cuda" takes every return of a section, this one passes over some (every = '
+            f'{plan.every}): leave `every` out, or use device="cpu"'
         )
     if carried:
         raise ValueError(

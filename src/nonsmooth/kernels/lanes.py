@@ -95,9 +95,7 @@ def _mix_rows_in_lanes(typing: Any, out: Any, row: Any, a: Any, b: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         out_, row_, a_, b_ = arguments
         rows = _Rows(context, builder, out, out_)
-        total = builder.fadd(
-            rows.scaled(rows.load(0), a_), rows.scaled(rows.load(1), b_), flags=_CONTRACT
-        )
+        total = builder.fadd(rows.scaled(rows.load(0), a_), rows.scaled(rows.load(1), b_), flags=_CONTRACT)
         rows.store(total, row_)
         return context.get_dummy_value()
 
