@@ -42,6 +42,8 @@ def test_free_memory_is_that_of_the_machine_or_the_container(tmp_path, monkeypat
     (tmp_path / "memory.max").write_text("2000000\n")
     (tmp_path / "memory.current").write_text("500000\n")
     assert memory.free_memory() == 1500000
+    (tmp_path / "memory.stat").write_text("file 600000\nactive_file 100000\ninactive_file 400000\n")
+    assert memory.free_memory() == 1900000  # files that were read are dropped when memory is needed
     (tmp_path / "memory.max").write_text("max\n")
     assert memory.free_memory() == 3000 * 1024
     memory.room_for(3000 * 1024, "this", "take less")

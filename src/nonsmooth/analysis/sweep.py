@@ -160,10 +160,6 @@ def sweep(
     }  # fmt: skip
     squeeze = (() if direction == "both" else ("direction",)) + (("start",) if is_one_start(start) else ())
     memory = system.memory_vector()
-    if gpu:
-        run_on_gpu(engine, points, starts, memory, attractors, slots, progress, parameter)
-        warn_if_coarse(system, engine, largest_of(starts, slots.values()))
-        return _dataset(system, engine.name, parameter, numbers, directions, starts, slots, options, squeeze)
 
     def march(slot: tuple[int, int], order: Sequence[int], report: Report) -> None:
         d, k = slot
@@ -177,7 +173,10 @@ def sweep(
             slots[slot].keep(i, row, verdict, chain)
             report.advance(1)
 
-    run_pieces(march, pieces_of(directions, len(starts), numbers), threads, progress, parameter)
+    if gpu:
+        run_on_gpu(engine, points, starts, memory, attractors, slots, progress, parameter)
+    else:
+        run_pieces(march, pieces_of(directions, len(starts), numbers), threads, progress, parameter)
     largest = largest_of(starts, slots.values())
     warn_if_coarse(system, engine, largest)
     warn_if_small(system, largest)

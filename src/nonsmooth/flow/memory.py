@@ -20,7 +20,7 @@ def free_memory() -> int | None:
                 known.append(int(line.split()[1]) * 1024)
         limit, used = ((LIMITS / f"memory.{name}").read_text().strip() for name in ("max", "current"))
         if limit != "max":
-            known.append(int(limit) - int(used))
+            known.append(int(limit) - int(used) + _cached())
     except (OSError, ValueError, IndexError):
         pass
     if not known and hasattr(os, "sysconf"):
@@ -29,6 +29,13 @@ def free_memory() -> int | None:
         except (OSError, ValueError):
             return None
     return min(known) if known else None
+
+
+def _cached() -> int:
+    """Bytes of files that a container's use counts too, and that the system drops when memory is asked for."""
+    facts = LIMITS / "memory.stat"
+    lines = facts.read_text().splitlines() if facts.exists() else []
+    return sum(int(line.split()[1]) for line in lines if line.startswith("inactive_file "))
 
 
 def room_for(n_bytes: float, what: str, remedy: str) -> None:
