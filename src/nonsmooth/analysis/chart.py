@@ -91,8 +91,8 @@ def chart(
     threads : int, optional
         Threads for independent work; the result does not depend on it. Default: one per core.
     device : {"cpu", "cuda"}
-        ``"cuda"`` runs the points on an NVIDIA GPU, one per thread, without ``carry``: by the exact flow or by
-        ``method="taylor"``. See the guide "A chart on a GPU".
+        ``"cuda"`` runs the points on an NVIDIA GPU, one per thread, by the exact flow or by ``method="taylor"``;
+        with ``carry`` by the exact flow of two states only. See the guide "A chart on a GPU".
     store : path, optional
         A Zarr store for finished chunks; what is there already is not computed again.
     client : dask.distributed.Client, optional
@@ -130,7 +130,7 @@ def chart(
         threads = whole_number(threads, "threads", 1)
     threads = workers_of(device, threads, client)
     work, label = planned.work, f"chart over {' and '.join(planned.values)}"
-    if refine is not False and not (isinstance(refine, np.bool_) and not refine):
+    if not isinstance(refine, bool | np.bool_) or refine:
         from nonsmooth.analysis.chart_refine import refined
 
         if store is not None or client is not None:

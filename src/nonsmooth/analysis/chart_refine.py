@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from nonsmooth.analysis.chart_work import ChartWork
 from nonsmooth.campaign.run import run
+from nonsmooth.flow.arguments import real_number
 from nonsmooth.flow.engine import IntArray
 from nonsmooth.kernels import codes
 
@@ -57,11 +58,11 @@ def refined(
 
     Raises
     ------
-    ValueError
-        A part outside 0..1, or a chart whose points are not independent: carried states, several starts.
+    ValueError, TypeError
+        A part that is no number or outside 0..1, or a chart whose points are not independent: carried states, several starts.
     """
-    share = LARGEST_PART if isinstance(part, bool | np.bool_) else part
-    if not isinstance(share, int | float | np.number) or not 0.0 < share <= 1.0:
+    share = LARGEST_PART if isinstance(part, bool | np.bool_) else real_number(part, "refine")
+    if not 0.0 < share <= 1.0:
         raise ValueError(
             f"refine = {part!r}: the part of the points to compute, above 0 and at most 1; True: a quarter"
         )
