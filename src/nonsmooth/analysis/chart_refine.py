@@ -59,7 +59,8 @@ def refined(
     Raises
     ------
     ValueError, TypeError
-        A part that is no number or outside 0..1, or a chart whose points are not independent: carried states, several starts.
+        A part that is no number or outside 0..1, or a chart whose points are not independent: carried states, several
+        starts.
     """
     share = LARGEST_PART if isinstance(part, bool | np.bool_) else real_number(part, "refine")
     if not 0.0 < share <= 1.0:
