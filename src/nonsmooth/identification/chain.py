@@ -92,6 +92,8 @@ def identify(
     if crank_length is not None and not 0 < crank_length < np.inf:
         raise ValueError(f"crank_length = {crank_length!r} must be a positive length in m")
     chain = _Chain(gather(recordings, apparatus=apparatus))
+    for note in chain.evidence.notes:
+        chain.say(note)
     decay = chain.taps()
     seen = chain.response(decay)
     chain.forces()
@@ -104,6 +106,8 @@ def identify(
     if contacts is not None and decay is not None:
         gap = refer(chain.evidence, decay, contacts, adjusted, seen, crank_length)
         chain.findings.append(gap.finding(contacts, grazing))
+        for note in gap.notes:
+            chain.say(note)
     found = joined(
         adjusted, gap, findings=chain.findings, identifiability=identifiability(adjusted, contacts, single),
         notes=[*agreement(adjusted, chain.evidence), *chain.notes], synthetic=chain.evidence.synthetic,

@@ -17,9 +17,10 @@ that wanders. Friction by the hyperbolic tangent lets the car creep to where the
 
 .. math::
 
-    F = F_C\, z / z_m, \quad \dot z = v\,[1 - \tanh(v / v_s)\, z / z_m]
+    F = F_C\, z / z_m, \quad \dot z = v_s \tanh(v / v_s)\,[1 - \tanh(v / v_s)\, z / z_m]
 
-which becomes Coulomb's friction as :math:`z_m \to 0`.
+which becomes Coulomb's friction as :math:`z_m, v_s \to 0`. Dahl has v in place of :math:`v_s \tanh(v / v_s)`; above v_s,
+where the bristle is full, the difference is a time of z_m / v_s in place of a way of z_m, and costs no short steps.
 
 A string cannot push: a tension that would be negative is zero. In contact :math:`y = x - g` and
 :math:`f = -(k_s y + c_s v)`; contact ends where f vanishes, and then :math:`k_s y + c_s \dot y = 0`. The driven end
@@ -172,7 +173,10 @@ def _car(relaxing: bool, rising: bool, holding: bool, wandering: bool, side: int
             rate = (u.v, (total - against) / p.m)
             rate += () if beside is None else (beside(u, p),)
             rate += (p.crank_rate,) if rising else ()
-            return (*rate, u.v * (1.0 - np.tanh(u.v / p.creep_velocity) * u.z / p.presliding)) if holding else rate
+            if holding:
+                slip = np.tanh(u.v / p.creep_velocity)
+                rate += (p.creep_velocity * slip * (1.0 - slip * u.z / p.presliding),)
+            return rate
 
         return rates
 
