@@ -118,7 +118,7 @@ def _run_study(study: Mapping[str, Any], folder: Path, quiet: bool, keep: bool =
     return 0
 
 
-def _offset(parameters: Any, session: Any) -> float | tuple[float, float]:
+def _offset(parameters: Any, session: Any) -> Any:
     """What the identified gap is more than the screw read; 0 where the session has no runs with contact."""
     from nonsmooth.identification.compare import gap_offset
 

@@ -29,7 +29,7 @@ from nonsmooth.identification.multiple_shooting import ContactFit, shoot_contact
 from nonsmooth.identification.natural_frequency import natural_frequency
 from nonsmooth.identification.parameter_set import ParameterSet
 from nonsmooth.identification.receptance import receptance_fit
-from nonsmooth.identification.referral import refer
+from nonsmooth.identification.referral import mark_of, refer
 from nonsmooth.identification.statements import agreement, for_model, identifiability
 from nonsmooth.identification.steady import Steady, steady
 from nonsmooth.identification.stiffness import stiffness
@@ -99,7 +99,7 @@ def identify(
     chain.forces()
     chain.drop()
     grazing = chain.graze(decay)
-    contacts, single = chain.contact(decay)
+    contacts, single = chain.contact(decay, chain.mark(decay, seen))
     adjusted = chain.adjusted()
     chain.calibrations(adjusted)
     gap = None
@@ -244,7 +244,17 @@ class _Chain:
             ),
         )  # fmt: skip
 
-    def contact(self, decay: DecayFit | None) -> tuple[ContactFit | None, Finding | None]:
+    def mark(self, decay: DecayFit | None, seen: Steady) -> float:
+        """The crank's angle at the photogate (rad), from steady runs without support or the first ones of the graze."""
+        if decay is None:
+            return 0.0
+        free = seen if len(seen) else steady(self.runs("grazing")[:4])
+        angle, note = mark_of(free, decay)
+        if note:
+            self.say(note)
+        return angle
+
+    def contact(self, decay: DecayFit | None, mark: float) -> tuple[ContactFit | None, Finding | None]:
         runs, resolution, rough = self.runs("contact"), self.evidence.resolution, self.adjusted()
         if not runs:
             return None, None
@@ -253,7 +263,7 @@ class _Chain:
             return None, None
         m = rough["m"]
         gamma = rough["c_s"] / m if "c_s" in rough.names else 1e-3 * rough["k_s"] / m
-        found = shoot_contacts(runs, decay, resolution=resolution, kappa=rough["k_s"] / m, gamma=gamma)
+        found = shoot_contacts(runs, decay, resolution=resolution, kappa=rough["k_s"] / m, gamma=gamma, mark=mark)
         self.observe(("kappa", "gamma"), found.values[3:5], found.covariance[3:5, 3:5], "multiple shooting")
         own = Quantity(m, float(np.sqrt(rough.covariance[rough.names.index("m"), rough.names.index("m")])))
         self.findings.append(contact_finding(found, own, resolution=resolution))

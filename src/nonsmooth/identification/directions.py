@@ -28,8 +28,10 @@ _HARDER = 1.8  # times: so much larger are accelerations away from the support t
 _FOLLOWS = 0.5  # least correlation of force and displacement of a pull
 
 
-def oriented(runs: Mapping[str, tuple[Run, ...]]) -> tuple[dict[str, tuple[Run, ...]], tuple[str, ...]]:
+def oriented(runs: Mapping[str, tuple[Run, ...]]) -> tuple[dict[str, tuple[Run, ...]], int, tuple[str, ...]]:
     """The runs with positions that grow towards the support and forces that pull that way, and what was turned.
+
+    The direction of the rotary sensor (-1: away from the support) and sentences on what was turned come with them.
 
     Raises
     ------
@@ -52,7 +54,7 @@ def oriented(runs: Mapping[str, tuple[Run, ...]]) -> tuple[dict[str, tuple[Run, 
                 f"({', '.join(against)}): it was pushed where a pull is positive, or mounted the other way round; its "
                 "readings are taken with the other sign there"
             )
-    return found, tuple(notes)
+    return found, -1 if sign < 0 else 1, tuple(notes)
 
 
 def towards_support(runs: Sequence[Run]) -> tuple[int, str]:

@@ -73,7 +73,10 @@ class Run:
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """All runs by procedure, what is known of the apparatus, and notes on what was turned (`oriented`)."""
+    """All runs by procedure, what is known of the apparatus, and what was turned (`oriented`).
+
+    ``direction`` is -1 where the rotary sensor counts away from the support: positions have the other sign then.
+    """
 
     runs: Mapping[str, tuple[Run, ...]]
     apparatus: Mapping[str, Quantity]
@@ -81,6 +84,7 @@ class Evidence:
     source: str = ""
     synthetic: bool = False
     missing: tuple[str, ...] = field(default=())
+    direction: int = 1
     notes: tuple[str, ...] = field(default=())
 
     @property
@@ -155,9 +159,9 @@ def gather(
         if procedure not in PROCEDURES:
             raise ValueError(unknown(procedure, "a procedure", "the experiment", PROCEDURES.keys()))
         runs[procedure] = tuple(_run(procedure, row[0], row[1], row[2], known) for row in rows)
-    runs, notes = oriented(runs)
+    runs, direction, notes = oriented(runs)
     synthetic = synthetic or any(run.synthetic for rows in runs.values() for run in rows)
-    return Evidence(runs, known, title, source, synthetic, tuple(p for p in PROCEDURES if p not in runs), notes)
+    return Evidence(runs, known, title, source, synthetic, tuple(p for p in PROCEDURES if p not in runs), direction, notes)
 
 
 def _rows(procedure: str, given: Any) -> list[Any]:

@@ -17,13 +17,15 @@ from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.free_decay import DecayFit
 from nonsmooth.identification.gap import MeanShift, mean_shift
 from nonsmooth.identification.multiple_shooting import ContactFit
+from nonsmooth.identification.receptance import crank_mark
 from nonsmooth.identification.steady import Steady
 from nonsmooth.identification.uncertainty import uniform
 
-__all__ = ["Referred", "places", "refer"]
+__all__ = ["Referred", "mark_of", "places", "refer"]
 
 FloatArray = NDArray[np.float64]
 
+_MOUNTED = 0.15  # rad: within which a mark is taken as put where it should be
 _HELD = 1e-3  # m: half width within which dry friction may hold a car of which nothing is known
 
 
@@ -100,6 +102,23 @@ def places(evidence: Evidence, decay: DecayFit | None, seen: Steady, *, held: fl
         seen, zero, error, string_length=length.value if length else None,
         string_error=length.uncertainty if length else 0.0, dry=dry,
     )  # fmt: skip
+
+
+def mark_of(seen: Steady, decay: DecayFit) -> tuple[float, str]:
+    """The crank's angle at the photogate (rad), and a sentence where it is far from 0; 0 where no run shows it.
+
+    A mark that is a few hundredths off, as gates are mounted, stays 0: fits with a free phase find it better.
+    """
+    if not len(seen):
+        return 0.0, ""
+    angle = crank_mark(seen, decay)
+    if abs(angle) < _MOUNTED:
+        return 0.0, ""
+    return angle, (
+        f"at the photogate's mark the crank stands {angle:+.2f} rad from where it pulls the car towards the support"
+        + (": the motor is on the other side, or the mark half a turn round" if abs(angle) > np.pi - _MOUNTED else "")
+        + "; phases are counted from there"
+    )
 
 
 def refer(
