@@ -44,7 +44,7 @@ def _stuck(rig: VirtualRig, run: int) -> dict[str, float]:
     place = rig.truth["sensor_zero"]
     if run:
         place = held * float(np.random.default_rng([rig.seed, 4, run]).uniform(-0.9, 0.9))
-    return {"x": place, "z": -place / held * rig.truth["presliding"]}
+    return {"x": place}
 
 
 def drop(rig: VirtualRig, *, n: int = 6, duration: float = 20.0) -> Recording:

@@ -12,22 +12,13 @@ Car between two springs on strings, one of them driven by a crank; a support wit
     \theta = \omega t + \sum_j a_j \sin(\nu_j t + \beta_j)
 
 The motor is on the support's side (s = 1) or on the other (s = -1); the slow terms of :math:`\theta` are those of a motor
-that wanders. Friction by the hyperbolic tangent lets the car creep to where the springs balance. On request it holds
-(Dahl's model): a bristle of deflection z carries it, and a force below F_C only deflects the bristle,
-
-.. math::
-
-    F = F_C\, z / z_m, \quad \dot z = v_s \tanh(v / v_s)\,[1 - \tanh(v / v_s)\, z / z_m]
-
-which becomes Coulomb's friction as :math:`z_m, v_s \to 0`. Dahl has v in place of :math:`v_s \tanh(v / v_s)`; above v_s,
-where the bristle is full, the difference is a time of z_m / v_s in place of a way of z_m, and costs no short steps.
+that wanders. Friction lets the car creep to where the springs balance, at about v_s; on request it holds: v_s is then
+0.1 µm/s, and a car that stops stays, within F_C/2k of that place, for as long as anything is recorded.
 
 A string cannot push: a tension that would be negative is zero. In contact :math:`y = x - g` and
 :math:`f = -(k_s y + c_s v)`; contact ends where f vanishes, and then :math:`k_s y + c_s \dot y = 0`. The driven end
 moves by d, so that to first order :math:`\rho = k a`, and its mean :math:`a^2 / (4 L)` moves the car's mean position
 by :math:`s a^2 / (8 L)`.
-
-Reference of the friction that holds: P.R. Dahl, A solid friction model, Aerospace Corp. TOR-0158(3107-18)-1 (1968).
 
 The same functions serve symbols (the ``System``) and numbers (the hand that pulls, the force sensor).
 """
@@ -104,7 +95,7 @@ def wander_of(p: Any) -> Wander:
 
 
 def car(
-    *, relaxing: bool = True, rising: bool = False, holding: bool = False, wandering: bool = False, side: int = 1
+    *, relaxing: bool = True, rising: bool = False, wandering: bool = False, side: int = 1
 ) -> System:
     """The car with its springs, strings and support.
 
@@ -116,8 +107,6 @@ def car(
     rising : bool
         Whether the length of the crank grows at ``crank_rate`` (state ``a`` in place of the parameter
         ``crank_length``), for quasi-static rises of the forcing.
-    holding : bool
-        Whether friction holds the car (a state ``z``), or lets it creep.
     wandering : bool
         Whether the motor wanders: further parameters, and no forcing period.
     side : {1, -1}
@@ -130,7 +119,7 @@ def car(
         ``relaxing``. It has no outputs, which would cost every run more than its integration; the forces are
         functions of this file.
     """
-    return _car(relaxing, rising, holding, wandering, side)
+    return _car(relaxing, rising, wandering, side)
 
 
 @cache
@@ -150,7 +139,7 @@ def _hanging_mass() -> System:
 
 
 @cache
-def _car(relaxing: bool, rising: bool, holding: bool, wandering: bool, side: int) -> System:
+def _car(relaxing: bool, rising: bool, wandering: bool, side: int) -> System:
     from nonsmooth.system.mode import Mode
     from nonsmooth.system.system import System
     from nonsmooth.system.transition import Transition
@@ -169,22 +158,16 @@ def _car(relaxing: bool, rising: bool, holding: bool, wandering: bool, side: int
 
         def rates(t: Any, u: Any, p: Any) -> Any:
             total = sum(sign * force(t, u, p) for sign, force in forces)
-            against = p.c * u.v + p.friction / p.presliding * u.z if holding else friction(u.v, p)
-            rate = (u.v, (total - against) / p.m)
+            rate = (u.v, (total - friction(u.v, p)) / p.m)
             rate += () if beside is None else (beside(u, p),)
-            rate += (p.crank_rate,) if rising else ()
-            if holding:
-                slip = np.tanh(u.v / p.creep_velocity)
-                rate += (p.creep_velocity * slip * (1.0 - slip * u.z / p.presliding),)
-            return rate
+            return (*rate, p.crank_rate) if rising else rate
 
         return rates
 
     def relaxation(u: Any, p: Any) -> Any:
         return -p.k_s / p.c_s * u.y
 
-    slow = (["a"] if rising else []) + (["z"] if holding else [])
-    on_car = ["x", "v", *slow]
+    on_car = ["x", "v", "a"] if rising else ["x", "v"]
     both, support = ((side, driven), (-side, fixed)), (1, from_support)
     modes: dict[str, Any] = {
         "free": Mode(field(*both), states=on_car),
@@ -207,9 +190,9 @@ def _car(relaxing: bool, rising: bool, holding: bool, wandering: bool, side: int
     ]
     if relaxing:
         def released(t: Any, u: Any, p: Any) -> Any:
-            return (u.x, u.v, u.x - p.g, *(getattr(u, name) for name in slow))
+            return (u.x, u.v, u.x - p.g, u.a) if rising else (u.x, u.v, u.x - p.g)
 
-        modes["relaxing"] = Mode(field(*both, beside=relaxation), states=["x", "v", "y", *slow])
+        modes["relaxing"] = Mode(field(*both, beside=relaxation), states=["x", "v", "y", *on_car[2:]])
         indicators["reach"] = lambda t, u, p: u.x - p.g - u.y
         indicators["unrest"] = lambda t, u, p: u.y - AT_REST
         transitions += [
@@ -225,10 +208,9 @@ def _car(relaxing: bool, rising: bool, holding: bool, wandering: bool, side: int
         "curvature": (1.0, "1/m"), "omega": (4.5, "rad/s"), "ripple": (0.01, "rad"), "ripple_phase": (0.0, "rad"),
     }  # fmt: skip
     parameters |= {"crank_rate": (0.0, "m/s")} if rising else {"crank_length": (0.0165, "m")}
-    parameters |= {"presliding": (2e-6, "m")} if holding else {}
     for j in range(1, WANDERING + 1) if wandering else ():
         parameters |= {f"wander_{j}": (0.0, "rad"), f"wander_rate_{j}": (1.0, "rad/s"), f"wander_phase_{j}": (0.0, "rad")}
-    states = {"x": "m", "v": "m/s"} | ({"y": "m"} if relaxing else {}) | dict.fromkeys(slow, "m")
+    states = {"x": "m", "v": "m/s"} | ({"y": "m"} if relaxing else {}) | ({"a": "m"} if rising else {})
     return System(
         name="virtual rig",
         states=states,
@@ -236,6 +218,6 @@ def _car(relaxing: bool, rising: bool, holding: bool, wandering: bool, side: int
         modes=modes,
         indicators=indicators,
         transitions=transitions,
-        scale={name: {"x": 1e-3, "v": 1e-2, "y": 1e-5, "a": 1e-2, "z": 1e-6}[name] for name in states},
+        scale={name: {"x": 1e-3, "v": 1e-2, "y": 1e-5, "a": 1e-2}[name] for name in states},
         period=None if wandering else lambda p: 2 * np.pi / p.omega,
     )

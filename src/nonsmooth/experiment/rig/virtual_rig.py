@@ -13,7 +13,7 @@ import numpy as np
 
 from nonsmooth.experiment.rig import sensors
 from nonsmooth.experiment.rig.physics import WANDERING, Wander
-from nonsmooth.experiment.rig.truth import FEATURES, NOMINAL_GAP, awkward, drawn, published, switched
+from nonsmooth.experiment.rig.truth import FEATURES, HOLDING, NOMINAL_GAP, awkward, drawn, published, switched
 from nonsmooth.experiment.session import PROCEDURES
 from nonsmooth.system.names import unknown
 
@@ -49,7 +49,7 @@ class VirtualRig:
         the string slips on the sensor's wheel; 0: none).
     holding : bool
         Dry friction that holds the car where it stops, within F_C/2k of where the springs balance, in place of one that
-        lets it creep there.
+        lets it creep there (``creep_velocity`` is then 0.1 µm/s).
     ripple, string, friction, support_relaxation, jitter, noise, quantisation, gain_error : bool
         Features that can be switched off: the motor's uneven turning, the finite length of the crank's string, dry
         friction, the time the support takes to come back, the jitter of the clock, the noise of the force sensor,
@@ -86,9 +86,8 @@ class VirtualRig:
                 raise TypeError(f"{name} = {on[name]!r}: a feature is on (True) or off (False)")
         if not isinstance(self.holding, bool):
             raise TypeError(f"holding = {self.holding!r}: friction holds the car (True) or lets it creep (False)")
-        truth = switched(drawn(self.seed), self.truth, on)
-        if self.holding and not truth["friction"]:
-            raise ValueError("holding = True: a rig without friction cannot hold the car")
+        held = {"creep_velocity": HOLDING} if self.holding else {}
+        truth = switched(drawn(self.seed), {**self.truth, **held}, on)
         object.__setattr__(self, "truth", MappingProxyType(truth))
 
     @classmethod
@@ -111,10 +110,8 @@ class VirtualRig:
         """The rig as a ``System`` with the truth's parameters; ``rising`` with the crank's length as a slow state."""
         from nonsmooth.experiment.rig.physics import car
 
-        equations = car(
-            relaxing=self.support_relaxation, rising=rising, holding=self.holding, wandering=self.wanders,
-            side=int(self.truth["motor_side"]),
-        )  # fmt: skip
+        side = int(self.truth["motor_side"])
+        equations = car(relaxing=self.support_relaxation, rising=rising, wandering=self.wanders, side=side)
         return equations.with_parameters(self.parameters(rising=rising))
 
     @property
@@ -140,7 +137,6 @@ class VirtualRig:
         values = {name: self.truth[name] for name in shared}
         values |= {"curvature": 1.0 / self.truth["string_length"], "omega": 4.5}
         values |= {"crank_rate": 0.0} if rising else {"crank_length": 0.0}
-        values |= {"presliding": self.truth["presliding"]} if self.holding else {}
         return values | settings
 
     def named_parameters(self, **settings: float) -> SimpleNamespace:
