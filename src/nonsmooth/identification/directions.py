@@ -54,6 +54,11 @@ def oriented(runs: Mapping[str, tuple[Run, ...]]) -> tuple[dict[str, tuple[Run, 
                 f"({', '.join(against)}): it was pushed where a pull is positive, or mounted the other way round; its "
                 "readings are taken with the other sign there"
             )
+    if backwards := [run.label for rows in runs.values() for run in rows if run.backwards]:
+        notes.append(
+            f"the photogate counts backwards in {len(backwards)} runs ({_few(backwards)}): only the times of channel 'Turn' "
+            "are used, which is right whichever way the motor turns"
+        )
     return found, -1 if sign < 0 else 1, tuple(notes)
 
 

@@ -35,7 +35,8 @@ _PASSAGES = 3  # of the photogate: fewer give no frequency and no scatter
 class Run:
     """One run: settings, position x (m) and force (N) each over its time (s), times of the photogate (s).
 
-    ``x`` is a DataArray that knows its run and channel; ``x_time`` and ``x_values`` are its arrays.
+    ``x`` is a DataArray that knows its run and channel; ``time`` and ``positions`` are its arrays. ``backwards``: the
+    photogate's count falls.
     """
 
     procedure: str
@@ -45,6 +46,7 @@ class Run:
     force: Any = None
     turns: FloatArray | None = None
     synthetic: bool = False
+    backwards: bool = False
 
     @property
     def time(self) -> FloatArray:
@@ -200,6 +202,7 @@ def _run(
         else:
             passages = take(recording, channel, name, samples=_PASSAGES)
             found["turns"] = np.asarray(passages["time"].values, dtype=np.float64)
+            found["backwards"] = bool(np.all(np.diff(np.asarray(passages.values, dtype=np.float64)) < 0))
     return Run(procedure, name, dict(settings), synthetic=recording.synthetic, **found)
 
 

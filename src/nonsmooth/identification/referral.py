@@ -98,10 +98,17 @@ def places(evidence: Evidence, decay: DecayFit | None, seen: Steady, *, held: fl
         zero, dry = 0.0, held or 0.0
         error = float(np.hypot(uniform(_HELD if held is None else held), uniform(evidence.resolution / 2)))
     length = evidence.apparatus.get("string_length")
-    return mean_shift(
+    found = mean_shift(
         seen, zero, error, string_length=length.value if length else None,
         string_error=length.uncertainty if length else 0.0, dry=dry,
     )  # fmt: skip
+    if decay is None or abs(found.rest) < evidence.resolution:
+        return found
+    said = (
+        f"the car rests at {1e3 * found.rest:+.3f} mm of the rotary sensor's count, and not where it was zeroed (dry "
+        f"friction holds it within ±{1e3 * dry:.2f} mm): gap and mean position count from where it rests"
+    )
+    return found._replace(notes=(said, *found.notes))
 
 
 def mark_of(seen: Steady, decay: DecayFit) -> tuple[float, str]:
