@@ -17,10 +17,11 @@ from nonsmooth.experiment.session import Quantity, Session
 from nonsmooth.identification.adjustment import Adjusted, Observation, adjust
 from nonsmooth.identification.calibrations import crank_force, voltage_frequency
 from nonsmooth.identification.contact_findings import contact_finding, one_contact
+from nonsmooth.identification.cross_checks import cross_checks, sentences
 from nonsmooth.identification.damping import amplitude_fit
 from nonsmooth.identification.decay_damping import decay_damping
 from nonsmooth.identification.evidence import Evidence, Run, gather
-from nonsmooth.identification.finding import Finding
+from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.free_decay import DecayFit, free_decay
 from nonsmooth.identification.grazing import grazing_gap
 from nonsmooth.identification.half_power import half_power
@@ -29,7 +30,7 @@ from nonsmooth.identification.multiple_shooting import ContactFit, shoot_contact
 from nonsmooth.identification.natural_frequency import natural_frequency
 from nonsmooth.identification.parameter_set import ParameterSet
 from nonsmooth.identification.receptance import receptance_fit
-from nonsmooth.identification.referral import mark_of, refer
+from nonsmooth.identification.referral import counted_gap, mark_of, refer
 from nonsmooth.identification.statements import agreement, for_model, identifiability
 from nonsmooth.identification.steady import Steady, steady
 from nonsmooth.identification.stiffness import stiffness
@@ -105,9 +106,10 @@ def identify(
     gap = None
     if contacts is not None and decay is not None:
         gap = refer(chain.evidence, decay, contacts, adjusted, seen, crank_length)
-        chain.findings.append(gap.finding(contacts, grazing))
-        for note in gap.notes:
+        chain.findings.append(gap.finding(contacts))
+        for note in (*gap.notes, *gap.counted.notes):
             chain.say(note)
+    chain.checks(adjusted, decay, contacts, grazing)
     found = joined(
         adjusted, gap, findings=chain.findings, identifiability=identifiability(adjusted, contacts, single),
         notes=[*agreement(adjusted, chain.evidence), *chain.notes], synthetic=chain.evidence.synthetic,
@@ -225,6 +227,28 @@ class _Chain:
         self.findings.append(found)
         self.observations.append(self.weighed("test_mass"))
         self.observe(("omega_s", "b_s"), decay.values[:2], decay.covariance[:2, :2], "drop of the test mass")
+
+    def checks(
+        self, adjusted: Adjusted, decay: DecayFit | None, contacts: ContactFit | None, grazing: Finding | None
+    ) -> None:
+        """Compare what the procedures say of one quantity; what disagrees is said."""
+        known = self.evidence.apparatus
+        masses = {name: known[name] for name in ("mass", "test_mass") if name in known}
+        at_rest = None
+        if grazing is not None and contacts is not None and decay is not None:
+            counted = counted_gap(contacts, float(self.runs("grazing")[0].settings["gap"]))
+            if counted is None:
+                self.notes.append("the graze was sought at another setting of the screw: its gap is not compared")
+            else:
+                at_rest = Estimate(counted.value - float(decay.values[3]), counted.error, "m")
+        found = cross_checks(
+            self.findings, masses, gain=adjusted.estimate("gain") if "gain" in adjusted.names else None,
+            gain_limit=self.gain_limit, k=adjusted.estimate("k") if "k" in adjusted.names else None, gap=at_rest,
+        )  # fmt: skip
+        agree, disagree = sentences(found)
+        self.notes += agree
+        for sentence in disagree:
+            self.say(sentence)
 
     def calibrations(self, adjusted: Adjusted) -> None:
         if runs := self.runs("voltage"):

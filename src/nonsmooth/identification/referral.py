@@ -7,11 +7,13 @@ Where the car rests and about which place it swings comes from one function, :fu
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.identification.adjustment import Adjusted
+from nonsmooth.identification.consistency import consistent
 from nonsmooth.identification.evidence import Evidence
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.free_decay import DecayFit
@@ -21,12 +23,58 @@ from nonsmooth.identification.receptance import crank_mark
 from nonsmooth.identification.steady import Steady
 from nonsmooth.identification.uncertainty import uniform
 
-__all__ = ["Referred", "mark_of", "places", "refer"]
+__all__ = ["CountedGap", "Referred", "counted_gap", "mark_of", "places", "refer"]
 
 FloatArray = NDArray[np.float64]
 
 _MOUNTED = 0.15  # rad: within which a mark is taken as put where it should be
 _HELD = 1e-3  # m: half width within which dry friction may hold a car of which nothing is known
+
+
+class CountedGap(NamedTuple):
+    """The gap in the sensor's count at one reading of the screw, by the runs with contact there.
+
+    ``index`` and ``weight``: the places of the runs' gaps among the parameters of the contacts' fit, and how much each
+    counts; ``notes``: a sentence on each run that is left out.
+    """
+
+    value: float
+    error: float
+    index: list[int]
+    weight: FloatArray
+    notes: tuple[str, ...]
+
+
+def counted_gap(contacts: ContactFit, reading: float) -> CountedGap | None:
+    """Weighted mean of the gaps of the runs at a reading of the screw, without those that disagree; None of none."""
+    rows = [i for i, run in enumerate(contacts.runs) if float(run.settings["gap"]) == reading]
+    if not rows:
+        return None
+    index = [contacts.place(i, 0) for i in rows]
+    own = np.diag(contacts.covariance)[index]
+    apart = consistent(contacts.values[index][:, None], own[:, None, None])
+    notes = [
+        f"contact {contacts.runs[i].name}: left out of the gap, which differs there by "
+        f"{1e6 * (contacts.values[j] - apart.mean[0]):+.0f} µm ({apart.off(contacts.values[[j]], [[e]])[0]:+.1f} "
+        "uncertainties) from that of the other runs: see whether the string slipped on the wheel"
+        for i, j, e, keep in zip(rows, index, own, apart.used, strict=True) if not keep
+    ]  # fmt: skip
+    index = [j for j, keep in zip(index, apart.used, strict=True) if keep]
+    block = contacts.covariance[np.ix_(index, index)]
+    weight = np.linalg.solve(block, np.ones(len(index)))
+    weight /= weight.sum()
+    counted = float(weight @ contacts.values[index])
+    off = contacts.values[index] - counted
+    chi2 = float(off @ np.linalg.solve(block, off))
+    # the runs may differ by more than they say: then their scatter counts
+    square = max(chi2 / max(len(index) - 1, 1), 1.0) * (weight @ block @ weight)
+    if not apart.agree:
+        square += float(apart.scatter[0, 0])
+        notes.append(
+            f"the gaps of the {len(index)} runs with contact disagree (Birge ratio {apart.birge:.1f}) and no majority "
+            "agrees: the scatter between them is the uncertainty; see whether the string slips on the wheel"
+        )
+    return CountedGap(counted, float(np.sqrt(square)), index, weight, tuple(notes))
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +92,8 @@ class Referred:
         With the unknowns of the adjustment: the same records tell the gap and k_s/m, the same decays zero and omega_0.
     crank_length, reading : float
         The crank to which the gap is referred, and the screw's reading that it stands for (m).
+    counted : CountedGap
+        The gap in the sensor's count.
     """
 
     gap: Estimate
@@ -54,25 +104,20 @@ class Referred:
     cross: FloatArray
     crank_length: float
     reading: float
+    counted: CountedGap
     notes: tuple[str, ...] = ()
 
-    def finding(self, contacts: ContactFit, grazing: Finding | None) -> Finding:
-        """The gap as a finding, compared with that from the grazing frequency where there is one."""
+    def finding(self, contacts: ContactFit) -> Finding:
+        """The gap as a finding."""
         notes = [
             f"counted from the mean position under the drive at a crank of {1e3 * self.crank_length:.2f} mm, "
             f"{1e6 * self.shift.value:+.0f} µm from where the car rests (string and uneven turning); as read at rest, "
             "the model would stand at another gap by as much",
             f"stands for a reading of {1e3 * self.reading:.4g} mm at the screw, whose zero is off by "
             f"{1e6 * (self.at_rest.value - self.reading):+.0f} µm",
+            *self.counted.notes,
         ]
         others = {"gap_at_rest": self.at_rest, "mean_shift": self.shift, "rest_position": self.rest}
-        if grazing is not None:
-            seen = grazing.others["at_rest"]
-            off = seen.value - self.at_rest.value
-            notes.append(
-                f"the grazing frequency says {1e6 * off:+.0f} µm more at rest, "
-                f"{abs(off) / np.hypot(seen.uncertainty, self.at_rest.uncertainty):.1f} uncertainties"
-            )
         return Finding(
             "g", self.gap, "multiple shooting over records with contact, referred to the mean position",
             contacts.fit.samples, tuple(run.name for run in contacts.runs), tuple(notes), others, self.covariance,
@@ -143,15 +188,8 @@ def refer(
     """
     readings = [float(run.settings["gap"]) for run in contacts.runs]
     reading = max(set(readings), key=readings.count)
-    index = [contacts.place(i, 0) for i, value in enumerate(readings) if value == reading]
-    block = contacts.covariance[np.ix_(index, index)]
-    weight = np.linalg.solve(block, np.ones(len(index)))
-    weight /= weight.sum()
-    counted = float(weight @ contacts.values[index])
-    off = contacts.values[index] - counted
-    chi2 = float(off @ np.linalg.solve(block, off))
-    # the runs may differ by more than they say: then their scatter counts
-    error = float(np.sqrt(max(chi2 / max(len(index) - 1, 1), 1.0) * (weight @ block @ weight)))
+    counted = counted_gap(contacts, reading)
+    assert counted is not None
     found = places(evidence, decay, seen)
     longest = max(float(run.settings["crank_length"]) for run in contacts.runs)
     crank = longest if crank_length is None else crank_length
@@ -160,16 +198,16 @@ def refer(
     rest = np.array([1.0, 0.0, 0.0])
     rows = np.array([[1.0, *(-rest - moved)], [1.0, *-rest], [0.0, *moved], [0.0, *rest]])
     known = np.zeros((4, 4))
-    known[0, 0], known[1:, 1:] = error**2, found.covariance
+    known[0, 0], known[1:, 1:] = counted.error**2, found.covariance
     covariance = rows @ known @ rows.T
-    values = rows @ [counted, found.rest, found.alpha, found.beta]
+    values = rows @ [counted.value, found.rest, found.alpha, found.beta]
     estimates = [
         Estimate(float(value), float(np.sqrt(covariance[i, i])), "m") for i, value in enumerate(values)
     ]
-    with_counted = _cross(adjusted, ("kappa", "gamma"), contacts.covariance[3:5][:, index] @ weight)
+    with_counted = _cross(adjusted, ("kappa", "gamma"), contacts.covariance[3:5][:, counted.index] @ counted.weight)
     with_zero = _cross(adjusted, ("omega_0", "b", "f"), decay.covariance[:3, 3])
     cross = rows @ np.array([with_counted, *np.outer(found.by_zero, with_zero)])
-    return Referred(*estimates, covariance, cross, crank, reading, found.notes)
+    return Referred(*estimates, covariance, cross, crank, reading, counted, found.notes)
 
 
 def _cross(adjusted: Adjusted, labels: tuple[str, ...], shared: FloatArray) -> FloatArray:
