@@ -78,7 +78,7 @@ def results(bias=0.0, n=40, seed=0):
 
         rows.append({
             "seed": i, "rows": {name: row(1.0, 1e-3 if name not in ("g", "gap_at_rest") else 1e-6) for name in ASKED},
-            "beside": {label: row(1.0, 1e-3) for label in BESIDE}, "friction": rng.uniform(0, 0.02),
+            "beside": {label: row(1.0, 1e-3) for label in BESIDE}, "truth": {"friction": rng.uniform(0, 0.02)},
         })  # fmt: skip
     return rows
 

@@ -174,8 +174,9 @@ class RigTrial:
         with _quiet():
             motions = [
                 measured_motion(
-                    item.recording, item.run, distance_per_turn=reference.direction * travel, zero=reference.mean(a)[0]
-                )
+                    item.recording, item.run, distance_per_turn=reference.direction * travel, zero=reference.mean(a)[0],
+                    mark=reference.mark,
+                )  # fmt: skip
                 for item, a in zip(runs, lengths, strict=True)
             ]
         measured = measured_sections(motions, "rho", [k * a for a in lengths], unit="N")
