@@ -29,7 +29,9 @@ ANOMALIES: Mapping[str, tuple[Callable[[Mapping[str, float]], bool], str]] = {
     "zeroed where it sticks": (lambda truth: abs(truth["sensor_zero"]) > _COUNT, "not where it was zeroed"),
     "motor on the other side": (lambda truth: truth["motor_side"] < 0, "the motor pulls from the side away"),
     "motor wanders": (lambda truth: truth["motor_wander"] > 0, "wanders"),
-    "slipped tap": (lambda truth: truth["slipped_tap"] > 0, "impulse: run 'Run #{slipped_tap:.0f}', channel 'Angle': left"),
+    "slipped tap": (
+        lambda truth: truth["slipped_tap"] > 0, "impulse: run 'Run #{slipped_tap:.0f}', channel 'Angle': left out"
+    ),
     "rotary sensor reversed": (lambda truth: truth["angle_sign"] < 0, "the rotary sensor counts away from the support"),
     "force sensor reversed": (lambda truth: truth["force_sign"] < 0, "the force sensor counts against"),
     "photogate reversed": (lambda truth: truth["turn_sign"] < 0, "the photogate counts backwards"),
@@ -174,7 +176,8 @@ def _said(results: Sequence[Mapping[str, Any]]) -> list[str]:
     factor = np.median([np.exp(1.96 * r["rows"]["c_s"][2] / r["rows"]["c_s"][1]) for r in results])
     lines = ["", f"c_s is known within a factor {factor:.3f} (median, 95 %)."]
     label = "c by amplitude, viscous only (Fig. 6)"
-    pairs = [(r["truth"]["friction"], r["beside"][label][1] / r["rows"]["c"][0] - 1) for r in results if label in r["beside"]]
+    seen = [r for r in results if label in r["beside"]]
+    pairs = [(r["truth"]["friction"], r["beside"][label][1] / r["rows"]["c"][0] - 1) for r in seen]
     if pairs:
         dry, bias = np.array(pairs).T
         slope = float(np.dot(dry, bias) / np.dot(dry, dry))
