@@ -62,15 +62,16 @@ def test_a_force_sensor_that_was_pushed_is_turned_and_named(procedure):
 
 
 def test_springs_and_support_swapped_are_named():
-    with pytest.raises(ValueError, match=r"'springs' have a slope of 1.2e\+03 N/m.*of 17 N/m.*look swapped: check `file`"):
+    with pytest.raises(ValueError, match=r"'springs' have a slope of 1.2e\+03 N/m.*of 17 N/m.*swapped: check `file`"):
         oriented({"springs": (pulled(1200.0, reach=0.03),), "support": (pulled(-17.0, "support"),)})
 
 
 def test_a_photogate_that_counts_backwards_is_named():
     def recording(count):
         sensors = {
-            "Angle": (TIME, 1e-3 * np.cos(4 * TIME), "rad"), "Turn": (np.arange(8) * 1.4, count * np.arange(8.0), "turns"),
-        }  # fmt: skip
+            "Angle": (TIME, 1e-3 * np.cos(4 * TIME), "rad"),
+            "Turn": (np.arange(8) * 1.4, count * np.arange(8.0), "turns"),
+        }
         return Recording.from_runs({"Run #1": {
             name: xr.Dataset({name: ("time", values, {"units": unit})}, {"time": time})
             for name, (time, values, unit) in sensors.items()

@@ -287,7 +287,13 @@ class _Chain:
             return None, None
         m = rough["m"]
         gamma = rough["c_s"] / m if "c_s" in rough.names else 1e-3 * rough["k_s"] / m
-        found = shoot_contacts(runs, decay, resolution=resolution, kappa=rough["k_s"] / m, gamma=gamma, mark=mark)
+        try:
+            found = shoot_contacts(
+                runs, decay, resolution=resolution, kappa=rough["k_s"] / m, gamma=gamma, mark=mark
+            )
+        except SolveError as error:
+            self.say(f"contact: not used, so that the gap is not known: {error}")
+            return None, None
         self.observe(("kappa", "gamma"), found.values[3:5], found.covariance[3:5, 3:5], "multiple shooting")
         own = Quantity(m, float(np.sqrt(rough.covariance[rough.names.index("m"), rough.names.index("m")])))
         self.findings.append(contact_finding(found, own, resolution=resolution))

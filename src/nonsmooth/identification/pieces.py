@@ -102,7 +102,7 @@ class Problem:
                 columns.append((both[0] - both[1]) / (2 * self.steps[index]))
             state.in_parameters.append(np.array(columns).T.reshape(len(piece.time), len(piece.which)))
             columns = []
-            for k, step in enumerate((1e-6, 1e-5)):
+            for k, step in enumerate((3e-8, 1e-7)):
                 ahead, behind = starts[i].copy(), starts[i].copy()
                 ahead[k] += step
                 behind[k] -= step

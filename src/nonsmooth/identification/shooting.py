@@ -79,6 +79,7 @@ def shoot(
     jitter: float | None = None,
     iterations: int = 40,
     outliers: float | None = None,
+    rough: bool = False,
 ) -> ShootingFit:
     """Fit common parameters and each piece's start.
 
@@ -99,6 +100,8 @@ def shoot(
     outliers : float, optional
         Leave out pieces whose reduced chi^2 exceeds this multiple of the median (a contact that was not seen, a
         hand that touched the car).
+    rough : bool
+        Only a start for another fit is wanted: it need not settle.
 
     Raises
     ------
@@ -115,7 +118,7 @@ def shoot(
     used = np.ones(len(pieces), dtype=bool)
     total = 0
     for _ in range(4):  # weights from residuals, residuals from weights
-        theta, starts, state, count = settle(problem, theta, starts, spread, used, centre, prior, iterations)
+        theta, starts, state, count = settle(problem, theta, starts, spread, used, centre, prior, iterations, rough)
         total += count
         again = False
         if outliers is not None:

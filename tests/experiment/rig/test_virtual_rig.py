@@ -379,9 +379,8 @@ def test_a_sensor_counts_the_other_way(sign: str, channel: str, procedure: str) 
 def test_the_motor_on_the_other_side_drives_a_mirrored_car() -> None:
     """Without a support the rig is symmetric but for the motor."""
     options = {"voltages": (5.0,), "crank_lengths": (0.03,), "duration": 3.0}
-    here, there = (
-        VirtualRig(2, quantisation=False, jitter=False, truth={"motor_side": side}).response(**options) for side in (1, -1)
-    )
+    exact = {"quantisation": False, "jitter": False}
+    here, there = (VirtualRig(2, **exact, truth={"motor_side": side}).response(**options) for side in (1, -1))
     np.testing.assert_allclose(position(there, "Run #1"), -position(here, "Run #1"), atol=1e-8)
     np.testing.assert_array_equal(there.channel("Turn", "Run #1")["time"], here.channel("Turn", "Run #1")["time"])
 
