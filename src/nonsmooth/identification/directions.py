@@ -49,9 +49,10 @@ def oriented(runs: Mapping[str, tuple[Run, ...]]) -> tuple[dict[str, tuple[Run, 
         against = [run.name for run in rows if _slope(run) < 0]
         if against:
             found[name] = tuple(_pushed(run) if run.name in against else run for run in rows)
+            which = "all" if len(against) == len(rows) else ", ".join(against)
             notes.append(
                 f"{name}: the force sensor counts against the displacement in {len(against)} of {len(rows)} runs "
-                f"({', '.join(against)}): it was pushed where a pull is positive, or mounted the other way round; its "
+                f"({which}): it was pushed where a pull is positive, or mounted the other way round; its "
                 "readings are taken with the other sign there"
             )
     if backwards := [run.label for rows in runs.values() for run in rows if run.backwards]:

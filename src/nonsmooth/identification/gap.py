@@ -125,7 +125,7 @@ def mean_shift(
     if off > _CLEAR:
         notes.append(
             f"the mean positions say a string of {1 / (8 * abs(free.alpha)):.3g} m, the notebook {string_length:.3g} "
-            f"m ({off:.0f} uncertainties apart): string_length is not used. Measure it from the crank to the driven spring"
+            f"m ({off:.0f} uncertainties apart): string_length is not used. Measure it from crank to driven spring"
         )
         return free._replace(side=side, notes=tuple(notes))
     if side < 0:
