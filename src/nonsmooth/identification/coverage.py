@@ -55,7 +55,7 @@ def one_rig(seed: int, folder: str, awkward: bool = False) -> dict[str, Any]:
         result = identify(session)
         runs = session.recordings("contact")
         shortest = min(runs, key=lambda item: float(item.settings["crank_length"]))
-        used = session_measurement(
+        value, error = session_measurement(
             session, "contact", shortest.run, k=result["k"], gap_offset=gap_offset(result, session)
         )[1]["g"]
         truth = load_truth(truth_file)
@@ -66,7 +66,7 @@ def one_rig(seed: int, folder: str, awkward: bool = False) -> dict[str, Any]:
     }  # fmt: skip
     rows = {name: _row(expected[name], result.estimate(name)) for name in ASKED if name != COMPARED}
     reading = float(shortest.settings["gap"]) - NOMINAL_GAP
-    rows[COMPARED] = _row(truth["g"] + reading - _moved(truth, min(cranks)), Estimate(*used, "m"))
+    rows[COMPARED] = _row(truth["g"] + reading - _moved(truth, min(cranks)), Estimate(value, error, "m"))
     findings = {finding.name: finding for finding in result.findings}
     beside = {}
     for label, (name, other, of) in BESIDE.items():
