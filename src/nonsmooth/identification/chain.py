@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from nonsmooth.errors import SolveError
 from nonsmooth.experiment.recording import RecordingWarning
 from nonsmooth.experiment.session import Quantity, Session
+from nonsmooth.experiment.signals.phase import drive_phase
 from nonsmooth.identification.adjustment import Adjusted, Observation, adjust
 from nonsmooth.identification.calibrations import crank_force, voltage_frequency
 from nonsmooth.identification.contact_findings import contact_finding, one_contact
@@ -95,6 +96,7 @@ def identify(
     chain = _Chain(gather(recordings, apparatus=apparatus))
     for note in chain.evidence.notes:
         chain.say(note)
+    chain.motor()
     decay = chain.taps()
     seen = chain.response(decay)
     chain.forces()
@@ -173,6 +175,23 @@ class _Chain:
     def say(self, sentence: str) -> None:
         self.notes.append(sentence)
         warnings.warn(sentence, RecordingWarning, stacklevel=5)
+
+    def motor(self) -> None:
+        """Say where the photogate sees the motor's frequency wander."""
+        known = self.evidence.apparatus.get("turn_resolution")
+        for procedure in ("response", "grazing", "contact"):
+            seen = [
+                drive_phase(run.passages).wander(1e-4 if known is None else known.value)
+                for run in self.runs(procedure) if run.turns is not None
+            ]
+            if unsteady := [size for size, steady in seen if not steady]:
+                self.say(
+                    f"{procedure}: the motor wanders in {len(unsteady)} of {len(seen)} runs, by "
+                    f"{100 * float(np.median(unsteady)):.2g} % from turn to turn (standard deviation; up to "
+                    f"{100 * max(unsteady):.2g} %), more than the photogate's steps explain. The crank's angle is "
+                    "followed from turn to turn, and what a turn may hide is in the uncertainty of what contacts tell; "
+                    "a regulated supply would be better"
+                )
 
     def taps(self) -> DecayFit | None:
         runs, resolution = self.runs("impulse"), self.evidence.resolution

@@ -8,7 +8,8 @@ swing with it, so that their difference, the gap *referred to the car's mean pos
 
 A piece in which the car turns at the support itself, a graze, is left out: its motion has no derivative in the
 parameters there (the push grows as the power 3/2 of a depth of micrometres), and the fit would stop at it wherever its
-minimum lies.
+minimum lies. How far the estimate moves with every other turn of the crank alone is added to its uncertainty: it is
+what a motor that wanders is worth.
 """
 
 from __future__ import annotations
@@ -23,9 +24,10 @@ from numpy.typing import NDArray
 
 from nonsmooth.errors import SolveError
 from nonsmooth.experiment.signals.phase import drive_phase
+from nonsmooth.identification.arrow import reduced
 from nonsmooth.identification.evidence import Run
 from nonsmooth.identification.free_decay import DecayFit
-from nonsmooth.identification.pieces import Piece, start_state
+from nonsmooth.identification.pieces import Piece, Problem, start_state
 from nonsmooth.identification.shooting import ShootingFit, shoot
 
 __all__ = ["ContactFit", "shoot_contacts"]
@@ -121,9 +123,10 @@ def shoot_contacts(
         raise ValueError("no run shows a contact: the gap and the support cannot be found from them")
     joint = _Joint(pieces, np.array(values), np.array(steps), precision, resolution, decay.fit.jitter)
     fit, kept = joint.best(len(taken))
+    moved = joint.by_turns(fit, kept)
     return ContactFit(
-        fit.values, fit.covariance, tuple(taken), tuple(kept), fit, joint.values, _blocks(precision),
-        len(pieces) - len(kept),
+        fit.values, fit.covariance + np.outer(moved, moved), tuple(taken), tuple(kept), fit, joint.values,
+        _blocks(precision), len(pieces) - len(kept),
     )  # fmt: skip
 
 
@@ -172,6 +175,21 @@ class _Joint:
                 if margin == _GRAZING[-1]:
                     raise
         raise AssertionError
+
+    def by_turns(self, fit: ShootingFit, kept: list[Piece]) -> FloatArray:
+        """How far the parameters move when the crank's angle is known from every other turn only, to first order.
+
+        Between passages of the photogate a motor that wanders is not where a straight line has it. How far it is off
+        nobody sees, but how far a line over two turns is off.
+        """
+        problem = Problem(kept, self.steps, self.resolution)
+        state = problem.derivatives(fit.values, fit.starts)
+        weights = problem.weights(state, self.jitter)
+        coarse = replace(problem, pieces=[replace(p, phase=p.phase if p.coarse is None else p.coarse) for p in kept])
+        other = replace(state, residuals=coarse.residuals(fit.values, fit.starts).residuals)
+        p, prior = len(fit.values), _blocks(self.precision)
+        normal, right, _ = reduced(problem, other, weights, fit.used, p)
+        return np.asarray(np.linalg.solve(normal + prior, right - prior @ (fit.values - self.values)))
 
     def fit(self, start: FloatArray, rough: bool = False) -> ShootingFit:
         """Fit all runs together from these parameters."""
@@ -236,7 +254,8 @@ def _build(p: FloatArray) -> tuple[Any, Any, Any]:
 def _pieces(run: Run, which: Any, gap: float, rest: float, most: int) -> list[Piece]:
     """Pieces from one low turning point to the next, in each of which the car rises above the gap."""
     t, x = run.time, run.positions
-    phase = drive_phase(run.passages).phase(t)
+    drive = drive_phase(run.passages)
+    phase, coarse = drive.phase(t), drive.coarser.phase(t)
     low = _turning_points(x)
     found: list[Piece] = []
     # the screw's reading may be off by a millimetre: what rises above half of it is taken
@@ -255,7 +274,7 @@ def _pieces(run: Run, which: Any, gap: float, rest: float, most: int) -> list[Pi
         local = t[begin:end] - t[begin]
         found.append(
             Piece(local, x[begin:end], phase[begin:end], which, _build, start_state(local, x[begin:end]),
-                  label=run.name, origin=float(t[begin]))
+                  label=run.name, origin=float(t[begin]), coarse=coarse[begin:end])
         )  # fmt: skip
     if len(found) > most:
         keep = np.unique(np.linspace(0, len(found) - 1, most).round().astype(int))

@@ -35,6 +35,8 @@ class Piece:
         The run it comes from.
     origin : float
         Its first sample's time in that run (s): ``time`` begins at zero.
+    coarse : array (n,), optional
+        The crank's angle as every other turn of it tells it.
     """
 
     time: FloatArray
@@ -46,6 +48,7 @@ class Piece:
     touching: bool = False
     label: str = ""
     origin: float = 0.0
+    coarse: FloatArray | None = None
 
 
 def start_state(time: FloatArray, x: FloatArray, n: int = 7) -> FloatArray:
