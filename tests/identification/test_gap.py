@@ -1,12 +1,14 @@
 """The gap: the drive's mean by quadrature, its fit, and the bracket of the graze from runs in closed form."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from tests.identification import made
 from tests.identification.made import COUNT, counted, decay_of, driven, run, swinging
 
 from nonsmooth.identification.gap import grazing_amplitude, mean_of_drive, mean_shift
-from nonsmooth.identification.grazing import grazing_gap
+from nonsmooth.identification.grazing import _sensor_error, _unseen, grazing_gap
 from nonsmooth.identification.steady import steady
 
 W, B, F, KAPPA = 4.5, 1.04, 0.01, 1400.0
@@ -120,6 +122,43 @@ def test_the_graze_brackets_the_gap():
     assert abs(frequency.value - 8.43) <= frequency.half_width + 1e-4
     assert found.others["at_rest"].value == pytest.approx(found.value + 2e-5 - 1e-6, abs=2e-6)
     assert found.data["contact"].values.sum() == 9
+
+
+def test_a_push_too_light_to_be_seen_widens_the_bracket():
+    gap, crank = grazing_amplitude(8.43, W, B, F, 0.010), 0.010
+    found = grazing_gap(stepping(gap), decay_of(W, B, F, 1e-6), resolution=COUNT, kappa=KAPPA)
+    a = [grazing_amplitude(w, W, B, F, crank) for w in (8.45, 8.40)]
+    # the mean of a run is seen to 0.06 counts at best: by as much a car that goes p beyond the gap is pushed
+    least = _unseen(0.06 * COUNT, a[0], KAPPA / W**2)
+    assert least > 3e-6
+    assert found.estimate.half_width > 0.5 * (a[1] - a[0] + least)
+    assert found.estimate.half_width < 0.5 * (a[1] - a[0] + 4 * least)
+
+
+@pytest.mark.parametrize("depth", [2e-6, 2e-5])
+def test_the_push_of_a_light_contact_by_quadrature(depth):
+    amplitude, stiff = 2e-3, KAPPA / W**2
+    theta = np.linspace(-np.pi, np.pi, 2_000_001)
+    x = amplitude * np.cos(theta)
+    # the mean of the support's force over 2k, k_s / 2k = kappa / omega_0^2
+    moved = stiff * float(np.mean(np.maximum(x - (amplitude - depth), 0.0)))
+    assert _unseen(moved, amplitude, stiff) == pytest.approx(depth, rel=0.01)
+
+
+def test_the_sensors_error_is_that_of_a_mean_of_four():
+    off = 1e-5 * np.array([1.0, -1.0, 2.0, -2.0, 1.0, -1.0])  # standard deviation sqrt(12/5) x 10 um
+    seen = SimpleNamespace(highest=2e-3 + off, mean=np.zeros(6), omega=np.full(6, 8.0))
+    error = _sensor_error(seen, np.ones(6, dtype=bool), lambda omega: np.full(len(omega), 2e-3), COUNT)
+    assert error == pytest.approx(1e-5 * np.sqrt(12 / 5) / np.sqrt(4))
+
+
+def test_a_gap_by_graze_is_neither_too_sure_nor_too_vague():
+    z = []
+    for seed in range(12):
+        gap = grazing_amplitude(8.43 - 0.01 * (seed % 5), W, B, F, 0.010)
+        found = grazing_gap(stepping(gap, seed=seed), decay_of(W, B, F, 1e-6), resolution=COUNT, kappa=KAPPA)
+        z.append((found.value - gap) / found.uncertainty)
+    assert 0.4 < np.sqrt(np.mean(np.square(z))) < 1.6
 
 
 def test_the_cranks_length_need_not_be_right():
