@@ -19,7 +19,8 @@ from tests.identification.made import (
 
 from nonsmooth.experiment.session import Quantity
 from nonsmooth.identification.contact_findings import contact_finding, one_contact
-from nonsmooth.identification.multiple_shooting import shoot_contacts
+from nonsmooth.identification.multiple_shooting import _grazes, shoot_contacts
+from nonsmooth.identification.pieces import Piece
 
 
 @pytest.fixture(scope="module")
@@ -72,6 +73,18 @@ def test_one_contact_tells_less_than_all_together(fitted):
     used = shown["segment"].values >= 0
     assert np.all(np.isfinite(shown["fitted"].values) == used) and used.any()
     assert np.nanmax(np.abs(shown["residual"].values)) < 3 * COUNT
+
+
+def test_a_piece_in_which_friction_all_but_holds_the_car_has_a_corner():
+    # x = -A cos(w t) passes +-0.5 mm/s within 2 v / (A w^2) = 5 ms; x = -A cos^3 lingers where it turns in the middle
+    time = np.arange(0, 1.4, 0.01)
+    piece = Piece(time, time, time, np.arange(11), lambda p: (p, p, p), np.zeros(2))
+    angle = 4.5 * time
+    swift = 0.01 * np.column_stack([-np.cos(angle), 4.5 * np.sin(angle)])
+    slow = 0.01 * np.column_stack([-np.cos(angle) ** 3, 3 * 4.5 * np.cos(angle) ** 2 * np.sin(angle)])
+    assert not _grazes(piece, swift, 1.0, 2e-5, 0.015) and _grazes(piece, slow, 1.0, 2e-5, 0.015)
+    assert not _grazes(piece, slow, 1.0, 2e-5, np.inf)
+    assert _grazes(piece, swift, 0.01 + 1e-5, 2e-5, np.inf)  # turns 10 um short of the gap
 
 
 def test_records_without_contact_are_refused():
