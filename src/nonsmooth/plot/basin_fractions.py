@@ -8,7 +8,7 @@ import numpy as np
 
 from nonsmooth.plot import palette, style
 from nonsmooth.plot.basins import kind_of
-from nonsmooth.plot.labels import label, only_states, variable_along
+from nonsmooth.plot.labels import name_and_unit, name_axes, only_states, variable_along
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -49,9 +49,10 @@ def basin_fractions(result: xr.Dataset, ax: Axes | None = None, *, y: str | None
             drawn.set(ylabel="share of starts (%)", ylim=(0, 100))
         else:
             _maxima(result, drawn, values, y)
-            drawn.set(ylabel=f"max {label(result, y)}")
+            text, unit = name_and_unit(result, y)
+            name_axes(drawn, y=(f"max {text}", unit))
         drawn.margins(x=0)
-        drawn.set(xlabel=label(result, parameter))
+        name_axes(drawn, name_and_unit(result, parameter))
         drawn.legend(  # above the axes, and above the power of ten of the ordinate
             loc="lower center", bbox_to_anchor=(0.5, 1.0 if y is None else 1.06), ncols=2, handlelength=1.0,
             handleheight=1.0, columnspacing=1.0,

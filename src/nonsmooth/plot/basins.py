@@ -8,7 +8,7 @@ import numpy as np
 
 from nonsmooth.plot import palette, style
 from nonsmooth.plot.cells import cell_edges
-from nonsmooth.plot.labels import label, variable_along
+from nonsmooth.plot.labels import name_and_unit, name_axes, variable_along
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -74,7 +74,8 @@ def basins(result: xr.Dataset, ax: Axes | None = None, *, size: float = 3.0) -> 
             handles=handles, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=min(len(handles), 3),
             handlelength=1.0, handleheight=1.0, columnspacing=1.0,
         )  # fmt: skip
-        drawn.set(xlim=xlim, ylim=ylim, xlabel=label(result, first), ylabel=label(result, second))
+        drawn.set(xlim=xlim, ylim=ylim)
+        name_axes(drawn, name_and_unit(result, first), name_and_unit(result, second))
     return drawn
 
 

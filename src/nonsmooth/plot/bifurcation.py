@@ -8,7 +8,7 @@ import numpy as np
 
 from nonsmooth.plot import style
 from nonsmooth.plot.branch import draw_branch
-from nonsmooth.plot.labels import column, first_states, label, variable_along
+from nonsmooth.plot.labels import column, first_states, name_and_unit, name_axes, variable_along
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -76,7 +76,7 @@ def bifurcation(
         # The whole sweep shows, its ends too where every point diverged.
         drawn.dataLim.update_from_data_x(result[parameter].values, ignore=False)
         drawn.margins(x=0)
-        drawn.set(xlabel=label(result, parameter), ylabel=label(result, name))
+        name_axes(drawn, name_and_unit(result, parameter), name_and_unit(result, name))
     return drawn
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth.plot import style
-from nonsmooth.plot.labels import label, only_states, variable_along
+from nonsmooth.plot.labels import name_and_unit, name_axes, only_states, variable_along
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -64,7 +64,7 @@ def branch(
         draw_branch(drawn, result, y=y, quantity=quantity, special=special, color=color)
         parameter = _parameter(result)
         (name,) = only_states(result, y)
-        drawn.set(xlabel=label(result, parameter), ylabel=_ordinate(result, name, quantity))
+        name_axes(drawn, name_and_unit(result, parameter), _ordinate(result, name, quantity))
         if special and result.sizes.get("special", 0):
             drawn.legend(loc="best")
     return drawn
@@ -139,8 +139,9 @@ def _parameter(result: xr.Dataset) -> str:
     return str(result.attrs["parameter"])
 
 
-def _ordinate(result: xr.Dataset, name: str, quantity: str) -> str:
-    return _WORDS[quantity] + label(result, name)
+def _ordinate(result: xr.Dataset, name: str, quantity: str) -> tuple[str, str]:
+    text, unit = name_and_unit(result, name)
+    return _WORDS[quantity] + text, unit
 
 
 def _virtual(result: xr.Dataset) -> NDArray[np.bool_]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from nonsmooth.plot import style
 from nonsmooth.plot.comparison import ABOVE, MEASURED, THEORY, check_kind, measured_label
-from nonsmooth.plot.labels import first_states, label
+from nonsmooth.plot.labels import first_states, name_and_unit, name_axes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -59,5 +59,5 @@ def comparison_diagram(result: xr.Dataset, ax: Axes | None = None, *, y: str | N
                     drawn.plot([place, place], [0.94, 1.0], color=color, linewidth=1.2, transform=top, zorder=6)
         drawn.margins(x=0)
         drawn.legend(**ABOVE, ncols=2, markerscale=4, columnspacing=1.0, handletextpad=0.4)
-        drawn.set(xlabel=label(result, parameter), ylabel=label(result, name))
+        name_axes(drawn, name_and_unit(result, parameter), name_and_unit(result, name))
     return drawn

@@ -8,7 +8,7 @@ import numpy as np
 
 from nonsmooth.plot import style
 from nonsmooth.plot.comparison import MEASURED, THEORY, check_kind, measured_label
-from nonsmooth.plot.labels import first_states, label
+from nonsmooth.plot.labels import first_states, name_and_unit, name_axes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -59,7 +59,8 @@ def comparison_time(result: xr.Dataset, ax: Axes | None = None, *, y: str | None
         low_y, high_y = drawn.get_ylim()
         drawn.set_ylim(low_y, high_y + 0.22 * (high_y - low_y))  # room for the legend
         drawn.legend(loc="upper center", ncols=3, columnspacing=1.0, handlelength=1.4)
-        drawn.set(xlabel="time (forcing periods)", ylabel=label(result, name))
+        drawn.set_xlabel("time (forcing periods)")
+        name_axes(drawn, y=name_and_unit(result, name))
     return drawn
 
 
@@ -116,7 +117,7 @@ def comparison_phase_portrait(
         low, high = drawn.get_ylim()
         drawn.set_ylim(low, high + 0.15 * (high - low))
         drawn.legend(loc="upper center", ncols=2)
-        drawn.set(xlabel=label(result, names[0]), ylabel=label(result, names[1]))
+        name_axes(drawn, name_and_unit(result, names[0]), name_and_unit(result, names[1]))
     return drawn
 
 
@@ -150,7 +151,7 @@ def comparison_section(
         if np.isfinite(distance):
             drawn.set_title(f"energy distance {distance:.3f}; 95 % of its own halves below {limit:.3f}", loc="left")
         drawn.legend(markerscale=1 if few else 4, loc="best")
-        drawn.set(xlabel=label(result, names[0]), ylabel=label(result, names[1]))
+        name_axes(drawn, name_and_unit(result, names[0]), name_and_unit(result, names[1]))
     return drawn
 
 

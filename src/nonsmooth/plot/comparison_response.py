@@ -8,7 +8,7 @@ import numpy as np
 
 from nonsmooth.plot import style
 from nonsmooth.plot.comparison import ABOVE, check_kind, measured_label
-from nonsmooth.plot.labels import first_states, label
+from nonsmooth.plot.labels import first_states, name_and_unit, name_axes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -58,7 +58,8 @@ def comparison_response(result: xr.Dataset, ax: Axes | None = None, *, digits: i
         drawn.margins(x=0.02)
         # Clear of the power of ten at the top of the axis.
         drawn.legend(**{**ABOVE, "bbox_to_anchor": (1.0, 1.07)}, ncols=2, handlelength=1.6, columnspacing=1.2)
-        drawn.set(xlabel=label(result, parameter), ylabel=f"amplitude of {label(result, state)}")
+        text, unit = name_and_unit(result, state)
+        name_axes(drawn, name_and_unit(result, parameter), (f"amplitude of {text}", unit))
     return drawn
 
 

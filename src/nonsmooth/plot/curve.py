@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.plot import style
-from nonsmooth.plot.labels import label, variable_along
+from nonsmooth.plot.labels import name_and_unit, name_axes, variable_along
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -70,7 +70,7 @@ def curve(result: xr.Dataset, ax: Axes | None = None, *, special: bool = True, c
         )  # fmt: skip
         if special:
             _mark(drawn, result, x, y)
-        drawn.set(xlabel=label(result, x), ylabel=label(result, y))
+        name_axes(drawn, name_and_unit(result, x), name_and_unit(result, y))
         _legend(drawn)
     return drawn
 

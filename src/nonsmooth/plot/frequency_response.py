@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from nonsmooth.plot import style
 from nonsmooth.plot.bifurcation import sorted_out
 from nonsmooth.plot.branch import draw_branch
-from nonsmooth.plot.labels import column, first_states, label, variable_along
+from nonsmooth.plot.labels import column, first_states, name_and_unit, name_axes, variable_along
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -82,7 +82,7 @@ def frequency_response(
             draw_branch(drawn, behind, y=name, quantity=quantity, color=style.COLORS["section"], width=0.6)
         drawn.legend(loc="best")
         drawn.margins(x=0)
-        drawn.set(xlabel=label(result, parameter), ylabel=_ordinate(result, name, quantity))
+        name_axes(drawn, name_and_unit(result, parameter), _ordinate(result, name, quantity))
     return drawn
 
 
@@ -132,5 +132,6 @@ def _mark(
     )  # fmt: skip
 
 
-def _ordinate(result: xr.Dataset, name: str, quantity: str) -> str:
-    return f"{quantity} of {label(result, name)}"
+def _ordinate(result: xr.Dataset, name: str, quantity: str) -> tuple[str, str]:
+    text, unit = name_and_unit(result, name)
+    return f"{quantity} of {text}", unit

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth.plot import style
-from nonsmooth.plot.labels import column, first_states, label, variable_along, words_of_flags
+from nonsmooth.plot.labels import column, first_states, name_and_unit, name_axes, variable_along, words_of_flags
 from nonsmooth.plot.segments import pieces_by_mode, with_gaps
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ def phase_portrait(
             )  # fmt: skip
         if zone is not None:
             _shade(drawn, float(result[zone]) if isinstance(zone, str) else zone)
-        drawn.set(xlabel=label(result, names[0]), ylabel=label(result, names[1]))
+        name_axes(drawn, name_and_unit(result, names[0]), name_and_unit(result, names[1]))
     return drawn
 
 

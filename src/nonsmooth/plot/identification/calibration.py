@@ -10,7 +10,7 @@ from nonsmooth.plot import style
 from nonsmooth.plot.comparison import ABOVE, MEASURED, measured_label
 from nonsmooth.plot.identification.findings import data_of, number, with_error
 from nonsmooth.plot.identification.residuals import residual_strip
-from nonsmooth.plot.labels import name_with_unit
+from nonsmooth.plot.labels import name_axes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -50,7 +50,7 @@ def calibration(finding: Any, ax: Axes | None = None) -> Axes:
         drawn.margins(x=0.03)
         drawn.legend(**ABOVE, ncols=3, columnspacing=1.0)
         drawn.annotate(_law(data), (0.97, 0.36), xycoords="axes fraction", ha="right", fontsize="small")
-        drawn.set(xlabel=_axis(data, "setting").replace("(m)", "(mm)"), ylabel=_axis(data, "reading"))
+        name_axes(drawn, _named(data, "setting"), _named(data, "reading"))
         if "fitted" in data:
             left = reading - np.interp(setting, at, data["fitted"].values)
             power = 3 * int(np.clip(np.ceil(-np.log10(max(float(np.max(np.abs(left))), 1e-12)) / 3), 0, 3))
@@ -61,9 +61,9 @@ def calibration(finding: Any, ax: Axes | None = None) -> Axes:
     return drawn
 
 
-def _axis(data: xr.Dataset, name: str) -> str:
+def _named(data: xr.Dataset, name: str) -> tuple[str, str]:
     attrs = data[name].attrs
-    return name_with_unit(str(attrs.get("long_name", name)), str(attrs.get("units", "")))
+    return str(attrs.get("long_name", name)), str(attrs.get("units", ""))
 
 
 def _law(data: xr.Dataset) -> str:

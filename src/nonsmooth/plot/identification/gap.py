@@ -10,7 +10,7 @@ from nonsmooth.plot import style
 from nonsmooth.plot.comparison import ABOVE, MEASURED, measured_label
 from nonsmooth.plot.identification.findings import data_of, number, with_error
 from nonsmooth.plot.identification.residuals import residual_strip
-from nonsmooth.plot.labels import name_with_unit
+from nonsmooth.plot.labels import name_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -53,8 +53,8 @@ def grazing(finding: Any, ax: Axes | None = None) -> Axes:
             )
         drawn.legend(**ABOVE, ncols=2, columnspacing=1.0)
         attrs = data["setting"].attrs
-        name = name_with_unit(str(attrs.get("long_name", "setting")), str(attrs.get("units", "")))
-        drawn.set(xlabel=name, ylabel="largest displacement (mm)")
+        setting_named = str(attrs.get("long_name", "setting")), str(attrs.get("units", ""))
+        name_axes(drawn, setting_named, ("largest displacement", "m"))
     return drawn
 
 
