@@ -29,6 +29,11 @@ MARKS = {
     "boundary_equilibrium": ("p", "boundary equilibrium"),
 }
 _OTHER = "*"
+#: Diameters in points. Several kinds meet at one point where a branch grazes: the smaller one lies on the larger.
+_SIZES = {"fold": 6.5, "flip": 5.5}
+_SIZE = 4.0
+_STATES = {"-": "stable", "--": "unstable", ":": "virtual"}
+_SEAM = 0.3  # opacity of a stable branch under the points that lie on it
 _WORDS = {"section": "", "maximum": "largest ", "minimum": "smallest ", "amplitude": "amplitude of "}
 
 
@@ -65,8 +70,7 @@ def branch(
         parameter = _parameter(result)
         (name,) = only_states(result, y)
         name_axes(drawn, name_and_unit(result, parameter), _ordinate(result, name, quantity))
-        if special and result.sizes.get("special", 0):
-            drawn.legend(loc="best")
+        drawn.legend(loc="best")
     return drawn
 
 
@@ -79,8 +83,12 @@ def draw_branch(
     special: bool = True,
     color: str | None = None,
     width: float = 0.9,
+    behind: bool = False,
 ) -> None:
-    """Draw the lines (``width`` in typographic points) and marks of a branch on axes that the caller labels."""
+    """Draw the lines (``width`` in typographic points) and marks of a branch on axes that the caller labels.
+
+    ``behind``: over points of a sweep, which lie on the stable parts: those become a pale, wide seam under them.
+    """
     variable_along(result, "stable", "continue_orbit")
     if quantity not in _WORDS:
         raise ValueError(f"quantity = {quantity!r}; allowed: {', '.join(map(repr, _WORDS))}")
@@ -96,8 +104,15 @@ def draw_branch(
         chosen = _with_neighbours(wanted, virtual if line != ":" else np.zeros_like(virtual))
         if not chosen.any():
             continue
+        under = behind and line == "-"
+        looks = {"linewidth": 3 * width, "alpha": _SEAM, "zorder": 0.5} if under else {"linewidth": width, "zorder": 3}
+        words = f"{_STATES[line]} branch"
         for row in ordinates:
-            ax.plot(values, np.where(chosen, row, np.nan), line, color=shade, linewidth=width, zorder=3)
+            known = ax.get_legend_handles_labels()[1]
+            ax.plot(
+                values, np.where(chosen, row, np.nan), line, color=shade, label=None if words in known else words,
+                **looks,
+            )  # fmt: skip
     if special:
         _mark(ax, result, ordinates)
 
@@ -127,10 +142,11 @@ def _mark(ax: Axes, result: xr.Dataset, ordinates: NDArray[np.float64]) -> None:
     for kind in dict.fromkeys(kinds):
         here = np.array([one == kind for one in kinds])
         marker, words = MARKS.get(kind, (_OTHER, kind.replace("_", " ")))
+        size = _SIZES.get(kind, _SIZE)
         ax.plot(
-            np.tile(values[here], len(heights)), heights[:, here].ravel(), marker, markersize=4, zorder=5,
-            linestyle="none", markerfacecolor="white", markeredgecolor=style.COLORS["section"], markeredgewidth=0.8,
-            label=None if words in known else words,
+            np.tile(values[here], len(heights)), heights[:, here].ravel(), marker, markersize=size,
+            zorder=5.7 - 0.1 * size, linestyle="none", markerfacecolor="white",
+            markeredgecolor=style.COLORS["section"], markeredgewidth=0.8, label=None if words in known else words,
         )  # fmt: skip
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from nonsmooth.plot import style
 from nonsmooth.plot.comparison import MEASURED, THEORY, check_kind, measured_label
 from nonsmooth.plot.labels import first_states, name_and_unit, name_axes
+from nonsmooth.plot.phase_portrait import shade_zone
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -108,12 +109,7 @@ def comparison_phase_portrait(
                 zorder=4 if side == "theory" else 5, rasterized=points[0].size > 500, linestyle="none",
             )  # fmt: skip
         if zone is not None:
-            edge = float(result[zone]) if isinstance(zone, str) else zone
-            left, right = drawn.get_xlim()
-            drawn.axvline(edge, color=style.COLORS["muted"], linewidth=0.6, linestyle="--", zorder=1)
-            if edge < right:
-                drawn.axvspan(max(edge, left), right, color=style.COLORS["zone"], alpha=0.18, linewidth=0, zorder=0)
-            drawn.set_xlim(left, right)
+            shade_zone(drawn, float(result[zone]) if isinstance(zone, str) else zone)
         low, high = drawn.get_ylim()
         drawn.set_ylim(low, high + 0.15 * (high - low))
         drawn.legend(loc="upper center", ncols=2)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -66,7 +66,7 @@ def curve(result: xr.Dataset, ax: Axes | None = None, *, special: bool = True, c
         known = drawn.get_legend_handles_labels()[1]
         drawn.plot(
             result[x].values, result[y].values, line, color=color or style.COLORS[shade], linewidth=1.0, zorder=3,
-            label=None if words in known else words, path_effects=_seam() if _over_chart(drawn) else None,
+            label=None if words in known else words, path_effects=style.halo(1.8) if _over_chart(drawn) else None,
         )  # fmt: skip
         if special:
             _mark(drawn, result, x, y)
@@ -79,13 +79,6 @@ def _over_chart(ax: Axes) -> bool:
     from matplotlib.collections import QuadMesh
 
     return any(isinstance(item, QuadMesh) for item in ax.collections)
-
-
-def _seam() -> list[Any]:
-    """A white seam, so that a line shows over every colour of a chart."""
-    from matplotlib import patheffects
-
-    return [patheffects.withStroke(linewidth=1.8, foreground="white")]
 
 
 def _legend(ax: Axes) -> None:

@@ -16,11 +16,11 @@ from matplotlib.ticker import ScalarFormatter
 
 from nonsmooth.plot.labels import with_unit
 
-__all__ = ["name_axis", "power_for"]
+__all__ = ["name_axis", "power_for", "prefixed"]
 
 _PREFIXES = {0: "", -3: "m", -6: "\N{MICRO SIGN}", -9: "n"}
 #: Units that take a prefix; the first one of a compound does: ``m``, ``m/s``, ``m s``, ``N/m``.
-_FIRST = re.compile(r"(m|s|N|V|A|Pa|W|J)(?=$|[/ ])")
+_FIRST = re.compile(r"(m|s|N|V|A|Pa|W|J|rad)(?=$|[/ ])")
 #: Below this a prefix is used. Lengths and speeds are read in millimetres up to a metre.
 _WHOLE = {"m": 1.0}
 _ALMOST_WHOLE = 0.1
@@ -37,7 +37,13 @@ def power_for(unit: str, largest: float) -> int:
     return max(-3 * int(np.ceil((-np.log10(largest) - 1) / 3 - 1e-9)) or -3, min(_PREFIXES))
 
 
-def name_axis(axis: Axis, name: str, unit: str) -> None:
+def prefixed(value: float, unit: str) -> tuple[str, str]:
+    """Return a value as an axis would write it, and its unit with the prefix: ``("−1.2", "mm")``."""
+    power = power_for(unit, abs(value))
+    return f"{value / 10.0**power:g}".replace("-", "\N{MINUS SIGN}"), _PREFIXES[power] + unit
+
+
+def name_axis(axis: Axis, name: str, unit: str, largest: float | None = None) -> None:
     """Label an axis with its quantity, in the unit whose prefix suits what the axis shows now.
 
     Call it when everything is drawn. The prefix is that of all axes which share this one's scale.
@@ -50,6 +56,8 @@ def name_axis(axis: Axis, name: str, unit: str) -> None:
         The quantity, as it stands in the label.
     unit
         The unit of the values drawn.
+    largest
+        The greatest magnitude among them; by default that of the axis' ends.
     """
     if not isinstance(axis.major, _Ticks):
         plain = axis.get_scale() == "linear" and type(axis.get_major_formatter()) is ScalarFormatter
@@ -59,30 +67,35 @@ def name_axis(axis: Axis, name: str, unit: str) -> None:
         ticks = _Ticks(axis.major)
         for one in _sharing(axis):
             one.major = ticks
-    axis.major.names[axis] = (name, unit)
-    power = power_for(unit, float(np.abs(axis.get_view_interval()).max()))
+    axis.set_label_text(with_unit(name, unit))
+    axis.major.units[axis] = unit
+    power = power_for(unit, float(np.abs(axis.get_view_interval()).max()) if largest is None else largest)
     axis.set_major_formatter(_Prefixed(unit))
-    for one, (word, own) in axis.major.names.items():
-        if one is axis or _power_of(one.get_label_text(), own) is not None:
-            one.set_label_text(with_unit(word, _PREFIXES[power] + own))
+    axis.major.write(power)
 
 
 class _Ticks(Ticker):
     """The ticks of axes that :func:`name_axis` named. Another formatter brings back the labels' plain units."""
 
-    names: dict[Axis, tuple[str, str]]
+    units: dict[Axis, str]
 
     def __init__(self, before: Ticker) -> None:
         super().__init__()
         self.__dict__.update(before.__dict__)
-        self.names = {}
+        self.units = {}
 
     def __setattr__(self, key: str, value: Any) -> None:
         super().__setattr__(key, value)
         if key == "formatter" and not isinstance(value, _Prefixed):
-            for axis, (name, unit) in self.__dict__.get("names", {}).items():
-                if _power_of(axis.get_label_text(), unit):
-                    axis.set_label_text(with_unit(name, unit))
+            self.write(0)
+
+    def write(self, power: int) -> None:
+        """Write the prefix into the labels that name the unit; what else stands there stays."""
+        for axis, unit in self.__dict__.get("units", {}).items():
+            text = axis.get_label_text()
+            old = _power_of(text, unit)
+            if old is not None and old != power:
+                axis.set_label_text(text.replace(f"({_PREFIXES[old]}{unit})", f"({_PREFIXES[power]}{unit})"))
 
 
 class _Prefixed(ScalarFormatter):

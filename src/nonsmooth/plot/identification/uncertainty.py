@@ -96,7 +96,7 @@ def coverage(finding: Any, ax: Axes | None = None) -> Axes:
             rms = float(np.sqrt(np.nanmean(off[:, k] ** 2)))
             drawn.annotate(
                 f"{np.count_nonzero(held[:, k])}/{rigs}\nrms {rms:.2f}", (k, 1.02), xycoords=("data", "axes fraction"),
-                ha="center", va="bottom", fontsize="small",
+                ha="center", va="bottom", fontsize=style.small(drawn),
             )  # fmt: skip
         reach = max(3.0, 1.08 * float(np.nanmax(np.abs(off[np.isfinite(off)]), initial=0.0)))
         drawn.set_ylim(-reach, reach)

@@ -11,12 +11,14 @@ from nonsmooth import plot
 from nonsmooth.analysis.sweep import sweep
 from nonsmooth.plot.comparison import MEASURED, THEORY
 from nonsmooth.plot.comparison_diagram import comparison_diagram
-from nonsmooth.studies.savi2007.figure import Figure, sheet
+from nonsmooth.plot.labels import name_and_unit, name_axes
+from nonsmooth.studies.savi2007.figure import Figure, only_outer, sheet
 from nonsmooth.studies.savi2007.flows import EXACT, Settings, starts
 from nonsmooth.studies.savi2007.gap import PHASES
 from nonsmooth.studies.savi2007.printed import FIGURE_14
 from nonsmooth.studies.savi2007.rig_motions import (
     GRID,
+    SIDES,
     Motions,
     compared,
     diagram_of,
@@ -100,7 +102,7 @@ def _compute_14(settings: Settings) -> dict[str, xr.Dataset]:
 def _caption_14(data: Mapping[str, xr.Dataset]) -> str:
     return (
         "State space at the gaps of the paper's caption, the model with the parameters identified (above) and the "
-        "virtual rig (synthetic, below); rings are the model's section points, the contact zone is shaded. "
+        "virtual rig (synthetic, below); crosses are the model's section points, the contact zone is shaded. "
         "Where starts lead to several motions, that of the paper is drawn. "
         f"Rig: {said(data, FIGURE_14)}."
     )
@@ -118,18 +120,16 @@ def _draw_16(data: Mapping[str, xr.Dataset]) -> Canvas:
     with plot.journal():
         canvas = sheet(plot.PAGE, 0.56 * plot.PAGE)
         grid = canvas.subplots(2, 4, sharex="col", sharey="col")
-        for row, side, color, word in (
-            (grid[0], "measured", MEASURED, "virtual rig (synthetic)"), (grid[1], "theory", THEORY, "model, identified")
-        ):  # fmt: skip
+        for row, side, color in zip(grid, SIDES, (THEORY, MEASURED), strict=True):
             for i, ax in enumerate(row):
                 points = result[f"{side}_section"].isel(section_phase=i).values
                 looks = {"color": color, "markersize": 1.4, "markeredgewidth": 0, "rasterized": True}
                 ax.plot(points[:, 0], points[:, 1], ".", **looks)
-                ax.ticklabel_format(axis="y", style="plain")
-                ax.set_xlabel("$x$ (m)" if side == "theory" else "")
-                ax.set_ylabel(f"{word}\n" + "$v$ (m/s)" if i == 0 else "")
-                if side == "measured":
+                name_axes(ax, name_and_unit(result, "x"), name_and_unit(result, "v"))
+                ax.set_ylabel(f"{SIDES[side]}\n{ax.get_ylabel()}")
+                if side == "theory":
                     ax.set_title(f"({'abcd'[i]}) phase ${_ANGLES[i]}$", y=1.0, pad=9)
+        only_outer(grid)
     return canvas
 
 
@@ -139,9 +139,9 @@ def _caption_16(data: Mapping[str, xr.Dataset]) -> str:
     words = ", ".join(f"{a:.3f} ({a / b:.2f})" for a, b in zip(far, halves, strict=True))
     return (
         "Strange attractor at g = 0.0018 m, omega = 11.15 rad/s, rho = 0.33 N: sections at four phases of the forcing "
-        f"from one record of the virtual rig (synthetic, {result.sizes['measured_iterate']} turns) and by the model "
-        "with the parameters identified. Energy distances of the two clouds at the four phases, and over the 95th "
-        f"percentile of those of the record's own halves: {words}."
+        "by the model with the parameters identified (above) and from one record of the virtual rig (synthetic, below, "
+        f"{result.sizes['measured_iterate']} turns). Energy distances of the two clouds at the four phases, and over "
+        f"the 95th percentile of those of the record's own halves: {words}."
     )
 
 
