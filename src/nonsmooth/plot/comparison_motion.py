@@ -107,6 +107,7 @@ def comparison_phase_portrait(
                 *points, "o", color=color, markersize=4.5 if ring else 0.9 if side == "theory" else 2.0,
                 markerfacecolor="none" if ring else color, markeredgewidth=0.9 if ring else 0,
                 zorder=4 if side == "theory" else 5, rasterized=points[0].size > 500, linestyle="none",
+                label=f"section points, {word}",
             )  # fmt: skip
         if zone is not None:
             shade_zone(drawn, float(result[zone]) if isinstance(zone, str) else zone)

@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure as Canvas
 
-__all__ = ["FIGURES"]
+__all__ = ["FIGURES", "PRINTED"]
 
-_PRINTED = {NUMBERS[key].value: NUMBERS[key].text for key in ("period 4 from", "period 2 from", "period 1 from")}
+PRINTED = {NUMBERS[key].value: NUMBERS[key].text for key in ("period 4 from", "period 2 from", "period 1 from")}
 
 
 def _compute_11(settings: Settings) -> dict[str, xr.Dataset]:
@@ -31,7 +31,7 @@ def _draw_11(data: Mapping[str, xr.Dataset]) -> Canvas:
         canvas = sheet(plot.PAGE, 0.5 * plot.PAGE)
         grid = canvas.subplots(1, 2, sharey=True)
         for ax, flow, letter in zip(grid, FLOWS, "ab", strict=True):
-            draw_diagram(ax, data, flow.key, "v", values=_PRINTED, words="printed in the paper (N)")
+            draw_diagram(ax, data, flow.key, "v", values=PRINTED, words="printed in the paper (N)")
             ax.set_title(f"({letter}) {flow.title}")
         only_outer(grid)
         shared_legend(canvas)

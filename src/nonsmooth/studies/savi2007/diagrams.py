@@ -110,15 +110,16 @@ def other_motions(many: xr.Dataset, swept: xr.Dataset) -> xr.DataArray:
     return many["period_number"].copy(data=far)
 
 
-def mark_values(ax: Axes, values: Mapping[float, str], words: str) -> None:
-    """A dotted line with its number at each of these values."""
+def mark_values(ax: Axes, values: Mapping[float, str], words: str, foot: bool = False) -> None:
+    """A dotted line with its number at each of these values, at the top or at the foot."""
     for i, (value, text) in enumerate(values.items()):
         ax.axvline(
             value, color="black", linewidth=0.7, linestyle=":", zorder=2.5, label=words if i == 0 else None
         )
         ax.annotate(
-            text, (value, 1.0), (-1.5, -3), xycoords=ax.get_xaxis_transform(), textcoords="offset points", rotation=90,
-            ha="right", va="top", fontsize=small(ax), path_effects=halo(), zorder=6,
+            text, (value, 0.0 if foot else 1.0), (-1.5, 3 if foot else -3), xycoords=ax.get_xaxis_transform(),
+            textcoords="offset points", rotation=90, ha="right", va="bottom" if foot else "top", fontsize=small(ax),
+            path_effects=halo(), zorder=6,
         )  # fmt: skip
 
 

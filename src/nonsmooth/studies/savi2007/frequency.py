@@ -25,11 +25,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Canvas
 
-__all__ = ["FIGURES"]
+__all__ = ["FIGURES", "SHOWN"]
 
 _CHAOTIC = 9.55
 _JUST_ABOVE = 9.8  # rad/s, above the grazing frequency
-_SHOWN = {omega: f"{omega:.2f}" for omega in FIGURE_18}
+SHOWN = {omega: f"{omega:.2f}" for omega in FIGURE_18}
 
 
 def _compute_17(settings: Settings) -> dict[str, xr.Dataset]:
@@ -49,7 +49,7 @@ def _draw_17(data: Mapping[str, xr.Dataset]) -> Canvas:
         for j, flow in enumerate(FLOWS):
             for i, state in enumerate("xv"):
                 ax = grid[i, j]
-                draw_diagram(ax, data, flow.key, state, values=_SHOWN, words="frequencies of Fig. 18 (rad/s)")
+                draw_diagram(ax, data, flow.key, state, values=SHOWN, words="frequencies of Fig. 18 (rad/s)")
                 ends = data[flow.key]["omega"].values[[0, -1]]
                 mark_grazing(ax, [omega for omega in grazing_of(data[flow.key]) if ends[0] < omega < ends[1]])
                 if flow is EXACT and state == "v":  # above each other in x

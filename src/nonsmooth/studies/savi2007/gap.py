@@ -21,12 +21,12 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure as Canvas
 
-__all__ = ["FIGURES", "PHASES"]
+__all__ = ["FIGURES", "GAPS", "PHASES"]
 
 PHASES = {"0": 0.0, "quarter": 0.25, "half": 0.5, "three_quarters": 0.75}  # of a forcing period
 _ANGLES = ("0", r"\pi/2", r"\pi", r"3\pi/2")
 _CHAOTIC = 0.0018
-_GAPS = {g: prefixed(g, "m")[0] for g in FIGURE_14}
+GAPS = {g: prefixed(g, "m")[0] for g in FIGURE_14}
 
 
 def _compute_13(settings: Settings) -> dict[str, xr.Dataset]:
@@ -38,7 +38,7 @@ def _draw_13(data: Mapping[str, xr.Dataset]) -> Canvas:
         canvas = sheet(plot.PAGE, 0.5 * plot.PAGE)
         grid = canvas.subplots(1, 2, sharey=True)
         for ax, flow, letter in zip(grid, FLOWS, "ab", strict=True):
-            draw_diagram(ax, data, flow.key, "v", values=_GAPS, words="gaps of Fig. 14 (mm)")
+            draw_diagram(ax, data, flow.key, "v", values=GAPS, words="gaps of Fig. 14 (mm)")
             ax.set_title(f"({letter}) {flow.title}")
         only_outer(grid)
         shared_legend(canvas)
