@@ -13,7 +13,7 @@ import pytest
 import xarray as xr
 
 from nonsmooth import plot
-from nonsmooth.plot.labels import column, label
+from nonsmooth.plot.labels import column, name_and_unit
 from nonsmooth.plot.segments import with_gaps
 
 CASES = [
@@ -136,7 +136,7 @@ def test_a_portrait_tells_the_modes_apart(trajectory: xr.Dataset) -> None:
 
 def test_a_portrait_carries_section_points(trajectory: xr.Dataset, points: xr.Dataset) -> None:
     ax = plot.phase_portrait(trajectory, section=points)
-    (drawn,) = (line for line in ax.lines if line.get_label() == "section")
+    (drawn,) = (line for line in ax.lines if line.get_label() == "section points")
     np.testing.assert_array_equal(drawn.get_xdata(), points["section"].sel(state="x").values.ravel())
 
 
@@ -159,10 +159,10 @@ def test_contact_is_shaded_over_time(trajectory: xr.Dataset) -> None:
 
 
 def test_labels_have_symbols_units_or_words(trajectory: xr.Dataset, swept: xr.Dataset) -> None:
-    assert label(trajectory, "time") == "$t$ (s)"
-    assert label(trajectory, "x") == "$x$ (m)"
-    assert label(trajectory, "contact_force") == "contact force (N)"
-    assert label(swept, "omega") == r"$\omega$ (rad/s)"
+    assert name_and_unit(trajectory, "time") == ("$t$", "s")
+    assert name_and_unit(trajectory, "x") == ("$x$", "m")
+    assert name_and_unit(trajectory, "contact_force") == ("contact force", "N")
+    assert name_and_unit(swept, "omega") == (r"$\omega$", "rad/s")
 
 
 def test_an_unknown_state_is_answered_with_all_states(swept: xr.Dataset) -> None:

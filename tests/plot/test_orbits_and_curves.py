@@ -127,4 +127,4 @@ def test_a_branch_of_equilibria() -> None:
         a, x = (np.asarray(part, dtype=float) for part in lines[0].get_data())
         good = np.isfinite(x)
         assert x[good] == pytest.approx(np.sqrt(a[good]), abs=1e-6)
-        assert words(ax) == ["fold"]
+        assert words(ax) == ["stable branch", "unstable branch", "fold"]
