@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 __all__ = ["bifurcation", "sorted_out"]
 
 _LINES = ("section", "third", "fourth")
-_COLORS = {"up": "pale", "down": "second", "none": "section"}
+_COLORS = {"up": "first", "down": "second", "none": "section"}
 _SEAM = 2.0  # a rising point over a falling one, which lies on it: both show
 
 
@@ -64,10 +64,12 @@ def bifurcation(
         for i, direction in enumerate(directions):
             cloud = points.isel(direction=i) if "direction" in points.dims else points
             values = np.broadcast_to(result[parameter].values, cloud.transpose(..., parameter).shape)
+            under = direction == "up" and "down" in directions
             drawn.plot(
                 values.ravel(), cloud.transpose(..., parameter).values.ravel(), ".", rasterized=True,
-                markersize=size * (_SEAM if direction == "up" and "down" in directions else 1.0), markeredgewidth=0,
-                color=color or style.COLORS[_COLORS[direction]], label=direction if len(directions) > 1 else None,
+                markersize=size * (_SEAM if under else 1.0), markeredgewidth=0,
+                color=color or style.COLORS["pale" if under else _COLORS[direction]],
+                label=direction if len(directions) > 1 else None,
             )  # fmt: skip
         for k, one in enumerate(branches):
             draw_branch(drawn, one, y=name, color=style.COLORS[_LINES[k % len(_LINES)]], behind=True)

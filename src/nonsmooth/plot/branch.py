@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -105,7 +105,7 @@ def draw_branch(
         if not chosen.any():
             continue
         under = behind and line == "-"
-        looks = {"linewidth": 3 * width, "alpha": _SEAM, "zorder": 0.5} if under else {"linewidth": width, "zorder": 3}
+        looks: dict[str, Any] = {"linewidth": 3 * width, "alpha": _SEAM, "zorder": 0.5} if under else {"linewidth": width, "zorder": 3}
         words = f"{_STATES[line]} branch"
         for row in ordinates:
             known = ax.get_legend_handles_labels()[1]

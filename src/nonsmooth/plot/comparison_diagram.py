@@ -70,10 +70,10 @@ def _flips(ax: Axes, result: xr.Dataset) -> None:
         kind: result[kind].values if kind in result else np.full(count, np.nan)
         for kind in ("theory_flip", "measured_flip_read", "measured_flip", "measured_flip_error")
     }
-    word, named = measured_label(result), set()
+    word = measured_label(result)
 
     def once(words: str) -> str | None:
-        return None if words in named else (named.add(words) or words)
+        return None if words in ax.get_legend_handles_labels()[1] else words
 
     for expected, read, still, error in zip(*found.values(), strict=True):
         if np.isfinite(expected):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -67,7 +67,7 @@ def comparison_response(result: xr.Dataset, ax: Axes | None = None, *, digits: i
 def _jumps(ax: Axes, result: xr.Dataset, digits: int) -> None:
     """A mark at the foot for each jump: filled where measured, open where predicted, with the difference."""
     foot = ax.get_xaxis_transform()
-    names = {"color": style.COLORS["muted"], "markersize": 3.5, "linestyle": "none"}
+    names: dict[str, Any] = {"color": style.COLORS["muted"], "markersize": 3.5, "linestyle": "none"}
     for key, word, face in (("measured_jump", measured_label(result), None), ("theory_jump", "theory", "white")):
         if np.isfinite(result[key].values if key in result else np.nan).any():
             ax.plot([], [], "D", markerfacecolor=face, label=f"jump, {word}", **names)

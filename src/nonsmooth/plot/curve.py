@@ -86,6 +86,7 @@ def _legend(ax: Axes) -> None:
     own, before = ax.get_legend_handles_labels()[1], ax.get_legend()
     if before is not None and not {text.get_text() for text in before.get_texts()} <= set(own):
         ax.add_artist(before)
+        before.set_clip_on(False)  # else the layout takes it for a thing within the axes, and cuts it
     if _over_chart(ax):
         ax.legend(loc="lower left", bbox_to_anchor=(1.01, 0.0), borderaxespad=0.0)
     else:

@@ -11,6 +11,7 @@ import re
 from typing import Any
 
 import numpy as np
+from matplotlib import rcParams
 from matplotlib.axis import Axis, Ticker
 from matplotlib.ticker import ScalarFormatter
 
@@ -59,19 +60,20 @@ def name_axis(axis: Axis, name: str, unit: str, largest: float | None = None) ->
     largest
         The greatest magnitude among them; by default that of the axis' ends.
     """
-    if not isinstance(axis.major, _Ticks):
+    ticks = axis.major
+    if not isinstance(ticks, _Ticks):
         plain = axis.get_scale() == "linear" and type(axis.get_major_formatter()) is ScalarFormatter
         if not plain or _FIRST.match(unit) is None:
             axis.set_label_text(with_unit(name, unit))
             return
-        ticks = _Ticks(axis.major)
+        ticks = _Ticks(ticks)
         for one in _sharing(axis):
             one.major = ticks
     axis.set_label_text(with_unit(name, unit))
-    axis.major.units[axis] = unit
+    ticks.units[axis] = unit
     power = power_for(unit, float(np.abs(axis.get_view_interval()).max()) if largest is None else largest)
     axis.set_major_formatter(_Prefixed(unit))
-    axis.major.write(power)
+    ticks.write(power)
 
 
 class _Ticks(Ticker):
@@ -104,10 +106,11 @@ class _Prefixed(ScalarFormatter):
     def __init__(self, unit: str) -> None:
         super().__init__()
         self.unit = unit
+        self.limits = tuple(rcParams["axes.formatter.limits"])  # of the numbers themselves
 
     def _power(self) -> int:
         """The power of the prefix in the label, on this axis or on one that shares its scale."""
-        if self.axis is None:
+        if not isinstance(self.axis, Axis):
             return 0
         found = [_power_of(axis.get_label_text(), self.unit) for axis in (self.axis, *_sharing(self.axis))]
         return next((power for power in found if power is not None), 0)
@@ -117,7 +120,7 @@ class _Prefixed(ScalarFormatter):
         power = self._power()
         if power:
             self.set_scientific(True)
-            self.set_powerlimits((power, power))
+        self.set_powerlimits((power, power) if power else self.limits)
         super().set_locs(locs)
 
     def get_offset(self) -> str:

@@ -66,8 +66,8 @@ def amplitude_fit(finding: Any, ax: Axes | None = None) -> Axes:
         drawn.margins(x=0.02)
         name_axes(drawn, (r"$\omega$", "rad/s"), ("amplitude of $x$", "m"))
         if left:
-            for (_, _, looks), words in zip(left, residuals, strict=True):
-                drawn.plot([], [], linestyle="none", markeredgewidth=0, label=words, **looks)
+            for (_, _, looks), name in zip(left, residuals, strict=True):
+                drawn.plot([], [], linestyle="none", markeredgewidth=0, label=name, **looks)
             residual_strip(drawn, "m", *left, error=error)
         drawn.legend(**ABOVE, ncols=2, columnspacing=1.0, handlelength=1.6)
     return drawn

@@ -82,12 +82,12 @@ def draw_diagram(
     """
     many, swept = data[f"{key}_starts"], data[key]
     other, settled = other_motions(many, swept), many["period_number"] > 0
-    for chosen, looks, name in (
-        (other & ~settled, {"color": "#D0D0D0", "size": 1.4}, "other starts, no period"),
-        (other & settled, {"color": "#8C8C8C", "size": 1.8}, "other starts, periodic"),
+    for chosen, color, size, name in (
+        (other & ~settled, "#D0D0D0", 1.4, "other starts, no period"),
+        (other & settled, "#8C8C8C", 1.8, "other starts, periodic"),
     ):
         if bool(chosen.any()):
-            plot.bifurcation(many.assign(section=many["section"].where(chosen)), ax, y=y, **looks)
+            plot.bifurcation(many.assign(section=many["section"].where(chosen)), ax, y=y, color=color, size=size)
             ax.get_lines()[-1].set(label=name, zorder=0.3)
     plot.bifurcation(swept, ax, y=y, size=0.9 if swept.sizes["iterate"] > 100 else 1.1)
     if key == EXACT.key:
