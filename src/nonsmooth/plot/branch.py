@@ -105,7 +105,9 @@ def draw_branch(
         if not chosen.any():
             continue
         under = behind and line == "-"
-        looks: dict[str, Any] = {"linewidth": 3 * width, "alpha": _SEAM, "zorder": 0.5} if under else {"linewidth": width, "zorder": 3}
+        looks: dict[str, Any] = {"linewidth": width, "zorder": 3}
+        if under:
+            looks = {"linewidth": 3 * width, "alpha": _SEAM, "zorder": 0.5}
         words = f"{_STATES[line]} branch"
         for row in ordinates:
             known = ax.get_legend_handles_labels()[1]

@@ -60,12 +60,12 @@ def name_axis(axis: Axis, name: str, unit: str, largest: float | None = None) ->
     largest
         The greatest magnitude among them; by default that of the axis' ends.
     """
-    ticks = axis.major
+    ticks, formatter = axis.major, axis.get_major_formatter()
+    ours = type(formatter) in (ScalarFormatter, _Prefixed)
+    if axis.get_scale() != "linear" or not ours or _FIRST.match(unit) is None:
+        axis.set_label_text(with_unit(name, unit))
+        return
     if not isinstance(ticks, _Ticks):
-        plain = axis.get_scale() == "linear" and type(axis.get_major_formatter()) is ScalarFormatter
-        if not plain or _FIRST.match(unit) is None:
-            axis.set_label_text(with_unit(name, unit))
-            return
         ticks = _Ticks(ticks)
         for one in _sharing(axis):
             one.major = ticks
