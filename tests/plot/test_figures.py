@@ -176,3 +176,15 @@ def test_point_clouds_are_pixels_and_text_stays_text(swept: xr.Dataset, tmp_path
     text = plot.save_figure(plot.bifurcation(swept), tmp_path / "a.svg").read_text()
     assert "data:image/png;base64" in text
     assert re.search(r"<text[^>]*>", text)
+
+
+def test_a_falling_sweep_does_not_hide_the_rising_one(swept: xr.Dataset) -> None:
+    """It lies on top, and its points are smaller: coinciding ones show as a seam. The legend shows both as large."""
+    ax = plot.bifurcation(swept, y="v")
+    up, down = ax.lines
+    assert up.get_markersize() >= 1.5 * down.get_markersize() and up.get_zorder() <= down.get_zorder()
+    light = [mpl.colors.rgb_to_hsv(mpl.colors.to_rgb(line.get_color())) @ [0, -1, 1] for line in (up, down)]
+    assert light[0] > light[1] + 0.2  # told apart in grey print too
+    assert len({handle.get_markersize() for handle in ax.get_legend().legend_handles}) == 1
+    alone = plot.bifurcation(swept.isel(direction=[0]), plt.figure().add_subplot(), y="v")
+    assert alone.lines[0].get_markersize() == down.get_markersize()

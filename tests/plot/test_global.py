@@ -12,6 +12,7 @@ from nonsmooth.analysis.basins import basins
 from nonsmooth.analysis.chart import chart
 from nonsmooth.plot.basin_fractions import basin_fractions as draw_fractions
 from nonsmooth.plot.basins import basins as draw_basins
+from nonsmooth.plot.basins import told_apart
 from nonsmooth.plot.chart import chart as draw_chart
 from nonsmooth.plot.palette import PERIODS, attractor_color
 
@@ -118,3 +119,15 @@ def test_runs_that_diverge_have_a_colour_of_their_own() -> None:
     colours = drawn.to_rgba(drawn.get_array()).reshape(2, 3, 4)
     assert (colours[:, 0] == colours[:, 2]).all() and (colours[:, 0] != colours[:, 1]).any()
     assert (colours[:, 0, :3] < 1.0).all()  # not the white of what is not known
+
+
+def test_attractors_of_one_kind_are_told_apart() -> None:
+    assert told_apart(["period 3", "chaos", "period 3"]) == ["period 3 (a)", "chaos", "period 3 (b)"]
+
+
+def test_each_attractor_has_a_mark_of_its_own(support: ns.System) -> None:
+    found = basins(support, {"x": np.linspace(-0.02, 0.02, 12), "v": np.linspace(-0.2, 0.2, 10)}, **QUIET)
+    ax = draw_basins(found)
+    marks = [line.get_marker() for line in ax.lines]
+    assert len(set(marks)) == found.sizes["attractor"]
+    assert [len(line.get_xdata()) for line in ax.lines] == found["period_number"].values.tolist()
