@@ -53,6 +53,8 @@ import numpy as np
 from nonsmooth.kernels import cache
 import driver
 
+told = []
+cache.before_compiling.append(told.append)
 model = cache.load_module(sys.stdin.read(), "model")
 value = driver.drive(model.f, model.g, np.ones(1), 2)
 drive = driver.drive
@@ -61,6 +63,7 @@ print(json.dumps({
     "driver": list(cache.cache_statistics(driver)),
     "model": list(cache.cache_statistics(model)),
     "overloads": len(getattr(drive, "signatures", [])),
+    "told": told,
     "file": model.__file__,
 }))
 '''
@@ -88,15 +91,18 @@ def test_second_process_compiles_nothing_and_a_new_model_only_itself(tmp_path):
     first = run(tmp_path, 2.0)
     assert first["value"] == expected(2.0)
     assert ["drive", 0, 1] in first["driver"]
+    assert sorted(first["told"]) == ["drive", "f", "g", "twice"]
 
     again = run(tmp_path, 2.0)
     assert again["value"] == expected(2.0)
     assert all(misses == 0 for _, _, misses in again["driver"] + again["model"])
+    assert again["told"] == []
 
     other = run(tmp_path, 3.0)
     assert other["value"] == expected(3.0)
     assert all(misses == 0 for _, _, misses in other["driver"])
     assert all((hits, misses) == (0, 1) for _, hits, misses in other["model"])
+    assert sorted(other["told"]) == ["f", "g"]
     # The functions came in as first-class function types: no second version of the driver was made for them.
     assert other["overloads"] == 1
 

@@ -35,7 +35,12 @@ from numba.core.compiler_lock import global_compiler_lock
 
 from nonsmooth.kernels.folder import cache_folder, mark_used, prune, write_atomically
 
-__all__ = ["cache_statistics", "callback", "compiled", "device", "inline", "kernel", "load_module"]
+__all__ = [
+    "before_compiling", "cache_statistics", "callback", "compiled", "device", "inline", "kernel", "load_module",
+]  # fmt: skip
+
+#: Called before a function is compiled because the cache has no entry for it, with the function's name.
+before_compiling: list[Callable[[str], None]] = []
 
 # Kernels allocate nothing (scratch is an argument), so they need no reference counts: "_nrt" off saves a third.
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}, "_nrt": False}
@@ -106,9 +111,9 @@ class _ContentCache(_Cache):
         path = self._path(sig, target_context.codegen())
         try:
             payload = pickle.loads(path.read_bytes())
-        except FileNotFoundError:
-            return None
-        except Exception:  # a damaged entry (full disk, lost power) is compiled anew and replaced
+        except Exception:  # none yet, or a damaged one (full disk, lost power): compiled, and kept in its place
+            for call in before_compiling:
+                call(self._name)
             return None
         mark_used(path)
         return CompileResult._rebuild(target_context, *payload)
