@@ -52,7 +52,7 @@ def derivative(scr, row, order, tau):
 def bracketed(scr, row, order, lo, hi):
     """Root of ``derivative(order)`` where it changes sign on [lo, hi]: Newton, kept inside the bracket.
 
-    The bracket is halved instead where Newton's change is not below half of the one before: the bound is not reached."""
+    Where a change is not below half of the one before the bracket is halved instead: the bound is never reached."""
     rising = derivative(scr, row, order, hi) > 0.0
     tau = 0.5 * (lo + hi)
     last = hi - lo

@@ -156,7 +156,7 @@ def _halve(b, base, left, m):
 def _zero(a, m, lo, hi, way):
     """The one zero in [lo, hi] of a, passed in the direction ``way``: Newton, kept inside its bracket.
 
-    The bracket is halved instead where Newton's change is not below half of the one before: the bound is not reached."""
+    Where a change is not below half of the one before the bracket is halved instead: the bound is never reached."""
     f_lo, f_hi = dense(a, m, lo), dense(a, m, hi)
     x = 0.5 * (lo + hi)
     if f_lo * f_hi < 0.0:
