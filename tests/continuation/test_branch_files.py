@@ -138,7 +138,7 @@ def test_schema(branch: xr.Dataset) -> None:
 
 
 def test_multipliers_change_little_from_point_to_point() -> None:
-    """A step is made shorter where multipliers move by more than 0.15 on the Riemann sphere, on a straight branch too."""
+    """A step is made shorter where multipliers move by more than 0.15 on the Riemann sphere, straight or not."""
     system = ns.models.discontinuous_support(rho=0.14, g=0.02, omega=3.4)
     branch = ns.continue_orbit(ns.find_orbit(system), "omega", (3.0, 7.0))
     mu, signature = branch["floquet_multipliers"].values, branch["signature"].values
