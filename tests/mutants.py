@@ -1,4 +1,4 @@
-"""Apply small mistakes to the sources one by one and see that a test fails: ``python tests/mutants.py [part of a name]``.
+"""Apply small mistakes to the sources one by one and see that a test fails: ``python tests/mutants.py [part of name]``.
 
 ``mutants.toml`` lists them: the file, the text and what it becomes, and the tests that state the fact. A mutant that
 all of them survive is a hole in the tests: exit code 1. The sources themselves are not touched; a copy is.
