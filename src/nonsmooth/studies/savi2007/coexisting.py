@@ -17,6 +17,7 @@ from nonsmooth.plot.basins import names_of as kinds_of
 from nonsmooth.plot.basins import section_mark
 from nonsmooth.plot.palette import attractor_color
 from nonsmooth.plot.phase_portrait import ZONE, shade_zone
+from nonsmooth.plot.units import prefixed
 from nonsmooth.studies.savi2007.figure import Figure, sheet
 from nonsmooth.studies.savi2007.flows import EXACT, Settings
 from nonsmooth.studies.savi2007.printed import FIGURE_13, FIGURE_17
@@ -97,7 +98,8 @@ def _caption(data: Mapping[str, xr.Dataset]) -> str:
     found = data["basins"]
     lost = int((found["label"].values < 0).sum())
     at = ", ".join(
-        f"{name} = {float(found[name]):g} {found[name].attrs['units']}" for name in ("omega", "rho", "g")
+        f"{name} = {' '.join(prefixed(float(found[name]), found[name].attrs['units']))}"
+        for name in ("omega", "rho", "g")
     )
     first, second = (str(dim) for dim in found["label"].dims)
     return (
@@ -117,6 +119,6 @@ def _caption(data: Mapping[str, xr.Dataset]) -> str:
 FIGURES = tuple(
     Figure(name, None, f"Basins at {words}", _compute(name), _draw, _caption, beside=beside)
     for name, words, beside in (
-        ("basins13", "g = 0.0014 m", 13), ("basins17", "omega = 9.55 rad/s", 17),
+        ("basins13", "g = 1.4 mm", 13), ("basins17", "omega = 9.55 rad/s", 17),
     )
 )  # fmt: skip

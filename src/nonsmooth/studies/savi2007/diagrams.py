@@ -25,7 +25,7 @@ __all__ = [
     "shared_legend",
 ]  # fmt: skip
 
-_OTHER, _SHARE = 0.03, 0.25  # another motion: a quarter of its points so far off, in parts of the diagram's range
+_OTHER, _SHARE = 0.05, 0.25  # another motion: a quarter of its points so far off, in parts of the diagram's range
 
 #: What a caption says of them.
 ABOUT_BRANCHES = (

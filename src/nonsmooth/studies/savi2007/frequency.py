@@ -85,7 +85,7 @@ def _name_windows(ax: Axes, data: Mapping[str, xr.Dataset], state: str) -> None:
 def _caption_17(data: Mapping[str, xr.Dataset]) -> str:
     grazing = ", ".join(f"{omega:.5f}" for omega in grazing_of(data["exact"]))
     return (
-        "Bifurcation diagram over the forcing frequency, rho = 0.23 N, g = 0.0036 m: displacement (above) and "
+        "Bifurcation diagram over the forcing frequency, rho = 0.23 N, g = 3.6 mm: displacement (above) and "
         "velocity at the section. Dotted: the three frequencies of Fig. 18; green: closed-form grazing of the "
         f"motion without contact ({grazing} rad/s; in (b) that of a gap g - eta). Above it chaos dies out, given time: "
         "what has no period in (b) had no time to. "

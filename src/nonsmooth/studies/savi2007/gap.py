@@ -94,7 +94,7 @@ def _draw_15(data: Mapping[str, xr.Dataset]) -> Canvas:
 def _caption_15(data: Mapping[str, xr.Dataset]) -> str:
     sizes = " and ".join(f"{data[f'{flow.key}_0'].sizes['iterate']} ({flow.key})" for flow in FLOWS)
     return (
-        "Strange attractor at g = 0.0018 m, omega = 11.15 rad/s, rho = 0.33 N: sections at four phases of the "
+        "Strange attractor at g = 1.8 mm, omega = 11.15 rad/s, rho = 0.33 N: sections at four phases of the "
         f"forcing, {sizes} points each, from rest. Both rows have the same axes."
     )
 

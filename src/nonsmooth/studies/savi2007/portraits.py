@@ -101,7 +101,11 @@ def setting(symbol: str, value: float, unit: str) -> str:
 def describe(data: Mapping[str, xr.Dataset], shown: Mapping[float, int]) -> str:
     """What the starts reached at each value, by the exact flow."""
     survey = data["exact"]
-    words = [f"{_parameter(survey)} = {value:g}: {words_of(periods_reached(survey, value))}" for value in shown]
+    name = _parameter(survey)
+    unit = str(survey[name].attrs["units"])
+    words = [
+        f"{name} = {' '.join(prefixed(value, unit))}: {words_of(periods_reached(survey, value))}" for value in shown
+    ]
     return f"Reached by {survey.sizes['start']} starts (exact): " + "; ".join(words) + "."
 
 

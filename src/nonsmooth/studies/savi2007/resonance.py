@@ -99,7 +99,7 @@ def _caption(name: str) -> Callable[[Mapping[str, xr.Dataset]], str]:
         exact, smoothed = data["exact"], data["smoothed"]
         grazing = " and ".join(f"{omega:.5f}" for omega in grazing_of(exact))
         return (
-            f"Frequency response for rho = {float(exact['rho']):g} N and g = {float(exact['g']):g} m: half the "
+            f"Frequency response for rho = {float(exact['rho']):g} N and g = {1e3 * float(exact['g']):g} mm: half the "
             "peak-to-peak displacement with rising and falling frequency; arrows: jumps, with their frequencies. "
             "Branches in (a): periodic orbits of the exact flow, continued from one of them. "
             f"Closed-form grazing at {grazing} rad/s (green; in (b) of g - eta). Steps of "

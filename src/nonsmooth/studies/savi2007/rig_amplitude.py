@@ -99,7 +99,7 @@ def _caption_12(data: Mapping[str, xr.Dataset]) -> str:
     return (
         "State space with section points at four amplitudes of Fig. 11, the model with the parameters identified "
         "(above) and the virtual rig (synthetic, below); crosses: the model's section points; contact zone shaded. "
-        f"Rig: {said(data, FIGURE_12)}."
+        f"Rig: {said(data, FIGURE_12, 'N')}."
     )
 
 

@@ -94,7 +94,8 @@ def _draw_18(data: Mapping[str, xr.Dataset]) -> Canvas:
 def _caption_18(data: Mapping[str, xr.Dataset]) -> str:
     return (
         "State space at three frequencies of Fig. 17: the virtual rig (synthetic, dashed, section points black) "
-        f"over the model with the parameters identified; the contact zone is shaded. Rig: {said(data, FIGURE_18)}."
+        "over the model with the parameters identified; the contact zone is shaded. "
+        f"Rig: {said(data, FIGURE_18, 'rad/s')}."
     )
 
 

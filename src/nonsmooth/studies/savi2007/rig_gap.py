@@ -120,7 +120,7 @@ def _caption_14(data: Mapping[str, xr.Dataset]) -> str:
         "State space at the gaps of the paper's caption, the model with the parameters identified (above) and the "
         "virtual rig (synthetic, below); crosses are the model's section points, the contact zone is shaded. "
         "Where starts lead to several motions, that of the paper is drawn. "
-        f"Rig: {said(data, FIGURE_14)}."
+        f"Rig: {said(data, FIGURE_14, 'm')}."
     )
 
 
@@ -154,7 +154,7 @@ def _caption_16(data: Mapping[str, xr.Dataset]) -> str:
     far, halves = result["energy_distance_matched"].values, result["measured_halves_p95"].values
     words = ", ".join(f"{a:.3f} ({a / b:.2f})" for a, b in zip(far, halves, strict=True))
     return (
-        "Strange attractor at g = 0.0018 m, omega = 11.15 rad/s, rho = 0.33 N: sections at four phases of the forcing "
+        "Strange attractor at g = 1.8 mm, omega = 11.15 rad/s, rho = 0.33 N: sections at four phases of the forcing "
         "by the model with the parameters identified (above) and from one record of the virtual rig (synthetic, below, "
         f"{result.sizes['measured_iterate']} turns). Energy distances of the two clouds at the four phases, and over "
         f"the 95th percentile of those of the record's own halves: {words}."

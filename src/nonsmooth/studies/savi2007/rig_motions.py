@@ -11,6 +11,7 @@ from nonsmooth import plot
 from nonsmooth.plot.comparison import MEASURED, THEORY
 from nonsmooth.plot.labels import name_and_unit, name_axes
 from nonsmooth.plot.phase_portrait import shade_zone
+from nonsmooth.plot.units import prefixed
 from nonsmooth.studies.savi2007.diagrams import shared_legend
 from nonsmooth.studies.savi2007.figure import only_outer, sheet
 from nonsmooth.studies.savi2007.laboratory import as_result
@@ -146,13 +147,13 @@ def chosen(data: Mapping[str, xr.Dataset], value: float, wanted: int) -> xr.Data
     return next((run for run in runs if int(run["measured_period_number"]) == wanted), runs[0])
 
 
-def said(data: Mapping[str, xr.Dataset], shown: Mapping[float, int]) -> str:
+def said(data: Mapping[str, xr.Dataset], shown: Mapping[float, int], unit: str) -> str:
     """What the rig did at each value, and what the model has there."""
     words = []
     for value in shown:
         rig = " and ".join(_name(n) for n in measured_periods_at(data, value))
         model = sorted({int(n) for run in runs_at(data, value) for n in run["coexisting_period_number"].values})
-        words.append(f"{value:g}: {rig} (model: {', '.join(_name(n) for n in model)})")
+        words.append(f"{' '.join(prefixed(value, unit))}: {rig} (model: {', '.join(_name(n) for n in model)})")
     return "; ".join(words)
 
 
