@@ -229,7 +229,7 @@ class _Joint:
         )  # fmt: skip
 
 
-def _grazes(piece: Piece, motion: FloatArray, gap: float, margin: float, lingers: float) -> bool:
+def _grazes(piece: Piece, motion: FloatArray, gap: float, margin: float, lingers: float = np.inf) -> bool:
     """Whether the car turns within a margin of the gap, or dry friction all but holds it on the way for so long.
 
     A start that changes by a micrometre then decides whether the car touches, or turns: there the sum of squares has
