@@ -67,7 +67,7 @@ def _caption_4(data: Mapping[str, xr.Dataset]) -> str:
     car, support = found_in(data["oscillator"]), found_in(data["support"])
     return (
         f"Force against displacement, {car.runs} pulls of the car and {support.runs} pushes of the support's spring by "
-        f"hand. (a) Slope 2k = {car.number}, k = {car.number.times(0.5)} (95 %; most of it the force sensor's gain, "
+        f"hand. (a) Slope 2k = {car.number}, k = {car.number.times(0.5)} (most of it the force sensor's gain, "
         f"within 1 %); below, what the lines leave: the two ways part by twice the dry friction. (b) k_s = "
         f"{support.number}. The paper: 8.47 and 1210 N/m."
     )
@@ -94,7 +94,7 @@ def _caption_7(data: Mapping[str, xr.Dataset]) -> str:
     found = found_in(data["drop"])
     return (
         f"Free decay of the support with 1.33 kg on it. (a) One of {found.runs} runs. (b) Logarithm of its turning "
-        f"points: damping ratio {found.others['damping_ratio']}, c_s = {found.number}, from all runs (95 %). "
+        f"points: damping ratio {found.others['damping_ratio']}, c_s = {found.number}, from all runs. "
         "The paper: 0.0075 and 0.60 N s/m."
     )
 
@@ -147,7 +147,7 @@ def _draw_table(data: Mapping[str, xr.Dataset]) -> Canvas:
         for ax in (wide, near):
             ax.axvline(0, color=plot.COLORS["muted"], linewidth=0.6, zorder=0)
             for i, (name, (printed, number, truth)) in enumerate(rows.items()):
-                middle, half = (100 * (v / truth) for v in (number.value - truth, number.interval.uncertainty))
+                middle, half = (100 * (v / truth) for v in (number.value - truth, number.expanded))
                 ax.errorbar(
                     middle, i + 0.12, xerr=half, fmt="o", color=plot.COLORS["first"], markersize=3, capsize=1.5,
                     elinewidth=0.8, label="identified, 95 %" if i == 0 else None,
