@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -48,7 +49,7 @@ def test_a_larger_uncertainty_only_ever_makes_it_undecided() -> None:
     for _ in range(300):
         printed, value, resolution = 1.0, 1 + rng.normal(0, 0.03), rng.choice([0.0, 0.005, 0.04])
         met = [judge(printed, _known(value, u), resolution) for u in np.linspace(0, 0.1, 41)]
-        changes = [new for old, new in zip(met, met[1:], strict=False) if new is not old]
+        changes = [new for old, new in pairwise(met) if new is not old]
         assert changes == [Verdict.UNDECIDED]
 
 

@@ -31,7 +31,9 @@ from nonsmooth.studies.savi2007.rows import Data, Row
 from nonsmooth.studies.savi2007.special import SpecialPoint, ratios, special_table, table_of_points
 from nonsmooth.studies.savi2007.verdicts import CLOSE, MEANING, RULE, Cause, Verdict, judge
 
-__all__ = ["write_report"]
+__all__ = ["REPORTS", "write_report"]
+
+REPORTS = ("claims.json", "report.md", "report.html")
 
 TITLE = "Savi, Divenyi, Franca & Weber (2007), reproduced"
 _PAPER = (
@@ -49,12 +51,11 @@ _MODEL, _RIG = "model", "virtual rig (synthetic)"
 def write_report(
     folder: Path, figures: Sequence[Figure], data: Data, rows: Sequence[Row], settings: Settings, *, complete: bool
 ) -> None:
-    """Write ``report.md``, ``report.html`` and ``claims.json`` into the folder that holds the figures."""
+    """Write ``REPORTS`` into the folder that holds the figures."""
     blocks = _blocks(folder, figures, data, rows, settings, complete)
     text = json.dumps([asdict(row) | {"reason": row.reason} for row in rows], indent=1, ensure_ascii=False)
-    (folder / "claims.json").write_text(text + "\n", encoding="utf-8")
-    (folder / "report.md").write_text(to_markdown(blocks), encoding="utf-8")
-    (folder / "report.html").write_text(to_html(blocks, TITLE), encoding="utf-8")
+    for name, content in zip(REPORTS, (text + "\n", to_markdown(blocks), to_html(blocks, TITLE)), strict=True):
+        (folder / name).write_text(content, encoding="utf-8")
 
 
 def _blocks(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth import plot
+from nonsmooth.experiment.rig import IDENTIFICATION
 from nonsmooth.plot import identification as pictures
 from nonsmooth.studies.savi2007.figure import Figure, sheet
 from nonsmooth.studies.savi2007.findings import Number, estimates_of, found_in, kept, the_finding
@@ -186,30 +187,32 @@ FIGURES = (
         _findings({"oscillator": "spring_slope", "support": "support_slope"}),
         _side_by_side(("oscillator", pictures.force_displacement, "(a) oscillator"),
                       ("support", pictures.force_displacement, "(b) support"), height=0.5),
-        _caption_4, rig=True,
+        _caption_4, rig=True, procedures=("springs", "support"),
     ),
     Figure(
         "fig05", 5, "Natural frequency from an impulsive response", _findings({"tap": "omega_0"}),
         _side_by_side(("tap", pictures.impulse_history, "(a) displacement"),
                       ("tap", pictures.impulse_response, "(b) magnitude of the DFT")),
-        _caption_5, rig=True,
+        _caption_5, rig=True, procedures=("impulse",),
     ),
     Figure(
         "fig06", 6, "Damping from the amplitude over frequency",
         _findings({"viscous": "c_viscous_only", "amplitudes": "c_response"}),
         _side_by_side(("amplitudes", pictures.amplitude_fit, ""), width=0.62 * plot.PAGE), _caption_6, rig=True,
+        procedures=("impulse", "response"),
     ),
     Figure(
         "fig07", 7, "Damping of the support from a free decay", _findings({"drop": "c_s_drop"}),
         _side_by_side(("drop", pictures.impulse_history, "(a) displacement of the test mass"),
                       ("drop", pictures.drop_decay, "(b) turning points")),
-        _caption_7, rig=True,
+        _caption_7, rig=True, procedures=("drop",),
     ),
     Figure(
         "fig08", 8, "Calibrations of the drive", _findings({"voltage": "voltage_frequency", "crank": "crank_force"}),
         _side_by_side(("voltage", pictures.calibration, "(a) motor"), ("crank", pictures.calibration, "(b) crank"),
                       height=0.5),
-        _caption_8, rig=True,
+        _caption_8, rig=True, procedures=("springs", "voltage", "crank"),
     ),
-    Figure("table1", None, "Table 1: parameters identified", _compute_table, _draw_table, _caption_table, rig=True),
+    Figure("table1", None, "Table 1: parameters identified", _compute_table, _draw_table, _caption_table, rig=True,
+           procedures=IDENTIFICATION),
 )  # fmt: skip

@@ -44,7 +44,8 @@ figcaption { font-size: .88rem; color: var(--muted); }
 .u { height: 2px; top: calc(50% - 1px); } .u.s0 { background: var(--model); } .u.s1 { background: var(--other); }
 .u.s2 { background: var(--rig); }
 .ticks span { position: absolute; transform: translateX(-50%); font-size: .78rem; color: var(--muted);
-  white-space: nowrap; }
+  white-space: nowrap; } .ticks span:first-child { transform: none; } .ticks span:last-child {
+  transform: translateX(-100%); }
 .key { display: flex; flex-wrap: wrap; gap: .2rem 1.4rem; font-size: .88rem; margin-bottom: .4rem; }
 .key span { display: inline-flex; align-items: center; gap: .5rem; } .key i { position: static; transform: none;
   display: inline-block; } .key .m.s2 { transform: rotate(45deg); } .key .zone { width: 1.4rem; height: .9rem; }
@@ -62,13 +63,14 @@ th, td { padding: .32rem .5rem; text-align: left; vertical-align: top; } th { ba
 @media screen and (max-width: 52rem) {
   .lines { grid-template-columns: 1fr; gap: .1rem; font-size: 1rem; } .lines dd { margin-bottom: .6rem; }
   .tally { grid-template-columns: 1fr; gap: .1rem; } .bar span { min-width: 1.1rem; font-size: .85rem; }
-  .values .s1 { display: none; } .comparison .grid { grid-template-columns: 1fr auto; } .comparison .values { grid-column: 2; }
+  .values .s1 { display: none; } .comparison .grid { grid-template-columns: 1fr auto; }
+  .comparison .values { grid-column: 2; }
   .comparison .axis { grid-column: 1 / -1; height: 1.2rem; margin-bottom: .35rem; }
   table thead { display: none; } table, table tbody, table tr,
   table td { display: block; } table tbody { padding: .5rem 0; }
   table td { padding: .15rem .4rem; } table td:empty { display: none; }
   table td[data-label]::before { content: attr(data-label) ": "; color: var(--muted); }
-  nav ul ul { columns: 1; } h1 { font-size: 1.4rem; }
+  td:first-child { font-weight: 700; } nav ul ul { columns: 1; } h1 { font-size: 1.4rem; }
 }
 @media print { body { max-width: none; font-size: 9.5pt; padding: 0; } h2 { break-after: avoid; } figure {
   break-inside: avoid; } nav { display: none; } a { color: inherit; text-decoration: none; }
