@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 import re
+import subprocess
+import time
 from pathlib import Path
 
 import numpy as np
@@ -145,7 +148,7 @@ def test_what_is_finished_is_used_again(quick: Reproduction, monkeypatch: pytest
 
 
 def test_a_run_of_another_kind_is_not_mixed_with_it(quick: Reproduction) -> None:
-    with pytest.raises(ValueError, match="holds figures of a quick run, which would be mixed: give another folder"):
+    with pytest.raises(ValueError, match="holds figures of a quick run, and would mix the two: give another folder"):
         reproduce(quick.out, figures=[9], progress=False)
 
 
@@ -167,6 +170,23 @@ def test_a_damaged_or_an_unfinished_figure_is_made_again(tmp_path: Path) -> None
     assert finished("fig02", settings) is None
     record.unlink()  # interrupted before the end
     assert finished("fig02", settings) is None
+
+
+@pytest.mark.skipif(not hasattr(os, "killpg"), reason="no process groups here")
+def test_what_a_measurement_has_forked_ends_with_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A notebook's Ctrl-C reaches one process only."""
+    shell = tmp_path / "shell"
+    shell.write_text("#!/bin/sh\nsleep 60 &\necho $!\nwait\n")
+    shell.chmod(0o700)
+    monkeypatch.setattr("nonsmooth.studies.savi2007.bench.sys.executable", str(shell))
+    log = tmp_path / "rig" / "log.txt"
+    with pytest.raises(KeyboardInterrupt), Bench(tmp_path, [figures_of_the_study()[0]], quick=True):
+        while not log.read_text().strip():
+            time.sleep(0.05)
+        raise KeyboardInterrupt
+    time.sleep(0.2)
+    shown = subprocess.run(["ps", "-o", "stat=", "-p", log.read_text().strip()], capture_output=True, text=True)
+    assert shown.stdout.strip()[:1] in ("", "Z")
 
 
 def test_a_folder_with_other_files_and_one_that_cannot_be_written_into_are_refused(tmp_path: Path) -> None:

@@ -40,7 +40,7 @@ def finished(name: str, settings: Settings) -> Made | None:
     Raises
     ------
     ValueError
-        If it was made with other settings.
+        If it is of a quick run and this one is not, or the reverse.
     """
     from nonsmooth.results.store import load
 
@@ -48,19 +48,21 @@ def finished(name: str, settings: Settings) -> Made | None:
     try:
         record = json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
         made_by, keys, seconds = dict(record["made_by"]), list(record["datasets"]), float(record["seconds"])
-        wanted = _made_by(settings)
-        if made_by != wanted:
-            _refuse_other(folder, made_by, wanted)
-            return None
-        return {key: load(folder / f"{name}_{key}.nc") for key in keys}, seconds
-    except (OSError, KeyError, TypeError, json.JSONDecodeError, DataFileError):
+        quick = bool(made_by["quick"])
+    except (OSError, ValueError, KeyError, TypeError):
         return None
-
-
-def _refuse_other(folder: Path, made_by: Mapping[str, object], wanted: Mapping[str, object]) -> None:
-    if made_by.get("quick") != wanted["quick"]:
-        is_quick = "a quick run" if made_by.get("quick") else "a run that is not quick"
-        raise ValueError(f"{folder} holds figures of {is_quick}, which would be mixed: give another folder (--out)")
+    if quick != settings.quick:
+        raise ValueError(
+            f"{folder} holds figures of a {'quick' if quick else 'whole'} run, and would mix the two: give another "
+            "folder (--out)"
+        )
+    wanted = _made_by(settings)
+    if made_by not in (wanted, wanted | {"full": True}):
+        return None
+    try:
+        return {key: load(folder / f"{name}_{key}.nc") for key in keys}, seconds
+    except (OSError, DataFileError):
+        return None
 
 
 def _made_by(settings: Settings) -> dict[str, str | bool]:

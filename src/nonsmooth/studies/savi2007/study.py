@@ -132,11 +132,11 @@ def reproduce(
         for i, figure in enumerate(computed):
             _say(progress, f"[{i + 1}/{len(computed)}] {figure.name}: {figure.title}")
             begin = time.perf_counter()
-            data = figure.compute(settings)
+            datasets = figure.compute(settings)
             seconds = time.perf_counter() - begin
-            finish(figure.name, data, seconds, settings)
-            made[figure.name] = data, seconds
-            _draw(figure, data, folder)
+            finish(figure.name, datasets, seconds, settings)
+            made[figure.name] = datasets, seconds
+            _draw(figure, datasets, folder)
         _say(progress and bool(measured), f"waiting for the virtual rig: {', '.join(one.name for one in measured)}")
         bench.wait(lambda line: _say(progress, line))
     for figure in measured:
