@@ -142,15 +142,15 @@ def _in_short(rows: Sequence[Row]) -> tuple[tuple[str, str], ...]:
 _CAUSES = {
     Cause.MISPRINT: "misprinted",
     Cause.TABLE_1: "because Table 1 contradicts itself (omega_0 = 4.60 rad/s; its k and m give 4.50)",
-    Cause.REAL: "real, by neither of these",
+    Cause.REAL: "real, neither misprinted nor due to Table 1",
     Cause.RIG: "by the virtual rig",
 }
 
 
 def _spread(counts: Mapping[Verdict, int]) -> str:
-    """``27 of the 34 statements that it can decide agree, 2 in part; 1 is undecided, 4 differ``."""
+    """``27 of the 34 statements that it can decide agree, 2 in part, 1 undecided, 4 differ``."""
     n = {verdict: counts.get(verdict, 0) for verdict in _DECIDING}
-    text = f"{n[Verdict.AGREES]} of the {sum(n.values())} statements that it can decide agree"
+    text = f"{n[Verdict.AGREES] or 'None'} of the {sum(n.values())} statements that it can decide agree"
     text += f", {n[Verdict.IN_PART]} in part" if n[Verdict.IN_PART] else ""
     text += f", {n[Verdict.UNDECIDED]} undecided" if n[Verdict.UNDECIDED] else ""
     return text + f", {n[Verdict.DIFFERS] or 'none'} {'differs' if n[Verdict.DIFFERS] == 1 else 'differ'}"

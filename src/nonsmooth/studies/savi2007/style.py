@@ -12,7 +12,7 @@ STYLE = """
   --zone: #2c343c; --notice: #4a3b10; --agrees: #1d4f3b; --part: #594609; --undecided: #3a424b; --differs: #6d2d16;
   --input: #42366a; --adds: #1b4763; } }
 * { box-sizing: border-box; }
-body { font: 16px/1.5 system-ui, -apple-system, 'Segoe UI', Roboto, 'DejaVu Sans', sans-serif; color: var(--ink);
+body { font: 1rem/1.5 system-ui, -apple-system, 'Segoe UI', Roboto, 'DejaVu Sans', sans-serif; color: var(--ink);
   background: var(--paper); max-width: 72rem; margin: 0 auto; padding: 1.2rem 1rem 4rem; overflow-wrap: break-word; }
 h1, h2, h3 { line-height: 1.2; text-wrap: balance; } h1 { font-size: 1.7rem; margin: .4rem 0 .6rem; }
 h2 { font-size: 1.3rem; margin: 2.4rem 0 .8rem; padding-bottom: .25rem; border-bottom: 2px solid var(--line); }
@@ -72,7 +72,7 @@ th, td { padding: .32rem .5rem; text-align: left; vertical-align: top; } th { ba
   table td[data-label]::before { content: attr(data-label) ": "; color: var(--muted); }
   td:first-child { font-weight: 700; } nav ul ul { columns: 1; } h1 { font-size: 1.4rem; }
 }
-@media print { body { max-width: none; font-size: 9.5pt; padding: 0; } h2 { break-after: avoid; } figure {
+@media print { html { font-size: 9.5pt; } body { max-width: none; padding: 0; } h2 { break-after: avoid; } figure {
   break-inside: avoid; } nav { display: none; } a { color: inherit; text-decoration: none; }
   * { print-color-adjust: exact; -webkit-print-color-adjust: exact; } }
 """
