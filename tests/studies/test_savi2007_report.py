@@ -19,7 +19,7 @@ from nonsmooth.studies.savi2007 import Reproduction, reproduce, study
 from nonsmooth.studies.savi2007.bench import Bench
 from nonsmooth.studies.savi2007.claims import CLAIMS
 from nonsmooth.studies.savi2007.findings import estimates_of
-from nonsmooth.studies.savi2007.finished import finish, finished
+from nonsmooth.studies.savi2007.finished import finish, finished, just_made
 from nonsmooth.studies.savi2007.flows import Settings
 from nonsmooth.studies.savi2007.printed import TABLE_1
 from nonsmooth.studies.savi2007.study import figures_of_the_study
@@ -167,6 +167,9 @@ def test_a_damaged_or_an_unfinished_figure_is_made_again(tmp_path: Path) -> None
     words = json.loads(record.read_text())
     words["made_by"]["sources"] = "another version"
     record.write_text(json.dumps(words))
+    assert finished("fig02", settings) is None
+    assert just_made("fig02", settings)[1] == 1.5  # by a process of this run, before the sources changed
+    record.write_text("{")
     assert finished("fig02", settings) is None
     record.unlink()  # interrupted before the end
     assert finished("fig02", settings) is None

@@ -191,7 +191,7 @@ def _name(period: int) -> str:
 
 
 def f15(data: Data) -> list[Row]:
-    """The strange attractor: neighbours part, and both flows draw the same set."""
+    """The strange attractor: neighbouring trajectories separate, and both flows draw the same set."""
     from scipy.spatial import cKDTree
 
     rates = [separation_rate(data["fig15"][f"{flow}_twins"]) for flow in FLOWS]
@@ -203,7 +203,10 @@ def f15(data: Data) -> list[Row]:
         size = exact.max(axis=0) - exact.min(axis=0)
         distance, _ = cKDTree(exact / size).query(smoothed / size)
         worst = max(worst, float(np.quantile(distance, 0.99)))
-    texts = [f"neighbours part by exp({rate:.3f} ± {error:.3f}) per period" for rate, error in rates]
+    texts = [
+        f"neighbouring trajectories separate by a factor exp({rate:.3f} ± {error:.3f}) per period"
+        for rate, error in rates
+    ]  # fmt: skip
     chaotic = all(rate > 5 * error for rate, error in rates)
     return [
         Row(
@@ -311,6 +314,7 @@ def f18(data: Data) -> list[Row]:
         Row(
             "F18", "Fig. 18, caption", f"orbits at omega = {wanted}", _reached(surveys[0], FIGURE_18),
             _reached(surveys[1], FIGURE_18), _apart(data, "fig18", FIGURE_18), agreed(met),
-            f"On the chaotic orbit neighbours part by exp({rate:.2f} ± {error:.2f}) per period (exact).",
+            "Neighbouring trajectories on the chaotic orbit separate by a factor "
+            f"exp({rate:.2f} ± {error:.2f}) per period (exact).",
         )
     ]  # fmt: skip

@@ -142,8 +142,8 @@ def c1(data: Data) -> list[Row]:
         periods = sorted({int(n) for n in np.unique(regimes(data["fig11"][flow], "up")[1]) if n > 0})
         rate, error = separation_rate(data["fig15"][f"{flow}_twins"])
         texts.append(
-            f"{met} jumps in Figs. 9-10; periods {', '.join(map(str, periods))} in Fig. 11; neighbours part by "
-            f"exp({rate:.2f} ± {error:.2f}) per period in Fig. 15"
+            f"{met} jumps in Figs. 9-10; periods {', '.join(map(str, periods))} in Fig. 11; neighbouring trajectories "
+            f"separate by a factor exp({rate:.2f} ± {error:.2f}) per period in Fig. 15"
         )
         seen.append(met > 0 and len(periods) > 1 and rate > 5 * error)
     at_grazing = []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
@@ -15,7 +15,7 @@ from nonsmooth.studies.savi2007.flows import Settings
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Made", "finish", "finished", "refuse_strange"]
+__all__ = ["Made", "finish", "finished", "just_made", "refuse_strange"]
 
 #: The datasets of a figure by key, and the seconds that they took.
 Made: TypeAlias = "tuple[dict[str, xr.Dataset], float]"
@@ -42,8 +42,6 @@ def finished(name: str, settings: Settings) -> Made | None:
     ValueError
         If it is of a quick run and this one is not, or the reverse.
     """
-    from nonsmooth.results.store import load
-
     folder = settings.place
     try:
         record = json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
@@ -57,8 +55,28 @@ def finished(name: str, settings: Settings) -> Made | None:
             "folder (--out)"
         )
     wanted = _made_by(settings)
-    if made_by not in (wanted, wanted | {"full": True}):
-        return None
+    return _loaded(folder, name, keys, seconds) if made_by in (wanted, wanted | {"full": True}) else None
+
+
+def just_made(name: str, settings: Settings) -> Made:
+    """What another process of this run has finished, even if the sources have been changed meanwhile.
+
+    Raises
+    ------
+    RuntimeError
+        If it is not there, or damaged.
+    """
+    folder = settings.place
+    record = json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
+    found = _loaded(folder, name, record["datasets"], record["seconds"])
+    if found is None:
+        raise RuntimeError(f"{folder}: datasets of {name} are not there, or damaged, although it was measured")
+    return found
+
+
+def _loaded(folder: Path, name: str, keys: Sequence[str], seconds: float) -> Made | None:
+    from nonsmooth.results.store import load
+
     try:
         return {key: load(folder / f"{name}_{key}.nc") for key in keys}, seconds
     except (OSError, DataFileError):

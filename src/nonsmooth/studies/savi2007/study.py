@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from nonsmooth.studies.savi2007.bench import Bench
 from nonsmooth.studies.savi2007.figure import Figure
-from nonsmooth.studies.savi2007.finished import finish, finished, refuse_strange
+from nonsmooth.studies.savi2007.finished import finish, finished, just_made, refuse_strange
 from nonsmooth.studies.savi2007.flows import Settings
 
 if TYPE_CHECKING:
@@ -139,11 +139,7 @@ def reproduce(
             _draw(figure, datasets, folder)
         _say(progress and bool(measured), f"waiting for the virtual rig: {', '.join(one.name for one in measured)}")
         bench.wait(lambda line: _say(progress, line))
-    for figure in measured:
-        found = finished(figure.name, settings)
-        if found is None:
-            raise RuntimeError(f"{folder}: the datasets of {figure.name} are not there although it was measured")
-        made[figure.name] = found
+    made |= {figure.name: just_made(figure.name, settings) for figure in measured}
     shown = tuple(figure for figure in known if figure.name in made)
     data = {figure.name: made[figure.name][0] for figure in shown}
     for figure in shown:
