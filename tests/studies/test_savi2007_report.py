@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
 import re
-import subprocess
-import time
 from pathlib import Path
 
 import numpy as np
@@ -173,22 +170,6 @@ def test_a_damaged_or_an_unfinished_figure_is_made_again(tmp_path: Path) -> None
     assert finished("fig02", settings) is None
     record.unlink()  # interrupted before the end
     assert finished("fig02", settings) is None
-
-
-@pytest.mark.skipif(not hasattr(os, "killpg"), reason="no process groups here")
-def test_what_a_measurement_has_forked_ends_with_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A notebook's Ctrl-C reaches one process only."""
-    shell = tmp_path / "shell"
-    shell.write_text("#!/bin/sh\nsleep 60 &\necho $!\nwait\n")
-    shell.chmod(0o700)
-    monkeypatch.setattr("nonsmooth.studies.savi2007.bench.sys.executable", str(shell))
-    log = tmp_path / "rig" / "log.txt"
-    with Bench(tmp_path, [figures_of_the_study()[0]], quick=True):
-        while not log.read_text().strip():
-            time.sleep(0.05)
-    time.sleep(0.2)
-    shown = subprocess.run(["ps", "-o", "stat=", "-p", log.read_text().strip()], capture_output=True, text=True)
-    assert shown.stdout.strip()[:1] in ("", "Z")
 
 
 def test_a_folder_with_other_files_and_one_that_cannot_be_written_into_are_refused(tmp_path: Path) -> None:

@@ -29,7 +29,6 @@ __all__ = ["Bench", "main", "measure"]
 
 RIG = "rig"
 _LOG = "log.txt"
-_GROUPED = hasattr(os, "killpg")
 _TIMED = " s of a processor"
 _LOOK = 0.2  # s; between two looks at what it says
 
@@ -48,20 +47,19 @@ class Bench:
             with open(folder / RIG / _LOG, "wb") as log:
                 self.process = subprocess.Popen(
                     command + ["--quick"] * quick + ["--full"] * full, stdin=subprocess.DEVNULL, stdout=log,
-                    stderr=subprocess.STDOUT, process_group=0 if _GROUPED else None,
+                    stderr=subprocess.STDOUT, start_new_session=True,
                 )  # fmt: skip
 
     def __enter__(self) -> Bench:
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self.process is None or self.process.poll() is not None:
-            return
-        if _GROUPED:  # with the processes that it has forked: a notebook's Ctrl-C reaches this one only
-            os.killpg(self.process.pid, signal.SIGTERM)
-        else:
-            self.process.terminate()
-        self.process.wait()
+        if self.process is not None and self.process.poll() is None:
+            if hasattr(os, "killpg"):  # the processes that it has forked do not end by themselves
+                os.killpg(self.process.pid, signal.SIGTERM)
+            else:
+                self.process.terminate()
+            self.process.wait()
 
     def wait(self, heard: Callable[[str], None]) -> None:
         """Wait until all figures are measured; ``heard`` gets the lines that are written until then.
