@@ -152,7 +152,7 @@ def test_the_gap_of_one_setting_is_the_mean_of_its_runs():
 def test_a_run_whose_gap_disagrees_is_named_and_left_out():
     values = 1.8e-3 + 1e-6 * np.array([1.0, -1.0, 55.0, 0.0])
     found = counted_gap(told(values, [2e-6] * 4, [0.0018] * 4), 0.0018)
-    assert found.index == [0, 1, 3] and found.value == pytest.approx(1.8e-3, abs=1e-12)
+    assert found.places == [0, 1, 3] and found.value == pytest.approx(1.8e-3, abs=1e-12)
     assert "contact Run #3: left out" in found.notes[0] and "+55 µm" in found.notes[0]
     halves = counted_gap(told(1.8e-3 + 1e-5 * np.array([5.0, 5.0, -5.0, -5.0]), [2e-6] * 4, [0.0018] * 4), 0.0018)
     assert halves.error > 5e-5 and "no majority agrees" in halves.notes[0]
