@@ -307,5 +307,5 @@ def _content(arrays: Mapping[str, NDArray[Any]]) -> str:
     found = hashlib.sha256()
     for name in sorted(arrays):
         found.update(f"{name} {arrays[name].dtype.str} {arrays[name].shape} ".encode())
-        found.update(np.ascontiguousarray(arrays[name]).reshape(-1).view(np.uint8))
+        found.update(np.ascontiguousarray(arrays[name]).reshape(-1).view(np.uint8).data)
     return found.hexdigest()

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from nonsmooth.cli import compare, identify, models, plan, reproduce, rig, run, show
+from nonsmooth.cli.terminal import printable
 from nonsmooth.errors import SolveError
 from nonsmooth.results.provenance import package_version
 
@@ -35,7 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except _USER_ERRORS as error:
         if options.traceback:
             raise
-        print(f"nonsmooth: {error}", file=sys.stderr)
+        print(f"nonsmooth: {printable(str(error))}", file=sys.stderr)
         return 2
 
 

@@ -25,7 +25,7 @@ _UNSTAMPED = '{"version": '
 
 
 def content(attributes: Mapping[Any, Any], variables: Iterable[tuple[str, bool, xr.Variable]]) -> dict[str, Any]:
-    """Content of a Dataset in short, as plain data: an entry for each variable, its values hashed, and one for the rest.
+    """Content of a Dataset in short, as plain data: an entry for each variable, with the hash of its values.
 
     The variables (name, coordinate or not, variable) are taken one at a time, so that a file need not be in memory
     whole. Equal contents have equal :func:`digest`.
@@ -93,7 +93,8 @@ def _entry(owner: str, key: Hashable, value: Any) -> list[Any]:
     where = f"attribute {key!r} of {owner}"
     if value is None or isinstance(value, bool | np.bool_ | dict):
         raise TypeError(
-            f"{where} is a {type(value).__name__}, which files cannot hold; use a number, a string or an array of numbers"
+            f"{where} is a {type(value).__name__}, which files cannot hold; "
+            "use a number, a string or an array of numbers"
         )
     array = np.asarray(value)
     entries, shape = array.ravel().tolist(), list(array.shape) if array.size > 1 else []
@@ -122,7 +123,7 @@ def _values(where: str, variable: xr.Variable) -> str:
         words = [_text(word, where) for word in values.ravel().tolist()]
         return hashlib.sha256("\0".join(words).encode()).hexdigest()
     ordered = np.ascontiguousarray(values, values.dtype.newbyteorder("<"))
-    return hashlib.sha256(ordered.reshape(-1).view(np.uint8)).hexdigest()
+    return hashlib.sha256(ordered.reshape(-1).view(np.uint8).data).hexdigest()
 
 
 def _text(word: Any, where: str) -> str:

@@ -176,7 +176,7 @@ def _is_result(path: Path) -> bool:
 
 @contextmanager
 def _readable(source: Path) -> Iterator[None]:
-    """What a damaged file causes, as one sentence: almost any exception of the libraries below, HDF5's own among them."""
+    """One sentence for what a damaged file causes: almost any exception of the libraries below, HDF5's among them."""
     try:
         yield
     except DataFileError:
