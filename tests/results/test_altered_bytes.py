@@ -82,9 +82,10 @@ def altered(whole: Path, copy: Path, rng: Rng) -> str:
     if copy.is_dir():
         shutil.rmtree(copy)
     (shutil.copytree if whole.is_dir() else shutil.copyfile)(whole, copy)
-    # Empty files have nothing to alter. Each file of a store comes as often as any other: most are descriptions.
+    # A file of a store is taken at random, most are descriptions; or a byte of them all, most are numbers.
     files = sorted(file for file in copy.rglob("*") if file.is_file() and file.stat().st_size) or [copy]
-    file = files[int(rng.integers(len(files)))]
+    sizes = np.array([file.stat().st_size for file in files])
+    file = files[int(rng.choice(len(files), p=None if rng.random() < 0.5 else sizes / sizes.sum()))]
     before = file.read_bytes()
     change = CHANGES[int(rng.integers(len(CHANGES)))]
     data = bytearray(before)

@@ -91,11 +91,11 @@ def test_a_codec_that_runs_code_is_not_used(tmp_path: Path) -> None:
     for name in ("a/.zarray", ".zmetadata"):
         whole = json.loads((path / name).read_text())
         array = whole.get("metadata", {"a/.zarray": whole})["a/.zarray"]
-        array.update(filters=[{"id": "pickle", "protocol": 5}], compressor=None)
+        array.update(dtype="|O", filters=[{"id": "vlen-utf8"}, {"id": "pickle"}], compressor=None, fill_value="")
         (path / name).write_text(json.dumps(whole))
     ran = tmp_path / "ran"
     (path / "a" / "0").write_bytes(f"cos\nmkdir\n(S'{ran}'\ntR.".encode() + bytes(40))
-    with pytest.raises(DataFileError, match=r"r\.zarr: 'a' is to be decoded by 'pickle', which is not done"):
+    with pytest.raises(DataFileError, match=r"r\.zarr: 'a' is to be decoded by .*, which is not done"):
         load(path)
     assert not ran.exists()
 

@@ -22,9 +22,9 @@ def marks_of(path: Path) -> Iterator[dict[str, Any]]:
 
 
 def started(log: Path) -> list[int]:
-    """The chunks that were begun, in their order; a line cut short by a crash of the machine is passed over."""
+    """The chunks that were begun, in their order; a line that was cut short or altered is passed over."""
     found = []
-    for line in log.read_text(encoding="utf-8").splitlines():
+    for line in log.read_text(encoding="utf-8", errors="replace").splitlines():
         with suppress(ValueError, KeyError, TypeError):
             found.append(int(json.loads(line)["chunk"]))
     return found

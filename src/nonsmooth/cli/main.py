@@ -5,7 +5,9 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Sequence
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 # Matrices here are tiny: threads of the linear algebra would wait for each other (20 times the processor time in small
 # fits), and beside our own threads for a core. Must stand before NumPy is loaded.
@@ -28,7 +30,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = _parser()
     options = parser.parse_args(arguments)
     try:
-        code: int = options.run(options)
+        with _fit_for_a_terminal():
+            code: int = options.run(options)
         return code
     except KeyboardInterrupt:
         print("nonsmooth: interrupted", file=sys.stderr)
@@ -38,6 +41,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise
         print(f"nonsmooth: {printable(str(error))}", file=sys.stderr)
         return 2
+
+
+@contextmanager
+def _fit_for_a_terminal() -> Iterator[None]:
+    """Warnings quote what stands in files."""
+    plain = warnings.formatwarning
+    warnings.formatwarning = lambda *given, **named: printable(plain(*given, **named))
+    try:
+        yield
+    finally:
+        warnings.formatwarning = plain
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -3,6 +3,9 @@
 The hash goes over names, roles (coordinate or not), dims, types, shapes, values and attributes of every variable and
 over the attributes of the Dataset, in a form that does not depend on the file format: byte order, the width of strings,
 compression and the order of variables leave it as it is.
+
+A NetCDF file also ends in a hash of its bytes, which is compared before the file is opened: the HDF5 library does not
+end on some damaged files. Programs that read NetCDF do not look at what follows the end that the file states.
 """
 
 from __future__ import annotations
@@ -11,17 +14,21 @@ import hashlib
 import json
 import re
 from collections.abc import Hashable, Iterable, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-__all__ = ["content", "digest", "seal", "sealed", "stamp", "unstamp"]
+__all__ = ["bytes_as_written", "content", "digest", "seal", "sealed", "stamp", "trailer", "unstamp"]
 
 #: A stamped provenance begins with its hash; one from before hashes were written begins with the version.
 _STAMPED = re.compile(r'\{"sha256": "([0-9a-f]{64})", ')
 _UNSTAMPED = '{"version": '
+_TRAILER = re.compile(rb"\nnonsmooth sha256 ([0-9a-f]{64})\n")
+_TRAILER_LENGTH = 83  # bytes
+_BLOCK = 1 << 20
 
 
 def content(attributes: Mapping[Any, Any], variables: Iterable[tuple[str, bool, xr.Variable]]) -> dict[str, Any]:
@@ -69,6 +76,28 @@ def unstamp(stamped: str) -> tuple[str | None, str]:
     if found is None and not stamped.startswith(_UNSTAMPED):
         raise ValueError("its provenance does not begin as it was written")
     return (None, stamped) if found is None else (found[1], "{" + stamped[found.end() :])
+
+
+def trailer(data: bytes | memoryview) -> bytes:
+    """The end of a file that holds ``data``."""
+    return f"\nnonsmooth sha256 {hashlib.sha256(data).hexdigest()}\n".encode()
+
+
+def bytes_as_written(path: Path) -> bool:
+    """Whether a file's bytes are those before its :func:`trailer`; True where it has none."""
+    found, left = hashlib.sha256(), path.stat().st_size - _TRAILER_LENGTH
+    if left < 0:
+        return True
+    with open(path, "rb") as file:
+        file.seek(left)
+        end = _TRAILER.fullmatch(file.read())
+        if end is None:
+            return True
+        file.seek(0)
+        while left > 0 and (block := file.read(min(left, _BLOCK))):
+            found.update(block)
+            left -= len(block)
+    return found.hexdigest() == end[1].decode()
 
 
 def seal(record: Mapping[str, Any]) -> dict[str, Any]:

@@ -21,7 +21,7 @@ import xarray as xr
 
 from nonsmooth.errors import DataFileError
 from nonsmooth.results import claims
-from nonsmooth.results.content import content, digest, stamp, unstamp
+from nonsmooth.results.content import bytes_as_written, content, digest, stamp, trailer, unstamp
 from nonsmooth.results.memory import room_for
 from nonsmooth.results.provenance import ATTRIBUTE
 from nonsmooth.results.whole import OLD, beside, told
@@ -29,6 +29,10 @@ from nonsmooth.results.whole import OLD, beside, told
 __all__ = ["check_place", "load", "save"]
 
 _EXPECTED = "expected a result written by nonsmooth.save (.nc or .zarr)"
+_ALTERED = (
+    "its content is not what was written there: bytes were altered, by a fault or by another program; take a copy that "
+    "is whole, or compute the result again"
+)
 _KEPT = (
     "make room or give another place; the result is not lost: it is the attribute `result` of this error, "
     "nonsmooth.save(error.result, PATH)"
@@ -71,7 +75,9 @@ def save(result: xr.Dataset, path: str | os.PathLike[str]) -> Path:
                 written = encoded.to_netcdf(
                     None, engine="h5netcdf", format="NETCDF4", encoding=_netcdf_encoding(encoded)
                 )
-                fresh.write_bytes(written)
+                with open(fresh, "wb") as file:
+                    file.write(written)
+                    file.write(trailer(written))
             else:
                 # Every chunk is written, empty or not, so that `load` can tell a missing one from zeros.
                 encoded.to_zarr(fresh, zarr_format=2, consolidated=True, write_empty_chunks=True)
@@ -115,10 +121,7 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
         attributes = {**raw.attrs, ATTRIBUTE: record}
         variables = list(_decoded(raw))
         if expected is not None and digest(content(attributes, variables)) != expected:
-            raise DataFileError(
-                f"{source}: its content is not what was written there: bytes were altered, by a fault or by another "
-                "program; take a copy that is whole, or compute the result again"
-            )
+            raise DataFileError(f"{source}: {_ALTERED}")
         coords = {name: variable for name, coordinate, variable in variables if coordinate}
         data = {name: variable for name, coordinate, variable in variables if not coordinate}
         result = xr.Dataset(data, coords, attributes)
@@ -189,6 +192,8 @@ def _claimed(source: Path) -> int:
     if source.suffix == ".nc":
         if not source.is_file():
             raise DataFileError(f"{source}: is not a file; {_EXPECTED}")
+        if not bytes_as_written(source):
+            raise DataFileError(f"{source}: {_ALTERED}")
         return claims.of_netcdf(source)
     if not _is_zarr(source):
         raise DataFileError(f"{source}: is not a Zarr store; {_EXPECTED}")
