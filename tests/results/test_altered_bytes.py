@@ -65,7 +65,8 @@ def with_all_types(swept: xr.Dataset) -> xr.Dataset:
     return swept.assign(
         floquet_multipliers=("multiplier", np.array([1 + 2j, complex(np.nan, 1)]), {"long_name": "multipliers"}),
         ended_because=("end", np.array(["the range ends", "µ < 0"])), period=((), 2.5, {"units": "s"}),
-        many=("sample", np.arange(6000) % 7 * 0.5), stable=("end", np.array([1, 0], np.int8)), touch=("hit", np.empty(0)),
+        many=("sample", np.arange(6000) % 7 * 0.5), stable=("end", np.array([1, 0], np.int8)),
+        touch=("hit", np.empty(0)),
     ).assign_attrs(comparison="sweep", level=0.95, counts=np.array([3, 4]))  # fmt: skip
 
 
@@ -107,8 +108,7 @@ def campaign(results: list[xr.Dataset], ending: str, n: int, folder: Path, seed:
             warnings.simplefilter("error")  # no altered file may pass for one from before there were hashes
             try:
                 found = load(copy)
-            except DataFileError as error:
-                assert f"altered.{ending}" in str(error)
+            except DataFileError:
                 outcome["refused"] += 1
                 continue
         assert same(found, results[k]), f"{what} (number {i}): loaded with other content"
@@ -128,5 +128,5 @@ def test_400_altered_files(
     ending: str, swept: xr.Dataset, points: xr.Dataset, trajectory: xr.Dataset, responded: xr.Dataset, tmp_path: Path
 ) -> None:
     outcome = campaign([with_all_types(swept), points, trajectory, responded], ending, 400, tmp_path, seed=2)
-    print(f"\n{ending}: 400 files altered, {outcome['refused']} refused, {outcome['same']} loaded with the same content")
+    print(f"\n{ending}: 400 altered, {outcome['refused']} refused, {outcome['same']} loaded with the same content")
     assert outcome.total() == 400 and outcome["refused"] >= 50

@@ -1,4 +1,4 @@
-"""Saves that are killed, and disks that are full: nothing stays behind, nothing is lost, nothing of others is touched."""
+"""Saves that are killed and disks that are full: nothing is lost, nothing stays behind, what others own is left."""
 
 from __future__ import annotations
 

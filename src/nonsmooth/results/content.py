@@ -139,7 +139,7 @@ def _entry(owner: str, key: Hashable, value: Any) -> list[Any]:
 
 
 def _kind(where: str, dtype: np.dtype[Any]) -> str:
-    if dtype.kind in "OTU":
+    if dtype.kind in ("O", "T", "U"):
         return "text"
     if dtype.kind in "biufc":
         return f"{dtype.kind}{dtype.itemsize}"
@@ -148,7 +148,7 @@ def _kind(where: str, dtype: np.dtype[Any]) -> str:
 
 def _values(where: str, variable: xr.Variable) -> str:
     values: NDArray[Any] = np.asarray(variable.values)
-    if values.dtype.kind in "OTU":
+    if values.dtype.kind in ("O", "T", "U"):
         words = [_text(word, where) for word in values.ravel().tolist()]
         return hashlib.sha256("\0".join(words).encode()).hexdigest()
     ordered = np.ascontiguousarray(values, values.dtype.newbyteorder("<"))
