@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+import nonsmooth as ns
 from nonsmooth.cli import main as cli
 from nonsmooth.cli.terminal import one_line, printable
 from nonsmooth.results.store import save
@@ -86,14 +87,24 @@ def test_odd_variables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> No
 def test_names_of_a_recording_and_of_a_missing_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "tap.csv"
     path.write_text("Time (s) Run #1,Position\x1b[2J (m) Run #1\n0,0.25\n0.01,0.5\n0.02,0.75\n")
-    with warnings.catch_warnings():
-        warnings.simplefilter("always")
-        warnings.showwarning = lambda *given: print(warnings.formatwarning(*given[:4]), file=sys.stderr)
+    with pytest.warns(UserWarning, match="too short"):
         assert cli.main(["show", str(path)]) == 0
-    said = shown(capsys)
-    assert "3 samples" in said and r"channel 'Position\x1b[2J': only 3 samples" in said.replace("\\\\", "\\")
+    assert "3 samples" in shown(capsys)
     assert cli.main(["show", f"{ESCAPE}.nc"]) == 2
     assert r"\x1b]0;owned\x07" in shown(capsys)
+
+
+def test_warnings(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    plain = warnings.formatwarning
+
+    def names() -> list[str]:
+        print(warnings.formatwarning(ESCAPE, UserWarning, "file.py", 3, ""), file=sys.stderr)
+        return []
+
+    monkeypatch.setattr(ns.models, "names", names)
+    assert cli.main(["models"]) == 0
+    assert r"file.py:3: UserWarning: \x1b]0;owned" in shown(capsys)
+    assert warnings.formatwarning is plain
 
 
 def test_text_for_a_terminal() -> None:
