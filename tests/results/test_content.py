@@ -69,7 +69,7 @@ def datasets(draw: st.DrawFn) -> xr.Dataset:
     return xr.Dataset(variables, attrs={**draw(attributes), "nonsmooth": RECORD}).set_coords(coordinates)
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(result=datasets())
 def test_one_hash_through_memory_and_both_formats(result: xr.Dataset, tmp_path: Path) -> None:
     for ending in FORMATS:
@@ -111,6 +111,7 @@ CHANGES: dict[str, Callable[[xr.Dataset], xr.Dataset]] = {
     "text": lambda ds: ds.assign(note=("rho", np.array(["a", "b", "d"]))),
     "text cut elsewhere": lambda ds: ds.assign(note=("rho", np.array(["a", "", "bc"]))),
     "a type": lambda ds: ds.assign(status=ds["status"].astype(np.int16)),
+    "a type of equal bytes": lambda ds: ds.assign(status=ds["status"].astype(np.uint8)),
     "float for integer": lambda ds: ds.assign(status=ds["status"].astype(np.float32)),
     "a name": lambda ds: ds.rename(period="Period"),
     "a dim": lambda ds: ds.rename(state="State"),

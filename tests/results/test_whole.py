@@ -96,12 +96,31 @@ def test_a_store_that_was_moved_away_when_its_process_was_killed_is_put_back(tmp
     """Killed between the two moves of a replacement."""
     target = save(large(10), tmp_path / "r.zarr")
     process, folder = writer(target)
-    target.rename(folder / whole.OLD)
+    target.rename(folder / whole._OLD)
     process.send_signal(signal.SIGKILL)
     process.communicate()
     clear(target)
     assert load(target).identical(large(10))
     assert [item.name for item in tmp_path.iterdir()] == ["r.zarr"]
+
+
+@pytest.mark.parametrize("ending", FORMATS)
+def test_what_stood_there_stays_where_the_move_fails(
+    ending: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    target, move = save(large(10), tmp_path / f"r.{ending}"), os.replace
+
+    def fails(source: Path, place: Path) -> None:
+        if Path(source).stem == "new":
+            raise KeyboardInterrupt
+        move(source, place)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "replace", fails)
+        with pytest.raises(KeyboardInterrupt):
+            save(large(20), target)
+    assert load(target).identical(large(10))
+    assert [item.name for item in tmp_path.iterdir()] == [target.name]
 
 
 def test_nothing_is_left_of_an_error(tmp_path: Path) -> None:

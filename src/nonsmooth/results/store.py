@@ -24,7 +24,7 @@ from nonsmooth.results import claims
 from nonsmooth.results.content import bytes_as_written, content, digest, stamp, trailer, unstamp
 from nonsmooth.results.memory import room_for
 from nonsmooth.results.provenance import ATTRIBUTE
-from nonsmooth.results.whole import OLD, beside, told
+from nonsmooth.results.whole import beside, replace, told
 
 __all__ = ["check_place", "load", "save"]
 
@@ -82,9 +82,7 @@ def save(result: xr.Dataset, path: str | os.PathLike[str]) -> Path:
                 # Every chunk is written, empty or not, so that `load` can tell a missing one from zeros.
                 encoded.to_zarr(fresh, zarr_format=2, consolidated=True, write_empty_chunks=True)
             _compare(target, fresh, held)
-            if target.is_dir():
-                os.replace(target, folder / OLD)
-            os.replace(fresh, target)
+            replace(target, fresh)
     except DataFileError as error:
         error.result = result
         raise

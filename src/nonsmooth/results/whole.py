@@ -21,9 +21,9 @@ from typing import Any
 
 from nonsmooth.errors import DataFileError
 
-__all__ = ["OLD", "beside", "clear", "told", "write_whole"]
+__all__ = ["beside", "clear", "replace", "told", "write_whole"]
 
-OLD = "old"  # where a folder goes that is about to be replaced
+_OLD = "old"  # where a folder goes that is about to be replaced
 _WRITER = "writer.json"
 _DAY = 86400.0  # seconds after which a folder is left behind whose writer cannot be asked (another machine, a restart)
 
@@ -43,10 +43,23 @@ def clear(target: Path) -> None:
     with suppress(OSError):  # a folder that may not be read or changed: its owner's next run clears it
         for folder in target.parent.glob(f".{escape(target.name)}-????????"):
             if not folder.is_symlink() and folder.is_dir() and _stale(folder, target):
-                moved = folder / OLD
+                moved = folder / _OLD
                 if moved.exists() and not target.exists():
                     os.replace(moved, target)
                 shutil.rmtree(folder, ignore_errors=True)
+
+
+def replace(target: Path, fresh: Path) -> None:
+    """Move ``fresh`` to its place; what stood there stays where that fails."""
+    moved = fresh.with_name(_OLD)
+    if target.is_dir():  # a folder cannot be replaced in one move
+        os.replace(target, moved)
+    try:
+        os.replace(fresh, target)
+    except BaseException:
+        if moved.exists():
+            os.replace(moved, target)
+        raise
 
 
 def write_whole(path: Path, data: bytes) -> None:
