@@ -26,6 +26,9 @@ ODD: dict[str, Any] = {
     "parameters of every type": {
         "system": {"parameters": {"a": None, "b": "nan", "c": [1], "d": {}, "e": 10**400, "f": "word"}}, "options": {},
     },
+    "text that would never end": {
+        "system": {"name": "s", "parameters": {}, "text": "((9**9999)**9999)*u.x " + "(" * 3000}, "options": {},
+    },
     "long": {"verb": "x" * 1_500_000, "system": {"name": "n" * 10**6, "parameters": {}}, "options": {"o": "p" * 10**6}},
     "escapes": {
         "verb": ESCAPE, "method": ESCAPE, "system": {"name": ESCAPE, "parameters": {ESCAPE: ESCAPE}, "text": ESCAPE},
