@@ -26,10 +26,10 @@ from nonsmooth.analysis.settled import usable
 from nonsmooth.campaign.run import run
 from nonsmooth.flow.arguments import check_options, check_system, float_array, real_number, whole_number
 from nonsmooth.flow.devices import BATCH, engine_on, on_gpu, workers_of
-from nonsmooth.flow.memory import room_for
 from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.kernels import codes
+from nonsmooth.results.memory import room_for
 
 if TYPE_CHECKING:
     import xarray as xr

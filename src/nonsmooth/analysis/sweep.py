@@ -14,10 +14,10 @@ from nonsmooth.analysis.sweep_pieces import Report, Slot, ended, largest_of, pie
 from nonsmooth.flow.arguments import check_options, check_system, float_array, whole_number
 from nonsmooth.flow.devices import engine_on, on_gpu, workers_of
 from nonsmooth.flow.engine import FloatArray, State
-from nonsmooth.flow.memory import room_for
 from nonsmooth.flow.methods import engine_for, warn_if_coarse
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.flow.starts import is_one_start, plain_start, start_states
+from nonsmooth.results.memory import room_for
 
 if TYPE_CHECKING:
     import xarray as xr

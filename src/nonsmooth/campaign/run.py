@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from nonsmooth.campaign.processors import clock
 from nonsmooth.campaign.threads import on_threads
 from nonsmooth.campaign.work import Work, bytes_of, empty_columns
-from nonsmooth.flow.memory import room_for
+from nonsmooth.results.memory import room_for
 from nonsmooth.results.progress import progress as progress_bar
 
 __all__ = ["run"]
