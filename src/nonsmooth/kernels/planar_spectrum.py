@@ -30,7 +30,7 @@ def exponential(tau, prop, tay, info, mode, n_i, X):
             a = a * local + tay[mode, n_i + r, 0, k]
             b = b * local + tay[mode, n_i + r, 1, k]
         for c in range(2):
-            X[r, c] = a * prop[mode, node, 0, c] + b * prop[mode, node, 1, c]
+            X[r, c] = a * prop[mode, node, c, 0] + b * prop[mode, node, c, 1]
 
 
 @inline
@@ -157,8 +157,8 @@ def spectrum(
             found[0] = -1
         if full:
             for r in range(2):
-                X[r, 0] = prop[mode, NODES, r, 0]
-                X[r, 1] = prop[mode, NODES, r, 1]
+                X[r, 0] = prop[mode, NODES, 0, r]
+                X[r, 1] = prop[mode, NODES, 1, r]
         else:
             exponential(step, prop, tay, info, mode, n_i, X)
         apply(X, Q)
