@@ -111,7 +111,8 @@ def run(effort: float) -> tuple[list[str], list[tuple[str, str, str, bool]]]:
         )  # fmt: skip
         exact, theirs = median(times["exact"]), median(times["heyoka"])
         ratios.append(ratio(times, "heyoka", "exact"))
-        per_period = float(ns.sweep(ours, "g", values, transient=50, keep=20, progress=False)["crossings_per_period"][0])
+        shown = ns.sweep(ours, "g", values, transient=50, keep=20, progress=False)
+        per_period = float(shown["crossings_per_period"][0])
         lines.append(
             f"| {masses} | {2 * masses} | {per_period:.1f} | {exact:.2f} | {theirs:.2f} "
             f"| {ratios[-1]:.1f} | {difference:.1e} |"
