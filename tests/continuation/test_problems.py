@@ -263,17 +263,6 @@ def test_e_cycle_is_born_in_a_hopf_bifurcation_and_reaches_the_seat(valve: xr.Da
     assert kind == ("persistence" if beside[0] * beside[1] < 0.0 else "non_smooth_fold")
 
 
-def test_e_multipliers_change_little_from_point_to_point(valve: xr.Dataset) -> None:
-    """A step is made shorter where multipliers move by more than 0.15 on the Riemann sphere or the branch bends."""
-    mu, signature = valve["floquet_multipliers"].values, valve["signature"].values
-    a, b = mu[:-1], mu[1:]
-    moved = (np.abs(a - b) / np.sqrt((1 + np.abs(a) ** 2) * (1 + np.abs(b) ** 2))).max(axis=1)
-    far = np.abs(np.diff(valve["q"].values)) > 1e-5
-    same = signature[1:] == signature[:-1]
-    assert (far & same).sum() > 20
-    assert moved[far & same].max() <= 0.15
-
-
 # K: stick-slip on a belt
 
 
