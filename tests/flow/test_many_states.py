@@ -125,7 +125,7 @@ def test_energy_of_two_masses_and_a_rigid_stop_is_lost_in_impacts_alone() -> Non
 def test_random_systems_run_as_by_their_series() -> None:
     """120 driven systems of 1 to 6 states with hysteresis between two modes, and kicks: as by series at 1e-13."""
     rng = np.random.default_rng(13)
-    worst, crossings = 0.0, 0
+    worst, crossings, judged = 0.0, 0, 0
     for case in range(120):
         n = 1 + case % 6
         A = [rng.normal(0.0, 1.0, (n, n)) for _ in range(2)]
@@ -149,13 +149,22 @@ def test_random_systems_run_as_by_their_series() -> None:
             ],
         )  # fmt: skip
         start = rng.normal(0.0, 1.0, n)
-        ways = ({"method": "exact"}, {"method": "taylor", "rtol": 1e-13})
-        exact, series = (ns.simulate(system, periods=20, start=start, **way) for way in ways)
+        found, said = [], []
+        for way in ({"method": "exact"}, {"method": "taylor", "rtol": 1e-13}):
+            try:
+                found.append(ns.simulate(system, periods=20, start=start, **way))
+            except ns.SolveError as error:  # two stable modes may throw the state out by turns
+                said.append(str(error).split(".")[0])
+        if said:
+            assert len(said) == 2 and said[0] == said[1], case
+            continue
+        exact, series = found
+        judged += 1
         assert exact["crossing_transition"].values.tolist() == series["crossing_transition"].values.tolist(), case
         crossings += exact.sizes["crossing"]
         for name in ("crossing_time", "u_before"):
             worst = max(worst, float(np.abs(exact[name].values - series[name].values).max(initial=0.0)))
         worst = max(worst, float(np.abs(exact["u"].values[-1] - series["u"].values[-1]).max()))
-    print(f"{crossings} transitions, largest difference {worst:.1e}")
-    assert crossings > 1000
+    print(f"{judged} systems, {crossings} transitions, largest difference {worst:.1e}")
+    assert judged > 90 and crossings > 1000
     assert worst < 1e-9

@@ -7,7 +7,7 @@ import os
 from typing import Any
 
 from nonsmooth.flow.engine import Engine, SectionPlan
-from nonsmooth.flow.planar import LinearEngine, PlanarEngine
+from nonsmooth.flow.linear import LinearEngine, PlanarEngine
 from nonsmooth.flow.series import SeriesEngine
 
 __all__ = ["BATCH", "DEVICES", "batch_size", "check_device", "engine_on", "gpu_name", "on_gpu", "workers_of"]

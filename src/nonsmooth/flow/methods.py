@@ -91,7 +91,7 @@ def engine_for(
     # A smoothed system runs by its series, also where its bands happen to be linear: one method for all of them.
     # A step or an order asks for a method that has one.
     if form is not None and not system.is_smoothed and step is None and "order" not in expert:
-        from nonsmooth.flow.planar import LinearEngine, PlanarEngine, is_linear
+        from nonsmooth.flow.linear import LinearEngine, PlanarEngine, is_linear
 
         if is_linear(equations, form) and not expert:
             kind = PlanarEngine if len(equations.u) == 2 else LinearEngine

@@ -8,8 +8,8 @@ local memory, which the GPU interleaves in the same way.
 from numba import float64, int64
 
 from .cuda_target import cuda, device, local
-from .planar_search import WIDTH
-from .planar_tables import HARMONICS, NODES, TERMS, M
+from .linear_search import WIDTH
+from .linear_tables import HARMONICS, NODES, TERMS, M
 
 # Set for each system; none is below 1, so that no array is empty.
 N_MODES = 2

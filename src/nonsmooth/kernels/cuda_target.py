@@ -18,7 +18,8 @@ from numba import config, cuda
 from nonsmooth.kernels.lanes import plain
 
 __all__ = [
-    "REGISTERS", "THREADS", "callback", "cuda", "device", "entry", "inline", "kernel", "local", "sum_columns", "sum_rows",
+    "REGISTERS", "THREADS", "callback", "cuda", "device", "entry", "inline", "kernel", "local", "sum_columns",
+    "sum_rows",
 ]  # fmt: skip
 
 THREADS = 64  # in a block: few, because a trajectory fills a thread's registers

@@ -1,8 +1,8 @@
 """Many numbers at once: sums of table rows and columns in vector instructions.
 
 Numba does not find these sums by itself: it unrolls such short loops, and switches off the pass of LLVM that would join
-what comes out. Here the vector instructions are written down; LLVM splits them to what the processor has. ``plain`` holds
-the same sums as loops, for a GPU's threads and for runs without compilation.
+what comes out. Here the vector instructions are written down; LLVM splits them to what the processor has. ``plain``
+holds the same sums as loops, for a GPU's threads and for runs without compilation.
 """
 
 from __future__ import annotations

@@ -9,10 +9,10 @@ from math import fabs, isfinite, log, sqrt
 
 from .cache import device, inline, kernel
 from .codes import CHATTER, DIVERGED, OK, TOO_MANY_CROSSINGS
-from .planar_layout import _INTEGERS, _LINEAR, _MATRIX, _NET, _SCRATCH, _VECTOR, BURST, MOST_CROSSINGS, SHORT
-from .planar_march import bounded, jump, leg, mark_zeros, next_holding, set_phase, settle, trigger, wrap_phase
-from .planar_search import slope_of
-from .planar_tables import HARMONICS, NODES, M, build
+from .linear_layout import _INTEGERS, _LINEAR, _MATRIX, _NET, _SCRATCH, _VECTOR, BURST, MOST_CROSSINGS, SHORT
+from .linear_march import bounded, jump, leg, mark_zeros, next_holding, set_phase, settle, trigger, wrap_phase
+from .linear_search import slope_of
+from .linear_tables import HARMONICS, NODES, M, build
 
 LOST = 1e-13  # a determinant below this part of the product of the rows' sizes is that of a singular matrix
 

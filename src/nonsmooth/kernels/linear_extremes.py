@@ -5,9 +5,9 @@ is halved down to two node spacings, where the polynomial's critical points deci
 """
 
 from .cache import device, inline
-from .planar_polynomial import NEVER, THIRD, classify, critical_points, horner
-from .planar_search import bound_at, compose, slope_of, to_node, value_of
-from .planar_tables import NODES, ONE, STATES, M
+from .linear_polynomial import NEVER, THIRD, classify, critical_points, horner
+from .linear_search import bound_at, compose, slope_of, to_node, value_of
+from .linear_tables import NODES, ONE, STATES, M
 
 
 @device

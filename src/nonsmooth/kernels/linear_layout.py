@@ -1,10 +1,10 @@
-"""Argument types, scratch memory and limits of the two planar kernels."""
+"""Argument types, scratch memory and limits of the kernels of the exact flow."""
 
 import numpy as np
 
 from .block import one_block
-from .planar_search import WIDTH
-from .planar_tables import DEGREE, HARMONICS, NODES, STATES, TERMS, M
+from .linear_search import WIDTH
+from .linear_tables import DEGREE, HARMONICS, NODES, STATES, TERMS, M
 
 MOST_CROSSINGS = 1000  # within one section return
 MOST_STEPS = 2_000_000  # on the way to a surface that may never be met again

@@ -2,11 +2,11 @@
 
 from .cache import device, kernel
 from .codes import CHATTER, DIVERGED, LOG_FULL, OK, TOO_MANY_CROSSINGS
-from .planar_layout import _INTEGERS, _LINEAR, _MATRIX, _NET, _SCRATCH, _VECTOR, BURST, MOST_CROSSINGS, SHORT
-from .planar_march import bounded, jump, leg, mark_zeros, next_holding, set_phase, settle, trigger, wrap_phase
-from .planar_polynomial import critical_points, curvature_at, horner
-from .planar_search import compose, dense, to_node
-from .planar_tables import HARMONICS, NODES, ONE, STATES, M, build
+from .linear_layout import _INTEGERS, _LINEAR, _MATRIX, _NET, _SCRATCH, _VECTOR, BURST, MOST_CROSSINGS, SHORT
+from .linear_march import bounded, jump, leg, mark_zeros, next_holding, set_phase, settle, trigger, wrap_phase
+from .linear_polynomial import critical_points, curvature_at, horner
+from .linear_search import compose, dense, to_node
+from .linear_tables import HARMONICS, NODES, ONE, STATES, M, build
 
 
 @device

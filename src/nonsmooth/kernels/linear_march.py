@@ -11,8 +11,8 @@ from math import cos, fabs, isfinite, sin
 
 from .cache import device, inline
 from .codes import BEYOND_STOP, OK
-from .planar_search import NEVER, bound_at, classify, dense, search, slope_of, to_node, turn, value_of
-from .planar_tables import HARMONICS, NODES, ONE, STATES, WAVE, M
+from .linear_search import NEVER, bound_at, classify, dense, search, slope_of, to_node, turn, value_of
+from .linear_tables import HARMONICS, NODES, ONE, STATES, WAVE, M
 
 EPS = 2.3e-16
 

@@ -8,15 +8,15 @@ fourth derivative (K h^4 / 144), keeps its sign; it is *found* where the coeffic
 the piece is halved, and at one node spacing the polynomial's own extrema decide. This finds double roots (grazing)
 and several crossings in one step, and stays sharp when the step starts on the surface.
 
-``scr`` holds Taylor polynomials in rows: one per condition under search; in ``dense`` and ``refine`` one per state, then the
-condition's.
+``scr`` holds Taylor polynomials in rows: one per condition under search; in ``dense`` and ``refine`` one per state, then
+the condition's.
 """
 
 from math import fabs
 
 from .cache import device, inline
 from .lanes import sum_columns, sum_rows
-from .planar_polynomial import (
+from .linear_polynomial import (
     NEVER,
     ONCE,
     OPEN,
@@ -27,7 +27,7 @@ from .planar_polynomial import (
     next_upward,
     slope_at,
 )  # fmt: skip
-from .planar_tables import DEGREE, HARMONICS, NODES, ONE, STATES, WAVE, M
+from .linear_tables import DEGREE, HARMONICS, NODES, ONE, STATES, WAVE, M
 
 WIDTH = DEGREE + 1
 

@@ -1,6 +1,6 @@
 """The engine of the exact flow: linear modes with harmonic forcing, affine indicators and resets, any number of states.
 
-It only packs a system into the arrays of ``kernels.planar_module`` and unpacks what comes back.
+It only packs a system into the arrays of ``kernels.linear_module`` and unpacks what comes back.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class Tables:
 
 @dataclass
 class LinearEngine:
-    """``Engine`` over ``kernels.planar_module`` for one system's traced form."""
+    """``Engine`` over ``kernels.linear_module`` for one system's traced form."""
 
     traced: Traced
     form: LinearForm
@@ -86,7 +86,8 @@ class LinearEngine:
             outputs = (t.oa, t.ob, t.oc, t.os)
         else:
             shape = (n_points, 0, n_modes)
-            outputs = (np.zeros((*shape, len(self.scale))), np.zeros(shape), np.zeros((*shape, n_h)), np.zeros((*shape, n_h)))
+            waves = np.zeros((*shape, n_h))
+            outputs = (np.zeros((*shape, len(self.scale))), np.zeros(shape), waves, waves)
         multiples = np.array(self.form.multiples, dtype=np.int64)
         with np.errstate(divide="ignore"):
             period = np.where(t.omega > 0.0, 2.0 * np.pi / t.omega, np.inf)
@@ -95,9 +96,9 @@ class LinearEngine:
             t.ia, t.ib, t.ic, t.is_, *outputs, t.ra, t.rb, t.rc, t.rs,
         )  # fmt: skip
         from nonsmooth.kernels.cache import compiled
-        from nonsmooth.kernels.planar_module import planar_module
+        from nonsmooth.kernels.linear_module import linear_module
 
-        module = planar_module(len(self.scale), n_h)
+        module = linear_module(len(self.scale), n_h)
         if n_points > 1:  # threads may share them
             compiled(module.chain)
         return Tables(points, linear, period, module, (n_modes, n_i, outputs[0].shape[1], len(self.net[1])))
@@ -160,7 +161,7 @@ class LinearEngine:
         )  # fmt: skip
 
     def _logs(self, size: int) -> list[np.ndarray]:
-        """Room for crossings (time, transition, states before and after), and touches (time, indicator, states, gap)."""
+        """Room for crossings (time, transition, states before, after), and touches (time, indicator, states, gap)."""
         n = len(self.scale)
         crossings = [np.zeros(size), np.zeros(size, dtype=np.int64), np.zeros((size, n)), np.zeros((size, n))]
         return [*crossings, np.zeros(size), np.zeros(size, dtype=np.int64), np.zeros((size, n)), np.zeros(size)]

@@ -1,11 +1,11 @@
 """Tables of one parameter point of a piecewise-linear system with harmonic forcing, for any number of states.
 
-In a mode u' = A u + b + sum_h (c_h cos k_h w t + s_h sin k_h w t). With w = (u_1, ..., u_n, 1, cos k_1 w t, sin k_1 w t,
-...) this is w' = M w, whose flow exp(M tau) needs no eigenvectors: singular, defective and resonant matrices are
-no special case. ``build`` sums the Taylor series of the upper n rows of exp(M tau) at 33 equidistant nodes of
+In a mode u' = A u + b + sum_h (c_h cos k_h w t + s_h sin k_h w t). With w = (u_1, ..., u_n, 1, cos k_1 w t,
+sin k_1 w t, ...) this is w' = M w, whose flow exp(M tau) needs no eigenvectors: singular, defective and resonant
+matrices are no special case. ``build`` sums the Taylor series of the upper n rows of exp(M tau) at 33 equidistant nodes of
 a step that is a quarter of the mode's fastest period.
 
-These files become one generated module for each number of states and of harmonics (``planar_module``), so that
+These files become one generated module for each number of states and of harmonics (``linear_module``), so that
 every inner loop has constant bounds. Arrays (M columns of w, functionals = indicators, states, affine outputs):
     prop[mode, node, M, n]         columns of the states' rows at the node, to be applied to w at the step's start
     rot[mode, node, 2 H + 1]       cos and sin of k_h w tau
@@ -209,7 +209,7 @@ def column(row, k, prop, mode, node, j):
 
 @device
 def bound_of(row, k, mode, every, prop, rot, info, out, at):
-    """Largest |entries| over each ``every``-th node of row[k] exp(M tau): into out[at:] (of each state, all the rest)."""
+    """Largest |entries| over each ``every``-th node of row[k] exp(M tau) into out[at:]: of each state, of the rest."""
     for j in range(STATES + 1):
         out[at + j] = 0.0
     for node in range(0, NODES + 1, every):

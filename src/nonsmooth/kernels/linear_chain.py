@@ -2,8 +2,8 @@
 
 from .cache import inline, kernel
 from .codes import CHATTER, DIVERGED, NO_CONVERGENCE, OK, TOO_MANY_CROSSINGS
-from .planar_extremes import find_twins, finish, include, widen
-from .planar_layout import (
+from .linear_extremes import find_twins, finish, include, widen
+from .linear_layout import (
     _INTEGERS,
     _LINEAR,
     _MATRIX,
@@ -16,9 +16,9 @@ from .planar_layout import (
     MOST_STEPS,
     SHORT,
 )  # fmt: skip
-from .planar_march import bounded, jump, leg, next_holding, set_phase, settle, sign_after, stride, trigger, wrap_phase
-from .planar_search import dense, value_of
-from .planar_tables import HARMONICS, ONE, STATES, M, build
+from .linear_march import bounded, jump, leg, next_holding, set_phase, settle, sign_after, stride, trigger, wrap_phase
+from .linear_search import dense, value_of
+from .linear_tables import HARMONICS, ONE, STATES, M, build
 
 
 @inline
