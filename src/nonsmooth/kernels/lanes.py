@@ -8,6 +8,7 @@ holds the same sums as loops, for a GPU's threads and for runs without compilati
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
@@ -140,28 +141,26 @@ def _sum_columns_in_lanes(typing: Any, out: Any, table: Any, mode: Any, node: An
         source, weights = _Array(context, builder, table, table_), _Array(context, builder, w, w_)
         target = _Array(context, builder, out, out_)
         if states <= FEW:
+
+            def product(r: int, j: Any) -> Any:
+                return builder.fmul(source.number(mode_, node_, j, r), weights.number(j), flags=_CONTRACT)
+
             totals = [
-                _sum(
-                    builder, source.number(mode_, node_, states, r),
-                    lambda j, r=r: builder.fmul(source.number(mode_, node_, j, r), weights.number(j), flags=_CONTRACT),
-                    states, m.literal_value,
-                )
+                _sum(builder, source.number(mode_, node_, states, r), partial(product, r), states, m.literal_value)
                 for r in range(states)
-            ]  # fmt: skip
+            ]
             for r, total in enumerate(totals):
                 target.put(total, r)
             return context.get_dummy_value()
+
+        def column(vector: Any, begin: int, j: Any) -> Any:
+            return _scaled(builder, source.load(vector, mode_, node_, j, begin), weights.number(j))
+
         parts = []
         for begin in range(0, states, WIDEST):
             vector = ir.VectorType(ir.DoubleType(), min(WIDEST, states - begin))
-            total = _sum(
-                builder, source.load(vector, mode_, node_, states, begin),
-                lambda j, vector=vector, begin=begin: _scaled(
-                    builder, source.load(vector, mode_, node_, j, begin), weights.number(j)
-                ),
-                states, m.literal_value,
-            )  # fmt: skip
-            parts.append((begin, total))
+            first = source.load(vector, mode_, node_, states, begin)
+            parts.append((begin, _sum(builder, first, partial(column, vector, begin), states, m.literal_value)))
         for begin, total in parts:
             target.store(total, begin)
         return context.get_dummy_value()

@@ -8,8 +8,8 @@ fourth derivative (K h^4 / 144), keeps its sign; it is *found* where the coeffic
 the piece is halved, and at one node spacing the polynomial's own extrema decide. This finds double roots (grazing)
 and several crossings in one step, and stays sharp when the step starts on the surface.
 
-``scr`` holds Taylor polynomials in rows: one per condition under search; in ``dense`` and ``refine`` one per state, then
-the condition's.
+``scr`` holds Taylor polynomials in rows: one per condition under search; in ``dense`` and ``refine`` one per state,
+then the condition's.
 """
 
 from math import fabs

@@ -2,8 +2,8 @@
 
 In a mode u' = A u + b + sum_h (c_h cos k_h w t + s_h sin k_h w t). With w = (u_1, ..., u_n, 1, cos k_1 w t,
 sin k_1 w t, ...) this is w' = M w, whose flow exp(M tau) needs no eigenvectors: singular, defective and resonant
-matrices are no special case. ``build`` sums the Taylor series of the upper n rows of exp(M tau) at 33 equidistant nodes of
-a step that is a quarter of the mode's fastest period.
+matrices are no special case. ``build`` sums the Taylor series of the upper n rows of exp(M tau) at 33 equidistant
+nodes of a step that is a quarter of the mode's fastest period.
 
 These files become one generated module for each number of states and of harmonics (``linear_module``), so that
 every inner loop has constant bounds. Arrays (M columns of w, functionals = indicators, states, affine outputs):
