@@ -16,8 +16,8 @@ from nonsmooth.analysis.sweep import swept_values
 from nonsmooth.campaign.run import run
 from nonsmooth.flow.arguments import check_options, check_system, whole_number, yes_or_no
 from nonsmooth.flow.devices import BATCH, engine_on, on_gpu, workers_of
+from nonsmooth.flow.linear import PlanarEngine
 from nonsmooth.flow.methods import engine_for
-from nonsmooth.flow.planar import PlanarEngine
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.flow.starts import is_one_start, plain_start, start_states
 
