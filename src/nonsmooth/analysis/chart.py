@@ -100,7 +100,7 @@ def chart(
     any_cpu : bool
         Go on with a store that was begun on another type of processor, or of GPU with ``device="cuda"``.
     progress : bool
-        A bar on a terminal.
+        A bar, on a terminal and in a notebook; nothing elsewhere.
 
     Returns
     -------

@@ -86,7 +86,7 @@ def lyapunov(
         ``"cuda"`` runs a sweep with ``direction=None`` on an NVIDIA GPU, one point per thread, for
         systems with the planar exact flow: see the guide "A chart on a GPU".
     progress : bool
-        A bar on a terminal.
+        A bar, on a terminal and in a notebook; nothing elsewhere.
 
     Returns
     -------

@@ -86,7 +86,7 @@ def sweep(
         ``"cuda"`` runs the points on an NVIDIA GPU, one per thread, with ``direction=None`` and without
         ``density``: by the exact flow or by ``method="taylor"``. See the guide "A chart on a GPU".
     progress : bool
-        A bar on a terminal.
+        A bar, on a terminal and in a notebook; nothing elsewhere.
 
     Returns
     -------

@@ -33,14 +33,10 @@ from numba.core.caching import _Cache
 from numba.core.compiler import CompileResult
 from numba.core.compiler_lock import global_compiler_lock
 
+from nonsmooth.kernels import before_compiling
 from nonsmooth.kernels.folder import cache_folder, mark_used, prune, write_atomically
 
-__all__ = [
-    "before_compiling", "cache_statistics", "callback", "compiled", "device", "inline", "kernel", "load_module",
-]  # fmt: skip
-
-#: Called before a function is compiled because the cache has no entry for it, with the function's name.
-before_compiling: list[Callable[[str], None]] = []
+__all__ = ["cache_statistics", "callback", "compiled", "device", "inline", "kernel", "load_module"]
 
 # Kernels allocate nothing (scratch is an argument), so they need no reference counts: "_nrt" off saves a third.
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}, "_nrt": False}

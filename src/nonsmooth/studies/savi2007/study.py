@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from nonsmooth.results.progress import say
 from nonsmooth.studies.savi2007.bench import Bench
 from nonsmooth.studies.savi2007.figure import Figure
 from nonsmooth.studies.savi2007.flows import Settings
@@ -92,7 +92,7 @@ def reproduce(
         The charts over two parameters too, of a million points each, and finer basins. Finished parts of a chart are
         kept in ``chartNN_store.zarr``: a run that was interrupted goes on from there.
     progress : bool
-        Bars and a line per figure, on a terminal.
+        Bars and a line per figure, on a terminal and in a notebook; nothing elsewhere.
 
     Returns
     -------
@@ -117,13 +117,15 @@ def reproduce(
     computed = [figure for figure in chosen if not figure.rig]
     with Bench(folder, [figure for figure in chosen if figure.rig], quick) as bench:
         for i, figure in enumerate(computed):
-            _say(progress, f"[{i + 1}/{len(computed)}] {figure.name}: {figure.title}")
+            if progress:
+                say(f"[{i + 1}/{len(computed)}] {figure.name}: {figure.title}")
             begin = time.perf_counter()
             data[figure.name] = figure.compute(settings)
             _save(figure, data[figure.name], folder)
             _draw(figure, data[figure.name], folder)
             seconds[figure.name] = time.perf_counter() - begin
-        _say(progress and bool(bench.figures), "waiting for the records of the virtual rig")
+        if progress and bench.figures:
+            say("waiting for the records of the virtual rig")
         measured, times = bench.results()
     data |= measured
     seconds |= times
@@ -152,11 +154,6 @@ def _chosen(numbers: Sequence[int] | None, full: bool) -> tuple[Figure, ...]:
         for figure in known
         if figure.number in numbers or figure.beside in numbers or (with_rig and figure.name == PARAMETERS)
     )
-
-
-def _say(aloud: bool, text: str) -> None:
-    if aloud and sys.stderr.isatty():
-        print(text, file=sys.stderr)
 
 
 def _save(figure: Figure, data: dict[str, xr.Dataset], folder: Path) -> None:
