@@ -41,7 +41,7 @@ def chart(
     section: Stroboscopic | Poincare | None = None,
     transient: int = 500,
     keep: int = 60,
-    max_period: int = 16,
+    max_period: int | None = None,
     stop_early: bool = True,
     extremes: bool = True,
     lyapunov: bool | int = False,
@@ -73,8 +73,8 @@ def chart(
         ``Stroboscopic(0)`` where the system has a period.
     transient, keep : int
         Section returns passed over, then judged. A point that is still settling gets up to eight transients.
-    max_period : int
-        Longest period number looked for, less than ``keep``.
+    max_period : int, optional
+        Longest period number looked for, less than ``keep``; the smaller of 16 and ``keep`` - 1 where not given.
     stop_early : bool
         A point ends as soon as its period number is certain (a small return, and multipliers inside the unit circle)
         instead of at the end of its transient. Labels are the same, but for chaotic transients that end about then.
@@ -166,7 +166,7 @@ class PlannedChart:
 
 def plan_chart(
     system: System, grid: Mapping[str, Any], *, start: Any = None, carry: Any = None, section: Any = None,
-    transient: Any = 500, keep: Any = 60, max_period: Any = 16, stop_early: bool = True, extremes: bool = True,
+    transient: Any = 500, keep: Any = 60, max_period: Any = None, stop_early: bool = True, extremes: bool = True,
     lyapunov: Any = False, refine: Any = False, method: str = "auto", rtol: Any = None, atol: Any = None,
     device: str = "cpu", campaign: bool = False, **expert: Any,
 ) -> PlannedChart:  # fmt: skip

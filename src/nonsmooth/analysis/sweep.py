@@ -41,7 +41,7 @@ def sweep(
     section: Stroboscopic | Poincare | None = None,
     transient: int = 500,
     keep: int = 100,
-    max_period: int = 16,
+    max_period: int | None = None,
     density: bool | Mapping[str, Any] = False,
     bins: int = 400,
     method: str = "auto",
@@ -71,8 +71,8 @@ def sweep(
     transient, keep : int
         Section returns passed over, then recorded, at each value. A point that is still settling gets up to eight
         transients; what is not settled then has the status ``slow``.
-    max_period : int
-        Longest period number looked for, less than ``keep``.
+    max_period : int, optional
+        Longest period number looked for, less than ``keep``; the smaller of 16 and ``keep`` - 1 where not given.
     density : bool or mapping
         Store a histogram of each state's section points instead of the points. A mapping gives ranges,
         ``{"x": (lowest, highest)}``; where none is given it is that of a coarse sweep and a twentieth more either side.
