@@ -14,6 +14,7 @@ from nonsmooth.analysis.sweep_pieces import Report, Slot, ended, largest_of, pie
 from nonsmooth.flow.arguments import check_options, check_system, float_array, whole_number
 from nonsmooth.flow.devices import engine_on, on_gpu, workers_of
 from nonsmooth.flow.engine import FloatArray, State
+from nonsmooth.flow.equilibria import refuse_resting
 from nonsmooth.flow.memory import room_for
 from nonsmooth.flow.methods import engine_for, warn_if_coarse
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
@@ -100,7 +101,8 @@ def sweep(
     Raises
     ------
     ValueError, TypeError
-        Arguments that do not fit. A point that fails keeps its status; the others are whole.
+        Arguments that do not fit, and starts at an equilibrium of a system without forcing. A point that fails keeps
+        its status; the others are whole.
     ImportError, RuntimeError
         ``device="cuda"`` without the package numba-cuda, or without a GPU.
 
@@ -126,6 +128,8 @@ def sweep(
     threads = workers_of(device, threads)
     starts = start_states(system, start)
     points = system.parameter_points({parameter: numbers})
+    if plan.indicator >= 0:
+        refuse_resting(system, starts, points, "sweep")
     attractors = Attractors(
         engine, engine.prepare(points), plan, transient, keep, max_period, tolerance_of(engine, rtol),
         system.scale_vector(),
