@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from nonsmooth.system.system import System
     from nonsmooth.system.traced import Traced
 
-__all__ = ["ROUNDING", "Equilibrium", "ModeField", "equilibrium_at", "refuse_resting", "sorted_eigenvalues"]
+__all__ = ["AT_REST", "ROUNDING", "Equilibrium", "ModeField", "equilibrium_at", "refuse_resting", "sorted_eigenvalues"]
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -133,6 +133,7 @@ def equilibrium_at(
         if found is None:
             return None
         eigenvalues = found
+    u[np.abs(u) <= ROUNDING * scale] = 0.0
     h, h_u = field.indicators(u, values, memory)
     edge = VANISHING * (np.abs(h_u) @ (scale + np.abs(u)))
     margins = field.margins(np.sign(h) * np.maximum(np.abs(h) - edge, 0.0))
@@ -185,7 +186,8 @@ def _under_forcing(
     """log|mu| / T at a state that the forcing leaves alone; empty where unknown, None where it moves."""
     traced, period = system.traced, system.period_at(values)
     span = 1.0 if period is None else period
-    M, n = np.eye(len(field.own)), len(field.own)
+    n = len(field.own)
+    M: FloatArray = np.eye(n)
     for k in range(STEPS):
         f, J, _ = field.evaluate(u, values, memory, (k + 0.5) * span / STEPS)
         size = np.abs(J) @ (system.scale_vector() + np.abs(u))[field.own]
