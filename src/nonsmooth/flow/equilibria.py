@@ -187,7 +187,7 @@ def _under_forcing(
     traced, period = system.traced, system.period_at(values)
     span = 1.0 if period is None else period
     n = len(field.own)
-    M: FloatArray = np.eye(n)
+    M: NDArray[np.floating[Any]] = np.eye(n)
     for k in range(STEPS):
         f, J, _ = field.evaluate(u, values, memory, (k + 0.5) * span / STEPS)
         size = np.abs(J) @ (system.scale_vector() + np.abs(u))[field.own]
