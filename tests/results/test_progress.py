@@ -91,20 +91,34 @@ def test_compiling_is_mentioned_once_for_all_kernels_of_some_seconds(
     assert terminal.getvalue() == f"nonsmooth: compiling (once; kept in {tmp_path}) ...\n"
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="terminals of POSIX")
-def test_the_first_call_on_a_terminal_says_that_it_compiles(tmp_path: Path) -> None:
-    """Before it does: the process is ended as soon as it has spoken."""
+def first_words(code: str, environment: dict[str, str]) -> tuple[str, float]:
+    """What a process writes first on a terminal, and the seconds of a processor until then; it is ended there."""
     import pty
 
-    code = "import nonsmooth as ns; ns.simulate(ns.models.discontinuous_support(), periods=1)"
     child, terminal = pty.fork()
     if child == 0:
-        os.environ["NONSMOOTH_CACHE_DIR"] = str(tmp_path)
+        os.environ.update(environment)
         os.execv(sys.executable, [sys.executable, "-c", code])
-    first = os.read(terminal, 4096).decode()
+    words = os.read(terminal, 4096).decode()
     os.kill(child, signal.SIGKILL)
     _, _, used = os.wait4(child, 0)
     os.close(terminal)
-    assert first.startswith("nonsmooth: compiling (once; kept in ")
-    assert not (tmp_path / "compiled").exists()
-    assert used.ru_utime + used.ru_stime < 4.0  # seconds of a processor: some 1, and 10 where it were said afterwards
+    return words, used.ru_utime + used.ru_stime
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="terminals of POSIX")
+def test_the_first_call_on_a_terminal_says_that_it_compiles(tmp_path: Path) -> None:
+    """Before it does."""
+    code = "import nonsmooth as ns; ns.simulate(ns.models.discontinuous_support(), periods=1)"
+    words, seconds = first_words(code, {"NONSMOOTH_CACHE_DIR": str(tmp_path)})
+    assert words.startswith("nonsmooth: compiling (once; kept in ")
+    assert not list(tmp_path.glob("compiled/*"))
+    assert seconds < 4.0  # some 1, and 10 where it were said afterwards
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="terminals of POSIX")
+def test_a_terminal_that_does_not_know_its_size_shows_a_bar() -> None:
+    """One that was just opened has no columns and no rows."""
+    code = "from nonsmooth.results.progress import progress\nwith progress(10, 'work') as advance: input()"
+    words, _ = first_words(code, {})
+    assert "work" in words and "0/10" in words

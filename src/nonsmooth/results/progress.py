@@ -8,6 +8,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from shutil import get_terminal_size
 from typing import Any
 
 from nonsmooth.kernels import before_compiling
@@ -33,7 +34,9 @@ def progress(total: int, label: str, enabled: bool = True, done: int = 0) -> Ite
     # A bar that is redrawn by its own steps needs no thread that looks after it.
     kind = type("Bar", (_tqdm(),), {"monitor_interval": 0})
     with kind(
-        total=total, desc=label, initial=done, leave=False, miniters=1, file=sys.stderr, dynamic_ncols=True,
+        total=total, desc=label, initial=done, leave=False, miniters=1, file=sys.stderr,
+        # a terminal may say that it has no columns and no rows
+        ncols=None if _in_notebook() else get_terminal_size().columns, nrows=20,
         bar_format="{desc}: {percentage:3.0f}%|{bar}| {n_fmt}/{total_fmt} [{elapsed}<{remaining}]",
     ) as bar:  # fmt: skip
 
@@ -54,13 +57,15 @@ def say(text: str) -> None:
 
 def is_watched() -> bool:
     """Whether stderr is a terminal, or this process a notebook's."""
-    shell = getattr(sys.modules.get("IPython"), "get_ipython", _nothing)()
-    if "IPKernelApp" in getattr(shell, "config", ()):
-        return True
     try:
-        return bool(sys.stderr.isatty())
+        return _in_notebook() or bool(sys.stderr.isatty())
     except (AttributeError, ValueError):  # no stderr (pythonw), or a closed one
         return False
+
+
+def _in_notebook() -> bool:
+    shell = getattr(sys.modules.get("IPython"), "get_ipython", _nothing)()
+    return "IPKernelApp" in getattr(shell, "config", ())
 
 
 def _tqdm() -> Any:
