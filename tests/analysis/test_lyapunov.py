@@ -184,6 +184,15 @@ def test_exponents_of_a_stable_equilibrium_are_the_real_parts_of_its_eigenvalues
     assert not recwarn.list
 
 
+@pytest.mark.parametrize("field", [lambda t, u, p: (u.v, -2 * u.x - 3 * u.v), lambda t, u, p: (-u.x, -2 * u.v)])
+def test_the_error_of_a_short_run_at_a_stable_equilibrium_covers_its_eigenvalues(field: Any) -> None:
+    """-1 and -2: the frame of the first is still turning, the batches of the second are alike to the last bit."""
+    found = spectrum(ns.System(states=["x", "v"], parameters={}, modes={"all": field}), duration=64.0)
+    error = found.standard_error.values
+    assert found.equilibrium == 1 and (error > 0.0).all()
+    assert (np.abs(found.exponents.values - [-1.0, -2.0]) <= error).all()
+
+
 def test_equilibria_are_named_along_a_sweep() -> None:
     with pytest.warns(UserWarning, match=r"at 2 of 3 values of 'r', 2 the first.*direction=None"):
         found = spectrum(lorenz(), parameter="r", values=[0.5, 2.0, 28.0], direction=None, duration=100.0)

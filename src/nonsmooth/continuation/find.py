@@ -201,7 +201,7 @@ def _polished(system: System, guesses: list[Guess], given: bool, unstable: bool,
 
 
 def _why(shooting: Shooting, name: str) -> tuple[str, str]:
-    """Why Newton's method found no orbit: a multiplier that is 1, or nothing that is known."""
+    """Status and sentence for a Newton iteration that did not converge: a multiplier is 1, or nothing is known."""
     tried = shooting.tried
     if tried is not None and np.isfinite(tried.monodromy).all():
         nearest = nearest_to_one(multipliers_of(tried.monodromy), shooting.forced)
