@@ -32,6 +32,15 @@ def undamped(stiffness: float, damping: float = 0.0) -> ns.System:
     )  # fmt: skip
 
 
+#: Damping that pushes below x = 1 and brakes beyond: a stable cycle.
+CYCLE = ns.System(
+    states=["x", "v"], parameters={"push": 0.2, "brake": 1.0},
+    modes={"near": lambda t, u, p: (u.v, p.push * u.v - u.x), "far": lambda t, u, p: (u.v, -p.brake * u.v - u.x)},
+    indicators={"beyond": lambda t, u, p: u.x - 1},
+    transitions=[ns.Transition("near", "far", when="beyond > 0"), ns.Transition("far", "near", when="beyond < 0")],
+)  # fmt: skip
+
+
 def test_a_start_at_an_unstable_equilibrium_is_named_at_once() -> None:
     """In the mode to which the start belongs, which is not the first."""
     begin = time.thread_time()
@@ -93,18 +102,17 @@ def test_a_family_of_cycles_is_said_to_be_one() -> None:
     assert caught.value.status == "neutral"
 
 
+def test_a_motion_that_dies_out_too_slowly_is_nearly_neutral() -> None:
+    """x'' = -x - 2e-4 x': once round its multipliers are exp(-2e-4 pi), and nothing rests for long."""
+    with pytest.raises(ns.SolveError, match=f"a multiplier is {np.exp(-2e-4 * np.pi):.5g}") as caught:
+        ns.find_orbit(CYCLE.with_parameters(push=-2e-4), start={"x": 0.5}, transient=10, **QUIET)
+    assert caught.value.status == "neutral" and str(caught.value).count("Newton") == 1
+    assert "nearly 1" in str(caught.value) and "dies out or grows very slowly" in str(caught.value)
+
+
 class Terminal(io.StringIO):
     def isatty(self) -> bool:
         return True
-
-
-#: Damping that pushes below x = 1 and brakes beyond: a stable cycle.
-CYCLE = ns.System(
-    states=["x", "v"], parameters={"push": 0.2, "brake": 1.0},
-    modes={"near": lambda t, u, p: (u.v, p.push * u.v - u.x), "far": lambda t, u, p: (u.v, -p.brake * u.v - u.x)},
-    indicators={"beyond": lambda t, u, p: u.x - 1},
-    transitions=[ns.Transition("near", "far", when="beyond > 0"), ns.Transition("far", "near", when="beyond < 0")],
-)  # fmt: skip
 
 
 @pytest.mark.parametrize("system", [undamped(2.0, 0.1), CYCLE], ids=["forced", "autonomous"])

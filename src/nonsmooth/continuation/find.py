@@ -35,7 +35,7 @@ GOOD = (codes.OK, codes.NOT_GUARANTEED)
 RTOL = 1e-12  # of the runs from which orbits are read, where the flow is not exact
 NOISE = 1e-11  # of the motion's size: beyond a boundary by less than this is on it
 FAR = 30.0  # how far from the motion, in units of its gap, the orbit may lie
-NEUTRAL = 1e-3  # a multiplier nearer to 1 than this explains that Newton's method did not converge
+NEUTRAL = 1e-2  # a multiplier nearer to 1 than this explains that Newton's method did not converge
 SLOW = 3.0  # or of the distance that its multipliers give for that gap
 
 
@@ -192,8 +192,10 @@ def _polished(system: System, guesses: list[Guess], given: bool, unstable: bool,
             reasons.append(("no_convergence", f"Newton's method left the motion for a {name} orbit far from it"))
     status = reasons[0][0] if guesses[0].gap <= CLOSED or given else "not_periodic"
     remedy = "Give another start, a longer transient, or period_number= (then an unstable orbit is taken too)"
-    if any(one == "neutral" for one, _ in reasons):
-        status, remedy = "neutral", "Add damping or a restoring force, or give another start"
+    neutral = [one for one in reasons if one[0] == "neutral"]
+    if neutral:
+        status, remedy = "neutral", "Add damping or a restoring force, or give another start or a longer transient"
+        reasons = neutral[:1] + [one for one in reasons if one[0] not in ("neutral", "no_convergence")]
     said = "; ".join(dict.fromkeys(text for _, text in reasons))
     raise SolveError(
         f"the motion settled on no periodic orbit that could be confirmed: {said}. {remedy}", status=status
@@ -209,7 +211,8 @@ def _why(shooting: Shooting, name: str) -> tuple[str, str]:
             size = "1" if abs(nearest - 1.0) <= 1e-6 else f"{nearest.real:.6g}, nearly 1"
             return "neutral", (
                 f"a multiplier is {size}, so that Newton's method has no single orbit to converge to: the motion "
-                "drifts or belongs to a family of orbits (an undamped system, a free translation, a conserved energy)"
+                "drifts, dies out or grows very slowly, or belongs to a family of orbits (an undamped system, a free "
+                "translation, a conserved energy)"
             )
     return "no_convergence", f"Newton's method did not converge to a {name} orbit"
 
