@@ -47,9 +47,9 @@ def progress(total: int, label: str, enabled: bool = True, done: int = 0) -> Ite
         yield advance
 
 
-def say(text: str) -> None:
+def say(text: str, enabled: bool = True) -> None:
     """A line on stderr, above the bars, where somebody watches; an unwritable stderr is passed over."""
-    if is_watched():
+    if enabled and is_watched():
         with suppress(OSError, ValueError):
             _tqdm().write(text, file=sys.stderr)
             sys.stderr.flush()
