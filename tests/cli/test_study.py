@@ -57,7 +57,7 @@ def test_a_file_computes_what_the_call_computes(write, tmp_path: Path, capsys) -
     [
         ("[simulate]\nperiods = 3\n", "u"),
         ("[poincare]\nn = 5\ntransient = 10\nsection = { phase = 0.25 }\n", "section"),
-        ("[frequency_response]\nvalues = [3.0, 3.1, 3.2]\ntransient = 20\nkeep = 4\nmax_period = 3\n", "amplitude"),
+        ("[frequency_response]\nvalues = [3.0, 3.1, 3.2]\ntransient = 20\nkeep = 4\n", "amplitude"),
     ],
 )
 def test_every_verb_is_a_table(verb: str, figure_of: str, write, tmp_path: Path) -> None:

@@ -44,7 +44,7 @@ def basin_fractions(
     section: Stroboscopic | Poincare | None = None,
     transient: int = 500,
     keep: int = 60,
-    max_period: int = 16,
+    max_period: int | None = None,
     method: str = "auto",
     rtol: float | None = None,
     atol: Any = None,
