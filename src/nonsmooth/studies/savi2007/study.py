@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import tempfile
 import time
 from collections.abc import Sequence
@@ -10,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from nonsmooth.results.progress import say
 from nonsmooth.studies.savi2007.bench import Bench
 from nonsmooth.studies.savi2007.figure import Figure
 from nonsmooth.studies.savi2007.finished import finish, finished, just_made, refuse_strange
@@ -122,7 +122,7 @@ def reproduce(
     made = {figure.name: found for figure in known if (found := finished(figure.name, settings)) is not None}
     missing = [figure for figure in chosen if figure.name not in made]
     if made:
-        _say(progress, f"finished before in {folder}: {', '.join(made)}")
+        say(f"finished before in {folder}: {', '.join(made)}", progress)
     if missing:
         for name in REPORTS:  # a report that stands is of the figures beside it
             (folder / name).unlink(missing_ok=True)
@@ -130,15 +130,16 @@ def reproduce(
     measured = [figure for figure in missing if figure.rig]
     with Bench(folder, measured, quick, full) as bench:
         for i, figure in enumerate(computed):
-            _say(progress, f"[{i + 1}/{len(computed)}] {figure.name}: {figure.title}")
+            say(f"[{i + 1}/{len(computed)}] {figure.name}: {figure.title}", progress)
             begin = time.perf_counter()
             datasets = figure.compute(settings)
             seconds = time.perf_counter() - begin
             finish(figure.name, datasets, seconds, settings)
             made[figure.name] = datasets, seconds
             _draw(figure, datasets, folder)
-        _say(progress and bool(measured), f"waiting for the virtual rig: {', '.join(one.name for one in measured)}")
-        bench.wait(lambda line: _say(progress, line))
+        names = ", ".join(one.name for one in measured)
+        say(f"waiting for the virtual rig: {names}", progress and bool(measured))
+        bench.wait(lambda line: say(line, progress))
     made |= {figure.name: just_made(figure.name, settings) for figure in measured}
     shown = tuple(figure for figure in known if figure.name in made)
     data = {figure.name: made[figure.name][0] for figure in shown}
@@ -177,11 +178,6 @@ def _chosen(wanted: Sequence[int | str] | None, full: bool) -> tuple[Figure, ...
             f"that the paper has not, goes by its name: {', '.join(names)}"
         )
     return tuple(figure for figure in known if figure.name in asked or str(figure.number) in asked)
-
-
-def _say(aloud: bool, text: str) -> None:
-    if aloud and sys.stderr.isatty():
-        print(text, file=sys.stderr)
 
 
 def _drawn(figure: Figure, folder: Path) -> bool:
