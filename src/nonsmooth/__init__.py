@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from nonsmooth.continuation.orbit import Orbit as Orbit
     from nonsmooth.continuation.special import special_points as special_points
     from nonsmooth.errors import DataFileError as DataFileError
+    from nonsmooth.errors import Interrupted as Interrupted
     from nonsmooth.errors import SolveError as SolveError
     from nonsmooth.errors import SystemDefinitionError as SystemDefinitionError
     from nonsmooth.experiment.load import load_recording as load_recording
@@ -88,6 +89,7 @@ _WHERE = {
     "SystemDefinitionError": "errors",
     "SolveError": "errors",
     "DataFileError": "errors",
+    "Interrupted": "errors",
 }
 _ROOMS = ("models", "plot")
 

@@ -1,8 +1,21 @@
-"""The exceptions of the package. Wrong values are plain ``ValueError``/``TypeError``; these add a meaning."""
+"""The exceptions of the package. Wrong values are plain ``ValueError``/``TypeError``; these add a meaning.
+
+Beside them the sentence on packages that only some work needs.
+"""
 
 from __future__ import annotations
 
-__all__ = ["DataFileError", "SolveError", "SystemDefinitionError"]
+from typing import Any
+
+__all__ = ["DataFileError", "Interrupted", "SolveError", "SystemDefinitionError", "not_installed"]
+
+
+def not_installed(package: str, extra: str) -> str:
+    """Return what to do where a package of an optional group is missing; nonsmooth itself is on no package index."""
+    return (
+        f"the package {package}, which is not installed: in a copy of the source of nonsmooth run "
+        f'python -m pip install ".[{extra}]"'
+    )
 
 
 class SystemDefinitionError(ValueError):
@@ -43,6 +56,23 @@ class SolveError(RuntimeError):
         where += [f"{name} = {value:.9g}" for name, value in (state or {}).items()]
         where += [] if mode is None else [f"mode {mode!r}"]
         super().__init__(message + (f" (at {', '.join(where)})" if where else ""))
+
+
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C in a verb that can tell what it had found until then.
+
+    It is a ``KeyboardInterrupt``: nothing that called the verb goes on, unless it catches this and takes the part.
+
+    Parameters
+    ----------
+    message : str
+    result : xarray.Dataset
+        What was found.
+    """
+
+    def __init__(self, message: str, result: Any) -> None:
+        super().__init__(message)
+        self.result = result
 
 
 class DataFileError(ValueError):
