@@ -42,7 +42,8 @@ class Bench:
         if figures:
             (folder / RIG).mkdir(parents=True, exist_ok=True)
             run = f"from {__name__} import main; main()"
-            command = [sys.executable, "-c", run, str(folder), *(figure.name for figure in figures)]
+            # -P: with -c alone a file of the caller's folder (a pint.py, say) would stand for a library.
+            command = [sys.executable, "-P", "-c", run, str(folder), *(figure.name for figure in figures)]
             with open(folder / RIG / _LOG, "wb") as log:
                 self.process = subprocess.Popen(
                     command + (["--quick"] if quick else []), stdin=subprocess.DEVNULL, stdout=log,
