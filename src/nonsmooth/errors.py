@@ -7,7 +7,17 @@ from __future__ import annotations
 
 from typing import Any
 
-__all__ = ["DataFileError", "Interrupted", "SolveError", "SystemDefinitionError", "not_installed"]
+__all__ = ["DataFileError", "Interrupted", "SolveError", "SystemDefinitionError", "not_installed", "shortened"]
+
+_QUOTED = 200  # characters of what was given that a message repeats
+
+
+def shortened(given: object, *, quoted: bool = True) -> str:
+    """Return what was given as a message repeats it: its ``repr`` (or ``str``), the middle of a long one left out."""
+    text = (repr if quoted else str)(given)
+    if len(text) <= _QUOTED:
+        return text
+    return f"{text[: _QUOTED // 2]} ... {text[-_QUOTED // 4 :]} ({len(text)} characters)"
 
 
 def not_installed(package: str, extra: str) -> str:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from numbers import Real
 from typing import Any
 
-from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.errors import SystemDefinitionError, shortened
 
 __all__ = ["Parameter", "finite_number", "latex_name"]
 
@@ -41,8 +41,11 @@ def latex_name(name: str) -> str:
 def finite_number(value: Any, what: str) -> float:
     """Return ``value`` as a float, or raise: TypeError for what is no real number, ValueError for NaN and inf."""
     if isinstance(value, bool) or not (isinstance(value, Real) or (hasattr(value, "__float__") and _scalar(value))):
-        raise TypeError(f"{what} must be a real number, not {value!r}")
-    number = float(value)
+        raise TypeError(f"{what} must be a real number, not {shortened(value)}")
+    try:
+        number = float(value)
+    except OverflowError:  # a whole number of hundreds of digits
+        number = math.inf
     if not math.isfinite(number):
         raise ValueError(f"{what} must be finite, not {number}")
     return number

@@ -157,7 +157,7 @@ def read_system(text: str) -> System:
         return system if smoothing is None else system.smoothed(smoothing["eta"])
     except SystemDefinitionError:
         raise
-    except (KeyError, TypeError, AttributeError, ValueError) as error:
+    except (KeyError, TypeError, AttributeError, ValueError, ArithmeticError) as error:
         what = f"{error} is missing" if isinstance(error, KeyError) else str(error)
         raise SystemDefinitionError(f"the text of the system {content.get('name')!r} is damaged: {what}") from error
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NoReturn
 
 import numpy as np
 import sympy as sp
 
-from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.errors import SystemDefinitionError, shortened
 from nonsmooth.system.names import unknown
 from nonsmooth.system.scalar import Scalar, to_expression
 
@@ -16,6 +17,8 @@ __all__ = ["Parameters", "States", "Symbols", "call_scalar", "call_vector", "ref
 
 # What no method can see inside a mode: the derivative jumps and nothing says where.
 _CORNERS = (sp.Abs, sp.sign, sp.Max, sp.Min, sp.Piecewise, sp.floor, sp.ceiling, sp.Heaviside)
+
+_LARGEST = sp.Integer(int(sys.float_info.max))
 
 
 class Symbols:
@@ -176,9 +179,11 @@ def _entry(value: Any, what: str) -> sp.Expr:
     except (TypeError, SystemDefinitionError) as error:
         raise SystemDefinitionError(f"{what} did not give a real number: {error}") from error
     if expression.has(sp.nan, sp.zoo, sp.oo, -sp.oo):
-        raise SystemDefinitionError(f"{what} divides by zero or is not finite: {expression}")
+        raise SystemDefinitionError(f"{what} divides by zero or is not finite: {shortened(expression, quoted=False)}")
     if expression.has(sp.I):
-        raise SystemDefinitionError(f"{what} is not real: {expression}")
+        raise SystemDefinitionError(f"{what} is not real: {shortened(expression, quoted=False)}")
+    if any(abs(number) > _LARGEST for number in expression.atoms(sp.Number)):
+        raise SystemDefinitionError(f"{what} holds a number beyond {float(_LARGEST):.3g}, more than a float can hold")
     return expression
 
 
