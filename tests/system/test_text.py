@@ -187,6 +187,15 @@ def test_what_takes_for_ever_is_refused_before_it_is_worked_out():
         assert expected in sentence and len(sentence) < 700
 
 
+@pytest.mark.parametrize(("given", "read"), [("\u00b5", "\u03bc"), ("\ufb01", "fi"), ("e\u0301", "\u00e9")])
+def test_a_name_is_what_python_reads(given, read):
+    """The micro sign of a keyboard is another character than the Greek letter that ``p.µ`` asks for in code."""
+    with pytest.raises(SystemDefinitionError, match=f"in code Python reads the name as '{read}'.*Name it '{read}'"):
+        System(states=["x"], parameters={given: 1.0}, modes={"m": lambda t, u, p: -u.x * getattr(p, given)})
+    system = System(states=["x"], parameters={read: 1.0}, modes={"m": lambda t, u, p: -u.x * getattr(p, read)})
+    assert System.from_text(system.to_text()) == system
+
+
 def test_a_number_too_large_arises_in_a_product():
     with pytest.raises(SystemDefinitionError, match="component 'v', holds a number beyond"):
         System.from_text(damaged(lambda d: d["modes"]["free"].update(v="(9999*u.x*p.m)**99")))

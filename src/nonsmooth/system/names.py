@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import difflib
 import keyword
+import unicodedata
 from collections.abc import Iterable, Mapping
 
 from nonsmooth.errors import SystemDefinitionError
@@ -50,6 +51,12 @@ def check_names(groups: Mapping[str, Iterable[str]], system: str) -> None:
                 raise SystemDefinitionError(
                     f"{system!r}: {name!r} cannot name a {what}: it must be a Python identifier that is no keyword "
                     f"and does not begin with an underscore{hint}"
+                )
+            if (read := unicodedata.normalize("NFKC", name)) != name:
+                letters = ", ".join(unicodedata.name(a, "?") for a in name if a not in read)
+                raise SystemDefinitionError(
+                    f"{system!r}: {name!r} cannot name a {what}: it holds {letters}, and in code Python reads the name "
+                    f"as {read!r} (p.{name} is p.{read}). Name it {read!r}, or in plain letters (mu)"
                 )
             if name in RESERVED:
                 raise SystemDefinitionError(
