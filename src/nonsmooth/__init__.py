@@ -9,6 +9,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from nonsmooth.kernels.forking import watch_forks
+
 if TYPE_CHECKING:
     from nonsmooth import models as models
     from nonsmooth import plot as plot
@@ -94,6 +96,9 @@ _WHERE = {
 _ROOMS = ("models", "plot")
 
 __all__ = sorted([*_WHERE, *_ROOMS, "__version__"])
+
+
+watch_forks()
 
 
 def __getattr__(name: str) -> Any:
