@@ -9,15 +9,17 @@ from typing import Any
 
 __all__ = ["DataFileError", "Interrupted", "SolveError", "SystemDefinitionError", "not_installed", "shortened"]
 
-_QUOTED = 200  # characters of what was given that a message repeats
 
 
-def shortened(given: object, *, quoted: bool = True) -> str:
+def shortened(given: object, *, quoted: bool = True, most: int = 200) -> str:
     """Return what was given as a message repeats it: its ``repr`` (or ``str``), the middle of a long one left out."""
-    text = (repr if quoted else str)(given)
-    if len(text) <= _QUOTED:
+    try:
+        text = (repr if quoted else str)(given)
+    except ValueError:  # Python writes no whole number of more than 4300 digits
+        text = f"<{type(given).__name__}>"
+    if len(text) <= most:
         return text
-    return f"{text[: _QUOTED // 2]} ... {text[-_QUOTED // 4 :]} ({len(text)} characters)"
+    return f"{text[: most // 2]} ... {text[-most // 4 :]} ({len(text)} characters)"
 
 
 def not_installed(package: str, extra: str) -> str:

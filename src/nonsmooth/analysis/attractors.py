@@ -23,6 +23,7 @@ from nonsmooth.analysis.series_cuda import series_exponents_on_gpu, settle_serie
 from nonsmooth.analysis.settle import LONGER, Attractors, tolerance_of
 from nonsmooth.analysis.settled import Settled, least_sizes, usable
 from nonsmooth.flow.engine import Chain, Engine, FloatArray, IntArray, SectionPlan, State
+from nonsmooth.flow.memory import room_for
 from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.planar import PlanarEngine
 from nonsmooth.kernels import codes
@@ -65,6 +66,7 @@ class Settler:
     width: int = field(init=False)  # numbers that say where a run stands on the section (``attractors_trace``)
 
     def __post_init__(self) -> None:
+        room_for(16.0 * self.keep * len(self.system.states), f"keep = {self.keep:.6g} section points", "keep fewer")
         object.__setattr__(self, "tolerance", tolerance_of(self.engine, self.rtol))
         u, m, forced = self.system.traced.u, self.system.traced.m, self.system.traced.period is not None
         object.__setattr__(self, "width", len(u) + len(m) + int(forced and self.plan.indicator >= 0))

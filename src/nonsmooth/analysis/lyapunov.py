@@ -137,6 +137,7 @@ def lyapunov(
     points = system.parameter_points({} if numbers is None else {str(parameter): numbers})
     forced = system.period() is not None
     count, length, wait = _length(system, periods, duration, transient, forced)
+    first_state(system, start, mode)  # refused before anything is compiled
     engine = engine_for(system, method, rtol, atol, **expert)
     options = {
         "parameter": parameter, "values": values, "direction": direction, "periods": periods, "duration": duration,

@@ -126,15 +126,16 @@ def sweep(
     threads = workers_of(device, threads)
     starts = start_states(system, start)
     points = system.parameter_points({parameter: numbers})
-    attractors = Attractors(
-        engine, engine.prepare(points), plan, transient, keep, max_period, tolerance_of(engine, rtol),
-        system.scale_vector(),
-    )  # fmt: skip
     traced = system.traced
     sizes = len(traced.u), len(traced.indicators), len(traced.outputs)
+    ranges, n_bins = ({}, 0) if density is False else given_ranges(system, density, bins)
+    width = keep * (len(traced.u) + 2) if density is False else len(traced.u) * (n_bins + 1) / 2
+    room_for(
+        16.0 * width * len(points) * len(directions) * len(starts), f"a sweep over {len(points)} values",
+        "take fewer values, starts or bins, keep fewer returns, or count them with density=True",
+    )  # fmt: skip
     edges = None
     if density is not False:
-        ranges, n_bins = given_ranges(system, density, bins)
         coarse = None
         if len(ranges) < len(system.states):
             few = min(keep, 1000)
@@ -144,10 +145,9 @@ def sweep(
                 atol=atol, threads=threads, progress=False, **expert,
             )["section"].transpose(..., "state").values  # fmt: skip
         edges = bin_edges(system, ranges, n_bins, coarse)
-    width = keep * (len(traced.u) + 2) if edges is None else edges.size // 2
-    room_for(
-        16.0 * width * len(points) * len(directions) * len(starts), f"a sweep over {len(points)} values",
-        "take fewer values, starts or bins, keep fewer returns, or count them with density=True",
+    attractors = Attractors(
+        engine, engine.prepare(points), plan, transient, keep, max_period, tolerance_of(engine, rtol),
+        system.scale_vector(),
     )  # fmt: skip
     slots = {
         (d, k): Slot(attractors, points, sizes, edges) for d in range(len(directions)) for k in range(len(starts))

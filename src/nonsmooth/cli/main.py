@@ -12,7 +12,7 @@ from collections.abc import Sequence
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from nonsmooth.cli import compare, identify, models, plan, reproduce, rig, run, show
-from nonsmooth.errors import SolveError
+from nonsmooth.errors import SolveError, shortened
 from nonsmooth.results.provenance import package_version
 
 __all__ = ["main"]
@@ -35,7 +35,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except _USER_ERRORS as error:
         if options.traceback:
             raise
-        print(f"nonsmooth: {error}", file=sys.stderr)
+        print(f"nonsmooth: {shortened(error, quoted=False, most=4000)}", file=sys.stderr)
         return 2
 
 

@@ -18,7 +18,7 @@ from nonsmooth.continuation.physical import allowed_range
 from nonsmooth.continuation.reading import special_row
 from nonsmooth.continuation.shooting import Shooting
 from nonsmooth.continuation.surfaces import look_at_surfaces
-from nonsmooth.errors import SolveError
+from nonsmooth.errors import SolveError, shortened
 from nonsmooth.flow.arguments import whole_number
 
 if TYPE_CHECKING:
@@ -100,7 +100,8 @@ def _box(system: System, ranges: Any) -> tuple[tuple[str, str], list[tuple[float
     """The two parameters and their ranges, which hold the system's own values."""
     if not isinstance(ranges, Mapping) or len(ranges) != 2:
         raise ValueError(
-            f'ranges names two parameters with their ends, {{"omega": (3, 7), "rho": (0.1, 0.3)}}; not {ranges!r}'
+            'ranges names two parameters with their ends, {"omega": (3, 7), "rho": (0.1, 0.3)}; '
+            f"not {shortened(ranges)}"
         )
     box = [
         limits(system, name, ends, system.values.get(name), word=f"the range of {name}", what="the special point")

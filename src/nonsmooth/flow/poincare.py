@@ -71,8 +71,8 @@ def poincare(
     n, transient = whole_number(n, "n", 1), whole_number(transient, "transient", 0)
     section, plan = section_plan(system, section)
     plan = replace(plan, extremes=False)
-    engine = engine_for(system, method, rtol, atol, **expert)
     starts = start_states(system, start)
+    engine = engine_for(system, method, rtol, atol, **expert)
     traced = system.traced
     out = Chain.empty(len(starts), n, len(traced.u), len(traced.indicators), len(traced.outputs))
     tables = engine.prepare(np.tile(system.parameter_vector(), (len(starts), 1)))

@@ -11,7 +11,7 @@ import keyword
 import unicodedata
 from collections.abc import Iterable, Mapping
 
-from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.errors import SystemDefinitionError, shortened
 
 __all__ = ["RESERVED", "check_keys", "check_names", "unknown"]
 
@@ -100,9 +100,9 @@ def unknown(name: object, what: str, of: str, known: Mapping[str, str] | Iterabl
     """
     units = known if isinstance(known, Mapping) else dict.fromkeys(known, "")
     ordered = sorted(units)
-    text = f"`{name}` is not {what} of {of}"
-    near = max(ordered, key=lambda candidate: _likeness(str(name), candidate), default=None)
-    if near is not None and _likeness(str(name), near) >= 0.5:
+    text = f"`{shortened(name, quoted=False)}` is not {what} of {of}"
+    near = max(ordered, key=lambda candidate: _likeness(str(name)[:100], candidate), default=None)
+    if near is not None and _likeness(str(name)[:100], near) >= 0.5:
         unit = units[near]
         text += f"; nearest: {near}" + (f" [{unit}]" if unit else "")
     return text + (f"; all: {', '.join(ordered)}" if ordered else f"; {of} has none")

@@ -84,7 +84,8 @@ class Parameter:
             parts = (given,)
         if not 1 <= len(parts) <= 3 or not all(isinstance(part, str) for part in parts[1:]):
             raise SystemDefinitionError(
-                f"parameter {name!r} is {given!r}; give a number, (number, unit) or (number, unit, LaTeX symbol)"
+                f"parameter {name!r} is {shortened(given)}; give a number, (number, unit) or (number, unit, LaTeX "
+                "symbol)"
             )
         value = finite_number(parts[0], f"parameter {name!r}")
         unit = parts[1] if len(parts) > 1 else ""

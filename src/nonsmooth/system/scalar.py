@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.errors import SystemDefinitionError, shortened
 
 __all__ = ["Condition", "Scalar", "to_expression", "where"]
 
@@ -52,7 +52,7 @@ def to_expression(value: Any) -> sp.Expr:
         raise SystemDefinitionError(f"`{value}` is a condition, not a number: wrap it in ns.where(condition, a, b)")
     if isinstance(value, (complex, np.complexfloating)):
         raise SystemDefinitionError(f"the function contains the complex number {value}; only real numbers are known")
-    raise TypeError(f"expected a number, got {value!r} ({type(value).__name__})")
+    raise TypeError(f"expected a number, got {shortened(value)} ({type(value).__name__})")
 
 
 def _binary(make: Callable[[Any, Any], Any]) -> tuple[Callable[..., Any], Callable[..., Any]]:
@@ -190,7 +190,7 @@ def _relation(value: Any) -> Any:
         return value.relation
     if isinstance(value, (bool, np.bool_)):
         return sp.true if value else sp.false
-    raise TypeError(f"ns.where needs a condition such as p.a > 0, not {value!r}")
+    raise TypeError(f"ns.where needs a condition such as p.a > 0, not {shortened(value)}")
 
 
 def where(condition: Any, a: Any, b: Any) -> Any:
