@@ -112,7 +112,19 @@ def __getattr__(name: str) -> Any:
         value = getattr(import_module(f"nonsmooth.{_WHERE[name]}"), name)
         globals()[name] = value
         return value
-    raise AttributeError(f"module 'nonsmooth' has no attribute {name!r}; it has: {', '.join(__all__)}")
+    raise AttributeError(_not_there(name), name=name)
+
+
+def _not_there(name: str) -> str:
+    """The sentence for a name that is not here; private names are asked for by machines."""
+    text = f"module 'nonsmooth' has no attribute {name!r}"
+    if name.startswith("_"):
+        return text
+    from nonsmooth.system.names import nearest
+
+    elsewhere = [f"ns.{room}.{name}" for room in _ROOMS if name in import_module(f"nonsmooth.{room}").__all__]
+    near = elsewhere or [f"ns.{one}" for one in nearest(name, __all__)]
+    return text + (f"; nearest: {', '.join(near)}" if near else "") + "; dir(nonsmooth) lists all"
 
 
 def __dir__() -> list[str]:

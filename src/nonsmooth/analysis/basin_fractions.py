@@ -24,6 +24,7 @@ from nonsmooth.flow.devices import BATCH, workers_of
 from nonsmooth.flow.memory import room_for
 from nonsmooth.flow.sections import Poincare, Stroboscopic
 from nonsmooth.flow.starts import random_starts, start_states
+from nonsmooth.system.names import by_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
 __all__ = ["basin_fractions"]
 
 
+@by_name
 def basin_fractions(
     system: System,
     parameter: str,

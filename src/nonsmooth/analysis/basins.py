@@ -31,6 +31,7 @@ from nonsmooth.flow.memory import room_for
 from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.kernels import codes
+from nonsmooth.system.names import by_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
 __all__ = ["basins", "by_share", "failed", "settler_of"]
 
 
+@by_name
 def basins(
     system: System,
     grid: Mapping[str, Any],

@@ -21,6 +21,7 @@ from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.planar import PlanarEngine
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.flow.starts import is_one_start, plain_start, start_states
+from nonsmooth.system.names import by_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -33,6 +34,7 @@ __all__ = ["PlannedChart", "chart", "described", "plan_chart"]
 EXPONENT_RETURNS = 1000
 
 
+@by_name
 def chart(
     system: System,
     grid: Mapping[str, Any],

@@ -20,6 +20,7 @@ import numpy as np
 from nonsmooth.errors import shortened
 from nonsmooth.flow.arguments import float_array, real_number, whole_number
 from nonsmooth.flow.engine import FloatArray
+from nonsmooth.system.names import by_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -33,6 +34,7 @@ WIDEST = 0.2  # of the extent: larger distances see the attractor's edges
 LEAST_DECADES = 0.8
 
 
+@by_name
 def correlation_dimension(
     section: Any, *, window: int = 1, scale: Any = None, range: tuple[float, float] | None = None
 ) -> xr.Dataset:

@@ -35,6 +35,7 @@ from nonsmooth.flow.poincare import result_status
 from nonsmooth.flow.starts import first_state, is_one_start, plain_start
 from nonsmooth.kernels import codes
 from nonsmooth.results.progress import progress as progress_bar
+from nonsmooth.system.names import by_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -46,6 +47,7 @@ __all__ = ["kaplan_yorke", "lyapunov"]
 UNITS = 4096  # pieces into which a duration is cut
 
 
+@by_name
 def lyapunov(
     system: System,
     *,

@@ -11,6 +11,7 @@ from nonsmooth.analysis.classify import longest_period
 from nonsmooth.analysis.density import bin_edges, coarse_values, given_ranges
 from nonsmooth.analysis.settle import Attractors, tolerance_of, warn_if_small
 from nonsmooth.analysis.sweep_pieces import Report, Slot, ended, largest_of, pieces_of, run_on_gpu, run_pieces
+from nonsmooth.errors import shortened
 from nonsmooth.flow.arguments import check_options, check_system, float_array, whole_number
 from nonsmooth.flow.devices import engine_on, on_gpu, workers_of
 from nonsmooth.flow.engine import FloatArray, State
@@ -18,6 +19,7 @@ from nonsmooth.flow.memory import room_for
 from nonsmooth.flow.methods import engine_for, warn_if_coarse
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.flow.starts import is_one_start, plain_start, start_states
+from nonsmooth.system.names import by_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,6 +33,7 @@ DIRECTIONS: dict[str | None, tuple[str, ...]] = {
 }  # fmt: skip
 
 
+@by_name
 def sweep(
     system: System,
     parameter: str,
@@ -191,11 +194,17 @@ def swept_values(system: System, parameter: str, values: Any) -> FloatArray:
     ValueError, TypeError
         A parameter that does not exist; values that are no list of finite numbers, each there once.
     """
+    if not isinstance(parameter, str):
+        raise TypeError(
+            f'the parameter that is varied is given by its name in quotes, as "{next(iter(system.values), "rho")}", '
+            f"before its values; not {shortened(parameter)}"
+        )
     if parameter not in system.values:
         system.with_parameters({parameter: 0.0})  # raises with the names there are
     numbers = float_array(values, f"values of {parameter!r}")
     if numbers.ndim != 1 or not len(numbers):
-        hint = "; for one value write [value]" if numbers.ndim == 0 else ""
+        hints = ["for one value write [value]", "give at least one", "give one axis, no mesh of two"]
+        hint = f"; {hints[min(numbers.ndim, 2)]}"
         raise ValueError(f"values of {parameter!r} must be a list of numbers, not of shape {numbers.shape}{hint}")
     if not np.isfinite(numbers).all():
         where = int(np.argmin(np.isfinite(numbers)))

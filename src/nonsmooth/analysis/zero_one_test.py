@@ -22,6 +22,7 @@ import numpy as np
 from nonsmooth.flow.arguments import float_array, whole_number
 from nonsmooth.flow.engine import FloatArray
 from nonsmooth.flow.memory import room_for
+from nonsmooth.system.names import by_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,6 +32,7 @@ __all__ = ["zero_one_test"]
 LEAST = 100
 
 
+@by_name
 def zero_one_test(section: Any, *, n_frequencies: int = 100, seed: int = 0) -> xr.DataArray:
     """K of the 0-1 test for every state: near 0 for regular motion, near 1 for chaos.
 

@@ -20,6 +20,7 @@ from nonsmooth.continuation.shooting import Shooting
 from nonsmooth.continuation.surfaces import look_at_surfaces
 from nonsmooth.errors import SolveError, shortened
 from nonsmooth.flow.arguments import whole_number
+from nonsmooth.system.names import by_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 __all__ = ["continue_curve"]
 
 
+@by_name
 def continue_curve(
     special_point: Any, ranges: Mapping[str, tuple[float, float]], *, step: float = 0.05, points: int = 1000
 ) -> xr.Dataset:

@@ -16,6 +16,7 @@ from nonsmooth.continuation.physical import allowed_range
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.arguments import check_system, whole_number
 from nonsmooth.flow.starts import first_state
+from nonsmooth.system.names import by_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 __all__ = ["continue_equilibrium"]
 
 
+@by_name
 def continue_equilibrium(
     system: System,
     parameter: str,

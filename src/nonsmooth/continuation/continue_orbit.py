@@ -23,6 +23,7 @@ from nonsmooth.continuation.reading import read_branch
 from nonsmooth.continuation.records import BranchRecord, PointRecord, SpecialRecord, from_march, joined, point_record
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.arguments import whole_number
+from nonsmooth.system.names import by_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,6 +35,7 @@ Records = tuple[list[PointRecord], list[SpecialRecord]]
 ZERO = 1e-6  # of the numbers beside it: the first orbit is a special point
 
 
+@by_name
 def continue_orbit(
     start: Any,
     parameter: str | None = None,

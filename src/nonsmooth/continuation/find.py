@@ -20,6 +20,7 @@ from nonsmooth.flow.failure import solve_error
 from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.starts import first_state, plain_start
 from nonsmooth.kernels import codes
+from nonsmooth.system.names import by_name
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
@@ -34,6 +35,7 @@ FAR = 30.0  # how far from the motion, in units of its gap, the orbit may lie
 SLOW = 3.0  # or of the distance that its multipliers give for that gap
 
 
+@by_name
 def find_orbit(
     system: System,
     *,

@@ -14,6 +14,7 @@ from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.flow.starts import is_one_start, plain_start, start_states
 from nonsmooth.kernels import codes
+from nonsmooth.system.names import by_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,6 +29,7 @@ def result_status(code: int) -> int:
     return codes.NO_CONVERGENCE if code < 0 else int(code)
 
 
+@by_name
 def poincare(
     system: System,
     *,

@@ -9,11 +9,12 @@ import numpy as np
 
 from nonsmooth.flow.arguments import check_options, check_system, float_array, real_number, whole_number
 from nonsmooth.flow.engine import FloatArray, Log, State
-from nonsmooth.flow.failure import solve_error
+from nonsmooth.flow.failure import solve_error, wrong_way
 from nonsmooth.flow.memory import room_for
 from nonsmooth.flow.methods import engine_for, warn_if_coarse
 from nonsmooth.flow.starts import first_state, is_one_start, plain_start
 from nonsmooth.kernels import codes
+from nonsmooth.system.names import by_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,6 +27,7 @@ SAMPLES_PER_PERIOD = 256
 SAMPLES = 4096
 
 
+@by_name
 def simulate(
     system: System,
     *,
@@ -158,7 +160,9 @@ def check_complete(log: Log, system: System, state: State, period: float | None)
         return
     time = state.clock[0] + (state.clock[1] * period if period is not None else 0.0)
     where = dict(zip(system.states, map(float, state.u), strict=True))
-    raise solve_error(log.status, time=float(time), state=where, mode=system.modes[int(state.counters[0])])
+    raise solve_error(
+        log.status, wrong_way(system, log), time=float(time), state=where, mode=system.modes[int(state.counters[0])]
+    )
 
 
 def _dataset(

@@ -11,7 +11,7 @@ from nonsmooth.errors import shortened
 from nonsmooth.flow.arguments import float_array, real_number, whole_number
 from nonsmooth.flow.engine import FloatArray, State
 from nonsmooth.flow.memory import room_for
-from nonsmooth.system.names import unknown
+from nonsmooth.system.names import by_name, unknown
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["first_state", "is_one_start", "plain_start", "random_starts", "start_states"]
 
 
+@by_name
 def random_starts(n: int, low: Any, high: Any, seed: int) -> list[Any]:
     """``n`` states drawn uniformly from a box, the same for the same seed.
 
@@ -179,5 +180,5 @@ def _number(value: Any, name: str) -> float:
 def _finite(values: FloatArray, names: Sequence[str]) -> FloatArray:
     if not np.isfinite(values).all():
         bad = names[int(np.flatnonzero(~np.isfinite(values))[0])]
-        raise ValueError(f"the start of state {bad!r} is not finite: {values.tolist()}")
+        raise ValueError(f"the start of state {bad!r} must be a finite number: {shortened(values.tolist())}")
     return values

@@ -40,7 +40,8 @@ def read_condition(text: object, indicators: Sequence[str], label: str) -> tuple
             raise SystemDefinitionError(
                 f"{label}: cannot read {shortened(part.strip())} in the condition {shortened(text)}; the grammar is: "
                 f"{GRAMMAR}. "
-                f"('or' is a second transition; anything else is a new indicator.)"
+                "('or' is a second transition; anything else is a new indicator: for x > g declare "
+                'indicators={"gap": lambda t, u, p: u.x - p.g} and write "gap > 0".)'
             )
         name, sign = match[1], 1 if match[2] == ">" else -1
         if name not in indicators:

@@ -123,7 +123,10 @@ def _is_mapping(given: Any, what: str, system: str, example: str) -> None:
 def _units(given: Any, what: str, system: str, raw: bool = False) -> dict[str, Any]:
     """Names with units from a mapping, or from a sequence of names (no units)."""
     if isinstance(given, str) or not isinstance(given, (Mapping, Sequence)):
-        raise SystemDefinitionError(f"{system!r}: `{what}` must map names to units, not {shortened(given)}")
+        raise SystemDefinitionError(
+            f'{system!r}: `{what}` must map names to units, as {{"x": "m"}}, or be a list of names; '
+            f"not {shortened(given)}"
+        )
     if not isinstance(given, Mapping):
         return dict.fromkeys(given, "")
     for key, unit in given.items():

@@ -87,6 +87,11 @@ class Parameter:
                 f"parameter {name!r} is {shortened(given)}; give a number, (number, unit) or (number, unit, LaTeX "
                 "symbol)"
             )
+        if isinstance(parts[0], str):
+            raise TypeError(
+                f"parameter {name!r} must be a real number, not {shortened(parts[0])}; its unit stands beside it: "
+                f'{{"{name}": (8.47, "N/m")}}'
+            )
         value = finite_number(parts[0], f"parameter {name!r}")
         unit = parts[1] if len(parts) > 1 else ""
         symbol = parts[2] if len(parts) > 2 and parts[2] else latex_name(name)
