@@ -63,7 +63,7 @@ def test_a_given_period_is_checked():
     assert forced(lambda t, u, p: 0, period=2.5).period() == 2.5
     with pytest.raises(SystemDefinitionError, match="does not repeat after the period"):
         forced(lambda t, u, p: np.cos(p.w * t), period=lambda p: 3 * np.pi / p.w)
-    with pytest.raises(SystemDefinitionError, match="failed when it was called"):
+    with pytest.raises(SystemDefinitionError, match=r"are \(t, u, p\), but it is called as f\(p\): parameters"):
         forced(lambda t, u, p: np.cos(p.w * t), period=lambda t, u, p: t)
 
 
