@@ -131,10 +131,15 @@ def by_name(function: F) -> F:
     @wraps(function)
     def called(*given: Any, **named: Any) -> Any:
         try:
-            signature.bind(*given, **named)
-        except TypeError as error:
-            raise TypeError(_misfit(verb, signature, given, named, str(error))) from None
-        return function(*given, **named)
+            return function(*given, **named)
+        except TypeError:
+            try:
+                signature.bind(*given, **named)
+            except TypeError as error:
+                misfit = _misfit(verb, signature, given, named, str(error))
+            else:
+                raise  # the function's own
+        raise TypeError(misfit)
 
     return cast(F, called)
 
