@@ -201,6 +201,13 @@ def test_a_number_too_large_arises_in_a_product():
         System.from_text(damaged(lambda d: d["modes"]["free"].update(v="(9999*u.x*p.m)**99")))
 
 
+def test_what_is_said_of_a_text_is_short():
+    for change in (lambda d: d["states"].update(x=[1] * 10**5), lambda d: d["transitions"][0].update(target="a" * 10**6)):
+        with pytest.raises(SystemDefinitionError) as raised:
+            System.from_text(damaged(change))
+        assert len(str(raised.value)) < 1500
+
+
 def damaged(change):
     content = json.loads(models.discontinuous_support().to_text())
     change(content)
