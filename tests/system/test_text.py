@@ -202,7 +202,8 @@ def test_a_number_too_large_arises_in_a_product():
 
 
 def test_what_is_said_of_a_text_is_short():
-    for change in (lambda d: d["states"].update(x=[1] * 10**5), lambda d: d["transitions"][0].update(target="a" * 10**6)):
+    vast = [1] * 10**5, "a" * 10**6
+    for change in (lambda d: d["states"].update(x=vast[0]), lambda d: d["transitions"][0].update(target=vast[1])):
         with pytest.raises(SystemDefinitionError) as raised:
             System.from_text(damaged(change))
         assert len(str(raised.value)) < 1500
