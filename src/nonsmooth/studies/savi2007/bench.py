@@ -12,6 +12,7 @@ import argparse
 import json
 import multiprocessing
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -47,7 +48,7 @@ class Bench:
             with open(folder / RIG / _LOG, "wb") as log:
                 self.process = subprocess.Popen(
                     command + (["--quick"] if quick else []), stdin=subprocess.DEVNULL, stdout=log,
-                    stderr=subprocess.STDOUT,
+                    stderr=subprocess.STDOUT, start_new_session=True,
                 )  # fmt: skip
 
     def __enter__(self) -> Bench:
@@ -55,7 +56,10 @@ class Bench:
 
     def __exit__(self, *_: object) -> None:
         if self.process is not None and self.process.poll() is None:
-            self.process.terminate()
+            if hasattr(os, "killpg"):  # the processes that it has forked do not end by themselves
+                os.killpg(self.process.pid, signal.SIGTERM)
+            else:
+                self.process.terminate()
             self.process.wait()
 
     def results(self) -> tuple[dict[str, dict[str, xr.Dataset]], dict[str, float]]:
