@@ -14,7 +14,7 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.cli import main as cli
-from nonsmooth.flow.planar import PlanarEngine
+from nonsmooth.flow.linear import PlanarEngine
 from nonsmooth.flow.series import SeriesEngine
 from nonsmooth.kernels import cache
 

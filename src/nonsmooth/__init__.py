@@ -10,6 +10,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from nonsmooth.kernels.forking import watch_forks
+from nonsmooth.results import progress as _progress  # noqa: F401  it says when kernels are compiled
 
 if TYPE_CHECKING:
     from nonsmooth import models as models

@@ -88,4 +88,12 @@ class Interrupted(KeyboardInterrupt):
 
 
 class DataFileError(ValueError):
-    """A file that cannot be read: the message names the file, the place in it, and what was expected."""
+    """A file that cannot be read or written: the message names the file, the place in it, and what was expected.
+
+    Attributes
+    ----------
+    result : xarray.Dataset or None
+        The result that could not be written, so that it is not lost.
+    """
+
+    result: Any = None

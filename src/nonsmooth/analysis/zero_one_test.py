@@ -21,7 +21,7 @@ import numpy as np
 
 from nonsmooth.flow.arguments import float_array, whole_number
 from nonsmooth.flow.engine import FloatArray
-from nonsmooth.flow.memory import room_for
+from nonsmooth.results.memory import room_for
 from nonsmooth.system.names import by_name
 
 if TYPE_CHECKING:

@@ -26,7 +26,7 @@ def run(
     threads : int, optional
         Threads of this process; one per core where not given. The result does not depend on it.
     progress : bool
-        A bar on a terminal.
+        A bar, on a terminal and in a notebook; nothing elsewhere.
     store : path, optional
         A Zarr store (see :mod:`nonsmooth.campaign.store`).
     client : dask.distributed.Client, optional

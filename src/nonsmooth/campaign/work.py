@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.flow.memory import room_for
+from nonsmooth.results.memory import room_for
 
 __all__ = ["Column", "Work", "check_room", "empty_columns"]
 

@@ -12,7 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.flow.memory import room_for
+from nonsmooth.results.memory import room_for
 
 __all__ = ["Chain", "Engine", "Log", "SectionPlan", "State"]
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from nonsmooth.flow.arguments import check_options, check_system, whole_number
 from nonsmooth.flow.engine import Chain, State
+from nonsmooth.flow.equilibria import refuse_resting
 from nonsmooth.flow.failure import solve_error
 from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
@@ -65,6 +66,8 @@ def poincare(
 
     Raises
     ------
+    ValueError
+        A start at an equilibrium, from which no section is met.
     SolveError
         A single run that could not be completed.
     """
@@ -74,6 +77,8 @@ def poincare(
     section, plan = section_plan(system, section)
     plan = replace(plan, extremes=False)
     starts = start_states(system, start)
+    if plan.indicator >= 0:
+        refuse_resting(system, starts, system.parameter_vector()[None, :], "poincare")
     engine = engine_for(system, method, rtol, atol, **expert)
     traced = system.traced
     out = Chain.empty(len(starts), n, len(traced.u), len(traced.indicators), len(traced.outputs))
