@@ -10,7 +10,6 @@ from typing import Any
 __all__ = ["DataFileError", "Interrupted", "SolveError", "SystemDefinitionError", "not_installed", "shortened"]
 
 
-
 def shortened(given: object, *, quoted: bool = True, most: int = 200) -> str:
     """Return what was given as a message repeats it: its ``repr`` (or ``str``), the middle of a long one left out."""
     try:
