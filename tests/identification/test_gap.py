@@ -1,11 +1,14 @@
 """The gap: the drive's mean by quadrature, its fit, and the bracket of the graze from runs in closed form."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
-from tests.identification.made import COUNT, counted, decay_of, run, swinging
+from tests.identification import made
+from tests.identification.made import COUNT, counted, decay_of, driven, run, swinging
 
 from nonsmooth.identification.gap import grazing_amplitude, mean_of_drive, mean_shift
-from nonsmooth.identification.grazing import grazing_gap
+from nonsmooth.identification.grazing import _sensor_error, _unseen, grazing_gap
 from nonsmooth.identification.steady import steady
 
 W, B, F, KAPPA = 4.5, 1.04, 0.01, 1400.0
@@ -89,6 +92,43 @@ def test_the_graze_brackets_the_gap():
     assert found.data["contact"].values.sum() == 9
 
 
+def test_a_push_too_light_to_be_seen_widens_the_bracket():
+    gap, crank = grazing_amplitude(8.43, W, B, F, 0.010), 0.010
+    found = grazing_gap(stepping(gap), decay_of(W, B, F, 1e-6), resolution=COUNT, kappa=KAPPA)
+    a = [grazing_amplitude(w, W, B, F, crank) for w in (8.45, 8.40)]
+    # the mean of a run is seen to 0.06 counts at best: by as much a car that goes p beyond the gap is pushed
+    least = _unseen(0.06 * COUNT, a[0], KAPPA / W**2)
+    assert least > 3e-6
+    assert found.estimate.half_width > 0.5 * (a[1] - a[0] + least)
+    assert found.estimate.half_width < 0.5 * (a[1] - a[0] + 4 * least)
+
+
+@pytest.mark.parametrize("depth", [2e-6, 2e-5])
+def test_the_push_of_a_light_contact_by_quadrature(depth):
+    amplitude, stiff = 2e-3, KAPPA / W**2
+    theta = np.linspace(-np.pi, np.pi, 2_000_001)
+    x = amplitude * np.cos(theta)
+    # the mean of the support's force over 2k, k_s / 2k = kappa / omega_0^2
+    moved = stiff * float(np.mean(np.maximum(x - (amplitude - depth), 0.0)))
+    assert _unseen(moved, amplitude, stiff) == pytest.approx(depth, rel=0.01)
+
+
+def test_the_sensors_error_is_that_of_a_mean_of_four():
+    off = 1e-5 * np.array([1.0, -1.0, 2.0, -2.0, 1.0, -1.0])  # standard deviation sqrt(12/5) x 10 um
+    seen = SimpleNamespace(highest=2e-3 + off, mean=np.zeros(6), omega=np.full(6, 8.0))
+    error = _sensor_error(seen, np.ones(6, dtype=bool), lambda omega: np.full(len(omega), 2e-3), COUNT)
+    assert error == pytest.approx(1e-5 * np.sqrt(12 / 5) / np.sqrt(4))
+
+
+def test_a_gap_by_graze_is_neither_too_sure_nor_too_vague():
+    z = []
+    for seed in range(12):
+        gap = grazing_amplitude(8.43 - 0.01 * (seed % 5), W, B, F, 0.010)
+        found = grazing_gap(stepping(gap, seed=seed), decay_of(W, B, F, 1e-6), resolution=COUNT, kappa=KAPPA)
+        z.append((found.value - gap) / found.uncertainty)
+    assert 0.4 < np.sqrt(np.mean(np.square(z))) < 1.6
+
+
 def test_the_cranks_length_need_not_be_right():
     gap = 1.004 * grazing_amplitude(8.43, W, B, F, 0.010)
     found = grazing_gap(stepping(gap, scale=1.004), decay_of(W, B, F), resolution=COUNT, kappa=KAPPA)
@@ -110,3 +150,31 @@ def test_what_does_not_show_a_graze_is_refused(runs, said):
     gap = grazing_amplitude(8.43, W, B, F, 0.010)
     with pytest.raises(ValueError, match=said):
         grazing_gap(runs(gap), decay_of(W, B, F), resolution=COUNT, kappa=KAPPA)
+
+
+def early(omega, crank=0.006):
+    """Steps down to a frequency at which a transient has led to contact before the free motion reaches the gap."""
+    rng = np.random.default_rng(4)
+    free = [
+        swinging(w, grazing_amplitude(w, made.W, made.B, made.F, crank), 0.3, made.PLACE, crank=crank, rng=rng)
+        for w in np.arange(omega + 0.5, omega + 0.01, -0.05)
+    ]
+    return [*free, *(driven(w, crank, duration=32.0, transient=20.0) for w in (omega, omega - 0.05))]
+
+
+@pytest.mark.parametrize("omega", [7.6, 7.4])
+def test_contact_that_a_transient_begins_early_is_in_the_uncertainty(omega):
+    decay = decay_of(made.W, made.B, made.F, made.PLACE)
+    found = grazing_gap(early(omega), decay, resolution=COUNT, kappa=made.KAPPA)
+    true = made.GAP - made.PLACE
+    free = grazing_amplitude(omega, made.W, made.B, made.F, 0.006)
+    assert true - free > 4e-5  # the free motion does not reach the support
+    low, high = found.interval()
+    assert low < true < high and high - low < 2e-4
+    assert "a transient may have begun contact" in found.notes[0]
+
+
+def test_steps_at_two_settings_of_the_screw_are_refused():
+    runs = [*early(7.4)[:-1], driven(7.35, 0.006, duration=32.0, transient=20.0, gap=0.0019)]
+    with pytest.raises(ValueError, match=r"readings of \[0.0018, 0.0019\] m at the screw: give one of them at a time"):
+        grazing_gap(runs, decay_of(made.W, made.B, made.F), resolution=COUNT, kappa=made.KAPPA)

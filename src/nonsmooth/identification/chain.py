@@ -14,13 +14,15 @@ from numpy.typing import NDArray
 from nonsmooth.errors import SolveError
 from nonsmooth.experiment.recording import RecordingWarning
 from nonsmooth.experiment.session import Quantity, Session
+from nonsmooth.experiment.signals.phase import drive_phase
 from nonsmooth.identification.adjustment import Adjusted, Observation, adjust
 from nonsmooth.identification.calibrations import crank_force, voltage_frequency
 from nonsmooth.identification.contact_findings import contact_finding, one_contact
+from nonsmooth.identification.cross_checks import cross_checks, sentences
 from nonsmooth.identification.damping import amplitude_fit
 from nonsmooth.identification.decay_damping import decay_damping
 from nonsmooth.identification.evidence import Evidence, Run, gather
-from nonsmooth.identification.finding import Finding
+from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.free_decay import DecayFit, free_decay
 from nonsmooth.identification.grazing import grazing_gap
 from nonsmooth.identification.half_power import half_power
@@ -29,7 +31,7 @@ from nonsmooth.identification.multiple_shooting import ContactFit, shoot_contact
 from nonsmooth.identification.natural_frequency import natural_frequency
 from nonsmooth.identification.parameter_set import ParameterSet
 from nonsmooth.identification.receptance import receptance_fit
-from nonsmooth.identification.referral import refer
+from nonsmooth.identification.referral import counted_gap, refer
 from nonsmooth.identification.statements import agreement, for_model, identifiability
 from nonsmooth.identification.steady import Steady, steady
 from nonsmooth.identification.stiffness import stiffness
@@ -92,6 +94,7 @@ def identify(
     if crank_length is not None and not 0 < crank_length < np.inf:
         raise ValueError(f"crank_length = {crank_length!r} must be a positive length in m")
     chain = _Chain(gather(recordings, apparatus=apparatus))
+    chain.motor()
     decay = chain.taps()
     seen = chain.response(decay)
     chain.forces()
@@ -103,7 +106,10 @@ def identify(
     gap = None
     if contacts is not None and decay is not None:
         gap = refer(chain.evidence, decay, contacts, adjusted, seen, crank_length)
-        chain.findings.append(gap.finding(contacts, grazing))
+        chain.findings.append(gap.finding(contacts))
+        for note in gap.counted.notes:
+            chain.say(note)
+    chain.checks(adjusted, decay, contacts, grazing)
     found = joined(
         adjusted, gap, findings=chain.findings, identifiability=identifiability(adjusted, contacts, single),
         notes=[*agreement(adjusted, chain.evidence), *chain.notes], synthetic=chain.evidence.synthetic,
@@ -168,6 +174,23 @@ class _Chain:
         self.notes.append(sentence)
         warnings.warn(sentence, RecordingWarning, stacklevel=5)
 
+    def motor(self) -> None:
+        """Say where the photogate sees the motor's frequency wander."""
+        known = self.evidence.apparatus.get("turn_resolution")
+        for procedure in ("response", "grazing", "contact"):
+            seen = [
+                drive_phase(run.passages).wander(1e-4 if known is None else known.value)
+                for run in self.runs(procedure) if run.turns is not None
+            ]
+            if unsteady := [size for size, steady in seen if not steady]:
+                self.say(
+                    f"{procedure}: the motor wanders in {len(unsteady)} of {len(seen)} runs, by "
+                    f"{100 * float(np.median(unsteady)):.2g} % from turn to turn (standard deviation; up to "
+                    f"{100 * max(unsteady):.2g} %), more than the photogate's steps explain. The crank's angle is "
+                    "followed from turn to turn, and what a turn may hide is in the uncertainty of what contacts tell; "
+                    "a regulated supply would be better"
+                )
+
     def taps(self) -> DecayFit | None:
         runs, resolution = self.runs("impulse"), self.evidence.resolution
         if not runs:
@@ -222,6 +245,28 @@ class _Chain:
         self.observations.append(self.weighed("test_mass"))
         self.observe(("omega_s", "b_s"), decay.values[:2], decay.covariance[:2, :2], "drop of the test mass")
 
+    def checks(
+        self, adjusted: Adjusted, decay: DecayFit | None, contacts: ContactFit | None, grazing: Finding | None
+    ) -> None:
+        """Compare what the procedures say of one quantity; what disagrees is said."""
+        known = self.evidence.apparatus
+        masses = {name: known[name] for name in ("mass", "test_mass") if name in known}
+        at_rest = None
+        if grazing is not None and contacts is not None and decay is not None:
+            counted = counted_gap(contacts, float(self.runs("grazing")[0].settings["gap"]))
+            if counted is None:
+                self.notes.append("the graze was sought at another setting of the screw: its gap is not compared")
+            else:
+                at_rest = Estimate(counted.value - float(decay.values[3]), counted.error, "m")
+        found = cross_checks(
+            self.findings, masses, gain=adjusted.estimate("gain") if "gain" in adjusted.names else None,
+            gain_limit=self.gain_limit, k=adjusted.estimate("k") if "k" in adjusted.names else None, gap=at_rest,
+        )  # fmt: skip
+        agree, disagree = sentences(found)
+        self.notes += agree
+        for sentence in disagree:
+            self.say(sentence)
+
     def calibrations(self, adjusted: Adjusted) -> None:
         if runs := self.runs("voltage"):
             self.beside("voltage calibration (Fig. 8a)", lambda: voltage_frequency(runs))
@@ -249,7 +294,11 @@ class _Chain:
             return None, None
         m = rough["m"]
         gamma = rough["c_s"] / m if "c_s" in rough.names else 1e-3 * rough["k_s"] / m
-        found = shoot_contacts(runs, decay, resolution=resolution, kappa=rough["k_s"] / m, gamma=gamma)
+        try:
+            found = shoot_contacts(runs, decay, resolution=resolution, kappa=rough["k_s"] / m, gamma=gamma)
+        except SolveError as reason:
+            self.say(f"contact: not used, so that the gap is not known: {reason}")
+            return None, None
         self.observe(("kappa", "gamma"), found.values[3:5], found.covariance[3:5, 3:5], "multiple shooting")
         own = Quantity(m, float(np.sqrt(rough.covariance[rough.names.index("m"), rough.names.index("m")])))
         self.findings.append(contact_finding(found, own, resolution=resolution))

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.identification.adjustment import Adjusted
+from nonsmooth.identification.consistency import consistent
 from nonsmooth.identification.evidence import Evidence
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.free_decay import DecayFit
@@ -15,9 +17,55 @@ from nonsmooth.identification.gap import mean_shift
 from nonsmooth.identification.multiple_shooting import ContactFit
 from nonsmooth.identification.steady import Steady
 
-__all__ = ["Referred", "refer"]
+__all__ = ["CountedGap", "Referred", "counted_gap", "refer"]
 
 FloatArray = NDArray[np.float64]
+
+
+class CountedGap(NamedTuple):
+    """The gap in the sensor's count at one reading of the screw, by the runs with contact there.
+
+    ``places`` and ``weight``: the places of the runs' gaps among the parameters of the contacts' fit, and how much each
+    counts; ``notes``: a sentence on each run that is left out.
+    """
+
+    value: float
+    error: float
+    places: list[int]
+    weight: FloatArray
+    notes: tuple[str, ...]
+
+
+def counted_gap(contacts: ContactFit, reading: float) -> CountedGap | None:
+    """Weighted mean of the gaps of the runs at a reading of the screw, without those that disagree; None of none."""
+    rows = [i for i, run in enumerate(contacts.runs) if float(run.settings["gap"]) == reading]
+    if not rows:
+        return None
+    index = [contacts.place(i, 0) for i in rows]
+    own = np.diag(contacts.covariance)[index]
+    apart = consistent(contacts.values[index][:, None], own[:, None, None])
+    notes = [
+        f"contact {contacts.runs[i].name}: left out of the gap, which differs there by "
+        f"{1e6 * (contacts.values[j] - apart.mean[0]):+.0f} µm ({apart.off(contacts.values[[j]], [[e]])[0]:+.1f} "
+        "uncertainties) from that of the other runs: see whether the string slipped on the wheel"
+        for i, j, e, keep in zip(rows, index, own, apart.used, strict=True) if not keep
+    ]  # fmt: skip
+    index = [j for j, keep in zip(index, apart.used, strict=True) if keep]
+    block = contacts.covariance[np.ix_(index, index)]
+    solved = np.linalg.solve(block, np.ones(len(index)))
+    weight: FloatArray = np.asarray(solved / solved.sum(), dtype=np.float64)
+    counted = float(weight @ contacts.values[index])
+    off = contacts.values[index] - counted
+    chi2 = float(off @ np.linalg.solve(block, off))
+    # the runs may differ by more than they say: then their scatter counts
+    square = max(chi2 / max(len(index) - 1, 1), 1.0) * (weight @ block @ weight)
+    if not apart.agree:
+        square += float(apart.scatter[0, 0])
+        notes.append(
+            f"the gaps of the {len(index)} runs with contact disagree (Birge ratio {apart.birge:.1f}) and no majority "
+            "agrees: the scatter between them is the uncertainty; see whether the string slips on the wheel"
+        )
+    return CountedGap(counted, float(np.sqrt(square)), index, weight, tuple(notes))
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +82,8 @@ class Referred:
         With the unknowns of the adjustment: the same records tell the gap and k_s/m, the same decays zero and omega_0.
     crank_length, reading : float
         The crank to which the gap is referred, and the screw's reading that it stands for (m).
+    counted : CountedGap
+        The gap in the sensor's count.
     """
 
     gap: Estimate
@@ -43,24 +93,19 @@ class Referred:
     cross: FloatArray
     crank_length: float
     reading: float
+    counted: CountedGap
 
-    def finding(self, contacts: ContactFit, grazing: Finding | None) -> Finding:
-        """The gap as a finding, compared with that from the grazing frequency where there is one."""
+    def finding(self, contacts: ContactFit) -> Finding:
+        """The gap as a finding."""
         notes = [
             f"counted from the mean position under the drive at a crank of {1e3 * self.crank_length:.2f} mm, "
             f"{1e6 * self.shift.value:+.0f} µm from where the car rests (string and uneven turning); as read at rest, "
             "the model would stand at another gap by as much",
             f"stands for a reading of {1e3 * self.reading:.4g} mm at the screw, whose zero is off by "
             f"{1e6 * (self.at_rest.value - self.reading):+.0f} µm",
+            *self.counted.notes,
         ]
         others = {"gap_at_rest": self.at_rest, "mean_shift": self.shift}
-        if grazing is not None:
-            seen = grazing.others["at_rest"]
-            off = seen.value - self.at_rest.value
-            notes.append(
-                f"the grazing frequency says {1e6 * off:+.0f} µm more at rest, "
-                f"{abs(off) / np.hypot(seen.uncertainty, self.at_rest.uncertainty):.1f} uncertainties"
-            )
         return Finding(
             "g", self.gap, "multiple shooting over records with contact, referred to the mean position",
             contacts.fit.samples, tuple(run.name for run in contacts.runs), tuple(notes), others, self.covariance,
@@ -82,15 +127,8 @@ def refer(
     """
     readings = [float(run.settings["gap"]) for run in contacts.runs]
     reading = max(set(readings), key=readings.count)
-    index = [contacts.place(i, 0) for i, value in enumerate(readings) if value == reading]
-    block = contacts.covariance[np.ix_(index, index)]
-    weight = np.linalg.solve(block, np.ones(len(index)))
-    weight /= weight.sum()
-    counted = float(weight @ contacts.values[index])
-    off = contacts.values[index] - counted
-    chi2 = float(off @ np.linalg.solve(block, off))
-    # the runs may differ by more than they say: then their scatter counts
-    error = float(np.sqrt(max(chi2 / max(len(index) - 1, 1), 1.0) * (weight @ block @ weight)))
+    counted = counted_gap(contacts, reading)
+    assert counted is not None
     zero, zero_error = float(decay.values[3]), decay.error("x_e")
     length = evidence.apparatus.get("string_length")
     shift = mean_shift(
@@ -102,15 +140,15 @@ def refer(
     moved, own, slope = shift.parts(crank)
     # gap = counted - zero - moved, at rest = counted - zero; moved itself goes with the zero
     rows = np.array([[1.0, -1.0 - slope, -1.0], [1.0, -1.0, 0.0], [0.0, slope, 1.0]])
-    covariance = rows @ np.diag([error**2, zero_error**2, own**2]) @ rows.T
+    covariance = rows @ np.diag([counted.error**2, zero_error**2, own**2]) @ rows.T
     gap, at_rest, by = (
         Estimate(float(value), float(np.sqrt(covariance[i, i])), "m")
-        for i, value in enumerate((counted - zero - moved, counted - zero, moved))
+        for i, value in enumerate((counted.value - zero - moved, counted.value - zero, moved))
     )
-    with_counted = _cross(adjusted, ("kappa", "gamma"), contacts.covariance[3:5][:, index] @ weight)
+    with_counted = _cross(adjusted, ("kappa", "gamma"), contacts.covariance[3:5][:, counted.places] @ counted.weight)
     with_zero = _cross(adjusted, ("omega_0", "b", "f"), decay.covariance[:3, 3])
     cross = rows @ np.array([with_counted, with_zero, np.zeros(len(adjusted.names))])
-    return Referred(gap, at_rest, by, covariance, cross, crank, reading)
+    return Referred(gap, at_rest, by, covariance, cross, crank, reading, counted)
 
 
 def _cross(adjusted: Adjusted, labels: tuple[str, ...], shared: FloatArray) -> FloatArray:
