@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import argparse
 import inspect
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -67,7 +68,8 @@ def _run_folder(options: argparse.Namespace) -> int:
     from nonsmooth.identification.compare.notebook import SHOWS
 
     here = Path()
-    session = load_session(options.study)
+    read = cache(load_session)  # each file once, however many runs of it are compared
+    session = read(options.study.resolve())
     wanted: list[dict[str, Any]] = []
     for procedure in session.procedures:
         runs = [item for item in session.recordings(procedure) if "gap" in item.settings]
@@ -85,22 +87,25 @@ def _run_folder(options: argparse.Namespace) -> int:
         if options.identified_from is not None:
             study["identified"]["session"] = str(options.identified_from.resolve())
     for measured in wanted:
-        _run_study({**study, "measured": measured}, here, options.quiet, keep=False)
+        _run_study({**study, "measured": measured}, here, options.quiet, keep=False, read=read)
     return 0
 
 
-def _run_study(study: Mapping[str, Any], folder: Path, quiet: bool, keep: bool = True) -> int:
+def _run_study(
+    study: Mapping[str, Any], folder: Path, quiet: bool, keep: bool = True, read: Callable[[Path], Any] | None = None
+) -> int:
     from nonsmooth.experiment.session import load_session
     from nonsmooth.identification.compare import compare, session_measurement
 
     system, parameters = _theory(study, folder)
     table = dict(study["measured"])
-    session = load_session(folder / table.pop("session"))
+    read = read or load_session
+    session = read(folder / table.pop("session"))
     procedure, runs = table.pop("procedure"), table.pop("run", None)
     k = float((parameters or system.values).get("k", system.values.get("k", 1.0)))
     if "gap_offset" not in table and "gap_at_rest" in getattr(parameters, "extra", {}):
         source = study["identified"].get("session")
-        table["gap_offset"] = _offset(parameters, session if source is None else load_session(folder / source))
+        table["gap_offset"] = _offset(parameters, session if source is None else read(folder / source))
     measured, settings = session_measurement(session, procedure, runs, k=k, **table)
     given = dict(study.get("compare", {}))
     settings |= given.pop("settings", {})
