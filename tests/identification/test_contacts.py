@@ -2,47 +2,24 @@
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
-from tests.identification.made import COUNT, counted, decay_of, run
+from tests.identification.made import (
+    COUNT,
+    GAMMA,
+    GAP,
+    KAPPA,
+    PLACE,
+    B,
+    F,
+    W,
+    counted,
+    decay_of,
+    driven,
+    run,
+)  # fmt: skip
 
 from nonsmooth.experiment.session import Quantity
 from nonsmooth.identification.contact_findings import contact_finding, one_contact
 from nonsmooth.identification.multiple_shooting import shoot_contacts
-
-W, B, F, KAPPA, GAMMA, GAP, PLACE = 4.5, 1.04, 0.0, 1440.0, 0.70, 0.0018, 3e-5
-
-
-def driven(omega, crank, duration=16.0):
-    """Contact from x = g on, and until k_s (x - g) + c_s v vanishes, by events."""
-
-    def rate(touching):
-        def field(t, u):
-            push = KAPPA * (u[0] - GAP) + GAMMA * u[1] if touching else 0.0
-            return u[1], W**2 * (0.5 * crank * np.cos(omega * t) + PLACE - u[0]) - B * u[1] - push
-
-        return field
-
-    def begins(t, u):
-        return u[0] - GAP
-
-    def ends(t, u):
-        return KAPPA * (u[0] - GAP) + GAMMA * u[1]
-
-    begins.terminal, begins.direction, ends.terminal, ends.direction = True, 1, True, -1
-    rng = np.random.default_rng(round(100 * omega))
-    time = np.arange(0, duration, 0.01)
-    at, x = time + np.abs(5e-5 * rng.standard_normal(len(time))), np.zeros(len(time))
-    t, u, touching, done = 0.0, np.zeros(2), False, 0
-    while done < len(at):
-        solved = solve_ivp(rate(touching), (t, duration + 0.1), u, "DOP853", events=ends if touching else begins,
-                           rtol=1e-10, atol=1e-13, dense_output=True)  # fmt: skip
-        t, u = solved.t[-1], solved.y[:, -1]
-        inside = (at >= solved.t[0]) & (at <= t)
-        x[inside], done = solved.sol(at[inside])[0], done + np.count_nonzero(inside)
-        touching = not touching
-    keep = time > 4.0
-    turns = np.arange(np.ceil(4.0 * omega / (2 * np.pi)) * 2 * np.pi / omega, duration, 2 * np.pi / omega)
-    return run("contact", time[keep], counted(x[keep]), turns=turns, name=f"{omega}", crank_length=crank, gap=0.0018)
 
 
 @pytest.fixture(scope="module")

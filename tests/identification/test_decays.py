@@ -68,21 +68,65 @@ def test_heights_with_friction_follow_the_recursion():
     assert envelope(np.array([2.0]), h, w, b, 0.0)[0] == pytest.approx(h * np.exp(-b))
 
 
-def test_viscous_and_dry_are_told_apart():
-    w, b, f, m = 4.5, 1.04, 0.012, 0.84
-    wd, rng, runs = np.sqrt(w**2 - b**2 / 4), np.random.default_rng(3), []
-    for i, h in enumerate((0.1, -0.09, 0.06, -0.05)):
-        # half swings about +-f/w^2 from turning point to turning point, after Den Hartog; let go from the height h
+def taps(heights=(0.1, -0.09, 0.06, -0.05), w=4.5, b=1.04, f=0.012, seed=3):
+    """Half swings about +-f/w^2 from turning point to turning point, after Den Hartog; let go from each height."""
+    wd, rng, runs = np.sqrt(w**2 - b**2 / 4), np.random.default_rng(seed), []
+    for i, h in enumerate(heights):
         t = np.arange(0, 10, 0.01)
         at = np.maximum(t + 5e-5 * rng.standard_normal(len(t)) - 0.5, 0.0)
         k = np.floor(at * wd / np.pi).astype(int)
-        heights = np.array([envelope(np.array([j * np.pi / wd]), abs(h), w, b, f)[0] for j in range(k.max() + 1)])
+        turned = np.array([envelope(np.array([j * np.pi / wd]), abs(h), w, b, f)[0] for j in range(k.max() + 1)])
         s, local = np.sign(h) * (-1.0) ** k, at - k * np.pi / wd
         swing = np.exp(-b / 2 * local) * (np.cos(wd * local) + b / (2 * wd) * np.sin(wd * local))
-        x = s * (f / w**2 + (heights[k] - f / w**2) * swing)
-        stopped = heights[k] <= f / w**2
+        x = s * (f / w**2 + (turned[k] - f / w**2) * swing)
+        stopped = turned[k] <= f / w**2
         x[stopped] = x[np.argmax(stopped) - 1] if stopped.any() else 0.0
         runs.append(run("impulse", t, counted(x), name=f"Run #{i + 1}"))
+    return runs
+
+
+def slipped(one, counts, at=2.0):
+    """The run with a string that slips on the wheel by so many counts at an instant (s)."""
+    x = one.positions + COUNT * counts * (one.time > at)
+    return run("impulse", one.time, x, name=one.name)
+
+
+def fitted(runs, **options):
+    rows = [(r.time, r.positions) for r in runs]
+    return free_decay(rows, resolution=COUNT, names=[r.name for r in runs], **options)
+
+
+@pytest.mark.parametrize("counts", [1, 2, 20])
+def test_a_tap_that_slipped_is_named_and_left_out(counts):
+    runs = taps((0.1, -0.09, 0.08, -0.07, 0.06, -0.05))
+    runs[2] = slipped(runs[2], counts)
+    decay = fitted(runs)
+    assert decay.runs == (0, 1, 3, 4, 5)
+    (note,) = decay.notes
+    assert "'Run #3'" in note and "left out" in note and "slipped" in note
+    assert np.all(np.abs(decay.values - [4.5, 1.04, 0.012, 0.0]) < 4 * np.sqrt(np.diag(decay.covariance)))
+    assert decay.error("omega_0") < 2e-4
+
+
+def test_taps_that_disagree_without_a_majority_are_all_used_and_widened():
+    runs = [r if i < 3 else slipped(r, 4, -1.0) for i, r in enumerate(taps((0.1, -0.09, 0.08, -0.07, 0.06, -0.05)))]
+    decay = fitted(runs)
+    assert decay.runs == (0, 1, 2, 3, 4, 5)
+    (note,) = decay.notes
+    assert "disagree" in note and "no majority" in note
+    # half of the runs count from a place that is 4 counts off: the standard deviation of 0 0 0 4 4 4 is 2 root(6/5)
+    assert decay.values[3] == pytest.approx(2 * COUNT, abs=0.5 * COUNT)
+    assert decay.error("x_e") == pytest.approx(2 * np.sqrt(6 / 5) * COUNT, rel=0.1)
+    assert abs(decay.values[0] - 4.5) < 3 * decay.error("omega_0")
+
+
+def test_one_tap_needs_no_other():
+    assert fitted(taps((0.1,))).notes == ()
+
+
+def test_viscous_and_dry_are_told_apart():
+    w, b, f, m = 4.5, 1.04, 0.012, 0.84
+    runs = taps(w=w, b=b, f=f)
     decay = free_decay([(r.time, r.positions) for r in runs], resolution=COUNT)
     found = decay_damping(runs, decay, Quantity(m), resolution=COUNT)
     assert abs(found.value - m * b) < 3.5 * found.uncertainty < 0.01

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from tests.identification.made import COUNT, counted, decay_of, run, swinging
+from tests.identification import made
+from tests.identification.made import COUNT, counted, decay_of, driven, run, swinging
 
 from nonsmooth.identification.gap import grazing_amplitude, mean_of_drive, mean_shift
 from nonsmooth.identification.grazing import grazing_gap
@@ -110,3 +111,31 @@ def test_what_does_not_show_a_graze_is_refused(runs, said):
     gap = grazing_amplitude(8.43, W, B, F, 0.010)
     with pytest.raises(ValueError, match=said):
         grazing_gap(runs(gap), decay_of(W, B, F), resolution=COUNT, kappa=KAPPA)
+
+
+def early(omega, crank=0.006):
+    """Steps down to a frequency at which a transient has led to contact before the free motion reaches the gap."""
+    rng = np.random.default_rng(4)
+    free = [
+        swinging(w, grazing_amplitude(w, made.W, made.B, made.F, crank), 0.3, made.PLACE, crank=crank, rng=rng)
+        for w in np.arange(omega + 0.5, omega + 0.01, -0.05)
+    ]
+    return [*free, *(driven(w, crank, duration=32.0, transient=20.0) for w in (omega, omega - 0.05))]
+
+
+@pytest.mark.parametrize("omega", [7.6, 7.4])
+def test_contact_that_a_transient_begins_early_is_in_the_uncertainty(omega):
+    decay = decay_of(made.W, made.B, made.F, made.PLACE)
+    found = grazing_gap(early(omega), decay, resolution=COUNT, kappa=made.KAPPA)
+    true = made.GAP - made.PLACE
+    free = grazing_amplitude(omega, made.W, made.B, made.F, 0.006)
+    assert true - free > 4e-5  # the free motion does not reach the support
+    low, high = found.interval()
+    assert low < true < high and high - low < 2e-4
+    assert "a transient may have begun contact" in found.notes[0]
+
+
+def test_steps_at_two_settings_of_the_screw_are_refused():
+    runs = [*early(7.4)[:-1], driven(7.35, 0.006, duration=32.0, transient=20.0, gap=0.0019)]
+    with pytest.raises(ValueError, match=r"readings of \[0.0018, 0.0019\] m at the screw: give one of them at a time"):
+        grazing_gap(runs, decay_of(made.W, made.B, made.F), resolution=COUNT, kappa=made.KAPPA)

@@ -123,7 +123,7 @@ def _run_study(
     return 0
 
 
-def _offset(parameters: Any, session: Any) -> float | tuple[float, float]:
+def _offset(parameters: Any, session: Any) -> Any:
     """What the identified gap is more than the screw read; 0 where the session has no runs with contact."""
     from nonsmooth.identification.compare import gap_offset
 

@@ -17,10 +17,11 @@ from nonsmooth.experiment.session import Quantity, Session
 from nonsmooth.identification.adjustment import Adjusted, Observation, adjust
 from nonsmooth.identification.calibrations import crank_force, voltage_frequency
 from nonsmooth.identification.contact_findings import contact_finding, one_contact
+from nonsmooth.identification.cross_checks import cross_checks, sentences
 from nonsmooth.identification.damping import amplitude_fit
 from nonsmooth.identification.decay_damping import decay_damping
 from nonsmooth.identification.evidence import Evidence, Run, gather
-from nonsmooth.identification.finding import Finding
+from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.free_decay import DecayFit, free_decay
 from nonsmooth.identification.grazing import grazing_gap
 from nonsmooth.identification.half_power import half_power
@@ -29,7 +30,7 @@ from nonsmooth.identification.multiple_shooting import ContactFit, shoot_contact
 from nonsmooth.identification.natural_frequency import natural_frequency
 from nonsmooth.identification.parameter_set import ParameterSet
 from nonsmooth.identification.receptance import receptance_fit
-from nonsmooth.identification.referral import refer
+from nonsmooth.identification.referral import counted_gap, mark_of, refer
 from nonsmooth.identification.statements import agreement, for_model, identifiability
 from nonsmooth.identification.steady import Steady, steady
 from nonsmooth.identification.stiffness import stiffness
@@ -92,18 +93,23 @@ def identify(
     if crank_length is not None and not 0 < crank_length < np.inf:
         raise ValueError(f"crank_length = {crank_length!r} must be a positive length in m")
     chain = _Chain(gather(recordings, apparatus=apparatus))
+    for note in chain.evidence.notes:
+        chain.say(note)
     decay = chain.taps()
     seen = chain.response(decay)
     chain.forces()
     chain.drop()
     grazing = chain.graze(decay)
-    contacts, single = chain.contact(decay)
+    contacts, single = chain.contact(decay, chain.mark(decay, seen))
     adjusted = chain.adjusted()
     chain.calibrations(adjusted)
     gap = None
     if contacts is not None and decay is not None:
         gap = refer(chain.evidence, decay, contacts, adjusted, seen, crank_length)
-        chain.findings.append(gap.finding(contacts, grazing))
+        chain.findings.append(gap.finding(contacts))
+        for note in (*gap.notes, *gap.counted.notes):
+            chain.say(note)
+    chain.checks(adjusted, decay, contacts, grazing)
     found = joined(
         adjusted, gap, findings=chain.findings, identifiability=identifiability(adjusted, contacts, single),
         notes=[*agreement(adjusted, chain.evidence), *chain.notes], synthetic=chain.evidence.synthetic,
@@ -222,6 +228,28 @@ class _Chain:
         self.observations.append(self.weighed("test_mass"))
         self.observe(("omega_s", "b_s"), decay.values[:2], decay.covariance[:2, :2], "drop of the test mass")
 
+    def checks(
+        self, adjusted: Adjusted, decay: DecayFit | None, contacts: ContactFit | None, grazing: Finding | None
+    ) -> None:
+        """Compare what the procedures say of one quantity; what disagrees is said."""
+        known = self.evidence.apparatus
+        masses = {name: known[name] for name in ("mass", "test_mass") if name in known}
+        at_rest = None
+        if grazing is not None and contacts is not None and decay is not None:
+            counted = counted_gap(contacts, float(self.runs("grazing")[0].settings["gap"]))
+            if counted is None:
+                self.notes.append("the graze was sought at another setting of the screw: its gap is not compared")
+            else:
+                at_rest = Estimate(counted.value - float(decay.values[3]), counted.error, "m")
+        found = cross_checks(
+            self.findings, masses, gain=adjusted.estimate("gain") if "gain" in adjusted.names else None,
+            gain_limit=self.gain_limit, k=adjusted.estimate("k") if "k" in adjusted.names else None, gap=at_rest,
+        )  # fmt: skip
+        agree, disagree = sentences(found)
+        self.notes += agree
+        for sentence in disagree:
+            self.say(sentence)
+
     def calibrations(self, adjusted: Adjusted) -> None:
         if runs := self.runs("voltage"):
             self.beside("voltage calibration (Fig. 8a)", lambda: voltage_frequency(runs))
@@ -240,7 +268,17 @@ class _Chain:
             ),
         )  # fmt: skip
 
-    def contact(self, decay: DecayFit | None) -> tuple[ContactFit | None, Finding | None]:
+    def mark(self, decay: DecayFit | None, seen: Steady) -> float:
+        """The crank's angle at the photogate (rad), from steady runs without support or the first ones of the graze."""
+        if decay is None:
+            return 0.0
+        free = seen if len(seen) else steady(self.runs("grazing")[:4])
+        angle, note = mark_of(free, decay)
+        if note:
+            self.say(note)
+        return angle
+
+    def contact(self, decay: DecayFit | None, mark: float) -> tuple[ContactFit | None, Finding | None]:
         runs, resolution, rough = self.runs("contact"), self.evidence.resolution, self.adjusted()
         if not runs:
             return None, None
@@ -249,7 +287,7 @@ class _Chain:
             return None, None
         m = rough["m"]
         gamma = rough["c_s"] / m if "c_s" in rough.names else 1e-3 * rough["k_s"] / m
-        found = shoot_contacts(runs, decay, resolution=resolution, kappa=rough["k_s"] / m, gamma=gamma)
+        found = shoot_contacts(runs, decay, resolution=resolution, kappa=rough["k_s"] / m, gamma=gamma, mark=mark)
         self.observe(("kappa", "gamma"), found.values[3:5], found.covariance[3:5, 3:5], "multiple shooting")
         own = Quantity(m, float(np.sqrt(rough.covariance[rough.names.index("m"), rough.names.index("m")])))
         self.findings.append(contact_finding(found, own, resolution=resolution))

@@ -63,8 +63,9 @@ def decay_damping(runs: Sequence[Run], decay: DecayFit, mass: Quantity, *, resol
         ``covariance`` is that of c and friction.
     """
     viscous = free_decay(
-        [(run.time, run.positions) for run in runs], resolution=resolution, friction=False, doubt_law=False
-    )
+        [(runs[i].time, runs[i].positions) for i in decay.runs], resolution=resolution, friction=False,
+        doubt_law=False, check=False,
+    )  # fmt: skip
     c, friction = mass.value * float(decay.values[1]), mass.value * float(decay.values[2])
     plain = mass.value * float(viscous.values[1])
     own = mass.value**2 * decay.covariance[1:3, 1:3]

@@ -22,11 +22,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.errors import SolveError
+from nonsmooth.identification.consistency import Consistent, consistent
 from nonsmooth.identification.pieces import Piece, start_state
 from nonsmooth.identification.shooting import ShootingFit, shoot
 
@@ -37,6 +39,7 @@ FloatArray = NDArray[np.float64]
 #: Speed (m/s) of the slowest half swing that is used.
 SLOWEST = 0.03
 _NAMES = ("omega_0", "b", "f", "x_e")
+_UNFITTING = 4.0  # chi^2 of a run's residuals, in that of the median run, from which the law does not fit it
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,6 +115,7 @@ def free_decay(
     jitter: float | None = None,
     doubt_law: bool = True,
     names: Sequence[str] | None = None,
+    check: bool = True,
 ) -> DecayFit:
     r"""Fit :math:`\omega_0`, c/m and F_C/m to free decays.
 
@@ -131,6 +135,8 @@ def free_decay(
         Add to the covariance how far the estimate moves with half of ``slowest``.
     names : sequence of str, optional
         Names of the records for the notes on those that cannot be used.
+    check : bool
+        Leave out records that disagree with the majority, with a note on each.
 
     Returns
     -------
@@ -143,44 +149,140 @@ def free_decay(
     SolveError
         If the fit does not settle.
     """
-    pieces: list[Piece] = []
-    taken, spans, notes = [], [], []
+    records, notes = _records(runs, resolution, slowest, names)
+    if not records:
+        raise ValueError("no free decay can be used; " + "; ".join(notes))
+    apart: Consistent | None = None
+    if check and len(records) > 1:
+        chosen, apart, said = _agreeing(records, runs, resolution, slowest, friction, jitter)
+        records, notes = [records[i] for i in chosen], notes + said
+    values, covariance, fit = _fit(records, friction, resolution, jitter)
+    if apart is not None:
+        used = _used(friction)
+        values[used], covariance[np.ix_(used, used)] = apart.mean, apart.covariance + apart.scatter
+    elif doubt_law:
+        slower = _records([runs[r.index] for r in records], resolution, slowest / 2, None)[0]
+        moved = _fit(slower, friction, resolution, jitter)[0] - values
+        covariance += np.outer(moved, moved)
+    return DecayFit(
+        values, covariance, tuple(r.index for r in records), tuple(r.span for r in records), fit, tuple(notes)
+    )
+
+
+class _Record(NamedTuple):
+    """The used part of a record: number of its run, name, first and last+1 sample, times (s) and positions (m)."""
+
+    index: int
+    name: str
+    span: tuple[int, int]
+    time: FloatArray
+    x: FloatArray
+
+
+def _records(
+    runs: Sequence[tuple[Any, Any]], resolution: float, slowest: float, names: Sequence[str] | None
+) -> tuple[list[_Record], list[str]]:
+    """The records that hold a decay, and a sentence on each that does not."""
+    found, notes = [], []
     for i, (time, x) in enumerate(runs):
         t, position = np.asarray(time, dtype=np.float64), np.asarray(x, dtype=np.float64)
+        name = f"decay {i + 1}" if names is None else f"run {names[i]!r}, channel 'Angle'"
         try:
             begin, end = swing(t, position, resolution=resolution, slowest=slowest)
         except ValueError as error:
-            name = f"decay {i + 1}" if names is None else f"run {names[i]!r}, channel 'Angle'"
             notes.append(f"{name}: not used: {error}")
             continue
-        taken.append(i)
-        spans.append((begin, end))
-        t, position = t[begin:end] - t[begin], position[begin:end]
-        which = np.arange(4) if friction else np.array([0, 1, 3])
-        pieces.append(
-            Piece(t, position, np.zeros_like(t), which, _build(friction), start_state(t, position), label=str(i))
-        )
-    if not pieces:
-        raise ValueError("no free decay can be used; " + "; ".join(notes))
-    guess = _guess(pieces)
-    used = [0, 1, 2, 3] if friction else [0, 1, 3]
-    place = {name: k for k, name in enumerate(used)}
+        found.append(_Record(i, name, (begin, end), t[begin:end] - t[begin], position[begin:end]))
+    return found, notes
+
+
+def _used(friction: bool) -> list[int]:
+    """Indices of the parameters that are fitted."""
+    return [0, 1, 2, 3] if friction else [0, 1, 3]
+
+
+def _fit(
+    records: Sequence[_Record], friction: bool, resolution: float, jitter: float | None
+) -> tuple[FloatArray, FloatArray, ShootingFit]:
+    """The four values, their covariance and the fit; zeros for a friction that is not fitted."""
+    used = _used(friction)
+    which = np.arange(len(used))
     pieces = [
-        Piece(p.time, p.x, p.phase, np.array([place[w] for w in p.which]), p.build, p.start, label=p.label)
-        for p in pieces
+        Piece(r.time, r.x, np.zeros_like(r.time), which, _build(friction), start_state(r.time, r.x), label=str(r.index))
+        for r in records
     ]
     steps = np.array([1e-4, 1e-4, 1e-5, 1e-6])[used]
-    fit = shoot(pieces, guess[used], steps, resolution=resolution, jitter=jitter)
+    fit = shoot(pieces, _guess(pieces)[used], steps, resolution=resolution, jitter=jitter)
     values, covariance = np.zeros(4), np.zeros((4, 4))
     values[used] = fit.values
     covariance[np.ix_(used, used)] = fit.covariance
-    if doubt_law:
-        other = free_decay(
-            runs, resolution=resolution, slowest=slowest / 2, friction=friction, jitter=jitter, doubt_law=False
+    return values, covariance, fit
+
+
+def _agreeing(
+    records: Sequence[_Record], runs: Sequence[tuple[Any, Any]], resolution: float, slowest: float, friction: bool,
+    jitter: float | None,
+) -> tuple[list[int], Consistent | None, list[str]]:  # fmt: skip
+    """Records that agree, their weighted mean where no majority agrees, and a sentence on each that is left out.
+
+    Each is fitted alone. One that the law does not fit (a string that slipped on the wheel, a hand that touched) leaves
+    more than the others; one that it fits may still tell other values.
+    """
+    alone: list[tuple[FloatArray, FloatArray, ShootingFit] | None] = []
+    for r in records:
+        try:
+            values, covariance, fit = _fit([r], friction, resolution, jitter)
+            slower = _records([runs[r.index]], resolution, slowest / 2, None)[0]
+            moved = _fit(slower, friction, resolution, jitter)[0] - values
+            alone.append((values, covariance + np.outer(moved, moved), fit))
+        except SolveError:
+            alone.append(None)
+    said = []
+    fitted = [i for i, one in enumerate(alone) if one is not None]
+    left = _unfitting([alone[i][2] for i in fitted], resolution)  # type: ignore[index]
+    typical = float(np.median(np.sqrt(left))) if len(left) else 1.0
+    good = [i for i, excess in zip(fitted, left, strict=True) if excess <= _UNFITTING * typical**2]
+    if 2 * len(good) <= len(records):
+        return list(range(len(records))), None, [
+            f"{len(records) - len(good)} of {len(records)} decays are not those of the law, and no majority is: "
+            "see whether the string slips on the wheel, and tap again"
+        ]  # fmt: skip
+    for i, r in enumerate(records):
+        if i not in good:
+            by = (
+                "no decay fits it" if i not in fitted else
+                f"it is {np.sqrt(left[fitted.index(i)]) / typical:.1f} times as far from a decay as the others are "
+                "(root of chi^2)"
+            )  # fmt: skip
+            said.append(f"{r.name}: left out: {by}; see whether the string slipped on the wheel")
+    if len(good) < 2:
+        return good, None, said
+    used = _used(friction)
+    told = [(one[0][used], one[1][np.ix_(used, used)]) for one in (alone[i] for i in good) if one is not None]
+    found = consistent([values for values, _ in told], [covariance for _, covariance in told])
+    for i, keep, (values, covariance) in zip(good, found.used, told, strict=True):
+        if not keep:
+            off = found.off(values, covariance)
+            k = int(np.argmax(np.abs(off)))
+            said.append(
+                f"{records[i].name}: left out: its {_NAMES[used[k]]} is {off[k]:+.1f} combined uncertainties from that "
+                f"of the {np.count_nonzero(found.used)} runs that agree; see whether the string slipped on the wheel"
+            )
+    if not found.agree:
+        said.append(
+            f"the {len(good)} decays disagree (Birge ratio {found.birge:.1f}) and no majority agrees: all are used, "
+            "with the scatter between them as uncertainty; see whether the string slips on the wheel"
         )
-        moved = other.values - values
-        covariance += np.outer(moved, moved)
-    return DecayFit(values, covariance, tuple(taken), tuple(spans), fit, tuple(notes))
+    return [i for i, keep in zip(good, found.used, strict=True) if keep], None if found.agree else found, said
+
+
+def _unfitting(fits: Sequence[ShootingFit], resolution: float) -> FloatArray:
+    """Mean square of each run's residuals over what a count and the clock's typical jitter let expect."""
+    jitter = float(np.median([fit.jitter for fit in fits])) if fits else 0.0
+    return np.array([
+        float(np.mean(r**2 / (resolution**2 / 12 + (jitter * f[:, 1]) ** 2)))
+        for fit in fits for r, f in zip(fit.residuals, fit.fitted, strict=True)
+    ])  # fmt: skip
 
 
 _NO_DRIVE, _NO_CONTACT = np.zeros(4), np.array([0.0, 0.0, np.inf])

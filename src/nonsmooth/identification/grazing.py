@@ -8,6 +8,22 @@ motion of amplitude A that goes by p beyond the gap is pushed by :math:`\tfrac43
 and its place moves by this over 2k.
 
 Between the two lies the gap, with the uncertainty of the bracket (uniform), of the sensor and, at rest, of the zero.
+
+Contact may begin too early: where a motion with contact exists beside the free one, the transient of a step (or of a
+start from rest) leads to it before the free motion reaches the support. The first run with contact shows this by
+itself. Per period it takes the impulse :math:`J = 2k\,T\,\Delta x` from the shift :math:`\Delta x` of its mean. A
+contact that goes by p beyond the gap while springs and drive hold the car back by :math:`a_0` gives
+
+.. math::
+
+    J = 2 m \omega_s (R \sin\theta - q\,\theta), \qquad
+    \omega_s^2 = k_s/m, \quad q = a_0/\omega_s^2, \quad R = p + q, \quad \cos\theta = q/R,
+
+the solution of :math:`\ddot y = -\omega_s^2 y - a_0` from contact to release. So the largest position less p is the
+gap, between the values for :math:`a_0 = 0` and for that of the free motion at its top. Where p is more than the width
+of the bracket, contact has not begun gently, and the gap is taken to lie between the larger of both lower and the
+larger of both upper ends.
+
 The screw's zero does not enter, and the place about which the car swings is seen in the same runs.
 """
 
@@ -36,6 +52,8 @@ _FIRST = 4  # runs that must be free
 _SIGMAS = 5.0  # by which the mean must leave its place
 _STEADY = 0.5  # counts: by which the mean of free runs may move
 _COUNTS = 0.06  # and by how much of a count: what the mean of a run can be off by rounding
+_ALIKE = 3.0  # counts by which the tops of contacts that are alike may differ
+_PUSHED = 0.03  # of the depth: what the law of the push leaves out (damping, drive during contact)
 
 
 def grazing_gap(runs: Sequence[Run], decay: DecayFit, *, resolution: float, kappa: float) -> Finding:
@@ -44,14 +62,14 @@ def grazing_gap(runs: Sequence[Run], decay: DecayFit, *, resolution: float, kapp
     Parameters
     ----------
     runs : sequence of Run
-        Steady runs in the order of the steps, with ``x``, ``turns`` and one ``crank_length``, the support mounted;
-        the first four free.
+        Steady runs in the order of the steps, with ``x``, ``turns``, one ``crank_length`` and one ``gap`` at the screw,
+        the support mounted; the first four free.
     decay : DecayFit
         The free oscillator.
     resolution : float
         Length of a count (m).
     kappa : float
-        About k_s/m (1/s^2): how light a push can be seen.
+        About k_s/m (1/s^2): what a push tells.
 
     Returns
     -------
@@ -62,9 +80,14 @@ def grazing_gap(runs: Sequence[Run], decay: DecayFit, *, resolution: float, kapp
     Raises
     ------
     ValueError
-        If the first four runs are not free or none has contact, the crank's length changes, or a free run comes after
-        contact has begun.
+        If the first four runs are not free or none has contact, the crank's length or the screw changes, or a free run
+        comes after contact has begun.
     """
+    if len(readings := {float(run.settings["gap"]) for run in runs if "gap" in run.settings}) > 1:
+        raise ValueError(
+            f"the graze is sought at one gap, these runs have readings of {sorted(readings)} m at the screw: give one "
+            "of them at a time"
+        )
     seen = steady(runs)
     if len(set(seen.crank.tolist())) != 1:
         raise ValueError(
@@ -84,8 +107,18 @@ def grazing_gap(runs: Sequence[Run], decay: DecayFit, *, resolution: float, kapp
     low, high = height(ends)
     place = float(np.mean(seen.mean[free]))
     low -= _unseen(limit, float(seen.amplitude[last]), kappa / natural**2)
-    gap, half = 0.5 * (low + high), 0.5 * abs(high - low)
     normal = _sensor_error(seen, free, height, resolution)
+    least, most, depth = _by_push(seen, first, last, place, decay, kappa, resolution)
+    by = f"by the width of the step, {1e6 * normal:.1f} µm by the sensor"
+    if depth > abs(high - low):
+        by = (
+            f"by the step and the push of the first run with contact, which goes {1e6 * depth:.0f} µm beyond the gap "
+            "at once: a transient may have begun contact before the free motion reached the gap"
+        )
+        if least > high:
+            by += f", and did, {1e6 * (0.5 * (least + most) - high):.0f} µm early"
+        low, high = max(low, least), max(high, most)
+    gap, half = 0.5 * (low + high), 0.5 * abs(high - low)
     zero, zero_error = float(decay.values[3]), decay.error("x_e")
     at_rest = float(np.hypot(np.hypot(normal, zero_error), uniform(half)))
     total = float(np.hypot(normal, uniform(half)))
@@ -96,7 +129,7 @@ def grazing_gap(runs: Sequence[Run], decay: DecayFit, *, resolution: float, kapp
         seen.samples, seen.names,
         (
             f"contact begins between {ends.min():.3f} and {ends.max():.3f} rad/s: the gap lies within "
-            f"±{1e6 * half:.1f} µm by the width of the step, {1e6 * normal:.1f} µm by the sensor",
+            f"±{1e6 * half:.1f} µm {by}",
             f"counted from the mean position under the drive at a crank of {1e3 * a:.2f} mm, "
             f"{1e6 * (place - zero):+.0f} µm from where the car rests",
         ),
@@ -146,6 +179,39 @@ def _bracket(seen: Steady, contact: NDArray[np.bool_]) -> tuple[int, int]:
 def _unseen(limit: float, amplitude: float, stiff: float) -> float:
     """How far beyond the gap a motion goes whose mean moves by ``limit``; ``stiff`` is k_s/(2k)."""
     return float((1.5 * np.pi * limit / stiff * np.sqrt(amplitude / 2)) ** (2 / 3))
+
+
+def _by_push(
+    seen: Steady, first: int, last: int, place: float, decay: DecayFit, kappa: float, resolution: float
+) -> tuple[float, float, float]:
+    """Least and largest gap that the first run with contact allows, from the place of the free motion, and its depth.
+
+    Where one contact is not like the other the push of each is not known: then the gap lies below the highest position,
+    and the depth is infinite.
+    """
+    from scipy.optimize import brentq
+
+    run, (natural, _, f) = seen.runs[first], (float(v) for v in decay.values[:3])
+    period = 2 * np.pi / float(seen.omega[first])
+    turn = np.floor((run.time - run.time[0]) / period).astype(int)
+    tops = np.array([run.positions[turn == i].max() for i in range(turn.max())]) - place
+    # dry friction moves the mean of a motion that goes longer one way
+    shift = place - float(seen.mean[first]) - f / natural**2 * float(seen.lean[first] - np.mean(seen.lean[: last + 1]))
+    stiff, impulse = float(np.sqrt(kappa)), natural**2 * period * max(shift, 0.0)
+    if float(np.ptp(tops)) > _ALIKE * resolution:
+        return 0.0, float(tops.max()), float("inf")
+
+    def depth(q: float) -> float:
+        def excess(p: float) -> float:
+            theta = float(np.arccos(q / (p + q)))
+            return 2 * stiff * ((p + q) * float(np.sin(theta)) - q * theta) - impulse
+
+        return float(brentq(excess, 0.0, impulse / (2 * stiff) + 10 * (impulse**2 * q / stiff**2) ** (1 / 3) + 1e-9))
+
+    held = float(seen.omega[last] ** 2 * seen.amplitude[last]) / kappa
+    most, least = depth(held), depth(1e-6 * held)
+    own = 0.5 * resolution + _PUSHED * most  # a top lies between samples, too
+    return float(tops.mean()) - most - own, float(tops.mean()) - least + own, most
 
 
 def _height(

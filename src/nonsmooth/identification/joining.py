@@ -49,10 +49,11 @@ def joined(
         n = len(inner)
         cross = gap.cross @ jacobian.T
         stacked = np.block([[covariance, cross.T], [cross, gap.covariance]])
-        order = [*range(n), len(covariance), *range(n, len(covariance)), len(covariance) + 1, len(covariance) + 2]
+        m = len(covariance)
+        order = [*range(n), m, *range(n, m), *range(m + 1, m + 4)]
         covariance = stacked[np.ix_(order, order)]
         estimates["g"] = gap.gap
-        extra |= {"gap_at_rest": gap.at_rest, "mean_shift": gap.shift}
+        extra |= {"gap_at_rest": gap.at_rest, "mean_shift": gap.shift, "rest_position": gap.rest}
     return ParameterSet(
         estimates, covariance, extra=extra, findings=findings, identifiability=identifiability, notes=notes,
         synthetic=synthetic,

@@ -107,7 +107,7 @@ def support_damping(
         "logarithmic decrement, regression over all turning points (Fig. 7)", decay.samples,
         tuple(runs[i].name for i in decay.runs), tuple(notes),
         others={
-            "c_s_fit": Estimate(float(decay.values[1]) * mass, decay.error("b") * mass, "N s/m"),
+            "c_s_fit": Estimate(float(decay.values[1]), decay.error("b")).times(mass, test_mass.uncertainty, "N s/m"),
             "omega_s": Estimate(float(decay.values[0]), decay.error("omega_0"), "rad/s"),
             "damping_ratio": Estimate(-rate / float(decay.values[0]), rate_error / float(decay.values[0])),
         },

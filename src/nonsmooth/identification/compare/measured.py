@@ -40,7 +40,7 @@ def measured_motion(
     run : str, optional
         Needed where there are several.
     distance_per_turn : float
-        Travel per turn of the sensor's wheel (m).
+        Travel per turn of the sensor's wheel (m); negative where it counts away from the support.
     counts_per_turn : int
         Counts of the encoder per turn.
     zero : float
@@ -75,7 +75,7 @@ def measured_motion(
     x = position(turned, distance_per_turn=distance_per_turn, zero=zero)
     time = x[x.dims[0]].values
     drive = drive_phase(turns, span=(float(time[0]), float(time[-1])))
-    step = resolution(distance_per_turn=distance_per_turn, counts_per_turn=counts_per_turn)
+    step = resolution(distance_per_turn=abs(distance_per_turn), counts_per_turn=counts_per_turn)
     smoothed = _smoothed(time, x, step, drive.omega, support)
     # Beyond the first and last turn the phase would be a guess.
     inside = (time >= turns[0]) & (time <= turns[-1])

@@ -166,7 +166,7 @@ class Laboratory:
         return discontinuous_support()
 
     @cached_property
-    def _gap_offset(self) -> tuple[float, float]:
+    def _gap_offset(self) -> GapOffset:
         """What the gap is more than the screw's reading, from the records with contact, and its uncertainty."""
         from nonsmooth.identification.compare import gap_offset
 
