@@ -8,15 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.analysis.classify import longest_period
-from nonsmooth.analysis.settle import Attractors, tolerance_of
-from nonsmooth.analysis.settled import usable
-from nonsmooth.flow.engine import Chain, State
-from nonsmooth.flow.methods import engine_for
-from nonsmooth.flow.sections import Stroboscopic, section_plan
 from nonsmooth.identification.compare.draws import Settings, draw_systems, drawn_variables, nominal
 from nonsmooth.identification.compare.flips import Flip, delayed_flips
 from nonsmooth.identification.compare.periods import flips, measured_period, period_numbers
+from nonsmooth.identification.compare.predict import Motions
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -58,7 +53,7 @@ def compare_diagram(
     words = ["up", "down"] if direction == "both" else [direction]
 
     def diagram(system: System) -> tuple[FloatArray, NDArray[np.int64]]:
-        return _marched(system, name, grid, settings, words, phase, transient, max_period, options)
+        return _marched(system, name, grid, settings, words, transient, max_period, options, phase)
 
     if is_system:
         sections, periods = diagram(nominal(theory, parameters, settings))
@@ -102,38 +97,21 @@ def compare_diagram(
 
 
 def _marched(
-    system: System, name: str, grid: FloatArray, settings: Settings, words: Sequence[str], phase: float,
-    transient: int, max_period: int, options: dict[str, Any],
+    system: System, name: str, grid: FloatArray, settings: Settings, words: Sequence[str], transient: int,
+    max_period: int, options: dict[str, Any], phase: float = 0.0,
 ) -> tuple[FloatArray, NDArray[np.int64]]:  # fmt: skip
     """The diagram, the state carried along; settings that follow from the parameter change with it."""
     rules = {key: setting for key, setting in settings.items() if setting.follows and key != name}
     # A drawn system is off its rule by an error that stays the same along the diagram.
     beside = {key: system.values[key] - rule.at(system.values) for key, rule in rules.items()}
-    at = [{**system.values, name: float(value)} for value in grid]
-    columns = {key: [rule.at(values) + beside[key] for values in at] for key, rule in rules.items()}
-    points = system.parameter_points({name: grid, **columns})
-    engine = engine_for(system, **options)
-    _, plan = section_plan(system, Stroboscopic(phase))
-    attractors = Attractors(
-        engine, engine.prepare(points), plan, transient, KEEP, longest_period(KEEP, max_period),
-        tolerance_of(engine, options.get("rtol")), system.scale_vector(),
-    )  # fmt: skip
-    traced = system.traced
-    sections = np.full((len(words), len(grid), KEEP, len(system.states)), np.nan)
-    periods = np.zeros((len(words), len(grid)), dtype=np.int64)
-    for d, word in enumerate(words):
-        out = Chain.empty(len(grid), KEEP, len(traced.u), len(traced.indicators), len(traced.outputs))
-
-        def rest() -> State:
-            return State(np.zeros(len(traced.u)), system.memory_vector())
-
-        state = rest()
-        for i in np.argsort(grid, kind="stable")[:: 1 if word == "up" else -1]:
-            verdict = attractors.settle(int(i), state, out, rest)
-            periods[d, i] = verdict.period_number
-            if usable(verdict.status):
-                sections[d, i] = out.section[i]
-    return sections, periods
+    systems = []
+    for value in grid:
+        here = {**system.values, name: float(value)}
+        systems.append(system.with_parameters(here | {k: rule.at(here) + beside[k] for k, rule in rules.items()}))
+    motions = Motions(systems, transient=transient, keep=KEEP, max_period=max_period, options=options, phase=phase)
+    rising = np.argsort(grid, kind="stable").tolist()
+    found = [motions.carried(rising if word == "up" else rising[::-1]) for word in words]
+    return np.stack([sections for sections, _ in found]), np.stack([periods for _, periods in found])
 
 
 def _measured(
