@@ -29,9 +29,10 @@ from nonsmooth.identification.joining import joined
 from nonsmooth.identification.multiple_shooting import ContactFit, shoot_contacts
 from nonsmooth.identification.natural_frequency import natural_frequency
 from nonsmooth.identification.parameter_set import ParameterSet
+from nonsmooth.identification.plausibility import check_plausible, not_driven
 from nonsmooth.identification.receptance import receptance_fit
 from nonsmooth.identification.referral import counted_gap, mark_of, refer
-from nonsmooth.identification.statements import agreement, for_model, identifiability
+from nonsmooth.identification.statements import agreement, disagreement, for_model, identifiability, impossible
 from nonsmooth.identification.steady import Steady, steady
 from nonsmooth.identification.stiffness import stiffness
 from nonsmooth.identification.support_damping import support_damping
@@ -39,6 +40,9 @@ from nonsmooth.identification.support_damping import support_damping
 __all__ = ["identify"]
 
 FloatArray = NDArray[np.float64]
+#: The findings that name the runs of a procedure which were used.
+_FOUND_BY = {"impulse": ("omega_0", "c_decay"), "drop": ("c_s_drop",), "springs": ("spring_slope",),
+             "support": ("support_slope",)}  # fmt: skip
 
 
 def identify(
@@ -93,6 +97,7 @@ def identify(
     if crank_length is not None and not 0 < crank_length < np.inf:
         raise ValueError(f"crank_length = {crank_length!r} must be a positive length in m")
     chain = _Chain(gather(recordings, apparatus=apparatus))
+    check_plausible(chain.evidence)
     for note in chain.evidence.notes:
         chain.say(note)
     decay = chain.taps()
@@ -110,9 +115,11 @@ def identify(
         for note in (*gap.notes, *gap.counted.notes):
             chain.say(note)
     chain.checks(adjusted, decay, contacts, grazing)
+    chain.doubts(adjusted, seen, contacts)
     found = joined(
         adjusted, gap, findings=chain.findings, identifiability=identifiability(adjusted, contacts, single),
-        notes=[*agreement(adjusted, chain.evidence), *chain.notes], synthetic=chain.evidence.synthetic,
+        notes=[*agreement(adjusted, chain.evidence), *chain.notes], anomalies=chain.anomalies,
+        synthetic=chain.evidence.synthetic,
     )  # fmt: skip
     return found if model is None else for_model(found, model)
 
@@ -125,6 +132,7 @@ class _Chain:
     findings: list[Finding] = field(default_factory=list)
     observations: list[Observation] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    anomalies: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.observations.append(self.weighed("mass"))
@@ -162,6 +170,9 @@ class _Chain:
         except (ValueError, SolveError) as error:
             self.say(f"{what}: not found: {error}")
             return None
+        if not np.isfinite([found.value, found.uncertainty] if isinstance(found, Finding) else 0.0).all():
+            self.say(f"{what}: not found: the recordings do not determine it")
+            return None
         self.findings += found if isinstance(found, list) else [found]
         return found[0] if isinstance(found, list) else found
 
@@ -169,6 +180,40 @@ class _Chain:
         """Say which decays were not used, and why."""
         for note in decay.notes:
             self.say(f"{procedure}: {note}")
+
+    def doubt(self, sentence: str) -> None:
+        """Say what contradicts itself: a parameter may be wrong by more than its uncertainty."""
+        self.anomalies.append(sentence)
+        warnings.warn(sentence, RecordingWarning, stacklevel=5)
+
+    def doubts(self, adjusted: Adjusted, seen: Steady, contacts: ContactFit | None) -> None:
+        """What cannot be, what disagrees, and procedures of which most runs could not be used."""
+        self.unused(contacts)
+        sentences = [not_driven(seen, self.evidence.resolution), disagreement(adjusted), *impossible(adjusted)]
+        if contacts is not None and contacts.poor:
+            sentences.append(
+                f"contact: the motion is not that of the model: root of chi^2 per degree of freedom "
+                f"{contacts.fit.reduced ** 0.5:.3g}, {np.count_nonzero(~contacts.fit.used)} of {len(contacts.pieces)} "
+                "pieces left out. Look at the crank's length, the photogate and the gap of these runs"
+            )
+        for sentence in sentences:
+            if sentence:
+                self.doubt(sentence)
+
+    def unused(self, contacts: ContactFit | None) -> None:
+        """Name the runs that no finding rests on; where they are most of a procedure, that is an anomaly."""
+        used = {
+            procedure: {name for finding in self.findings if finding.name in names for name in finding.runs}
+            for procedure, names in _FOUND_BY.items()
+        }  # fmt: skip
+        used["contact"] = set() if contacts is None else {run.name for run in contacts.runs}
+        for procedure, kept in used.items():
+            given = [run.name for run in self.runs(procedure)]
+            idle = [name for name in given if name not in kept]
+            if not idle or (procedure == "contact" and contacts is None):
+                continue
+            sentence = f"{procedure}: {len(idle)} of {len(given)} runs were not used: {', '.join(idle)}"
+            (self.doubt if 2 * len(idle) > len(given) else self.say)(sentence)
 
     def say(self, sentence: str) -> None:
         self.notes.append(sentence)
@@ -248,7 +293,7 @@ class _Chain:
         agree, disagree = sentences(found)
         self.notes += agree
         for sentence in disagree:
-            self.say(sentence)
+            self.doubt(sentence)
 
     def calibrations(self, adjusted: Adjusted) -> None:
         if runs := self.runs("voltage"):

@@ -54,6 +54,11 @@ class ContactFit:
         return _SHARED + _PER_RUN * run + which
 
     @property
+    def poor(self) -> bool:
+        """Whether the fit leaves more than it should: chi^2, or a fifth of its pieces as outliers."""
+        return _poor(self.fit)
+
+    @property
     def n_contacts(self) -> int:
         """Pieces, each with at least one contact."""
         return int(np.count_nonzero(self.fit.used))
