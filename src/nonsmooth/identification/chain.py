@@ -115,7 +115,7 @@ def identify(
         for note in (*gap.notes, *gap.counted.notes):
             chain.say(note)
     chain.checks(adjusted, decay, contacts, grazing)
-    chain.doubts(adjusted, seen, contacts)
+    chain.doubts(adjusted, contacts)
     found = joined(
         adjusted, gap, findings=chain.findings, identifiability=identifiability(adjusted, contacts, single),
         notes=[*agreement(adjusted, chain.evidence), *chain.notes], anomalies=chain.anomalies,
@@ -186,10 +186,10 @@ class _Chain:
         self.anomalies.append(sentence)
         warnings.warn(sentence, RecordingWarning, stacklevel=5)
 
-    def doubts(self, adjusted: Adjusted, seen: Steady, contacts: ContactFit | None) -> None:
+    def doubts(self, adjusted: Adjusted, contacts: ContactFit | None) -> None:
         """What cannot be, what disagrees, and procedures of which most runs could not be used."""
         self.unused(contacts)
-        sentences = [not_driven(seen, self.evidence.resolution), disagreement(adjusted), *impossible(adjusted)]
+        sentences = [disagreement(adjusted), *impossible(adjusted)]
         if contacts is not None and contacts.poor:
             sentences.append(
                 f"contact: the motion is not that of the model: root of chi^2 per degree of freedom "
@@ -240,6 +240,8 @@ class _Chain:
                 f"{mounted} runs of the response state a gap: the support was mounted, no damping from them"
             )
         seen = steady(free)
+        if sentence := not_driven(seen, self.evidence.resolution):
+            raise ValueError(sentence)
         if free and decay is not None:
             self.beside("damping by amplitude (Fig. 6)", lambda: amplitude_fit(seen, decay, self.mass))
             self.beside("complex frequency response", lambda: receptance_fit(seen, decay, self.mass))
@@ -329,6 +331,9 @@ class _Chain:
             return None, None
         if decay is None or "k_s" not in rough.names:
             self.say("contact: not used: needs taps of the car (impulse), and the support's stiffness")
+            return None, None
+        if impossible(rough):  # said of the final values
+            self.say("contact: not used: what the other procedures say of the car and the support cannot be")
             return None, None
         m = rough["m"]
         gamma = rough["c_s"] / m if "c_s" in rough.names else 1e-3 * rough["k_s"] / m
