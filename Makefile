@@ -12,7 +12,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 PYTEST_ARGS ?= -n auto --dist loadfile --no-loadscope-reorder
 
 .DEFAULT_GOAL := help
-.PHONY: help reproduce reproduce-full test slow fuzz coverage rig-against-model check bench gpu gpu-compiler docs clean \
+.PHONY: help reproduce reproduce-full test slow fuzz coverage coverage-awkward rig-against-model check bench gpu gpu-compiler docs clean \
 	distclean
 
 help:  ## list the targets
@@ -35,6 +35,9 @@ fuzz: $(VENV)/.installed-test  ## read 100 000 damaged recordings with every rea
 
 coverage: $(VENV)/.installed-run  ## identify 40 virtual rigs; writes docs/measured_coverage.md
 	$(BIN)/python -m nonsmooth.identification.coverage --seeds 0-39 --out docs/measured_coverage.md
+
+coverage-awkward: $(VENV)/.installed-run  ## the same on rigs where much goes wrong; writes docs/measured_coverage_awkward.md
+	$(BIN)/python -m nonsmooth.identification.coverage --awkward --seeds 0-39 --out docs/measured_coverage_awkward.md
 
 rig-against-model: $(VENV)/.installed-run  ## lay virtual rigs over the model; writes docs/measured_rig_against_model.md
 	$(BIN)/python -m nonsmooth.identification.compare.rig_against_model --seeds 2 3 --out docs/measured_rig_against_model.md

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from nonsmooth.errors import SolveError
 from nonsmooth.identification.adjustment import Observation, adjust
 from nonsmooth.identification.finding import Estimate
 from nonsmooth.identification.parameter_set import ParameterSet
@@ -42,6 +43,46 @@ def test_a_motion_and_the_scale_tell_the_gain():
     expected = np.hypot(u_m, 0) * np.sqrt(shrink)
     i = found.names.index("k_s")
     assert np.sqrt(found.covariance[i, i]) / 1200 == pytest.approx(expected, rel=0.03)
+
+
+@pytest.mark.parametrize("gain", [1.004, 1.02])
+def test_the_birge_ratio_of_a_gain_told_twice_is_its_closed_form(gain):
+    # one degree of freedom: the gain by S / (m omega_0^2), where only the mass errs, against 1 +- limit / sqrt(3)
+    m, u_m, omega, limit = 0.84, 1e-3, 4.5, 0.01
+    found = adjust(
+        [one("mass", m, u_m), one("omega_0", omega, 1e-8), one("spring_slope", m * omega**2 * gain, 1e-8)],
+        gain_limit=limit,
+    )
+    expected = (gain - 1) / np.hypot(limit / np.sqrt(3), gain * u_m / m)
+    assert found.freedom == 1
+    assert found.birge == pytest.approx(expected, rel=0.01)
+
+
+def test_the_birge_ratio_of_a_frequency_told_twice_is_its_closed_form():
+    # k_s / M by the drop and by k_s / m of contacts: gain known from nothing, one degree of freedom
+    found = adjust(
+        [one("mass", 0.84, 1e-6), one("test_mass", 1.33, 1e-6), one("kappa", 1440.0, 2.0),
+         Observation(("omega_s", "b_s"), np.array([30.2, 0.45]), np.diag([0.01**2, 0.01**2]))],
+        gain_limit=0.01,
+    )  # fmt: skip
+    by_drop, by_contact = 1.33 * 30.2**2, 0.84 * 1440.0
+    error = np.hypot(1.33 * 2 * 30.2 * 0.01, 0.84 * 2.0)
+    assert found.freedom == 1
+    assert found.birge == pytest.approx(abs(by_drop - by_contact) / error, rel=1e-3)
+    assert "k" not in found.names
+
+
+def test_without_redundancy_there_is_no_birge_ratio():
+    found = adjust([one("mass", 0.84, 1e-3), one("omega_0", 4.5, 1e-6)], gain_limit=0.01)
+    assert found.freedom == 0 and np.isnan(found.birge)
+
+
+def test_an_adjustment_that_does_not_converge_is_refused():
+    # k_s / m says 8.4 N/m, the sensor 1200: no gain near 1 brings them together
+    given = [one("mass", 0.84, 1e-3), one("omega_0", 4.5, 1e-6), one("kappa", 10.0, 1e-5),
+             one("support_slope", 1200.0, 1e-3)]  # fmt: skip
+    with pytest.raises(SolveError, match=r"not converged after 50 rounds: 'gain' still changes .* look at the mass"):
+        adjust(given, gain_limit=0.01)
 
 
 def test_no_mass_is_an_error():

@@ -12,12 +12,12 @@ from nonsmooth.identification.support_damping import log_decrement, support_damp
 MASS, STIFF, C_S = 1.33, 1210.0, 0.60
 
 
-def drops(heights=(0.011, 0.009, 0.008, 0.007), c=C_S, seed=0):
+def drops(heights=(0.011, 0.009, 0.008, 0.007), c=C_S, seed=0, duration=20):
     rng, found = np.random.default_rng(seed), []
     w, b = np.sqrt(STIFF / MASS), c / MASS
     wd = np.sqrt(w**2 - b**2 / 4)
     for i, h in enumerate(heights):
-        t = np.arange(0, 20, 0.01)
+        t = np.arange(0, duration, 0.01)
         at = np.maximum(t + 5e-5 * rng.standard_normal(len(t)) - 0.5, 0.0)
         x = -h * np.exp(-b / 2 * at) * (np.cos(wd * at) + b / (2 * wd) * np.sin(wd * at))
         found.append(run("drop", t, counted(x), name=f"Run #{i + 1}"))
@@ -38,6 +38,15 @@ def test_the_supports_damping_by_decrement_and_by_fit():
 def test_the_test_masss_uncertainty_is_in_it():
     wide = support_damping(drops(), resolution=COUNT, test_mass=Quantity(MASS, 0.05 * MASS))[0]
     assert wide.uncertainty / wide.value == pytest.approx(0.05, rel=0.02)
+
+
+def test_the_decrements_error_is_that_of_a_mean_where_drops_differ():
+    """Four supports that differ by more than their records' noise: standard deviation over the root of their number."""
+    damped = np.array([0.56, 0.60, 0.62, 0.66])
+    runs = [drops([0.011], c=c, seed=i, duration=5)[0] for i, c in enumerate(damped)]
+    found, decay = support_damping(runs, resolution=COUNT, test_mass=Quantity(MASS, 0.0))
+    assert decay.runs == (0, 1, 2, 3) and any("no majority" in note for note in found.notes)
+    assert found.uncertainty == pytest.approx(damped.std(ddof=1) / np.sqrt(4), rel=0.05)
 
 
 def test_turning_points_lie_on_their_envelope():

@@ -1,12 +1,14 @@
 """The gap: the drive's mean by quadrature, its fit, and the bracket of the graze from runs in closed form."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from tests.identification import made
 from tests.identification.made import COUNT, counted, decay_of, driven, run, swinging
 
 from nonsmooth.identification.gap import grazing_amplitude, mean_of_drive, mean_shift
-from nonsmooth.identification.grazing import grazing_gap
+from nonsmooth.identification.grazing import _sensor_error, _unseen, grazing_gap
 from nonsmooth.identification.steady import steady
 
 W, B, F, KAPPA = 4.5, 1.04, 0.01, 1400.0
@@ -27,11 +29,12 @@ def test_fig_13_with_half_a_metre_of_string_is_off_by_0_4_mm():
     assert mean_of_drive(0.33 / 8.47, 0.5) / 2 == pytest.approx(0.38e-3, abs=1e-5)
 
 
-def moved(length, ripple_part, zero, n=6, seed=0):
+def moved(length, ripple_part, zero, n=6, seed=0, cranks=(0.0165, 0.035)):
+    """Steady runs whose mean is moved by a string of this length; a negative one: the motor is on the other side."""
     rng = np.random.default_rng(seed)
     return steady([
         swinging(omega, 0.01, 0.3, zero + a**2 / (8 * length) + ripple_part * a, crank=a, rng=rng)
-        for a in (0.0165, 0.035) for omega in np.linspace(3, 7, n)
+        for a in cranks for omega in np.linspace(3, 7, n)
     ])  # fmt: skip
 
 
@@ -40,17 +43,48 @@ def test_the_shift_is_that_of_string_and_ripple():
     value, error = found.at(0.039)
     assert abs(value - (0.039**2 / (8 * 0.7) + 2e-3 * 0.039)) < 3.5 * error < 2e-5
     assert found.runs == 12
-    nothing = mean_shift(moved(0.7, 0, 0).only([]), 0.0, 1e-6, string_length=0.5, string_error=0.005)
-    value, error = nothing.at(0.039)
-    assert value == pytest.approx(mean_of_drive(0.039, 0.5) / 2) and error > 0.03 / 4 * 0.03
+    assert found.side == 1 and found.notes == ()
 
 
-def test_a_wrong_zero_moves_the_shift_as_stated():
-    seen, step = moved(0.7, 2e-3, 0.0), 1e-6
-    one, other = (mean_shift(seen, zero, 1e-6, string_length=0.7, string_error=0.005) for zero in (0.0, step))
-    slope = one.parts(0.039)[2]
-    assert other.at(0.039)[0] - one.at(0.039)[0] == pytest.approx(slope * step, rel=1e-2)
-    assert one.at(0.039)[1] == pytest.approx(np.hypot(one.parts(0.039)[1], slope * 1e-6))
+@pytest.mark.parametrize("side", [1, -1])
+def test_the_motors_side_is_read_off_the_runs_and_not_off_the_string(side):
+    found = mean_shift(moved(side * 0.7, 2e-3, 1e-4), 1e-4, 1e-6, string_length=0.705, string_error=0.005)
+    true = side * 0.039**2 / (8 * 0.7) + 2e-3 * 0.039
+    value, error = found.at(0.039)
+    assert found.side == side and abs(value - true) < 3.5 * error < 2e-5
+    assert ["away from the support" in note for note in found.notes] == ([True] if side < 0 else [])
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_where_no_run_tells_the_side_the_shift_is_uncertain_by_it_and_that_is_said(side):
+    for seen, words in ((moved(0.7, 0, 0).only([]), "no run without the support tells"),
+                        (moved(side * 0.7, 1e-3, 0, cranks=(0.02,)), "the 6 runs without the support do not tell")):
+        found = mean_shift(seen, 0.0, 1e-6, string_length=0.7, string_error=0.005)
+        assert found.side == 0 and words in found.notes[0]
+        value, error = found.at(0.039)
+        assert abs(value - side * mean_of_drive(0.039, 0.7) / 2) < 2 * error
+    value, error = found.at(0.02)  # where there are runs, they tell the shift whatever the side is
+    assert abs(value - side * 0.02**2 / 5.6 - 2e-5) < 3.5 * error < 1e-5
+
+
+def test_a_string_that_the_runs_contradict_is_not_used_and_named():
+    found = mean_shift(moved(0.7, 0, 0), 0.0, 1e-6, string_length=1.4, string_error=0.005)
+    value, error = found.at(0.039)
+    assert abs(value - mean_of_drive(0.039, 0.7) / 2) < 3.5 * error < 1e-5
+    assert "the notebook 1.4 m" in found.notes[0] and "string_length is not used" in found.notes[0]
+
+
+def test_rest_sensor_zero_and_mean_position_are_three_things():
+    # zeroed 0.4 mm beside rest: the mean position in the sensor's count moves with it, the shift from rest does not
+    one, other = (
+        mean_shift(moved(0.7, 2e-3, rest), rest, 1e-6, string_length=0.7, string_error=0.005) for rest in (0.0, -4e-4)
+    )
+    assert other.rest == pytest.approx(-4e-4, abs=3e-6)
+    assert other.at(0.039)[0] == pytest.approx(one.at(0.039)[0], abs=3 * one.at(0.039)[1])
+    assert other.place(0.039)[0] - one.place(0.039)[0] == pytest.approx(-4e-4, abs=3e-6)
+    # runs at two cranks and the string tell the place of rest too, where no tap does
+    without = mean_shift(moved(0.7, 2e-3, -4e-4), 0.0, 1e-3, string_length=0.7, string_error=0.005)
+    assert abs(without.rest + 4e-4) < 3 * np.sqrt(without.covariance[0, 0]) < 3e-4
 
 
 def test_friction_moves_the_place_of_a_car_that_goes_longer_one_way():
@@ -88,6 +122,43 @@ def test_the_graze_brackets_the_gap():
     assert abs(frequency.value - 8.43) <= frequency.half_width + 1e-4
     assert found.others["at_rest"].value == pytest.approx(found.value + 2e-5 - 1e-6, abs=2e-6)
     assert found.data["contact"].values.sum() == 9
+
+
+def test_a_push_too_light_to_be_seen_widens_the_bracket():
+    gap, crank = grazing_amplitude(8.43, W, B, F, 0.010), 0.010
+    found = grazing_gap(stepping(gap), decay_of(W, B, F, 1e-6), resolution=COUNT, kappa=KAPPA)
+    a = [grazing_amplitude(w, W, B, F, crank) for w in (8.45, 8.40)]
+    # the mean of a run is seen to 0.06 counts at best: by as much a car that goes p beyond the gap is pushed
+    least = _unseen(0.06 * COUNT, a[0], KAPPA / W**2)
+    assert least > 3e-6
+    assert found.estimate.half_width > 0.5 * (a[1] - a[0] + least)
+    assert found.estimate.half_width < 0.5 * (a[1] - a[0] + 4 * least)
+
+
+@pytest.mark.parametrize("depth", [2e-6, 2e-5])
+def test_the_push_of_a_light_contact_by_quadrature(depth):
+    amplitude, stiff = 2e-3, KAPPA / W**2
+    theta = np.linspace(-np.pi, np.pi, 2_000_001)
+    x = amplitude * np.cos(theta)
+    # the mean of the support's force over 2k, k_s / 2k = kappa / omega_0^2
+    moved = stiff * float(np.mean(np.maximum(x - (amplitude - depth), 0.0)))
+    assert _unseen(moved, amplitude, stiff) == pytest.approx(depth, rel=0.01)
+
+
+def test_the_sensors_error_is_that_of_a_mean_of_four():
+    off = 1e-5 * np.array([1.0, -1.0, 2.0, -2.0, 1.0, -1.0])  # standard deviation sqrt(12/5) x 10 um
+    seen = SimpleNamespace(highest=2e-3 + off, mean=np.zeros(6), omega=np.full(6, 8.0))
+    error = _sensor_error(seen, np.ones(6, dtype=bool), lambda omega: np.full(len(omega), 2e-3), COUNT)
+    assert error == pytest.approx(1e-5 * np.sqrt(12 / 5) / np.sqrt(4))
+
+
+def test_a_gap_by_graze_is_neither_too_sure_nor_too_vague():
+    z = []
+    for seed in range(12):
+        gap = grazing_amplitude(8.43 - 0.01 * (seed % 5), W, B, F, 0.010)
+        found = grazing_gap(stepping(gap, seed=seed), decay_of(W, B, F, 1e-6), resolution=COUNT, kappa=KAPPA)
+        z.append((found.value - gap) / found.uncertainty)
+    assert 0.4 < np.sqrt(np.mean(np.square(z))) < 1.6
 
 
 def test_the_cranks_length_need_not_be_right():

@@ -113,6 +113,30 @@ def test_amplitudes_with_and_without_friction_in_the_law():
         amplitude_fit(responding(f).only([0, 1]), decay_of(W, B, f), Quantity(M))
 
 
+def test_stated_uncertainties_are_neither_too_small_nor_too_large():
+    f, rows = 0.012, {}
+    for seed in range(6):
+        seen, decay = responding(f, seed=seed), decay_of(W, B, f)
+        both, whole = amplitude_fit(seen, decay, Quantity(M))[1], receptance_fit(seen, decay, Quantity(M))
+        told = [
+            ("c_response", both.estimate, M * B), ("its friction", both.others["friction"], M * f),
+            ("c", whole.estimate, M * B), ("omega_0", whole.others["omega_0"], W),
+            ("friction", whole.others["friction"], M * f), ("scale", whole.others["drive_scale"], 1.0),
+            ("mark", whole.others["mark"], 0.0),
+        ]  # fmt: skip
+        for name, one, truth in told:
+            rows.setdefault(name, []).append((one.value - truth) / one.uncertainty)
+    spread = {name: np.sqrt(np.mean(np.square(z))) for name, z in rows.items()}
+    assert all(0.2 < size < 2.0 for size in spread.values()), spread
+
+
+def test_half_powers_uncertainty_is_neither_too_small_nor_too_large():
+    found = [half_power(responding(seed=seed), Quantity(M)) for seed in range(6)]
+    for truth, rows in ((M * B, [one.estimate for one in found]), (W, [one.others["omega_0"] for one in found])):
+        z = [(row.value - truth) / row.uncertainty for row in rows]
+        assert 0.2 < np.sqrt(np.mean(np.square(z))) < 2.0
+
+
 def test_a_steady_run_is_its_closed_form():
     one = steady([swinging(5.0, 0.02, 0.7, 1e-3, crank=0.0165, mark=0.4, second=1e-4)])
     assert one.omega[0] == pytest.approx(5.0, rel=1e-5)

@@ -24,12 +24,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.errors import SolveError
 from nonsmooth.identification.finding import Estimate
 from nonsmooth.identification.uncertainty import uniform
 
 __all__ = ["LAWS", "UNKNOWNS", "Adjusted", "Observation", "adjust"]
 
 FloatArray = NDArray[np.float64]
+
+_ROUNDS = 50
+_CONVERGED = 1e-6  # of a standard uncertainty
 
 #: The unknowns of the adjustment, with units.
 UNKNOWNS: Mapping[str, str] = {
@@ -67,15 +71,16 @@ class Observation:
 class Adjusted:
     """The unknowns that the observations determine, their covariance, and how well all fits together.
 
-    ``birge`` is the root of chi^2 per degree of freedom (NaN where nothing is left over); ``pulls`` are the residuals
-    of the observations over their standard uncertainties. ``influence`` (p, n) is how much each unknown moves with each
-    observed value, ``labels`` their names in order.
+    ``birge`` is the root of chi^2 per degree of ``freedom`` (NaN where nothing is left over); ``pulls`` are the
+    residuals of the observations over their standard uncertainties. ``influence`` (p, n) is how much each unknown moves
+    with each observed value, ``labels`` their names in order.
     """
 
     names: tuple[str, ...]
     values: FloatArray
     covariance: FloatArray
     birge: float
+    freedom: int
     pulls: Mapping[str, float]
     influence: FloatArray
     labels: tuple[str, ...]
@@ -103,6 +108,8 @@ def adjust(observations: list[Observation], *, gain_limit: float) -> Adjusted:
     ------
     ValueError
         If no mass is known, so that nothing has a scale.
+    SolveError
+        If the adjustment does not converge: the observations contradict each other by far.
     """
     labels = [name for o in observations for name in o.names]
     if "mass" not in labels:
@@ -127,7 +134,7 @@ def adjust(observations: list[Observation], *, gain_limit: float) -> Adjusted:
         i = names.index("gain")
         known[i] = 1.0
         prior[i, i] = (scale[i] / max(uniform(gain_limit), 1e-12)) ** 2
-    for _ in range(50):
+    for _ in range(_ROUNDS):
         at = dict(zip(names, u, strict=True))
         left = (y - np.array([LAWS[label](at) for label in labels])) / size
         jacobian = np.empty((n, len(names)))
@@ -143,8 +150,15 @@ def adjust(observations: list[Observation], *, gain_limit: float) -> Adjusted:
         normal = jacobian.T @ weight @ jacobian + prior
         change = np.linalg.solve(normal, jacobian.T @ weight @ left - prior @ ((u - known) / scale))
         u = u + change * scale
-        if np.max(np.abs(change)) < 1e-12:
+        off = np.abs(change) / np.sqrt(np.diag(np.linalg.inv(normal)))
+        if np.max(off) < _CONVERGED:
             break
+    else:
+        raise SolveError(
+            f"the adjustment has not converged after {_ROUNDS} rounds: {names[int(np.argmax(off))]!r} still changes by "
+            f"{np.max(off):.1g} of its standard uncertainty. The observations ({', '.join(labels)}) contradict each "
+            "other by far: look at the mass, the wheel and the units, and leave out what is in doubt"
+        )
     found = np.linalg.inv(normal) * np.outer(scale, scale)
     at = dict(zip(names, u, strict=True))
     residual = y - np.array([LAWS[label](at) for label in labels])
@@ -157,7 +171,7 @@ def adjust(observations: list[Observation], *, gain_limit: float) -> Adjusted:
         pulls[label if label not in pulls else f"{label} ({i})"] = float(residual[i] / np.sqrt(covariance[i, i]))
     birge = float(np.sqrt(chi2 / freedom)) if freedom > 0 else float("nan")
     influence = np.linalg.solve(normal, jacobian.T @ weight) * scale[:, None] / size
-    return Adjusted(names, u, np.asarray(found, dtype=np.float64), birge, pulls, influence, tuple(labels))
+    return Adjusted(names, u, np.asarray(found, dtype=np.float64), birge, freedom, pulls, influence, tuple(labels))
 
 
 def _scaled(covariance: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:

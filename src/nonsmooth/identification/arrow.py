@@ -21,16 +21,21 @@ __all__ = ["reduced", "settle"]
 
 FloatArray = NDArray[np.float64]
 _SETTLED = 1e-3  # of a standard uncertainty
+_LITTLE = 1e-4  # of the sum of squares: what a rough fit leaves to be gained
+_ACCURACY = 0.05  # of a standard uncertainty: how near the minimum is told where the derivatives' accuracy ends
 
 
-def reduced(problem: Problem, state: State, weights: list[FloatArray], used: Any, p: int) -> tuple[Any, ...]:
-    """Normal equations without the starts, and what gives the starts' steps back."""
+def reduced(
+    problem: Problem, state: State, weights: list[FloatArray], used: Any, p: int, damping: float = 0.0
+) -> tuple[Any, ...]:
+    """Normal equations without the starts, and what gives the starts' steps back; ``damping`` is that of the starts."""
     normal, right = np.zeros((p, p)), np.zeros(p)
     back = []
     for i, piece in enumerate(problem.pieces):
         g, s = state.in_parameters[i] * weights[i][:, None], state.in_start[i] * weights[i][:, None]
         r = state.residuals[i] * weights[i]
-        block = np.linalg.inv(s.T @ s + 1e-12 * np.trace(s.T @ s) * np.eye(2))
+        square = s.T @ s
+        block = np.linalg.inv(square + 1e-12 * np.trace(square) * np.eye(2) + damping * np.diag(np.diag(square)))
         back.append((block, s.T @ g, s.T @ r))
         if used[i]:
             normal[np.ix_(piece.which, piece.which)] += g.T @ g - (s.T @ g).T @ block @ (s.T @ g)
@@ -40,14 +45,16 @@ def reduced(problem: Problem, state: State, weights: list[FloatArray], used: Any
 
 def settle(
     problem: Problem, theta: FloatArray, starts: FloatArray, spread: float, used: Any, centre: FloatArray,
-    prior: FloatArray, iterations: int,
+    prior: FloatArray, iterations: int, rough: bool = False,
 ) -> tuple[FloatArray, FloatArray, State, int]:  # fmt: skip
     """Levenberg and Marquardt's iteration: parameters, starts, the state there, and how many steps it took.
+
+    With ``rough`` it ends where it makes little way, or has taken all its iterations: a start for another fit.
 
     Raises
     ------
     SolveError
-        If it does not settle, or a direction of the parameters is not determined.
+        If it does not settle, within the iterations or at all, or a direction of the parameters is not determined.
     """
     damping = 1e-4
     p = len(theta)
@@ -60,19 +67,19 @@ def settle(
 
     best = cost(state, theta)
     for count in range(1, iterations + 1):
-        normal, right, back = reduced(problem, state, weights, used, p)
-        full = normal + prior
-        pull = right - prior @ (theta - centre)
-        scale = np.sqrt(np.maximum(np.diag(full), 1e-300))
-        shrunk = full / np.outer(scale, scale)
-        if not np.isfinite(shrunk).all():
-            raise SolveError(
-                f"the motion of this fit over {len(problem.pieces)} pieces grows without bound: its records are not of "
-                "the motion that they are taken for"
-            )
-        if np.linalg.cond(shrunk) > 1e13:
-            raise SolveError("the records do not determine all parameters of this fit; give one its value")
         while True:
+            normal, right, back = reduced(problem, state, weights, used, p, damping)
+            full = normal + prior
+            pull = right - prior @ (theta - centre)
+            scale = np.sqrt(np.maximum(np.diag(full), 1e-300))
+            shrunk = full / np.outer(scale, scale)
+            if not np.isfinite(shrunk).all():
+                raise SolveError(
+                    f"the motion of this fit over {len(problem.pieces)} pieces grows without bound: its records are not "
+                    "of the motion that they are taken for"
+                )
+            if np.linalg.cond(shrunk) > 1e13:
+                raise SolveError("the records do not determine all parameters of this fit; give one its value")
             step = np.linalg.solve(shrunk + damping * np.eye(p), pull / scale) / scale
             moved = starts.copy()
             for i, (block, cross, part) in enumerate(back):
@@ -80,14 +87,37 @@ def settle(
             trial = problem.residuals(theta + step, moved)
             found = cost(trial, theta + step)
             if np.isfinite(found) and found <= best * (1 + 1e-12):
-                damping = max(damping / 10, 1e-9)
                 break
             damping *= 8
-            if damping > 1e8:  # no smaller sum of squares: the derivatives' own accuracy is reached
-                return theta, starts, state, count
-        small = float(np.max(np.abs(step) * np.sqrt(np.diag(full))))
+            if damping > 1e8:  # no smaller sum of squares: the derivatives' own accuracy is reached, or nothing fits
+                if (far := _distance(problem, state, weights, used, theta, centre, prior)) < _ACCURACY or rough:
+                    return theta, starts, state, count
+                raise SolveError(
+                    f"the fit over {len(problem.pieces)} pieces did not settle: no step lowers the sum of squares, "
+                    f"though its minimum should be {far:.2g} standard uncertainties away; look at the records for jumps"
+                )
         theta, starts, gain, best = theta + step, moved, best - found, found
         state = problem.derivatives(theta, starts)
-        if small < _SETTLED or gain < 1e-7 * best:
+        # by the undamped step: a damped one is short wherever it is taken
+        far = _distance(problem, state, weights, used, theta, centre, prior)
+        if far < _SETTLED or (far < _ACCURACY and gain < 1e-7 * best) or (rough and gain < _LITTLE * best):
             return theta, starts, state, count
+        damping = max(damping / 10, 1e-9)
+    if rough:
+        return theta, starts, state, iterations
     raise SolveError(f"the fit over {len(problem.pieces)} pieces did not settle in {iterations} iterations")
+
+
+def _distance(
+    problem: Problem, state: State, weights: list[FloatArray], used: Any, theta: FloatArray, centre: FloatArray,
+    prior: FloatArray,
+) -> float:  # fmt: skip
+    """Largest undamped step of a parameter or a used start, in standard uncertainties."""
+    normal, right, back = reduced(problem, state, weights, used, len(theta))
+    covariance = np.linalg.inv(normal + prior)
+    step = covariance @ (right - prior @ (theta - centre))
+    far = [np.abs(step) / np.sqrt(np.maximum(np.diag(covariance), 1e-300))]
+    for piece, (block, cross, part), use in zip(problem.pieces, back, used, strict=True):
+        if use:
+            far.append(np.abs(block @ (part - cross @ step[piece.which])) / np.sqrt(np.diag(block)))
+    return float(np.max(np.concatenate(far)))

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from nonsmooth.errors import SolveError
 from nonsmooth.experiment.recording import RecordingWarning
 from nonsmooth.experiment.session import Quantity, Session
+from nonsmooth.experiment.signals.phase import drive_phase
 from nonsmooth.identification.adjustment import Adjusted, Observation, adjust
 from nonsmooth.identification.calibrations import crank_force, voltage_frequency
 from nonsmooth.identification.contact_findings import contact_finding, one_contact
@@ -100,6 +101,7 @@ def identify(
     check_plausible(chain.evidence)
     for note in chain.evidence.notes:
         chain.say(note)
+    chain.motor()
     decay = chain.taps()
     seen = chain.response(decay)
     chain.forces()
@@ -219,6 +221,23 @@ class _Chain:
         self.notes.append(sentence)
         warnings.warn(sentence, RecordingWarning, stacklevel=5)
 
+    def motor(self) -> None:
+        """Say where the photogate sees the motor's frequency wander."""
+        known = self.evidence.apparatus.get("turn_resolution")
+        for procedure in ("response", "grazing", "contact"):
+            seen = [
+                drive_phase(run.passages).wander(1e-4 if known is None else known.value)
+                for run in self.runs(procedure) if run.turns is not None
+            ]
+            if unsteady := [size for size, steady in seen if not steady]:
+                self.say(
+                    f"{procedure}: the motor wanders in {len(unsteady)} of {len(seen)} runs, by "
+                    f"{100 * float(np.median(unsteady)):.2g} % from turn to turn (standard deviation; up to "
+                    f"{100 * max(unsteady):.2g} %), more than the photogate's steps explain. The crank's angle is "
+                    "followed from turn to turn, and what a turn may hide is in the uncertainty of what contacts tell; "
+                    "a regulated supply would be better"
+                )
+
     def taps(self) -> DecayFit | None:
         runs, resolution = self.runs("impulse"), self.evidence.resolution
         if not runs:
@@ -337,7 +356,13 @@ class _Chain:
             return None, None
         m = rough["m"]
         gamma = rough["c_s"] / m if "c_s" in rough.names else 1e-3 * rough["k_s"] / m
-        found = shoot_contacts(runs, decay, resolution=resolution, kappa=rough["k_s"] / m, gamma=gamma, mark=mark)
+        try:
+            found = shoot_contacts(
+                runs, decay, resolution=resolution, kappa=rough["k_s"] / m, gamma=gamma, mark=mark
+            )
+        except SolveError as error:
+            self.say(f"contact: not used, so that the gap is not known: {error}")
+            return None, None
         self.observe(("kappa", "gamma"), found.values[3:5], found.covariance[3:5, 3:5], "multiple shooting")
         own = Quantity(m, float(np.sqrt(rough.covariance[rough.names.index("m"), rough.names.index("m")])))
         self.findings.append(contact_finding(found, own, resolution=resolution))

@@ -63,6 +63,8 @@ def contact_finding(found: ContactFit, mass: Quantity, *, resolution: float) -> 
         f"{1e6 * found.fit.jitter:.0f} µs",
         "one contact is 8 samples at 100 Hz: what is known of c_s comes from many fitted together",
     ]
+    if found.grazing:
+        notes.append(f"{found.grazing} pieces in which the car only grazes the support are left out")
     if left:
         notes.append(f"{left} of {len(found.pieces)} pieces are left out: they fit far worse than the others")
     return Finding(
@@ -139,7 +141,7 @@ class _Alone:
         self.known[_KAPPA] = self.values[_KAPPA]
         self.precision = found.precision[np.ix_(self.rows, self.rows)].copy()
         self.precision[_KAPPA, _KAPPA] += kappa_error**-2.0
-        self.steps = np.array([1e-4, 1e-4, 1e-5, 1e-4 * self.values[_KAPPA], 1e-2, 1e-6, 1e-6, *[1e-5] * 4])
+        self.steps = np.array([1e-6, 1e-6, 1e-7, 1e-6 * self.values[_KAPPA], 1e-4, 3e-8, 3e-8, *[1e-7] * 4])
 
     def fit(self, gamma: float, hold: float) -> ShootingFit:
         """The other parameters at this c_s/m, which is held with the precision ``hold``."""

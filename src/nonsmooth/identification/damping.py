@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.errors import SolveError
 from nonsmooth.experiment.session import Quantity
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.free_decay import DecayFit
@@ -135,7 +136,10 @@ def _fit(
     def residual(p: Any) -> FloatArray:
         return (_predicted(omega, crank, natural, p["b"].value, p["f"].value) - amplitude) / spread
 
-    found = Minimizer(residual, parameters, scale_covar=True).minimize().params
+    fitted = Minimizer(residual, parameters, scale_covar=True).minimize()
+    if not fitted.success:
+        raise SolveError("the fit of the amplitudes did not settle; look at them over frequency")
+    found = fitted.params
     return {
         name: (float(row.value), float(row.stderr if row.stderr is not None else np.inf))
         for name, row in found.items()

@@ -1,10 +1,10 @@
 """Directions of the sensors: which way each counts, read off the recordings, and all runs brought to one convention.
 
-The convention: the position grows towards the support, and the force sensor reads positive where it pulls the car that
-way. A rotary sensor with its string the other way round, or a force sensor that is pushed in place of pulled, counts the
-other way, and no notebook says so. The support shows it: it pushes a car only away from itself, and harder than the
-springs do, so the largest accelerations of a run with contact point away from it. A pull then shows the force sensor's
-direction: the force of a spring grows with its displacement.
+The convention: the position grows towards the support, and the force sensor reads positive where it pulls the car
+that way. A rotary sensor with its string the other way round, or a force sensor that is pushed in place of pulled,
+counts the other way, and no notebook says so. The support shows it: it pushes a car only away from itself, and harder
+than the springs do, so the largest accelerations of a run with contact point away from it. A pull then shows the force
+sensor's direction: the force of a spring grows with its displacement.
 """
 
 from __future__ import annotations
@@ -49,15 +49,16 @@ def oriented(runs: Mapping[str, tuple[Run, ...]]) -> tuple[dict[str, tuple[Run, 
         against = [run.name for run in rows if _slope(run) < 0]
         if against:
             found[name] = tuple(_pushed(run) if run.name in against else run for run in rows)
+            which = "all" if len(against) == len(rows) else ", ".join(against)
             notes.append(
                 f"{name}: the force sensor counts against the displacement in {len(against)} of {len(rows)} runs "
-                f"({', '.join(against)}): it was pushed where a pull is positive, or mounted the other way round; its "
+                f"({which}): it was pushed where a pull is positive, or mounted the other way round; its "
                 "readings are taken with the other sign there"
             )
     if backwards := [run.label for rows in runs.values() for run in rows if run.backwards]:
         notes.append(
-            f"the photogate counts backwards in {len(backwards)} runs ({_few(backwards)}): only the times of channel 'Turn' "
-            "are used, which is right whichever way the motor turns"
+            f"the photogate counts backwards in {len(backwards)} runs ({_few(backwards)}): only the times of channel "
+            "'Turn' are used, which is right whichever way the motor turns"
         )
     return found, -1 if sign < 0 else 1, tuple(notes)
 
@@ -80,9 +81,9 @@ def towards_support(runs: Sequence[Run]) -> tuple[int, str]:
         )
     if len(down) > len(up):
         return -1, (
-            f"the rotary sensor counts away from the support: in {len(down)} of {len(up) + len(down)} runs with contact "
-            "the support pushes the car towards growing positions; channel 'Angle' is taken with the other sign in all "
-            "runs"
+            f"the rotary sensor counts away from the support: in {len(down)} of {len(up) + len(down)} runs with "
+            "contact the support pushes the car towards growing positions; channel 'Angle' is taken with the other "
+            "sign in all runs"
         )
     return (1, "") if up else (0, "")
 

@@ -163,7 +163,8 @@ def gather(
         runs[procedure] = tuple(_run(procedure, row[0], row[1], row[2], known) for row in rows)
     runs, direction, notes = oriented(runs)
     synthetic = synthetic or any(run.synthetic for rows in runs.values() for run in rows)
-    return Evidence(runs, known, title, source, synthetic, tuple(p for p in PROCEDURES if p not in runs), direction, notes)
+    missing = tuple(p for p in PROCEDURES if p not in runs)
+    return Evidence(runs, known, title, source, synthetic, missing, direction, notes)
 
 
 def _rows(procedure: str, given: Any) -> list[Any]:

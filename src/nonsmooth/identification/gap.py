@@ -32,9 +32,9 @@ class MeanShift(NamedTuple):
 
     Three places are told apart: where the sensor counts zero, where the springs balance (``rest``; a car with dry
     friction stops within F_C/2k of it, and a sensor is zeroed where the car happens to stand), and the mean position
-    under the drive. ``covariance`` is that of (rest, alpha, beta), ``by_zero`` how they move with the place of rest that
-    the taps tell; number of ``runs``; ``side``: 1 where the motor pulls from the support's side, -1 from the other, 0
-    where the runs do not tell; ``notes`` on what the runs say of the string.
+    under the drive. ``covariance`` is that of (rest, alpha, beta), ``by_zero`` how they move with the place of rest
+    that the taps tell; number of ``runs``; ``side``: 1 where the motor pulls from the support's side, -1 from the
+    other, 0 where the runs do not tell; ``notes`` on what the runs say of the string.
     """
 
     rest: float
@@ -96,8 +96,8 @@ def mean_shift(
     seen : Steady
         Steady runs; without any, what is known of string and motor alone bounds the shift.
     zero, zero_error : float
-        Where the car rests in the sensor's count (m), from the free decay; without taps, where the sensor was zeroed and
-        how far that may be from rest.
+        Where the car rests in the sensor's count (m), from the free decay; without taps, where the sensor was zeroed
+        and how far that may be from rest.
     string_length, string_error : float, optional
         Length of the string.
     dry : float
@@ -111,11 +111,11 @@ def mean_shift(
     if abs(free.alpha) > _CLEAR * error:
         side = int(np.sign(free.alpha))
     if not side:
-        runs = f"the {len(seen)} runs without the support do not tell" if len(seen) else "no run without the support tells"
+        several = f"the {len(seen)} runs without the support do not tell"
         notes.append(
-            f"{runs} on which side the motor is, and with it which way its string moves the mean position: the gap is "
-            "uncertain by as much where the crank is another than theirs. Record such runs (response, no gap) at two crank "
-            "lengths or more, and taps of the car (impulse)"
+            f"{several if len(seen) else 'no run without the support tells'} on which side the motor is, and with it "
+            "which way its string moves the mean position: the gap is uncertain by as much at other crank lengths than "
+            "theirs. Record such runs (response, no gap) at two crank lengths or more, and taps of the car (impulse)"
         )
         return _fitted(seen, zero, zero_error, string_length, 0.0, size, dry)._replace(notes=tuple(notes))
     where = "the support's side" if side > 0 else "the side away from the support"
@@ -124,8 +124,8 @@ def mean_shift(
     off = abs(free.alpha - side * size) / float(np.hypot(error, told))
     if off > _CLEAR:
         notes.append(
-            f"the mean positions say a string of {1 / (8 * abs(free.alpha)):.3g} m, the notebook {string_length:.3g} m "
-            f"({off:.0f} uncertainties apart): string_length is not used. Measure it from the crank to the driven spring"
+            f"the mean positions say a string of {1 / (8 * abs(free.alpha)):.3g} m, the notebook {string_length:.3g} "
+            f"m ({off:.0f} uncertainties apart): string_length is not used. Measure it from crank to driven spring"
         )
         return free._replace(side=side, notes=tuple(notes))
     if side < 0:
@@ -138,7 +138,7 @@ def _fitted(
     seen: Steady, zero: float, zero_error: float, string_length: float | None, alpha: float, alpha_error: float,
     dry: float,
 ) -> MeanShift:  # fmt: skip
-    """Rest, alpha and beta by least squares; alpha is known beforehand to its error, beta within a ripple of 0.03 rad."""
+    """Rest, alpha and beta by least squares; alpha is known beforehand to its error, beta to a ripple of 0.03 rad."""
     # of the string's term the next order too, 0.1 % at a = 39 mm and L = 0.5 m
     further = 3 * seen.crank**2 / (16 * string_length**2) if string_length else np.zeros(len(seen))
     matrix = np.column_stack([np.ones(len(seen)), seen.crank**2 * (1 + further), seen.crank])

@@ -158,11 +158,18 @@ def _touching(seen: Steady, resolution: float) -> tuple[NDArray[np.bool_], float
             "farther away from resonance, in free motion (where contact ends is not where it begins)"
         )
     begun, limit = _FIRST, 0.0
-    for _ in range(3):  # the scatter of the means from the free runs, the free runs from the scatter
+    for _ in range(len(seen.mean)):  # the scatter of the means from the free runs, the free runs from the scatter
         free = seen.mean[:begun]
         limit = max(_SIGMAS * float(np.std(free, ddof=1)), _COUNTS * resolution)
         near = np.flatnonzero(np.abs(seen.mean - float(np.mean(free))) <= limit)
-        begun = max(int(near[-1]) + 1 if len(near) else 0, _FIRST)
+        before, begun = begun, max(int(near[-1]) + 1 if len(near) else 0, _FIRST)
+        if begun == before:
+            break
+    else:
+        raise ValueError(
+            "which runs are free cannot be told: their mean position drifts towards that of contact; zero the sensor, "
+            "and step finer"
+        )
     if begun == n:
         raise ValueError(f"none of the {n} runs touches: step on from free motion into contact")
     return np.arange(n) >= begun, limit

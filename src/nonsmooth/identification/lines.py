@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.errors import SolveError
 from nonsmooth.identification.uncertainty import correlated
 
 __all__ = ["LinearLaw", "StraightLine", "linear_law", "scattered_line", "york"]
@@ -60,10 +61,15 @@ def york(x: Any, y: Any, x_error: Any, y_error: Any) -> StraightLine:
         u, w = xs - x_mean, ys - y_mean
         beta = weight * (u * vy + slope * w * vx)
         new = float(np.sum(weight * beta * w) / np.sum(weight * beta * u))
-        settled = abs(new - slope) <= 1e-14 * abs(new)
-        slope = new
-        if settled:
+        change, slope = abs(new - slope), new
+        if change <= 1e-14 * abs(slope):
             break
+    else:
+        if change > 1e-9 * abs(slope):
+            raise SolveError(
+                f"the slope of the line still changes by {change / abs(slope):.1g} of itself after 100 rounds: the "
+                "points do not lie along a line; look at them"
+            )
     adjusted = x_mean + beta
     centre = np.average(adjusted, weights=weight)
     slope_var = 1.0 / float(np.sum(weight * (adjusted - centre) ** 2))

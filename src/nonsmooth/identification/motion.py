@@ -36,6 +36,7 @@ CONTACT = ("kappa", "gamma", "g")
 
 _STEP = 2.5e-3  # s: (38 rad/s x 2.5 ms)^5 / 120 is 7e-8 of the amplitude per step
 _HALVINGS = 60
+_SWITCHES = 20  # in one step
 
 
 @njit(cache=True)
@@ -82,6 +83,8 @@ def _beyond(x, v, sign, touching, contact):
 def march(time, phase, x, v, touching, oscillator, drive, contact, out):
     """Fill ``out`` (n, 2) with x and v at the times; returns the number of contacts that began.
 
+    NaN from where more than twenty switches fall into one step.
+
     Parameters
     ----------
     time, phase : array (n,)
@@ -108,7 +111,7 @@ def march(time, phase, x, v, touching, oscillator, drive, contact, out):
         h = dt / n
         for j in range(n):
             done = 0.0
-            for _ in range(20):
+            for switches in range(_SWITCHES):
                 left = h - done
                 if left <= 1e-12:
                     break
@@ -146,5 +149,8 @@ def march(time, phase, x, v, touching, oscillator, drive, contact, out):
                 else:
                     touching = True
                     begun += 1
+                if switches == _SWITCHES - 1:  # chatter: no motion that a fit may take
+                    out[i:, :] = np.nan
+                    return begun
         out[i, 0], out[i, 1] = x, v
     return begun

@@ -5,6 +5,11 @@ each mode. What the free decay has told, :math:`\omega_0, c/m, F_C/m`, enters as
 amplitude is the crank's length, while its phase at the mark, its second harmonic (string and ripple) and the place
 about which the car swings are free in each run. The gap comes out in the sensor's own count, and the place of the
 swing with it, so that their difference, the gap *referred to the car's mean position under the drive*, needs no zero.
+
+A piece in which the car turns at the support itself, a graze, is left out: its motion has no derivative in the
+parameters there (the push grows as the power 3/2 of a depth of micrometres), and the fit would stop at it wherever its
+minimum lies. How far the estimate moves with every other turn of the crank alone is added to its uncertainty: it is
+what a motor that wanders is worth.
 """
 
 from __future__ import annotations
@@ -19,9 +24,10 @@ from numpy.typing import NDArray
 
 from nonsmooth.errors import SolveError
 from nonsmooth.experiment.signals.phase import drive_phase
+from nonsmooth.identification.arrow import reduced
 from nonsmooth.identification.evidence import Run
 from nonsmooth.identification.free_decay import DecayFit
-from nonsmooth.identification.pieces import Piece, start_state
+from nonsmooth.identification.pieces import Piece, Problem, start_state
 from nonsmooth.identification.shooting import ShootingFit, shoot
 
 __all__ = ["ContactFit", "shoot_contacts"]
@@ -30,6 +36,7 @@ FloatArray = NDArray[np.float64]
 _SHARED = 5  # omega_0, b, f, kappa, gamma
 _PER_RUN = 6  # gap, place, cosine and sine of the drive, its second harmonic
 LONGEST = 2.5  # s: of a piece
+_GRAZING = (2e-5, 6e-5)  # m: from the gap, within which a turning point is a graze; the second where the first fails
 _LARGE, _LEFT_OUT = 3.0, 0.2  # chi^2 per degree of freedom, and share of pieces, from which a fit is doubted
 
 
@@ -38,7 +45,7 @@ class ContactFit:
     """Outcome: ``kappa`` = k_s/m, ``gamma`` = c_s/m, and for each run the gap and the place of the swing.
 
     ``values`` and ``covariance``: omega_0, b, f, kappa, gamma, then per run g, x_e, cosine, sine, cosine_2, sine_2;
-    ``known`` and ``precision``: what was known of them before.
+    ``known`` and ``precision``: what was known of them before; ``grazing``: how many pieces are left out as grazes.
     """
 
     values: FloatArray
@@ -48,6 +55,7 @@ class ContactFit:
     fit: ShootingFit
     known: FloatArray
     precision: FloatArray
+    grazing: int = 0
 
     def place(self, run: int, which: int) -> int:
         """Index of a run's own parameter: 0 gap, 1 place, 2-5 drive."""
@@ -89,9 +97,11 @@ def shoot_contacts(
     ------
     ValueError
         If no run has a contact.
+    SolveError
+        If the fit does not settle.
     """
     values = [*decay.values[:3], kappa, gamma]
-    steps = [1e-4, 1e-4, 1e-5, 1e-4 * kappa, 1e-2]
+    steps = [1e-6, 1e-6, 1e-7, 1e-6 * kappa, 1e-4]
     told: FloatArray = np.asarray(np.linalg.inv(_regular(decay.covariance[:3, :3])))
     precision: list[FloatArray] = [told, 1e-12 / kappa**2 * np.eye(2)]
     pieces: list[Piece] = []
@@ -107,7 +117,7 @@ def shoot_contacts(
         taken.append(run)
         along = np.array([np.cos(mark), -np.sin(mark)])  # a cos(phi + mark)
         values += [gap + decay.values[3], decay.values[3], *(crank * along), 0.0, 0.0]
-        steps += [1e-6, 1e-6, 1e-5, 1e-5, 1e-5, 1e-5]
+        steps += [3e-8, 3e-8, 1e-7, 1e-7, 1e-7, 1e-7]
         # the drive: amplitude as set to 0.5 %, a phase of the mark to 0.05 rad, a second harmonic to 3 %
         spread = np.array([1.5e-3, 1e-3, 5e-3 * crank, 0.05 * crank, 0.03 * crank, 0.03 * crank])
         own_precision = np.diag(spread**-2.0)
@@ -117,10 +127,12 @@ def shoot_contacts(
     if not pieces:
         raise ValueError("no run shows a contact: the gap and the support cannot be found from them")
     joint = _Joint(pieces, np.array(values), np.array(steps), precision, resolution, decay.fit.jitter)
-    fit = joint.best(len(taken))
+    fit, kept = joint.best(len(taken))
+    moved = joint.by_turns(fit, kept)
     return ContactFit(
-        fit.values, fit.covariance, tuple(taken), tuple(pieces), fit, joint.values, _blocks(precision)
-    )
+        fit.values, fit.covariance + np.outer(moved, moved), tuple(taken), tuple(kept), fit, joint.values,
+        _blocks(precision), len(pieces) - len(kept),
+    )  # fmt: skip
 
 
 def _poor(fit: ShootingFit) -> bool:
@@ -139,26 +151,54 @@ class _Joint:
     resolution: float
     jitter: float
 
-    def best(self, runs: int) -> ShootingFit:
-        """The joint fit; where it does not get there, once more from fits of each run alone.
+    def best(self, runs: int) -> tuple[ShootingFit, list[Piece]]:
+        """The joint fit, and the pieces that are no grazes; where it does not get there, from fits of each run alone.
 
         Far from the solution the cost is rough, the rougher the more runs: each alone finds the way.
         """
         first: ShootingFit | None = None
         try:
-            first = self.fit(self.values)
+            first = self.fit(self.values, rough=True)
         except SolveError:
             if runs == 1:
                 raise
-        if first is not None and (runs == 1 or not _poor(first)):
-            return first
-        again = self.fit(self.one_by_one(runs))
-        rows = [again] if first is None else [first, again]
-        return min(rows, key=lambda found: (float(np.mean(~found.used)), found.reduced))
+        if first is None or (runs > 1 and _poor(first)):
+            again = self.fit(self.one_by_one(runs), rough=True)
+            rows = [again] if first is None else [first, again]
+            first = min(rows, key=lambda found: (float(np.mean(~found.used)), found.reduced))
+        for margin in _GRAZING:
+            kept = [
+                replace(piece, start=start)
+                for piece, start, motion in zip(self.pieces, first.starts, first.fitted, strict=True)
+                if not _grazes(piece, motion, float(first.values[piece.which[_SHARED]]), margin)
+            ]
+            if not kept:
+                raise SolveError("every piece with contact grazes the support only: use more forcing, or a smaller gap")
+            try:
+                return replace(self, pieces=kept).fit(first.values), kept
+            except SolveError:
+                if margin == _GRAZING[-1]:
+                    raise
+        raise AssertionError
 
-    def fit(self, start: FloatArray) -> ShootingFit:
+    def by_turns(self, fit: ShootingFit, kept: list[Piece]) -> FloatArray:
+        """How far the parameters move when the crank's angle is known from every other turn only, to first order.
+
+        Between passages of the photogate a motor that wanders is not where a straight line has it. How far it is off
+        nobody sees, but how far a line over two turns is off.
+        """
+        problem = Problem(kept, self.steps, self.resolution)
+        state = problem.derivatives(fit.values, fit.starts)
+        weights = problem.weights(state, self.jitter)
+        coarse = replace(problem, pieces=[replace(p, phase=p.phase if p.coarse is None else p.coarse) for p in kept])
+        other = replace(state, residuals=coarse.residuals(fit.values, fit.starts).residuals)
+        p, prior = len(fit.values), _blocks(self.precision)
+        normal, right, _ = reduced(problem, other, weights, fit.used, p)
+        return np.asarray(np.linalg.solve(normal + prior, right - prior @ (fit.values - self.values)))
+
+    def fit(self, start: FloatArray, rough: bool = False) -> ShootingFit:
         """Fit all runs together from these parameters."""
-        return self._shoot(self.pieces, start, slice(None), self.precision)
+        return self._shoot(self.pieces, start, slice(None), self.precision, rough)
 
     def one_by_one(self, runs: int) -> FloatArray:
         """Start for the joint fit from fits of each run alone; what they share by its median."""
@@ -172,7 +212,7 @@ class _Joint:
             rows = np.r_[np.arange(_SHARED), np.arange(own.start, own.stop)]
             blocks = [*self.precision[:2], self.precision[2 + i]]
             try:
-                alone = self._shoot(pieces, self.values[rows], rows, blocks)
+                alone = self._shoot(pieces, self.values[rows], rows, blocks, True)
             except SolveError:
                 continue
             if not _poor(alone):
@@ -182,11 +222,22 @@ class _Joint:
             start[:_SHARED] = np.median(shared, axis=0)
         return start
 
-    def _shoot(self, pieces: list[Piece], start: FloatArray, rows: Any, blocks: list[FloatArray]) -> ShootingFit:
+    def _shoot(
+        self, pieces: list[Piece], start: FloatArray, rows: Any, blocks: list[FloatArray], rough: bool
+    ) -> ShootingFit:
         return shoot(
             pieces, start, self.steps[rows], resolution=self.resolution, known=self.values[rows],
-            precision=_blocks(blocks), jitter=self.jitter, outliers=6.0,
+            precision=_blocks(blocks), jitter=self.jitter, outliers=6.0, rough=rough,
         )  # fmt: skip
+
+
+def _grazes(piece: Piece, motion: FloatArray, gap: float, margin: float) -> bool:
+    """Whether the car turns within a margin of the gap."""
+    x, v = motion[:, 0], motion[:, 1]
+    i = np.flatnonzero(v[:-1] * v[1:] < 0)
+    slowing = (v[i + 1] - v[i]) / np.diff(piece.time)[i]
+    turned = x[i] - v[i] ** 2 / (2 * slowing)
+    return bool(np.any(np.abs(turned - gap) < margin))
 
 
 def _blocks(blocks: list[FloatArray]) -> FloatArray:
@@ -208,7 +259,8 @@ def _build(p: FloatArray) -> tuple[Any, Any, Any]:
 def _pieces(run: Run, which: Any, gap: float, rest: float, most: int) -> list[Piece]:
     """Pieces from one low turning point to the next, in each of which the car rises above the gap."""
     t, x = run.time, run.positions
-    phase = drive_phase(run.passages).phase(t)
+    drive = drive_phase(run.passages)
+    phase, coarse = drive.phase(t), drive.coarser.phase(t)
     low = _turning_points(x)
     found: list[Piece] = []
     # the screw's reading may be off by a millimetre: what rises above half of it is taken
@@ -227,7 +279,7 @@ def _pieces(run: Run, which: Any, gap: float, rest: float, most: int) -> list[Pi
         local = t[begin:end] - t[begin]
         found.append(
             Piece(local, x[begin:end], phase[begin:end], which, _build, start_state(local, x[begin:end]),
-                  label=run.name, origin=float(t[begin]))
+                  label=run.name, origin=float(t[begin]), coarse=coarse[begin:end])
         )  # fmt: skip
     if len(found) > most:
         keep = np.unique(np.linspace(0, len(found) - 1, most).round().astype(int))

@@ -35,6 +35,8 @@ class Piece:
         The run it comes from.
     origin : float
         Its first sample's time in that run (s): ``time`` begins at zero.
+    coarse : array (n,), optional
+        The crank's angle as every other turn of it tells it.
     """
 
     time: FloatArray
@@ -46,6 +48,7 @@ class Piece:
     touching: bool = False
     label: str = ""
     origin: float = 0.0
+    coarse: FloatArray | None = None
 
 
 def start_state(time: FloatArray, x: FloatArray, n: int = 7) -> FloatArray:
@@ -102,7 +105,7 @@ class Problem:
                 columns.append((both[0] - both[1]) / (2 * self.steps[index]))
             state.in_parameters.append(np.array(columns).T.reshape(len(piece.time), len(piece.which)))
             columns = []
-            for k, step in enumerate((1e-6, 1e-5)):
+            for k, step in enumerate((3e-8, 1e-7)):
                 ahead, behind = starts[i].copy(), starts[i].copy()
                 ahead[k] += step
                 behind[k] -= step

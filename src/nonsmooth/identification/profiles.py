@@ -12,6 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.errors import SolveError
+
 __all__ = ["Profile", "profile_likelihood", "profile_of"]
 
 FloatArray = NDArray[np.float64]
@@ -77,7 +79,10 @@ def profile_likelihood(
                     trial[others] = part
                     return residual(trial)
 
-                now[others] = least_squares(free, now[others], x_scale=sizes[others]).x
+                fitted = least_squares(free, now[others], x_scale=sizes[others])
+                if not fitted.success:
+                    raise SolveError(f"the fit with the parameter at {grid[i]:.6g} did not settle: {fitted.message}")
+                now[others] = fitted.x
             cost[i] = float(np.sum(residual(now) ** 2))
     least = min(float(cost.min()), float(np.sum(residual(best) ** 2)))
     return profile_of(grid, (cost - least) / scale, float(best[which]), level=level)

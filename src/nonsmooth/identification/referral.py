@@ -201,13 +201,13 @@ def refer(
     known[0, 0], known[1:, 1:] = counted.error**2, found.covariance
     covariance = rows @ known @ rows.T
     values = rows @ [counted.value, found.rest, found.alpha, found.beta]
-    estimates = [
+    gap, at_rest, by, place = (
         Estimate(float(value), float(np.sqrt(covariance[i, i])), "m") for i, value in enumerate(values)
-    ]
+    )
     with_counted = _cross(adjusted, ("kappa", "gamma"), contacts.covariance[3:5][:, counted.index] @ counted.weight)
     with_zero = _cross(adjusted, ("omega_0", "b", "f"), decay.covariance[:3, 3])
     cross = rows @ np.array([with_counted, *np.outer(found.by_zero, with_zero)])
-    return Referred(*estimates, covariance, cross, crank, reading, counted, found.notes)
+    return Referred(gap, at_rest, by, place, covariance, cross, crank, reading, counted, found.notes)
 
 
 def _cross(adjusted: Adjusted, labels: tuple[str, ...], shared: FloatArray) -> FloatArray:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from nonsmooth.errors import SolveError
 from nonsmooth.identification.nonlinear_mode import NonlinearMode, interpolation
 
 __all__ = ["FEWEST_CURVES", "ResponseFit"]
@@ -124,14 +125,23 @@ class ResponseFit:
             left = self._left(p)
             # Unknowns that the measurement determined: all but what the prior of the shifts did.
             freedom = max(rows - (count - float(prior @ np.diag(inverse))), 1.0)
-            before = (sigma, *spread)
+            before, moved = (sigma, *spread), 0.0
             # Points of a curve that err alike count less.
             sigma = max(float(np.sqrt(left @ left / freedom * self._alike(left))), 1e-9)
             if self.shifts:
                 own, own_error = p[first:].reshape(2, n), np.diag(inverse)[first:].reshape(2, n)
                 spread = np.sqrt(np.maximum(np.mean(own**2 + own_error, axis=1), 1e-18))
-            if k > 2 and np.allclose(before, (sigma, *spread), rtol=1e-2):
+                # by how much of what the points of a curve say of its shift: towards 0 the way is long
+                told = np.mean(np.maximum(np.diag(normal - np.diag(prior))[first:], 1e-300).reshape(2, n), axis=1)
+                change = np.abs(spread - before[1:])
+                moved = float(np.max(np.minimum(change / spread, change * np.sqrt(told))))
+            if k > 2 and moved < 1e-2 and abs(sigma / before[0] - 1) < 1e-2:
                 break
+        else:
+            raise SolveError(
+                f"the scatter of points and curves has not settled in {_ROUNDS} rounds: {before} and "
+                f"{(sigma, *spread)} in the last two; take fewer knots, or leave out a curve that stands apart"
+            )
         self.p, self.covariance, self.left = p, inverse, left
         self.sigma = float(np.sqrt(left @ left / freedom))
         self.spread = spread if self.shifts else np.array([np.nan, np.nan])
@@ -153,6 +163,11 @@ class ResponseFit:
             normal = np.einsum("ki,kj->ij", J, J) + np.diag(prior)
             slope = J.T @ (self._left(p) / sigma) + prior * p
             scale = np.sqrt(np.maximum(np.diag(normal), 1e-30))
+            inverse = np.linalg.pinv(normal / np.outer(scale, scale), hermitian=True)
+            # the undamped step in standard uncertainties: a damped one is short wherever it is taken
+            far = float(np.max(np.abs(inverse @ (slope / scale)) / np.sqrt(np.maximum(np.diag(inverse), 1e-300))))
+            if far < 1e-3:
+                return p, normal
             change = np.zeros_like(p)
             while damping < 1e12:
                 step = normal / np.outer(scale, scale) + damping * np.eye(len(p))
@@ -162,12 +177,15 @@ class ResponseFit:
                     break
                 damping *= 10.0
             else:
-                return p, normal
-            fall, p, now = now - then, p + change, then
+                if far < 0.05:  # no smaller sum of squares: rounding
+                    return p, normal
+                raise SolveError(
+                    f"the fit of the responses stops {far:.2g} standard uncertainties away from its minimum; take "
+                    "fewer knots"
+                )
+            p, now = p + change, then
             damping = max(0.1 * damping, 1e-12)
-            if fall <= 1e-10 * now or float(np.max(np.abs(change * scale))) < 1e-9:
-                break
-        return p, normal
+        raise SolveError("the fit of the responses has not converged in 200 steps; take fewer knots")
 
     def _start(self, count: int) -> FloatArray:
         """Natural frequencies by the tops of the curves; damping by the width of the lowest, the least bent of them."""

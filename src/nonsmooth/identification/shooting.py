@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.errors import SolveError
 from nonsmooth.identification.arrow import settle
 from nonsmooth.identification.pieces import Piece, Problem, State
 from nonsmooth.identification.sandwich import sandwich
@@ -27,6 +28,7 @@ from nonsmooth.identification.sandwich import sandwich
 __all__ = ["ShootingFit", "shoot"]
 
 FloatArray = NDArray[np.float64]
+_ROUNDS = 10  # of weights from residuals and residuals from weights
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +81,7 @@ def shoot(
     jitter: float | None = None,
     iterations: int = 40,
     outliers: float | None = None,
+    rough: bool = False,
 ) -> ShootingFit:
     """Fit common parameters and each piece's start.
 
@@ -99,6 +102,8 @@ def shoot(
     outliers : float, optional
         Leave out pieces whose reduced chi^2 exceeds this multiple of the median (a contact that was not seen, a
         hand that touched the car).
+    rough : bool
+        Only a start for another fit is wanted: it need not settle.
 
     Raises
     ------
@@ -114,8 +119,8 @@ def shoot(
     spread = 0.0 if jitter is None else jitter
     used = np.ones(len(pieces), dtype=bool)
     total = 0
-    for _ in range(4):  # weights from residuals, residuals from weights
-        theta, starts, state, count = settle(problem, theta, starts, spread, used, centre, prior, iterations)
+    for _ in range(_ROUNDS):  # weights from residuals, residuals from weights
+        theta, starts, state, count = settle(problem, theta, starts, spread, used, centre, prior, iterations, rough)
         total += count
         again = False
         if outliers is not None:
@@ -126,8 +131,13 @@ def shoot(
             wider = _jitter(state, used, resolution)
             again |= abs(wider - spread) > 0.05 * max(wider, spread)
             spread = wider
-        if not again:
+        if not again or rough:
             break
+    else:
+        raise SolveError(
+            f"weights and outliers of the fit over {len(pieces)} pieces have not settled in {_ROUNDS} rounds; look at "
+            "the residuals of the runs"
+        )
     found = sandwich(problem, theta, starts, spread, used, prior)
     return ShootingFit(
         theta, found.covariance, starts, found.state.residuals, found.state.fitted, resolution / np.sqrt(12), spread,
@@ -136,18 +146,22 @@ def shoot(
 
 
 def _jitter(state: State, used: Any, resolution: float) -> float:
-    """Standard deviation of the instants: the part of the squared residuals that grows with v^2 (median over bins)."""
+    """Standard deviation of the instants, from the part of the squared residuals that grows with v^2."""
+    from scipy.optimize import brentq
+
     r = np.concatenate([r for r, u in zip(state.residuals, used, strict=True) if u])
     v = np.concatenate([f[:, 1] for f, u in zip(state.fitted, used, strict=True) if u])
     v2, extra = v**2, r**2 - resolution**2 / 12
-    sigma2 = 0.0
-    for _ in range(20):  # maximum likelihood by scoring: Var(r^2) = 2 variance^2
-        weight = 1.0 / (resolution**2 / 12 + sigma2 * v2) ** 2
-        new = max(0.0, float(np.sum(weight * v2 * extra) / np.sum(weight * v2**2)))
-        if abs(new - sigma2) <= 1e-4 * new:
-            break
-        sigma2 = new
-    return float(np.sqrt(sigma2))
+
+    def score(sigma2: float) -> float:  # of the likelihood, with Var(r^2) = 2 variance^2
+        return float(np.sum(v2 * (extra - sigma2 * v2) / (resolution**2 / 12 + sigma2 * v2) ** 2))
+
+    if score(0.0) <= 0:
+        return 0.0
+    high = float(np.max(extra)) / float(np.mean(v2))
+    while score(high) > 0:
+        high *= 4
+    return float(np.sqrt(brentq(score, 0.0, high, rtol=1e-6)))
 
 
 def _worse(state: State, used: Any, limit: float) -> NDArray[np.bool_]:

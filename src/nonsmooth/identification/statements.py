@@ -29,7 +29,10 @@ def agreement(adjusted: Adjusted, evidence: Evidence) -> list[str]:
     """That the procedures agree, and which were not recorded."""
     notes = []
     if np.isfinite(adjusted.birge) and not disagreement(adjusted):
-        notes.append(f"the procedures agree: Birge ratio {adjusted.birge:.2f}")
+        notes.append(
+            f"the procedures agree: Birge ratio {adjusted.birge:.2f}, {adjusted.freedom} degree"
+            f"{'s' if adjusted.freedom > 1 else ''} of freedom"
+        )
     if lacking := [name for name in _NEEDED if name in evidence.missing]:
         notes.append(f"no recordings of: {', '.join(lacking)}")
     return notes
@@ -37,7 +40,7 @@ def agreement(adjusted: Adjusted, evidence: Evidence) -> list[str]:
 
 def disagreement(adjusted: Adjusted) -> str:
     """A sentence where the procedures disagree by more than chance, else an empty one."""
-    freedom = len(adjusted.labels) + ("gain" in adjusted.names) - len(adjusted.names)
+    freedom = adjusted.freedom
     if freedom < 1 or not np.isfinite(adjusted.birge) or birge_ratio(freedom * adjusted.birge**2, freedom)[1]:
         return ""
     name, pull = max(adjusted.pulls.items(), key=lambda row: abs(row[1]))
@@ -68,10 +71,10 @@ def identifiability(adjusted: Adjusted, contacts: ContactFit | None, single: Fin
     moved = "omega_0" in adjusted.labels
     said = {
         "m": "weighed; no recording tells it but through the force sensor, whose gain is known to a percent",
-        "k": "from omega_0 and m; the force sensor's slope agrees within its gain" if moved else
+        "k": "from omega_0 and m; the force sensor's slope tells its gain" if moved else
         "from the force sensor, whose gain is known to a percent only: taps of the car would tell it better",
         "c": "from the shape of the free decay, together with the dry friction: the rig's own viscous part",
-        "k_s": "from the frequency of the test mass and of contacts; the force sensor's slope within its gain",
+        "k_s": "from the frequency of the test mass and of contacts; the force sensor's slope but for its gain",
         "c_s": "from the decay of the drop; a contact lasts 8 samples at 100 Hz and c_s/k_s is 0.5 ms, so no sample "
         "shows it: a single contact tells it by the speed that it takes",
         "g": "from where contacts begin, referred to the mean position under the drive",

@@ -52,6 +52,43 @@ def test_subharmonics_count_parts_of_the_drive() -> None:
     assert found.omega == 5.0
 
 
+def test_errors_with_a_subharmonic_are_as_stated() -> None:
+    z: dict[str, list[float]] = {"omega": [], "amplitude": [], "phase": []}
+    rng = np.random.default_rng(3)
+    t = 2 + np.arange(1200) / 60
+    for _ in range(150):
+        w, phase = rng.uniform(7.3, 7.5), rng.uniform(0.5, 5.5)
+        x = np.cos(w / 3 * t - phase) + 0.3 * np.cos(w * t - 2) + rng.normal(0, 0.05, len(t))
+        found = fit(t, x, 7.4, 3, refine=True, subharmonic=3)
+        z["omega"].append((found.omega - w) / found.omega_error)
+        z["amplitude"] += list((found.amplitudes[[0, 2]] - [1.0, 0.3]) / found.amplitude_errors[[0, 2]])
+        z["phase"] += list((found.phases[[0, 2]] - [phase, 2.0]) / found.phase_errors[[0, 2]])
+    assert all(0.85 < rms(np.array(v)) < 1.15 for v in z.values()), {k: rms(np.array(v)) for k, v in z.items()}
+
+
+def test_a_line_in_noise_has_the_least_error_that_is_possible() -> None:
+    # Rife and Boorstyn: var(omega) = 24 s^2 / (A^2 N T^2) for a long record
+    t = np.arange(2000) / 100
+    x = np.cos(5.0 * t - 1.0) + np.random.default_rng(0).normal(0, 0.1, len(t))
+    found = fit(t, x, 5.0, 1, refine=True)
+    assert found.omega_error == pytest.approx(np.sqrt(24 / 2000) * 0.1 / 20, rel=0.1)
+    assert found.mean_error == pytest.approx(0.1 / np.sqrt(2000), rel=0.1)
+
+
+@pytest.mark.parametrize("told", [True, False])
+def test_errors_of_extremes_are_as_stated(told: bool) -> None:
+    rng, z_time, z_value = np.random.default_rng(5), [], []
+    for _ in range(25):
+        w, phase, count = rng.uniform(2.9, 3.1), rng.uniform(0, 6), 2e-3
+        t = np.arange(2500) / 100
+        x = np.cos(w * t - phase) + (0 if told else rng.normal(0, count, len(t)))
+        found = extremes(t, np.round(x / count) * count if told else x, resolution=count if told else None)
+        turns = np.rint((w * found.time - phase) / np.pi)
+        z_time += list((found.time - (turns * np.pi + phase) / w) / found.time_error)
+        z_value += list((found.value - found.kind) / found.value_error)
+    assert 0.5 < rms(np.array(z_time)) < 1.3 and 0.5 < rms(np.array(z_value)) < 1.3
+
+
 def test_refused_fits() -> None:
     t = np.arange(100) / 100
     with pytest.raises(ValueError, match="lasts 0.99 s, less than one period of 1.257 s"):

@@ -45,6 +45,17 @@ def test_soft_contacts_of_the_exact_model(g: float, rho: float, omega: float, to
     assert float(found.stiffness) == pytest.approx(TABLE_1["k_s"] / TABLE_1["m"], rel=0.02)
 
 
+def test_the_gaps_error_is_neither_too_small_nor_too_large() -> None:
+    t, x, _, _ = driven(0.0018, 0.33, 11.15)
+    rng, z = np.random.default_rng(0), []
+    for _ in range(5):  # where the encoder's counts lie, and where the record begins
+        shift, begin = rng.uniform(0, COUNT), int(rng.integers(0, 800))
+        counts = np.round((x[begin:] + shift) / COUNT) * COUNT
+        found = contacts(t[begin:], counts, resolution=COUNT, omega=11.15)
+        z.append((float(found.gap) - shift - 0.0018) / float(found.gap_error))
+    assert 0.4 < rms(np.array(z)) < 1.7
+
+
 def test_a_given_gap_is_taken() -> None:
     t, x, begin, _ = driven(-0.0045, 0.45, 3.69)
     found = contacts(t, np.round(x / COUNT) * COUNT, resolution=COUNT, gap=-0.0045)

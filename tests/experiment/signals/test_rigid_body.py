@@ -86,6 +86,27 @@ def test_a_ball_needs_its_height_only() -> None:
     np.testing.assert_allclose(found.impact_time, times[1 : 1 + found.sizes["impact"]], atol=1e-7)
 
 
+def test_errors_of_a_balls_restitution_are_as_stated() -> None:
+    z, z_speed, z_fall, rng = [], [], [], np.random.default_rng(0)
+    for _ in range(120):
+        v, e, g = rng.uniform(2.5, 3.5), rng.uniform(0.4, 0.9), 9.81
+        when = 0.2 + rng.uniform(0, 0.01)
+        t = np.arange(45) / 100
+        s = t - when
+        z0 = np.where(s < 0, -v * s, e * v * s) - g / 2 * s**2 + rng.normal(0, 3e-5, len(t))
+        free = flights(t, z0)
+        if free.sizes["flight"] != 2:
+            continue
+        z_fall.append((float(free.acceleration) + g) / float(free.acceleration_error))
+        one = restitution(t, z0, free).isel(impact=0)
+        z.append((float(one.restitution) - e) / float(one.restitution_error))
+        # before and after are those at the instant of the impact, which is a sample long
+        z_speed.append((float(one.v_after) - e * v) / float(one.v_after_error))
+    assert len(z) > 80
+    for values in (z, z_speed, z_fall):
+        assert 0.7 < np.sqrt(np.mean(np.square(values))) < 1.4
+
+
 def test_doors() -> None:
     t, place, q, _, _ = tossed(1, 0.0)
     with pytest.raises(ValueError, match="no stretch of at least 4 samples falls freely"):

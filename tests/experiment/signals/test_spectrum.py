@@ -72,6 +72,23 @@ def test_amplitude_phase_and_power_of_a_line() -> None:
     assert float(white.density.mean()) * RATE / 2 == pytest.approx(0.09, rel=0.02)
 
 
+@pytest.mark.parametrize("n", [256, 257])
+@pytest.mark.parametrize("padding", [1, 2, 3])
+def test_the_density_is_that_of_scipy_up_to_half_the_sample_rate(n: int, padding: int) -> None:
+    from scipy.signal import periodogram
+
+    x = np.random.default_rng(n).normal(size=n)
+    frequency, density = periodogram(x, RATE, window="hann", nfft=n * padding, detrend="constant")
+    lines = spectrum(x, RATE, padding=padding)
+    np.testing.assert_allclose(lines.frequency, frequency, rtol=1e-12)
+    np.testing.assert_allclose(lines.density, density, rtol=1e-10, atol=1e-18)
+
+
+def test_a_signal_at_half_the_sample_rate_has_its_amplitude() -> None:
+    x = 0.3 * (-1.0) ** np.arange(64)
+    assert float(spectrum(x, RATE, window="boxcar").amplitude[-1]) == pytest.approx(0.3, rel=1e-12)
+
+
 def test_rate_from_the_signals_own_times() -> None:
     t = np.arange(400) / 50
     x = xr.DataArray(np.cos(2 * np.pi * 2 * t), {"time": t}, ("time",), name="Angle", attrs={"units": "rad"})

@@ -11,9 +11,9 @@ Car between two springs on strings, one of them driven by a crank; a support wit
     \varphi = \theta + \epsilon \sin(\theta + \beta), \quad
     \theta = \omega t + \sum_j a_j \sin(\nu_j t + \beta_j)
 
-The motor is on the support's side (s = 1) or on the other (s = -1); the slow terms of :math:`\theta` are those of a motor
-that wanders. Friction lets the car creep to where the springs balance, at about v_s; on request it holds: v_s is then
-0.1 µm/s, and a car that stops stays, within F_C/2k of that place, for as long as anything is recorded.
+The motor is on the support's side (s = 1) or on the other (s = -1); the slow terms of :math:`\theta` are those of a
+motor that wanders. Friction lets the car creep to where the springs balance, at about v_s; on request it holds: v_s is
+then 0.1 µm/s, and a car that stops stays, within F_C/2k of that place, for as long as anything is recorded.
 
 A string cannot push: a tension that would be negative is zero. In contact :math:`y = x - g` and
 :math:`f = -(k_s y + c_s v)`; contact ends where f vanishes, and then :math:`k_s y + c_s \dot y = 0`. The driven end
@@ -209,7 +209,8 @@ def _car(relaxing: bool, rising: bool, wandering: bool, side: int) -> System:
     }  # fmt: skip
     parameters |= {"crank_rate": (0.0, "m/s")} if rising else {"crank_length": (0.0165, "m")}
     for j in range(1, WANDERING + 1) if wandering else ():
-        parameters |= {f"wander_{j}": (0.0, "rad"), f"wander_rate_{j}": (1.0, "rad/s"), f"wander_phase_{j}": (0.0, "rad")}
+        parameters |= {f"wander_{j}": (0.0, "rad"), f"wander_phase_{j}": (0.0, "rad")}
+        parameters |= {f"wander_rate_{j}": (1.0, "rad/s")}
     states = {"x": "m", "v": "m/s"} | ({"y": "m"} if relaxing else {}) | ({"a": "m"} if rising else {})
     return System(
         name="virtual rig",

@@ -84,7 +84,8 @@ def force(
     rig: VirtualRig, rng: np.random.Generator, run: str, time: FloatArray, pulled: FloatArray
 ) -> xr.Dataset:
     """The channel ``Force`` (N) of a sensor that is pulled with the force ``pulled``; saturation is a warning."""
-    reading = rig.truth["force_sign"] * rig.truth["force_gain"] * pulled + rig.truth["force_noise"] * rng.standard_normal(len(pulled))
+    reading = rig.truth["force_gain"] * pulled + rig.truth["force_noise"] * rng.standard_normal(len(pulled))
+    reading = rig.truth["force_sign"] * reading
     if rig.quantisation:
         reading = FORCE_STEP * np.rint(reading / FORCE_STEP)
     beyond = int(np.count_nonzero(np.abs(reading) > FORCE_RANGE))

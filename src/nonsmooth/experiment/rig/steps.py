@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from nonsmooth.errors import SolveError
 from nonsmooth.experiment.rig.driven import Setting, records
 from nonsmooth.experiment.rig.motor import frequency, mean_position, voltage_for
 from nonsmooth.experiment.rig.truth import NOMINAL_GAP
@@ -70,10 +71,15 @@ def graze_frequency(rig: VirtualRig, crank_length: float, gap: float) -> float:
     room = rig.true_gap(gap) - mean_position(rig, crank_length)
     dry = 4 / np.pi * p.friction
     omega = 2.0 * np.sqrt(2 * p.k / p.m)
-    for _ in range(50):
+    for _ in range(200):
         along = np.sqrt(max((p.k * crank_length) ** 2 - (dry + p.c * omega * room) ** 2, 0.0))
-        omega = np.sqrt((2 * p.k + along / room) / p.m)
-    return float(omega)
+        before, omega = omega, np.sqrt((2 * p.k + along / room) / p.m)
+        if abs(omega - before) < 1e-9 * omega:
+            return float(omega)
+    raise SolveError(
+        f"no frequency above resonance at which a crank of {crank_length:g} m reaches a gap of {room:g} m was found; "
+        "use a longer crank or a smaller gap"
+    )
 
 
 def contact(

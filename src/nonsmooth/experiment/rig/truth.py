@@ -44,6 +44,7 @@ FEATURES: Mapping[str, Mapping[str, float]] = MappingProxyType({
 #: Creep velocity (m/s) of a friction that holds: 2 µm in a record of 20 s, a thirtieth of a count.
 HOLDING = 1e-7
 
+_NOT_NEGATIVE = ("c", "friction", "ripple", "force_noise", "clock_jitter", "force_gain", "slipped_tap")
 _SPREAD = 0.2  # around Table 1
 
 
@@ -124,12 +125,12 @@ def _check(truth: Mapping[str, float]) -> None:
             raise ValueError(f"truth[{name!r}] = {value!r} must be finite")
         if name in positive and value <= 0:
             raise ValueError(f"truth[{name!r}] = {value!r} must be positive")
-        if name in ("c", "friction", "ripple", "force_noise", "clock_jitter", "force_gain", "slipped_tap") and value < 0:
+        if name in _NOT_NEGATIVE and value < 0:
             raise ValueError(f"truth[{name!r}] = {value!r} must not be negative")
         if name in ("motor_side", "angle_sign", "force_sign", "turn_sign") and abs(value) != 1:
             raise ValueError(f"truth[{name!r}] = {value!r} must be 1 or -1")
     if not 0 <= truth["motor_wander"] <= 0.05:
-        raise ValueError(f"truth['motor_wander'] = {truth['motor_wander']!r} must lie between 0 and 0.05 of the frequency")
+        raise ValueError(f"truth['motor_wander'] = {truth['motor_wander']!r} must lie between 0 and 0.05 (relative)")
     if truth["ripple"] >= 1:
         raise ValueError(f"truth['ripple'] = {truth['ripple']!r}: from 1 on the motor would turn back")
 

@@ -120,7 +120,7 @@ class VirtualRig:
         return self.truth["motor_wander"] > 0
 
     def wander(self, procedure: str, run: int, omega: float) -> Wander:
-        """The slow terms of the motor's angle in one run: periods of 2 to 60 s, equal parts of the frequency's variance."""
+        """The slow terms of the motor's angle in one run: periods of 2 to 60 s, the same part of the variance each."""
         if not self.wanders:
             return ()
         rng = np.random.default_rng([self.seed, 2, list(PROCEDURES).index(procedure), run])
@@ -265,7 +265,7 @@ class VirtualRig:
 
     def write_session(
         self, folder: str | os.PathLike[str], procedures: Sequence[str] | None = None, *,
-        truth: str | os.PathLike[str] | None = None,
+        truth: str | os.PathLike[str] | None = None, options: Mapping[str, Mapping[str, Any]] | None = None,
     ) -> Path:  # fmt: skip
         """Record and write a session folder; the truth goes to a file beside it, ``<folder>.truth.toml``.
 
@@ -277,6 +277,8 @@ class VirtualRig:
             Default: those that identification needs (``IDENTIFICATION``), without ``rise`` and ``section``.
         truth : path, optional
             Where the truth goes; never into the folder.
+        options : mapping, optional
+            Options of procedures, as ``{"impulse": {"velocities": (0.5, -0.5)}}``.
 
         Returns
         -------
@@ -284,7 +286,11 @@ class VirtualRig:
             The folder.
         """
         names = IDENTIFICATION if procedures is None else tuple(procedures)
-        return self._write(folder, {name: self.record(name) for name in names}, truth, f"virtual rig, seed {self.seed}")
+        chosen = options or {}
+        if strange := [name for name in chosen if name not in names]:
+            raise ValueError(f"options of {', '.join(strange)}: not recorded here; there are {', '.join(names)}")
+        made = {name: self.record(name, **chosen.get(name, {})) for name in names}
+        return self._write(folder, made, truth, f"virtual rig, seed {self.seed}")
 
     def write_figure(
         self, number: int, folder: str | os.PathLike[str], *, truth: str | os.PathLike[str] | None = None,

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from nonsmooth.errors import SolveError
 from nonsmooth.experiment.signals.checks import signal
 from nonsmooth.experiment.signals.smoothing import smooth
 
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["contacts"]
+
+_UNDECIDED = 0.01  # of the samples: at the edge of contact, of which none is used for the support
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -132,9 +135,15 @@ def _beside_the_free_motion(found: xr.Dataset, omega: float | None, free: Mask) 
         spread = 1.4826 * float(np.median(np.abs(left[free] - np.median(left[free]))))
         level = max(4.0 * spread, 3.0 * float(np.median(found["a_error"].values)))
         again = left > -level
-        if (again == free).all():
+        changed, free = int(np.count_nonzero(again != free)), again
+        if not changed:
             break
-        free = again
+    else:
+        if changed > _UNDECIDED * len(free):
+            raise SolveError(
+                f"which samples are free of the support cannot be told: {changed} of {len(free)} change sides from "
+                "round to round; give the gap, or the drive's frequency"
+            )
     return left, free
 
 

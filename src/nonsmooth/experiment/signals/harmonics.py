@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from nonsmooth.errors import SolveError
 from nonsmooth.experiment.signals.checks import signal, whose
 
 if TYPE_CHECKING:
@@ -203,6 +204,12 @@ def _best(tau: Floats, values: Floats, omega: float, n: int, length: float) -> f
         best += step
         if abs(step) < 1e-13 * omega:
             break
+    else:
+        if abs(step) > 1e-6 * math.pi / length:
+            raise SolveError(
+                f"no frequency near {omega:.6g} rad/s fits best: the search still moves by {abs(step):.2g} rad/s after "
+                "20 steps; give one that is nearer, or a longer record"
+            )
     return best
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from nonsmooth.errors import SolveError
 from nonsmooth.experiment.signals.checks import signal, whose
 from nonsmooth.experiment.signals.smoothing import smooth
 
@@ -131,7 +132,9 @@ def _kink(t: Floats, x: Floats, i: int, low: int, high: int, variance: float) ->
     values = [squares(tau) for tau in grid]
     k = int(np.argmin(values))
     bounds = (grid[max(k - 1, 0)], grid[min(k + 1, 4)])
-    found = minimize_scalar(squares, bounds=bounds, method="bounded", options={"xatol": 1e-3 * h, "maxiter": 12})
+    found = minimize_scalar(squares, bounds=bounds, method="bounded", options={"xatol": 1e-3 * h, "maxiter": 40})
+    if not found.success:
+        raise SolveError(f"the instant of a kink near t = {t[i]:.6g} s was not found: {found.message}")
     tau = float(np.clip(found.x, 1e-3 * h, 0.999 * h))
     step = 0.1 * h
     bend = (squares(tau + step) - 2 * squares(tau) + squares(tau - step)) / step**2

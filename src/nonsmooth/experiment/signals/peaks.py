@@ -110,14 +110,13 @@ def _vertex(
     p, *_ = np.linalg.lstsq(A, x, rcond=None)
     slope = p[1:] * np.arange(1, order + 1)
     bend = slope[1:] * np.arange(1, order)
-    place = 0.0
-    for _ in range(20):
-        curvature = float(np.polynomial.polynomial.polyval(place, bend))
-        if sign * curvature >= 0:
-            return None  # the samples bend the other way: no extreme here
-        place = float(np.clip(place - np.polynomial.polynomial.polyval(place, slope) / curvature, -1.0, 1.0))
-    if abs(place) >= 1.0:
-        return None
+    roots = np.roots(slope[::-1])
+    level = np.real(roots[np.abs(np.imag(roots)) < 1e-9 * np.maximum(np.abs(roots), 1.0)])
+    turns = level[(np.abs(level) < 1.0) & (sign * np.polynomial.polynomial.polyval(level, bend) < 0)]
+    if len(turns) == 0:
+        return None  # the samples bend the other way, or rise from end to end: no extreme here
+    place = float(turns[np.argmin(np.abs(turns))])
+    curvature = float(np.polynomial.polynomial.polyval(place, bend))
     left = x - A @ p
     variance = float(left @ left) / max(len(t) - order - 1, 1)
     if resolution is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -61,6 +61,23 @@ class DrivePhase:
         before = TURN * self.turns[0] + self.omega * (t - self.turn_times[0])
         after = TURN * self.turns[-1] + self.omega * (t - self.turn_times[-1])
         return np.where(t < self.turn_times[0], before, np.where(t > self.turn_times[-1], after, inside))
+
+    @property
+    def coarser(self) -> DrivePhase:
+        """The same drive known from every other turn only: how far its phase differs is what a turn may hide."""
+        return replace(self, turn_times=self.turn_times[::2], turns=self.turns[::2])
+
+    def wander(self, resolution: float = 1e-4) -> tuple[float, bool]:
+        """Relative standard deviation of the frequency from turn to turn, and whether chance explains it.
+
+        The part that a gate of this ``resolution`` (s) makes is taken out. What repeats with every turn does not show.
+        """
+        from scipy.stats import chi2
+
+        steps = np.diff(self.turn_times) / np.diff(self.turns)
+        seen, gate = float(np.var(steps, ddof=1)), resolution**2 / 6
+        steady = bool(chi2.sf(seen / gate * (len(steps) - 1), len(steps) - 1) > 1e-4)
+        return float(np.sqrt(max(seen - gate, 0.0)) / np.mean(steps)), steady
 
     def times(self, phase: float = 0.0) -> Floats:
         """The instants within ``span`` at which the phase is ``phase`` (in turns, 0 to 1) plus a whole number."""

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from nonsmooth.errors import SolveError
 from nonsmooth.experiment.signals.checks import signal, whose
 from nonsmooth.experiment.signals.savitzky_golay import savitzky_golay
 
@@ -230,8 +231,13 @@ class _Nodes:
         start = np.array([[one, one], [one - 1.0, one], [one, one + 1.0]])
         both = minimize(
             lambda g: self.cost(10.0 ** np.clip(g, low, high)), start[0], method="Nelder-Mead",
-            options={"initial_simplex": start, "xatol": 0.02, "fatol": 0.02, "maxfev": 120},
+            options={"initial_simplex": start, "xatol": 0.02, "fatol": 0.02, "maxfev": 400},
         )  # fmt: skip
+        if not both.success:
+            raise SolveError(
+                "the intensities of the motion outside and inside of contacts were not found in 400 evaluations; give "
+                "intensity=(outside, inside)"
+            )
         return np.asarray(10.0 ** np.clip(both.x, low, high))
 
     def result(self, q: Floats, model: str, x: Any) -> xr.Dataset:

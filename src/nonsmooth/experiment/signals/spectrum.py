@@ -123,8 +123,9 @@ def spectrum(
     frequency = fft.rfftfreq(n * padding, 1.0 / rate)
     amplitude = 2.0 * np.abs(lines) / weights.sum()
     density = 2.0 * np.abs(lines) ** 2 / (rate * float(weights @ weights))
-    for one_sided in (amplitude[:1], density[:1]):  # the line at 0 has no mirror image
-        one_sided *= 0.5
+    alone = [0] if n * padding % 2 else [0, -1]  # the lines at 0 and at half the sample rate have no mirror image
+    for one_sided in (amplitude, density):
+        one_sided[alone] *= 0.5
     unit = str(getattr(x, "attrs", {}).get("units", ""))
     name = window if isinstance(window, str) else repr(window)
     return xr.Dataset(

@@ -7,6 +7,6 @@ from nonsmooth.identification.compare.reference import GapOffset, GapReference, 
 from nonsmooth.identification.compare.series import measured_response, measured_rise, measured_sections
 
 __all__ = [
-    "GapOffset", "GapReference", "compare", "gap_offset", "gap_reference", "measured_motion", "measured_response", "measured_rise",
-    "measured_sections", "session_measurement",
+    "GapOffset", "GapReference", "compare", "gap_offset", "gap_reference", "measured_motion", "measured_response",
+    "measured_rise", "measured_sections", "session_measurement",
 ]  # fmt: skip

@@ -25,6 +25,7 @@ def measured_motion(
     distance_per_turn: float,
     counts_per_turn: int = 1440,
     zero: float = 0.0,
+    mark: float = 0.0,
     support: bool = True,
     angle: str = "Angle",
     turn: str = "Turn",
@@ -46,6 +47,8 @@ def measured_motion(
     zero : float
         Position (m) that becomes x = 0: the car's mean position under the drive. A string of length L lets it move by
         :math:`a^2 / (8 L)` from where it rested, and the model knows nothing of this.
+    mark : float
+        The crank's angle (rad) at which the photogate sees it; 0 where it pulls the car towards the support.
     support : bool
         Whether the support was mounted.
     angle, turn : str
@@ -87,7 +90,7 @@ def measured_motion(
         {
             "u": (("time", "state"), u, {"long_name": "measured state"}),
             "u_error": (("time", "state"), error, {"long_name": "standard error of the measured state"}),
-            "phase": ("time", drive.phase(time[inside]) / (2 * np.pi), {
+            "phase": ("time", (drive.phase(time[inside]) + mark % (2 * np.pi)) / (2 * np.pi), {
                 "long_name": "phase of the drive", "units": "forcing periods"}),
         },
         {

@@ -91,7 +91,7 @@ def session_measurement(
     motions = [
         measured_motion(
             item.recording, item.run, distance_per_turn=travel,
-            counts_per_turn=counts, zero=shift, support="gap" in item.settings,
+            counts_per_turn=counts, zero=shift, mark=reference.mark, support="gap" in item.settings,
         )
         for item in chosen
     ]  # fmt: skip

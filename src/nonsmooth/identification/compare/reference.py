@@ -54,14 +54,17 @@ class GapReference:
         What the gap at rest is more than the screw reads.
     direction : int
         -1 where the sensor counts away from the support.
+    mark : float
+        The crank's angle (rad) at the photogate, from where it pulls towards the support; 0 where it is near that.
     taps : bool
         Whether taps told the place of rest.
     notes : tuple of str
     """
 
     places: MeanShift | None = None
-    offset: GapOffset = GapOffset(0.0, 0.0)
+    offset: GapOffset = field(default_factory=lambda: GapOffset(0.0, 0.0))
     direction: int = 1
+    mark: float = 0.0
     taps: bool = False
     notes: tuple[str, ...] = field(default=())
 
@@ -117,7 +120,7 @@ def gap_reference(
     from nonsmooth.experiment.recording import RecordingWarning
     from nonsmooth.identification.evidence import gather
     from nonsmooth.identification.free_decay import free_decay
-    from nonsmooth.identification.referral import places
+    from nonsmooth.identification.referral import mark_of, places
     from nonsmooth.identification.steady import steady
 
     given = _offset(offset)
@@ -128,12 +131,17 @@ def gap_reference(
     decay = None
     if taps := evidence.runs.get("impulse", ()):
         decay = free_decay(
-            [(run.time, run.positions) for run in taps], resolution=evidence.resolution, names=[run.name for run in taps]
-        )
+            [(run.time, run.positions) for run in taps], resolution=evidence.resolution,
+            names=[run.name for run in taps],
+        )  # fmt: skip
         notes += [f"impulse: {note}" for note in decay.notes]
     free = [run for run in evidence.runs.get("response", ()) if "gap" not in run.settings]
-    found = places(evidence, decay, steady(free), held=given.held)
-    if decay is None:
+    seen, mark = steady(free), 0.0
+    found = places(evidence, decay, seen, held=given.held)
+    if decay is not None:
+        mark, said = mark_of(seen, decay)
+        notes += [said] if said else []
+    else:
         notes.append(
             f"no taps of the car (impulse) in {session.folder}: where it rests is taken from the sensor's zero, to "
             f"±{1e3 * float(np.sqrt(found.covariance[0, 0])):.2g} mm, since a car with dry friction is zeroed where it "
@@ -142,7 +150,7 @@ def gap_reference(
     notes += found.notes
     for note in notes:
         warnings.warn(note, RecordingWarning, stacklevel=3)
-    return GapReference(found, given, evidence.direction, decay is not None, tuple(notes))
+    return GapReference(found, given, evidence.direction, mark, decay is not None, tuple(notes))
 
 
 def _offset(given: float | Sequence[float] | GapOffset) -> GapOffset:

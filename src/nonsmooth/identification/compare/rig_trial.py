@@ -169,12 +169,12 @@ class RigTrial:
         reference = gap_reference(session, offset=self.reading)
         runs = session.recordings("section")
         k = self.identified["k"]
-        travel = session.apparatus["distance_per_turn"].value
+        travel = reference.direction * session.apparatus["distance_per_turn"].value
         lengths = [float(item.settings["crank_length"]) for item in runs]
         with _quiet():
             motions = [
                 measured_motion(
-                    item.recording, item.run, distance_per_turn=reference.direction * travel, zero=reference.mean(a)[0]
+                    item.recording, item.run, distance_per_turn=travel, zero=reference.mean(a)[0], mark=reference.mark
                 )
                 for item, a in zip(runs, lengths, strict=True)
             ]

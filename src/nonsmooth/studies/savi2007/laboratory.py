@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from nonsmooth.experiment.recording import Recording
     from nonsmooth.experiment.rig import VirtualRig
     from nonsmooth.experiment.session import Session
+    from nonsmooth.identification.compare import GapOffset
     from nonsmooth.identification.parameter_set import ParameterSet
     from nonsmooth.system.system import System
 
