@@ -75,8 +75,8 @@ def settle(
             shrunk = full / np.outer(scale, scale)
             if not np.isfinite(shrunk).all():
                 raise SolveError(
-                    f"the motion of this fit over {len(problem.pieces)} pieces grows without bound: its records are not "
-                    "of the motion that they are taken for"
+                    f"the motion of this fit over {len(problem.pieces)} pieces grows without bound: its records "
+                    "are not of the motion that they are taken for"
                 )
             if np.linalg.cond(shrunk) > 1e13:
                 raise SolveError("the records do not determine all parameters of this fit; give one its value")

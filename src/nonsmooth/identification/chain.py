@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,6 +17,7 @@ from nonsmooth.experiment.recording import RecordingWarning
 from nonsmooth.experiment.session import Quantity, Session
 from nonsmooth.experiment.signals.phase import drive_phase
 from nonsmooth.identification.adjustment import Adjusted, Observation, adjust
+from nonsmooth.identification.blas import one_blas_thread
 from nonsmooth.identification.calibrations import crank_force, voltage_frequency
 from nonsmooth.identification.contact_findings import contact_finding, one_contact
 from nonsmooth.identification.cross_checks import cross_checks, sentences
@@ -46,6 +48,7 @@ _FOUND_BY = {"impulse": ("omega_0", "c_decay"), "drop": ("c_s_drop",), "springs"
              "support": ("support_slope",)}  # fmt: skip
 
 
+@one_blas_thread()
 def identify(
     recordings: Session | str | os.PathLike[str] | Mapping[str, Any],
     model: Any = None,
@@ -124,6 +127,17 @@ def identify(
         synthetic=chain.evidence.synthetic,
     )  # fmt: skip
     return found if model is None else for_model(found, model)
+
+
+@contextmanager
+def _of(procedure: str) -> Iterator[None]:
+    """Put the procedure before the message of what goes wrong in its fit, and what to look at behind it."""
+    try:
+        yield
+    except (ValueError, SolveError) as error:
+        raise type(error)(
+            f"{procedure}: {error}. Are these the recordings of {procedure!r}, each one tap with its free decay?"
+        ) from error
 
 
 @dataclass(eq=False)
@@ -242,9 +256,10 @@ class _Chain:
         runs, resolution = self.runs("impulse"), self.evidence.resolution
         if not runs:
             return None
-        decay = free_decay(
-            [(run.time, run.positions) for run in runs], resolution=resolution, names=[run.name for run in runs]
-        )
+        with _of("impulse"):
+            decay = free_decay(
+                [(run.time, run.positions) for run in runs], resolution=resolution, names=[run.name for run in runs]
+            )
         self.left_out("impulse", decay)
         self.observe(("omega_0", "b", "f"), decay.values[:3], decay.covariance[:3, :3], "free decay")
         self.beside("natural frequency (Fig. 5)", lambda: natural_frequency(runs, decay))
@@ -288,7 +303,8 @@ class _Chain:
         if not runs:
             return
         mass = self.evidence.quantity("test_mass")
-        found, decay = support_damping(runs, resolution=self.evidence.resolution, test_mass=mass)
+        with _of("drop"):
+            found, decay = support_damping(runs, resolution=self.evidence.resolution, test_mass=mass)
         self.left_out("drop", decay)
         self.findings.append(found)
         self.observations.append(self.weighed("test_mass"))
