@@ -12,7 +12,8 @@ export OPENBLAS_NUM_THREADS ?= 1
 PYTEST_ARGS ?= -n auto --dist loadfile --no-loadscope-reorder
 
 .DEFAULT_GOAL := help
-.PHONY: help reproduce reproduce-full test slow fuzz coverage coverage-awkward rig-against-model check bench gpu gpu-compiler docs clean \
+.PHONY: help reproduce reproduce-full test slow mutants fuzz coverage coverage-awkward rig-against-model check bench gpu \
+	gpu-compiler docs clean \
 	distclean
 
 help:  ## list the targets
@@ -29,6 +30,9 @@ test: $(VENV)/.installed-test  ## run the tests
 
 slow: $(VENV)/.installed-test $(VENV)/.installed-cluster  ## run the long campaigns that `make test` leaves out
 	$(BIN)/python -m pytest -m slow -s
+
+mutants: $(VENV)/.installed-test  ## small mistakes in the sources, one by one: each must fail a test
+	$(BIN)/python tests/mutants.py
 
 fuzz: $(VENV)/.installed-test  ## read 100 000 damaged recordings with every reader
 	$(BIN)/python -m pytest -m slow tests/experiment/test_fuzz.py -s

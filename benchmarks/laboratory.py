@@ -1,8 +1,8 @@
 """Processor time of ``identify`` and ``compare`` of a session of a virtual rig: ``python -m benchmarks.laboratory``.
 
-``--session FOLDER`` takes a session at hand in place of a fresh one. Each command runs in a process of its own, whose user
-and system time is printed: it depends less on other work on the machine than the time by the clock. The first run of an
-empty cache also compiles: run it twice.
+``--session FOLDER`` takes a session at hand in place of a fresh one. Each command runs in a process of its own, whose
+user and system time is printed: it depends less on other work on the machine than the time by the clock. The first run
+of an empty cache also compiles: run it twice.
 """
 
 from __future__ import annotations

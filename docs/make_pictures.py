@@ -1,14 +1,17 @@
 """Draw the pictures of the documentation: one per example, and some from a page's own code.
 
 Run it from anywhere: ``python docs/make_pictures.py``, with names of pictures for some of them only. It takes some ten
-seconds (longer the first time) and writes ``docs/pictures/*.png``, which are kept with the source so that the pages can
-be built without computing anything. Examples of measured data need the environment variable NONSMOOTH_DATA; without it
-their pictures stay as they are.
+seconds (longer the first time; minutes for ``comparison_section``, which measures and identifies a virtual rig) and
+writes ``docs/pictures/*.png``, which are kept with the source so that the pages can be built without computing
+anything. Examples of measured data need the environment variable NONSMOOTH_DATA; without it their pictures stay as they
+are. Two pictures belong to scripts that measure: ``effect_of_eta`` to ``docs/measure_methods.py``, ``chart_cost`` to
+``benchmarks/chart_size.py``.
 """
 
 from __future__ import annotations
 
 import contextlib
+import io
 import os
 import re
 import runpy
@@ -23,15 +26,42 @@ from nonsmooth import plot
 
 DOCS = Path(__file__).resolve().parent
 PICTURES = DOCS / "pictures"
-DPI = 170
+PIXELS = 1400  # wide: twice what a page shows, for screens of two pixels per point
+INCHES = 5.2  # a figure of one column is drawn this wide, its letters as they are
 
 
 def keep(drawn: Any, name: str) -> None:
     """Save a figure (or the figure of some axes) as docs/pictures/NAME.png, without date or program in it."""
+    from PIL import Image
+
     figure = getattr(drawn, "figure", drawn)
+    width, height = figure.get_size_inches()
+    grown = max(1.0, INCHES / width)
+    figure.set_size_inches(grown * width, grown * height)
+    drawing = io.BytesIO()
     with plot.journal():
-        figure.savefig(PICTURES / f"{name}.png", dpi=DPI, metadata={"Software": None})
-    print(f"{name}.png: {(PICTURES / f'{name}.png').stat().st_size // 1024} kB")
+        figure.savefig(drawing, format="png", dpi=PIXELS / (grown * width))
+    target = PICTURES / f"{name}.png"
+    # A palette of 256 colours shows the same in a third of the bytes.
+    Image.open(drawing).convert("RGB").quantize(256, dither=Image.Dither.NONE).save(target, optimize=True)
+    print(f"{name}.png: {target.stat().st_size // 1024} kB")
+
+
+def comparison_section() -> Any:
+    """The section points of the guide's rig over the model's, by the guide's own commands and study file."""
+    from nonsmooth.cli.main import main as nonsmooth
+    from nonsmooth.plot import comparison_section as draw
+    from nonsmooth.results.store import load
+
+    page = (DOCS / "guides" / "from_your_rig_to_parameters.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"^```toml\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
+    (study,) = (text for text in blocks if "[measured]" in text)
+    commands = re.findall(r"^\$ nonsmooth (rig .*|identify rig_03 .*)$", page, re.MULTILINE)
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+        Path("run4.toml").write_text(study, encoding="utf-8")
+        for command in (*commands, "compare run4.toml"):
+            assert nonsmooth(command.split()) == 0, command
+        return draw(load("run4.nc"))
 
 
 def first_code(page: Path) -> str:
@@ -53,6 +83,8 @@ def main(wanted: list[str]) -> None:
             names: dict[str, Any] = {}
             exec(first_code(DOCS / f"{page}.md"), names)
             keep(names["ax"], stem)
+    if not wanted or "comparison_section" in wanted:
+        keep(comparison_section(), "comparison_section")
     for path in sorted((DOCS.parent / "examples").glob("*.py")):
         if wanted and path.stem not in wanted:
             continue

@@ -15,6 +15,7 @@ from typing import Any
 import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
+from make_pictures import keep
 
 import nonsmooth as ns
 
@@ -23,14 +24,15 @@ ETAS = np.array([3e-5, 1e-5, 3e-6, 1e-6])
 PAPER = {"method": "rkf45", "rtol": 1e-6}  # with eta = 1e-5
 FINE = {"method": "rkf45", "rtol": 1e-11}
 PERIODS = 4
+COLORS = [ns.plot.COLORS[name] for name in ("first", "second", "third", "fourth", "zone", "muted")]
 
 ORBITS: dict[str, dict[str, float]] = {
-    "Fig. 9, omega 4.8": {"rho": 0.14, "g": 0.02, "omega": 4.8},
-    "Fig. 10, omega 5.2": {"rho": 0.16, "g": 0.0145, "omega": 5.2},
-    "Fig. 11, rho 0.45": {"rho": 0.45, "g": -0.0045, "omega": 3.69},
-    "Fig. 11, rho 0.39": {"rho": 0.39, "g": -0.0045, "omega": 3.69},
-    "Fig. 13, g -0.0012": {"rho": 0.33, "g": -0.0012, "omega": 11.15},
-    "Fig. 13, g 0.0009": {"rho": 0.33, "g": 0.0009, "omega": 11.15},
+    "Fig. 9, omega 4.8 rad/s": {"rho": 0.14, "g": 0.02, "omega": 4.8},
+    "Fig. 10, omega 5.2 rad/s": {"rho": 0.16, "g": 0.0145, "omega": 5.2},
+    "Fig. 11, rho 0.45 N": {"rho": 0.45, "g": -0.0045, "omega": 3.69},
+    "Fig. 11, rho 0.39 N": {"rho": 0.39, "g": -0.0045, "omega": 3.69},
+    "Fig. 13, g -1.2 mm": {"rho": 0.33, "g": -0.0012, "omega": 11.15},
+    "Fig. 13, g 0.9 mm": {"rho": 0.33, "g": 0.0009, "omega": 11.15},
 }
 
 
@@ -68,7 +70,7 @@ def short(value: float, form: str = ".1e") -> str:
 
 def oscillator_table() -> list[str]:
     """Error after four periods and time per period of every method, on an orbit with four contacts in two periods."""
-    system = ns.models.discontinuous_support(**ORBITS["Fig. 11, rho 0.39"])
+    system = ns.models.discontinuous_support(**ORBITS["Fig. 11, rho 0.39 N"])
     start = on_attractor(system)
     exact = end(system, start)
     smooth = system.smoothed(eta=1e-5)
@@ -177,21 +179,25 @@ def grazing_table() -> tuple[list[str], np.ndarray]:
 def draw(errors: Mapping[str, np.ndarray], paper: Mapping[str, float], found: np.ndarray) -> None:
     """Left: error over eta; right: shift of the grazing frequency over eta."""
     with ns.plot.journal():
-        figure, (left, right) = plt.subplots(1, 2, figsize=(6.85, 2.9))
-        for i, (name, values) in enumerate(errors.items()):
-            left.loglog(ETAS, values, "o-", color=f"C{i}", label=name, markersize=3)
-            left.loglog(1e-5, paper[name], "x", color=f"C{i}", markersize=5)
+        figure, (left, right) = plt.subplots(1, 2, figsize=(6.85, 3.6))
+        widths = 1e6 * ETAS  # in micrometres
+        for (name, values), color, mark in zip(errors.items(), COLORS, "osD^vP", strict=True):
+            left.loglog(widths, values, f"{mark}-", color=color, label=name, markersize=3)
+            left.loglog(10, paper[name], "x", color=color, markersize=5)
+        left.plot([], [], "x", color="black", markersize=5, label="rtol $10^{-6}$, as in the paper's setting")
         guide = min(values[-1] for values in errors.values()) / 3
-        left.loglog(ETAS, guide * (ETAS / ETAS[-1]) ** 2, ":", color="0.4", label="slope 2")
-        left.set(xlabel=r"$\eta$ (m)", ylabel="error after 4 periods (1 mm, 1 cm/s)")
-        left.legend(fontsize=5.5)
-        right.loglog(ETAS, found - grazing(0.02), "o", label="smoothed model")
+        left.loglog(widths, guide * (ETAS / ETAS[-1]) ** 2, ":", color="0.4", label="slope 2")
+        left.set_ylabel(r"error, $[(\Delta x / 1\,\mathrm{mm})^2 + (\Delta v / 10\,\mathrm{mm/s})^2]^{1/2}$")
+        right.loglog(widths, found - grazing(0.02), "o", label="smoothed model")
         line = np.geomspace(ETAS.min(), ETAS.max(), 50)
-        right.loglog(line, [grazing(0.02 - eta) - grazing(0.02) for eta in line], "-", color="0.4",
+        right.loglog(1e6 * line, [grazing(0.02 - eta) - grazing(0.02) for eta in line], "-", color="0.4",
                      zorder=1, label=r"closed form, gap $g - \eta$")  # fmt: skip
-        right.set(xlabel=r"$\eta$ (m)", ylabel="shift of the grazing frequency (rad/s)")
-        right.legend()
-        figure.savefig(DOCS / "pictures" / "effect_of_eta.png", dpi=170, metadata={"Software": None})
+        right.set_ylabel("shift of the grazing frequency (rad/s)")
+        for ax in (left, right):
+            ax.set_xlabel("half width of the band, $\\eta$ (\N{MICRO SIGN}m)")
+            ax.xaxis.set_major_formatter("{x:g}")
+            ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
+        keep(figure, "effect_of_eta")
 
 
 def main() -> None:

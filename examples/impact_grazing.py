@@ -24,7 +24,10 @@ def main() -> Axes:
     oscillator = ns.models.impact_oscillator(omega=0.8)
     diagram = ns.sweep(oscillator, "A", np.arange(0.3, 0.6, STEP), keep=60, progress=False)
     ax = ns.plot.bifurcation(diagram, y="v", size=1.2)
-    ax.axvline(GRAZING, color="0.5", linestyle=":", linewidth=0.8, zorder=0)
+    ax.axvline(GRAZING, color="0.5", linestyle=":", linewidth=0.8, zorder=0, label="grazing, closed form")
+    ax.set(xlabel="amplitude of the forcing, $A$", ylabel="velocity at the section, $v$")
+    with ns.plot.journal():
+        ax.legend(loc="lower right", title="dimensionless")
 
     below = diagram.sel(A=diagram.A < GRAZING)
     clearance = below.clearance.sel(indicator="stop")

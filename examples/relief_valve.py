@@ -27,6 +27,7 @@ def main() -> Axes:
         valve, "q", np.linspace(4.0, 8.4, 441), direction="down", start=START, section=MAXIMA, keep=50, progress=False
     )
     ax = ns.plot.bifurcation(diagram, y="y1", size=1.2)
+    ax.set(xlabel="inflow, $q$ (dimensionless)", ylabel="maxima of the lift, $y_1$ (dimensionless)")
 
     cycle = ns.sweep(valve, "q", [8.0], start=START, section=MAXIMA, progress=False).isel(q=0)
     returns = ns.poincare(valve.with_parameters(q=8.0), section=MAXIMA, n=3, transient=600, start=START)

@@ -51,6 +51,8 @@ def main() -> Axes:
     """Simulate from the unstrained spring, and compare one cycle with its closed form."""
     run = ns.simulate(belt, duration=40.0, samples=4001)
     ax = ns.plot.phase_portrait(run, y="velocity")
+    with ns.plot.journal():
+        ax.legend(loc="center")
 
     drop, turn = 0.5, np.arctan2(0.2, 0.5)  # (f_s - f_d) / k and the angle of the first point of the slip
     begins, ends = run.crossing_time.values[0::2], run.crossing_time.values[1::2]

@@ -48,6 +48,9 @@ def agree(case, n: int, part: float, least: float) -> None:
     assert right[sure].mean() >= 0.95
     assert right[sure & ~computed].mean() >= 0.95
     assert sure.mean() > 0.9
+    # an inferred label is never certain: of n tested without an error 1 - 1 / (n + 2) are expected right (Laplace)
+    confidence = refined["confidence"].values
+    assert (confidence[~computed] < 1.0).all() and (confidence[computed] == 1.0).all()
     assert not missed
 
 

@@ -135,3 +135,15 @@ def test_schema(branch: xr.Dataset) -> None:
     special = ns.special_points(branch)
     assert {"kind", "rho", "section", "floquet_multipliers"} <= set(special.data_vars)
     assert special.sizes["special"] == branch.sizes["special"]
+
+
+def test_multipliers_change_little_from_point_to_point() -> None:
+    """A step is made shorter where multipliers move by more than 0.15 on the Riemann sphere, straight or not."""
+    system = ns.models.discontinuous_support(rho=0.14, g=0.02, omega=3.4)
+    branch = ns.continue_orbit(ns.find_orbit(system), "omega", (3.0, 7.0))
+    mu, signature = branch["floquet_multipliers"].values, branch["signature"].values
+    a, b = mu[:-1], mu[1:]
+    moved = (np.abs(a - b) / np.sqrt((1 + np.abs(a) ** 2) * (1 + np.abs(b) ** 2))).max(axis=1)
+    steps = (signature[1:] == signature[:-1]) & (np.abs(np.diff(branch["omega"].values)) > 1e-5)
+    assert steps.sum() > 100
+    assert moved[steps].max() <= 0.15

@@ -256,6 +256,11 @@ def test_e_cycle_is_born_in_a_hopf_bifurcation_and_reaches_the_seat(valve: xr.Da
     (graze,) = of_kind(valve, "grazing")
     assert graze == pytest.approx(7.56, abs=0.01)
     assert set(np.unique(valve["contacts_per_period"])) == {0.0, 1.0}
+    # Without forcing a multiplier is 1 and det(I - M) tells nothing: the branch itself shows on which side it goes on.
+    q, contact = valve["q"].values, valve["contacts_per_period"].values == 1.0
+    beside = [q[some][np.argsort(np.abs(q[some] - graze))[1:4]].mean() - graze for some in (contact, ~contact)]
+    (kind,) = ns.special_points(valve)["grazing"].values[ns.special_points(valve)["kind"].values == "grazing"]
+    assert kind == ("persistence" if beside[0] * beside[1] < 0.0 else "non_smooth_fold")
 
 
 # K: stick-slip on a belt

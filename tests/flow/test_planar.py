@@ -306,3 +306,40 @@ def test_a_step_never_passes_two_ends_of_a_period() -> None:
     run = ns.simulate(system, periods=7, start={"x": 1.0, "y": 1.0}, method="exact")
     assert np.abs(run.crossing_time.values - [np.log(5.0) / 0.3, 6.25]).max() < 1e-12
     assert abs(run.u_before.values[1, 0] - np.exp(0.3 * 6.25)) < 1e-12
+
+
+def test_a_condition_on_what_is_identically_zero_does_not_hold() -> None:
+    """``speed > 0`` is strict: where a mode holds v at zero it never holds, at a start or after a transition."""
+    held = ns.System(
+        states=["x", "v"],
+        parameters={"k": 1.0},
+        modes={"slip": lambda t, u, p: (u.v, -p.k * u.x), "stick": lambda t, u, p: (0 * u.x, 0 * u.v)},
+        indicators={"speed": lambda t, u, p: u.v},
+        transitions=[
+            ns.Transition("slip", "stick", when="speed < 0", reset=lambda t, u, p: (u.x, 0 * u.v)),
+            ns.Transition("stick", "slip", when="speed > 0"),
+        ],
+    )
+    resting = ns.simulate(held, duration=5.0, start={"x": 0.3}, mode="stick", method="exact", samples=3)
+    assert not resting.sizes["crossing"] and (resting["u"].values == [0.3, 0.0]).all()
+    run = ns.simulate(held, duration=9.0, start={"v": 1.0}, method="exact", samples=3)
+    assert run["crossing_time"].values == pytest.approx([np.pi / 2], abs=1e-13)  # sin t stops at its top
+    assert run["u"].values[-1] == pytest.approx([1.0, 0.0], abs=1e-13)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_kick_at_a_phase_comes_once_each_period(method: str) -> None:
+    """v grows by K at a quarter of each period and x moves on straight lines; the mode stays the same."""
+    kick, period = 0.4, 2.0
+    kicked = ns.System(
+        states=["x", "v"],
+        parameters={"K": kick, "T": period},
+        modes={"drift": lambda t, u, p: (u.v, 0 * u.x)},
+        transitions=[ns.Transition("drift", "drift", at=0.25, reset=lambda t, u, p: (u.x, u.v + p.K))],
+        period=lambda p: p.T,
+    )
+    run = ns.simulate(kicked, periods=5, start=[0.0, 0.1], method=method, **METHODS[method])
+    assert run["crossing_time"].values == pytest.approx(period * (0.25 + np.arange(5)), rel=1e-14)
+    assert run["u_after"].values[:, 1] == pytest.approx(0.1 + kick * np.arange(1, 6), rel=1e-12)
+    x = 0.1 * 5 * period + kick * sum(period * (5 - 0.25 - k) for k in range(5))
+    assert run["u"].values[-1, 0] == pytest.approx(x, rel=1e-12)

@@ -7,6 +7,7 @@ import pytest
 from linear_flow import LinearFlow
 
 import nonsmooth as ns
+from nonsmooth.flow.sections import section_plan
 
 METHODS = {"exact": {}, "taylor": {"rtol": 1e-13}, "rkf45": {"rtol": 1e-13}}
 
@@ -188,3 +189,12 @@ def test_a_start_beyond_a_stop_is_said_to_be_one() -> None:
     with pytest.raises(ns.SolveError, match="beyond a stop") as caught:
         ns.poincare(ns.models.impact_oscillator(), n=3, start={"x": 2.0})
     assert caught.value.status == "beyond_stop"
+
+
+def test_how_long_a_return_is_waited_for(swing: ns.System) -> None:
+    """A thousand forcing periods, or a million units of time where there is no forcing, unless ``t_max`` says."""
+    support = ns.models.discontinuous_support(omega=4.0)
+    section = ns.Poincare("penetration")
+    assert section_plan(support, section)[1].t_max == pytest.approx(1000 * 2 * np.pi / 4.0, rel=1e-15)
+    assert section_plan(swing, ns.Poincare("speed"))[1].t_max == 1e6
+    assert section_plan(swing, ns.Poincare("speed", t_max=3.0))[1].t_max == 3.0

@@ -53,6 +53,8 @@ import numpy as np
 from nonsmooth.kernels import cache
 import driver
 
+told = []
+cache.before_compiling.append(told.append)
 model = cache.load_module(sys.stdin.read(), "model")
 value = driver.drive(model.f, model.g, np.ones(1), 2)
 drive = driver.drive
@@ -61,6 +63,7 @@ print(json.dumps({
     "driver": list(cache.cache_statistics(driver)),
     "model": list(cache.cache_statistics(model)),
     "overloads": len(getattr(drive, "signatures", [])),
+    "told": told,
     "file": model.__file__,
 }))
 '''
@@ -88,15 +91,18 @@ def test_second_process_compiles_nothing_and_a_new_model_only_itself(tmp_path):
     first = run(tmp_path, 2.0)
     assert first["value"] == expected(2.0)
     assert ["drive", 0, 1] in first["driver"]
+    assert sorted(first["told"]) == ["drive", "f", "g", "twice"]
 
     again = run(tmp_path, 2.0)
     assert again["value"] == expected(2.0)
     assert all(misses == 0 for _, _, misses in again["driver"] + again["model"])
+    assert again["told"] == []
 
     other = run(tmp_path, 3.0)
     assert other["value"] == expected(3.0)
     assert all(misses == 0 for _, _, misses in other["driver"])
     assert all((hits, misses) == (0, 1) for _, hits, misses in other["model"])
+    assert sorted(other["told"]) == ["f", "g"]
     # The functions came in as first-class function types: no second version of the driver was made for them.
     assert other["overloads"] == 1
 
@@ -134,10 +140,23 @@ def test_a_kernel_is_compiled_when_it_is_first_called(tmp_path):
     assert after == {"twice": [0, 1], "drive": [0, 0]}
 
 
-def test_damaged_entries_are_compiled_anew(tmp_path):
+def cut(data):
+    return data[:100]
+
+
+def three_bits_flipped(data):
+    """In the machine code, where unpickling sees nothing."""
+    changed = bytearray(data)
+    for part in (0.5, 0.6, 0.7):
+        changed[int(part * len(data))] ^= 0x10
+    return bytes(changed)
+
+
+@pytest.mark.parametrize("damage", [cut, three_bits_flipped])
+def test_damaged_entries_are_compiled_anew(tmp_path, damage):
     run(tmp_path, 2.0)
     for entry in (tmp_path / "cache" / "compiled").iterdir():
-        entry.write_bytes(entry.read_bytes()[:100])
+        entry.write_bytes(damage(entry.read_bytes()))
     for source in (tmp_path / "cache" / "generated").glob("*.py"):
         source.write_text("damaged")
     damaged = run(tmp_path, 2.0)
@@ -156,7 +175,11 @@ def test_without_jit(tmp_path):
 def test_stamp_follows_imports_through_kernel_files(monkeypatch):
     from nonsmooth.kernels import cache
 
-    sources = {"low": "x = 1", "mid": "from .low import x", "top": "from .mid import x", "apart": "y = 2"}
+    sources = {
+        "low": "x = 1", "mid": "from .low import x", "top": "from . import mid",
+        "other": "import nonsmooth.kernels.mid",
+        "apart": "y = 2  # a word: low, mid, top",
+    }  # fmt: skip
 
     def stamp(text):
         monkeypatch.setattr(cache, "_kernel_sources", lambda: dict(sources))
@@ -167,7 +190,7 @@ def test_stamp_follows_imports_through_kernel_files(monkeypatch):
     sources["low"] = "x = 3"
     after = {name: stamp(text) for name, text in sources.items()}
     assert before["apart"] == after["apart"]
-    assert all(before[name] != after[name] for name in ("low", "mid", "top"))
+    assert all(before[name] != after[name] for name in ("low", "mid", "top", "other"))
     cache._source_stamp.cache_clear()
 
 
@@ -207,6 +230,58 @@ def test_unwritable_user_folder_falls_back_to_a_private_one(tmp_path, monkeypatc
     assert folder.parent == tmp_path
     assert Path(folder).stat().st_mode & 0o077 == 0
     usable_folder.cache_clear()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="permissions of POSIX")
+@pytest.mark.parametrize("part", ["", "compiled"])
+def test_a_folder_that_others_may_write_is_refused(tmp_path, monkeypatch, part):
+    """What stands there is executed. A folder that was chosen: an error; the user's own: a private one in its place."""
+    from nonsmooth.kernels.folder import cache_folder, usable_folder
+
+    open_to_all = tmp_path / "nonsmooth"
+    (open_to_all / part).mkdir(parents=True)
+    (open_to_all / part).chmod(0o777)
+    usable_folder.cache_clear()
+    monkeypatch.setenv("NONSMOOTH_CACHE_DIR", str(open_to_all))
+    with pytest.raises(PermissionError, match="others may write it"):
+        cache_folder()
+    monkeypatch.delenv("NONSMOOTH_CACHE_DIR")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    with pytest.warns(UserWarning, match="others may write it"):
+        assert cache_folder() == tmp_path / f"nonsmooth-{os.getuid()}"
+    usable_folder.cache_clear()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="permissions of POSIX")
+def test_new_entries_are_the_users_alone_and_others_are_not_executed(tmp_path):
+    run(tmp_path, 2.0)
+    entries = [*(tmp_path / "cache").rglob("*")]
+    assert entries and all(path.stat().st_mode & 0o022 == 0 for path in entries)
+    for entry in (tmp_path / "cache" / "compiled").iterdir():
+        entry.chmod(0o666)
+    assert ["drive", 0, 1] in run(tmp_path, 2.0)["driver"]
+
+
+@pytest.mark.skipif(sys.platform in ("win32", "darwin"), reason="a user without a name or home, as in a container")
+def test_an_unknown_user_without_a_home(tmp_path):
+    """Path.home() raises for such a user, and no name is known; compiled code is kept among the temporary files."""
+    script = """
+import os, sys
+from pathlib import Path
+def none():
+    raise RuntimeError("Could not determine home directory.")
+Path.home = none
+from nonsmooth.kernels.folder import cache_folder
+print(cache_folder())
+"""
+    unset = ("HOME", "USER", "LOGNAME", "XDG_CACHE_HOME", "NONSMOOTH_CACHE_DIR")
+    environment = {name: value for name, value in os.environ.items() if name not in unset}
+    done = subprocess.run(
+        [sys.executable, "-c", script], env={**environment, "TMPDIR": str(tmp_path)}, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.strip() == str(tmp_path / f"nonsmooth-{os.getuid()}")
 
 
 def test_one_signature_only(tmp_path, monkeypatch):

@@ -13,7 +13,7 @@ import pytest
 import xarray as xr
 
 from nonsmooth import plot
-from nonsmooth.plot.labels import column, label
+from nonsmooth.plot.labels import column, name_and_unit
 from nonsmooth.plot.segments import with_gaps
 
 CASES = [
@@ -136,7 +136,7 @@ def test_a_portrait_tells_the_modes_apart(trajectory: xr.Dataset) -> None:
 
 def test_a_portrait_carries_section_points(trajectory: xr.Dataset, points: xr.Dataset) -> None:
     ax = plot.phase_portrait(trajectory, section=points)
-    (drawn,) = (line for line in ax.lines if line.get_label() == "section")
+    (drawn,) = (line for line in ax.lines if line.get_label() == "section points")
     np.testing.assert_array_equal(drawn.get_xdata(), points["section"].sel(state="x").values.ravel())
 
 
@@ -159,10 +159,10 @@ def test_contact_is_shaded_over_time(trajectory: xr.Dataset) -> None:
 
 
 def test_labels_have_symbols_units_or_words(trajectory: xr.Dataset, swept: xr.Dataset) -> None:
-    assert label(trajectory, "time") == "$t$ (s)"
-    assert label(trajectory, "x") == "$x$ (m)"
-    assert label(trajectory, "contact_force") == "contact force (N)"
-    assert label(swept, "omega") == r"$\omega$ (rad/s)"
+    assert name_and_unit(trajectory, "time") == ("$t$", "s")
+    assert name_and_unit(trajectory, "x") == ("$x$", "m")
+    assert name_and_unit(trajectory, "contact_force") == ("contact force", "N")
+    assert name_and_unit(swept, "omega") == (r"$\omega$", "rad/s")
 
 
 def test_an_unknown_state_is_answered_with_all_states(swept: xr.Dataset) -> None:
@@ -176,3 +176,15 @@ def test_point_clouds_are_pixels_and_text_stays_text(swept: xr.Dataset, tmp_path
     text = plot.save_figure(plot.bifurcation(swept), tmp_path / "a.svg").read_text()
     assert "data:image/png;base64" in text
     assert re.search(r"<text[^>]*>", text)
+
+
+def test_a_falling_sweep_does_not_hide_the_rising_one(swept: xr.Dataset) -> None:
+    """It lies on top, and its points are smaller: coinciding ones show as a seam. The legend shows both as large."""
+    ax = plot.bifurcation(swept, y="v")
+    up, down = ax.lines
+    assert up.get_markersize() >= 1.5 * down.get_markersize() and up.get_zorder() <= down.get_zorder()
+    light = [mpl.colors.rgb_to_hsv(mpl.colors.to_rgb(line.get_color())) @ [0, -1, 1] for line in (up, down)]
+    assert light[0] > light[1] + 0.2  # told apart in grey print too
+    assert len({handle.get_markersize() for handle in ax.get_legend().legend_handles}) == 1
+    alone = plot.bifurcation(swept.isel(direction=[0]), plt.figure().add_subplot(), y="v")
+    assert alone.lines[0].get_markersize() == down.get_markersize()

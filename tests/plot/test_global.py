@@ -12,6 +12,7 @@ from nonsmooth.analysis.basins import basins
 from nonsmooth.analysis.chart import chart
 from nonsmooth.plot.basin_fractions import basin_fractions as draw_fractions
 from nonsmooth.plot.basins import basins as draw_basins
+from nonsmooth.plot.basins import told_apart
 from nonsmooth.plot.chart import chart as draw_chart
 from nonsmooth.plot.palette import PERIODS, attractor_color
 
@@ -37,7 +38,7 @@ def test_a_chart_shows_each_period_once_with_its_colour(support: ns.System) -> N
     assert mesh.get_array().size == 8
     first = mesh.to_rgba(mesh.get_array().ravel())[0]
     assert mpl.colors.to_hex(first) == PERIODS[int(plane["period_number"][0, 0]) - 1].lower()
-    assert ax.get_xlabel() == "$g$ (m)" and ax.get_ylabel() == r"$\rho$ (N)"
+    assert ax.get_xlabel() == "$g$ (mm)" and ax.get_ylabel() == r"$\rho$ (N)"
     for show in ("lyapunov", "maximum", "contacts_per_period"):
         drawn = draw_chart(plane, show=show)
         low, high = drawn.collections[0].get_clim()
@@ -55,7 +56,7 @@ def test_basins_show_their_attractors(support: ns.System) -> None:
     found = basins(support, {"x": np.linspace(-0.02, 0.02, 12), "v": np.linspace(-0.2, 0.2, 10)}, **QUIET)
     ax = draw_basins(found)
     words = texts(ax)
-    assert len(words) == 3 and {word.split(":")[0] for word in words[:2]} == {"period 3", "period 4"}
+    assert len(words) == 2 and {word.split(":")[0] for word in words} == {"period 3", "period 4"}
     assert sum(len(line.get_xdata()) for line in ax.lines) == 7
     np.testing.assert_array_equal(ax.collections[0].get_array().ravel(), found["label"].values.T.ravel())
     assert len({attractor_color(k) for k in range(9)}) == 9 and attractor_color(-1) == "#FFFFFF"
@@ -81,7 +82,7 @@ def test_shares_add_up_to_all(support: ns.System) -> None:
     top = max(path.vertices[:, 1].max() for item in ax.collections for path in item.get_paths())
     assert top == pytest.approx(100.0)
     above = draw_fractions(along, y="x")
-    assert above.get_ylabel() == "max $x$ (m)"
+    assert above.get_ylabel() == "max $x$ (mm)"
     with pytest.raises(ValueError, match="not a state"):
         draw_fractions(along, y="z")
 
@@ -94,7 +95,7 @@ def test_a_density_diagram_shows_the_shares_of_the_bins() -> None:
     ax = density(swept, y="v")
     shown = np.ma.filled(ax.collections[0].get_array(), 0.0).reshape(10, 3)
     np.testing.assert_allclose(np.nan_to_num(shown), 5.0 * swept["density"].sel(state="v").values.T)
-    assert ax.get_xlabel() == r"$\rho$ (N)" and ax.get_ylabel() == "$v$ (m/s)"
+    assert ax.get_xlabel() == r"$\rho$ (N)" and ax.get_ylabel() == "$v$ (mm/s)"
     np.testing.assert_allclose(ax.get_xlim(), (0.29, 0.38))
     with pytest.raises(ValueError, match=r"plot\.density"):
         ns.plot.bifurcation(swept)
@@ -113,8 +114,20 @@ def test_runs_that_diverge_have_a_colour_of_their_own() -> None:
     found = ns.basins(system, {"x": [-1.5, 0.5, 1.5], "y": [0.0, 1.0]}, transient=50, keep=20, progress=False)
     axes = draw_basins(found)
     names = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert names == ["period 1: 33.3 %", "diverged", "attractor"]
+    assert names == ["period 1: 33.3 %", "diverged"]
     drawn = axes.collections[0]
     colours = drawn.to_rgba(drawn.get_array()).reshape(2, 3, 4)
     assert (colours[:, 0] == colours[:, 2]).all() and (colours[:, 0] != colours[:, 1]).any()
     assert (colours[:, 0, :3] < 1.0).all()  # not the white of what is not known
+
+
+def test_attractors_of_one_kind_are_told_apart() -> None:
+    assert told_apart(["period 3", "chaos", "period 3"]) == ["period 3 (a)", "chaos", "period 3 (b)"]
+
+
+def test_each_attractor_has_a_mark_of_its_own(support: ns.System) -> None:
+    found = basins(support, {"x": np.linspace(-0.02, 0.02, 12), "v": np.linspace(-0.2, 0.2, 10)}, **QUIET)
+    ax = draw_basins(found)
+    marks = [line.get_marker() for line in ax.lines]
+    assert len(set(marks)) == found.sizes["attractor"]
+    assert [len(line.get_xdata()) for line in ax.lines] == found["period_number"].values.tolist()

@@ -209,7 +209,7 @@ def test_numbers_are_written_with_their_errors() -> None:
 
 def test_the_grid_of_the_transform_is_shown() -> None:
     """A record of 20.48 s has lines 0.0488 Hz apart: 0.7324 Hz is the paper's 4.60 rad/s."""
-    assert "0.7324 Hz = 4.602 rad/s" in words(identification.impulse_response(decay()))
+    assert "largest line 0.7324 Hz ± half a step" in words(identification.impulse_response(decay()))
 
 
 def test_a_calibration_says_where_its_line_begins() -> None:
@@ -221,7 +221,7 @@ def test_lengths_are_drawn_in_millimetres() -> None:
     length = {"units": "m", "long_name": "crank length"}
     data = line().assign(setting=("run", np.arange(2.0, 12.0) / 1e3, length))
     ax = identification.calibration(data.assign_coords(setting_fine=data["setting"].values))
-    assert ax.get_xlabel() == "crank length (mm)" and ax.lines[0].get_xdata()[0] == pytest.approx(2.0)
+    assert ax.get_xlabel() == "crank length (mm)" and ax.lines[0].get_xdata()[0] == pytest.approx(2e-3)
 
 
 def test_one_slope_of_many_pulls_is_one_number() -> None:
@@ -249,3 +249,111 @@ def test_pictures_of_a_motion() -> None:
         comparison_response(result)
     with pytest.raises(ValueError, match="no result of compare"):
         comparison_diagram(xr.Dataset())
+
+
+def entries(ax: Any) -> list[str]:
+    return [text.get_text() for text in ax.get_legend().get_texts()]
+
+
+def strip_of(ax: Any) -> Any:
+    """The axes of the residuals at the foot of a picture."""
+    (strip,) = [one for one in ax.figure.axes if one is not ax]
+    return strip
+
+
+def test_the_colours_of_residuals_stand_in_the_legend() -> None:
+    """They are those of the way the car moved: forces 10 mN above the mean line where it moved away, below it back."""
+    ax = identification.force_displacement(spring())
+    shown = dict(zip(entries(ax), ax.get_legend().legend_handles, strict=True))
+    clouds = {line.get_color(): line.get_ydata() for line in strip_of(ax).lines if len(line.get_xdata()) > 2}
+    np.testing.assert_allclose(clouds[shown["residual, displacement growing"].get_color()], 0.01, atol=1e-12)
+    np.testing.assert_allclose(clouds[shown["residual, displacement falling"].get_color()], -0.01, atol=1e-12)
+    assert strip_of(ax).get_ylabel() == "residual (mN)"
+
+
+def test_two_fits_of_one_curve_are_told_apart_by_what_they_leave() -> None:
+    ax = identification.amplitude_fit(amplitudes())
+    omega = amplitudes()["omega"].values
+    left = {line.get_color(): line.get_ydata() for line in strip_of(ax).lines if len(line.get_xdata()) > 2}
+    shown = dict(zip(entries(ax), ax.get_legend().legend_handles, strict=True))
+    np.testing.assert_allclose(left[shown["residual, $c$ beside dry friction"].get_color()], 0.0, atol=1e-15)
+    np.testing.assert_allclose(left[shown["residual, $c$ alone"].get_color()], -0.001 / omega, rtol=1e-9)
+
+
+def test_a_calibration_ends_at_zero_and_shows_its_band() -> None:
+    """omega = 1.2 V - 0.9 is zero at 0.75 V: a motor does not turn backwards. The band shows where residuals do."""
+    fine = np.linspace(0, 12, 49)
+    fit = 1.2 * fine - 0.9
+    data = line().drop_vars(["fitted", "setting_fine"]).assign(
+        fitted=("setting_fine", fit), fitted_low=("setting_fine", fit - 0.02), fitted_high=("setting_fine", fit + 0.02)
+    )  # fmt: skip
+    ax = identification.calibration(data.assign_coords(setting_fine=fine))
+    assert ax.lines[0].get_ydata().min() >= 0 and ax.lines[0].get_xdata()[0] == pytest.approx(0.75, abs=0.26)
+    (band,) = strip_of(ax).collections[:1]
+    heights = band.get_paths()[0].vertices[:, 1]
+    low, high = strip_of(ax).get_ylim()
+    assert np.ptp(heights) == pytest.approx(0.04) and np.ptp(heights) > 0.05 * (high - low)
+    assert any("95 % band" in one for one in entries(ax))
+
+
+def test_a_decay_is_joined() -> None:
+    """Unjoined samples of a fast oscillation make patterns that are not there."""
+    shown = identification.impulse_history(decay()).lines[0]
+    assert shown.get_linestyle() == "-" and shown.get_marker() in ("None", None, "")
+
+
+def test_a_spectrum_fills_its_axes() -> None:
+    ax = identification.impulse_response(decay())
+    heights = np.concatenate([line.get_ydata() for line in ax.lines if line.get_marker() == "o"])
+    assert heights.max() > 0.9 * ax.get_ylim()[1]
+
+
+def diagram() -> xr.Dataset:
+    """Two values, and a flip: theory at 0.42, the record at 0.46 and with its delay taken out at 0.40."""
+    rho = np.array([0.3, 0.5])
+    return xr.Dataset(
+        {
+            "theory_section": (("rho", "direction", "iterate", "state"), np.zeros((2, 1, 2, 2))),
+            "measured_rho": ("sample", rho), "measured_section": (("sample", "state"), np.zeros((2, 2))),
+            "theory_flip": ("flip", [0.42]), "measured_flip": ("flip", [0.40]), "measured_flip_read": ("flip", [0.46]),
+            "measured_flip_error": ("flip", [0.01]),
+        },
+        {
+            "rho": ("rho", rho, {"units": "N"}), "state": ["x", "v"], "state_unit": ("state", ["m", "m/s"]),
+            "direction": ["up"], "flip": ["1-2"],
+        },
+        SYNTHETIC | {"comparison": "diagram"},
+    )  # fmt: skip
+
+
+def test_a_delayed_flip_shows_as_read_and_as_corrected() -> None:
+    ax = comparison_diagram(diagram(), y="v")
+    by_name = {one.get_label(): one for one in ax.lines}
+    assert by_name["flip, theory"].get_xdata()[0] == 0.42
+    assert by_name["flip, virtual rig (synthetic)"].get_xdata()[0] == 0.46
+    (arrow,) = [text for text in ax.texts if text.arrow_patch]
+    assert (arrow.xyann[0], arrow.xy[0]) == (0.46, 0.40)
+    assert {"theory", "virtual rig (synthetic)", "flip, virtual rig (synthetic), delay taken out"} <= set(entries(ax))
+
+
+def test_jumps_and_their_differences_stand_in_the_legend() -> None:
+    omega = np.array([3.0, 4.0, 5.0])
+    result = xr.Dataset(
+        {
+            "theory_amplitude": (("omega", "direction"), np.full((3, 1), 0.01)), "measured_omega": ("run", omega),
+            "measured_direction": ("run", ["up"] * 3), "measured_amplitude": ("run", np.full(3, 0.01)),
+            "measured_amplitude_error": ("run", np.full(3, 1e-4)), "jump_direction": ("jump", ["up"]),
+            "measured_jump": ("jump", [4.1]), "theory_jump": ("jump", [4.05]),
+        },
+        {
+            "omega": ("omega", omega, {"units": "rad/s"}), "direction": ["up"], "state": ["x"],
+            "state_unit": ("state", ["m"]),
+        },
+        SYNTHETIC | {"comparison": "response"},
+    )  # fmt: skip
+    ax = comparison_response(result)
+    assert "\N{MINUS SIGN}0.050" in [text.get_text() for text in ax.texts]
+    assert {
+        "jump, theory", "jump, virtual rig (synthetic)", "numbers: theory less measured (rad/s)",
+    } <= set(entries(ax))  # fmt: skip
+    assert ax.get_ylabel().endswith("(mm)")

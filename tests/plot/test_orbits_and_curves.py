@@ -127,4 +127,43 @@ def test_a_branch_of_equilibria() -> None:
         a, x = (np.asarray(part, dtype=float) for part in lines[0].get_data())
         good = np.isfinite(x)
         assert x[good] == pytest.approx(np.sqrt(a[good]), abs=1e-6)
-        assert words(ax) == ["fold"]
+        assert words(ax) == ["stable branch", "unstable branch", "fold"]
+
+
+def test_branches_lie_under_what_was_measured_or_swept(branch: xr.Dataset) -> None:
+    """Stable parts are a pale, wide seam below; unstable ones thin and dashed above; both stand in the legend once."""
+    response = ns.frequency_response(
+        ns.models.discontinuous_support(rho=0.14, g=0.02), np.arange(4.4, 4.7, 0.05), direction="both", progress=False
+    )
+    ax = plot.frequency_response(response, branch)
+    by_name = {line.get_label(): line for line in ax.get_lines()}
+    stable, unstable, swept = (by_name[name] for name in ("stable branch", "unstable branch", "increasing"))
+    assert stable.get_zorder() < swept.get_zorder() < unstable.get_zorder()
+    assert stable.get_linewidth() > swept.get_linewidth() and stable.get_alpha() < 0.5
+    assert swept.get_linestyle() == "-" and unstable.get_linestyle() == "--"
+    entries = words(ax)
+    assert len(entries) == len(set(entries)) and {"stable branch", "unstable branch", "fold", "grazing"} <= set(entries)
+
+
+def test_marks_at_one_point_do_not_hide_each_other(branch: xr.Dataset) -> None:
+    """A fold that is a graze: the smaller cross lies on the larger circle."""
+    by_name = {line.get_label(): line for line in plot.branch(branch).get_lines()}
+    fold, graze = by_name["fold"], by_name["grazing"]
+    assert graze.get_markersize() < fold.get_markersize() and graze.get_zorder() > fold.get_zorder()
+    shared = np.abs(fold.get_xdata()[:, None] - graze.get_xdata()[None, :]).min()
+    assert shared < 1e-3  # there is such a point
+
+
+def test_a_legend_that_a_curve_found_is_not_cut(special: xr.Dataset) -> None:
+    """Beside a chart, outside the axes: the layout makes room for it."""
+    plane = ns.chart(
+        ns.models.discontinuous_support(rho=0.14, g=0.02), {"omega": [4.0, 4.5], "rho": [0.14, 0.15]}, progress=False
+    )
+    flip = special.isel(special=np.flatnonzero(special["kind"].values == "flip")[:1]).isel(special=0)
+    with plot.journal():
+        ax = plot.chart(plane)
+        before = ax.get_legend()
+        before.get_texts()[0].set_text("a period that did not settle")
+        plot.curve(ns.continue_curve(flip, {"omega": (3.4, 4.6), "rho": (0.13, 0.16)}), ax)
+    ax.figure.canvas.draw()
+    assert before is not ax.get_legend() and before.get_window_extent().x1 <= ax.figure.bbox.x1

@@ -51,3 +51,9 @@ def test_what_is_no_data_is_refused(labels: Labels) -> None:
 def test_a_dataset_without_a_record_is_refused() -> None:
     with pytest.raises(ValueError, match="no attribute 'nonsmooth'"):
         read_provenance(xr.Dataset())
+
+
+def test_the_seed_zero_is_a_seed(labels: Labels) -> None:
+    """Drawing from seed 0 can be repeated; None says that nothing was drawn."""
+    record = read_provenance(xr.Dataset(attrs=provenance(labels, "basins", {}, method="exact", seed=0)))
+    assert record["seed"] == 0 and record["seed"] is not None

@@ -114,7 +114,7 @@ def test_branches_are_drawn_over_the_response(quick: Reproduction) -> None:
     swept, branch = quick.data["fig09"]["exact"], quick.data["fig09"]["branch"]
     ax = plot.frequency_response(swept, branch, plt.figure().add_subplot())
     half = 0.5 * (branch["maximum"] - branch["minimum"]).sel(state="x").values
-    unstable = next(line for line in ax.lines if line.get_linestyle() == "--")
+    unstable = next(line for line in ax.lines if line.get_label() == "unstable branch")
     drawn = ~np.isnan(unstable.get_ydata())
     assert unstable.get_ydata()[drawn] == pytest.approx(half[drawn])
     assert drawn[~branch["stable"].values].all()

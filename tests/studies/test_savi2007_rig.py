@@ -72,7 +72,7 @@ def test_motions_at_a_gap_are_a_set_over_its_starts() -> None:
     assert chosen(data, 0.0014, 3) is data["0.0014"]  # none has it: the first
     verdicts = [cell.verdict for cell in claims_rig.f14({"fig14_rig": data})]
     assert verdicts == ["agrees", "agrees", "differs", "agrees", NOT_ASKED]
-    assert "0.0009: no period and period 2 (model: period 1, period 3)" in said(data, FIGURE_14)
+    assert "0.9 mm: no period and period 2 (model: period 1, period 3)" in said(data, FIGURE_14, "m")
 
 
 def test_the_sections_of_figure_16_agree_below_twice_the_halves() -> None:

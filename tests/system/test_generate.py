@@ -83,6 +83,15 @@ def test_field_and_values(traced, point):
         np.testing.assert_allclose(out, [exact(e, t, *point) for e in rows], rtol=1e-14, atol=1e-14)
 
 
+def test_the_sign_of_zero_is_zero(traced):
+    """|x| + A sign(y) at y = 0 is |x|: sign(0) = 0, as in NumPy and SymPy."""
+    model, q = compile_model(traced), np.array([*PARAMETERS, MEMORY])
+    out = np.full(len(traced.indicators) + len(CORNERS), np.nan)
+    for y, sign in ((0.0, 0.0), (1e-300, 1.0), (-1e-300, -1.0)):
+        model.values(0, 0.4, np.array([-1.25, y]), q, out)
+        assert out[len(traced.indicators)] == 1.25 + PARAMETERS[0] * sign
+
+
 def test_jumps_write_state_and_memory_from_the_state_before(traced):
     model, q, u = compile_model(traced), np.array([*PARAMETERS, MEMORY]), np.array([-1.25, 2.0])
     a, b, _ = PARAMETERS

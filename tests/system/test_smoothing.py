@@ -161,6 +161,20 @@ def test_a_width_for_each_indicator():
         system.smoothed({"gap": 1e-5})
 
 
+def test_of_unequal_bands_the_least_margin_counts_in_its_own_width():
+    """Entering over 1e-5 in the penetration against 4e-5 in the separation: the least of g_r / eta_r tells the band.
+
+    At g_a = 2e-5 and g_b = 6e-5 the ratios are 2 and 1.5: the second is the least, though its margin is the larger one.
+    """
+    smooth = general().smoothed({"penetration": 1e-5, "separation": 4e-5})
+    traced = smooth.traced
+    (least,) = [i for i, name in enumerate(traced.indicator_names) if "*" in name]
+    point = {x: g + 2e-5, v: k_s / c_s * 4e-5}  # penetration 2e-5, separation -6e-5
+    values = dict(zip(traced.p, smooth.parameter_vector(), strict=True))
+    number = float(traced.indicators[least].subs(point).subs(values))
+    assert number == pytest.approx(2e-5 - 6e-5 / 4, abs=1e-15)  # > 0: the first is not the least
+
+
 def general():
     """The paper's system without its own bands, so that the general form applies."""
 

@@ -71,7 +71,7 @@ def grow(
             return arc
         last = here
         s, levels = _thin(s, levels, seen, near, turn)
-    arc.ending = "closed"
+    arc.ending = "images"
     return arc
 
 

@@ -165,6 +165,8 @@ class Locus:
             Y = np.asarray(Y - step, dtype=float)
             if np.abs(step).max() < CLOSE:
                 break
+        else:
+            return None
         _, values, vectors = np.linalg.svd(matrix)
         if values[-1] < 1e-9 * values[0]:
             return None

@@ -48,6 +48,7 @@ ENDS = {
     "length": "The length asked for was reached.",
     "closed": "The manifold ends: its images no longer grow (it runs into another orbit).",
     "points": "The largest number of points was reached.",
+    "images": "Two thousand images of the first segment are shorter than the length asked for: it grows too slowly.",
     "lost": "The next points have no image, or no preimage was found: the motion diverges, starts beyond a stop, or "
     "the section map cannot be inverted there.",
 }

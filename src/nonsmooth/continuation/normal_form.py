@@ -57,7 +57,7 @@ class _ReturnMap:
         for _ in range(ROUNDS):
             solved = shooting.evaluate(X)
             if size == n:
-                break
+                return self._scaled(solved.monodromy)
             right = -solved.residual[n:size] / inner
             try:
                 step = solve(solved.jacobian[n:size, n:size] * inner[None, :] / inner[:, None], right)
@@ -67,9 +67,9 @@ class _ReturnMap:
             if not length < 10.0:
                 return np.full((n, n), np.nan)
             if length < DONE:
-                break
+                return self._scaled(solved.monodromy)
             X[n:size] += inner * step
-        return self._scaled(solved.monodromy)
+        return np.full((n, n), np.nan)
 
     def along(self, v: FloatArray) -> tuple[FloatArray, FloatArray]:
         """B(v, .) and C(v, v, .) as matrices; steps shrink until two agree (near a graze they must be short)."""

@@ -25,9 +25,12 @@ DIVERGENCE = 1e9  # in units of a state's scale
 
 
 def is_planar(traced: Traced, form: LinearForm | None) -> bool:
-    """Whether the fast kernel covers the system: two states, everything affine, no memory, no mode that lacks one."""
+    """Whether the fast kernel covers the system: two states, everything affine, no memory, no mode that lacks one.
+
+    It notes the modes of a start rule as bits of one integer: 62 modes at most."""
     return (
         form is not None
+        and len(traced.mode_names) <= 62
         and len(traced.u) == 2
         and form.affine_indicators
         and form.affine_resets

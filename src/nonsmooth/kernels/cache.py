@@ -2,8 +2,9 @@
 
 Numba's own disk cache looks only at the file a function stands in, so an edit in another kernel file would
 run stale code, and it cannot write beside a read-only install. Here one file per compiled function lives in
-``cache_folder()``; its name is a hash of the source, the signature, the versions and the CPU, so nothing is
-ever stale, entries never change, and several processes need no lock.
+``cache_folder()``; its name is a hash of the source and of what it imports, the options, the signature, the versions
+and the CPU, so nothing is ever stale, entries never change, and several processes need no lock. An entry is code: it
+begins with a hash of its content, and one that another user may write is not read (``folder``).
 
 Everything that leans on private parts of Numba (a dispatcher's ``_cache`` and ``_compile_for_args``,
 ``CompileResult._reduce``) stands in this file; ``tests/kernels/test_cache.py`` covers it. Checked with Numba 0.62 and
@@ -12,13 +13,13 @@ Everything that leans on private parts of Numba (a dispatcher's ``_cache`` and `
 
 from __future__ import annotations
 
+import ast
 import contextlib
 import gc
 import hashlib
 import importlib.util
 import inspect
 import pickle
-import re
 import sys
 import threading
 from collections.abc import Callable, Iterator
@@ -33,14 +34,22 @@ from numba.core.caching import _Cache
 from numba.core.compiler import CompileResult
 from numba.core.compiler_lock import global_compiler_lock
 
-from nonsmooth.kernels.folder import cache_folder, mark_used, prune, write_atomically
+from nonsmooth.kernels.folder import cache_folder, make_private, mark_used, prune, read_private, write_atomically
 
-__all__ = ["cache_statistics", "callback", "compiled", "device", "inline", "kernel", "load_module"]
+__all__ = [
+    "before_compiling", "cache_statistics", "callback", "compiled", "device", "inline", "kernel", "load_module",
+]  # fmt: skip
+
+#: Called before a function is compiled because the cache has no entry for it, with the function's name.
+before_compiling: list[Callable[[str], None]] = []
 
 # Kernels allocate nothing (scratch is an argument), so they need no reference counts: "_nrt" off saves a third.
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}, "_nrt": False}
 # What only kernels call needs no way in from Python.
 _INNER: dict[str, Any] = {**_OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+_DIGEST = hashlib.sha256().digest_size
+_GENERATED = "nonsmooth_generated_"
+_MACHINERY = {"cache", "folder"}
 _lock = threading.Lock()
 
 
@@ -54,22 +63,47 @@ def _kernel_sources() -> dict[str, str]:
     return {path.stem: path.read_text(encoding="utf-8") for path in sorted(Path(__file__).parent.rglob("*.py"))}
 
 
+def _imported(text: str) -> Iterator[str]:
+    """Names of the modules that a text imports: stems of this room, full names of generated ones."""
+    room = __name__.rpartition(".")[0]
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            package = room + (f".{node.module}" if node.module else "") if node.level else node.module or ""
+            names = [package, *(f"{package}.{alias.name}" for alias in node.names)]
+        else:
+            continue
+        for name in names:
+            if name.startswith(room + "."):
+                yield name.removeprefix(room + ".").partition(".")[0]
+            elif name.startswith(_GENERATED):
+                yield name.partition(".")[0]
+
+
 @cache
 def _source_stamp(text: str) -> str:
-    """Hash of a source text and of every kernel file it may import, through any number of files.
+    """Hash of a source text and of every kernel file and generated module that it imports, through any number of files.
 
-    A file counts as imported when its stem occurs as a word: this can only err towards recompiling.
-    """
+    The files of the cache itself are left out: what they decide about a function's code stands in its key."""
     sources = _kernel_sources()
-    reached: set[str] = set()
+    reached: dict[str, str] = {}
     pending = [text]
     while pending:
-        found = sources.keys() & set(re.findall(r"\w+", pending.pop()))
-        pending.extend(sources[stem] for stem in found - reached)
-        reached |= found
+        for name in _imported(pending.pop()):
+            if name in reached or name in _MACHINERY:
+                continue
+            if name.startswith(_GENERATED):
+                found = Path(str(sys.modules[name].__file__)).read_text(encoding="utf-8")
+            elif name in sources:
+                found = sources[name]
+            else:
+                continue  # not a module: a function of the package, say
+            reached[name] = found
+            pending.append(found)
     digest = hashlib.sha256(text.encode())
-    for stem in sorted(reached):
-        digest.update(f"\0{stem}\0{sources[stem]}".encode())
+    for name in sorted(reached):
+        digest.update(f"\0{name}\0{reached[name]}".encode())
     return digest.hexdigest()
 
 
@@ -81,7 +115,7 @@ def _file_stamp(path: str) -> str:
 class _ContentCache(_Cache):
     """Numba's cache protocol over one immutable file per function, signature, source, version and CPU."""
 
-    def __init__(self, function: Callable[..., Any]) -> None:
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
         self._name = function.__qualname__
         config = numba.config
         self._origin = (
@@ -91,6 +125,8 @@ class _ContentCache(_Cache):
             numba.__version__,
             llvmlite.__version__,
             (config.OPT, config.BOUNDSCHECK, config.DEBUGINFO_DEFAULT, config.USING_SVML),
+            sorted(options.items(), key=str),
+            sorted(_INNER.items(), key=str),
         )
 
     @property
@@ -104,12 +140,13 @@ class _ContentCache(_Cache):
     def load_overload(self, sig: Any, target_context: Any) -> CompileResult | None:
         target_context.refresh()
         path = self._path(sig, target_context.codegen())
-        try:
-            payload = pickle.loads(path.read_bytes())
-        except FileNotFoundError:
+        stored = read_private(path)
+        digest, entry = stored[:_DIGEST], stored[_DIGEST:]
+        if not entry or hashlib.sha256(entry).digest() != digest:  # none yet, or a damaged one: compiled anew
+            for call in before_compiling:
+                call(self._name)
             return None
-        except Exception:  # a damaged entry (full disk, lost power) is compiled anew and replaced
-            return None
+        payload = pickle.loads(entry)
         mark_used(path)
         return CompileResult._rebuild(target_context, *payload)
 
@@ -121,7 +158,8 @@ class _ContentCache(_Cache):
             )
         path = self._path(sig, data.codegen)
         with contextlib.suppress(OSError):  # a full disk costs a compile in the next process, not this run
-            write_atomically(path, numba.core.serialize.dumps(data._reduce()))
+            entry = numba.core.serialize.dumps(data._reduce())
+            write_atomically(path, hashlib.sha256(entry).digest() + entry)
             prune(path.parent)
 
     def enable(self) -> None:
@@ -201,7 +239,7 @@ def compiled(function: Any) -> Any:
 def _cached(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     dispatcher = numba.njit(**{**_OPTIONS, **options})(function)
     if dispatcher is not function:
-        dispatcher._cache = _ContentCache(function)
+        dispatcher._cache = _ContentCache(function, options)
     return dispatcher
 
 
@@ -260,14 +298,15 @@ def load_module(source: str, stem: str) -> ModuleType:
     """
     name = f"{stem}_{hashlib.sha256(source.encode()).hexdigest()[:20]}"
     with _lock:
-        full_name = f"nonsmooth_generated_{name}"
+        full_name = f"{_GENERATED}{name}"
         if full_name in sys.modules:
             return sys.modules[full_name]
         path = cache_folder() / "generated" / f"{name}.py"
         data = source.encode()
-        if not path.exists() or path.read_bytes() != data:
+        if read_private(path) != data:
             write_atomically(path, data)
             prune(path.parent)
+        make_private(path.parent / "__pycache__")
         mark_used(path)
         spec = importlib.util.spec_from_file_location(full_name, path)
         assert spec is not None and spec.loader is not None

@@ -133,6 +133,7 @@ def _fires(lo, hi, C, m, n, powers, rows, side, side_next, scale, tail, slack, a
             side_next[rows[best_row, 0]] = rows[best_row, 1]
             return NONE, -1
         cursor, begun = best, True
+    found[0] = 1  # too many crossings on one step: it is halved, or said to be not guaranteed
     return NONE, -1
 
 

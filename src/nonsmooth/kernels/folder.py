@@ -1,20 +1,26 @@
-"""Where compiled code is kept on disk: the folder, whole files only, and what nothing has used for long goes."""
+"""Where compiled code is kept on disk: a folder that nobody else may write, whole files only; unused ones are removed.
+
+What stands there is executed. So a folder, or a file in it, that belongs to another user or that others may write is
+not used, and new ones are made for the user alone.
+"""
 
 from __future__ import annotations
 
 import contextlib
-import getpass
 import os
+import stat
 import sys
 import tempfile
 import time
 import uuid
+import warnings
 from functools import cache
 from pathlib import Path
 
-__all__ = ["cache_folder", "mark_used", "prune", "usable_folder", "write_atomically"]
+__all__ = ["cache_folder", "make_private", "mark_used", "prune", "read_private", "usable_folder", "write_atomically"]
 
 UNUSED_DAYS = 90.0
+PARTS = ("", "compiled", "generated", "generated/__pycache__")
 
 
 def cache_folder() -> Path:
@@ -24,12 +30,13 @@ def cache_folder() -> Path:
     -------
     Path
         The environment variable ``NONSMOOTH_CACHE_DIR`` where set, else the user's cache folder of the
-        platform, else (neither can be written) a private folder among the temporary files.
+        platform, else (there is none, it cannot be written, or others may write it) a private folder among the
+        temporary files.
 
     Raises
     ------
     PermissionError
-        ``NONSMOOTH_CACHE_DIR`` is set and cannot be written.
+        ``NONSMOOTH_CACHE_DIR`` is set and cannot be written, or others may write it.
     """
     return usable_folder(os.environ.get("NONSMOOTH_CACHE_DIR", ""))
 
@@ -37,41 +44,92 @@ def cache_folder() -> Path:
 @cache
 def usable_folder(chosen: str) -> Path:
     if chosen:
-        folder = Path(chosen).expanduser().absolute()
+        folder = Path(os.path.expanduser(chosen)).absolute()
         if not _writable(folder):
             raise PermissionError(f"NONSMOOTH_CACHE_DIR={chosen} cannot be written: choose another folder or unset it")
+        if not _private(folder):
+            raise PermissionError(
+                f"NONSMOOTH_CACHE_DIR={chosen} belongs to another user, or others may write it or a folder in it, and "
+                f"what stands there is executed: choose another folder, or empty this one and `chmod go-w` it"
+            )
         return folder
-    if sys.platform == "win32":
-        base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
-    elif sys.platform == "darwin":
-        base = Path.home() / "Library" / "Caches"
-    else:
-        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    folder = base / "nonsmooth"
-    if _writable(folder):
+    found = _of_the_user()
+    if found is not None and _writable(found):
+        if _private(found):
+            return found
+        warnings.warn(
+            f"compiled code is not kept in {found}: it belongs to another user, or others may write it or a folder in "
+            f"it, and what stands there is executed; remove it, and it will be made anew",
+            stacklevel=2,
+        )
+    user = os.getuid() if hasattr(os, "getuid") else "user"
+    folder = Path(tempfile.gettempdir()) / f"nonsmooth-{user}"
+    if _writable(folder) and _private(folder):
         return folder
-    # Compiled code is executed, so a folder that somebody else could have made must not be trusted.
-    folder = Path(tempfile.gettempdir()) / f"nonsmooth-{getpass.getuser()}"
-    if _writable(folder, mode=0o700) and (not hasattr(os, "getuid") or folder.stat().st_uid == os.getuid()):
-        return folder
+    warnings.warn(
+        "no folder for compiled code: it is compiled again in each process; "
+        "set NONSMOOTH_CACHE_DIR to a folder that only you can write",
+        stacklevel=2,
+    )
     return Path(tempfile.mkdtemp(prefix="nonsmooth-"))
 
 
-def _writable(folder: Path, mode: int = 0o777) -> bool:
+def _of_the_user() -> Path | None:
+    """The platform's folder; None for a user without a home."""
     try:
-        folder.mkdir(parents=True, exist_ok=True, mode=mode)
+        if sys.platform == "win32":
+            base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+        elif sys.platform == "darwin":
+            base = Path.home() / "Library" / "Caches"
+        else:
+            base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    except RuntimeError:
+        return None
+    return base / "nonsmooth"
+
+
+def _writable(folder: Path) -> bool:
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(exist_ok=True, mode=0o700)
         tempfile.TemporaryFile(dir=folder).close()
     except OSError:
         return False
     return True
 
 
+def _private(folder: Path) -> bool:
+    """Whether only this user (and root) may write the folder and those of ours in it."""
+    return all(_own(path.stat()) for path in (folder / part for part in PARTS) if path.exists())
+
+
+def _own(found: os.stat_result) -> bool:
+    if not hasattr(os, "getuid"):  # Windows: a user's folders are private by inheritance
+        return True
+    return found.st_uid in (os.getuid(), 0) and not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+
+
+def read_private(path: Path) -> bytes:
+    """The content of a file that only this user may write; empty where there is none."""
+    try:
+        with path.open("rb") as file:
+            return file.read() if _own(os.fstat(file.fileno())) else b""
+    except OSError:
+        return b""
+
+
+def make_private(folder: Path) -> None:
+    folder.mkdir(exist_ok=True, mode=0o700)
+
+
 def write_atomically(path: Path, data: bytes) -> None:
     """Another process sees the whole file or none; the last of several writers of the same content wins."""
-    path.parent.mkdir(parents=True, exist_ok=True)
+    make_private(path.parent)
     unfinished = path.with_name(f"{path.name}.{uuid.uuid4().hex[:12]}.tmp")
+    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
     try:
-        unfinished.write_bytes(data)
+        with os.fdopen(os.open(unfinished, flags, 0o600), "wb") as file:
+            file.write(data)
         os.replace(unfinished, path)
     except OSError:
         with contextlib.suppress(OSError):

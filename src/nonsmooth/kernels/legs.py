@@ -95,21 +95,22 @@ def excess(C, D, n_u, powers):
 
 @device
 def step_for(C, D, n_u, remaining, guess, powers):
-    """A step on which all series have converged, at most ``remaining``; negative where a series is not finite."""
+    """A step on which all series have converged, at most ``remaining``; negative where there is none."""
     order = D.shape[2] - 1
     h = min(guess, remaining)
-    for _ in range(4):
+    for attempt in range(60):
         powers[0] = 1.0
         for k in range(order):
             powers[k + 1] = powers[k] * h
         worst = excess(C, D, n_u, powers)
         if not (worst < inf):
             return -1.0
-        if worst <= ACCURACY and (h >= remaining or worst > 1e-3 * ACCURACY):
+        # after four attempts a step may be shorter than it could be, but not longer
+        if worst <= ACCURACY and (h >= remaining or worst > 1e-3 * ACCURACY or attempt >= 4):
             return h
         factor = 10.0 if worst <= 0.0 else min(10.0, 0.97 * (ACCURACY / worst) ** (1.0 / order))
         h = min(h * factor, remaining)
-    return h
+    return -1.0
 
 
 @device

@@ -50,10 +50,13 @@ def derivative(scr, row, order, tau):
 
 @device
 def bracketed(scr, row, order, lo, hi):
-    """Root of ``derivative(order)`` where it changes sign on [lo, hi]: Newton, kept inside the bracket."""
+    """Root of ``derivative(order)`` where it changes sign on [lo, hi]: Newton, kept inside the bracket.
+
+    Where a change is not below half of the one before the bracket is halved instead: the bound is never reached."""
     rising = derivative(scr, row, order, hi) > 0.0
     tau = 0.5 * (lo + hi)
-    for _ in range(80):
+    last = hi - lo
+    for _ in range(200):
         value = derivative(scr, row, order, tau)
         if value == 0.0:
             return tau
@@ -63,8 +66,9 @@ def bracketed(scr, row, order, lo, hi):
             lo = tau
         slope = derivative(scr, row, order + 1, tau) if order < 2 else 0.0
         nxt = tau - value / slope if slope != 0.0 else lo
-        if not (lo < nxt < hi):
+        if not (lo < nxt < hi and 2.0 * fabs(nxt - tau) <= last):
             nxt = 0.5 * (lo + hi)
+        last = fabs(nxt - tau)
         if nxt == tau or not (lo < nxt < hi):
             return nxt
         tau = nxt

@@ -139,7 +139,7 @@ def dense(prop, rot, tay, info, mode, n_i, rates, w, tau, wn, scr, found, out):
 def refine(prop, rot, fun, tay, info, mode, n_i, w, f, sign, zero, guess, wn, scr, found):
     """The upward root of a functional near a good guess, on its polynomial beside the nearest node; -1: not found.
 
-    Halley's method: of third order, so that two steps mostly do."""
+    Halley's method: of third order, so that two steps mostly do. What has not converged is not found."""
     spacing = info[mode, 1]
     tau = guess
     result = -1.0
@@ -152,11 +152,10 @@ def refine(prop, rot, fun, tay, info, mode, n_i, w, f, sign, zero, guess, wn, sc
             if zero == 2:
                 scr[2, 1] = 0.0
         local = tau - node * spacing
-        good = True
+        converged = False
         slope = 1.0
         for _k in range(10):
-            good = fabs(local) <= 0.75 * spacing
-            if not good:
+            if not (fabs(local) <= 0.75 * spacing):
                 break
             value = horner(scr, 2, local)
             slope = slope_at(scr, 2, local)
@@ -165,9 +164,10 @@ def refine(prop, rot, fun, tay, info, mode, n_i, w, f, sign, zero, guess, wn, sc
             local -= change
             # the next change would be the cube of this one, over the square of the time scale
             if fabs(change) <= 1e-4 * spacing and fabs(change * half) <= 4e-6 * fabs(slope):
+                converged = True
                 break
         tau = node * spacing + local
-        if good:
+        if converged:
             if slope * sign > 0.0 and tau >= 0.0:
                 result = tau
             break
@@ -307,7 +307,9 @@ def search(
                     tau = refine(
                         prop, rot, fun, tay, info, mode, n_i, w, f, float(rows[row, 1]), flag, tau, wn, scr, found
                     )
-                    if tau < 0.0:
+                    # the root of another piece is not the one that is certain here
+                    if not ((node - 1e-6) * spacing <= tau <= (last + 1e-6) * spacing):
+                        tau = -1.0
                         break
                     found[0] = f
                     dense(prop, rot, tay, info, mode, n_i, rates, w, tau, wn, scr, found, end)

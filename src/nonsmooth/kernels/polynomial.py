@@ -154,12 +154,15 @@ def _halve(b, base, left, m):
 
 @device
 def _zero(a, m, lo, hi, way):
-    """The one zero in [lo, hi] of a, passed in the direction ``way``: Newton, kept inside its bracket."""
+    """The one zero in [lo, hi] of a, passed in the direction ``way``: Newton, kept inside its bracket.
+
+    Where a change is not below half of the one before the bracket is halved instead: the bound is never reached."""
     f_lo, f_hi = dense(a, m, lo), dense(a, m, hi)
     x = 0.5 * (lo + hi)
     if f_lo * f_hi < 0.0:
         x = min(max(lo + (hi - lo) * f_lo / (f_lo - f_hi), lo), hi)
-    for _ in range(100):
+    last = hi - lo
+    for _ in range(200):
         f, d = a[m], 0.0
         for k in range(m - 1, -1, -1):
             d = d * x + f
@@ -171,9 +174,10 @@ def _zero(a, m, lo, hi, way):
         else:
             lo = x
         new = x - f / d if d != 0.0 else -1.0
-        if not (lo <= new <= hi):
+        if not (lo <= new <= hi and 2.0 * fabs(new - x) <= last):
             new = 0.5 * (lo + hi)
-        if fabs(new - x) <= 2.0 * EPS * new or new == lo == hi:
+        last = fabs(new - x)
+        if last <= 2.0 * EPS * new or new == lo == hi:
             return new
         x = new
     return x
@@ -187,7 +191,8 @@ def _extremum(a, m, lo, hi, way):
     x = 0.5 * (lo + hi)
     if lo == 0.0 and hi == 1.0 and a[1] != a[1] + 2.0 * a[2]:
         x = min(max(-a[1] / (2.0 * a[2]), 0.0), 1.0)
-    for _ in range(100):
+    last = hi - lo
+    for _ in range(200):
         d, dd = m * a[m], 0.0
         for k in range(m - 1, 0, -1):
             dd = dd * x + d
@@ -199,9 +204,10 @@ def _extremum(a, m, lo, hi, way):
         else:
             hi = x
         new = x - d / dd if dd != 0.0 else -1.0
-        if not (lo <= new <= hi):
+        if not (lo <= new <= hi and 2.0 * fabs(new - x) <= last):
             new = 0.5 * (lo + hi)
-        if fabs(new - x) <= 1e-9 or new == lo == hi:
+        last = fabs(new - x)
+        if last <= 1e-9 or new == lo == hi:
             return new
         x = new
     return x

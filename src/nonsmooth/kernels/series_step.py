@@ -36,16 +36,16 @@ def triggered(mode, t, period, net):
 
 @device
 def converged(C, m, n, n_indicators, h, scale):
-    """Shorten an exact step until the series of nonlinear indicators has converged as well."""
+    """Shorten an exact step until the series of nonlinear indicators has converged as well; 0 where it does not."""
     for _ in range(60):
         worst, power = 0.0, h ** (m - 1)
         for i in range(n_indicators):
             if scale[i] > 0.0:
                 worst = max(worst, (fabs(C[n + i, m - 1]) * power + fabs(C[n + i, m]) * power * h) / scale[i])
         if not (worst > 1e-16):
-            break
+            return h
         h *= 0.8
-    return h
+    return 0.0
 
 
 @inline
@@ -59,9 +59,11 @@ def failed(u, n, largest):
 
 @device
 def polished(values, mode, t, q, C, m, n, row, h, tau, u_dense, vals):
-    """A zero of the interpolated indicator ``row``, moved to the zero of the indicator of the dense state."""
+    """A zero of the interpolated indicator ``row``, moved to the zero of the indicator of the dense state.
+
+    Where Newton's method does not get there the interpolated one stands, which has the error of the step."""
     at = tau
-    for _ in range(4):
+    for _ in range(12):
         dense_states(C, m, n, at, u_dense)
         values(mode, t + at, u_dense, q, vals)
         slope = 0.0
@@ -74,8 +76,8 @@ def polished(values, mode, t, q, C, m, n, row, h, tau, u_dense, vals):
             break
         at -= move
         if fabs(move) <= 1e-8 * h:  # the next move would be its square
-            break
-    return at
+            return at
+    return tau
 
 
 @device

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth.plot import palette, style
-from nonsmooth.plot.basins import kind_of
-from nonsmooth.plot.labels import label, only_states, variable_along
+from nonsmooth.plot.basins import kind_of, told_apart
+from nonsmooth.plot.labels import name_and_unit, name_axes, only_states, variable_along
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -49,9 +49,10 @@ def basin_fractions(result: xr.Dataset, ax: Axes | None = None, *, y: str | None
             drawn.set(ylabel="share of starts (%)", ylim=(0, 100))
         else:
             _maxima(result, drawn, values, y)
-            drawn.set(ylabel=f"max {label(result, y)}")
+            text, unit = name_and_unit(result, y)
+            name_axes(drawn, y=(f"max {text}", unit))
         drawn.margins(x=0)
-        drawn.set(xlabel=label(result, parameter))
+        name_axes(drawn, name_and_unit(result, parameter))
         drawn.legend(  # above the axes, and above the power of ten of the ordinate
             loc="lower center", bbox_to_anchor=(0.5, 1.0 if y is None else 1.06), ncols=2, handlelength=1.0,
             handleheight=1.0, columnspacing=1.0,
@@ -68,21 +69,25 @@ def _names(result: xr.Dataset, k: int) -> str:
     distinct = list(dict.fromkeys(kinds))
     periods = [kind.removeprefix("period ") for kind in distinct if kind.startswith("period")]
     words = [f"period {', '.join(periods)}"] if periods else []
-    return f"{k}: " + ", ".join(words + [kind for kind in distinct if not kind.startswith("period")])
+    return ", ".join(words + [kind for kind in distinct if not kind.startswith("period")])
+
+
+def _all_names(result: xr.Dataset) -> list[str]:
+    return told_apart([_names(result, k) for k in range(result.sizes["attractor"])])
 
 
 def _shares(result: xr.Dataset, drawn: Axes, values: np.ndarray) -> None:
     shares = [100 * result["fraction"].values[:, k] for k in range(result.sizes["attractor"])]
     shares.append(100 * (result["not_converged"] + result["diverged"]).values)
     colors = [palette.attractor_color(k) for k in range(len(shares) - 1)] + [palette.UNKNOWN]
-    names = [_names(result, k) for k in range(len(shares) - 1)] + ["none reached"]
+    names = [*_all_names(result), "none reached"]
     if not shares[-1].any():
         shares, colors, names = shares[:-1], colors[:-1], names[:-1]
     drawn.stackplot(values, *shares, colors=colors, labels=names, edgecolor="black", linewidth=0.3)
 
 
 def _maxima(result: xr.Dataset, drawn: Axes, values: np.ndarray, y: str) -> None:
-    for k in range(result.sizes["attractor"]):
+    for k, name in enumerate(_all_names(result)):
         heights = result["maximum"].sel(state=y).values[:, k]
         share = result["fraction"].values[:, k]
         good = np.isfinite(heights)
@@ -92,5 +97,5 @@ def _maxima(result: xr.Dataset, drawn: Axes, values: np.ndarray, y: str) -> None
             edgecolors="black", linewidths=0.3,
         )  # fmt: skip
         drawn.scatter(  # of one size in the legend, whatever the share
-            [], [], s=25, color=palette.attractor_color(k), edgecolors="black", linewidths=0.3, label=_names(result, k)
+            [], [], s=25, color=palette.attractor_color(k), edgecolors="black", linewidths=0.3, label=name
         )

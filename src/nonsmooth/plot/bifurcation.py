@@ -8,7 +8,7 @@ import numpy as np
 
 from nonsmooth.plot import style
 from nonsmooth.plot.branch import draw_branch
-from nonsmooth.plot.labels import column, first_states, label, variable_along
+from nonsmooth.plot.labels import column, first_states, name_and_unit, name_axes, variable_along
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -16,8 +16,9 @@ if TYPE_CHECKING:
 
 __all__ = ["bifurcation", "sorted_out"]
 
-_LINES = ("second", "third", "fourth")
+_LINES = ("section", "third", "fourth")
 _COLORS = {"up": "first", "down": "second", "none": "section"}
+_SEAM = 2.0  # a rising point over a falling one, which lies on it: both show
 
 
 def bifurcation(
@@ -33,16 +34,17 @@ def bifurcation(
     Parameters
     ----------
     result
-        A ``sweep`` (or ``frequency_response``); of one swept both ways, the falling one is drawn on top.
+        A ``sweep`` (or ``frequency_response``); of one swept both ways, the falling one lies on the rising one, whose
+        points are larger and show round its own.
     *over
-        Branches of ``continue_orbit`` over the same parameter: stable solid, unstable dashed, special points marked.
-        Axes to draw on may stand here too, as in the other plots.
+        Branches of ``continue_orbit`` over the same parameter: stable parts as a pale seam under the points, unstable
+        ones dashed, special points marked. Axes to draw on may stand here too, as in the other plots.
     ax
         Where to draw; a new one-column figure if None.
     y
         The state of the ordinate; by default the first.
     size
-        Diameter of a point in typographic points.
+        Diameter of a point in typographic points; of a rising sweep under a falling one, half of it.
     color
         One colour for all points instead of one per direction.
 
@@ -62,21 +64,21 @@ def bifurcation(
         for i, direction in enumerate(directions):
             cloud = points.isel(direction=i) if "direction" in points.dims else points
             values = np.broadcast_to(result[parameter].values, cloud.transpose(..., parameter).shape)
+            under = direction == "up" and "down" in directions
             drawn.plot(
                 values.ravel(), cloud.transpose(..., parameter).values.ravel(), ".", rasterized=True,
-                markersize=size, markeredgewidth=0, color=color or style.COLORS[_COLORS[direction]],
+                markersize=size * (_SEAM if under else 1.0), markeredgewidth=0,
+                color=color or style.COLORS["pale" if under else _COLORS[direction]],
                 label=direction if len(directions) > 1 else None,
             )  # fmt: skip
-        if len(directions) > 1:
-            drawn.legend(markerscale=6 / max(size, 0.1), loc="best")
         for k, one in enumerate(branches):
-            draw_branch(drawn, one, y=name, color=style.COLORS[_LINES[k % len(_LINES)]])
-        if branches and (drawn.get_legend_handles_labels()[1] or len(directions) > 1):
-            drawn.legend(loc="best", markerscale=1.0)
+            draw_branch(drawn, one, y=name, color=style.COLORS[_LINES[k % len(_LINES)]], behind=True)
+        if len(directions) > 1 or branches:
+            style.even_dots(drawn.legend(loc="best"))
         # The whole sweep shows, its ends too where every point diverged.
         drawn.dataLim.update_from_data_x(result[parameter].values, ignore=False)
         drawn.margins(x=0)
-        drawn.set(xlabel=label(result, parameter), ylabel=label(result, name))
+        name_axes(drawn, name_and_unit(result, parameter), name_and_unit(result, name))
     return drawn
 
 

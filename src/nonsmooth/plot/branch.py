@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nonsmooth.plot import style
-from nonsmooth.plot.labels import label, only_states, variable_along
+from nonsmooth.plot.labels import name_and_unit, name_axes, only_states, variable_along
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,6 +29,11 @@ MARKS = {
     "boundary_equilibrium": ("p", "boundary equilibrium"),
 }
 _OTHER = "*"
+#: Diameters in points. Several kinds meet at one point where a branch grazes: the smaller one lies on the larger.
+_SIZES = {"fold": 6.5, "flip": 5.5}
+_SIZE = 4.0
+_STATES = {"-": "stable", "--": "unstable", ":": "virtual"}
+_SEAM = 0.3  # opacity of a stable branch under the points that lie on it
 _WORDS = {"section": "", "maximum": "largest ", "minimum": "smallest ", "amplitude": "amplitude of "}
 
 
@@ -64,9 +69,8 @@ def branch(
         draw_branch(drawn, result, y=y, quantity=quantity, special=special, color=color)
         parameter = _parameter(result)
         (name,) = only_states(result, y)
-        drawn.set(xlabel=label(result, parameter), ylabel=_ordinate(result, name, quantity))
-        if special and result.sizes.get("special", 0):
-            drawn.legend(loc="best")
+        name_axes(drawn, name_and_unit(result, parameter), _ordinate(result, name, quantity))
+        drawn.legend(loc="best")
     return drawn
 
 
@@ -79,8 +83,12 @@ def draw_branch(
     special: bool = True,
     color: str | None = None,
     width: float = 0.9,
+    behind: bool = False,
 ) -> None:
-    """Draw the lines (``width`` in typographic points) and marks of a branch on axes that the caller labels."""
+    """Draw the lines (``width`` in typographic points) and marks of a branch on axes that the caller labels.
+
+    ``behind``: over points of a sweep, which lie on the stable parts: those become a pale, wide seam under them.
+    """
     variable_along(result, "stable", "continue_orbit")
     if quantity not in _WORDS:
         raise ValueError(f"quantity = {quantity!r}; allowed: {', '.join(map(repr, _WORDS))}")
@@ -96,8 +104,17 @@ def draw_branch(
         chosen = _with_neighbours(wanted, virtual if line != ":" else np.zeros_like(virtual))
         if not chosen.any():
             continue
+        under = behind and line == "-"
+        looks: dict[str, Any] = {"linewidth": width, "zorder": 3}
+        if under:
+            looks = {"linewidth": 3 * width, "alpha": _SEAM, "zorder": 0.5}
+        words = f"{_STATES[line]} branch"
         for row in ordinates:
-            ax.plot(values, np.where(chosen, row, np.nan), line, color=shade, linewidth=width, zorder=3)
+            known = ax.get_legend_handles_labels()[1]
+            ax.plot(
+                values, np.where(chosen, row, np.nan), line, color=shade, label=None if words in known else words,
+                **looks,
+            )  # fmt: skip
     if special:
         _mark(ax, result, ordinates)
 
@@ -127,10 +144,11 @@ def _mark(ax: Axes, result: xr.Dataset, ordinates: NDArray[np.float64]) -> None:
     for kind in dict.fromkeys(kinds):
         here = np.array([one == kind for one in kinds])
         marker, words = MARKS.get(kind, (_OTHER, kind.replace("_", " ")))
+        size = _SIZES.get(kind, _SIZE)
         ax.plot(
-            np.tile(values[here], len(heights)), heights[:, here].ravel(), marker, markersize=4, zorder=5,
-            linestyle="none", markerfacecolor="white", markeredgecolor=style.COLORS["section"], markeredgewidth=0.8,
-            label=None if words in known else words,
+            np.tile(values[here], len(heights)), heights[:, here].ravel(), marker, markersize=size,
+            zorder=5.7 - 0.1 * size, linestyle="none", markerfacecolor="white",
+            markeredgecolor=style.COLORS["section"], markeredgewidth=0.8, label=None if words in known else words,
         )  # fmt: skip
 
 
@@ -139,8 +157,9 @@ def _parameter(result: xr.Dataset) -> str:
     return str(result.attrs["parameter"])
 
 
-def _ordinate(result: xr.Dataset, name: str, quantity: str) -> str:
-    return _WORDS[quantity] + label(result, name)
+def _ordinate(result: xr.Dataset, name: str, quantity: str) -> tuple[str, str]:
+    text, unit = name_and_unit(result, name)
+    return _WORDS[quantity] + text, unit
 
 
 def _virtual(result: xr.Dataset) -> NDArray[np.bool_]:

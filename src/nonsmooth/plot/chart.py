@@ -8,7 +8,7 @@ import numpy as np
 
 from nonsmooth.plot import palette, style
 from nonsmooth.plot.cells import cell_edges
-from nonsmooth.plot.labels import label, only_states, variable_along
+from nonsmooth.plot.labels import name_and_unit, name_axes, only_states, variable_along
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -59,7 +59,7 @@ def chart(
                 (name,) = only_states(result, y)
                 values = values.sel(state=name)
             _numbers(values, drawn, first, second, show)
-        drawn.set(xlabel=label(result, first), ylabel=label(result, second))
+        name_axes(drawn, name_and_unit(result, first), name_and_unit(result, second))
     return drawn
 
 
@@ -108,4 +108,4 @@ def _numbers(values: xr.DataArray, drawn: Axes, first: str, second: str, show: s
     unit = values.attrs.get("units", "1")
     text = values.attrs.get("long_name", show)
     extend = "both" if show == "lyapunov" else "neither"
-    drawn.figure.colorbar(mesh, ax=drawn, label=text if unit in ("", "1") else f"{text} ({unit})", extend=extend)
+    name_axes(drawn.figure.colorbar(mesh, ax=drawn, extend=extend).ax, y=(text, unit))

@@ -8,7 +8,7 @@ import numpy as np
 
 from nonsmooth.plot import style
 from nonsmooth.plot.comparison import ABOVE, MEASURED, THEORY, check_kind, measured_label
-from nonsmooth.plot.labels import first_states, label
+from nonsmooth.plot.labels import first_states, name_and_unit, name_axes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -18,7 +18,7 @@ __all__ = ["comparison_diagram"]
 
 
 def comparison_diagram(result: xr.Dataset, ax: Axes | None = None, *, y: str | None = None, size: float = 1.6) -> Axes:
-    """Draw a comparison of a diagram: theory as a pale cloud, measured points in black, flips as ticks at the top.
+    """Draw a comparison of a diagram: theory as a pale cloud, measured points in black, flips as marks at the top.
 
     Parameters
     ----------
@@ -51,13 +51,46 @@ def comparison_diagram(result: xr.Dataset, ax: Axes | None = None, *, y: str | N
             result[f"measured_{parameter}"].values, result["measured_section"].sel(state=name).values, ".",
             color=MEASURED, markersize=size, markeredgewidth=0, rasterized=True, label=measured_label(result),
         )  # fmt: skip
-        top = drawn.get_xaxis_transform()
-        for row in range(result.sizes.get("flip", 0)):
-            seen, expected = (float(result[key].values[row]) for key in ("measured_flip", "theory_flip"))
-            for place, color in ((expected, THEORY), (seen, MEASURED)):
-                if np.isfinite(place):
-                    drawn.plot([place, place], [0.94, 1.0], color=color, linewidth=1.2, transform=top, zorder=6)
+        _flips(drawn, result)
         drawn.margins(x=0)
-        drawn.legend(**ABOVE, ncols=2, markerscale=4, columnspacing=1.0, handletextpad=0.4)
-        drawn.set(xlabel=label(result, parameter), ylabel=label(result, name))
+        style.even_dots(drawn.legend(**ABOVE, ncols=2, columnspacing=1.0))
+        name_axes(drawn, name_and_unit(result, parameter), name_and_unit(result, name))
     return drawn
+
+
+def _flips(ax: Axes, result: xr.Dataset) -> None:
+    """Ticks at the top: where theory flips, where the record does, and where it would without its delay.
+
+    A parameter that moves while it is recorded delays a flip; an arrow leads from the flip as read to the one with the
+    delay taken out, whose bar is its uncertainty.
+    """
+    top = ax.get_xaxis_transform()
+    count = result.sizes.get("flip", 0)
+    found = {
+        kind: result[kind].values if kind in result else np.full(count, np.nan)
+        for kind in ("theory_flip", "measured_flip_read", "measured_flip", "measured_flip_error")
+    }
+    word = measured_label(result)
+
+    def once(words: str) -> str | None:
+        return None if words in ax.get_legend_handles_labels()[1] else words
+
+    for expected, read, still, error in zip(*found.values(), strict=True):
+        if np.isfinite(expected):
+            ax.plot([expected] * 2, [0.93, 1.0], color=THEORY, linewidth=2.0, transform=top, zorder=6,
+                    solid_capstyle="butt", label=once("flip, theory"))  # fmt: skip
+        moved = np.isfinite(read) and np.isfinite(still) and read != still
+        if np.isfinite(read):
+            ax.plot([read] * 2, [0.93, 1.0], color=MEASURED, linewidth=1.2, transform=top, zorder=6,
+                    solid_capstyle="butt", label=once(f"flip, {word}"))  # fmt: skip
+        if moved:
+            ax.annotate(
+                "", (still, 0.965), (read, 0.965), xycoords=top, textcoords=top, zorder=5,
+                arrowprops={"arrowstyle": "->", "color": MEASURED, "linewidth": 0.6, "shrinkA": 0, "shrinkB": 3},
+            )  # fmt: skip
+        if np.isfinite(still) and (moved or not np.isfinite(read)):
+            ax.errorbar(
+                [still], [0.965], xerr=[error] if np.isfinite(error) else None, fmt="D", color=MEASURED, markersize=3.5,
+                markerfacecolor="white", markeredgewidth=0.8, elinewidth=0.8, capsize=1.5, transform=top, zorder=6,
+                label=once(f"flip, {word}, delay taken out"),
+            )  # fmt: skip

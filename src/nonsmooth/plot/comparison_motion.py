@@ -8,7 +8,8 @@ import numpy as np
 
 from nonsmooth.plot import style
 from nonsmooth.plot.comparison import MEASURED, THEORY, check_kind, measured_label
-from nonsmooth.plot.labels import first_states, label
+from nonsmooth.plot.labels import first_states, name_and_unit, name_axes
+from nonsmooth.plot.phase_portrait import shade_zone
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -59,7 +60,8 @@ def comparison_time(result: xr.Dataset, ax: Axes | None = None, *, y: str | None
         low_y, high_y = drawn.get_ylim()
         drawn.set_ylim(low_y, high_y + 0.22 * (high_y - low_y))  # room for the legend
         drawn.legend(loc="upper center", ncols=3, columnspacing=1.0, handlelength=1.4)
-        drawn.set(xlabel="time (forcing periods)", ylabel=label(result, name))
+        drawn.set_xlabel("time (forcing periods)")
+        name_axes(drawn, y=name_and_unit(result, name))
     return drawn
 
 
@@ -105,18 +107,14 @@ def comparison_phase_portrait(
                 *points, "o", color=color, markersize=4.5 if ring else 0.9 if side == "theory" else 2.0,
                 markerfacecolor="none" if ring else color, markeredgewidth=0.9 if ring else 0,
                 zorder=4 if side == "theory" else 5, rasterized=points[0].size > 500, linestyle="none",
+                label=f"section points, {word}",
             )  # fmt: skip
         if zone is not None:
-            edge = float(result[zone]) if isinstance(zone, str) else zone
-            left, right = drawn.get_xlim()
-            drawn.axvline(edge, color=style.COLORS["muted"], linewidth=0.6, linestyle="--", zorder=1)
-            if edge < right:
-                drawn.axvspan(max(edge, left), right, color=style.COLORS["zone"], alpha=0.18, linewidth=0, zorder=0)
-            drawn.set_xlim(left, right)
+            shade_zone(drawn, float(result[zone]) if isinstance(zone, str) else zone)
         low, high = drawn.get_ylim()
         drawn.set_ylim(low, high + 0.15 * (high - low))
         drawn.legend(loc="upper center", ncols=2)
-        drawn.set(xlabel=label(result, names[0]), ylabel=label(result, names[1]))
+        name_axes(drawn, name_and_unit(result, names[0]), name_and_unit(result, names[1]))
     return drawn
 
 
@@ -150,7 +148,7 @@ def comparison_section(
         if np.isfinite(distance):
             drawn.set_title(f"energy distance {distance:.3f}; 95 % of its own halves below {limit:.3f}", loc="left")
         drawn.legend(markerscale=1 if few else 4, loc="best")
-        drawn.set(xlabel=label(result, names[0]), ylabel=label(result, names[1]))
+        name_axes(drawn, name_and_unit(result, names[0]), name_and_unit(result, names[1]))
     return drawn
 
 

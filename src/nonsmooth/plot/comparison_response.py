@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nonsmooth.plot import style
 from nonsmooth.plot.comparison import ABOVE, check_kind, measured_label
-from nonsmooth.plot.labels import first_states, label
+from nonsmooth.plot.labels import first_states, name_and_unit, name_axes, with_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 __all__ = ["comparison_response"]
 
+#: Height in points of a jump's number above its marks: a rising and a falling one may lie at one place.
+_LIFT = {"up": 5, "down": 14}
 _LOOKS = {"up": ("first", "^", "-", "increasing"), "down": ("second", "v", "--", "decreasing")}
 
 
@@ -29,7 +31,7 @@ def comparison_response(result: xr.Dataset, ax: Axes | None = None, *, digits: i
     ax
         Where to draw; a new one-column figure if None.
     digits
-        Digits after the point of the jumps written into the legend.
+        Digits after the point of the differences between jumps, predicted less measured.
     """
     check_kind(result, "response")
     parameter = str(result["theory_amplitude"].dims[0])
@@ -56,15 +58,20 @@ def comparison_response(result: xr.Dataset, ax: Axes | None = None, *, digits: i
         _jumps(drawn, result, digits)
         drawn.set_ylim(bottom=0)
         drawn.margins(x=0.02)
-        # Clear of the power of ten at the top of the axis.
-        drawn.legend(**{**ABOVE, "bbox_to_anchor": (1.0, 1.07)}, ncols=2, handlelength=1.6, columnspacing=1.2)
-        drawn.set(xlabel=label(result, parameter), ylabel=f"amplitude of {label(result, state)}")
+        drawn.legend(**ABOVE, ncols=2, handlelength=1.6, columnspacing=1.2)
+        text, unit = name_and_unit(result, state)
+        name_axes(drawn, name_and_unit(result, parameter), (f"amplitude of {text}", unit))
     return drawn
 
 
 def _jumps(ax: Axes, result: xr.Dataset, digits: int) -> None:
-    """A tick at the foot for each jump: filled where measured, open where predicted, with the difference."""
+    """A mark at the foot for each jump: filled where measured, open where predicted, with the difference."""
     foot = ax.get_xaxis_transform()
+    names: dict[str, Any] = {"color": style.COLORS["muted"], "markersize": 3.5, "linestyle": "none"}
+    for key, word, face in (("measured_jump", measured_label(result), None), ("theory_jump", "theory", "white")):
+        if np.isfinite(result[key].values if key in result else np.nan).any():
+            ax.plot([], [], "D", markerfacecolor=face, label=f"jump, {word}", **names)
+    differences = False
     for row in range(result.sizes.get("jump", 0)):
         direction = str(result["jump_direction"].values[row])
         color = style.COLORS[_LOOKS[direction][0]]
@@ -77,7 +84,13 @@ def _jumps(ax: Axes, result: xr.Dataset, digits: int) -> None:
                 clip_on=False, zorder=6,
             )  # fmt: skip
         if np.isfinite(seen) and np.isfinite(expected):
+            number = f"{expected - seen:+.{digits}f}".replace("-", "\N{MINUS SIGN}")
             ax.annotate(
-                f"{expected - seen:+.{digits}f}", ((seen + expected) / 2, 0.03), (0, 6), xycoords=foot,
-                textcoords="offset points", ha="center", fontsize="x-small", color=color,
+                number, ((seen + expected) / 2, 0.03), (0, _LIFT[direction]), xycoords=foot,
+                textcoords="offset points", ha="center", fontsize=style.small(ax), color=color, zorder=6,
+                path_effects=style.halo(),
             )  # fmt: skip
+            differences = True
+    if differences:
+        unit = name_and_unit(result, str(result["theory_amplitude"].dims[0]))[1]
+        ax.plot([], [], linestyle="none", label=with_unit("numbers: theory less measured", unit))

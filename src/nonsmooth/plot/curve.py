@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from nonsmooth.plot import style
-from nonsmooth.plot.labels import label, variable_along
+from nonsmooth.plot.labels import name_and_unit, name_axes, variable_along
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -66,11 +66,11 @@ def curve(result: xr.Dataset, ax: Axes | None = None, *, special: bool = True, c
         known = drawn.get_legend_handles_labels()[1]
         drawn.plot(
             result[x].values, result[y].values, line, color=color or style.COLORS[shade], linewidth=1.0, zorder=3,
-            label=None if words in known else words, path_effects=_seam() if _over_chart(drawn) else None,
+            label=None if words in known else words, path_effects=style.halo(1.8) if _over_chart(drawn) else None,
         )  # fmt: skip
         if special:
             _mark(drawn, result, x, y)
-        drawn.set(xlabel=label(result, x), ylabel=label(result, y))
+        name_axes(drawn, name_and_unit(result, x), name_and_unit(result, y))
         _legend(drawn)
     return drawn
 
@@ -81,18 +81,12 @@ def _over_chart(ax: Axes) -> bool:
     return any(isinstance(item, QuadMesh) for item in ax.collections)
 
 
-def _seam() -> list[Any]:
-    """A white seam, so that a line shows over every colour of a chart."""
-    from matplotlib import patheffects
-
-    return [patheffects.withStroke(linewidth=1.8, foreground="white")]
-
-
 def _legend(ax: Axes) -> None:
     """The legend of the curves; that of a chart beneath them stays, and the new one stands below it."""
     own, before = ax.get_legend_handles_labels()[1], ax.get_legend()
     if before is not None and not {text.get_text() for text in before.get_texts()} <= set(own):
         ax.add_artist(before)
+        before.set_clip_on(False)  # else the layout takes it for a thing within the axes, and cuts it
     if _over_chart(ax):
         ax.legend(loc="lower left", bbox_to_anchor=(1.01, 0.0), borderaxespad=0.0)
     else:

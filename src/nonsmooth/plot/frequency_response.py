@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from nonsmooth.plot import style
 from nonsmooth.plot.bifurcation import sorted_out
 from nonsmooth.plot.branch import draw_branch
-from nonsmooth.plot.labels import column, first_states, label, variable_along
+from nonsmooth.plot.labels import column, first_states, name_and_unit, name_axes, variable_along
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -22,10 +22,6 @@ _LOOKS: dict[str, dict[str, Any]] = {
     "up": {"color": style.COLORS["first"], "linestyle": "-"},
     "down": {"color": style.COLORS["second"], "linestyle": "--"},
     "none": {"color": style.COLORS["section"], "linestyle": "none", "marker": ".", "markersize": 1.5},
-}
-_POINTS = {  # beside branches, whose lines are solid and dashed
-    key: {"color": _LOOKS[key]["color"], "linestyle": "none", "marker": ".", "markersize": size, "markeredgewidth": 0}
-    for key, size in {"up": 4.5, "down": 3.0, "none": 1.8}.items()
 }
 _WORDS = {"up": "increasing", "down": "decreasing", "none": "each from its start"}
 
@@ -46,8 +42,8 @@ def frequency_response(
     result
         What ``frequency_response`` gave.
     *over
-        Branches of ``continue_orbit`` over the same parameter: stable solid, unstable dashed, special points marked;
-        the response is then drawn as points. Axes to draw on may stand here too, as in the other plots.
+        Branches of ``continue_orbit`` over the same parameter: stable parts as a pale seam under the response, unstable
+        ones dashed, special points marked. Axes to draw on may stand here too, as in the other plots.
     ax
         Where to draw; a new one-column figure if None.
     y
@@ -65,7 +61,6 @@ def frequency_response(
     values = result[parameter].values
     heights = column(result, quantity, name)
     ax, branches = sorted_out(over, ax, parameter)
-    looks = _POINTS if branches else _LOOKS
     with style.axes(ax) as drawn:
         for i, direction in enumerate(np.atleast_1d(result["direction"].values).astype(str)):
             one = heights.isel(direction=i) if "direction" in heights.dims else heights
@@ -74,15 +69,15 @@ def frequency_response(
                 found = _intervals(values, curve, _jumps(result, direction, k))
                 at = [i for _, i in found]
                 broken = np.insert(values, at, np.nan), np.insert(curve, at, np.nan)
-                drawn.plot(*broken, label=_WORDS[direction] if k == 0 else None, **looks[direction])
+                drawn.plot(*broken, label=_WORDS[direction] if k == 0 else None, **_LOOKS[direction])
                 if jumps:
                     for place, i in found:
                         _mark(drawn, curve, i, values[0] <= values[-1], place, direction, digits)
         for behind in branches:
-            draw_branch(drawn, behind, y=name, quantity=quantity, color=style.COLORS["section"], width=0.6)
+            draw_branch(drawn, behind, y=name, quantity=quantity, color=style.COLORS["section"], width=0.7, behind=True)
         drawn.legend(loc="best")
         drawn.margins(x=0)
-        drawn.set(xlabel=label(result, parameter), ylabel=_ordinate(result, name, quantity))
+        name_axes(drawn, name_and_unit(result, parameter), _ordinate(result, name, quantity))
     return drawn
 
 
@@ -127,10 +122,12 @@ def _mark(
     small = abs(after - before) < 0.2 * np.ptp(curve[np.isfinite(curve)])  # no room beside the arrow: below it
     where, offset = (min(before, after), (side, -3)) if small else ((before + after) / 2, (side, 0))
     ax.annotate(
-        f"{place:.{digits}g}", (place, where), offset, textcoords="offset points", color=color, fontsize="small",
-        rotation=90, va="top" if small else "center", ha="left" if side > 0 else "right",
+        f"{place:.{digits}g}", (place, where), offset, textcoords="offset points", color=color, rotation=90,
+        fontsize=style.small(ax), va="top" if small else "center", ha="left" if side > 0 else "right", zorder=6,
+        path_effects=style.halo(),
     )  # fmt: skip
 
 
-def _ordinate(result: xr.Dataset, name: str, quantity: str) -> str:
-    return f"{quantity} of {label(result, name)}"
+def _ordinate(result: xr.Dataset, name: str, quantity: str) -> tuple[str, str]:
+    text, unit = name_and_unit(result, name)
+    return f"{quantity} of {text}", unit

@@ -8,12 +8,16 @@ from nonsmooth.system.parameter import latex_name
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.axes import Axes
 
-__all__ = ["column", "first_states", "label", "name_with_unit", "only_states", "variable_along", "words_of_flags"]
+__all__ = [
+    "column", "first_states", "name_and_unit", "name_axes", "only_states", "symbol_of", "variable_along", "with_unit",
+    "words_of_flags",
+]  # fmt: skip
 
 
-def label(result: xr.Dataset, name: str) -> str:
-    """``$\\rho$ (N)``: the symbol in italics and the unit, for a state, a parameter or an output."""
+def name_and_unit(result: xr.Dataset, name: str) -> tuple[str, str]:
+    """``("$\\rho$", "N")``: symbol and unit of a state, a parameter or an output, the unit being that of its values."""
     symbol, unit = "", "1"
     if "state" in result.coords and name in result["state"].values:
         at = result["state"].values.tolist().index(name)
@@ -22,13 +26,29 @@ def label(result: xr.Dataset, name: str) -> str:
     elif name in result.variables:
         attrs = result[name].attrs
         unit, symbol = attrs.get("units", "1"), attrs.get("symbol", "")
-    return name_with_unit("t" if name == "time" else name, unit, symbol)
+    return symbol_of("t" if name == "time" else name, symbol), unit
 
 
-def name_with_unit(name: str, unit: str, symbol: str = "") -> str:
-    """The label itself, where there is no result to look the unit and the symbol up in."""
-    text = f"${symbol}$" if symbol else _plain(name)
+def with_unit(text: str, unit: str) -> str:
+    """``text (unit)``; of what has no unit the text alone."""
     return text if unit in ("", "1") else f"{text} ({unit})"
+
+
+def name_axes(ax: Axes, x: tuple[str, str] | None = None, y: tuple[str, str] | None = None) -> None:
+    """Label the axes with quantities and units, in the prefixes that suit what is drawn: see ``plot.units``."""
+    from nonsmooth.plot.units import name_axis
+
+    for axis, named in ((ax.xaxis, x), (ax.yaxis, y)):
+        if named is not None:
+            name_axis(axis, *named)
+
+
+def symbol_of(name: str, symbol: str = "") -> str:
+    """``$x$``: the symbol in italics, made from the name where none is given; ``contact force`` stays words."""
+    if symbol:
+        return f"${symbol}$"
+    latex = latex_name(name)
+    return name.replace("_", " ") if latex.startswith(r"\mathrm") else f"${latex}$"
 
 
 def column(result: xr.Dataset, variable: str, name: str) -> xr.DataArray:
@@ -91,9 +111,3 @@ def only_states(result: xr.Dataset, *names: str | None) -> list[str]:
 def words_of_flags(array: xr.DataArray) -> list[str]:
     """The words of a variable's ``flag_meanings``: the modes' names, the transitions' labels."""
     return str(array.attrs["flag_meanings"]).split()
-
-
-def _plain(name: str) -> str:
-    """A name without a symbol of its own: ``rho`` and ``k_s`` as mathematics, ``contact_force`` as words."""
-    latex = latex_name(name)
-    return name.replace("_", " ") if latex.startswith(r"\mathrm") else f"${latex}$"

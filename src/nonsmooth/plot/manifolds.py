@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth.plot import style
-from nonsmooth.plot.labels import label, only_states, variable_along, words_of_flags
+from nonsmooth.plot.labels import name_and_unit, name_axes, only_states, variable_along, words_of_flags
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -65,6 +65,6 @@ def manifolds(
             markeredgewidth=0.9, zorder=5,
             label=None if "saddle" in drawn.get_legend_handles_labels()[1] else "saddle",
         )  # fmt: skip
-        drawn.set(xlabel=label(result, names[0]), ylabel=label(result, names[1]))
+        name_axes(drawn, name_and_unit(result, names[0]), name_and_unit(result, names[1]))
         drawn.legend(loc="best")
     return drawn

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.plot import style
-from nonsmooth.plot.labels import label, variable_along
+from nonsmooth.plot.labels import name_and_unit, name_axes, variable_along
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -49,7 +49,7 @@ def multipliers(result: xr.Dataset | Any, ax: Axes | None = None, *, limit: floa
             dots = drawn.scatter(
                 mu.real.ravel(), mu.imag.ravel(), c=shade.ravel(), s=4, cmap="viridis", linewidths=0, zorder=3
             )
-            drawn.figure.colorbar(dots, ax=drawn, label=label(data, name))
+            name_axes(drawn.figure.colorbar(dots, ax=drawn).ax, y=name_and_unit(data, name))
         else:
             drawn.plot(mu.real.ravel(), mu.imag.ravel(), "o", color=style.COLORS["first"], markersize=3.5, zorder=3)
         drawn.set(

@@ -7,15 +7,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth.plot import style
-from nonsmooth.plot.labels import column, first_states, label, variable_along, words_of_flags
+from nonsmooth.plot.labels import column, first_states, name_and_unit, name_axes, variable_along, words_of_flags
 from nonsmooth.plot.segments import pieces_by_mode, with_gaps
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = ["phase_portrait"]
+__all__ = ["phase_portrait", "shade_zone"]
 
+ZONE = "contact zone"  # in legends
 _MODE_COLORS = ("first", "second", "third", "fourth")
 
 
@@ -54,17 +55,17 @@ def phase_portrait(
         pieces = pieces_by_mode(np.nan_to_num(cut_mode, nan=-1).astype(int), *cut)
         for k, (color, (xs, ys)) in enumerate(zip(_cycle(len(pieces)), pieces, strict=True)):
             if np.isfinite(xs).any():
-                drawn.plot(xs, ys, color=style.COLORS[color], label=modes[k], zorder=2 + 0.1 * k)
+                drawn.plot(xs, ys, color=style.COLORS[color], label=modes[k].replace("_", " "), zorder=2 + 0.1 * k)
         if section is not None:
             variable_along(section, "section", "poincare or sweep")
             points = [column(section, "section", name).values.ravel() for name in names]
             drawn.plot(
-                *points, "o", markersize=2.6, color=style.COLORS["section"], zorder=4, label="section",
+                *points, "o", markersize=2.6, color=style.COLORS["section"], zorder=4, label="section points",
                 rasterized=points[0].size > 500,
             )  # fmt: skip
         if zone is not None:
-            _shade(drawn, float(result[zone]) if isinstance(zone, str) else zone)
-        drawn.set(xlabel=label(result, names[0]), ylabel=label(result, names[1]))
+            shade_zone(drawn, float(result[zone]) if isinstance(zone, str) else zone)
+        name_axes(drawn, name_and_unit(result, names[0]), name_and_unit(result, names[1]))
     return drawn
 
 
@@ -72,10 +73,10 @@ def _cycle(count: int) -> list[str]:
     return [_MODE_COLORS[k % len(_MODE_COLORS)] for k in range(count)]
 
 
-def _shade(ax: Axes, edge: float) -> None:
+def shade_zone(ax: Axes, edge: float) -> None:
     """Shade x > edge as far as the axes reach now, without moving them."""
     low, high = ax.get_xlim()
     ax.axvline(edge, color=style.COLORS["muted"], linewidth=0.6, linestyle="--", zorder=1)
     if edge < high:
-        ax.axvspan(max(edge, low), high, color=style.COLORS["zone"], alpha=0.18, linewidth=0, zorder=0)
+        ax.axvspan(max(edge, low), high, color=style.COLORS["zone"], alpha=0.18, linewidth=0, zorder=0, label=ZONE)
     ax.set_xlim(low, high)

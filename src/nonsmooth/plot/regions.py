@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.plot import style
-from nonsmooth.plot.labels import name_with_unit
+from nonsmooth.plot.labels import name_axes, symbol_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -67,10 +67,8 @@ def regions(
             _draw_bands(drawn, first, second, margins)
         else:
             _draw_surfaces(drawn, first, second, margins)
-        drawn.set(
-            xlim=xlim, ylim=ylim, xlabel=name_with_unit(names[0], system.states[names[0]]),
-            ylabel=name_with_unit(names[1], system.states[names[1]]),
-        )  # fmt: skip
+        drawn.set(xlim=xlim, ylim=ylim)
+        name_axes(drawn, *((symbol_of(name), system.states[name]) for name in names))
     return drawn
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from nonsmooth.plot import style
-from nonsmooth.plot.labels import column, first_states, label, variable_along
+from nonsmooth.plot.labels import column, first_states, name_and_unit, name_axes, variable_along
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,5 +34,5 @@ def section(
             *(column(result, "section", name).values.ravel() for name in names), ".",
             markersize=size, markeredgewidth=0, rasterized=True, color=color or style.COLORS["section"],
         )  # fmt: skip
-        drawn.set(xlabel=label(result, names[0]), ylabel=label(result, names[1]))
+        name_axes(drawn, name_and_unit(result, names[0]), name_and_unit(result, names[1]))
     return drawn

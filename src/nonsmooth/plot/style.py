@@ -17,8 +17,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.legend import Legend
 
-__all__ = ["COLORS", "COLUMN", "PAGE", "axes", "journal", "save_figure"]
+__all__ = ["COLORS", "COLUMN", "PAGE", "axes", "even_dots", "halo", "journal", "save_figure", "small"]
 
 #: Widths of one column (84 mm) and of the page (174 mm), in inches.
 COLUMN = 84 / 25.4
@@ -27,6 +28,7 @@ PAGE = 174 / 25.4
 #: What a colour stands for. The palette is that of Okabe and Ito (2008), told apart by all common colour visions.
 COLORS = {
     "first": "#0072B2",  # blue: the first mode, the rising sweep
+    "pale": "#56B4E9",  # the rising sweep as a wide seam under the falling one
     "second": "#D55E00",  # vermilion: the other modes, the falling sweep
     "section": "#000000",
     "third": "#009E73",
@@ -34,6 +36,8 @@ COLORS = {
     "zone": "#E69F00",  # filled areas only, drawn pale
     "muted": "#7F7F7F",
 }
+
+_DOT = 7.0  # of a point cloud in a legend, in points; the mark "." is half of it wide
 
 _RC: Any = {
     "figure.figsize": (COLUMN, COLUMN * 0.72),
@@ -104,13 +108,33 @@ def _own_legend(ax: Axes) -> Iterator[None]:
     """Legends in the package's style on a caller's axes; what the caller has set stays."""
     import matplotlib as mpl
 
-    letters = _RC["legend.fontsize"] / _RC["axes.labelsize"] * ax.xaxis.label.get_fontsize()
-    wanted: Any = {"legend.frameon": _RC["legend.frameon"], "legend.fontsize": letters}
+    wanted: Any = {"legend.frameon": _RC["legend.frameon"], "legend.fontsize": small(ax)}
     now: Any = mpl.rcParams
     plain: Any = mpl.rcParamsDefault
     free: Any = {key: value for key, value in wanted.items() if now[key] == plain[key]}
     with mpl.rc_context(free):
         yield
+
+
+def small(ax: Axes) -> float:
+    """Size of letters within axes: 7/8 of their labels', as in legends; 7 pt in the package's style."""
+    return float(_RC["legend.fontsize"] / _RC["axes.labelsize"] * ax.xaxis.label.get_fontsize())
+
+
+def halo(width: float = 2.0) -> list[Any]:
+    """A white seam of ``width`` points, so that letters or a line show over whatever lies below."""
+    from matplotlib import patheffects
+
+    return [patheffects.withStroke(linewidth=width, foreground="white")]
+
+
+def even_dots(legend: Legend) -> None:
+    """Show the dots of point clouds in a legend large enough to be told apart, whatever their size in the figure."""
+    from matplotlib.lines import Line2D
+
+    for shown in legend.legend_handles:
+        if isinstance(shown, Line2D) and shown.get_marker() == ".":
+            shown.set_markersize(_DOT)
 
 
 def save_figure(figure: Figure | Axes, path: str | os.PathLike[str]) -> Path:

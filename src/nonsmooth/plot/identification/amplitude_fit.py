@@ -9,6 +9,8 @@ import numpy as np
 from nonsmooth.plot import style
 from nonsmooth.plot.comparison import ABOVE, MEASURED, measured_label
 from nonsmooth.plot.identification.findings import data_of, number, with_error
+from nonsmooth.plot.identification.residuals import residual_strip
+from nonsmooth.plot.labels import name_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,7 +21,7 @@ _MARKERS = {"up": "^", "down": "v"}
 
 
 def amplitude_fit(finding: Any, ax: Axes | None = None) -> Axes:
-    """Draw measured amplitudes over frequency with the fits.
+    """Draw measured amplitudes over frequency with the fits; below, what each fit leaves.
 
     The fit that knows no friction puts all losses into c; its bias is written beside it.
 
@@ -32,10 +34,12 @@ def amplitude_fit(finding: Any, ax: Axes | None = None) -> Axes:
         Where to draw; a new one-column figure if None.
     """
     data = data_of(finding, "amplitude", "omega", "omega_fine")
-    omega, heights = data["omega"].values, 1e3 * data["amplitude"].values
-    error = 1e3 * data["amplitude_error"].values if "amplitude_error" in data else None
+    omega, heights = data["omega"].values, data["amplitude"].values
+    error = data["amplitude_error"].values if "amplitude_error" in data else None
     words = data["direction"].values.astype(str) if "direction" in data else np.full(len(omega), "")
-    with style.axes(ax) as drawn:
+    left: list[tuple[Any, Any, Any]] = []
+    residuals: list[str] = []
+    with style.axes(ax, ratio=0.85) as drawn:
         for i, word in enumerate(dict.fromkeys(words)):
             mine = words == word
             drawn.errorbar(
@@ -44,18 +48,26 @@ def amplitude_fit(finding: Any, ax: Axes | None = None) -> Axes:
                 label=measured_label(data) + (f", steps {word}" if word else "") if i < 2 else None,
             )  # fmt: skip
         for name, word, color, line in (
-            ("joint", "c and dry friction", "first", "-"), ("viscous", "c alone", "second", "--"),
+            ("joint", "$c$ beside dry friction", "first", "-"), ("viscous", "$c$ alone", "second", "--"),
         ):  # fmt: skip
             if f"{name}_amplitude" in data:
                 label = word
                 if np.isfinite(value := number(data, f"c_{name}")):
-                    label += f",\n$c$ = {with_error(value, number(data, f'c_{name}_error'), 'N s/m')}"
+                    label += f": {with_error(value, number(data, f'c_{name}_error'), 'N s/m')}"
+                curve = np.interp(omega, data["omega_fine"].values, data[f"{name}_amplitude"].values)
+                looks = {"color": style.COLORS[color], "marker": "s" if name == "joint" else "D", "markersize": 2.4}
+                left.append((omega, heights - curve, looks))
+                residuals.append(f"residual, {word}")
                 drawn.plot(
-                    data["omega_fine"].values, 1e3 * data[f"{name}_amplitude"].values, line,
+                    data["omega_fine"].values, data[f"{name}_amplitude"].values, line,
                     color=style.COLORS[color], label=label,
                 )  # fmt: skip
         drawn.set_ylim(bottom=0)
         drawn.margins(x=0.02)
+        name_axes(drawn, (r"$\omega$", "rad/s"), ("amplitude of $x$", "m"))
+        if left:
+            for (_, _, looks), name in zip(left, residuals, strict=True):
+                drawn.plot([], [], linestyle="none", markeredgewidth=0, label=name, **looks)
+            residual_strip(drawn, "m", *left, error=error)
         drawn.legend(**ABOVE, ncols=2, columnspacing=1.0, handlelength=1.6)
-        drawn.set(xlabel=r"$\omega$ (rad/s)", ylabel="amplitude of $x$ (mm)")
     return drawn

@@ -10,7 +10,7 @@ from nonsmooth.plot import style
 from nonsmooth.plot.comparison import ABOVE, MEASURED, measured_label
 from nonsmooth.plot.identification.findings import data_of, number, with_error
 from nonsmooth.plot.identification.residuals import residual_strip
-from nonsmooth.plot.labels import name_with_unit
+from nonsmooth.plot.labels import name_axes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -32,38 +32,39 @@ def calibration(finding: Any, ax: Axes | None = None) -> Axes:
     """
     data = data_of(finding, "setting", "reading")
     error = data["reading_error"].values if "reading_error" in data else None
-    scale = 1e3 if data["setting"].attrs.get("units") == "m" else 1.0  # lengths in mm
     with style.axes(ax, ratio=0.85) as drawn:
-        setting, reading = scale * data["setting"].values, data["reading"].values
+        setting, reading = data["setting"].values, data["reading"].values
         if "fitted" in data:
-            at = scale * data["setting_fine"].values
-            if "fitted_low" in data:
-                drawn.fill_between(
-                    at, data["fitted_low"].values, data["fitted_high"].values, color=style.COLORS["first"], alpha=0.25,
-                    linewidth=0, label="95 % band",
-                )  # fmt: skip
-            drawn.plot(at, data["fitted"].values, color=style.COLORS["first"], label="fitted")
+            at, fitted = data["setting_fine"].values, data["fitted"].values
+            # No further than to zero: what is measured here has one sign.
+            there = fitted * np.sign(np.mean(reading)) >= 0
+            drawn.plot(at[there], fitted[there], color=style.COLORS["first"], label="fitted")
         drawn.errorbar(
             setting, reading, yerr=error, fmt="o", color=MEASURED, markersize=2.8,
             elinewidth=0.6, label=measured_label(data), zorder=4,
         )  # fmt: skip
         drawn.margins(x=0.03)
-        drawn.legend(**ABOVE, ncols=3, columnspacing=1.0)
-        drawn.annotate(_law(data), (0.97, 0.36), xycoords="axes fraction", ha="right", fontsize="small")
-        drawn.set(xlabel=_axis(data, "setting").replace("(m)", "(mm)"), ylabel=_axis(data, "reading"))
+        size = style.small(drawn)
+        drawn.annotate(_law(data), (0.04, 0.96), xycoords="axes fraction", va="top", fontsize=size)
+        name_axes(drawn, _named(data, "setting"), _named(data, "reading"))
         if "fitted" in data:
-            left = reading - np.interp(setting, at, data["fitted"].values)
-            power = 3 * int(np.clip(np.ceil(-np.log10(max(float(np.max(np.abs(left))), 1e-12)) / 3), 0, 3))
-            unit = str(data["reading"].attrs.get("units", ""))
-            word = f"residual ({unit})" if power == 0 else rf"residual ($10^{{-{power}}}$ {unit})"
-            size = 10.0**power
-            residual_strip(drawn, setting, size * left, word, error=None if error is None else size * error)
+            left = reading - np.interp(setting, at, fitted)
+            band = None
+            if "fitted_low" in data:
+                low, high = (data[f"fitted_{end}"].values - fitted for end in ("low", "high"))
+                band = at[there], low[there], high[there]
+                drawn.fill_between(
+                    [], [], color=style.COLORS["first"], alpha=0.25, linewidth=0, label="its 95 % band (below)"
+                )
+            unit, dots = str(data["reading"].attrs.get("units", "")), {"marker": "o", "markersize": 2}
+            residual_strip(drawn, unit, (setting, left, dots), error=error, band=band)
+        drawn.legend(**ABOVE, ncols=3, columnspacing=1.0)
     return drawn
 
 
-def _axis(data: xr.Dataset, name: str) -> str:
+def _named(data: xr.Dataset, name: str) -> tuple[str, str]:
     attrs = data[name].attrs
-    return name_with_unit(str(attrs.get("long_name", name)), str(attrs.get("units", "")))
+    return str(attrs.get("long_name", name)), str(attrs.get("units", ""))
 
 
 def _law(data: xr.Dataset) -> str:

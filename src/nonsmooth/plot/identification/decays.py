@@ -56,7 +56,7 @@ def free_decay(finding: Any, ax: Axes | None = None) -> Axes:
         if np.isfinite(friction := number(data, "friction_force")):
             parts.append(f"friction {with_error(1e3 * friction, 1e3 * number(data, 'friction_force_error'), 'mN')}")
         if parts:
-            drawn.annotate("\n".join(parts), (0.04, 0.06), xycoords="axes fraction", fontsize="small")
+            drawn.annotate("\n".join(parts), (0.04, 0.06), xycoords="axes fraction", fontsize=style.small(drawn))
         drawn.legend(loc="upper right")
         drawn.set(xlabel="time (s)", ylabel="peak height (mm)")
     return drawn

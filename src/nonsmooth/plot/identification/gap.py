@@ -10,7 +10,7 @@ from nonsmooth.plot import style
 from nonsmooth.plot.comparison import ABOVE, MEASURED, measured_label
 from nonsmooth.plot.identification.findings import data_of, number, with_error
 from nonsmooth.plot.identification.residuals import residual_strip
-from nonsmooth.plot.labels import name_with_unit
+from nonsmooth.plot.labels import name_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,9 +30,9 @@ def grazing(finding: Any, ax: Axes | None = None) -> Axes:
         Where to draw; a new one-column figure if None.
     """
     data = data_of(finding, "setting", "amplitude")
-    setting, height = data["setting"].values, 1e3 * data["amplitude"].values
+    setting, height = data["setting"].values, data["amplitude"].values
     contact = data["contact"].values.astype(bool) if "contact" in data else np.zeros(len(setting), dtype=bool)
-    error = 1e3 * data["amplitude_error"].values if "amplitude_error" in data else np.full(len(setting), np.nan)
+    error = data["amplitude_error"].values if "amplitude_error" in data else np.full(len(setting), np.nan)
     with style.axes(ax) as drawn:
         for chosen, face, word in ((~contact, "white", "free"), (contact, MEASURED, "contact")):
             if chosen.any():
@@ -49,12 +49,12 @@ def grazing(finding: Any, ax: Axes | None = None) -> Axes:
         if np.isfinite(gap := number(data, "gap")):
             text = with_error(1e3 * gap, 1e3 * number(data, "gap_error"), "mm")
             drawn.axhline(
-                1e3 * gap, color=style.COLORS["second"], linestyle="--", linewidth=0.9, label=f"$g$ = {text}"
+                gap, color=style.COLORS["second"], linestyle="--", linewidth=0.9, label=f"$g$ = {text}"
             )
         drawn.legend(**ABOVE, ncols=2, columnspacing=1.0)
         attrs = data["setting"].attrs
-        name = name_with_unit(str(attrs.get("long_name", "setting")), str(attrs.get("units", "")))
-        drawn.set(xlabel=name, ylabel="largest displacement (mm)")
+        setting_named = str(attrs.get("long_name", "setting")), str(attrs.get("units", ""))
+        name_axes(drawn, setting_named, ("largest displacement", "m"))
     return drawn
 
 
@@ -72,8 +72,8 @@ def multiple_shooting(finding: Any, ax: Axes | None = None, *, seconds: float = 
         Length shown, from the first fitted sample on.
     """
     data = data_of(finding, "x", "fitted", "time")
-    time, x, fitted = data["time"].values, 1e3 * data["x"].values, 1e3 * data["fitted"].values
-    residual = 1e6 * data["residual"].values if "residual" in data else 1e3 * (x - fitted)
+    time, x, fitted = data["time"].values, data["x"].values, data["fitted"].values
+    residual = data["residual"].values if "residual" in data else x - fitted
     used = np.flatnonzero(np.isfinite(fitted))
     if not len(used):
         raise ValueError("no sample of this record was fitted")
@@ -95,10 +95,10 @@ def multiple_shooting(finding: Any, ax: Axes | None = None, *, seconds: float = 
         if np.isfinite(gap := number(data, "gap")):
             text = with_error(1e3 * gap, 1e3 * number(data, "gap_error"), "mm")
             drawn.axhline(
-                1e3 * gap, color=style.COLORS["second"], linestyle="--", linewidth=0.8, label=f"$g$ = {text}"
+                gap, color=style.COLORS["second"], linestyle="--", linewidth=0.8, label=f"$g$ = {text}"
             )
         drawn.margins(x=0)
         drawn.legend(**ABOVE, ncols=2, columnspacing=1.0, markerscale=2)
-        drawn.set(xlabel="time (s)", ylabel="displacement (mm)")
-        residual_strip(drawn, time[shown], residual[shown], "residual (µm)")
+        name_axes(drawn, ("time", "s"), ("displacement", "m"))
+        residual_strip(drawn, "m", (time[shown], residual[shown], {}))
     return drawn

@@ -9,6 +9,7 @@ import numpy as np
 from nonsmooth.plot import style
 from nonsmooth.plot.comparison import ABOVE, MEASURED, measured_label
 from nonsmooth.plot.identification.findings import data_of, number, with_error
+from nonsmooth.plot.labels import name_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,7 +29,7 @@ def half_power(finding: Any, ax: Axes | None = None) -> Axes:
         Where to draw; a new one-column figure if None.
     """
     data = data_of(finding, "omega", "amplitude", "omega_low", "omega_high", "largest")
-    omega, heights = data["omega"].values, 1e3 * data["amplitude"].values
+    omega, heights = data["omega"].values, data["amplitude"].values
     low, high, top = (number(data, name) for name in ("omega_low", "omega_high", "largest"))
     with style.axes(ax) as drawn:
         drawn.axvspan(
@@ -36,7 +37,7 @@ def half_power(finding: Any, ax: Axes | None = None) -> Axes:
             label=f"bandwidth, {low:.3f} to {high:.3f} rad/s",
         )  # fmt: skip
         drawn.axhline(
-            1e3 * top / np.sqrt(2), color=style.COLORS["second"], linestyle="--", linewidth=0.9,
+            top / np.sqrt(2), color=style.COLORS["second"], linestyle="--", linewidth=0.9,
             label=r"largest amplitude$/\sqrt{2}$",
         )  # fmt: skip
         drawn.plot(
@@ -46,10 +47,10 @@ def half_power(finding: Any, ax: Axes | None = None) -> Axes:
         ratio = with_error(number(data, "damping_ratio"), number(data, "damping_ratio_error"))
         drawn.annotate(
             rf"$\xi$ = {ratio}" + "\n" + rf"$c$ = {with_error(number(data, 'c'), number(data, 'c_error'), 'N s/m')}",
-            (0.97, 0.95), xycoords="axes fraction", ha="right", va="top", fontsize="small",
+            (0.97, 0.95), xycoords="axes fraction", ha="right", va="top", fontsize=style.small(drawn),
         )  # fmt: skip
         drawn.set_ylim(bottom=0)
         drawn.margins(x=0.02)
         drawn.legend(**ABOVE, ncols=2, columnspacing=1.0, handlelength=1.6)
-        drawn.set(xlabel=r"$\omega$ (rad/s)", ylabel="amplitude of $x$ (mm)")
+        name_axes(drawn, (r"$\omega$", "rad/s"), ("amplitude of $x$", "m"))
     return drawn

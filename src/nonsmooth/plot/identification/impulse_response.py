@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.plot import style
-from nonsmooth.plot.comparison import MEASURED, measured_label
+from nonsmooth.plot.comparison import ABOVE, MEASURED, measured_label
 from nonsmooth.plot.identification.findings import data_of, number
+from nonsmooth.plot.labels import name_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -38,7 +39,7 @@ def impulse_response(finding: Any, ax: Axes | None = None) -> Axes:
         np.nanargmax(magnitude)
     )
     first, last = max(top - BINS, 0), min(top + BINS + 1, len(frequency))
-    at, heights = frequency[first:last], 1e3 * magnitude[first:last]
+    at, heights = frequency[first:last], magnitude[first:last]
     with style.axes(ax) as drawn:
         drawn.vlines(at, 0, heights, color=MEASURED, linewidth=0.7)
         drawn.plot(at, heights, "o", color=MEASURED, markersize=2.6, label=f"DFT, {measured_label(data)}")
@@ -46,14 +47,14 @@ def impulse_response(finding: Any, ax: Axes | None = None) -> Axes:
             fine = data["fine_frequency"].values
             inside = (fine >= at[0]) & (fine <= at[-1])
             drawn.plot(
-                fine[inside], 1e3 * data["fine_magnitude"].values[inside], color=style.COLORS["muted"], linewidth=0.7,
+                fine[inside], data["fine_magnitude"].values[inside], color=style.COLORS["muted"], linewidth=0.7,
                 label="transform between its lines",
             )  # fmt: skip
         step = number(data, "grid_step")
         if np.isfinite(step):
             drawn.axvspan(
-                frequency[top] - step / 2, frequency[top] + step / 2, ymax=0.5, color=style.COLORS["zone"], alpha=0.25,
-                linewidth=0, zorder=0, label=f"largest line {_both(frequency[top])}, ± half a step",
+                frequency[top] - step / 2, frequency[top] + step / 2, color=style.COLORS["zone"], alpha=0.25,
+                linewidth=0, zorder=0, label=f"largest line {frequency[top]:.4f} Hz ± half a step",
             )  # fmt: skip
         places = (
             ("peak_frequency", "interpolated peak", "first", "-"), ("decay_frequency", "decay fit", "second", "--"),
@@ -62,14 +63,12 @@ def impulse_response(finding: Any, ax: Axes | None = None) -> Axes:
             value = number(data, name)
             if np.isfinite(value):
                 drawn.axvline(
-                    value, ymax=0.5, color=style.COLORS[color], linestyle=line, linewidth=1.0,
-                    label=f"{word} {_both(value)}",
-                )  # fmt: skip
-        unit = "mm s" if data["magnitude"].attrs.get("units") == "m s" else "mm"
-        drawn.set_ylim(0, 2.1 * heights.max())
-        drawn.legend(loc="upper right", handlelength=1.6)
+                    value, color=style.COLORS[color], linestyle=line, linewidth=1.0, label=f"{word} {value:.4f} Hz"
+                )
+        drawn.set_ylim(0, 1.06 * heights.max())
         drawn.margins(x=0.02)
-        drawn.set(xlabel="frequency (Hz)", ylabel=f"magnitude ({unit})")
+        drawn.legend(**ABOVE, ncols=2, handlelength=1.6, columnspacing=1.0)
+        name_axes(drawn, ("frequency", "Hz"), ("magnitude", str(data["magnitude"].attrs.get("units", "m"))))
     return drawn
 
 
@@ -77,20 +76,14 @@ def impulse_history(finding: Any, ax: Axes | None = None) -> Axes:
     """Draw the impulse response over time, with the decay that was fitted to it."""
     data = data_of(finding, "x", "time")
     with style.axes(ax) as drawn:
-        drawn.plot(
-            data["time"].values, 1e3 * data["x"].values, ".", color=MEASURED, markersize=1.6, markeredgewidth=0,
-            label=measured_label(data), rasterized=True,
-        )  # fmt: skip
+        # Joined: a few unjoined samples per oscillation make patterns that are not there.
+        drawn.plot(data["time"].values, data["x"].values, color=MEASURED, linewidth=0.5, label=measured_label(data))
         if "fitted" in data:
             drawn.plot(
-                data["time"].values, 1e3 * data["fitted"].values, color=style.COLORS["second"], linewidth=0.8,
+                data["time"].values, data["fitted"].values, "--", color=style.COLORS["second"], linewidth=1.0,
                 label="fitted decay",
             )  # fmt: skip
         drawn.margins(x=0)
-        drawn.legend(loc="upper right", markerscale=3)
-        drawn.set(xlabel="time (s)", ylabel="displacement (mm)")
+        drawn.legend(loc="upper right")
+        name_axes(drawn, ("time", "s"), ("displacement", "m"))
     return drawn
-
-
-def _both(frequency: float) -> str:
-    return f"{frequency:.4f} Hz = {2 * np.pi * frequency:.3f} rad/s"

@@ -51,7 +51,8 @@ def nyquist(finding: Any, ax: Axes | None = None) -> Axes:
         natural = with_error(number(data, "omega_0"), number(data, "omega_0_error"), "rad/s")
         text = rf"$\omega_0$ = {natural}" + "\n"
         text += rf"$c$ = {with_error(number(data, 'c'), number(data, 'c_error'), 'N s/m')}"
-        drawn.annotate(text, (0.5, 0.5), xycoords="axes fraction", ha="center", va="center", fontsize="small")
+        size = style.small(drawn)
+        drawn.annotate(text, (0.5, 0.5), xycoords="axes fraction", ha="center", va="center", fontsize=size)
         drawn.set_aspect("equal", adjustable="datalim")
         drawn.legend(**ABOVE, ncols=2, columnspacing=1.0, handlelength=1.4)
         drawn.set(xlabel=r"Re $X/a$", ylabel=r"Im $X/a$")

@@ -9,7 +9,7 @@ import numpy as np
 from nonsmooth.plot import style
 from nonsmooth.plot.comparison import measured_label
 from nonsmooth.plot.identification.findings import data_of, number
-from nonsmooth.plot.labels import name_with_unit
+from nonsmooth.plot.labels import name_axes, symbol_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -55,7 +55,8 @@ def profile(finding: Any, ax: Axes | None = None) -> Axes:
         drawn.margins(x=0)
         drawn.legend(loc="upper center", ncols=2, columnspacing=1.0)
         name = str(data.attrs.get("parameter", "value"))
-        drawn.set(xlabel=name_with_unit(name, unit), ylabel=r"$\chi^2$ above its least")
+        drawn.set_ylabel(r"$\chi^2$ above its least")
+        name_axes(drawn, (symbol_of(name), unit))
     return drawn
 
 
@@ -95,11 +96,11 @@ def coverage(finding: Any, ax: Axes | None = None) -> Axes:
             rms = float(np.sqrt(np.nanmean(off[:, k] ** 2)))
             drawn.annotate(
                 f"{np.count_nonzero(held[:, k])}/{rigs}\nrms {rms:.2f}", (k, 1.02), xycoords=("data", "axes fraction"),
-                ha="center", va="bottom", fontsize="small",
+                ha="center", va="bottom", fontsize=style.small(drawn),
             )  # fmt: skip
         reach = max(3.0, 1.08 * float(np.nanmax(np.abs(off[np.isfinite(off)]), initial=0.0)))
         drawn.set_ylim(-reach, reach)
-        drawn.set_xticks(range(len(names)), [name_with_unit(name, "") for name in names])
+        drawn.set_xticks(range(len(names)), [symbol_of(name) for name in names])
         drawn.tick_params(axis="x", top=False, length=0)
         drawn.set_ylabel("(estimate − truth) / uncertainty")
         drawn.set_xlabel(f"{rigs} virtual rigs (synthetic), by seed from left to right")

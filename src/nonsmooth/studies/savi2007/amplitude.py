@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from nonsmooth import plot
 from nonsmooth.studies.savi2007.branches import branches
 from nonsmooth.studies.savi2007.diagrams import ABOUT_BRANCHES, diagrams, draw_diagram, how, shared_legend
-from nonsmooth.studies.savi2007.figure import Figure, sheet
+from nonsmooth.studies.savi2007.figure import Figure, only_outer, sheet
 from nonsmooth.studies.savi2007.flows import FLOWS, Settings
 from nonsmooth.studies.savi2007.portraits import describe, draw_portraits, portraits
 from nonsmooth.studies.savi2007.printed import FIGURE_11, FIGURE_12, NUMBERS
@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure as Canvas
 
-__all__ = ["FIGURES"]
+__all__ = ["FIGURES", "PRINTED"]
 
-_PRINTED = [NUMBERS[f"period {n} from"].value for n in (4, 2, 1)]
+PRINTED = {NUMBERS[key].value: NUMBERS[key].text for key in ("period 4 from", "period 2 from", "period 1 from")}
 
 
 def _compute_11(settings: Settings) -> dict[str, xr.Dataset]:
@@ -29,18 +29,20 @@ def _compute_11(settings: Settings) -> dict[str, xr.Dataset]:
 def _draw_11(data: Mapping[str, xr.Dataset]) -> Canvas:
     with plot.journal():
         canvas = sheet(plot.PAGE, 0.5 * plot.PAGE)
-        for ax, flow, letter in zip(canvas.subplots(1, 2, sharey=True), FLOWS, "ab", strict=True):
-            draw_diagram(ax, data, flow.key, "v", values=_PRINTED)
+        grid = canvas.subplots(1, 2, sharey=True)
+        for ax, flow, letter in zip(grid, FLOWS, "ab", strict=True):
+            draw_diagram(ax, data, flow.key, "v", values=PRINTED, words="printed in the paper (N)")
             ax.set_title(f"({letter}) {flow.title}")
-        ax.set_ylabel("")
+        only_outer(grid)
         shared_legend(canvas)
     return canvas
 
 
 def _caption_11(data: Mapping[str, xr.Dataset]) -> str:
     return (
-        "Bifurcation diagram over the forcing amplitude, omega = 3.69 rad/s, g = -0.0045 m: velocity at the section. "
-        "Dotted: the paper's printed ends of chaos, period 4 and period 2. " + ABOUT_BRANCHES + how(data)
+        "Bifurcation diagram over the forcing amplitude, omega = 3.69 rad/s, g = -4.5 mm: velocity at the section. "
+        "Dotted: the paper's printed ends of chaos (0.26 N), period 4 (0.28 N) and period 2 (0.406 N). "
+        + ABOUT_BRANCHES + how(data)
     )
 
 

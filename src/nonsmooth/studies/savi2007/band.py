@@ -14,6 +14,7 @@ from nonsmooth.flow.poincare import poincare
 from nonsmooth.flow.simulate import simulate
 from nonsmooth.results.labels import labels_of
 from nonsmooth.results.provenance import provenance
+from nonsmooth.studies.savi2007.diagrams import shared_legend
 from nonsmooth.studies.savi2007.figure import Figure, sheet
 from nonsmooth.studies.savi2007.flows import ETA, EXACT, SMOOTHED, Settings
 from nonsmooth.studies.savi2007.grazing import grazing_frequencies, steady_state
@@ -28,9 +29,10 @@ __all__ = ["FIGURES", "order_in_eta"]
 ORBITS = {
     r"Fig. 9, $\omega = 4.8$ rad/s": {**FIGURE_9, "omega": 4.8},
     r"Fig. 11, $\rho = 0.45$ N": {**FIGURE_11, "rho": 0.45},
-    "Fig. 13, $g = 0.0009$ m": {**FIGURE_13, "g": 0.0009},
+    "Fig. 13, $g = 0.9$ mm": {**FIGURE_13, "g": 0.0009},
 }
 PERIODS = 4
+_AXIS, _PAPERS = "half width of the band, $\\eta$ (\N{MICRO SIGN}m)", "the paper's $\\eta$, 10 \N{MICRO SIGN}m"
 ETAS = np.array([1e-6, 3e-6, 1e-5, 3e-5, 1e-4])
 FITTED = (9e-7, 3.1e-5)  # etas of the fitted order: between rounding of the method and bands as wide as the contact
 FINE = 1e-11  # rtol at which the error is that of the smoothing alone
@@ -121,9 +123,9 @@ def order_in_eta(errors: xr.Dataset, form: str) -> np.ndarray:
 def _draw(data: Mapping[str, xr.Dataset]) -> Canvas:
     errors, grazing = data["error"], data["grazing"]
     with plot.journal():
-        canvas = sheet(plot.PAGE, 0.44 * plot.PAGE)
+        canvas = sheet(plot.PAGE, 0.52 * plot.PAGE)
         left, right = canvas.subplots(1, 2)
-        eta = errors["eta"].values
+        eta = 1e6 * errors["eta"].values  # in micrometres, as the axes
         colors = [plot.COLORS[name] for name in ("first", "second", "third")]
         for color, orbit in zip(colors, errors["orbit"].values, strict=True):
             one = errors["error"].sel(orbit=orbit)
@@ -135,28 +137,29 @@ def _draw(data: Mapping[str, xr.Dataset]) -> Canvas:
         hollow = {"color": "black", "markerfacecolor": "none", "markersize": 6}
         left.plot([], [], "s", label="rtol $10^{-6}$, as in the figures", **hollow)
         left.plot([], [], ":", color="black", label="general form")
-        left.axvline(ETA, color="black", linewidth=0.6, linestyle="--", zorder=0)
-        left.legend(loc="lower right")
+        left.axvline(1e6 * ETA, color="black", linewidth=0.6, linestyle="--", zorder=0, label=_PAPERS)
         left.set(
-            xlabel=r"$\eta$ (m)", ylabel="error after 4 periods (1 mm, 1 cm/s)",
-            title="(a) error of the smoothed switch",
+            xlabel=_AXIS, title="(a) error of the smoothed switch after 4 periods",
+            ylabel=r"$[(\Delta x / 1\,\mathrm{mm})^2 + (\Delta v / 10\,\mathrm{mm/s})^2]^{1/2}$",
         )  # fmt: skip
         at = grazing["eta"].values > 0
         base = float(grazing["closed_form"][0])
         fine = np.geomspace(grazing["eta"].values[at].min() / 2, grazing["eta"].values[at].max() * 2, 50)
         sharp = EXACT.system(**FIGURE_9).values
         closed = [grazing_frequencies({**sharp, "g": FIGURE_9["g"] - e})[-1] - base for e in fine]
-        right.loglog(fine, closed, color=plot.COLORS["third"], label=r"closed form, gap $g - \eta$")
+        right.loglog(1e6 * fine, closed, color=plot.COLORS["third"], label=r"closed form, gap $g - \eta$")
         right.loglog(
-            grazing["eta"].values[at], grazing["grazing"].values[at] - base, "o", color=plot.COLORS["first"],
+            1e6 * grazing["eta"].values[at], grazing["grazing"].values[at] - base, "o", color=plot.COLORS["first"],
             label="smoothed model, bisected",
         )  # fmt: skip
-        right.axvline(ETA, color="black", linewidth=0.6, linestyle="--", zorder=0, label="the paper's $\\eta$")
-        right.legend(loc="upper left")
+        right.axvline(1e6 * ETA, color="black", linewidth=0.6, linestyle="--", zorder=0, label=_PAPERS)
         right.set(
-            xlabel=r"$\eta$ (m)", ylabel="shift of the grazing frequency (rad/s)",
+            xlabel=_AXIS, ylabel="shift of the grazing frequency (rad/s)",
             title="(b) grazing of Fig. 9, falling frequency",
         )  # fmt: skip
+        for ax in (left, right):
+            ax.xaxis.set_major_formatter("{x:g}")
+        shared_legend(canvas, columns=4)
     return canvas
 
 

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.legend_handler import HandlerTuple
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
 from nonsmooth import plot
 from nonsmooth.analysis.basins import basins
 from nonsmooth.flow.simulate import simulate
-from nonsmooth.plot.basins import kind_of
+from nonsmooth.plot.basins import names_of as kinds_of
+from nonsmooth.plot.basins import section_mark
 from nonsmooth.plot.palette import attractor_color
+from nonsmooth.plot.phase_portrait import ZONE, shade_zone
+from nonsmooth.plot.units import prefixed
 from nonsmooth.studies.savi2007.figure import Figure, sheet
 from nonsmooth.studies.savi2007.flows import EXACT, Settings
 from nonsmooth.studies.savi2007.printed import FIGURE_13, FIGURE_17
@@ -48,45 +54,43 @@ def _compute(name: str) -> Callable[[Settings], dict[str, xr.Dataset]]:
 
 
 def names_of(found: xr.Dataset) -> list[str]:
-    """``0: period 3, 67.30 ± 0.29 %`` of each attractor: its number, what it is, its share with the binomial error."""
+    """``period 3, 67.30 ± 0.29 %`` of each attractor: what it is, its share with the binomial error."""
     words = []
-    for k in range(found.sizes["attractor"]):
-        kind = kind_of(int(found["period_number"][k]), bool(found["chaotic"][k]))
+    for k, kind in enumerate(kinds_of(found)):
         share, error = (100 * float(found[name][k]) for name in ("fraction", "fraction_error"))
-        words.append(f"{k}: {kind}, {share:.2f} ± {error:.2f} %")
+        words.append(f"{kind}, {share:.2f} ± {error:.2f} %")
     return words
 
 
 def _draw(data: Mapping[str, xr.Dataset]) -> Canvas:
     found = data["basins"]
     with plot.journal():
-        canvas = sheet(plot.PAGE, 0.46 * plot.PAGE)
+        canvas = sheet(plot.PAGE, 0.5 * plot.PAGE)
         left, right = canvas.subplots(1, 2)
         plot.basins(found, left)
         left.get_legend().remove()
         left.set_title("(a) basins, section at phase 0", y=1.0, pad=9)
-        for k, name in enumerate(names_of(found)):
+        handles: list[Any] = []
+        for k in range(found.sizes["attractor"]):
             cycle = int(found["period_number"][k]) > 0
             begun = len(right.get_lines())
             plot.phase_portrait(data[f"orbit_{k}"], right)
             for line in right.get_lines()[begun:]:
-                line.set(color=attractor_color(k), linewidth=1.1 if cycle else 0.3, zorder=3 if cycle else 2, label="_")
+                line.set(color=attractor_color(k), linewidth=1.1 if cycle else 0.3, zorder=3 if cycle else 2)
             points = found["section_points"].values[found["point_attractor"].values == k]
-            right.plot(
-                points[:, 0], points[:, 1], "o", color="black", markersize=3.0 if cycle else 0.6, zorder=4,
-                markeredgecolor="white", markeredgewidth=0.5 if cycle else 0, rasterized=not cycle,
-            )  # fmt: skip
-            right.plot([], [], "s", color=attractor_color(k), markersize=5, markeredgecolor="black",
-                       markeredgewidth=0.4, label=name)  # fmt: skip
-        right.plot([], [], "o", color="black", markersize=3, label="section points")
+            mark = section_mark(found, k, 3.6 if cycle else 2.4)
+            right.plot(points[:, 0], points[:, 1], linestyle="", **mark)
+            patch = Patch(facecolor=attractor_color(k), edgecolor="black", linewidth=0.4)
+            handles.append((patch, Line2D([], [], linestyle="", **{**mark, "markersize": 3.6 if cycle else 2.4})))
         limits = right.get_xlim()
-        right.axvspan(float(found["g"]), limits[1], color=plot.COLORS["zone"], alpha=0.18, linewidth=0, zorder=0,
-                      label="contact zone")  # fmt: skip
+        shade_zone(right, float(found["g"]))
         right.set_xlim(limits)
-        right.ticklabel_format(axis="y", style="plain")
         right.set_title("(b) attractors", y=1.0, pad=9)
-        entries = dict(zip(*reversed(right.get_legend_handles_labels()), strict=True))
-        canvas.legend(list(entries.values()), list(entries), loc="outside lower center", ncols=5)
+        zone = Patch(facecolor=plot.COLORS["zone"], alpha=0.18, linewidth=0)
+        canvas.legend(
+            [*handles, zone], [*names_of(found), ZONE], loc="outside lower center", ncols=4,
+            handler_map={tuple: HandlerTuple(ndivide=1)}, title="attractors with their section points, and basins",
+        )  # fmt: skip
     return canvas
 
 
@@ -94,7 +98,8 @@ def _caption(data: Mapping[str, xr.Dataset]) -> str:
     found = data["basins"]
     lost = int((found["label"].values < 0).sum())
     at = ", ".join(
-        f"{name} = {float(found[name]):g} {found[name].attrs['units']}" for name in ("omega", "rho", "g")
+        f"{name} = {' '.join(prefixed(float(found[name]), found[name].attrs['units']))}"
+        for name in ("omega", "rho", "g")
     )
     first, second = (str(dim) for dim in found["label"].dims)
     return (
@@ -102,8 +107,11 @@ def _caption(data: Mapping[str, xr.Dataset]) -> str:
         f"of each attractor of this plane, with its binomial standard error: {'; '.join(names_of(found))}. "
         f"{lost or 'No'} start{'' if lost == 1 else 's'} reached none. Least jump of the state from a section point "
         "into another basin: "
-        + ", ".join(f"{k}: {float(value):.2g}" for k, value in enumerate(found["minimal_shock"].values))
-        + " (in units of 1 mm and 1 cm/s). Dimension of the boundary by box counting: "
+        + ", ".join(
+            f"{kind} {float(value):.2g}"
+            for kind, value in zip(kinds_of(found), found["minimal_shock"].values, strict=True)
+        )
+        + " (in units of 1 mm and 10 mm/s). Dimension of the boundary by box counting: "
         + f"{float(found['boundary_dimension']):.3f}; basin entropy {float(found['entropy']):.3f}."
     )
 
@@ -111,6 +119,6 @@ def _caption(data: Mapping[str, xr.Dataset]) -> str:
 FIGURES = tuple(
     Figure(name, None, f"Basins at {words}", _compute(name), _draw, _caption, beside=beside)
     for name, words, beside in (
-        ("basins13", "g = 0.0014 m", 13), ("basins17", "omega = 9.55 rad/s", 17),
+        ("basins13", "g = 1.4 mm", 13), ("basins17", "omega = 9.55 rad/s", 17),
     )
 )  # fmt: skip

@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.lines import Line2D
 
 from nonsmooth import plot
 from nonsmooth.analysis.sweep import sweep
 from nonsmooth.plot.branch import draw_branch
+from nonsmooth.plot.style import even_dots, halo, small
 from nonsmooth.results.provenance import read_provenance
 from nonsmooth.studies.savi2007.branches import branches_of
 from nonsmooth.studies.savi2007.flows import EXACT, FLOWS, Settings, starts
@@ -20,12 +20,17 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Canvas
 
-__all__ = ["ABOUT_BRANCHES", "diagrams", "draw_branches", "draw_diagram", "how", "name_lines", "shared_legend"]
+__all__ = [
+    "ABOUT_BRANCHES", "diagrams", "draw_branches", "draw_diagram", "how", "mark_grazing", "mark_values",
+    "shared_legend",
+]  # fmt: skip
+
+_OTHER, _SHARE = 0.05, 0.25  # another motion: a quarter of its points so far off, in parts of the diagram's range
 
 #: What a caption says of them.
 ABOUT_BRANCHES = (
-    "Black lines in (a): orbits of period 1, 2, 4 and 8 of the exact flow, continued from one of period 1 (solid: "
-    "stable, dashed: unstable); special points marked on those of period 1 and 2. "
+    "Branches in (a): orbits of period 1, 2, 4 and 8 of the exact flow, continued from one of period 1; where they are "
+    "stable, the swept points lie on them. Special points are marked on those of period 1 and 2. "
 )
 
 
@@ -67,38 +72,71 @@ def _grid(low: float, high: float, steps: int, also: tuple[float, ...]) -> np.nd
     return np.unique(np.round(np.concatenate([np.linspace(low, high, steps + 1), also]), 9))
 
 
-def draw_diagram(ax: Axes, data: Mapping[str, xr.Dataset], key: str, y: str, *, values: Sequence[float] = ()) -> None:
-    """One diagram: starts in grey behind, down over up; the paper's parameter values as dotted lines.
+def draw_diagram(
+    ax: Axes, data: Mapping[str, xr.Dataset], key: str, y: str, *, values: Mapping[float, str], words: str
+) -> None:
+    """One diagram: up, down over it, and in grey what other starts lead to; ``values`` of the paper as dotted lines.
 
-    On that of the exact flow the branches of periodic orbits.
+    On that of the exact flow the branches of periodic orbits. Other starts that reached no period are told apart: chaos
+    looks like a transient that is not over. ``words`` say in the legend which values these are.
     """
-    plot.bifurcation(data[f"{key}_starts"], ax, y=y, color="#B4B4B4", size=1.8)
-    behind = len(ax.get_lines())
-    plot.bifurcation(data[key], ax, y=y, size=0.9 if data[key].sizes["iterate"] > 100 else 1.3)
-    for i, line in enumerate(ax.get_lines()):
-        line.set_zorder(1 + (i >= behind))
-    ax.get_lines()[0].set_label("several starts")
-    for i, value in enumerate(values):
-        label = "printed in the paper" if i == 0 else None
-        ax.axvline(value, color="black", linewidth=0.6, linestyle=":", zorder=0, label=label)
+    many, swept = data[f"{key}_starts"], data[key]
+    other, settled = other_motions(many, swept), many["period_number"] > 0
+    for chosen, color, size, name in (
+        (other & ~settled, "#D0D0D0", 1.4, "other starts, no period"),
+        (other & settled, "#8C8C8C", 1.8, "other starts, periodic"),
+    ):
+        if bool(chosen.any()):
+            plot.bifurcation(many.assign(section=many["section"].where(chosen)), ax, y=y, color=color, size=size)
+            ax.get_lines()[-1].set(label=name, zorder=0.3)
+    plot.bifurcation(swept, ax, y=y, size=0.9 if swept.sizes["iterate"] > 100 else 1.1)
     if key == EXACT.key:
         draw_branches(ax, data, y=y)
+    mark_values(ax, values, words)
+
+
+def other_motions(many: xr.Dataset, swept: xr.Dataset) -> xr.DataArray:
+    """Of each value and start, whether it leads to section points that the sweeps at this value have not."""
+    parameter = str(swept["maximum"].dims[0])
+    known = swept["section"].stack(point=("direction", "iterate")).transpose(parameter, "point", "state").values
+    found = many["section"].transpose(parameter, "start", "iterate", "state").values
+    scale = np.nanmax(known, axis=(0, 1)) - np.nanmin(known, axis=(0, 1))
+    nearest = np.abs(swept[parameter].values[None, :] - many[parameter].values[:, None]).argmin(axis=1)
+    far = np.zeros(found.shape[:2], dtype=bool)
+    for i, at in enumerate(nearest):
+        there = known[at][np.isfinite(known[at]).all(axis=1)] / scale
+        distance = np.linalg.norm(found[i][:, :, None] / scale - there, axis=-1).min(axis=-1)
+        far[i] = (distance > _OTHER).mean(axis=-1) > _SHARE
+    return many["period_number"].copy(data=far)
+
+
+def mark_values(ax: Axes, values: Mapping[float, str], words: str, foot: bool = False) -> None:
+    """A dotted line with its number at each of these values, at the top or at the foot."""
+    for i, (value, text) in enumerate(values.items()):
+        ax.axvline(
+            value, color="black", linewidth=0.7, linestyle=":", zorder=2.5, label=words if i == 0 else None
+        )
+        ax.annotate(
+            text, (value, 0.0 if foot else 1.0), (-1.5, 3 if foot else -3), xycoords=ax.get_xaxis_transform(),
+            textcoords="offset points", rotation=90, ha="right", va="bottom" if foot else "top", fontsize=small(ax),
+            path_effects=halo(), zorder=6,
+        )  # fmt: skip
+
+
+def mark_grazing(ax: Axes, places: Sequence[float]) -> None:
+    """A short line at the foot for each grazing in closed form, so that it hides no jump that begins there."""
+    for i, place in enumerate(places):
+        ax.plot(
+            [place, place], [0.0, 0.07], color=plot.COLORS["third"], linewidth=2.0, transform=ax.get_xaxis_transform(),
+            zorder=1, label="grazing, closed form" if i == 0 else None, solid_capstyle="butt",
+        )  # fmt: skip
 
 
 def draw_branches(ax: Axes, data: Mapping[str, xr.Dataset], *, y: str) -> None:
     """The branches of a figure in black, where there are any; marks on those of period 1 and 2."""
-    found = branches_of(data)
-    for one in found:
+    for one in branches_of(data):
         few = int(one["period_number"]) <= 2
-        draw_branch(ax, one, y=y, special=few, color="black", width=0.6)
-    if found:
-        name_lines(ax)
-
-
-def name_lines(ax: Axes) -> None:
-    """Entries of the legend for the lines of branches."""
-    for words, line in (("stable orbits", "-"), ("unstable orbits", "--")):
-        ax.plot([], [], line, color="black", linewidth=0.7, label=words)
+        draw_branch(ax, one, y=y, special=few, color="black", width=0.6 if few else 0.35, behind=True)
 
 
 def shared_legend(canvas: Canvas, columns: int = 5) -> None:
@@ -109,10 +147,7 @@ def shared_legend(canvas: Canvas, columns: int = 5) -> None:
             entries.setdefault(words, handle)
         if (own := ax.get_legend()) is not None:
             own.remove()
-    drawn = canvas.legend(list(entries.values()), list(entries), loc="outside lower center", ncols=columns)
-    for shown in drawn.legend_handles:
-        if isinstance(shown, Line2D):
-            shown.set_markersize(4)
+    even_dots(canvas.legend(list(entries.values()), list(entries), loc="outside lower center", ncols=columns))
 
 
 def how(data: Mapping[str, xr.Dataset]) -> str:

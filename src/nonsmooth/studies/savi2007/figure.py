@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from nonsmooth.studies.savi2007.flows import Settings
 
@@ -12,7 +14,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure as Canvas
 
-__all__ = ["Figure", "sheet"]
+__all__ = ["Figure", "only_outer", "sheet"]
 
 
 @dataclass(frozen=True)
@@ -56,6 +58,16 @@ class Figure:
         if self.number is None and self.beside is not None:
             return self.beside + 0.5
         return 99.0 if self.number is None else float(self.number)
+
+
+def only_outer(grid: Any) -> None:
+    """Hide the axes' names but for those at the foot and on the left; hidden, they still tell the unit of the ticks."""
+    rows = np.atleast_2d(grid)
+    for row in rows[:-1]:
+        for ax in row:
+            ax.xaxis.label.set_visible(False)
+    for ax in rows[:, 1:].ravel():
+        ax.yaxis.label.set_visible(False)
 
 
 def sheet(width: float, height: float) -> Canvas:

@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from nonsmooth import plot
 from nonsmooth.analysis.sweep import sweep
 from nonsmooth.flow.poincare import poincare
+from nonsmooth.plot.style import halo, small
 from nonsmooth.studies.savi2007.branches import branches
-from nonsmooth.studies.savi2007.diagrams import ABOUT_BRANCHES, diagrams, draw_diagram, how, shared_legend
-from nonsmooth.studies.savi2007.figure import Figure, sheet
+from nonsmooth.studies.savi2007.diagrams import ABOUT_BRANCHES, diagrams, draw_diagram, how, mark_grazing, shared_legend
+from nonsmooth.studies.savi2007.figure import Figure, only_outer, sheet
 from nonsmooth.studies.savi2007.flows import EXACT, FLOWS, Settings, starts
 from nonsmooth.studies.savi2007.portraits import chosen_start, describe, draw_portraits, portraits
 from nonsmooth.studies.savi2007.printed import FIGURE_17, FIGURE_18
@@ -19,12 +22,14 @@ from nonsmooth.studies.savi2007.twins import twins
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Canvas
 
-__all__ = ["FIGURES"]
+__all__ = ["FIGURES", "SHOWN"]
 
 _CHAOTIC = 9.55
 _JUST_ABOVE = 9.8  # rad/s, above the grazing frequency
+SHOWN = {omega: f"{omega:.2f}" for omega in FIGURE_18}
 
 
 def _compute_17(settings: Settings) -> dict[str, xr.Dataset]:
@@ -44,25 +49,59 @@ def _draw_17(data: Mapping[str, xr.Dataset]) -> Canvas:
         for j, flow in enumerate(FLOWS):
             for i, state in enumerate("xv"):
                 ax = grid[i, j]
-                draw_diagram(ax, data, flow.key, state, values=tuple(FIGURE_18))
-                for omega in grazing_of(data[flow.key]):
-                    if data[flow.key]["omega"].min() < omega < data[flow.key]["omega"].max():
-                        label = "grazing, closed form"
-                        ax.axvline(omega, color=plot.COLORS["third"], linewidth=0.8, zorder=0, label=label)
-                ax.set_xlabel(ax.get_xlabel() if i else "")
-                ax.set_ylabel(ax.get_ylabel() if j == 0 else "")
+                draw_diagram(ax, data, flow.key, state, values=SHOWN, words="frequencies of Fig. 18 (rad/s)")
+                ends = data[flow.key]["omega"].values[[0, -1]]
+                mark_grazing(ax, [omega for omega in grazing_of(data[flow.key]) if ends[0] < omega < ends[1]])
+                if flow is EXACT and state == "v":  # above each other in x
+                    _name_windows(ax, data, state)
             grid[0, j].set_title(f"({'ab'[j]}) {flow.title}")
+        only_outer(grid)
         shared_legend(canvas)
     return canvas
+
+
+def _windows(data: Mapping[str, xr.Dataset]) -> dict[int, tuple[float, float]]:
+    """Periods above 1 that starts reach at frequencies above grazing, each with its lowest and highest frequency."""
+    above = data["exact_starts"].sel(omega=slice(_JUST_ABOVE, None))
+    periods = above["period_number"]
+    found = {}
+    for period in np.unique(periods.values[periods.values > 1]):
+        at = above["omega"].values[(periods == period).any("start").values]
+        found[int(period)] = (float(at[0]), float(at[-1]))
+    return found
+
+
+def _name_windows(ax: Axes, data: Mapping[str, xr.Dataset], state: str) -> None:
+    """The period of each window, above the highest of its points."""
+    many = data["exact_starts"]
+    for period, (low, high) in _windows(data).items():
+        top = many["section"].sel(state=state, omega=slice(low, high)).where(many["period_number"] == period).max()
+        ax.annotate(
+            f"period {period}", (0.5 * (low + high), float(top)), (0, 3), textcoords="offset points", ha="center",
+            fontsize=small(ax), path_effects=halo(), zorder=6,
+        )  # fmt: skip
 
 
 def _caption_17(data: Mapping[str, xr.Dataset]) -> str:
     grazing = ", ".join(f"{omega:.5f}" for omega in grazing_of(data["exact"]))
     return (
-        "Bifurcation diagram over the forcing frequency, rho = 0.23 N, g = 0.0036 m: displacement (above) and "
+        "Bifurcation diagram over the forcing frequency, rho = 0.23 N, g = 3.6 mm: displacement (above) and "
         "velocity at the section. Dotted: the three frequencies of Fig. 18; green: closed-form grazing of the "
-        f"motion without contact ({grazing} rad/s; in (b) that of a gap g - eta). Above it chaos dies out, given time. "
-        "Grey shows motions that coexist with what the sweeps follow. " + ABOUT_BRANCHES + how(data)
+        f"motion without contact ({grazing} rad/s; in (b) that of a gap g - eta). Above it chaos dies out, given time: "
+        "what has no period in (b) had no time to. "
+        f"Grey shows motions that coexist with what the sweeps follow. {_about_windows(data)}"
+        + ABOUT_BRANCHES + how(data)
+    )
+
+
+def _about_windows(data: Mapping[str, xr.Dataset]) -> str:
+    ends = {n: sorted({f"{low:.2f}", f"{high:.2f}"}) for n, (low, high) in _windows(data).items()}
+    if not ends:
+        return ""
+    words = " and ".join(f"period {period} at {' to '.join(at)} rad/s" for period, at in ends.items())
+    return (
+        f"The small hooks above grazing are narrow windows of further motions: {words}, each with motions of no period "
+        "at its lower end. "
     )
 
 

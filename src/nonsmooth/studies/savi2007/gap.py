@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 from nonsmooth import plot
 from nonsmooth.flow.poincare import poincare
 from nonsmooth.flow.sections import Stroboscopic
+from nonsmooth.plot.units import prefixed
 from nonsmooth.studies.savi2007.branches import branches
 from nonsmooth.studies.savi2007.diagrams import ABOUT_BRANCHES, diagrams, draw_diagram, how, shared_legend
-from nonsmooth.studies.savi2007.figure import Figure, sheet
+from nonsmooth.studies.savi2007.figure import Figure, only_outer, sheet
 from nonsmooth.studies.savi2007.flows import FLOWS, Settings
 from nonsmooth.studies.savi2007.portraits import describe, draw_portraits, portraits
 from nonsmooth.studies.savi2007.printed import FIGURE_13, FIGURE_14, FIGURE_14_TEXT
@@ -20,11 +21,12 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure as Canvas
 
-__all__ = ["FIGURES", "PHASES"]
+__all__ = ["FIGURES", "GAPS", "PHASES"]
 
 PHASES = {"0": 0.0, "quarter": 0.25, "half": 0.5, "three_quarters": 0.75}  # of a forcing period
 _ANGLES = ("0", r"\pi/2", r"\pi", r"3\pi/2")
 _CHAOTIC = 0.0018
+GAPS = {g: prefixed(g, "m")[0] for g in FIGURE_14}
 
 
 def _compute_13(settings: Settings) -> dict[str, xr.Dataset]:
@@ -34,10 +36,11 @@ def _compute_13(settings: Settings) -> dict[str, xr.Dataset]:
 def _draw_13(data: Mapping[str, xr.Dataset]) -> Canvas:
     with plot.journal():
         canvas = sheet(plot.PAGE, 0.5 * plot.PAGE)
-        for ax, flow, letter in zip(canvas.subplots(1, 2, sharey=True), FLOWS, "ab", strict=True):
-            draw_diagram(ax, data, flow.key, "v", values=tuple(FIGURE_14))
+        grid = canvas.subplots(1, 2, sharey=True)
+        for ax, flow, letter in zip(grid, FLOWS, "ab", strict=True):
+            draw_diagram(ax, data, flow.key, "v", values=GAPS, words="gaps of Fig. 14 (mm)")
             ax.set_title(f"({letter}) {flow.title}")
-        ax.set_ylabel("")
+        only_outer(grid)
         shared_legend(canvas)
     return canvas
 
@@ -81,17 +84,17 @@ def _draw_15(data: Mapping[str, xr.Dataset]) -> Canvas:
         for row, flow in zip(grid, FLOWS, strict=True):
             for i, (ax, key) in enumerate(zip(row, PHASES, strict=True)):
                 plot.section(data[f"{flow.key}_{key}"], ax, size=0.7)
-                ax.set_xlabel(ax.get_xlabel() if flow is FLOWS[-1] else "")
-                ax.set_ylabel(f"{flow.short}\n{ax.get_ylabel()}" if i == 0 else "")
+                ax.set_ylabel(f"{flow.short}\n{ax.get_ylabel()}")
                 if flow is FLOWS[0]:
                     ax.set_title(f"({'abcd'[i]}) phase ${_ANGLES[i]}$", y=1.0, pad=9)
+        only_outer(grid)
     return canvas
 
 
 def _caption_15(data: Mapping[str, xr.Dataset]) -> str:
     sizes = " and ".join(f"{data[f'{flow.key}_0'].sizes['iterate']} ({flow.key})" for flow in FLOWS)
     return (
-        "Strange attractor at g = 0.0018 m, omega = 11.15 rad/s, rho = 0.33 N: sections at four phases of the "
+        "Strange attractor at g = 1.8 mm, omega = 11.15 rad/s, rho = 0.33 N: sections at four phases of the "
         f"forcing, {sizes} points each, from rest. Both rows have the same axes."
     )
 

@@ -10,7 +10,9 @@ import numpy as np
 from nonsmooth import plot
 from nonsmooth.analysis.sweep import sweep
 from nonsmooth.flow.simulate import simulate
-from nonsmooth.studies.savi2007.figure import sheet
+from nonsmooth.plot.units import prefixed
+from nonsmooth.studies.savi2007.diagrams import shared_legend
+from nonsmooth.studies.savi2007.figure import only_outer, sheet
 from nonsmooth.studies.savi2007.flows import FLOWS, Settings, starts
 from nonsmooth.studies.savi2007.measure import APERIODIC, periods_reached
 
@@ -18,7 +20,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure as Canvas
 
-__all__ = ["chosen_start", "describe", "draw_portraits", "portraits"]
+__all__ = ["chosen_start", "describe", "draw_portraits", "portraits", "setting"]
 
 CHAOTIC_PERIODS = 40  # drawn of an orbit without a period
 
@@ -63,8 +65,8 @@ def draw_portraits(
 
     def draw(data: Mapping[str, xr.Dataset]) -> Canvas:
         with plot.journal():
-            canvas = sheet(plot.PAGE, 0.62 * plot.PAGE * 2 / max(len(shown) - 1, 2) + 0.3)
-            grid = canvas.subplots(2, len(shown), sharex="col", sharey="col", squeeze=False)
+            canvas = sheet(plot.PAGE, 0.62 * plot.PAGE * 2 / max(len(shown) - 1, 2) + 0.5)
+            grid = canvas.subplots(2, len(shown), sharex="col", sharey=True, squeeze=False)
             for row, flow in zip(grid, FLOWS, strict=True):
                 for i, (ax, (value, wanted)) in enumerate(zip(row, shown.items(), strict=True)):
                     orbit, survey = data[f"{flow.key}_{value:g}"], data[flow.key]
@@ -76,21 +78,34 @@ def draw_portraits(
                         for line in ax.get_lines():
                             line.set(linewidth=0.35)
                         plot.section(points, ax, size=3.0)
-                        ax.get_lines()[-1].set_zorder(4)
-                    ax.ticklabel_format(axis="y", style="plain")
-                    ax.set_xlabel(ax.get_xlabel() if flow is FLOWS[-1] else "")
-                    ax.set_ylabel(f"{flow.short}\n{ax.get_ylabel()}" if i == 0 else "")
+                        ax.get_lines()[-1].set(zorder=4, label="section points")
+                    for line in ax.get_lines():
+                        if str(line.get_label()).endswith("band"):
+                            line.set_label("_")  # 2 eta wide: not to be seen
+                    ax.set_ylabel(f"{flow.short}\n{ax.get_ylabel()}")
                     if flow is FLOWS[0]:
-                        ax.set_title(f"({'abcd'[i]}) ${symbol} = {value:g}$ {unit}", y=1.0, pad=9)
+                        ax.set_title(f"({'abcd'[i]}) {setting(symbol, value, unit)}", y=1.0, pad=9)
+            only_outer(grid)
+            shared_legend(canvas)
         return canvas
 
     return draw
 
 
+def setting(symbol: str, value: float, unit: str) -> str:
+    """``$g = -1.2$ mm``: a setting in the unit of the axes."""
+    number, prefix = prefixed(value, unit)
+    return f"${symbol} = {number}$ {prefix}"
+
+
 def describe(data: Mapping[str, xr.Dataset], shown: Mapping[float, int]) -> str:
     """What the starts reached at each value, by the exact flow."""
     survey = data["exact"]
-    words = [f"{_parameter(survey)} = {value:g}: {words_of(periods_reached(survey, value))}" for value in shown]
+    name = _parameter(survey)
+    unit = str(survey[name].attrs["units"])
+    words = [
+        f"{name} = {' '.join(prefixed(value, unit))}: {words_of(periods_reached(survey, value))}" for value in shown
+    ]
     return f"Reached by {survey.sizes['start']} starts (exact): " + "; ".join(words) + "."
 
 

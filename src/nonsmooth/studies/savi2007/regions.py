@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from nonsmooth import plot
+from nonsmooth.plot.labels import name_axes
 from nonsmooth.studies.savi2007.figure import Figure, sheet
 from nonsmooth.studies.savi2007.flows import ETA, EXACT, SMOOTHED, Settings
 
@@ -27,9 +28,9 @@ def _draw(data: Mapping[str, xr.Dataset]) -> Canvas:
         for ax, flow in ((left, EXACT), (right, SMOOTHED)):
             plot.regions(flow.system(g=0.0), ax, xlim=(-5 * ETA, 5 * ETA), ylim=(-0.12, 0.12))
         left.set_title("(a) non-smooth system, Eqs. 4-5")
-        right.set_title(r"(b) smoothed system, $\eta = 10^{-5}$ m, Eqs. 9-10")
+        right.set_title(r"(b) smoothed system, $\eta = 10$ µm, Eqs. 9-10")
         for ax in (left, right):
-            ax.set(xlabel="$x - g$ (m)", ylabel=r"$\dot x$ (m/s)")
+            name_axes(ax, ("$x - g$", "m"), ("$v$", "m/s"))
     return canvas
 
 

@@ -9,9 +9,10 @@ import numpy as np
 
 from nonsmooth import plot
 from nonsmooth.analysis.response import frequency_response
+from nonsmooth.plot.style import small
 from nonsmooth.studies.savi2007.branches import branches, branches_of
-from nonsmooth.studies.savi2007.diagrams import name_lines, shared_legend
-from nonsmooth.studies.savi2007.figure import Figure, sheet
+from nonsmooth.studies.savi2007.diagrams import mark_grazing, shared_legend
+from nonsmooth.studies.savi2007.figure import Figure, only_outer, sheet
 from nonsmooth.studies.savi2007.flows import EXACT, FLOWS, Settings
 from nonsmooth.studies.savi2007.grazing import grazing_frequencies
 from nonsmooth.studies.savi2007.printed import FIGURE_9, FIGURE_10, NUMBERS
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Canvas
 
-__all__ = ["FIGURES", "grazing_of"]
+__all__ = ["FIGURES", "grazing_of", "mark_printed"]
 
 
 def grazing_of(response: xr.Dataset) -> list[float]:
@@ -52,15 +53,14 @@ def _draw(printed: Mapping[str, float]) -> Callable[[Mapping[str, xr.Dataset]], 
     def draw(data: Mapping[str, xr.Dataset]) -> Canvas:
         with plot.journal():
             canvas = sheet(plot.PAGE, 0.5 * plot.PAGE)
-            for ax, flow, letter in zip(canvas.subplots(1, 2, sharey=True), FLOWS, "ab", strict=True):
+            grid = canvas.subplots(1, 2, sharey=True)
+            for ax, flow, letter in zip(grid, FLOWS, "ab", strict=True):
                 response = data[flow.key]
                 found = branches_of(data) if flow is EXACT else []
                 plot.frequency_response(response, *found, ax)
-                if found:
-                    name_lines(ax)
                 _mark(ax, response, printed)
-                ax.set_title(f"({letter}) {flow.title}")
-            ax.set_ylabel("")
+                ax.set_title(f"({letter}) {flow.title}", y=1.0, pad=14 if printed else 6)
+            only_outer(grid)
             shared_legend(canvas)
         return canvas
 
@@ -69,9 +69,7 @@ def _draw(printed: Mapping[str, float]) -> Callable[[Mapping[str, xr.Dataset]], 
 
 def _mark(ax: Axes, response: xr.Dataset, printed: Mapping[str, float]) -> None:
     """Grazing frequencies, the range of period 2, and the paper's numbers at the upper edge."""
-    for i, grazing in enumerate(grazing_of(response)):
-        label = "grazing, closed form" if i == 0 else None
-        ax.axvline(grazing, color=plot.COLORS["third"], linewidth=0.8, zorder=0, label=label)
+    mark_grazing(ax, grazing_of(response))
     omega = response["omega"].values
     doubled = (response["period_number"] == 2).any("direction").values
     if doubled.any():
@@ -79,12 +77,21 @@ def _mark(ax: Axes, response: xr.Dataset, printed: Mapping[str, float]) -> None:
             omega, 0, 1, where=doubled, transform=ax.get_xaxis_transform(), color=plot.COLORS["zone"], alpha=0.25,
             linewidth=0, zorder=0, label="period 2",
         )  # fmt: skip
+    mark_printed(ax, printed)
+    ax.margins(y=0.12)
+
+
+def mark_printed(ax: Axes, printed: Mapping[str, float]) -> None:
+    """The paper's numbers at the upper edge."""
     for i, value in enumerate(printed.values()):
         ax.plot(
             value, 1.0, "v", transform=ax.get_xaxis_transform(), color="black", markersize=4, clip_on=False,
-            label="printed in the paper" if i == 0 else None, linestyle="none",
+            label="printed in the paper (rad/s)" if i == 0 else None, linestyle="none",
         )  # fmt: skip
-    ax.margins(y=0.12)
+        ax.annotate(
+            f"{value:.2f}", (value, 1.0), (0, 3.5), xycoords=ax.get_xaxis_transform(), textcoords="offset points",
+            ha="center", fontsize=small(ax),
+        )  # fmt: skip
 
 
 def _caption(name: str) -> Callable[[Mapping[str, xr.Dataset]], str]:
@@ -92,9 +99,9 @@ def _caption(name: str) -> Callable[[Mapping[str, xr.Dataset]], str]:
         exact, smoothed = data["exact"], data["smoothed"]
         grazing = " and ".join(f"{omega:.5f}" for omega in grazing_of(exact))
         return (
-            f"Frequency response for rho = {float(exact['rho']):g} N and g = {float(exact['g']):g} m: half the "
-            "peak-to-peak displacement with rising and falling frequency, jumps marked. Black in (a): periodic "
-            "orbits of the exact flow, continued from one of them (solid: stable, dashed: unstable). "
+            f"Frequency response for rho = {float(exact['rho']):g} N and g = {1e3 * float(exact['g']):g} mm: half the "
+            "peak-to-peak displacement with rising and falling frequency; arrows: jumps, with their frequencies. "
+            "Branches in (a): periodic orbits of the exact flow, continued from one of them. "
             f"Closed-form grazing at {grazing} rad/s (green; in (b) of g - eta). Steps of "
             f"{_step(exact):.4f} rad/s (exact) and {_step(smoothed):.4f} rad/s (smoothed; a shorter transient).{name}"
         )

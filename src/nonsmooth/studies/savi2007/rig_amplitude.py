@@ -9,9 +9,11 @@ import numpy as np
 
 from nonsmooth import plot
 from nonsmooth.plot.comparison_diagram import comparison_diagram
+from nonsmooth.studies.savi2007.amplitude import PRINTED
+from nonsmooth.studies.savi2007.diagrams import mark_values, shared_legend
 from nonsmooth.studies.savi2007.figure import Figure, sheet
 from nonsmooth.studies.savi2007.flows import Settings
-from nonsmooth.studies.savi2007.printed import FIGURE_12, NUMBERS
+from nonsmooth.studies.savi2007.printed import FIGURE_12
 from nonsmooth.studies.savi2007.rig_motions import GRID, compared, draw_pairs, motions, said
 
 if TYPE_CHECKING:
@@ -22,7 +24,6 @@ __all__ = ["FIGURES", "RISES", "flip_of", "flips_said", "rate_of", "slowest"]
 
 RISES = (450.0, 900.0, 1800.0)  # s, from 0.2 to 0.5 N; the one in the middle is drawn
 _SHORT = (300.0,)
-_PRINTED = [NUMBERS[f"period {n} from"].value for n in (4, 2, 1)]
 
 
 def _compute_11(settings: Settings) -> dict[str, xr.Dataset]:
@@ -39,15 +40,12 @@ def _compute_11(settings: Settings) -> dict[str, xr.Dataset]:
 
 def _draw_11(data: Mapping[str, xr.Dataset]) -> Canvas:
     with plot.journal():
-        canvas = sheet(0.72 * plot.PAGE, 0.5 * plot.PAGE)
+        canvas = sheet(0.72 * plot.PAGE, 0.56 * plot.PAGE)
         ax = canvas.subplots()
         comparison_diagram(_drawn(data), ax, y="v")
-        for i, value in enumerate(_PRINTED):
-            ax.axvline(
-                value, color="black", linewidth=0.6, linestyle=":", zorder=0,
-                label="printed in the paper" if i == 0 else None,
-            )  # fmt: skip
-        ax.legend(loc="lower right", markerscale=4)
+        ax.margins(y=0.14)  # the marks of flips above
+        mark_values(ax, PRINTED, "printed in the paper (N)", foot=True)
+        shared_legend(canvas, columns=3)
     return canvas
 
 
@@ -66,9 +64,10 @@ def _caption_11(data: Mapping[str, xr.Dataset]) -> str:
     drawn = _drawn(data)
     return (
         "Velocity at the section while the forcing of the virtual rig (synthetic) rises slowly and evenly, 0.2 to "
-        f"0.5 N in {drawn.attrs['rise']}, over the model's diagram with the parameters identified. Ticks above: flips "
-        "of rig (black) and model (blue). Where the records themselves change their period, late by the more the "
-        f"faster they rise: {'; '.join(read)} (in N). The flips with this delay taken out, in the same order: "
+        f"0.5 N in {drawn.attrs['rise']}, over the model's diagram with the parameters identified. Marks above: flips "
+        "of the model (blue), of the record (black) and of the record with its delay taken out (diamond). Where the "
+        "records themselves change their period, late by the more the faster they rise: "
+        f"{'; '.join(read)} (in N). The flips with this delay taken out, in the same order: "
         f"{'; '.join(found)}. The model's: {flips_said(drawn, 'theory_flip')}. Dotted: the paper's printed ends of "
         "chaos, period 4 and period 2."
     )
@@ -99,8 +98,8 @@ def _compute_12(settings: Settings) -> dict[str, xr.Dataset]:
 def _caption_12(data: Mapping[str, xr.Dataset]) -> str:
     return (
         "State space with section points at four amplitudes of Fig. 11, the model with the parameters identified "
-        "(above) and the virtual rig (synthetic, below); rings: the model's section points; contact zone shaded. "
-        f"Rig: {said(data, FIGURE_12)}."
+        "(above) and the virtual rig (synthetic, below); crosses: the model's section points; contact zone shaded. "
+        f"Rig: {said(data, FIGURE_12, 'N')}."
     )
 
 

@@ -11,12 +11,15 @@ from nonsmooth import plot
 from nonsmooth.analysis.sweep import sweep
 from nonsmooth.plot.comparison import MEASURED, THEORY
 from nonsmooth.plot.comparison_diagram import comparison_diagram
-from nonsmooth.studies.savi2007.figure import Figure, sheet
+from nonsmooth.plot.labels import name_and_unit, name_axes
+from nonsmooth.studies.savi2007.diagrams import mark_values, shared_legend
+from nonsmooth.studies.savi2007.figure import Figure, only_outer, sheet
 from nonsmooth.studies.savi2007.flows import EXACT, Settings, starts
-from nonsmooth.studies.savi2007.gap import PHASES
+from nonsmooth.studies.savi2007.gap import GAPS, PHASES
 from nonsmooth.studies.savi2007.printed import FIGURE_14
 from nonsmooth.studies.savi2007.rig_motions import (
     GRID,
+    SIDES,
     Motions,
     compared,
     diagram_of,
@@ -34,7 +37,7 @@ if TYPE_CHECKING:
 
     from nonsmooth.studies.savi2007.laboratory import Laboratory
 
-__all__ = ["FIGURES"]
+__all__ = ["FIGURES", "transient_points"]
 
 _ANGLES = ("0", r"\pi/2", r"\pi", r"3\pi/2")
 
@@ -65,16 +68,30 @@ def _coexisting(settings: Settings, set_: Mapping[str, Any]) -> xr.Dataset:
 
 def _draw_13(data: Mapping[str, xr.Dataset]) -> Canvas:
     with plot.journal():
-        canvas = sheet(0.72 * plot.PAGE, 0.5 * plot.PAGE)
+        canvas = sheet(0.72 * plot.PAGE, 0.56 * plot.PAGE)
         ax = canvas.subplots()
-        plot.bifurcation(data["starts"], ax, y="v", color="#B4B4B4", size=1.6)
-        behind = len(ax.get_lines())
-        comparison_diagram(without_flips(data["compared"]), ax, y="v", size=2.4)
-        for i, line in enumerate(ax.get_lines()):
-            line.set_zorder(1 + (i >= behind))
-        ax.get_lines()[0].set_label("theory, several starts")
-        ax.legend(loc="lower left", markerscale=3)
+        plot.bifurcation(data["starts"], ax, y="v", color="#B4B4B4", size=1.8)
+        ax.get_lines()[0].set(label="theory, several starts", zorder=0.5)
+        compared, over = without_flips(data["compared"]), transient_points(data["compared"], data["runs"])
+        comparison_diagram(compared.isel(sample=~over), ax, y="v", size=2.8)
+        if over.any():
+            points = compared.isel(sample=over)
+            ax.plot(
+                points["measured_g"].values, points["measured_section"].sel(state="v").values, "_", markersize=4,
+                color=plot.COLORS["muted"], markeredgewidth=0.3, rasterized=True, zorder=1,
+                label="virtual rig (synthetic), transient",
+            )  # fmt: skip
+        mark_values(ax, GAPS, "gaps of Fig. 14 (mm)")
+        shared_legend(canvas, columns=3)
     return canvas
+
+
+def transient_points(compared: xr.Dataset, runs: xr.Dataset) -> np.ndarray:
+    """Which section points belong to records that have no period where others at the same setting have one."""
+    periodic = runs["period_number"].values > 0
+    settled = set(runs["setting"].values[periodic])
+    over = np.array([setting in settled for setting in runs["setting"].values]) & ~periodic
+    return np.repeat(over, compared.sizes["sample"] // runs.sizes["run"])  # as many points of each run, run by run
 
 
 def _caption_13(data: Mapping[str, xr.Dataset]) -> str:
@@ -82,7 +99,8 @@ def _caption_13(data: Mapping[str, xr.Dataset]) -> str:
     return (
         "Velocity at the section over the gap: the virtual rig (synthetic) at four settings of the support, let go "
         "from several places, over the model's diagram with the parameters identified, swept up and down (blue) and "
-        "from several starts (grey). At 0.9 mm some of the rig's records are still in transient chaos. Gaps "
+        "from several starts (grey). Grey bars: records that have no period yet where others at the same gap "
+        "have one, transient chaos. Gaps "
         f"referred to the car's mean position under the drive: {gaps} mm."
     )
 
@@ -100,9 +118,9 @@ def _compute_14(settings: Settings) -> dict[str, xr.Dataset]:
 def _caption_14(data: Mapping[str, xr.Dataset]) -> str:
     return (
         "State space at the gaps of the paper's caption, the model with the parameters identified (above) and the "
-        "virtual rig (synthetic, below); rings are the model's section points, the contact zone is shaded. "
+        "virtual rig (synthetic, below); crosses are the model's section points, the contact zone is shaded. "
         "Where starts lead to several motions, that of the paper is drawn. "
-        f"Rig: {said(data, FIGURE_14)}."
+        f"Rig: {said(data, FIGURE_14, 'm')}."
     )
 
 
@@ -118,18 +136,16 @@ def _draw_16(data: Mapping[str, xr.Dataset]) -> Canvas:
     with plot.journal():
         canvas = sheet(plot.PAGE, 0.56 * plot.PAGE)
         grid = canvas.subplots(2, 4, sharex="col", sharey="col")
-        for row, side, color, word in (
-            (grid[0], "measured", MEASURED, "virtual rig (synthetic)"), (grid[1], "theory", THEORY, "model, identified")
-        ):  # fmt: skip
+        for row, side, color in zip(grid, SIDES, (THEORY, MEASURED), strict=True):
             for i, ax in enumerate(row):
                 points = result[f"{side}_section"].isel(section_phase=i).values
                 looks = {"color": color, "markersize": 1.4, "markeredgewidth": 0, "rasterized": True}
                 ax.plot(points[:, 0], points[:, 1], ".", **looks)
-                ax.ticklabel_format(axis="y", style="plain")
-                ax.set_xlabel("$x$ (m)" if side == "theory" else "")
-                ax.set_ylabel(f"{word}\n" + "$v$ (m/s)" if i == 0 else "")
-                if side == "measured":
+                name_axes(ax, name_and_unit(result, "x"), name_and_unit(result, "v"))
+                ax.set_ylabel(f"{SIDES[side]}\n{ax.get_ylabel()}")
+                if side == "theory":
                     ax.set_title(f"({'abcd'[i]}) phase ${_ANGLES[i]}$", y=1.0, pad=9)
+        only_outer(grid)
     return canvas
 
 
@@ -138,10 +154,10 @@ def _caption_16(data: Mapping[str, xr.Dataset]) -> str:
     far, halves = result["energy_distance_matched"].values, result["measured_halves_p95"].values
     words = ", ".join(f"{a:.3f} ({a / b:.2f})" for a, b in zip(far, halves, strict=True))
     return (
-        "Strange attractor at g = 0.0018 m, omega = 11.15 rad/s, rho = 0.33 N: sections at four phases of the forcing "
-        f"from one record of the virtual rig (synthetic, {result.sizes['measured_iterate']} turns) and by the model "
-        "with the parameters identified. Energy distances of the two clouds at the four phases, and over the 95th "
-        f"percentile of those of the record's own halves: {words}."
+        "Strange attractor at g = 1.8 mm, omega = 11.15 rad/s, rho = 0.33 N: sections at four phases of the forcing "
+        "by the model with the parameters identified (above) and from one record of the virtual rig (synthetic, below, "
+        f"{result.sizes['measured_iterate']} turns). Energy distances of the two clouds at the four phases, and over "
+        f"the 95th percentile of those of the record's own halves: {words}."
     )
 
 

@@ -9,9 +9,14 @@ import numpy as np
 
 from nonsmooth import plot
 from nonsmooth.plot.comparison import MEASURED, THEORY
-from nonsmooth.studies.savi2007.figure import sheet
+from nonsmooth.plot.labels import name_and_unit, name_axes
+from nonsmooth.plot.phase_portrait import shade_zone
+from nonsmooth.plot.units import prefixed
+from nonsmooth.studies.savi2007.diagrams import shared_legend
+from nonsmooth.studies.savi2007.figure import only_outer, sheet
 from nonsmooth.studies.savi2007.laboratory import as_result
 from nonsmooth.studies.savi2007.measure import APERIODIC
+from nonsmooth.studies.savi2007.portraits import setting
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -22,10 +27,12 @@ if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
 __all__ = [
-    "GRID", "Motions", "chosen", "compared", "diagram_of", "draw_pairs", "measured_periods_at", "model_at", "motions",
-    "runs_at", "runs_of", "said", "without_flips",
+    "GRID", "SIDES", "Motions", "chosen", "compared", "diagram_of", "draw_pairs", "measured_periods_at", "model_at",
+    "motions", "runs_at", "runs_of", "said", "without_flips",
 ]  # fmt: skip
 
+#: The two sides of a sheet, the model above the rig.
+SIDES = {"theory": "model, identified", "measured": "virtual rig (synthetic)"}
 GRID = 384  # samples of an orbit in each forcing period: enough for the eye within a contact
 
 #: Measured motions and the settings that belong to them, by key.
@@ -140,13 +147,13 @@ def chosen(data: Mapping[str, xr.Dataset], value: float, wanted: int) -> xr.Data
     return next((run for run in runs if int(run["measured_period_number"]) == wanted), runs[0])
 
 
-def said(data: Mapping[str, xr.Dataset], shown: Mapping[float, int]) -> str:
+def said(data: Mapping[str, xr.Dataset], shown: Mapping[float, int], unit: str) -> str:
     """What the rig did at each value, and what the model has there."""
     words = []
     for value in shown:
         rig = " and ".join(_name(n) for n in measured_periods_at(data, value))
         model = sorted({int(n) for run in runs_at(data, value) for n in run["coexisting_period_number"].values})
-        words.append(f"{value:g}: {rig} (model: {', '.join(_name(n) for n in model)})")
+        words.append(f"{' '.join(prefixed(value, unit))}: {rig} (model: {', '.join(_name(n) for n in model)})")
     return "; ".join(words)
 
 
@@ -161,41 +168,40 @@ def draw_pairs(
 
     def draw(data: Mapping[str, xr.Dataset]) -> Canvas:
         with plot.journal():
-            canvas = sheet(plot.PAGE, 0.62 * plot.PAGE * 2 / max(len(shown) - 1, 2) + 0.3)
-            grid = canvas.subplots(2, len(shown), sharex="col", sharey="col", squeeze=False)
+            canvas = sheet(plot.PAGE, 0.62 * plot.PAGE * 2 / max(len(shown) - 1, 2) + 0.5)
+            grid = canvas.subplots(2, len(shown), sharex="col", sharey=True, squeeze=False)
             for i, (value, wanted) in enumerate(shown.items()):
                 result = chosen(data, value, wanted)
                 for ax, side in zip(grid[:, i], ("theory", "measured"), strict=True):
                     _portrait(ax, result, side)
-                    ax.set(xlabel="$x$ (m)" if side == "measured" else "")
-                    ax.ticklabel_format(axis="y", style="plain")
-                grid[0, i].set_title(f"({'abcd'[i]}) ${symbol} = {value:g}$ {unit}", y=1.0, pad=9)
-            for ax, word in zip(grid[:, 0], ("model, identified", "virtual rig (synthetic)"), strict=True):
-                ax.set_ylabel(f"{word}\n" + "$v$ (m/s)")
+                    ax.set_ylabel(f"{SIDES[side]}\n{ax.get_ylabel()}")
+                grid[0, i].set_title(f"({'abcd'[i]}) {setting(symbol, value, unit)}", y=1.0, pad=9)
+            only_outer(grid)
+            shared_legend(canvas)
         return canvas
 
     return draw
 
 
 def _portrait(ax: Axes, result: xr.Dataset, side: str) -> None:
-    """One side's orbit and section points; of motions with a period the model's points as rings on both sides."""
+    """One side's orbit and section points; on the rig's, of motions with a period, the model's points as crosses."""
     color = THEORY if side == "theory" else MEASURED
+    word = "model" if side == "theory" else "virtual rig"
     closed = "phase" in result.coords
     orbit = result[f"{side}_orbit"].values
     orbit = np.vstack([orbit, orbit[:1]]) if closed else orbit
-    ax.plot(orbit[:, 0], orbit[:, 1], color=color, linewidth=0.7 if closed else 0.35)
+    ax.plot(orbit[:, 0], orbit[:, 1], color=color, linewidth=0.7 if closed else 0.35, label=word)
     points = result[f"{side}_section"].values.reshape(-1, 2)
-    size = 2.4 if closed else 1.6
-    ax.plot(points[:, 0], points[:, 1], "o", color=color, markersize=size, markeredgewidth=0, rasterized=True, zorder=4)
+    ax.plot(
+        points[:, 0], points[:, 1], "o", color=plot.COLORS["second"], markersize=3.0 if closed else 1.4,
+        markeredgewidth=0, rasterized=True, zorder=5, label=None if side == "theory" else "section points",
+    )  # fmt: skip
     n = int(result["theory_period_number"])
-    if n:
-        rings = result["theory_section"].values.reshape(-1, 2)[:n]
+    if n and side == "measured":
+        expected = result["theory_section"].values.reshape(-1, 2)[:n]
         ax.plot(
-            rings[:, 0], rings[:, 1], "o", color=THEORY, markersize=6, markerfacecolor="none", markeredgewidth=0.8,
-            zorder=5,
+            expected[:, 0], expected[:, 1], "x", color=THEORY, markersize=7, markeredgewidth=1.0, linestyle="none",
+            zorder=4, label="section points of the model",
         )  # fmt: skip
-    edge, (left, right) = float(result["g"]), ax.get_xlim()
-    ax.axvline(edge, color=plot.COLORS["muted"], linewidth=0.6, linestyle="--", zorder=1)
-    if edge < right:
-        ax.axvspan(max(edge, left), right, color=plot.COLORS["zone"], alpha=0.18, linewidth=0, zorder=0)
-    ax.set_xlim(left, right)
+    shade_zone(ax, float(result["g"]))
+    name_axes(ax, name_and_unit(result, "x"), name_and_unit(result, "v"))

@@ -9,10 +9,11 @@ import numpy as np
 
 from nonsmooth import plot
 from nonsmooth.plot import identification as pictures
+from nonsmooth.plot.comparison import ABOVE
 from nonsmooth.studies.savi2007.figure import Figure, sheet
 from nonsmooth.studies.savi2007.findings import Number, estimates_of, found_in, kept, the_finding
 from nonsmooth.studies.savi2007.flows import Settings
-from nonsmooth.studies.savi2007.printed import TABLE_1
+from nonsmooth.studies.savi2007.printed import NUMBERS, TABLE_1
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -48,19 +49,26 @@ def _side_by_side(
             axes = np.atleast_1d(canvas.subplots(1, len(parts)))
             for ax, (key, picture, title) in zip(axes, parts, strict=True):
                 picture(data[key], ax)
-                ax.set_title(title, loc="left", pad=16 if _legend_above(ax) else 6)
+                ax.set_title(title, loc="left", pad=6 + _legend_above(ax))
         return canvas
 
     return draw
 
 
-def _legend_above(ax: Axes) -> bool:
-    """Whether the legend stands above the axes, where the title would be."""
+def _legend_above(ax: Axes) -> float:
+    """Height in points of a legend that stands above the axes, in the place of the title."""
     legend = ax.get_legend()
-    if legend is None:
-        return False
-    box = legend.get_bbox_to_anchor()
-    return bool(box.transformed(ax.transAxes.inverted()).y0 >= 0.99)
+    if legend is None or legend.get_bbox_to_anchor().transformed(ax.transAxes.inverted()).y0 < 0.99:
+        return 0.0
+    return 72 * legend.get_window_extent().height / ax.figure.dpi
+
+
+def _spectrum(data: xr.Dataset, ax: Axes) -> None:
+    """The spectrum of the tap with the peak as the paper reads it."""
+    pictures.impulse_response(data, ax)
+    printed = NUMBERS["peak of the DFT"]
+    ax.axvline(printed.value, color="black", linestyle=":", linewidth=1.0, label=f"printed in the paper {printed}")
+    ax.legend(**ABOVE, ncols=2, handlelength=1.6, columnspacing=1.0)
 
 
 def _caption_4(data: Mapping[str, xr.Dataset]) -> str:
@@ -68,7 +76,7 @@ def _caption_4(data: Mapping[str, xr.Dataset]) -> str:
     return (
         f"Force against displacement, {car.runs} pulls of the car and {support.runs} pushes of the support's spring by "
         f"hand. (a) Slope 2k = {car.number}, k = {car.number.times(0.5)} (95 %; most of it the force sensor's gain, "
-        f"within 1 %); below, what the lines leave: the two ways part by twice the dry friction. (b) k_s = "
+        f"within 1 %); below, what the mean line leaves, the two ways apart by twice the dry friction. (b) k_s = "
         f"{support.number}. The paper: 8.47 and 1210 N/m."
     )
 
@@ -143,29 +151,25 @@ def _draw_table(data: Mapping[str, xr.Dataset]) -> Canvas:
     rows = table_rows(data)
     with plot.journal():
         canvas = sheet(plot.PAGE, 0.36 * plot.PAGE)
-        wide, near = canvas.subplots(1, 2, sharey=True)
-        for ax in (wide, near):
-            ax.axvline(0, color=plot.COLORS["muted"], linewidth=0.6, zorder=0)
-            for i, (name, (printed, number, truth)) in enumerate(rows.items()):
-                middle, half = (100 * (v / truth) for v in (number.value - truth, number.interval.uncertainty))
+        ax = canvas.subplots()
+        ax.axvline(0, color=plot.COLORS["muted"], linewidth=0.6, zorder=0)
+        for i, (name, (printed, number, truth)) in enumerate(rows.items()):
+            middle, half = (100 * (v / truth) for v in (number.value - truth, number.interval.uncertainty))
+            ax.errorbar(
+                middle, i + 0.12, xerr=half, fmt="o", color=plot.COLORS["first"], markersize=3, capsize=1.5,
+                elinewidth=0.8, label="identified on the virtual rig (synthetic), 95 %" if i == 0 else None,
+            )  # fmt: skip
+            if printed:
+                value, rounding = TABLE_1[name].value, TABLE_1[name].rounding
                 ax.errorbar(
-                    middle, i + 0.12, xerr=half, fmt="o", color=plot.COLORS["first"], markersize=3, capsize=1.5,
-                    elinewidth=0.8, label="identified, 95 %" if i == 0 else None,
+                    100 * (value / truth - 1), i - 0.2, xerr=100 * rounding / truth, fmt="s", markersize=3,
+                    color="black", markerfacecolor="white", capsize=1.5, elinewidth=0.6,
+                    label="printed in the paper, with its rounding" if i == 0 else None,
                 )  # fmt: skip
-                if printed:
-                    value, rounding = TABLE_1[name].value, TABLE_1[name].rounding
-                    ax.errorbar(
-                        100 * (value / truth - 1), i - 0.2, xerr=100 * rounding / truth, fmt="s", markersize=3,
-                        color="black", markerfacecolor="white", capsize=1.5, elinewidth=0.6,
-                        label="printed in the paper, with its rounding" if i == 0 else None,
-                    )  # fmt: skip
-            ax.set_xlabel("difference from the rig's truth (%)")
-        wide.set_yticks(range(len(rows)), [NAMES[name][1] for name in rows])
-        wide.set_ylim(len(rows) - 0.5, -0.5)
-        near.set_xlim(-0.3, 0.3)
-        wide.set_title("(a) virtual rig (synthetic)", loc="left")
-        near.set_title("(b) the same, near zero", loc="left")
-        wide.legend(loc="lower right")
+        ax.set_yticks(range(len(rows)), [NAMES[name][1] for name in rows])
+        ax.set_ylim(len(rows) - 0.5, -0.5)
+        ax.set_xlabel("difference from the rig's truth (%)")
+        ax.legend(loc="lower right")
     return canvas
 
 
@@ -191,13 +195,14 @@ FIGURES = (
     Figure(
         "fig05", 5, "Natural frequency from an impulsive response", _findings({"tap": "omega_0"}),
         _side_by_side(("tap", pictures.impulse_history, "(a) displacement"),
-                      ("tap", pictures.impulse_response, "(b) magnitude of the DFT")),
+                      ("tap", _spectrum, "(b) magnitude of the DFT"), height=0.5),
         _caption_5, rig=True,
     ),
     Figure(
         "fig06", 6, "Damping from the amplitude over frequency",
         _findings({"viscous": "c_viscous_only", "amplitudes": "c_response"}),
-        _side_by_side(("amplitudes", pictures.amplitude_fit, ""), width=0.62 * plot.PAGE), _caption_6, rig=True,
+        _side_by_side(("amplitudes", pictures.amplitude_fit, ""), width=0.62 * plot.PAGE, height=0.5), _caption_6,
+        rig=True,
     ),
     Figure(
         "fig07", 7, "Damping of the support from a free decay", _findings({"drop": "c_s_drop"}),

@@ -9,11 +9,13 @@ import numpy as np
 
 from nonsmooth import plot
 from nonsmooth.plot.comparison_response import comparison_response
+from nonsmooth.studies.savi2007.diagrams import shared_legend
 from nonsmooth.studies.savi2007.figure import Figure, sheet
 from nonsmooth.studies.savi2007.flows import Settings
 from nonsmooth.studies.savi2007.laboratory import as_result
 from nonsmooth.studies.savi2007.measure import measured_jumps, measured_periods
 from nonsmooth.studies.savi2007.printed import NUMBERS
+from nonsmooth.studies.savi2007.resonance import mark_printed
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -50,18 +52,11 @@ def _steps(settings: Settings, number: int) -> dict[str, Any]:
 def _draw(printed: Mapping[str, float]) -> Callable[[Mapping[str, xr.Dataset]], Canvas]:
     def draw(data: Mapping[str, xr.Dataset]) -> Canvas:
         with plot.journal():
-            canvas = sheet(0.72 * plot.PAGE, 0.52 * plot.PAGE)
+            canvas = sheet(0.72 * plot.PAGE, 0.6 * plot.PAGE)
             ax = canvas.subplots()
             comparison_response(data["compared"], ax)
-            for text in ax.texts:  # the differences of two jumps at one place, one above the other
-                if text.get_color() == plot.COLORS["second"]:
-                    text.set_position((0, 14))
-            for i, value in enumerate(printed.values()):
-                ax.plot(
-                    value, 1.0, "v", transform=ax.get_xaxis_transform(), color="black", markersize=4, clip_on=False,
-                    label="printed in the paper" if i == 0 else None, linestyle="none",
-                )  # fmt: skip
-            ax.legend(loc="lower left", bbox_to_anchor=(0.0, 0.12), handlelength=1.6)
+            mark_printed(ax, printed)
+            shared_legend(canvas, columns=2)
         return canvas
 
     return draw
@@ -80,7 +75,8 @@ def _caption(data: Mapping[str, xr.Dataset]) -> str:
         f"over the model's response with the parameters identified, rho = {float(compared['rho']):.4f} N and g = "
         f"{1e3 * float(compared['g']):.3f} mm. Jumps of the rig, {'; '.join(words)}; {doubled} runs with period 2. "
         f"Half of the runs lie within {np.nanmedian(differences):.2f} % of the model, nine of ten within "
-        f"{np.nanquantile(differences, 0.9):.1f} %. Diamonds: jumps measured (full) and predicted (open)."
+        f"{np.nanquantile(differences, 0.9):.1f} %. Diamonds: jumps measured (full) and predicted (open), with their "
+        "difference."
     )
 
 

@@ -1,0 +1,56 @@
+"""Apply small mistakes to the sources one by one and see that a test fails: ``python tests/mutants.py [part of name]``.
+
+``mutants.toml`` lists them: the file, the text and what it becomes, and the tests that state the fact. A mutant that
+all of them survive is a hole in the tests: exit code 1. The sources themselves are not touched; a copy is.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import tomllib
+from pathlib import Path
+
+HERE = Path(__file__).parent
+SOURCES = HERE.parent / "src"
+
+
+def passes(tests: list[str], sources: Path) -> bool:
+    """Whether the tests pass with the package from ``sources``."""
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-x", "-q", "-n", "0", "-p", "no:cacheprovider", *tests],
+        cwd=HERE.parent, env={**os.environ, "PYTHONPATH": str(sources)}, capture_output=True, text=True,
+    )  # fmt: skip
+    if done.returncode not in (0, 1):
+        raise SystemExit(f"pytest could not run {' '.join(tests)}:\n{done.stdout}{done.stderr}")
+    return done.returncode == 0
+
+
+def main(wanted: str) -> int:
+    mutants = [one for one in tomllib.loads((HERE / "mutants.toml").read_text())["mutant"] if wanted in one["name"]]
+    survivors = []
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder) / "src"
+        shutil.copytree(SOURCES, copy, ignore=shutil.ignore_patterns("__pycache__"))
+        every = sorted({test for one in mutants for test in one["tests"]})
+        if every and not passes(every, copy):
+            raise SystemExit(f"these tests do not pass as it is: {' '.join(every)}")
+        for one in mutants:
+            path = copy / "nonsmooth" / one["file"]
+            text = path.read_text(encoding="utf-8")
+            if text.count(one["old"]) != 1:
+                raise SystemExit(f"{one['name']}: stands {text.count(one['old'])} times in {one['file']}: {one['old']}")
+            path.write_text(text.replace(one["old"], one["new"]), encoding="utf-8")
+            survives = passes(one["tests"], copy)
+            path.write_text(text, encoding="utf-8")
+            print(f"{'SURVIVES' if survives else 'caught  '}  {one['name']}", flush=True)
+            survivors += [one["name"]] * survives
+    print(f"{len(mutants)} mutants, {len(survivors)} survive")
+    return int(bool(survivors))
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1] if len(sys.argv) > 1 else ""))
