@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -117,7 +118,7 @@ class Motions:
         orbits: list[FloatArray] = []
         statuses = set()
         for k, start in enumerate(np.atleast_2d(starts)):
-            verdict = self.rules.settle(i, self._state(start), self.out, lambda u=start: self._state(u))
+            verdict = self.rules.settle(i, self._state(start), self.out, partial(self._state, start))
             statuses.add(int(verdict.status))
             points, number = self.out.section[i].copy(), verdict.period_number
             if not usable(verdict.status) or not np.isfinite(points).all():
