@@ -12,9 +12,8 @@ export OPENBLAS_NUM_THREADS ?= 1
 PYTEST_ARGS ?= -n auto --dist loadfile --no-loadscope-reorder
 
 .DEFAULT_GOAL := help
-.PHONY: help reproduce reproduce-full test slow mutants fuzz coverage coverage-awkward rig-against-model check bench gpu \
-	gpu-compiler docs clean \
-	distclean
+.PHONY: help reproduce reproduce-full test slow mutants fuzz altered coverage coverage-awkward rig-against-model check \
+	bench gpu gpu-compiler docs clean distclean
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 26
@@ -36,6 +35,9 @@ mutants: $(VENV)/.installed-test  ## small mistakes in the sources, one by one: 
 
 fuzz: $(VENV)/.installed-test  ## read 100 000 damaged recordings with every reader
 	$(BIN)/python -m pytest -m slow tests/experiment/test_fuzz.py -s
+
+altered: $(VENV)/.installed-test  ## alter bytes of 400 saved files of each format: none loads with other content
+	$(BIN)/python -m pytest -m slow tests/results/test_altered_bytes.py -s
 
 coverage: $(VENV)/.installed-run  ## identify 40 virtual rigs; writes docs/measured_coverage.md
 	$(BIN)/python -m nonsmooth.identification.coverage --seeds 0-39 --out docs/measured_coverage.md

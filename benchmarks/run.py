@@ -17,6 +17,7 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 sys.path.insert(0, str(Path(__file__).parent))
 
 import branch
+import chain
 import chart
 import chart_size
 import diagram
@@ -34,7 +35,7 @@ def main() -> int:
     options = parser.parse_args()
     effort = 0.1 if options.quick else 1.0
     text, verdicts = ["# Benchmarks", "", *(f"- {fact}" for fact in machine.facts() if fact), ""], []
-    for part in (oscillator, valve, valve_scan, diagram, chart, chart_size, lyapunov, branch):
+    for part in (oscillator, chain, valve, valve_scan, diagram, chart, chart_size, lyapunov, branch):
         lines, part_verdicts = part.run(effort)
         print("\n".join(lines), flush=True)
         text += lines

@@ -244,7 +244,9 @@ SWEEP = {
     "keep": ("rho", VALUES, {"keep": 1}, ValueError, r"keep = 1 must be a whole number, at least 2"),
     "keep as text": ("rho", VALUES, {"keep": "all"}, TypeError, r"keep must be a real number, not 'all'"),
     "max_period": ("rho", VALUES, {"max_period": 0}, ValueError, r"max_period = 0 .*at least 1"),
-    "max_period beyond keep": ("rho", VALUES, {"keep": 10}, ValueError, r"max_period = 16: 10 kept .* periods up to 9"),
+    "max_period beyond keep": (
+        "rho", VALUES, {"keep": 10, "max_period": 16}, ValueError, r"max_period = 16: 10 kept .* periods up to 9",
+    ),
     "threads": ("rho", VALUES, {"threads": 0}, ValueError, r"threads = 0 .*at least 1"),
     "section as a number": ("rho", VALUES, {"section": 0.5}, TypeError, r"ns\.Stroboscopic\(\.\.\.\) or ns\.Poincare"),
     "start of nothing": ("rho", VALUES, {"start": []}, ValueError, r"2 numbers \(x, v\)"),

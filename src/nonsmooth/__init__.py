@@ -9,6 +9,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from nonsmooth.results import progress as _progress  # noqa: F401  it says when kernels are compiled
+
 if TYPE_CHECKING:
     from nonsmooth import models as models
     from nonsmooth import plot as plot

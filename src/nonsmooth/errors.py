@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 __all__ = ["DataFileError", "SolveError", "SystemDefinitionError"]
 
 
@@ -46,4 +48,12 @@ class SolveError(RuntimeError):
 
 
 class DataFileError(ValueError):
-    """A file that cannot be read: the message names the file, the place in it, and what was expected."""
+    """A file that cannot be read or written: the message names the file, the place in it, and what was expected.
+
+    Attributes
+    ----------
+    result : xarray.Dataset or None
+        The result that could not be written, so that it is not lost.
+    """
+
+    result: Any = None

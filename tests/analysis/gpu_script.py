@@ -12,10 +12,10 @@ from gpu_both import both, launches_of
 
 import nonsmooth as ns
 from nonsmooth.flow import planar_cuda
-from nonsmooth.kernels.cuda_module import cuda_planar_module
+from nonsmooth.kernels.cuda_module import cuda_linear_module
 
 LAUNCHED = launches_of(planar_cuda.PlanarOnGpu)
-paper = cuda_planar_module(1, 2, 2, 1, 2, 5)
+paper = cuda_linear_module(1, 2, 2, 1, 2, 5)
 plain_fill, built = paper.fill, 0
 
 

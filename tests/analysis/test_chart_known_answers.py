@@ -40,6 +40,11 @@ def test_values_in_any_order(linear: ns.System, options: dict) -> None:
         np.testing.assert_allclose(plane["minimum"].sel(state="v"), -expected * OMEGA[:, None], rtol=1e-8)
 
 
+def test_few_kept_points_are_enough_for_short_periods(linear: ns.System) -> None:
+    plane = ns.chart(linear, {"omega": OMEGA, "c": DAMPING}, keep=3, **QUIET)
+    assert (plane["period_number"] == 1).all()
+
+
 def test_exponents_do_not_depend_on_the_section(linear: ns.System) -> None:
     """-c / 2, also where returns to a surface come at other phases of the forcing."""
     for section in (ns.Stroboscopic(0.3), ns.Poincare("speed")):
@@ -94,7 +99,11 @@ def test_starts_count_the_roots_they_reach() -> None:
 
 @pytest.mark.parametrize(
     ("options", "message"),
-    [({"max_period": 60}, "raise keep"), ({"keep": 9}, "up to 8"), ({"lyapunov": 100.5}, "whole number")],
+    [
+        ({"max_period": 60}, "raise keep"),
+        ({"keep": 9, "max_period": 9}, "up to 8"),
+        ({"lyapunov": 100.5}, "whole number"),
+    ],
 )
 def test_what_a_window_cannot_show_is_told(linear: ns.System, options: dict, message: str) -> None:
     with pytest.raises((ValueError, TypeError), match=message):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nonsmooth.analysis.classify import MARGIN, judge, residuals
+from nonsmooth.analysis.classify import MARGIN, judge, longest_period, residuals
 from nonsmooth.analysis.classify_many import candidates, certain
 from nonsmooth.kernels import codes
 
@@ -95,3 +95,8 @@ def test_many_at_once_are_judged_like_one() -> None:
                 period > 0, np.where(found, codes.OK, codes.SLOW), status
             ).tolist()
             np.testing.assert_array_equal([v.residual for v in one_by_one], residual)
+
+
+@pytest.mark.parametrize(("keep", "longest"), [(2, 1), (10, 9), (16, 15), (17, 16), (100, 16)])
+def test_periods_are_looked_for_as_far_as_the_kept_points_show_them(keep: int, longest: int) -> None:
+    assert longest_period(keep, None) == longest

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.flow import memory
+from nonsmooth.results import memory
 
 QUIET = {"progress": False}
 SUPPORT = ns.models.discontinuous_support()

@@ -128,23 +128,89 @@ def test_both_ways_to_a_spectrum_agree() -> None:
     assert abs(float(exact.nearest_graze) - float(taylor.nearest_graze)) < 1e-5
 
 
+def lorenz() -> ns.System:
+    return ns.System(
+        states=["x", "y", "z"], parameters={"s": 10.0, "r": 28.0, "b": 8 / 3},
+        modes={"all": lambda t, u, p: (p.s * (u.y - u.x), u.x * (p.r - u.z) - u.y, u.x * u.y - p.b * u.z)},
+    )  # fmt: skip
+
+
 @pytest.mark.parametrize("pieces", [4096, 64])
 def test_lorenz(pieces: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Published: 0.9056, 0, -14.5723 (Sprott 2003); the sum -(sigma + 1 + b) is exact. Here within the stated error.
 
     Also where the record has so few samples that a motion begun at one has forgotten it before the next."""
     monkeypatch.setattr("nonsmooth.analysis.lyapunov.UNITS", pieces)
-    system = ns.System(
-        states=["x", "y", "z"], parameters={"s": 10.0, "r": 28.0, "b": 8 / 3},
-        modes={"all": lambda t, u, p: (p.s * (u.y - u.x), u.x * (p.r - u.z) - u.y, u.x * u.y - p.b * u.z)},
-    )  # fmt: skip
-    found = spectrum(system, duration=4000, start=[1.0, 1.0, 20.0])
+    found = spectrum(lorenz(), duration=4000, start=[1.0, 1.0, 20.0])
+    assert found.equilibrium == 0 and "note" not in found.attrs
     error = found.standard_error.values
     assert error[0] < 5e-3 and error[1] < 2e-3
     assert (np.abs(found.exponents.values - [0.9056, 0.0, -14.5723]) < 4 * error + 1e-4).all()
     assert abs(float(found.exponents[1])) < 1e-3
     assert abs(float(found.exponents.sum()) + 10.0 + 1.0 + 8 / 3) < 1e-10
     assert abs(float(found.kaplan_yorke) - 2.062) < 2e-3  # Sprott: 2.062
+
+
+def at_origin(r: float) -> np.ndarray:
+    """Eigenvalues of the Lorenz system at the origin: (-11 +- sqrt(121 + 40 (r - 1))) / 2 and -8/3."""
+    root = np.sqrt(121.0 + 40.0 * (r - 1.0))
+    return np.sort([0.5 * (-11.0 + root), 0.5 * (-11.0 - root), -8 / 3])[::-1]
+
+
+def test_exponents_of_an_unstable_equilibrium_are_named_as_such(tmp_path: Path) -> None:
+    """The start of zeros is one: 11.8277, -2.6667, -22.8277 are the origin's eigenvalues, not the attractor's."""
+    with pytest.warns(UserWarning, match=r"x = 0, y = 0, z = 0 .* unstable equilibrium, eigenvalues 11\.8277.*start="):
+        found = spectrum(lorenz(), duration=200.0)
+    assert np.abs(found.exponents.values - at_origin(28.0)).max() < 1e-9
+    assert np.isnan(found.standard_error.values).all() and np.isnan(found.kaplan_yorke)
+    assert found.equilibrium == 2 and found.equilibrium.attrs["flag_meanings"] == "none stable unstable undecided"
+    assert "not of an attractor" in found.attrs["note"]
+    ns.save(found, tmp_path / "found.nc")
+    assert ns.load(tmp_path / "found.nc").identical(found)
+
+
+def test_exponents_of_a_stable_equilibrium_are_the_real_parts_of_its_eigenvalues(
+    recwarn: pytest.WarningsRecorder,
+) -> None:
+    """The origin below r = 1; at r = 10 a focus, lambda^3 + (41/3) lambda^2 + (160/3) lambda + 480 = 0, to whose real
+    parts the estimates go like 1/t: the error covers that."""
+    focus = np.sort(np.roots([1.0, 41 / 3, 160 / 3, 480.0]).real)[::-1]
+    for r, start, known in ((0.5, [0.1, 0.2, 0.3], at_origin(0.5)), (10.0, [4.0, 5.0, 8.0], focus)):
+        found = spectrum(lorenz().with_parameters(r=r), duration=400.0, start=start)
+        error = found.standard_error.values
+        assert found.equilibrium == 1 and found.kaplan_yorke == 0.0
+        assert "real parts of its eigenvalues" in found.attrs["note"]
+        assert (error > 0.0).all() and (np.abs(found.exponents.values - known) <= error + 1e-12).all()
+    assert not recwarn.list
+
+
+@pytest.mark.parametrize("field", [lambda t, u, p: (u.v, -2 * u.x - 3 * u.v), lambda t, u, p: (-u.x, -2 * u.v)])
+def test_the_error_of_a_short_run_at_a_stable_equilibrium_covers_its_eigenvalues(field: Any) -> None:
+    """-1 and -2: the frame of the first is still turning, the batches of the second are alike to the last bit."""
+    found = spectrum(ns.System(states=["x", "v"], parameters={}, modes={"all": field}), duration=64.0)
+    error = found.standard_error.values
+    assert found.equilibrium == 1 and (error > 0.0).all()
+    assert (np.abs(found.exponents.values - [-1.0, -2.0]) <= error).all()
+
+
+def test_equilibria_are_named_along_a_sweep() -> None:
+    with pytest.warns(UserWarning, match=r"at 2 of 3 values of 'r', 2 the first.*direction=None"):
+        found = spectrum(lorenz(), parameter="r", values=[0.5, 2.0, 28.0], direction=None, duration=100.0)
+    assert found.equilibrium.values.tolist() == [1, 2, 2]
+    assert np.isnan(found.standard_error.values).all(axis=1).tolist() == [False, True, True]
+    for row, r in zip(found.exponents.values, (0.5, 2.0, 28.0), strict=True):
+        assert np.abs(row - at_origin(r)).max() < 1e-9
+
+
+def test_a_fixed_point_of_a_forced_system_is_no_attractor_where_its_neighbours_leave() -> None:
+    """x grows by r in a kick and is folded, x -> r x (1 - x): the start of zeros stays, with the exponent log r."""
+    logistic = ns.System(
+        states=["x"], parameters={"r": 3.9}, modes={"rest": lambda t, u, p: 0 * u.x}, period=1.0,
+        transitions=[ns.Transition("rest", "rest", at=0.5, reset=lambda t, u, p: p.r * u.x * (1 - u.x))],
+    )  # fmt: skip
+    with pytest.warns(UserWarning, match=r"x = 0 \(mode 'rest'\) is an unstable equilibrium"):
+        found = spectrum(logistic, periods=640)
+    assert abs(float(found.exponents[0]) - np.log(3.9)) < 1e-12 and np.isnan(found.standard_error[0])
 
 
 def test_an_autonomous_cycle_with_impacts_has_a_zero_exponent() -> None:

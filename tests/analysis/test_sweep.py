@@ -55,6 +55,13 @@ def test_period_numbers_of_the_logistic_map(logistic: ns.System) -> None:
         assert status == ("ok" if expected else "not_periodic")
 
 
+def test_few_kept_points_show_short_periods(logistic: ns.System) -> None:
+    """Five points show cycles of up to four: not the 8 at 3.5445, and the result says up to where."""
+    diagram = ns.sweep(logistic, "r", [2.9, 3.05, 3.46, 3.5445, 3.83], start={"x": 0.3}, keep=5, **QUIET)
+    assert diagram["period_number"].values.tolist() == [1, 2, 4, 0, 3]
+    assert read_provenance(diagram)["options"]["max_period"] == 4
+
+
 def test_section_points_and_extremes_of_the_logistic_map(logistic: ns.System) -> None:
     """The fixed point 1 - 1/r, and the 2-cycle (r + 1 +- sqrt((r - 3)(r + 1))) / (2 r)."""
     r = np.array([2.2, 2.8, 3.1, 3.3])

@@ -43,6 +43,14 @@ class Squares:
         return {"verb": "squares", "system": self.name, "options": {"size": self.size}}
 
 
+@dataclass(frozen=True)
+class Zeros(Squares):
+    """Every other chunk holds nothing but zeros."""
+
+    def compute(self, chunk: int) -> dict[str, Any]:
+        return {name: values * (chunk % 2) for name, values in super().compute(chunk).items()}
+
+
 def right(columns: Mapping[str, Any], work: Squares) -> bool:
     place = np.arange(work.size)
     return bool((columns["square"] == place**2.0).all() and (columns["pair"] == np.column_stack([place, -place])).all())

@@ -30,7 +30,7 @@ PLANES = {
     },
 }  # fmt: skip
 PLAN = """
-import json, sys, netCDF4, xarray
+import json, sys, h5netcdf, xarray
 from pathlib import Path
 from nonsmooth.analysis.chart import plan_chart
 from nonsmooth.analysis.chart_work import STORED

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from simple_work import Squares, hashes, right
+import zarr
+from simple_work import Squares, Zeros, hashes, right
 
 import nonsmooth as ns
 from nonsmooth.analysis.basins import basins
@@ -65,6 +66,73 @@ def test_a_chunk_cut_short_is_computed_again(tmp_path: Path) -> None:
     assert right(run(work, store=path, **QUIET), work)
 
 
+def test_chunks_of_zeros_are_files_too_however_many_threads_write(tmp_path: Path) -> None:
+    """Bit for bit those of one thread, counted beforehand; the library's settings stay the user's own meanwhile."""
+    work, seen = Zeros(size=300, step=5), set()
+
+    class Watching(Zeros):
+        def compute(self, chunk: int) -> dict[str, object]:
+            seen.add((zarr.config.get("array.write_empty_chunks"), zarr.config.get("threading.max_workers")))
+            return super().compute(chunk)
+
+    with zarr.config.set({"array.write_empty_chunks": False, "threading.max_workers": 5}):
+        run(work, threads=1, store=tmp_path / "1.zarr", **QUIET)
+        for threads in (2, 8):
+            run(Watching(size=300, step=5), threads=threads, store=tmp_path / f"{threads}.zarr", **QUIET)
+        assert seen == {(False, 5)}
+    first = hashes(tmp_path / "1.zarr")
+    assert len(first) == 2 * work.n_chunks() + 3  # a file per column and chunk; the descriptions
+    assert hashes(tmp_path / "2.zarr") == hashes(tmp_path / "8.zarr") == first
+    contents = {describe_store(tmp_path / f"{threads}.zarr")["content"] for threads in (1, 2, 8)}
+    assert len(contents) == 1 and None not in contents
+
+
+def test_altered_facts_and_descriptions(tmp_path: Path) -> None:
+    """What a store says of itself is checked like its numbers: refused, or computed again."""
+    work, path = Squares(), tmp_path / "squares.zarr"
+    run(work, store=path, **QUIET)
+    whole = {file: file.read_bytes() for file in path.rglob("*") if file.is_file()}
+    mark = path / "run" / "000003.json"
+    mark.write_bytes(whole[mark].replace(b'"seconds": 0.0', b'"seconds": 9.0'))
+    assert mark.read_bytes() != whole[mark]
+    assert describe_store(path)["done"] == 14 and describe_store(path)["content"] is None
+    assert right(run(work, store=path, **QUIET), work)
+    for file, old, new, message in (
+        (path / "zarr.json", rb'"verb\": \"squares', rb'"verb\": \"squared', "what it says of its work was altered"),
+        (path / "results" / "pair" / "zarr.json", b'"int32"', b'"int16"', "column 'pair' was altered"),
+        (path / "results" / "pair" / "zarr.json", b"100", b"900", "column 'pair' was altered"),
+        (path / "results" / "square" / "zarr.json", b'"float64"', b'"flo', "column 'square' is damaged"),
+    ):
+        assert old in whole[file]
+        file.write_bytes(whole[file].replace(old, new))
+        with pytest.raises(DataFileError, match=rf"squares\.zarr: .*{message}.*give another name"):
+            run(work, store=path, **QUIET)
+        file.write_bytes(whole[file])
+    assert right(run(work, store=path, **QUIET), work)
+
+
+def test_altered_bytes_of_a_finished_store(tmp_path: Path) -> None:
+    """One byte anywhere: the same columns, or an error; what is reported as damaged is computed again."""
+    work, path, rng = Squares(), tmp_path / "squares.zarr", np.random.default_rng(3)
+    run(work, store=path, **QUIET)
+    files = sorted(file for file in path.rglob("*") if file.is_file())
+    refused = 0
+    for _ in range(60):
+        file = files[rng.integers(len(files))]
+        before = file.read_bytes()
+        data = bytearray(before)
+        data[rng.integers(len(data))] ^= int(rng.integers(1, 256))
+        file.write_bytes(data)
+        try:
+            assert right(run(work, threads=1, store=path, **QUIET), work)
+        except DataFileError:
+            refused += 1
+        if not file.exists() or file.parent.name != "run":
+            file.write_bytes(before)
+        assert right(run(work, threads=1, store=path, **QUIET), work)
+    assert refused > 5
+
+
 def test_the_store_of_another_work_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "squares.zarr"
     run(Squares(), store=path, **QUIET)
@@ -92,7 +160,7 @@ def test_other_rules_of_judgement_are_another_version(monkeypatch: pytest.Monkey
     """Labels are decided by analysis as much as by the kernels."""
     version, read = identity._kernel_version.__wrapped__, Path.read_bytes
     now = version()
-    for changed in ("analysis/classify.py", "flow/planar.py", "kernels/planar_march.py"):
+    for changed in ("analysis/classify.py", "flow/linear.py", "kernels/linear_march.py"):
         with monkeypatch.context() as patched:
             def edited(file: Path, end: str = changed) -> bytes:
                 return read(file) + (b"#" if file.as_posix().endswith(end) else b"")

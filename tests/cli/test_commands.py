@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import pytest
@@ -79,6 +80,29 @@ def test_a_damaged_file_is_one_message_and_exit_code_2(
 def test_an_unknown_study_is_answered_with_the_known_ones(capsys: pytest.CaptureFixture[str]) -> None:
     assert run("reproduce", "savi2008") == 2
     assert "savi2007" in capsys.readouterr().err
+
+
+def test_a_figure_that_a_study_has_not_is_answered_with_those_it_has(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in ("19", "fig19"):
+        assert run("reproduce", "savi2007", "--figure", name, "--out", tmp_path / "out") == 2
+        said = capsys.readouterr().err
+        assert f"figure {name}: " in said and "2, 4, 5" in said and "fig11_rig, " in said and "basins13" in said
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_study_says_what_it_does_before_anything_is_loaded(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def load(name: str) -> None:
+        assert capsys.readouterr().err == f"reproducing savi2007 into {Path('out') / 'savi2007_quick'}\n"
+        raise ValueError("loaded")
+
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    monkeypatch.setattr("nonsmooth.cli.reproduce.importlib.import_module", load)
+    assert run("reproduce", "savi2007", "--quick") == 2
+    assert "loaded" in capsys.readouterr().err
 
 
 def test_ctrl_c_ends_with_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

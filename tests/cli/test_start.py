@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-HEAVY = ("sympy", "numba", "xarray", "matplotlib", "scipy", "rich")
+HEAVY = ("sympy", "numba", "xarray", "matplotlib", "scipy", "tqdm")
 
 
 @pytest.mark.parametrize("module", ["nonsmooth.cli.main", "nonsmooth.plot"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import xarray as xr
 
 import nonsmooth as ns
 from nonsmooth.cli import main as cli
-from nonsmooth.cli.study import read_study
+from nonsmooth.cli.study import Study, read_study
 from nonsmooth.errors import DataFileError
 from nonsmooth.results.provenance import read_provenance
 
@@ -56,7 +57,7 @@ def test_a_file_computes_what_the_call_computes(write, tmp_path: Path, capsys) -
     [
         ("[simulate]\nperiods = 3\n", "u"),
         ("[poincare]\nn = 5\ntransient = 10\nsection = { phase = 0.25 }\n", "section"),
-        ("[frequency_response]\nvalues = [3.0, 3.1, 3.2]\ntransient = 20\nkeep = 4\nmax_period = 3\n", "amplitude"),
+        ("[frequency_response]\nvalues = [3.0, 3.1, 3.2]\ntransient = 20\nkeep = 4\n", "amplitude"),
     ],
 )
 def test_every_verb_is_a_table(verb: str, figure_of: str, write, tmp_path: Path) -> None:
@@ -140,6 +141,67 @@ def test_what_would_fail_after_the_run_is_told_before(output: str, message: str,
     (tmp_path / "taken").write_text("a file")
     assert cli.main(["run", str(write(CHART + output))]) == 2
     assert message in capsys.readouterr().err
+
+
+SIMULATE = "[simulate]\nperiods = 2\n"
+BASINS = "[basins]\ngrid = { x = [0.0, 0.1], v = [0.0, 0.1] }\n"
+ONE_STATE = """
+import nonsmooth as ns
+decay = ns.System(states=["x"], parameters={"k": 1.0}, modes={"motion": lambda t, u, p: (-p.k * u.x,)})
+"""
+
+
+@pytest.mark.parametrize(
+    ("verb", "output", "message"),
+    [
+        (SIMULATE, 'x = "nope"', r"x = 'nope' is not in the result; there are: x, v, .*mode"),
+        (SIMULATE, 'y = "w"', "y = 'w' is not in the result"),
+        (SWEEP, 'y = "nope"', "y = 'nope' is not in the result; there are: x, v$"),
+        (SWEEP, 'x = "x"', "x = 'x': this figure has no such choice; take the line out"),
+        (BASINS, 'y = "x"', "y = 'x': this figure has no such choice"),
+        ("[chart]\ngrid = { omega = [9.0, 9.5], rho = [0.2, 0.3] }\n", 'y = "u"', "y = 'u' is not in the result"),
+    ],
+)
+def test_axes_that_the_figure_cannot_have_are_told_before_the_run(
+    verb: str, output: str, message: str, write, monkeypatch: pytest.MonkeyPatch, capsys
+) -> None:
+    monkeypatch.setattr(Study, "compute", lambda *_, **__: pytest.fail("computed"))
+    assert cli.main(["run", str(write(SYSTEM + verb + '[output]\nfigure = "r.svg"\n' + output + "\n"))]) == 2
+    assert re.search(message, capsys.readouterr().err.strip())
+
+
+def test_a_figure_of_two_states_needs_two(write, tmp_path: Path, capsys) -> None:
+    (tmp_path / "mine.py").write_text(ONE_STATE)
+    study = '[system]\nmodel = "mine.py:decay"\n[simulate]\nduration = 1.0\n[output]\nfigure = "r.svg"\n'
+    assert cli.main(["run", str(write(study))]) == 2
+    assert "the figure is of two states, and the system has one (x)" in capsys.readouterr().err
+
+
+def test_a_figure_that_fails_costs_no_result(write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> None:
+    """Whatever the reason; the result is kept beside, or said where it is."""
+
+    def fail(*_: object, **__: object) -> None:
+        raise RuntimeError("no font")
+
+    monkeypatch.setattr(ns.plot, "save_figure", fail)
+    monkeypatch.chdir(tmp_path)
+    study = str(write(SYSTEM + SIMULATE + '[output]\nfigure = "r.svg"\n'))
+    assert cli.main(["run", study, "--quiet"]) == 2
+    (kept,) = tmp_path.glob("*.nc")
+    said = capsys.readouterr().err
+    assert "no font" in said and f"the result is kept in {kept}" in said
+    assert ns.load(kept)["u"].size
+    study = str(write(SYSTEM + SIMULATE + '[output]\nfigure = "r.svg"\ndata = "a.zarr"\n'))
+    assert cli.main(["run", study, "--quiet"]) == 2
+    assert f"the result is in {tmp_path / 'a.zarr'}" in capsys.readouterr().err
+
+
+def test_what_stands_where_the_result_goes_is_told_before_the_run(write, tmp_path: Path, capsys) -> None:
+    for name in ("a.nc", "a.zarr", "a.svg"):
+        (tmp_path / name).mkdir()
+    for line in ('data = "a.nc"', 'data = "a.zarr"', 'figure = "a.svg"'):
+        assert cli.main(["run", str(write(SYSTEM + SIMULATE + "[output]\n" + line + "\n"))]) == 2
+        assert "give another name" in capsys.readouterr().err
 
 
 def test_a_result_never_replaces_chunks(write, tmp_path: Path, capsys) -> None:

@@ -89,7 +89,8 @@ def _mat(compress: bool) -> bytes:
 
 
 def _hdf5() -> bytes:
-    h5py = pytest.importorskip("h5py")
+    import h5py
+
     packed = io.BytesIO()
     with h5py.File(packed, "w") as file:
         group = file.create_group("s")

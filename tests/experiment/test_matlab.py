@@ -122,7 +122,8 @@ def test_deep_nesting_is_refused() -> None:
 
 
 def hdf5(fill: Any) -> bytes:
-    h5py = pytest.importorskip("h5py")
+    import h5py
+
     packed = io.BytesIO()
     with h5py.File(packed, "w") as opened:
         fill(opened, h5py)

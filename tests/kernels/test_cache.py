@@ -50,11 +50,12 @@ def g(mode, t, u):
 SCRIPT = '''
 import json, sys
 import numpy as np
+from nonsmooth import kernels
 from nonsmooth.kernels import cache
 import driver
 
 told = []
-cache.before_compiling.append(told.append)
+kernels.before_compiling.append(told.append)
 model = cache.load_module(sys.stdin.read(), "model")
 value = driver.drive(model.f, model.g, np.ones(1), 2)
 drive = driver.drive

@@ -6,56 +6,61 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from numba import njit
 
 from nonsmooth.kernels.block import LINE, one_block
-from nonsmooth.kernels.cache import kernel
-from nonsmooth.kernels.lanes import LANES, mix_rows, plain, sum_rows
-from nonsmooth.kernels.planar_tables import DEGREE
+from nonsmooth.kernels.lanes import LANES, plain, sum_columns, sum_rows
+from nonsmooth.kernels.linear_tables import DEGREE
 
-COLUMNS = 7
-
-
-@kernel("void(float64[:,::1], float64[:,:,:,::1], float64[::1])")
-def sum_compiled(out, table, w):
-    sum_rows(out, 2, table, 1, 2, w, COLUMNS)
+# states and terms of a sum: one by one, in vectors, in loops over terms, in several vectors
+SHAPES = ((2, 5), (2, 7), (5, 8), (20, 23), (20, 43), (70, 73))
 
 
-@kernel("void(float64[:,::1], float64, float64)")
-def mix_compiled(out, a, b):
-    mix_rows(out, 2, a, b)
+def sums(states: int, terms: int, rows: object, columns: object) -> tuple[object, object]:
+    def rows_summed(out, table, w):
+        rows(out, 2, table, 1, 2, w, states, terms)
+
+    def columns_summed(out, table, w):
+        columns(out, table, 1, 2, w, states, terms)
+
+    return rows_summed, columns_summed
 
 
-def sum_plain(out, table, w):
-    plain.sum_rows(out, 2, table, 1, 2, w, COLUMNS)
+def compiled_sums(states: int, terms: int) -> tuple[object, object]:
+    plain_rows, plain_columns = sums(states, terms, sum_rows, sum_columns)
+    text = "void(float64[{}::1], float64[:,:,:,::1], float64[::1])"
+    return njit(text.format(":,"))(plain_rows), njit(text.format(""))(plain_columns)
 
 
-def mix_plain(out, a, b):
-    plain.mix_rows(out, 2, a, b)
-
-
-def close(found: np.ndarray, exact: list[Fraction], size: list[float]) -> None:
-    for value, wanted, most in zip(found, exact, size, strict=True):
-        assert abs(Fraction(float(value)) - wanted) <= Fraction(8 * 2.0**-53 * most)
+def close(found: np.ndarray, table: np.ndarray, weights: np.ndarray) -> None:
+    """Each sum to rounding: sum_j table[j, k] weights[j] in exact arithmetic."""
+    for k, value in enumerate(found):
+        terms = [Fraction(float(a)) * Fraction(float(b)) for a, b in zip(table[:, k], weights, strict=True)]
+        most = float(sum(map(abs, terms)))
+        assert abs(Fraction(float(value)) - sum(terms)) <= Fraction(len(terms) * 2.0**-53 * most)
 
 
 @pytest.mark.parametrize("odd", [0, 1])  # also where a row straddles cache lines
-@pytest.mark.parametrize(("add", "mix"), [(sum_compiled, mix_compiled), (sum_plain, mix_plain)])
-def test_rows_are_summed_to_rounding_and_no_other_row_is_touched(add, mix, odd: int) -> None:
+@pytest.mark.parametrize(("states", "terms"), SHAPES)
+@pytest.mark.parametrize("made", [compiled_sums, lambda n, m: sums(n, m, plain.sum_rows, plain.sum_columns)])
+def test_sums_are_right_to_rounding_and_touch_nothing_else(made, states: int, terms: int, odd: int) -> None:
+    by_rows, by_columns = made(states, terms)
     rng = np.random.default_rng(3)
-    table, w = rng.standard_normal((2, 3, COLUMNS, LANES)), rng.standard_normal(COLUMNS)
+    w = rng.standard_normal(terms)
+    weights = w.copy()
+    weights[states] = 1.0  # this column stands for a constant, whatever w holds
+    table = rng.standard_normal((2, 3, terms, LANES))
     out = rng.standard_normal(4 * LANES + odd)[odd:].reshape(4, LANES)
     before = out.copy()
-    add(out, table, w)
-    weights = [*w[:2], 1.0, *w[3:]]  # the third column stands for a constant
-    terms = [[Fraction(float(table[1, 2, j, k])) * Fraction(float(weights[j])) for j in range(COLUMNS)]
-             for k in range(LANES)]  # fmt: skip
-    close(out[2], [sum(row) for row in terms], [float(sum(map(abs, row))) for row in terms])
+    by_rows(out, table, w)
+    close(out[2], table[1, 2], weights)
     np.testing.assert_array_equal(out[[0, 1, 3]], before[[0, 1, 3]])
-    mix(out, 0.3, -1.7)
-    terms = [[Fraction(0.3) * Fraction(float(out[0, k])), Fraction(-1.7) * Fraction(float(out[1, k]))]
-             for k in range(LANES)]  # fmt: skip
-    close(out[2], [sum(row) for row in terms], [float(sum(map(abs, row))) for row in terms])
-    np.testing.assert_array_equal(out[[0, 1, 3]], before[[0, 1, 3]])
+    table = rng.standard_normal((2, 3, terms, states))
+    out = rng.standard_normal(terms + 1 + odd)[odd:]
+    before = out.copy()
+    by_columns(out, table, w)
+    close(out[:states], table[1, 2], weights)
+    np.testing.assert_array_equal(out[states:], before[states:])
 
 
 def test_a_row_of_lanes_is_a_row_of_taylor_coefficients() -> None:

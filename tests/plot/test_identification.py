@@ -209,7 +209,7 @@ def test_numbers_are_written_with_their_errors() -> None:
 
 def test_the_grid_of_the_transform_is_shown() -> None:
     """A record of 20.48 s has lines 0.0488 Hz apart: 0.7324 Hz is the paper's 4.60 rad/s."""
-    assert "largest line 0.7324 Hz ± half a step" in words(identification.impulse_response(decay()))
+    assert "largest line 0.7324 Hz, half a step to each side" in words(identification.impulse_response(decay()))
 
 
 def test_a_calibration_says_where_its_line_begins() -> None:

@@ -16,7 +16,8 @@ from nonsmooth.studies.savi2007.flows import Settings
 from nonsmooth.studies.savi2007.measure import Interval, measured_jumps, measured_periods
 from nonsmooth.studies.savi2007.printed import FIGURE_14, NUMBERS, TABLE_1
 from nonsmooth.studies.savi2007.rig_motions import chosen, measured_periods_at, said
-from nonsmooth.studies.savi2007.rows import NOT_ASKED, Cell, Row, printed_cell
+from nonsmooth.studies.savi2007.rows import Cell, Row, printed_cell
+from nonsmooth.studies.savi2007.verdicts import Verdict
 
 STEP = 0.05
 
@@ -47,15 +48,19 @@ def test_jumps_and_periods_of_a_response_made_by_hand() -> None:
 def test_the_cells_of_figure_9_are_those_of_the_response() -> None:
     data = {"fig09_rig": _response({"up": 5.86, "down": 5.26})}
     region, rising = claims_rig_response.f9a(data)
-    assert region == Cell("period 2 from 3.600 to 4.000 rad/s (9 runs)", "agrees")  # 3.63 lies within
+    assert region == Cell("period 2 from 3.600 to 4.000 rad/s (9 runs)", Verdict.AGREES)  # 3.63 lies within
     assert rising.verdict == "agrees"  # 5.88 lies in the step 5.85 ... 5.90
     falling, closed, again = claims_rig_response.f9b(data)
     assert falling.verdict == "agrees"  # 5.29 in 5.25 ... 5.30, by its rounding
-    assert closed.verdict.startswith("differs by 2.2")  # 5.275 against grazing at 5.15986
+    assert closed.verdict == "undecided"  # 5.275, known to 0.025, against grazing at 5.15986: 1.7 to 2.7 %
     assert again.verdict == "agrees"
     (between,) = claims_rig_response.f9c(data)
     assert between.verdict == "agrees in part"
-    assert "not found" in claims_rig_response.f9a({"fig09_rig": _response({"up": 9.0, "down": 9.0})})[1].text
+    missing = claims_rig_response.f9a({"fig09_rig": _response({"up": 9.0, "down": 9.0})})[1]
+    assert missing.verdict == "undecided" and "not found" in missing.text
+    near, outside = (_response({"up": 5.86, "down": 5.26}, doubled=(low, 4.0)) for low in (3.65, 3.75))
+    assert claims_rig_response.f9a({"fig09_rig": near})[0].verdict == "undecided"  # runs at 3.60 and 3.65
+    assert claims_rig_response.f9a({"fig09_rig": outside})[0].verdict == "differs"
 
 
 def _steady(numbers: dict[str, int]) -> dict[str, xr.Dataset]:
@@ -71,7 +76,7 @@ def test_motions_at_a_gap_are_a_set_over_its_starts() -> None:
     assert chosen(data, 0.0009, 2) is data["0.0009_2"]
     assert chosen(data, 0.0014, 3) is data["0.0014"]  # none has it: the first
     verdicts = [cell.verdict for cell in claims_rig.f14({"fig14_rig": data})]
-    assert verdicts == ["agrees", "agrees", "differs", "agrees", NOT_ASKED]
+    assert verdicts == ["agrees", "agrees", "differs", "agrees", "not asked"]
     assert "0.9 mm: no period and period 2 (model: period 1, period 3)" in said(data, FIGURE_14, "m")
 
 
@@ -90,9 +95,11 @@ def test_the_sections_of_figure_16_agree_below_twice_the_halves() -> None:
 
 
 def test_a_cell_beside_a_printed_number() -> None:
-    assert printed_cell(TABLE_1["k"], Interval(8.40, 8.50)) == Cell("8.450 ± 0.050 N/m (-0.2 %)", "agrees")
+    cell = printed_cell(TABLE_1["k"], Interval(8.40, 8.50))
+    assert (cell.text, cell.verdict) == ("8.450 ± 0.029 N/m; -0.2 % (0.0 to 0.8)", "agrees")  # 0.1 / sqrt(12) = 0.029
     assert printed_cell(NUMBERS["jump falling"], None).text == "not found"
-    row = Row("F9b", "here", "5.29", "a", "b", "none", "agrees", "Model.").measured(Cell("c", "differs", "Rig."))
+    answer = Cell("c", Verdict.DIFFERS, "Rig.")
+    row = Row("F9b", "here", "5.29", "a", "b", "none", Verdict.AGREES, "Model.").measured(answer)
     assert (row.rig, row.rig_verdict, row.verdict, row.why) == ("c", "differs", "agrees", "Model. Rig.")
 
 
@@ -110,7 +117,7 @@ def test_a_finding_is_kept_with_its_numbers(tmp_path) -> None:
     assert found.others["slope_a"].uncertainty == 0.01
     half = found.number.times(0.5)
     assert (half.value, half.uncertainty) == (8.47, 0.02)
-    assert Number(2.0, 1.0, 1.5, 3.0, "m").interval == Interval(1.0, 3.0)  # the wider side
+    assert Number(2.0, 1.0, 1.5, 3.0, "m").expanded == 1.0  # the wider side
 
 
 def test_what_is_not_there_is_said() -> None:

@@ -23,8 +23,8 @@ from nonsmooth.analysis.series_cuda import series_exponents_on_gpu, settle_serie
 from nonsmooth.analysis.settle import LONGER, Attractors, tolerance_of
 from nonsmooth.analysis.settled import Settled, least_sizes, usable
 from nonsmooth.flow.engine import Chain, Engine, FloatArray, IntArray, SectionPlan, State
+from nonsmooth.flow.linear import PlanarEngine
 from nonsmooth.flow.methods import engine_for
-from nonsmooth.flow.planar import PlanarEngine
 from nonsmooth.kernels import codes
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ import numpy as np
 
 from nonsmooth.analysis.settled import Settled, usable
 from nonsmooth.flow.engine import Chain, FloatArray, IntArray
-from nonsmooth.flow.planar import DIVERGENCE, PlanarEngine
+from nonsmooth.flow.linear import DIVERGENCE, PlanarEngine
 from nonsmooth.flow.poincare import result_status
 
 __all__ = ["exponents_compiled", "load", "run_compiled"]
@@ -17,7 +17,7 @@ __all__ = ["exponents_compiled", "load", "run_compiled"]
 
 def load(engine: PlanarEngine) -> Any:
     """The compiled module of an engine's number of harmonics."""
-    from nonsmooth.kernels.planar_module import settle_module
+    from nonsmooth.kernels.linear_module import settle_module
 
     return settle_module(len(engine.form.multiples))
 

@@ -15,7 +15,7 @@ from nonsmooth.analysis.settled import Settled, usable
 from nonsmooth.flow.devices import batch_size
 from nonsmooth.flow.engine import FloatArray, IntArray
 from nonsmooth.flow.launches import batches
-from nonsmooth.flow.planar import PlanarEngine
+from nonsmooth.flow.linear import PlanarEngine
 from nonsmooth.flow.planar_cuda import SLICE, Buffers, PlanarOnGpu, States
 from nonsmooth.flow.poincare import result_status
 from nonsmooth.kernels import codes

@@ -20,9 +20,9 @@ from nonsmooth.analysis.sweep import swept_values
 from nonsmooth.campaign.run import run
 from nonsmooth.flow.arguments import check_options, check_system, real_number, whole_number
 from nonsmooth.flow.devices import BATCH, workers_of
-from nonsmooth.flow.memory import room_for
 from nonsmooth.flow.sections import Poincare, Stroboscopic
 from nonsmooth.flow.starts import random_starts, start_states
+from nonsmooth.results.memory import room_for
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -44,7 +44,7 @@ def basin_fractions(
     section: Stroboscopic | Poincare | None = None,
     transient: int = 500,
     keep: int = 60,
-    max_period: int = 16,
+    max_period: int | None = None,
     method: str = "auto",
     rtol: float | None = None,
     atol: Any = None,

@@ -26,10 +26,10 @@ from nonsmooth.analysis.settled import usable
 from nonsmooth.campaign.run import run
 from nonsmooth.flow.arguments import check_options, check_system, float_array, real_number, whole_number
 from nonsmooth.flow.devices import BATCH, engine_on, on_gpu, workers_of
-from nonsmooth.flow.memory import room_for
 from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.kernels import codes
+from nonsmooth.results.memory import room_for
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -48,7 +48,7 @@ def basins(
     section: Stroboscopic | Poincare | None = None,
     transient: int = 500,
     keep: int = 60,
-    max_period: int = 16,
+    max_period: int | None = None,
     method: str = "auto",
     rtol: float | None = None,
     atol: Any = None,
@@ -75,8 +75,8 @@ def basins(
     transient, keep : int
         Section returns passed over, then judged; a run ends earlier where its cycle is certain, and is followed for
         20 000 returns and more where it has no period.
-    max_period : int
-        Longest period number looked for, less than ``keep``.
+    max_period : int, optional
+        Longest period number looked for, less than ``keep``; the smaller of 16 and ``keep`` - 1 where not given.
     method, rtol, atol
         See :func:`nonsmooth.flow.methods.engine_for`.
     threads : int, optional
@@ -91,7 +91,7 @@ def basins(
     any_cpu : bool
         Go on with a store that was begun on another type of processor, or of GPU with ``device="cuda"``.
     progress : bool
-        A bar on a terminal.
+        A bar, on a terminal and in a notebook; nothing elsewhere.
 
     Returns
     -------

@@ -16,8 +16,9 @@ from nonsmooth.analysis.sweep import swept_values
 from nonsmooth.campaign.run import run
 from nonsmooth.flow.arguments import check_options, check_system, whole_number, yes_or_no
 from nonsmooth.flow.devices import BATCH, engine_on, on_gpu, workers_of
+from nonsmooth.flow.equilibria import refuse_resting
+from nonsmooth.flow.linear import PlanarEngine
 from nonsmooth.flow.methods import engine_for
-from nonsmooth.flow.planar import PlanarEngine
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.flow.starts import is_one_start, plain_start, start_states
 
@@ -41,7 +42,7 @@ def chart(
     section: Stroboscopic | Poincare | None = None,
     transient: int = 500,
     keep: int = 60,
-    max_period: int = 16,
+    max_period: int | None = None,
     stop_early: bool = True,
     extremes: bool = True,
     lyapunov: bool | int = False,
@@ -73,8 +74,8 @@ def chart(
         ``Stroboscopic(0)`` where the system has a period.
     transient, keep : int
         Section returns passed over, then judged. A point that is still settling gets up to eight transients.
-    max_period : int
-        Longest period number looked for, less than ``keep``.
+    max_period : int, optional
+        Longest period number looked for, less than ``keep``; the smaller of 16 and ``keep`` - 1 where not given.
     stop_early : bool
         A point ends as soon as its period number is certain (a small return, and multipliers inside the unit circle)
         instead of at the end of its transient. Labels are the same, but for chaotic transients that end about then.
@@ -100,7 +101,7 @@ def chart(
     any_cpu : bool
         Go on with a store that was begun on another type of processor, or of GPU with ``device="cuda"``.
     progress : bool
-        A bar on a terminal.
+        A bar, on a terminal and in a notebook; nothing elsewhere.
 
     Returns
     -------
@@ -112,7 +113,8 @@ def chart(
     Raises
     ------
     ValueError, TypeError
-        Arguments that do not fit. A point that fails keeps its status; the others are whole.
+        Arguments that do not fit, and starts at an equilibrium of a system without forcing. A point that fails keeps
+        its status; the others are whole.
     ImportError, RuntimeError
         ``device="cuda"`` without the package numba-cuda, or without a GPU.
 
@@ -166,7 +168,7 @@ class PlannedChart:
 
 def plan_chart(
     system: System, grid: Mapping[str, Any], *, start: Any = None, carry: Any = None, section: Any = None,
-    transient: Any = 500, keep: Any = 60, max_period: Any = 16, stop_early: bool = True, extremes: bool = True,
+    transient: Any = 500, keep: Any = 60, max_period: Any = None, stop_early: bool = True, extremes: bool = True,
     lyapunov: Any = False, refine: Any = False, method: str = "auto", rtol: Any = None, atol: Any = None,
     device: str = "cpu", campaign: bool = False, **expert: Any,
 ) -> PlannedChart:  # fmt: skip
@@ -180,6 +182,8 @@ def plan_chart(
     section, plan = section_plan(system, section)
     along = _carry(values, carry)
     starts = start_states(system, start)
+    if plan.indicator >= 0:
+        refuse_resting(system, starts, _corners(system, values), "chart")
     n_exponent = (EXPONENT_RETURNS if lyapunov else 0) if isinstance(lyapunov, bool | np.bool_) else lyapunov
     n_exponent = whole_number(n_exponent, "lyapunov", 0)
     if 0 < n_exponent < 40:
@@ -230,6 +234,13 @@ def _check_edges(system: System, values: Mapping[str, FloatArray]) -> None:
     for along, across in ((first[[0, -1]], second), (first, second[[0, -1]])):  # the plane's edges
         x, y = np.meshgrid(along, across)
         system.parameter_points({a: x.ravel(), b: y.ravel()})
+
+
+def _corners(system: System, values: Mapping[str, FloatArray]) -> FloatArray:
+    """The parameter points at the plane's corners (4, n_parameters)."""
+    (a, first), (b, second) = values.items()
+    x, y = np.meshgrid(first[[0, -1]], second[[0, -1]])
+    return system.parameter_points({a: x.ravel(), b: y.ravel()})
 
 
 def _carry(values: Mapping[str, FloatArray], carry: Any) -> tuple[str, str] | None:

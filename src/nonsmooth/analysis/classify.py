@@ -20,6 +20,7 @@ from nonsmooth.kernels import codes
 
 __all__ = ["TOLERANCE", "Verdict", "judge", "longest_period", "residuals"]
 
+LONGEST = 16  # period number looked for where none is given and as many points are kept
 TOLERANCE = 1e-9  # of the return, in units of the motion's size
 NEARLY = 1e-3  # a smallest return below this is a motion that may still settle
 SHRINKING = 3e-2  # and so is one below this whose returns all shrink: near a flip they do so ever more slowly
@@ -42,13 +43,15 @@ class Verdict:
 
 
 def longest_period(keep: int, max_period: object) -> int:
-    """``max_period`` as a whole number that ``keep`` section points can show.
+    """``max_period`` as a whole number that ``keep`` section points can show; where None, up to 16.
 
     Raises
     ------
     ValueError, TypeError
         One that is not, or not a whole number from 1.
     """
+    if max_period is None:
+        return min(LONGEST, keep - 1)
     longest = whole_number(max_period, "max_period", 1)
     if longest >= keep:
         raise ValueError(

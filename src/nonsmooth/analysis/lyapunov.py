@@ -9,6 +9,7 @@ is reported as ``trace_defect`` and must be rounding. It sees determinants only,
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +20,7 @@ from nonsmooth.analysis.spectrum import (
     BATCHES,
     GOOD,
     Spectrum,
+    at_rest,
     batch_ends,
     evaluated,
     failed_spectrum,
@@ -35,6 +37,7 @@ from nonsmooth.flow.poincare import result_status
 from nonsmooth.flow.starts import first_state, is_one_start, plain_start
 from nonsmooth.kernels import codes
 from nonsmooth.results.progress import progress as progress_bar
+from nonsmooth.results.statuses import EQUILIBRIA
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -86,7 +89,7 @@ def lyapunov(
         ``"cuda"`` runs a sweep with ``direction=None`` on an NVIDIA GPU, one point per thread, for
         systems with the planar exact flow: see the guide "A chart on a GPU".
     progress : bool
-        A bar on a terminal.
+        A bar, on a terminal and in a notebook; nothing elsewhere.
 
     Returns
     -------
@@ -94,7 +97,7 @@ def lyapunov(
         Over the parameter where one is given: ``exponents(exponent)``, descending, per unit time; ``standard_error``
         (from 32 batches of equal length); ``running(batch, exponent)``, the estimate after each batch;
         ``trace_defect``, their sum less what the trace identity demands; ``kaplan_yorke``; ``nearest_graze``, the least
-        \|h'\| / (\|h_u\| \|u'\|) of all crossings; ``status``.
+        \|h'\| / (\|h_u\| \|u'\|) of all crossings; ``equilibrium``, whether the run stayed at one; ``status``.
 
     Raises
     ------
@@ -112,6 +115,11 @@ def lyapunov(
     time. One is NaN, and comes last, for memory that is never written or a state of modes that are never visited: it
     is constant. The phase of the forcing is no state, so a forced limit cycle has negative exponents only; an
     autonomous motion that does not end in an equilibrium has one exponent zero.
+
+    A run that comes to rest at a stable equilibrium has the real parts of its eigenvalues, and the standard error is no
+    less than the distance from them. A run that begins at an unstable one, as the start of zeros often is, stays there:
+    its exponents are no attractor's. A warning names the equilibrium, ``equilibrium`` and the attribute ``note`` say it
+    in the result, and ``standard_error`` and ``kaplan_yorke`` are NaN. Give ``start=``, a state beside it.
 
     The Kaplan-Yorke dimension is that of the attractor in the space of the states: for forced systems that of its
     stroboscopic section. Near an attractor whose leading exponents are equal, or the moduli of complex multipliers,
@@ -150,7 +158,9 @@ def lyapunov(
                 'periods: a single trajectory is one thread, which a processor runs faster; use device="cpu"'
             )
         with progress_bar(len(points), "lyapunov", progress) as advance:
-            done = _on_gpu(system, engine, points, first_state(system, start, mode), count, int(wait), advance)
+            first = first_state(system, start, mode)
+            done = _on_gpu(system, engine, points, first.copy(), count, int(wait), advance)
+            done = [at_rest(one, system, at, first, first) for one, at in zip(done, points, strict=True)]
         return _dataset(system, engine.name, options, parameter, numbers, done)
     tables = engine.prepare(points)
     order = np.arange(len(points)) if numbers is None else np.argsort(numbers, kind="stable")
@@ -166,11 +176,11 @@ def lyapunov(
             kept = state.copy()
             here = system.period_at(points[i]) if forced else None
             unit = length if here is None or duration is not None else here
-            one = spectrum_along(system, engine, tables, int(i), state, here, unit, count, wait)
+            one = spectrum_along(system, engine, tables, int(i), points[i], state, here, unit, count, wait)
             if carried and one.status == codes.BEYOND_STOP:  # a stop has moved past it: as in a sweep, begin anew
                 state = first_state(system, start, mode)
                 kept = state.copy()
-                one = spectrum_along(system, engine, tables, int(i), state, here, unit, count, wait)
+                one = spectrum_along(system, engine, tables, int(i), points[i], state, here, unit, count, wait)
             found[i] = one
             if one.status not in GOOD:
                 state = kept if i != order[0] else None
@@ -237,10 +247,42 @@ def _dataset(
     from nonsmooth.results.variations import spectrum
 
     labels = labels_of(system)
+    attrs = provenance(labels, "lyapunov", options, method=method)
+    if note := _note(system, parameter, numbers, found):
+        attrs = {**attrs, "note": note}
     return spectrum(
-        labels, provenance(labels, "lyapunov", options, method=method), parameter, numbers,
+        labels, attrs, parameter, numbers,
+        equilibrium=[EQUILIBRIA.index(one.rest.kind) if one.rest else 0 for one in found],
         exponents=[one.exponents for one in found], standard_error=[one.error for one in found],
         running=[one.running for one in found], trace_defect=[one.defect for one in found],
         kaplan_yorke=[one.dimension for one in found], nearest_graze=[one.nearest for one in found],
         elapsed=[one.elapsed for one in found], status=[result_status(one.status) for one in found],
     )  # fmt: skip
+
+
+def _note(system: System, parameter: str | None, numbers: FloatArray | None, found: list[Spectrum]) -> str:
+    """The equilibria at which runs stayed, in sentences; unstable ones in a warning too."""
+    told = []
+    for kind in EQUILIBRIA[1:]:
+        which = [i for i, one in enumerate(found) if one.rest is not None and one.rest.kind == kind]
+        if not which:
+            continue
+        rest = found[which[0]].rest
+        assert rest is not None
+        where = ""
+        if numbers is not None:
+            values = [f"{numbers[i]:.6g}" for i in which]
+            where = f", at {len(which)} of {len(found)} values of {parameter!r}, {values[0]} the first"
+        text = f"{rest.words(list(system.states))}{where}: "
+        if kind == "unstable":
+            text += (
+                "the run began there, and nothing but rounding errors leads away. These are the exponents of this "
+                "equilibrium, not of an attractor; give start=, a state beside it"
+            ) + (", and direction=None" if numbers is not None else "")
+            warnings.warn(f"lyapunov of {system.name!r}: {text}", stacklevel=4)
+        else:
+            text += "the motion rests there" + (
+                ", and the exponents are the real parts of its eigenvalues" if kind == "stable" else ""
+            )
+        told.append(text)
+    return "; ".join(told)

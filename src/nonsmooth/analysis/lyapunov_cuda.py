@@ -8,7 +8,7 @@ import numpy as np
 
 from nonsmooth.flow.devices import batch_size
 from nonsmooth.flow.engine import FloatArray, IntArray
-from nonsmooth.flow.planar import PlanarEngine
+from nonsmooth.flow.linear import PlanarEngine
 from nonsmooth.flow.planar_cuda import PlanarOnGpu
 
 __all__ = ["growth_on_gpu"]

@@ -44,7 +44,7 @@ def frequency_response(
     direction : {"up", "down", "both", None}
         See :func:`nonsmooth.sweep`.
     progress : bool
-        A bar on a terminal.
+        A bar, on a terminal and in a notebook; nothing elsewhere.
     **options
         All other options of :func:`nonsmooth.sweep`.
 

@@ -2,21 +2,22 @@ r"""The Lyapunov exponents of one trajectory: its growth in batches of time, the
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.flow.engine import Chain, Engine, FloatArray, SectionPlan, State
+from nonsmooth.flow.equilibria import Equilibrium, equilibrium_at
 from nonsmooth.flow.spectrum import frame_for
 from nonsmooth.kernels import codes
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["ALIGN", "BATCHES", "GOOD", "Spectrum", "batch_ends", "evaluated", "failed_spectrum", "kaplan_yorke",
-           "spectrum_along"]  # fmt: skip
+__all__ = ["ALIGN", "BATCHES", "GOOD", "Spectrum", "at_rest", "batch_ends", "evaluated", "failed_spectrum",
+           "kaplan_yorke", "spectrum_along"]  # fmt: skip
 
 BATCHES = 32
 ALIGN = 100  # units of the transient in which the frame turns into the directions of growth
@@ -35,13 +36,14 @@ class Spectrum:
     nearest: float
     elapsed: float
     status: int
+    rest: Equilibrium | None = None  # where the trajectory stays, or began
 
 
 def spectrum_along(
-    system: System, engine: Engine, tables: Any, i: int, state: State, period: float | None, unit: float, count: int,
-    wait: int,
+    system: System, engine: Engine, tables: Any, i: int, values: FloatArray, state: State, period: float | None,
+    unit: float, count: int, wait: int,
 ) -> Spectrum:  # fmt: skip
-    """Run row i from ``state`` on: the transient, its last part with the frame, then ``count`` units."""
+    """Run row i (parameters ``values``) from ``state`` on: the transient, its end with the frame, ``count`` units."""
     if period is not None:
         state.keep_phase(period, 0.0)
     state.settled = False
@@ -52,6 +54,7 @@ def spectrum_along(
     frame = frame_for(system, engine, tables, i)
     if status in GOOD and align:
         status = frame.advance(state, align, unit).status
+    begun = state.copy()
     if status in GOOD:
         growth = frame.advance(state, count, unit)
         status = growth.status
@@ -63,9 +66,34 @@ def spectrum_along(
     used = int(frame.active.sum())
     logs = growth.logarithms[:, :used]
     batches = np.add.reduceat(logs, batch_ends(count)[:-1]) if count >= BATCHES else None
-    return evaluated(
+    found = evaluated(
         n, logs.mean(axis=0) / unit, batches, count, unit, growth.defect, growth.nearest, status, period is not None
     )
+    return at_rest(found, system, values, begun, state)
+
+
+def at_rest(found: Spectrum, system: System, values: FloatArray, begun: State, ended: State) -> Spectrum:
+    """The exponents with the equilibrium at which the run stayed, or began, and the errors they then have.
+
+    Beside a stable equilibrium the true exponents are known, the real parts of its eigenvalues. Batches that are all
+    alike say nothing of an exponent's error, and an equilibrium that no motion approaches has no dimension.
+    """
+    at = [
+        equilibrium_at(system, one.u, int(one.counters[0]), values=values, memory=one.memory) for one in (ended, begun)
+    ]
+    if at[0] is not None and at[0].kind == "unstable" and at[1] is None:
+        return found  # passes by
+    rest = at[0] if at[0] is not None else at[1]
+    if rest is not None and rest.kind == "undecided" and found.exponents[0] > 3.0 / found.elapsed:
+        rest = replace(rest, kind="unstable")
+    if rest is None or (at[0] is None and rest.kind != "unstable"):
+        return found
+    if rest.kind == "unstable":
+        return replace(found, rest=rest, error=np.full_like(found.error, np.nan), dimension=np.nan)
+    error, known = found.error, rest.eigenvalues.real
+    if rest.kind == "stable" and len(known) == len(error):
+        error = np.maximum(error, np.abs(found.exponents - known) + np.finfo(float).eps * np.abs(known))
+    return replace(found, rest=rest, error=error)
 
 
 def batch_ends(count: int) -> NDArray[np.int64]:

@@ -14,10 +14,11 @@ from nonsmooth.analysis.sweep_pieces import Report, Slot, ended, largest_of, pie
 from nonsmooth.flow.arguments import check_options, check_system, float_array, whole_number
 from nonsmooth.flow.devices import engine_on, on_gpu, workers_of
 from nonsmooth.flow.engine import FloatArray, State
-from nonsmooth.flow.memory import room_for
+from nonsmooth.flow.equilibria import refuse_resting
 from nonsmooth.flow.methods import engine_for, warn_if_coarse
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.flow.starts import is_one_start, plain_start, start_states
+from nonsmooth.results.memory import room_for
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,7 +42,7 @@ def sweep(
     section: Stroboscopic | Poincare | None = None,
     transient: int = 500,
     keep: int = 100,
-    max_period: int = 16,
+    max_period: int | None = None,
     density: bool | Mapping[str, Any] = False,
     bins: int = 400,
     method: str = "auto",
@@ -71,8 +72,8 @@ def sweep(
     transient, keep : int
         Section returns passed over, then recorded, at each value. A point that is still settling gets up to eight
         transients; what is not settled then has the status ``slow``.
-    max_period : int
-        Longest period number looked for, less than ``keep``.
+    max_period : int, optional
+        Longest period number looked for, less than ``keep``; the smaller of 16 and ``keep`` - 1 where not given.
     density : bool or mapping
         Store a histogram of each state's section points instead of the points. A mapping gives ranges,
         ``{"x": (lowest, highest)}``; where none is given it is that of a coarse sweep and a twentieth more either side.
@@ -86,7 +87,7 @@ def sweep(
         ``"cuda"`` runs the points on an NVIDIA GPU, one per thread, with ``direction=None`` and without
         ``density``: by the exact flow or by ``method="taylor"``. See the guide "A chart on a GPU".
     progress : bool
-        A bar on a terminal.
+        A bar, on a terminal and in a notebook; nothing elsewhere.
 
     Returns
     -------
@@ -100,7 +101,8 @@ def sweep(
     Raises
     ------
     ValueError, TypeError
-        Arguments that do not fit. A point that fails keeps its status; the others are whole.
+        Arguments that do not fit, and starts at an equilibrium of a system without forcing. A point that fails keeps
+        its status; the others are whole.
     ImportError, RuntimeError
         ``device="cuda"`` without the package numba-cuda, or without a GPU.
 
@@ -126,6 +128,8 @@ def sweep(
     threads = workers_of(device, threads)
     starts = start_states(system, start)
     points = system.parameter_points({parameter: numbers})
+    if plan.indicator >= 0:
+        refuse_resting(system, starts, points, "sweep")
     attractors = Attractors(
         engine, engine.prepare(points), plan, transient, keep, max_period, tolerance_of(engine, rtol),
         system.scale_vector(),

@@ -12,7 +12,7 @@ from nonsmooth.analysis.settle import LONGER
 from nonsmooth.analysis.settled import LEAST, Settled, usable
 from nonsmooth.flow.devices import batch_size
 from nonsmooth.flow.engine import Chain, FloatArray
-from nonsmooth.flow.planar import PlanarEngine
+from nonsmooth.flow.linear import PlanarEngine
 from nonsmooth.flow.planar_cuda import PlanarOnGpu
 from nonsmooth.flow.poincare import result_status
 from nonsmooth.kernels import codes

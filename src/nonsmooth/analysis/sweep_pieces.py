@@ -101,7 +101,7 @@ def run_on_gpu(
     """All points from each start, on the GPU."""
     from nonsmooth.analysis.series_cuda import sweep_series_on_gpu
     from nonsmooth.analysis.sweep_cuda import sweep_on_gpu
-    from nonsmooth.flow.planar import PlanarEngine
+    from nonsmooth.flow.linear import PlanarEngine
 
     with progress_bar(len(points) * len(starts), f"sweep over {label}", progress) as advance:
         for k, start in enumerate(starts):

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from nonsmooth.campaign.processors import clock
 from nonsmooth.campaign.threads import on_threads
 from nonsmooth.campaign.work import Work, bytes_of, empty_columns
-from nonsmooth.flow.memory import room_for
+from nonsmooth.results.memory import room_for
 from nonsmooth.results.progress import progress as progress_bar
 
 __all__ = ["run"]
@@ -29,7 +29,7 @@ def run(
     threads : int, optional
         Threads of this process; one per core where not given. The result does not depend on it.
     progress : bool
-        A bar on a terminal.
+        A bar, on a terminal and in a notebook; nothing elsewhere.
     store : path, optional
         A Zarr store (see :mod:`nonsmooth.campaign.store`).
     client : dask.distributed.Client, optional

@@ -3,13 +3,16 @@
 ::
 
     chart.zarr/              a Zarr group; the attribute ``nonsmooth_campaign`` says what the work is
-        results/             one array per column, one file per chunk (Zstandard, one thread, fixed level)
+        results/             one array per column, one file per chunk, of zeros too (Zstandard, fixed level)
         run/000017.json      chunk 17 is done: its key and the hash of its content, by whom, when, time worked
         run/started.log      which chunks were begun: one begun twice was lost with its worker
 
 A chunk's key is a hash of the model, the parameters, the options, the source of kernels and rules, and the chunk's
 place. Its mark is written after its arrays, so that a chunk cut short counts as missing. Arrays hold results only:
 facts about the run (which machine, how long) stay in ``run``, so that equal work gives equal files.
+
+Processes write chunks without knowing of each other, so each chunk has its own hash, and they are compared whenever
+the store is read. The hash of a finished store is the hash of these: it says whether two stores hold the same.
 """
 
 from __future__ import annotations
@@ -18,7 +21,6 @@ import hashlib
 import json
 import os
 import socket
-import tempfile
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -29,16 +31,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.campaign.identity import described, difference
-from nonsmooth.campaign.marks import mark_in, marks_of, started, told, write_whole
+from nonsmooth.campaign.marks import mark_in, marks_of, started
 from nonsmooth.campaign.processors import processor_type
 from nonsmooth.campaign.work import Work
 from nonsmooth.errors import DataFileError
+from nonsmooth.results.content import digest, seal, sealed
+from nonsmooth.results.whole import beside, told, write_whole
 
 __all__ = ["ChunkStore", "describe_store", "open_store", "stored_bytes"]
 
 ATTRIBUTE = "nonsmooth_campaign"
+ANEW = "give another name, and compute it anew there"
+KEPT = "finished chunks are whole, run it again to go on"
 LEVEL = 3  # of the compression
-FACTS = 360  # bytes of the facts about the run that are kept for each chunk
+FACTS = 440  # bytes of the facts about the run that are kept for each chunk
 
 
 @dataclass(frozen=True)
@@ -65,7 +71,7 @@ class ChunkStore:
     def note_start(self, chunk: int) -> None:
         """Write into the log that the work on a chunk begins: what was begun more often than once was lost before."""
         line = json.dumps({"chunk": chunk, "host": socket.gethostname(), "process": os.getpid(), "began": time.time()})
-        with told(self.path), open(self.path / "run" / "started.log", "a", encoding="utf-8") as log:
+        with told(self.path, KEPT), open(self.path / "run" / "started.log", "a", encoding="utf-8") as log:
             log.write(line + "\n")
 
     def write(self, work: Work, chunk: int, arrays: Mapping[str, NDArray[Any]], seconds: float) -> None:
@@ -77,7 +83,7 @@ class ChunkStore:
             The disk is full, or may not be written; what was there before is whole.
         """
         first, last = work.bounds(chunk)
-        with told(self.path):
+        with told(self.path, KEPT):
             group = _results(self.path, "r+")
             kept = {name: np.ascontiguousarray(arrays[name], item.dtype) for name, item in work.columns().items()}
             _put(group, kept, first, last)
@@ -86,7 +92,7 @@ class ChunkStore:
                 "cpu": processor_type(work.device), "host": socket.gethostname(), "process": os.getpid(),
                 "seconds": round(seconds, 4), "ended": time.time(),
             }  # fmt: skip
-            write_whole(self.path / "run" / f"{chunk:06d}.json", json.dumps(mark).encode())
+            write_whole(self.path / "run" / f"{chunk:06d}.json", json.dumps(seal(mark)).encode())
 
     def read(self, work: Work) -> dict[str, NDArray[Any]]:
         """All columns, over all places.
@@ -95,10 +101,12 @@ class ChunkStore:
         ------
         DataFileError
             A chunk that is marked as done is damaged; its mark is taken away, so that the next run computes it again.
+            The description of a column was altered.
         """
         group = _results(self.path, "r")
-        with told(self.path):
-            columns = _whole(group)
+        _check_columns(self.path, group, work)
+        with told(self.path, KEPT):
+            columns = _whole(group, work)
             there = columns or group
             damaged = [mark["chunk"] for mark in marks_of(self.path) if not self._is_whole(work, mark, there)]
         if damaged:
@@ -108,18 +116,18 @@ class ChunkStore:
             raise DataFileError(
                 f"{self.path}: {len(damaged)} chunks are damaged ({some}); run it again, they will be computed anew"
             )
-        return columns or {name: np.asarray(array[...]) for name, array in group.arrays()}
+        return columns or {name: np.asarray(group[name][...]) for name in work.columns()}
 
     def _is_whole(self, work: Work, mark: Mapping[str, Any], columns: Any) -> bool:
         """Whether a chunk's arrays are those that were written."""
         first, last = work.bounds(mark["chunk"])
         try:
-            digest = _content({name: np.asarray(columns[name][first:last]) for name in work.columns()})
+            found = _content({name: np.asarray(columns[name][first:last]) for name in work.columns()})
         except (OSError, MemoryError):
             raise  # the machine's trouble: the chunk may be whole
         except Exception:
             return False
-        return bool(digest == mark.get("content"))
+        return bool(found == mark.get("content"))
 
     def _key(self, chunk: int) -> str:
         return hashlib.sha256(f"{self.key}:{chunk}".encode()).hexdigest()
@@ -169,10 +177,12 @@ def open_store(path: str | os.PathLike[str], work: Work, *, any_cpu: bool = Fals
 def describe_store(path: str | os.PathLike[str]) -> dict[str, Any]:
     """What a store is of, and how far it is: ``verb``, ``system``, ``options``, ``chunks``, ``done``, ``seconds``.
 
+    ``content``: once all chunks are there, the hash of their hashes; else None.
+
     Raises
     ------
     DataFileError
-        Not a store of chunks.
+        Not a store of chunks, or its description was altered.
     """
     import zarr
 
@@ -181,8 +191,12 @@ def describe_store(path: str | os.PathLike[str]) -> dict[str, Any]:
         record: dict[str, Any] = dict(json.loads(str(zarr.open_group(target, mode="r").attrs[ATTRIBUTE])))
     except Exception as error:
         raise DataFileError(f"{target}: is not a store of chunks ({error})") from error
+    if not sealed(record):
+        raise DataFileError(f"{target}: what it says of its work was altered, or is of an older version; {ANEW}")
     marks = list(marks_of(target))
-    record["done"] = len({mark["chunk"] for mark in marks})
+    contents = {mark["chunk"]: mark["content"] for mark in marks}
+    record["done"] = len(contents)
+    record["content"] = digest(sorted(contents.items())) if len(contents) == record["chunks"] else None
     record["seconds"] = sum(mark["seconds"] for mark in marks)
     log = target / "run" / "started.log"
     record["started"] = len(started(log)) if log.exists() else record["done"]
@@ -214,11 +228,11 @@ def _make(target: Path, work: Work, wanted: Mapping[str, Any], key: str) -> None
     """A whole empty store, or none."""
     import zarr
 
-    with told(target), tempfile.TemporaryDirectory(prefix=f".{target.name}-", dir=target.parent) as folder:
-        fresh = Path(folder) / "new.zarr"
+    with told(target, "nothing was begun; make room, or give another place"), beside(target) as folder:
+        fresh = folder / "new.zarr"
         root = zarr.open_group(fresh, mode="w", zarr_format=3)
         facts = {"key": key, "device": work.device, "cpu": processor_type(work.device), "made": time.time()}
-        root.attrs[ATTRIBUTE] = json.dumps({**wanted, **facts})
+        root.attrs[ATTRIBUTE] = json.dumps(seal({**wanted, **facts}))
         results = root.create_group("results")
         first, last = work.bounds(0)
         _create(results, work, wanted["places"], last - first)
@@ -242,21 +256,47 @@ def _create(group: Any, work: Work, places: int, chunk: int) -> None:
 
 
 def _put(group: Any, arrays: Mapping[str, NDArray[Any]], first: int, last: int) -> None:
+    """Write places of each column, zeros too.
+
+    That zeros are written is a setting of an opened array, not of the file. It is set for each array: the library's
+    configuration is one for the whole process, the user's threads included.
+    """
+    import zarr
+
     for name, values in arrays.items():
-        group[name][first:last] = values
+        found = group[name]
+        array = zarr.Array(zarr.AsyncArray(found.metadata, found.store_path, {"write_empty_chunks": True}))
+        array[first:last] = values
 
 
 def _results(path: Path, mode: Any) -> Any:
     import zarr
 
-    with zarr.config.set({"array.write_empty_chunks": True, "threading.max_workers": 1}):
+    try:
         return zarr.open_group(path / "results", mode=mode)
+    except OSError:
+        raise
+    except Exception as error:
+        raise DataFileError(f"{path}: the description of its results is damaged ({error}); {ANEW}") from error
 
 
-def _whole(group: Any) -> dict[str, NDArray[Any]]:
+def _check_columns(path: Path, group: Any, work: Work) -> None:
+    """Refuse columns whose description was altered: their type and shape follow from the work."""
+    places = work.bounds(work.n_chunks() - 1)[1]
+    for name, item in work.columns().items():
+        try:
+            array = group[name]
+            found = (array.shape, array.dtype)
+        except Exception as error:
+            raise DataFileError(f"{path}: the description of column {name!r} is damaged ({error}); {ANEW}") from error
+        if found != ((places, *item.shape), np.dtype(item.dtype)):
+            raise DataFileError(f"{path}: the description of column {name!r} was altered; {ANEW}")
+
+
+def _whole(group: Any, work: Work) -> dict[str, NDArray[Any]]:
     """All columns; none where a chunk is damaged: that comes up as almost anything from the codecs."""
     try:
-        return {name: np.asarray(array[...]) for name, array in group.arrays()}
+        return {name: np.asarray(group[name][...]) for name in work.columns()}
     except (OSError, MemoryError):
         raise
     except Exception:
@@ -264,7 +304,8 @@ def _whole(group: Any) -> dict[str, NDArray[Any]]:
 
 
 def _content(arrays: Mapping[str, NDArray[Any]]) -> str:
-    digest = hashlib.sha256()
+    found = hashlib.sha256()
     for name in sorted(arrays):
-        digest.update(name.encode() + np.ascontiguousarray(arrays[name]).tobytes())
-    return digest.hexdigest()
+        found.update(f"{name} {arrays[name].dtype.str} {arrays[name].shape} ".encode())
+        found.update(np.ascontiguousarray(arrays[name]).reshape(-1).view(np.uint8).data)
+    return found.hexdigest()

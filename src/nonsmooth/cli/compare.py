@@ -9,6 +9,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nonsmooth.cli.keep import keep, kept_whatever_comes
 from nonsmooth.cli.tables import read_tables, with_folder
 from nonsmooth.system.names import check_keys, unknown
 
@@ -176,26 +177,29 @@ def _theory(study: Mapping[str, Any], folder: Path) -> tuple[Any, Any]:
 def _write(result: xr.Dataset, output: Mapping[str, str], folder: Path) -> list[Path]:
     written = []
     if "data" in output:
-        from nonsmooth.results.store import save
-
-        written.append(save(result, with_folder(folder / output["data"])))
+        written.append(keep(result, folder / output["data"]))
     if "figure" in output:
-        import matplotlib as mpl
-
-        mpl.use("Agg")
-        from nonsmooth import plot
-        from nonsmooth.plot import comparison_diagram, comparison_motion, comparison_response
-
-        pictures = _PICTURES[result.attrs["comparison"]]
-        wanted = output.get("picture", next(iter(pictures)))
-        if wanted not in pictures:
-            raise ValueError(unknown(wanted, "a picture", f"a comparison of a {result.attrs['comparison']}", pictures))
-        module = {"motion": comparison_motion, "response": comparison_response, "diagram": comparison_diagram}
-        draw = getattr(module[result.attrs["comparison"]], pictures[wanted])
-        axes = {key: output[key] for key in ("x", "y") if key in output and key in inspect.signature(draw).parameters}
-        zone = {"zone": "g"} if wanted == "phase_portrait" and "g" in result.coords else {}
-        written.append(plot.save_figure(draw(result, **axes, **zone), with_folder(folder / output["figure"])))
+        with kept_whatever_comes(result, written, folder / "comparison.nc"):
+            written.append(_draw(result, output, folder / output["figure"]))
     return written
+
+
+def _draw(result: xr.Dataset, output: Mapping[str, str], path: Path) -> Path:
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    from nonsmooth import plot
+    from nonsmooth.plot import comparison_diagram, comparison_motion, comparison_response
+
+    pictures = _PICTURES[result.attrs["comparison"]]
+    wanted = output.get("picture", next(iter(pictures)))
+    if wanted not in pictures:
+        raise ValueError(unknown(wanted, "a picture", f"a comparison of a {result.attrs['comparison']}", pictures))
+    module = {"motion": comparison_motion, "response": comparison_response, "diagram": comparison_diagram}
+    draw = getattr(module[result.attrs["comparison"]], pictures[wanted])
+    axes = {key: output[key] for key in ("x", "y") if key in output and key in inspect.signature(draw).parameters}
+    zone = {"zone": "g"} if wanted == "phase_portrait" and "g" in result.coords else {}
+    return plot.save_figure(draw(result, **axes, **zone), with_folder(path))
 
 
 def _summary(result: xr.Dataset) -> str:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from nonsmooth.cli.keep import keep
 from nonsmooth.cli.tables import read_tables, with_folder
 from nonsmooth.system.names import check_keys, unknown
 
@@ -142,9 +143,7 @@ def _quantity(value: Any) -> Any:
 def _write(found: Any, study: _Study, data: Path | None) -> list[Path]:
     written = []
     if data is not None:
-        from nonsmooth.results.store import save
-
-        written.append(save(found.to_dataset(), with_folder(data)))
+        written.append(keep(found.to_dataset(), data))
     if study.table is not None:
         from nonsmooth.identification.report import report
 

@@ -5,13 +5,16 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Sequence
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 # Matrices here are tiny: threads of the linear algebra would wait for each other (20 times the processor time in small
 # fits), and beside our own threads for a core. Must stand before NumPy is loaded.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from nonsmooth.cli import compare, identify, models, plan, reproduce, rig, run, show
+from nonsmooth.cli.terminal import printable
 from nonsmooth.errors import SolveError
 from nonsmooth.results.provenance import package_version
 
@@ -27,7 +30,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = _parser()
     options = parser.parse_args(arguments)
     try:
-        code: int = options.run(options)
+        with _fit_for_a_terminal():
+            code: int = options.run(options)
         return code
     except KeyboardInterrupt:
         print("nonsmooth: interrupted", file=sys.stderr)
@@ -35,8 +39,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except _USER_ERRORS as error:
         if options.traceback:
             raise
-        print(f"nonsmooth: {error}", file=sys.stderr)
+        print(f"nonsmooth: {printable(str(error))}", file=sys.stderr)
         return 2
+
+
+@contextmanager
+def _fit_for_a_terminal() -> Iterator[None]:
+    """Warnings quote what stands in files."""
+    plain = warnings.formatwarning
+    warnings.formatwarning = lambda *given, **named: printable(plain(*given, **named))
+    try:
+        yield
+    finally:
+        warnings.formatwarning = plain
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -26,7 +26,7 @@ def add(commands: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    for library in ("netCDF4", "xarray"):  # what the run itself loads counts in its memory
+    for library in ("h5netcdf", "xarray"):  # what the run itself loads counts in its memory
         import_module(library)
 
     from nonsmooth.analysis.chart import plan_chart

@@ -22,9 +22,15 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("study", help="the study, for example savi2007")
     parser.add_argument(
-        "--figure", type=int, action="append", metavar="N", help="only this figure of the paper; may be repeated"
-    )
-    parser.add_argument("--out", type=Path, metavar="DIR", help="where to write (default: out/STUDY)")
+        "--figure", action="append", metavar="N",
+        help="only this figure of the paper, by model and rig, or one by its name (fig11_rig, table1, eta, ...); "
+        "may be repeated",
+    )  # fmt: skip
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR",
+        help="where to write (default: out/STUDY, with --quick out/STUDY_quick); what an earlier or an interrupted run "
+        "finished there is used again",
+    )  # fmt: skip
     parser.add_argument("--quick", action="store_true", help="coarser grids and shorter runs: a first look")
     parser.add_argument(
         "--full", action="store_true", help="large charts over two parameters too; an interrupted run goes on"
@@ -40,9 +46,11 @@ def _run(options: argparse.Namespace) -> int:
     known = sorted(module.name for module in pkgutil.iter_modules(studies.__path__) if module.ispkg)
     if options.study not in known:
         raise ValueError(unknown(options.study, "a study", "this package", known))
+    out = options.out or Path("out") / (options.study + "_quick" * options.quick)
+    if not options.quiet and sys.stderr.isatty():  # what follows loads the numerics: that takes a second or more
+        print(f"reproducing {options.study} into {out}", file=sys.stderr, flush=True)
     _draw_without_screen()
     study = importlib.import_module(f"nonsmooth.studies.{options.study}")
-    out = options.out or Path("out") / options.study
     study.reproduce(
         out=out, figures=options.figure, quick=options.quick, full=options.full, progress=not options.quiet
     )

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from nonsmooth.cli.terminal import one_line, printable
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,12 +38,14 @@ def _run(options: argparse.Namespace) -> int:
     if options.file.suffix not in (".nc", ".zarr"):  # what an instrument wrote
         from nonsmooth.experiment.load import load_recording
 
-        print(load_recording(options.file))
+        print(printable(repr(load_recording(options.file))))
         return 0
     result = load(options.file)
     print(summary(result))
     if options.text:
-        print(read_provenance(result).get("system", {}).get("text", "(not made from a system)"))
+        system = read_provenance(result).get("system")
+        text = system.get("text") if isinstance(system, dict) else None
+        print(printable(text) if isinstance(text, str) else "(not made from a system)")
     return 0
 
 
@@ -54,10 +59,12 @@ def progress_of(path: Path) -> str:
     part, places = 100 * done / chunks, record["places"]
     whose = "a GPU" if record.get("device") == "cuda" else "one core"
     lines = [
-        f"{record['verb']}: {done} of {chunks} chunks are there ({part:.3g} %), {places} points",
-        f"worked      {record['seconds']:.3g} s of {whose}, on a processor of type {record['cpu']}",
+        f"{one_line(record['verb'])}: {done} of {chunks} chunks are there ({part:.3g} %), {places} points",
+        f"worked      {record['seconds']:.3g} s of {whose}, on a processor of type {one_line(record['cpu'], 80)}",
         f"remains     about {each * (chunks - done):.3g} s of {whose}" if done < chunks else "remains     nothing",
     ]
+    if record["content"]:
+        lines.append(f"content     sha256 {record['content'][:16]}; stores of equal results have the same")
     if record["started"] > done:
         lines.append(f"begun       {record['started']}: some chunks are under way, or were lost with their worker")
     return "\n".join(lines)
@@ -67,45 +74,48 @@ def summary(result: xr.Dataset) -> str:
     """A few lines: where the result comes from, its dims and variables, how its points ended."""
     from nonsmooth.results.provenance import read_provenance
 
-    record = read_provenance(result)
-    if "system" in record:
-        system = record["system"]
-        lines = [
-            f"{record['verb']} of {system['name']!r} (nonsmooth {record['version']}, method {record['method']})",
-            "parameters  " + ", ".join(
-                f"{name} = {_number(None if name in result.dims else value)}"
-                for name, value in system["parameters"].items()
-            ),
-            "options     " + ", ".join(f"{name} = {_short(value)}" for name, value in record["options"].items()),
-        ]
-    else:  # a recording: made from a file, not from a system
-        lines = [f"{name:<12}{_short(value)}" for name, value in record.items()]
-    lines.append("dims        " + ", ".join(f"{name} {size}" for name, size in result.sizes.items()))
+    lines = _origin(read_provenance(result), result)
+    lines.append("dims        " + ", ".join(f"{one_line(name)} {size}" for name, size in result.sizes.items()))
     for name, array in result.data_vars.items():
-        dims = ", ".join(map(str, array.dims))
-        unit = array.attrs.get("units", "")
-        lines.append(f"  {name}({dims})  {array.attrs.get('long_name', '')}{f' [{unit}]' if unit else ''}")
+        dims = ", ".join(map(one_line, array.dims))
+        unit = one_line(array.attrs.get("units", ""))
+        what = one_line(array.attrs.get("long_name", ""), 80)
+        lines.append(f"  {one_line(name)}({dims})  {what}{f' [{unit}]' if unit else ''}")
     if "status" in result:
         lines.append("status      " + _statuses(result))
     return "\n".join(lines)
 
 
+def _origin(record: Mapping[str, Any], result: xr.Dataset) -> list[str]:
+    """The system, its parameters and the options; what else the record holds, where it is not of a system."""
+    system, options = record.get("system"), record.get("options")
+    if not (isinstance(system, dict) and isinstance(system.get("parameters"), dict) and isinstance(options, dict)):
+        return [f"{one_line(name):<12}{one_line(value)}" for name, value in record.items()]
+    verb, version, method = (one_line(record.get(key)) for key in ("verb", "version", "method"))
+    parameters = (
+        f"{one_line(name)} = {'varied' if value is None or name in result.dims else _number(value)}"
+        for name, value in system["parameters"].items()
+    )
+    return [
+        f"{verb} of '{one_line(system.get('name'))}' (nonsmooth {version}, method {method})",
+        "parameters  " + ", ".join(parameters),
+        "options     " + ", ".join(f"{one_line(name)} = {one_line(value)}" for name, value in options.items()),
+    ]
+
+
 def _statuses(result: xr.Dataset) -> str:
-    from nonsmooth.results.statuses import by_code
+    from nonsmooth.results.statuses import STATUSES
 
+    known = {status.code: status for status in STATUSES}
     codes, counts = np.unique(result["status"].values, return_counts=True)
-    if result["status"].size == 1:
-        status = by_code(codes[0])
+    if result["status"].size == 1 and (status := known.get(codes.tolist()[0])):
         return f"{status.name}: {status.sentence}"
-    return ", ".join(f"{by_code(code).name} {count}" for code, count in zip(codes, counts, strict=True))
+    names = (known[code].name if code in known else f"{one_line(code)} (unknown)" for code in codes.tolist())
+    return ", ".join(f"{name} {count}" for name, count in zip(names, counts, strict=True))
 
 
-def _short(value: Any, limit: int = 40) -> str:
-    if isinstance(value, list) and len(value) > 4:
-        return f"[{value[0]} ... {value[-1]}] ({len(value)})"
-    text = str(value)
-    return text if len(text) <= limit else text[: limit - 3] + "..."
-
-
-def _number(value: float | None) -> str:
-    return "varied" if value is None else f"{float(value):.6g}"
+def _number(value: Any) -> str:
+    try:
+        return f"{float(value):.6g}"
+    except (TypeError, ValueError, OverflowError):
+        return one_line(value)

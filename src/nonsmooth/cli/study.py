@@ -17,6 +17,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nonsmooth.cli.keep import keep, kept_whatever_comes
 from nonsmooth.cli.tables import read_tables, with_folder
 from nonsmooth.system.names import check_keys, unknown
 
@@ -91,19 +92,17 @@ class Study:
         """Save the data and draw the figure that ``[output]`` asks for; returns what was written."""
         folder, written = self.path.parent, []
         if "data" in self.output:
-            from nonsmooth.results.store import save
-
-            written.append(save(result, with_folder(folder / self.output["data"])))
+            written.append(keep(result, folder / self.output["data"]))
         if "figure" in self.output:
-            import matplotlib as mpl
+            with kept_whatever_comes(result, written, self.path.with_suffix(".nc")):
+                import matplotlib as mpl
 
-            mpl.use("Agg")
-            from nonsmooth import plot
+                mpl.use("Agg")
+                from nonsmooth import plot
 
-            named = {axis: self.output[axis] for axis in ("x", "y") if axis in self.output}
-            counted = self.verb == "sweep" and "density" in result
-            ax = getattr(plot, "density" if counted else _FIGURES[self.verb])(result, **named)
-            written.append(plot.save_figure(ax, with_folder(folder / self.output["figure"])))
+                named = {axis: self.output[axis] for axis in ("x", "y") if axis in self.output}
+                ax = getattr(plot, _figure(self.verb, self.options))(result, **named)
+                written.append(plot.save_figure(ax, with_folder(folder / self.output["figure"])))
         return written
 
 
@@ -131,6 +130,7 @@ def read_study(path: Path) -> Study:
     _check_output(output, path)
     system = _system(document["system"], path)
     options = _options(verbs[0], document[verbs[0]], where)
+    _check_axes(output, _figure(verbs[0], options), system, f"{where}, table [output]")
     return Study(path, system, verbs[0], options, output)
 
 
@@ -189,6 +189,8 @@ def _told(source: Path, call: Callable[[], Any]) -> Any:
 
 def _check_output(output: Mapping[str, Any], path: Path) -> None:
     """What would fail after hours of computing is told before."""
+    from nonsmooth.results.store import check_place
+
     place = f"{path}, table [output]"
     for name, value in output.items():
         if not isinstance(value, str):
@@ -202,10 +204,37 @@ def _check_output(output: Mapping[str, Any], path: Path) -> None:
         folder = next((one for one in target.parents if one.exists()), path.parent)
         if not (folder.is_dir() and os.access(folder, os.W_OK)):
             raise ValueError(f"{place}: {name} = {output[name]!r}: nothing may be written into {folder}")
+        if name == "data" and target.exists():
+            check_place(target)
+        elif name == "figure" and target.is_dir():
+            raise ValueError(f"{place}: {name} = {output[name]!r} is a folder; give another name")
     if "store" in output and "data" in output and _same(path.parent / output["store"], path.parent / output["data"]):
         raise ValueError(
             f"{place}: data and store are both {output['data']!r}: the result would replace the chunks; give two names"
         )
+
+
+def _figure(verb: str, options: Mapping[str, Any]) -> str:
+    """The plot of a verb's result."""
+    return "density" if verb == "sweep" and options.get("density") else _FIGURES[verb]
+
+
+def _check_axes(output: Mapping[str, Any], figure: str, system: Any, place: str) -> None:
+    """What the figure's axes may be is known from the system."""
+    if "figure" not in output:
+        return
+    from nonsmooth import plot
+
+    taken = inspect.signature(getattr(plot, figure)).parameters
+    states = list(system.states)
+    known = [*states, *system.outputs, *system.memory, "mode"] if figure == "phase_portrait" else states
+    for axis in ("x", "y"):
+        if axis in output and axis not in taken:
+            raise ValueError(f"{place}: {axis} = {output[axis]!r}: this figure has no such choice; take the line out")
+        if axis in output and output[axis] not in known:
+            raise ValueError(f"{place}: {axis} = {output[axis]!r} is not in the result; there are: {', '.join(known)}")
+    if "x" in taken and len(states) < 2:
+        raise ValueError(f"{place}: the figure is of two states, and the system has one ({states[0]}); take it out")
 
 
 def _same(one: Path, other: Path) -> bool:

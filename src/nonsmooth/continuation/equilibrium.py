@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+
+from nonsmooth.flow.equilibria import ModeField, sorted_eigenvalues
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
@@ -46,23 +48,12 @@ class Equilibria:
     """
 
     def __init__(self, system: System, mode: int, parameter: str, width: float) -> None:
-        import sympy as sp
-
         self.system, self.mode, self.parameter = system, mode, parameter
-        traced = system.traced
         self.place = list(system.values).index(parameter)
-        self.values = system.parameter_vector()
-        # States that the mode lacks stay zero.
-        self.own = [i for i in range(len(traced.u)) if not traced.lacking[mode][i]]
-        self.n, self.n_u = len(self.own), len(traced.u)
-        f = [traced.fields[mode][i] for i in self.own]
-        u = [traced.u[i] for i in self.own]
-        entries = [*f, *(e.diff(s) for e in f for s in u), *(e.diff(traced.p[self.place]) for e in f)]
-        memory = dict(zip(traced.m, system.memory_vector(), strict=True))
-        self._field = sp.lambdify([list(traced.u), list(traced.p)], [sp.sympify(e).subs(memory) for e in entries],
-                                  modules="numpy")  # fmt: skip
-        self._indicators = sp.lambdify([list(traced.u), list(traced.p)],
-                                       [e.subs(memory) for e in traced.indicators], modules="numpy")  # fmt: skip
+        self.values, self.memory = system.parameter_vector(), system.memory_vector()
+        self.field = ModeField(system.traced, mode, (self.place,))
+        self.own = self.field.own
+        self.n, self.n_u = len(self.own), len(system.traced.u)
         self.scale = np.append(system.scale_vector()[self.own], width)
 
     def whole(self, x: FloatArray) -> FloatArray:
@@ -76,11 +67,8 @@ class Equilibria:
         X = Y * self.scale
         values = self.values.copy()
         values[self.place] = X[-1]
-        with np.errstate(all="ignore"):
-            found: Any = np.array(self._field(self.whole(X[:-1]), values), dtype=float)
-        n = self.n
-        J = np.column_stack([found[n : n + n * n].reshape(n, n), found[n + n * n :]])
-        return found[:n], J * self.scale
+        f, J, in_parameter = self.field.evaluate(self.whole(X[:-1]), values, self.memory)
+        return f, np.column_stack([J, in_parameter]) * self.scale
 
     def correct(self, Y: FloatArray, border: FloatArray, level: float) -> tuple[FloatArray, FloatArray] | None:
         """Newton for f = 0 and border . Y = level: (Y, J)."""
@@ -111,16 +99,11 @@ class Equilibria:
         t /= np.linalg.norm(t)
         X = Y * self.scale
         jacobian = J[:, :-1] / self.scale[:-1]
-        eigenvalues = np.linalg.eigvals(jacobian).astype(complex)
-        eigenvalues = eigenvalues[np.lexsort((-eigenvalues.imag, -eigenvalues.real))]
+        eigenvalues = sorted_eigenvalues(jacobian)
         values = self.values.copy()
         values[self.place] = X[-1]
         u = self.whole(X[:-1])
-        h = np.array(self._indicators(u, values), dtype=float) if self.system.indicators else np.empty(0)
-        margins = np.array([
-            min(row.sign * h[row.indicator] for row in jump.rows) if jump.source == self.mode and jump.rows else -np.inf
-            for jump in self.system.transitions
-        ])  # fmt: skip
+        margins = self.field.margins(self.field.indicators(u, values, self.memory)[0])
         sign = float(np.linalg.slogdet(np.vstack([J, t]))[0])
         return Rest(Y, t, u, float(X[-1]), jacobian, eigenvalues, margins, sign)
 

@@ -9,19 +9,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.continuation.anchor import anchor_at
+from nonsmooth.continuation.multipliers import multipliers_of, nearest_to_one, stability
 from nonsmooth.continuation.orbit import Orbit, orbit_of
 from nonsmooth.continuation.path import Walk
 from nonsmooth.continuation.primitive import primitive
+from nonsmooth.continuation.search import search_within
 from nonsmooth.continuation.settled import CLOSED, NEAR, Guess, forced_guesses, settle_forced, touching
 from nonsmooth.continuation.shooting import Shooting
 from nonsmooth.errors import SolveError
-from nonsmooth.flow.arguments import check_system, whole_number
+from nonsmooth.flow.arguments import check_system, real_number, whole_number
 from nonsmooth.flow.failure import solve_error
 from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.starts import first_state, plain_start
 from nonsmooth.kernels import codes
 
 if TYPE_CHECKING:
+    from nonsmooth.continuation.search import Search
+    from nonsmooth.flow.engine import State
     from nonsmooth.system.system import System
 
 __all__ = ["find_orbit"]
@@ -31,6 +35,7 @@ GOOD = (codes.OK, codes.NOT_GUARANTEED)
 RTOL = 1e-12  # of the runs from which orbits are read, where the flow is not exact
 NOISE = 1e-11  # of the motion's size: beyond a boundary by less than this is on it
 FAR = 30.0  # how far from the motion, in units of its gap, the orbit may lie
+NEUTRAL = 1e-2  # a multiplier nearer to 1 than this explains that Newton's method did not converge
 SLOW = 3.0  # or of the distance that its multipliers give for that gap
 
 
@@ -41,6 +46,8 @@ def find_orbit(
     period_number: int | None = None,
     transient: int = 500,
     max_period: int = 32,
+    budget: float = 60.0,
+    progress: bool = True,
 ) -> Orbit:
     """Find a periodic orbit from a simulation: period, signature and phases are read off it, Newton does the rest.
 
@@ -58,6 +65,10 @@ def find_orbit(
         near it too.
     max_period : int
         The longest period looked for.
+    budget : float
+        Seconds of processor time after which the search ends with an error (``budget``); compiling does not count.
+    progress : bool
+        A bar of the budget, on a terminal and in a notebook; nothing elsewhere.
 
     Returns
     -------
@@ -67,8 +78,10 @@ def find_orbit(
     Raises
     ------
     SolveError
-        The motion is not periodic (``not_periodic``), Newton's method did not converge (``no_convergence``), the orbit
-        found has not the period asked for (``shorter_period``), or the simulation failed; the message says what to do.
+        The motion is not periodic (``not_periodic``) or rests at an equilibrium (``equilibrium``), which is named;
+        Newton's method did not converge (``no_convergence``), because a multiplier is 1 (``neutral``); the orbit found
+        has not the period asked for (``shorter_period``); the budget is spent, or the simulation failed. The message
+        says what to do.
     ValueError, TypeError
         Arguments that do not fit.
     """
@@ -78,30 +91,13 @@ def find_orbit(
     if period_number is not None:
         period_number = whole_number(period_number, "period_number", 1)
     transient, max_period = whole_number(transient, "transient", 0), whole_number(max_period, "max_period", 1)
-    engine = engine_for(system, rtol=RTOL)
+    seconds = real_number(budget, "budget")
+    if not seconds > 0:
+        raise ValueError(f"budget = {budget!r}: a search takes a positive number of seconds")
     state = first_state(system, start)
-    if system.period() is None:
-        from nonsmooth.continuation.settled_autonomous import autonomous_guesses
-
-        guesses = autonomous_guesses(system, engine, state, transient, max_period, period_number)
-    else:
-        keep = 2 * max(max_period, period_number or 1) + 2
-        begun = state.copy()
-        settled = settle_forced(system, engine, state, transient, keep)
-        if settled.status not in GOOD and not transient and period_number is not None:
-            # The motion leaves an unstable orbit and fails later: its first rounds are enough.
-            settled = settle_forced(system, engine, begun, 0, period_number + 1)
-        if settled.status not in GOOD:
-            raise solve_error(settled.status)
-        guesses = forced_guesses(system, settled, period_number, max_period)
-    if not guesses:
-        raise SolveError(
-            f"no periodic motion was found: after {transient} forcing periods no return up to the period number "
-            f"{period_number or max_period} came near its beginning (chaotic, quasi-periodic, a longer period). Give "
-            "another start, a longer transient or max_period, or period_number= for an unstable orbit within it",
-            status="not_periodic",
-        )
-    orbit = _polished(system, guesses, given=period_number is not None, unstable=transient == 0)
+    with search_within(seconds, "find_orbit", progress) as search:
+        guesses = _guesses(system, state, period_number, transient, max_period, search)
+        orbit = _polished(system, guesses, period_number is not None, transient == 0, search)
     options = {
         "start": plain_start(system, start), "period_number": period_number, "transient": transient,
         "max_period": max_period,
@@ -109,17 +105,55 @@ def find_orbit(
     return replace(orbit, options=options)
 
 
-def _polished(system: System, guesses: list[Guess], given: bool, unstable: bool) -> Orbit:
+def _guesses(
+    system: System, state: State, period_number: int | None, transient: int, max_period: int, search: Search
+) -> list[Guess]:
+    """Stretches of the motion that nearly close.
+
+    Raises
+    ------
+    SolveError
+        There is none, or the motion fails.
+    """
+    engine = engine_for(system, rtol=RTOL)
+    if system.period() is None:
+        from nonsmooth.continuation.settled_autonomous import autonomous_guesses
+
+        guesses = autonomous_guesses(system, engine, state, transient, max_period, period_number, search)
+    else:
+        keep = 2 * max(max_period, period_number or 1) + 2
+        begun = state.copy()
+        settled = settle_forced(system, engine, state, transient, keep, search)
+        if settled.status not in GOOD and not transient and period_number is not None:
+            # The motion leaves an unstable orbit and fails later: its first rounds are enough.
+            settled = settle_forced(system, engine, begun, 0, period_number + 1, search)
+        if settled.status not in GOOD:
+            raise solve_error(settled.status)
+        guesses = forced_guesses(system, settled, period_number, max_period)
+    if not guesses:
+        unit = "rounds" if system.period() is None else "forcing periods"
+        raise SolveError(
+            f"no periodic motion was found: after {transient} {unit} no return up to the period number "
+            f"{period_number or max_period} came near its beginning (chaotic, quasi-periodic, a longer period). Give "
+            "another start, a longer transient or max_period, or period_number= for an unstable orbit within it",
+            status="not_periodic",
+        )
+    return guesses
+
+
+def _polished(system: System, guesses: list[Guess], given: bool, unstable: bool, search: Search) -> Orbit:
     """Newton from each guess; the first orbit that is admissible, near, and stable (or asked for)."""
     reasons: list[tuple[str, str]] = []
+    search.look()
     for guess in [one for first in guesses for one in (*touching(first, system), first)]:
         shooting = Shooting(system, guess.signature, guess.period_number)
         X = shooting.join(guess.times, guess.states, guess.period)
         size = np.concatenate([guess.size, np.ones(shooting.n - len(guess.size))])
         name = _name(guess.period_number)
+        search.doing = f"looking for a {name} orbit by Newton's method"
         anchor_at(shooting, shooting.values, X[: shooting.n], size)
         left = shooting.evaluate(X).residual[: shooting.n]  # what the guess lacks to close
-        solved = shooting.newton(X, _scale(shooting, size, guess.period))
+        solved = shooting.newton(X, _scale(shooting, size, guess.period), look=search.look)
         shorter = None if solved is None else primitive(shooting, solved, size)
         gap = guess.gap
         if shorter is not None and given:
@@ -129,13 +163,13 @@ def _polished(system: System, guesses: list[Guess], given: bool, unstable: bool)
             continue
         if shorter is not None:
             shooting, X = shorter
-            solved = shooting.newton(X, _scale(shooting, size, guess.period))
+            solved = shooting.newton(X, _scale(shooting, size, guess.period), look=search.look)
             name = _name(shooting.period_number)
             if shooting.forced:
                 gap = float(guess.gaps[shooting.period_number - 1])
                 left = np.full(shooting.n, np.nan)
         if solved is None:
-            reasons.append(("no_convergence", f"Newton's method did not converge to a {name} orbit"))
+            reasons.append(_why(shooting, name))
             continue
         walk = Walk(shooting)
         path = walk.along(solved, shooting.split(solved.X)[1])
@@ -151,16 +185,36 @@ def _polished(system: System, guesses: list[Guess], given: bool, unstable: bool)
         elif given or unstable or (orbit.stable and _is_near(orbit, guess, gap, left)):
             return orbit
         elif not orbit.stable:
-            reasons.append(("not_periodic", f"the {name} orbit near the motion is unstable"))
+            kind = stability(orbit.floquet_multipliers, shooting.forced)
+            told = "neutral (a multiplier has modulus 1, nothing is damped)" if kind == "neutral" else kind
+            reasons.append(("not_periodic", f"the {name} orbit near the motion is {told}"))
         else:
             reasons.append(("no_convergence", f"Newton's method left the motion for a {name} orbit far from it"))
     status = reasons[0][0] if guesses[0].gap <= CLOSED or given else "not_periodic"
+    remedy = "Give another start, a longer transient, or period_number= (then an unstable orbit is taken too)"
+    neutral = [one for one in reasons if one[0] == "neutral"]
+    if neutral:
+        status, remedy = "neutral", "Add damping or a restoring force, or give another start or a longer transient"
+        reasons = neutral[:1] + [one for one in reasons if one[0] not in ("neutral", "no_convergence")]
     said = "; ".join(dict.fromkeys(text for _, text in reasons))
     raise SolveError(
-        f"the motion settled on no periodic orbit that could be confirmed: {said}. Give another start, a longer "
-        "transient, or period_number= (then an unstable orbit is taken too)",
-        status=status,
+        f"the motion settled on no periodic orbit that could be confirmed: {said}. {remedy}", status=status
     )
+
+
+def _why(shooting: Shooting, name: str) -> tuple[str, str]:
+    """Status and sentence for a Newton iteration that did not converge: a multiplier is 1, or nothing is known."""
+    tried = shooting.tried
+    if tried is not None and np.isfinite(tried.monodromy).all():
+        nearest = nearest_to_one(multipliers_of(tried.monodromy), shooting.forced)
+        if abs(nearest - 1.0) <= NEUTRAL:
+            size = "1" if abs(nearest - 1.0) <= 1e-6 else f"{nearest.real:.6g}, nearly 1"
+            return "neutral", (
+                f"a multiplier is {size}, so that Newton's method has no single orbit to converge to: the motion "
+                "drifts, dies out or grows very slowly, or belongs to a family of orbits (an undamped system, a free "
+                "translation, a conserved energy)"
+            )
+    return "no_convergence", f"Newton's method did not converge to a {name} orbit"
 
 
 def _name(period_number: int) -> str:

@@ -9,11 +9,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["EDGE", "multipliers_of", "product_of_pairs", "stable_by", "without_own"]
+__all__ = [
+    "EDGE", "multipliers_of", "nearest_to_one", "product_of_pairs", "stability", "stable_by", "without_own",
+]  # fmt: skip
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 EDGE = 1e-9  # a modulus within this of 1 counts as neither
+NEUTRAL = 1e-6  # an unstable multiplier nearer to the unit circle than this is called neutral: no damping, a family
 
 
 def multipliers_of(M: FloatArray) -> ComplexArray:
@@ -42,6 +45,19 @@ def stable_by(mu: ComplexArray, forced: bool) -> bool:
     """Whether all multipliers (but the orbit's own 1) lie inside the unit circle."""
     others = without_own(mu, forced)
     return bool(not len(others) or np.abs(others).max() < 1.0 - EDGE)
+
+
+def stability(mu: ComplexArray, forced: bool) -> str:
+    """"stable", "unstable", or "neutral" where the largest multiplier (but the orbit's own 1) has modulus 1."""
+    if stable_by(mu, forced):
+        return "stable"
+    return "neutral" if np.abs(without_own(mu, forced)).max() <= 1.0 + NEUTRAL else "unstable"
+
+
+def nearest_to_one(mu: ComplexArray, forced: bool) -> complex:
+    """The multiplier (but the orbit's own 1) that lies nearest to 1; NaN where there is none."""
+    others = without_own(mu, forced)
+    return complex(others[np.abs(others - 1.0).argmin()]) if len(others) else complex(np.nan)
 
 
 def product_of_pairs(mu: ComplexArray) -> float:

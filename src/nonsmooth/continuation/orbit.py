@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.continuation.multipliers import multipliers_of, stable_by
+from nonsmooth.continuation.multipliers import multipliers_of, stability, stable_by
 from nonsmooth.continuation.signature import Signature
 
 if TYPE_CHECKING:
@@ -125,7 +125,7 @@ class Orbit:
 
     def __repr__(self) -> str:
         name = f"period-{self.period_number}" if self.period_number else "autonomous"
-        words = "stable" if self.stable else "unstable"
+        words = stability(self.floquet_multipliers, self.period_number > 0)
         if self.virtual:
             words = "virtual"
         numbers = ", ".join(f"{mu:.6g}" for mu in self.floquet_multipliers)

@@ -14,6 +14,7 @@ from nonsmooth.flow.variational import VariationalFlow
 from nonsmooth.kernels import codes
 
 if TYPE_CHECKING:
+    from nonsmooth.continuation.search import Search
     from nonsmooth.flow.engine import Engine
     from nonsmooth.system.system import System
 
@@ -55,12 +56,32 @@ class Settled:
     tables: Any
 
 
-def settle_forced(system: System, engine: Engine, state: State, transient: int, keep: int) -> Settled:
+def settle_forced(
+    system: System, engine: Engine, state: State, transient: int, keep: int, search: Search
+) -> Settled:
     """Run a forced system through a transient and keep the section points after it."""
     traced = system.traced
-    out = Chain.empty(1, keep, len(traced.u), len(traced.indicators), len(traced.outputs))
+    sizes = len(traced.u), len(traced.indicators), len(traced.outputs)
     tables = engine.prepare(system.parameter_vector()[None, :])
-    engine.chain(tables, 0, 1, state, None, SectionPlan(), transient, keep, out)
+    passed, left, begun = Chain.empty(1, 1, *sizes), transient, state.copy()
+
+    def march(piece: float) -> bool:
+        nonlocal left
+        some = min(max(1, round(piece)), left)
+        if some:
+            engine.chain(tables, 0, 1, state, None, SectionPlan(), some - 1, 1, passed)
+            left -= some
+        return int(passed.status[0]) in (codes.OK, codes.NOT_GUARANTEED)
+
+    search.in_pieces(float(transient), march)
+    if passed.status[0] == codes.BEYOND_STOP:  # an impact on the section: a motion that was cut there cannot begin
+        state, left, passed.status[0] = begun, transient, codes.OK
+    out = Chain.empty(1, keep, *sizes)
+    if passed.status[0] in (codes.OK, codes.NOT_GUARANTEED):
+        engine.chain(tables, 0, 1, state, None, SectionPlan(), left, keep, out)
+    else:
+        out.status[0] = passed.status[0]
+    search.look()
     size = np.maximum(0.5 * (out.maximum[0] - out.minimum[0]), 1e-3 * system.scale_vector())
     return Settled(np.nan_to_num(out.section[0]), out.section_mode[0], size, state, int(out.status[0]), engine, tables)
 

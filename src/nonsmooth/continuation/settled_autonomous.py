@@ -16,11 +16,13 @@ from nonsmooth.continuation.settled import NEAR, Guess, fired_row
 from nonsmooth.continuation.signature import Signature, Visit
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.engine import Log, State
+from nonsmooth.flow.equilibria import AT_REST, ROUNDING, equilibrium_at
 from nonsmooth.flow.failure import solve_error
 from nonsmooth.flow.variational import VariationalFlow
 from nonsmooth.kernels import codes
 
 if TYPE_CHECKING:
+    from nonsmooth.continuation.search import Search
     from nonsmooth.flow.engine import Engine
     from nonsmooth.system.system import System
 
@@ -31,10 +33,14 @@ SAMPLES = 4001
 FEW, MANY = 8, 200  # rounds in a stretch of motion that is long, and short, enough to look at
 LONGEST = 1e6
 REST = 1e-7  # of its scale: a motion smaller than this has come to rest
+AT_ONCE = 1e-12  # of a unit of time: what happens within it happens at the start
+ELSEWHERE = (
+    "Give start=, a state away from it, or follow the equilibrium with continue_equilibrium to where a cycle is born"
+)
 
 
 def autonomous_guesses(
-    system: System, engine: Engine, state: State, transient: int, most: int, given: int | None
+    system: System, engine: Engine, state: State, transient: int, most: int, given: int | None, search: Search
 ) -> list[Guess]:
     """Candidates for once round, the shortest first."""
     tables = engine.prepare(system.parameter_vector()[None, :])
@@ -42,33 +48,52 @@ def autonomous_guesses(
     def run(duration: float) -> tuple[Log, FloatArray]:
         begin = float(state.clock[0])
         instants = begin + np.linspace(0.0, duration, SAMPLES)
-        log = engine.record(tables, state, begin + duration, instants)
+        log = search.record(engine, tables, state, begin + duration, instants)
         if log.status not in (codes.OK, codes.NOT_GUARANTEED):
             raise solve_error(log.status)
         return log, instants
 
+    first = state.copy()  # in the mode to which transitions that already hold lead
+    engine.record(tables, first, float(first.clock[0]) + AT_ONCE, np.empty(0))
+    _refuse_equilibrium(system, first, "the start", ROUNDING)
     duration = 64.0
     while True:
         log, instants = run(duration)
         rounds = len(_passages(log, instants, system)[0])
+        if not rounds and _at_rest(log, system):
+            _refuse_equilibrium(system, state, "the motion comes to rest:", AT_REST, stable=True)
         if rounds < FEW and duration < LONGEST:
             duration *= 4.0
         elif rounds > MANY:
             duration *= FEW / rounds * 4.0
         else:
             break
-    one = duration / max(rounds, 1)
+    if rounds < 2:  # a motion that drifts passes once
+        _refuse_equilibrium(system, state, "the motion comes to rest:", AT_REST)
+        raise SolveError(
+            f"the motion does not come back: over {duration:.3g} units of time the state that moves most passed the "
+            "middle of its range at most once. There is no cycle here; give another start",
+            status="not_periodic",
+        )
+    one = duration / rounds
     if transient:
+        search.doing = f"letting {transient} rounds of some {one:.3g} units of time pass"
         run(transient * one)
     log, instants = run(max((2 * (given or min(most, 8)) + 3), FEW) * one)
     if _at_rest(log, system):
-        raise SolveError(
-            "the motion comes to rest at an equilibrium: there is no cycle here. Give another start, or follow the "
-            "equilibrium with continue_equilibrium to where a cycle is born",
-            status="equilibrium",
-        )
+        _refuse_equilibrium(system, state, "the motion comes to rest:", AT_REST)
+        raise SolveError(f"the motion comes to rest: there is no cycle here. {ELSEWHERE}", status="equilibrium")
     found = _by_transitions(system, log, most, given) if len(log.crossing_time) > 1 else []
     return found or _by_level(system, log, instants, most, given)
+
+
+def _refuse_equilibrium(system: System, state: State, what: str, near: float, stable: bool = False) -> None:
+    """SolveError where the state is an equilibrium (``stable``: a stable one), with its name."""
+    at = equilibrium_at(system, state.u, int(state.counters[0]), memory=state.memory, near=near)
+    if at is not None and (at.kind == "stable" or not stable):
+        raise SolveError(
+            f"{what} {at.words(list(system.states))}. No cycle passes there. {ELSEWHERE}", status="equilibrium"
+        )
 
 
 def _swing(log: Log, system: System) -> tuple[int, float, FloatArray]:

@@ -17,6 +17,7 @@ f_ref (z_0 - z_ref) = 0).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -104,6 +105,7 @@ class Shooting:
         self._one = np.eye(n)
         self._columns = self.z_at[:, None] + np.arange(n)
         self.reference: tuple[FloatArray, FloatArray] | None = None  # autonomous, no crossings: (z_ref, f_ref)
+        self.tried: Solved | None = None
         self.alone = [False] * m  # crossings whose other rows vanish together with the one that fires
         self.divided = [False] * m  # exits whose equation is divided by the length of the visit
 
@@ -244,13 +246,20 @@ class Shooting:
         F[last] = f_ref @ (z0 - z_ref)
         J[last, : self.n] = f_ref
 
-    def newton(self, X: FloatArray, scale: FloatArray, *, tolerance: float = 1e-12, most: int = 30) -> Solved | None:
-        """Solve at fixed parameters; None where it does not converge."""
+    def newton(
+        self, X: FloatArray, scale: FloatArray, *, tolerance: float = 1e-12, most: int = 30,
+        look: Callable[[], Any] | None = None,
+    ) -> Solved | None:  # fmt: skip
+        """Solve at fixed parameters; None where it does not converge. ``look`` is called before each iteration.
+
+        The last iterate stays in ``tried``: what it was that did not converge."""
         X = X.copy()
         size = self.size
         last = np.inf
         for i in range(most):
-            solved = self.evaluate(X)
+            if look is not None:
+                look()
+            solved = self.tried = self.evaluate(X)
             if not np.isfinite(solved.residual).all():
                 return None
             try:

@@ -9,7 +9,6 @@ import numpy as np
 
 from nonsmooth.errors import DataFileError
 from nonsmooth.experiment.limits import MAX_COLUMNS, MAX_DEPTH, inflation_limit
-from nonsmooth.experiment.needed import needed
 from nonsmooth.experiment.reading import Source
 from nonsmooth.experiment.remarks import Remarks
 
@@ -18,7 +17,8 @@ __all__ = ["load_v73"]
 
 def load_v73(data: bytes, source: Source, remarks: Remarks) -> dict[str, Any]:
     """The variables of a file, as dicts (structs), lists (cells, arrays of structs), text and arrays."""
-    h5py = needed("h5py", "h5py", source)
+    import h5py
+
     try:
         with h5py.File(io.BytesIO(data), "r") as opened:
             return _Reader(h5py, opened, source, remarks, inflation_limit(len(data))).group(opened, 0)

@@ -7,7 +7,7 @@ import os
 from typing import Any
 
 from nonsmooth.flow.engine import Engine, SectionPlan
-from nonsmooth.flow.planar import PlanarEngine
+from nonsmooth.flow.linear import LinearEngine, PlanarEngine
 from nonsmooth.flow.series import SeriesEngine
 
 __all__ = ["BATCH", "DEVICES", "batch_size", "check_device", "engine_on", "gpu_name", "on_gpu", "workers_of"]
@@ -74,9 +74,11 @@ def workers_of(device: str, threads: int | None, client: Any = None) -> int | No
 def engine_on(device: Any, engine: Engine, plan: SectionPlan | None) -> Engine:
     """The engine for a device.
 
-    The planar kernels of a GPU know stroboscopic sections only: with a Poincare section the same flow goes there by the
+    The planar kernels of a GPU know two states and stroboscopic sections only: else the same flow goes there by the
     series kernels."""
-    if device != "cuda" or not isinstance(engine, PlanarEngine) or plan is None or plan.indicator < 0:
+    if device != "cuda" or not isinstance(engine, LinearEngine):
+        return engine
+    if isinstance(engine, PlanarEngine) and (plan is None or plan.indicator < 0):
         return engine
     from nonsmooth.flow.methods import RTOL
 

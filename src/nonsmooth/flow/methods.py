@@ -91,10 +91,11 @@ def engine_for(
     # A smoothed system runs by its series, also where its bands happen to be linear: one method for all of them.
     # A step or an order asks for a method that has one.
     if form is not None and not system.is_smoothed and step is None and "order" not in expert:
-        from nonsmooth.flow.planar import PlanarEngine, is_planar
+        from nonsmooth.flow.linear import LinearEngine, PlanarEngine, is_linear
 
-        if is_planar(equations, form) and not expert:
-            return PlanarEngine(equations, form, system.scale_vector())
+        if is_linear(equations, form) and not expert:
+            kind = PlanarEngine if len(equations.u) == 2 else LinearEngine
+            return kind(equations, form, system.scale_vector())
         name = "exact"
     elif method == "exact":
         name = "exact"

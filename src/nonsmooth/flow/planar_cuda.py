@@ -9,12 +9,12 @@ import numpy as np
 
 from nonsmooth.flow.engine import FloatArray, IntArray
 from nonsmooth.flow.launches import launch
-from nonsmooth.flow.planar import DIVERGENCE, PlanarEngine
+from nonsmooth.flow.linear import DIVERGENCE, PlanarEngine
 from nonsmooth.kernels import codes
 
 __all__ = ["SLICE", "Buffers", "PlanarOnGpu", "States"]
 
-TABLES = 6  # of a thread's work arrays, the first ones: what ``build`` fills (see ``kernels.planar_layout``)
+TABLES = 6  # of a thread's work arrays, the first ones: what ``build`` fills (see ``kernels.linear_layout``)
 SLICE = 256  # section returns of one launch, at most: below a second also on a small GPU
 
 
@@ -62,13 +62,13 @@ class PlanarOnGpu:
     """
 
     def __init__(self, engine: PlanarEngine, points: FloatArray, phase: float) -> None:
-        from nonsmooth.kernels.cuda_module import cuda_planar_module
+        from nonsmooth.kernels.cuda_module import cuda_linear_module
         from nonsmooth.kernels.cuda_target import THREADS, cuda
 
         tables = engine.prepare(points)
         n_modes, n_indicators, n_outputs, n_rows = tables.sizes
         self.sizes = max(n_indicators, 1), max(n_outputs, 1)
-        self.module = cuda_planar_module(
+        self.module = cuda_linear_module(
             len(engine.form.multiples), n_modes, *self.sizes, max(len(engine.net[0]), 1), n_rows
         )
         self.cuda, self.threads, self.phase = cuda, THREADS, float(phase)

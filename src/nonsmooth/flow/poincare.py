@@ -9,6 +9,7 @@ import numpy as np
 
 from nonsmooth.flow.arguments import check_options, check_system, whole_number
 from nonsmooth.flow.engine import Chain, State
+from nonsmooth.flow.equilibria import refuse_resting
 from nonsmooth.flow.failure import solve_error
 from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
@@ -63,6 +64,8 @@ def poincare(
 
     Raises
     ------
+    ValueError
+        A start at an equilibrium, from which no section is met.
     SolveError
         A single run that could not be completed.
     """
@@ -73,6 +76,8 @@ def poincare(
     plan = replace(plan, extremes=False)
     engine = engine_for(system, method, rtol, atol, **expert)
     starts = start_states(system, start)
+    if plan.indicator >= 0:
+        refuse_resting(system, starts, system.parameter_vector()[None, :], "poincare")
     traced = system.traced
     out = Chain.empty(len(starts), n, len(traced.u), len(traced.indicators), len(traced.outputs))
     tables = engine.prepare(np.tile(system.parameter_vector(), (len(starts), 1)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from nonsmooth.flow.arguments import check_options, check_system, float_array, real_number, whole_number
 from nonsmooth.flow.engine import FloatArray, Log, State
+from nonsmooth.flow.equilibria import ROUNDING, equilibrium_at
 from nonsmooth.flow.failure import solve_error
 from nonsmooth.flow.methods import engine_for, warn_if_coarse
 from nonsmooth.flow.starts import first_state, is_one_start, plain_start
@@ -71,7 +73,8 @@ def simulate(
         ``u(time, state)``, ``mode``, ``segment`` (each crossing stands twice in ``time``: the limits before and
         after), ``crossing_time``, ``crossing_transition``, ``u_before``, ``u_after``, the touches (``touch_time``,
         ``touch_indicator``, ``touch_u``, ``touch_clearance``: maxima of an armed indicator that do not reach zero),
-        the outputs, and ``status``.
+        the outputs, and ``status``. A run that stays at an equilibrium from its start says so in the attribute
+        ``note``, and in a warning where the equilibrium is unstable.
 
     Raises
     ------
@@ -110,7 +113,29 @@ def simulate(
         "ramps": None if not ramps else {k: v if not callable(v) else str(v) for k, v in ramps.items()},
         "method": method, "rtol": rtol, "atol": atol, **expert,
     }  # fmt: skip
-    return _dataset(system, traced, engine.name, options, log, instants, period)
+    found = _dataset(system, traced, engine.name, options, log, instants, period)
+    note = "" if ramps else _resting(system, begun, log, state)
+    return found.assign_attrs(note=note) if note else found
+
+
+def _resting(system: System, begun: FloatArray, log: Log, state: State) -> str:
+    """The equilibrium at which a run begins and stays, in a sentence; a warning too where it is unstable."""
+    still = ROUNDING * (system.scale_vector() + begun)
+    few = log.sample_u[:: max(1, len(log.sample_u) // 64)]  # most runs are seen to move by these
+    for u in (begun * np.sign(state.u), few, log.sample_u, log.u_before, log.u_after):
+        if (np.abs(u - state.u) > still).any():
+            return ""
+    at = equilibrium_at(system, state.u, int(state.counters[0]), memory=state.memory)
+    if at is None:
+        return ""
+    text = f"{at.words(list(system.states))}: the run begins and stays there"
+    if at.kind == "unstable":
+        warnings.warn(
+            f"simulate of {system.name!r}: {text}, though any other motion nearby leaves it; give start=, a state "
+            "beside it",
+            stacklevel=3,
+        )
+    return text
 
 
 def run_length(

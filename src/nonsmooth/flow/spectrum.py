@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.flow.engine import Engine, FloatArray, Log, State
-from nonsmooth.flow.planar import DIVERGENCE, PlanarEngine
+from nonsmooth.flow.linear import DIVERGENCE, PlanarEngine
 from nonsmooth.flow.variational import VariationalFlow
 from nonsmooth.kernels import codes
 
@@ -66,7 +66,7 @@ class _PlanarFrame:
     """One kernel for the trajectory and its frame."""
 
     def __init__(self, engine: PlanarEngine, tables: Any, i: int, scale: FloatArray) -> None:
-        from nonsmooth.kernels.planar_module import spectrum_module
+        from nonsmooth.kernels.linear_module import spectrum_module
 
         self.engine, self.tables, self.i, self.scale = engine, tables, i, scale
         module = spectrum_module(len(engine.form.multiples))

@@ -229,7 +229,10 @@ class _Chain:
             if not idle or (procedure == "contact" and contacts is None):
                 continue
             sentence = f"{procedure}: {len(idle)} of {len(given)} runs were not used: {', '.join(idle)}"
-            (self.doubt if 2 * len(idle) > len(given) else self.say)(sentence)
+            if 2 * len(idle) > len(given):
+                self.doubt(sentence)
+            elif any(not any(procedure in note and repr(name) in note for note in self.notes) for name in idle):
+                self.say(sentence)
 
     def say(self, sentence: str) -> None:
         self.notes.append(sentence)

@@ -63,8 +63,8 @@ class ContactFit:
 
     @property
     def poor(self) -> bool:
-        """Whether the fit leaves more than it should: chi^2, or a fifth of its pieces as outliers."""
-        return _poor(self.fit)
+        """Whether the motion is another than the model's: chi^2, or half of its pieces as outliers."""
+        return bool(self.fit.reduced > _LARGE or np.mean(~self.fit.used) > 0.5)
 
     @property
     def n_contacts(self) -> int:

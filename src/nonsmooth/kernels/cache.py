@@ -34,14 +34,10 @@ from numba.core.caching import _Cache
 from numba.core.compiler import CompileResult
 from numba.core.compiler_lock import global_compiler_lock
 
+from nonsmooth.kernels import before_compiling
 from nonsmooth.kernels.folder import cache_folder, make_private, mark_used, prune, read_private, write_atomically
 
-__all__ = [
-    "before_compiling", "cache_statistics", "callback", "compiled", "device", "inline", "kernel", "load_module",
-]  # fmt: skip
-
-#: Called before a function is compiled because the cache has no entry for it, with the function's name.
-before_compiling: list[Callable[[str], None]] = []
+__all__ = ["cache_statistics", "callback", "compiled", "device", "inline", "kernel", "load_module"]
 
 # Kernels allocate nothing (scratch is an argument), so they need no reference counts: "_nrt" off saves a third.
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}, "_nrt": False}
@@ -143,7 +139,7 @@ class _ContentCache(_Cache):
         stored = read_private(path)
         digest, entry = stored[:_DIGEST], stored[_DIGEST:]
         if not entry or hashlib.sha256(entry).digest() != digest:  # none yet, or a damaged one: compiled anew
-            for call in before_compiling:
+            for call in tuple(before_compiling):
                 call(self._name)
             return None
         payload = pickle.loads(entry)

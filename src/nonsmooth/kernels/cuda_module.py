@@ -15,17 +15,17 @@ from types import ModuleType
 
 from nonsmooth.kernels.cache import load_module
 
-__all__ = ["cuda_planar_module", "joined", "stamp"]
+__all__ = ["cuda_linear_module", "joined", "stamp"]
 
 PARTS = (
-    "planar_tables", "planar_polynomial", "planar_search", "planar_march", "planar_extremes", "planar_layout",
-    "planar_chain", "planar_settle", "planar_spectrum", "cuda_planar", "cuda_tables", "cuda_advance", "cuda_judge",
+    "linear_tables", "linear_polynomial", "linear_search", "linear_march", "linear_extremes", "linear_layout",
+    "linear_chain", "planar_settle", "planar_spectrum", "cuda_planar", "cuda_tables", "cuda_advance", "cuda_judge",
     "cuda_growth",
 )  # fmt: skip
 
 
 @cache
-def cuda_planar_module(
+def cuda_linear_module(
     harmonics: int, modes: int, indicators: int, outputs: int, transitions: int, rows: int
 ) -> ModuleType:
     """The module with the entries of the ``cuda_*`` texts; ``rows`` counts those of the section too."""

@@ -8,8 +8,8 @@ local memory, which the GPU interleaves in the same way.
 from numba import float64, int64
 
 from .cuda_target import cuda, device, local
-from .planar_search import WIDTH
-from .planar_tables import HARMONICS, NODES, TERMS, M
+from .linear_search import WIDTH
+from .linear_tables import HARMONICS, NODES, TERMS, M
 
 # Set for each system; none is below 1, so that no array is empty.
 N_MODES = 2
@@ -96,14 +96,14 @@ def arrays_of_thread(packed, multiples, i):
     at = unpack3(rb, packed, i, at)
     at = unpack4(rc, packed, i, at)
     at = unpack4(rs, packed, i, at)
-    prop = cuda.local.array((N_MODES, N_NODES, 2, M), float64)
+    prop = cuda.local.array((N_MODES, N_NODES, M, 2), float64)
     rot = cuda.local.array((N_MODES, N_NODES, N_TURNS), float64)
     fun = cuda.local.array((N_MODES, N_FUNCTIONALS, N_SUMS), float64)
     tay = cuda.local.array((N_MODES, N_FUNCTIONALS, M, WIDTH), float64)
     field = cuda.local.array((N_MODES, 2, M), float64)
     info = cuda.local.array((N_MODES, 4), float64)
     row = cuda.local.array((N_TERMS, M), float64)
-    vectors = cuda.local.array((7, M), float64)
+    vectors = cuda.local.array((8, M), float64)
     scr = cuda.local.array((N_POLYNOMIALS, WIDTH), float64)
     points = cuda.local.array(4, float64)
     rates = cuda.local.array(N_HARMONICS, float64)

@@ -28,11 +28,11 @@ def ptx_of(entry: str, signature: str, shape: tuple[int, ...], capability: tuple
     signature : str
         Types of its arguments, as Numba writes them.
     shape : tuple of int
-        Arguments of :func:`nonsmooth.kernels.cuda_module.cuda_planar_module`.
+        Arguments of :func:`nonsmooth.kernels.cuda_module.cuda_linear_module`.
     """
-    from nonsmooth.kernels.cuda_module import cuda_planar_module
+    from nonsmooth.kernels.cuda_module import cuda_linear_module
 
-    return ptx_of_module(cuda_planar_module(*shape), entry, signature, capability)
+    return ptx_of_module(cuda_linear_module(*shape), entry, signature, capability)
 
 
 def ptx_of_module(

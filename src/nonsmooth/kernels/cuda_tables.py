@@ -7,7 +7,7 @@ numbers; where all have one point, as for basins, a read serves a whole warp.
 
 from .cuda_planar import N_MODES, arrays_of_thread
 from .cuda_target import cuda, device, entry, local
-from .planar_tables import HARMONICS, build
+from .linear_tables import HARMONICS, build
 
 
 @device

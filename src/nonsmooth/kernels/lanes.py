@@ -1,14 +1,14 @@
-"""Eight numbers at once: sums of Taylor rows in vector instructions.
+"""Many numbers at once: sums of table rows and columns in vector instructions.
 
-A row of eight doubles is one AVX-512 register or two of AVX. Numba does not find these sums by itself: it unrolls such
-short loops, and switches off the pass of LLVM that would join what comes out. Here the vector instructions are written
-down; LLVM splits them to what the processor has. ``plain`` holds the same sums as loops, for a GPU's threads and for
-runs without compilation.
+Numba does not find these sums by itself: it unrolls such short loops, and switches off the pass of LLVM that would join
+what comes out. Here the vector instructions are written down; LLVM splits them to what the processor has. ``plain``
+holds the same sums as loops, for a GPU's threads and for runs without compilation.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
@@ -17,31 +17,42 @@ from llvmlite import ir
 from numba.core import cgutils, types
 from numba.extending import intrinsic
 
-__all__ = ["LANES", "mix_rows", "plain", "sum_rows"]
+__all__ = ["LANES", "plain", "sum_columns", "sum_rows"]
 
 LANES = 8
-_VECTOR = ir.VectorType(ir.DoubleType(), LANES)
+WIDEST = 32  # lanes of one sum: what the vector registers hold
+LONGEST = 24  # sums of more terms are loops
+FEW = 2  # so many columns' entries go one by one: joining them costs more than it gains
 _CONTRACT = ("contract",)
 
 
-def _sum_rows(out: Any, row: Any, table: Any, mode: Any, f: Any, w: Any, m: Any) -> None:
+def _sum_rows(out: Any, row: Any, table: Any, mode: Any, f: Any, w: Any, one: Any, m: Any) -> None:
+    """out[row, :] = sum_j table[mode, f, j, :] w[j], with w[one] = 1; the first ``one`` terms come last."""
     for k in range(LANES):
-        total = table[mode, f, 2, k]
-        for j in range(3, m):
+        total = table[mode, f, one, k]
+        for j in range(one + 1, m):
             total += table[mode, f, j, k] * w[j]
-        out[row, k] = total + table[mode, f, 1, k] * w[1] + table[mode, f, 0, k] * w[0]
+        for j in range(one - 1, -1, -1):
+            total += table[mode, f, j, k] * w[j]
+        out[row, k] = total
 
 
-def _mix_rows(out: Any, row: Any, a: Any, b: Any) -> None:
-    for k in range(LANES):
-        out[row, k] = a * out[0, k] + b * out[1, k]
+def _sum_columns(out: Any, table: Any, mode: Any, node: Any, w: Any, n: Any, m: Any) -> None:
+    """out[:n] = sum_j table[mode, node, j, :] w[j], with w[n] = 1; the states, known last, come last."""
+    for r in range(n):
+        total = table[mode, node, n, r]
+        for j in range(n + 1, m):
+            total += table[mode, node, j, r] * w[j]
+        for j in range(n - 1, -1, -1):
+            total += table[mode, node, j, r] * w[j]
+        out[r] = total
 
 
-plain = SimpleNamespace(sum_rows=_sum_rows, mix_rows=_mix_rows)
+plain = SimpleNamespace(sum_rows=_sum_rows, sum_columns=_sum_columns)
 
 
-class _Rows:
-    """Vectors from and to the rows of an array, inside a function under construction."""
+class _Array:
+    """Numbers and vectors from and to an array, inside a function under construction."""
 
     def __init__(self, context: Any, builder: Any, kind: Any, value: Any) -> None:
         self.context, self.builder, self.kind = context, builder, kind
@@ -57,46 +68,101 @@ class _Rows:
     def number(self, *indices: Any) -> Any:
         return self.builder.load(self._at(*indices))
 
-    def load(self, *indices: Any) -> Any:
-        return self.builder.load(self.builder.bitcast(self._at(*indices, 0), _VECTOR.as_pointer()), align=8)
+    def put(self, number: Any, *indices: Any) -> None:
+        self.builder.store(number, self._at(*indices))
 
-    def store(self, vector: Any, *indices: Any) -> None:
-        self.builder.store(vector, self.builder.bitcast(self._at(*indices, 0), _VECTOR.as_pointer()), align=8)
+    def load(self, vector: Any, *indices: Any) -> Any:
+        return self.builder.load(self.builder.bitcast(self._at(*indices), vector.as_pointer()), align=8)
 
-    def scaled(self, vector: Any, number: Any) -> Any:
-        """A vector times a number."""
-        nothing, lane = ir.Constant(_VECTOR, ir.Undefined), ir.IntType(32)
-        one = self.builder.insert_element(nothing, number, ir.Constant(lane, 0))
-        zeros = ir.Constant(ir.VectorType(lane, LANES), [0] * LANES)
-        return self.builder.fmul(vector, self.builder.shuffle_vector(one, nothing, zeros), flags=_CONTRACT)
+    def store(self, value: Any, *indices: Any) -> None:
+        self.builder.store(value, self.builder.bitcast(self._at(*indices), value.type.as_pointer()), align=8)
+
+
+def _scaled(builder: Any, vector: Any, number: Any) -> Any:
+    """A vector times a number."""
+    nothing, lane = ir.Constant(vector.type, ir.Undefined), ir.IntType(32)
+    one = builder.insert_element(nothing, number, ir.Constant(lane, 0))
+    zeros = ir.Constant(ir.VectorType(lane, vector.type.count), [0] * vector.type.count)
+    return builder.fmul(vector, builder.shuffle_vector(one, nothing, zeros), flags=_CONTRACT)
+
+
+def _sum(builder: Any, first: Any, terms: Callable[[Any], Any], one: int, m: int) -> Any:
+    """``first`` and terms(j) for j behind ``one``, then before it; one by one, or in loops where there are many."""
+
+    def add(total: Any, j: Any) -> Any:
+        return builder.fadd(total, terms(j), flags=_CONTRACT)
+
+    if m <= LONGEST:
+        total = first
+        for j in (*range(one + 1, m), *range(one - 1, -1, -1)):
+            total = add(total, j)
+        return total
+    place = cgutils.alloca_once_value(builder, first)
+    for begin, end in ((one + 1, m), (0, one)):
+        if end > begin:
+            whole = ir.IntType(64)
+            with cgutils.for_range_slice(
+                builder, ir.Constant(whole, begin), ir.Constant(whole, end), ir.Constant(whole, 1), intp=whole
+            ) as (j, _):
+                builder.store(add(builder.load(place), j), place)
+    return builder.load(place)
 
 
 @intrinsic(prefer_literal=True)
-def _sum_rows_in_lanes(typing: Any, out: Any, row: Any, table: Any, mode: Any, f: Any, w: Any, m: Any) -> Any:
+def _sum_rows_in_lanes(
+    typing: Any, out: Any, row: Any, table: Any, mode: Any, f: Any, w: Any, one: Any, m: Any
+) -> Any:  # fmt: skip
     whole = types.int64
-    signature = types.void(out, whole, table, whole, whole, w, m)
+    signature = types.void(out, whole, table, whole, whole, w, one, m)
+    vector = ir.VectorType(ir.DoubleType(), LANES)
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        out_, row_, table_, mode_, f_, w_, _ = arguments
-        source, weights = _Rows(context, builder, table, table_), _Rows(context, builder, w, w_)
-        total = source.load(mode_, f_, 2)
-        for j in (*range(3, m.literal_value), 1, 0):
-            total = builder.fadd(total, source.scaled(source.load(mode_, f_, j), weights.number(j)), flags=_CONTRACT)
-        _Rows(context, builder, out, out_).store(total, row_)
+        out_, row_, table_, mode_, f_, w_ = arguments[:6]
+        source, weights = _Array(context, builder, table, table_), _Array(context, builder, w, w_)
+        total = _sum(
+            builder, source.load(vector, mode_, f_, one.literal_value, 0),
+            lambda j: _scaled(builder, source.load(vector, mode_, f_, j, 0), weights.number(j)),
+            one.literal_value, m.literal_value,
+        )  # fmt: skip
+        _Array(context, builder, out, out_).store(total, row_, 0)
         return context.get_dummy_value()
 
     return signature, generate
 
 
-@intrinsic
-def _mix_rows_in_lanes(typing: Any, out: Any, row: Any, a: Any, b: Any) -> Any:
-    signature = types.void(out, types.int64, types.float64, types.float64)
+@intrinsic(prefer_literal=True)
+def _sum_columns_in_lanes(typing: Any, out: Any, table: Any, mode: Any, node: Any, w: Any, n: Any, m: Any) -> Any:
+    whole = types.int64
+    signature = types.void(out, table, whole, whole, w, n, m)
+    states = n.literal_value
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        out_, row_, a_, b_ = arguments
-        rows = _Rows(context, builder, out, out_)
-        total = builder.fadd(rows.scaled(rows.load(0), a_), rows.scaled(rows.load(1), b_), flags=_CONTRACT)
-        rows.store(total, row_)
+        out_, table_, mode_, node_, w_ = arguments[:5]
+        source, weights = _Array(context, builder, table, table_), _Array(context, builder, w, w_)
+        target = _Array(context, builder, out, out_)
+        if states <= FEW:
+
+            def product(r: int, j: Any) -> Any:
+                return builder.fmul(source.number(mode_, node_, j, r), weights.number(j), flags=_CONTRACT)
+
+            totals = [
+                _sum(builder, source.number(mode_, node_, states, r), partial(product, r), states, m.literal_value)
+                for r in range(states)
+            ]
+            for r, total in enumerate(totals):
+                target.put(total, r)
+            return context.get_dummy_value()
+
+        def column(vector: Any, begin: int, j: Any) -> Any:
+            return _scaled(builder, source.load(vector, mode_, node_, j, begin), weights.number(j))
+
+        parts = []
+        for begin in range(0, states, WIDEST):
+            vector = ir.VectorType(ir.DoubleType(), min(WIDEST, states - begin))
+            first = source.load(vector, mode_, node_, states, begin)
+            parts.append((begin, _sum(builder, first, partial(column, vector, begin), states, m.literal_value)))
+        for begin, total in parts:
+            target.store(total, begin)
         return context.get_dummy_value()
 
     return signature, generate
@@ -107,4 +173,4 @@ def _choose(compiled: Any, loops: Callable[..., None]) -> Any:
 
 
 sum_rows = _choose(_sum_rows_in_lanes, _sum_rows)
-mix_rows = _choose(_mix_rows_in_lanes, _mix_rows)
+sum_columns = _choose(_sum_columns_in_lanes, _sum_columns)

@@ -16,7 +16,7 @@ from numba import types
 
 from .cache import device, inline, kernel
 from .codes import BEYOND_STOP, NOT_PERIODIC, OK, SLOW
-from .planar_chain import chain
+from .linear_chain import chain
 
 _i, _f = types.int64, types.float64
 _f1, _f2, _f3, _f4, _i1, _i2 = _f[::1], _f[:, ::1], _f[:, :, ::1], _f[:, :, :, ::1], _i[::1], _i[:, ::1]

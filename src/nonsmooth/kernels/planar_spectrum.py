@@ -9,10 +9,10 @@ from math import fabs, isfinite, log, sqrt
 
 from .cache import device, inline, kernel
 from .codes import CHATTER, DIVERGED, OK, TOO_MANY_CROSSINGS
-from .planar_layout import _INTEGERS, _LINEAR, _MATRIX, _NET, _SCRATCH, _VECTOR, BURST, MOST_CROSSINGS, SHORT
-from .planar_march import bounded, jump, leg, mark_zeros, next_holding, set_phase, settle, trigger, wrap_phase
-from .planar_search import slope_of
-from .planar_tables import HARMONICS, NODES, M, build
+from .linear_layout import _INTEGERS, _LINEAR, _MATRIX, _NET, _SCRATCH, _VECTOR, BURST, MOST_CROSSINGS, SHORT
+from .linear_march import bounded, jump, leg, mark_zeros, next_holding, set_phase, settle, trigger, wrap_phase
+from .linear_search import slope_of
+from .linear_tables import HARMONICS, NODES, M, build
 
 LOST = 1e-13  # a determinant below this part of the product of the rows' sizes is that of a singular matrix
 
@@ -30,7 +30,7 @@ def exponential(tau, prop, tay, info, mode, n_i, X):
             a = a * local + tay[mode, n_i + r, 0, k]
             b = b * local + tay[mode, n_i + r, 1, k]
         for c in range(2):
-            X[r, c] = a * prop[mode, node, 0, c] + b * prop[mode, node, 1, c]
+            X[r, c] = a * prop[mode, node, c, 0] + b * prop[mode, node, c, 1]
 
 
 @inline
@@ -157,8 +157,8 @@ def spectrum(
             found[0] = -1
         if full:
             for r in range(2):
-                X[r, 0] = prop[mode, NODES, r, 0]
-                X[r, 1] = prop[mode, NODES, r, 1]
+                X[r, 0] = prop[mode, NODES, 0, r]
+                X[r, 1] = prop[mode, NODES, 1, r]
         else:
             exponential(step, prop, tay, info, mode, n_i, X)
         apply(X, Q)

@@ -1,37 +1,98 @@
-"""Progress of long work: a bar on a terminal, nothing anywhere else."""
+"""Progress of long work, for a person who watches: on a terminal and in a notebook, and nothing anywhere else."""
 
 from __future__ import annotations
 
 import sys
+import threading
+import time
+import warnings
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from shutil import get_terminal_size
+from typing import Any
 
-__all__ = ["progress"]
+from nonsmooth.kernels import before_compiling
+
+__all__ = ["is_watched", "progress", "say"]
+
+AGAIN = 10.0  # seconds until compiling is mentioned again
+_mentioned = -AGAIN
 
 
 @contextmanager
 def progress(total: int, label: str, enabled: bool = True, done: int = 0) -> Iterator[Callable[..., None]]:
-    """A bar of ``total`` steps on stderr; yields ``advance(n=1)``, which any thread may call.
+    """A bar of ``total`` steps; yields ``advance(n=1)``, which any thread may call.
 
     ``done`` steps were made before: they fill the bar, and do not count in the estimate of what remains. No bar is
-    drawn, and nothing is imported, when ``enabled`` is False, when there is nothing to do or when stderr is not a
-    terminal. The bar is wiped when the block ends, by an exception too.
+    drawn, and nothing is imported, when ``enabled`` is False, when there is nothing to do or when nobody watches
+    (:func:`is_watched`). The bar is wiped when the block ends, by an exception too.
     """
-    if not enabled or total <= 0 or not sys.stderr.isatty():
+    if not enabled or total <= 0 or not is_watched():
         yield _count_nothing
         return
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(label, total=total, completed=done)
+    lock = threading.Lock()
+    # A bar that is redrawn by its own steps needs no thread that looks after it.
+    kind = type("Bar", (_tqdm(),), {"monitor_interval": 0})
+    with kind(
+        total=total, desc=label, initial=done, leave=False, miniters=1, file=sys.stderr,
+        # a terminal may say that it has no columns and no rows
+        ncols=None if _in_notebook() else get_terminal_size().columns, nrows=20,
+        bar_format="{desc}: {percentage:3.0f}%|{bar}| {n_fmt}/{total_fmt} [{elapsed}<{remaining}]",
+    ) as bar:  # fmt: skip
 
         def advance(n: int = 1) -> None:
-            bar.advance(task, n)
+            with lock:
+                bar.update(n)
 
         yield advance
 
 
+def say(text: str, enabled: bool = True) -> None:
+    """A line on stderr, above the bars, where somebody watches; an unwritable stderr is passed over."""
+    if enabled and is_watched():
+        with suppress(OSError, ValueError):
+            _tqdm().write(text, file=sys.stderr)
+            sys.stderr.flush()
+
+
+def is_watched() -> bool:
+    """Whether stderr is a terminal, or this process a notebook's."""
+    try:
+        return _in_notebook() or bool(sys.stderr.isatty())
+    except (AttributeError, ValueError):  # no stderr (pythonw), or a closed one
+        return False
+
+
+def _in_notebook() -> bool:
+    shell = getattr(sys.modules.get("IPython"), "get_ipython", _nothing)()
+    return "IPKernelApp" in getattr(shell, "config", ())
+
+
+def _tqdm() -> Any:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # a notebook without ipywidgets has bars of text
+        from tqdm.auto import tqdm
+    return tqdm
+
+
+def _say_compiling(name: str) -> None:
+    """Kernels come one after the other: one line for those of some seconds."""
+    global _mentioned
+    now = time.monotonic()
+    if now - _mentioned < AGAIN or not is_watched():
+        return
+    _mentioned = now
+    from nonsmooth.kernels.folder import cache_folder
+
+    say(f"nonsmooth: compiling (once; kept in {cache_folder()}) ...")
+
+
 def _count_nothing(n: int = 1) -> None:
     pass
+
+
+def _nothing() -> None:
+    pass
+
+
+before_compiling.append(_say_compiling)

@@ -67,13 +67,18 @@ def provenance(
 
 
 def read_provenance(result: xr.Dataset) -> dict[str, Any]:
-    """The record written by :func:`provenance`; ValueError if the Dataset carries none."""
+    """The record written by :func:`provenance`; ValueError if the Dataset carries none, or one that cannot be read."""
     text = result.attrs.get(ATTRIBUTE)
     if not isinstance(text, str):
         raise ValueError(
             f"this Dataset has no attribute {ATTRIBUTE!r}: it was not made by nonsmooth, or lost it on the way"
         )
-    record: dict[str, Any] = json.loads(text)
+    try:
+        record = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise ValueError(f"the attribute {ATTRIBUTE!r} of this Dataset is not JSON ({error})") from None
+    if not isinstance(record, dict):
+        raise ValueError(f"the attribute {ATTRIBUTE!r} of this Dataset is a {type(record).__name__}, not a JSON object")
     return record
 
 

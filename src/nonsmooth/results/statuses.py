@@ -10,7 +10,7 @@ import numpy as np
 
 from nonsmooth.kernels import codes
 
-__all__ = ["STATUSES", "Status", "by_code", "by_name", "flag_attributes", "status_attributes"]
+__all__ = ["EQUILIBRIA", "STATUSES", "Status", "by_code", "by_name", "flag_attributes", "status_attributes"]
 
 
 @dataclass(frozen=True)
@@ -73,6 +73,9 @@ STATUSES: tuple[Status, ...] = (
         "Run it again; finished points are whole.",
     ),
 )  # fmt: skip
+
+#: What a run can rest at; "undecided": an equilibrium whose eigenvalues do not say whether it is stable.
+EQUILIBRIA = ("none", "stable", "unstable", "undecided")
 
 _BY_CODE = {status.code: status for status in STATUSES}
 _BY_NAME = {status.name: status for status in STATUSES}

@@ -1,15 +1,18 @@
-"""Results on disk: NetCDF (``.nc``) and Zarr (``.zarr``), both ways, with nothing lost.
+"""Results on disk: NetCDF (``.nc``) and Zarr (``.zarr``), both ways, with nothing lost and nothing altered.
 
 What the file formats cannot hold is converted on the way out and back on the way in: complex variables get
 a last dim ``part`` = re, im; strings keep NumPy's fixed-width type; integer flags keep their type.
-Files are written beside their place and moved there when whole, so an interrupted save leaves the old file.
+Files are written beside their place and moved there when whole, so an interrupted save leaves the old file. Each
+carries the hash of its content, which ``save`` compares with what it wrote and ``load`` with what it read.
 """
 
 from __future__ import annotations
 
+import json
 import os
-import tempfile
-from collections.abc import Hashable
+import warnings
+from collections.abc import Hashable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +20,23 @@ import numpy as np
 import xarray as xr
 
 from nonsmooth.errors import DataFileError
+from nonsmooth.results import claims
+from nonsmooth.results.content import bytes_as_written, content, digest, stamp, trailer, unstamp
+from nonsmooth.results.memory import room_for
 from nonsmooth.results.provenance import ATTRIBUTE
+from nonsmooth.results.whole import beside, replace, told
 
-__all__ = ["load", "save"]
+__all__ = ["check_place", "load", "save"]
 
 _EXPECTED = "expected a result written by nonsmooth.save (.nc or .zarr)"
+_ALTERED = (
+    "its content is not what was written there: bytes were altered, by a fault or by another program; take a copy that "
+    "is whole, or compute the result again"
+)
+_KEPT = (
+    "make room or give another place; the result is not lost: it is the attribute `result` of this error, "
+    "nonsmooth.save(error.result, PATH)"
+)
 _COMPRESS_FROM = 4096  # elements; smaller arrays do not gain
 
 
@@ -33,64 +48,108 @@ def save(result: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     Raises
     ------
     TypeError
-        If ``result`` is not a Dataset.
+        If ``result`` is not a Dataset, or holds something that files do not give back as it is.
     ValueError
-        If the path ends in neither ``.nc`` nor ``.zarr``.
+        If the path ends in neither ``.nc`` nor ``.zarr``, or ``result`` is not a result of this package.
     DataFileError
-        If the folder does not exist, or something other than a saved result stands at a ``.zarr`` path.
+        If the folder does not exist, something other than a saved result stands at the path, or the disk is full or
+        read-only. The result is the attribute ``result`` of the error.
     """
     if not isinstance(result, xr.Dataset):
         raise TypeError(f"save takes an xarray.Dataset, got {type(result).__name__}")
     target = Path(path)
-    suffix = _suffix(target)
-    if not target.parent.is_dir():
-        raise DataFileError(f"{target}: the folder {target.parent} does not exist; create it first")
-    encoded = _encode(result)
-    with tempfile.TemporaryDirectory(prefix=f".{target.name}-", dir=target.parent) as folder:
-        fresh = Path(folder) / f"new{suffix}"
-        if suffix == ".nc":
-            encoded.to_netcdf(fresh, engine="netcdf4", format="NETCDF4", encoding=_netcdf_encoding(encoded))
-            os.replace(fresh, target)
-        else:
-            # Every chunk is written, empty or not, so that `load` can tell a missing one from zeros.
-            encoded.to_zarr(fresh, zarr_format=2, consolidated=True, write_empty_chunks=True)
-            if target.exists():
-                if not _is_result(target):
-                    raise DataFileError(
-                        f"{target}: what stands there is no saved result of this package (a store of chunks, another "
-                        "Zarr store, a file); it was left alone: give another name"
-                    )
-                os.replace(target, Path(folder) / "old.zarr")
-            os.replace(fresh, target)
+    try:
+        check_place(target)
+        record = result.attrs.get(ATTRIBUTE)
+        if not isinstance(record, str):
+            raise ValueError(
+                f"{target}: this Dataset has no attribute {ATTRIBUTE!r}, so load would refuse it; where a calculation "
+                f"lost it, copy it from the result: new.attrs[{ATTRIBUTE!r}] = result.attrs[{ATTRIBUTE!r}]"
+            )
+        held = content(result.attrs, _variables(result))
+        encoded = _encode(result).assign_attrs({ATTRIBUTE: stamp(record, digest(held))})
+        with told(target, _KEPT), beside(target) as folder:
+            fresh = folder / f"new{target.suffix}"
+            if target.suffix == ".nc":
+                # Made in memory: the HDF5 library does not survive a disk that is full.
+                written = encoded.to_netcdf(
+                    None, engine="h5netcdf", format="NETCDF4", encoding=_netcdf_encoding(encoded)
+                )
+                with open(fresh, "wb") as file:
+                    file.write(written)
+                    file.write(trailer(written))
+            else:
+                # Every chunk is written, empty or not, so that `load` can tell a missing one from zeros.
+                encoded.to_zarr(fresh, zarr_format=2, consolidated=True, write_empty_chunks=True)
+            _compare(target, fresh, held)
+            replace(target, fresh)
+    except DataFileError as error:
+        error.result = result
+        raise
     return target
 
 
 def load(path: str | os.PathLike[str]) -> xr.Dataset:
     """Read a result written by :func:`save`, whole, into memory.
 
+    A file from before hashes of the content were written is loaded with a warning.
+
     Raises
     ------
     ValueError
         If the path ends in neither ``.nc`` nor ``.zarr``.
     DataFileError
-        If the file is missing, truncated, unreadable, or not a result of this package.
+        If the file is missing, truncated, unreadable, altered, or not a result of this package.
+    MemoryError
+        If it takes more memory than there is.
     """
     source = Path(path)
-    suffix = _suffix(source)
+    _suffix(source)
     if not source.exists():
         raise DataFileError(f"{source}: no such file; {_EXPECTED}")
-    try:
-        raw = _read_netcdf(source) if suffix == ".nc" else _read_zarr(source)
-    except DataFileError:
-        raise
-    # Damaged files surface as almost any exception of the libraries below, HDF5's own among them.
-    except Exception as error:
-        raise DataFileError(f"{source}: cannot be read, it is damaged or cut short ({error}); {_EXPECTED}") from error
-    if ATTRIBUTE not in raw.attrs:
-        raise DataFileError(
-            f"{source}: has no attribute {ATTRIBUTE!r}, so it is not a result of this package; {_EXPECTED}"
+    with _readable(source):
+        n_bytes = _claimed(source)
+    room_for(n_bytes, f"the content of {source}", "load it where there is more memory")
+    with _readable(source), _opened(source) as raw:
+        if ATTRIBUTE not in raw.attrs:
+            raise DataFileError(
+                f"{source}: has no attribute {ATTRIBUTE!r}, so it is not a result of this package; {_EXPECTED}"
+            )
+        expected, record = unstamp(str(raw.attrs[ATTRIBUTE]))
+        attributes = {**raw.attrs, ATTRIBUTE: record}
+        variables = list(_decoded(raw))
+        if expected is not None and digest(content(attributes, variables)) != expected:
+            raise DataFileError(f"{source}: {_ALTERED}")
+        coords = {name: variable for name, coordinate, variable in variables if coordinate}
+        data = {name: variable for name, coordinate, variable in variables if not coordinate}
+        result = xr.Dataset(data, coords, attributes)
+    if expected is None:
+        warnings.warn(
+            f"{source}: was written without a hash of its content, so altered bytes would not be noticed; save it "
+            "again to add one",
+            stacklevel=2,
         )
-    return _decode(raw)
+    return result
+
+
+def check_place(target: Path) -> None:
+    """Refuse a path that :func:`save` cannot write to.
+
+    Raises
+    ------
+    ValueError
+        If the path ends in neither ``.nc`` nor ``.zarr``.
+    DataFileError
+        If its folder does not exist, or something other than a saved result stands there.
+    """
+    suffix = _suffix(target)
+    if not target.parent.is_dir():
+        raise DataFileError(f"{target}: the folder {target.parent} does not exist; create it first")
+    if target.exists() and not (_is_result(target) if suffix == ".zarr" else target.is_file()):
+        raise DataFileError(
+            f"{target}: what stands there is no saved result of this package (a store of chunks, another "
+            "Zarr store, a file, a folder); it was left alone: give another name"
+        )
 
 
 def _suffix(path: Path) -> str:
@@ -106,8 +165,6 @@ def _is_zarr(path: Path) -> bool:
 
 def _is_result(path: Path) -> bool:
     """Whether a Zarr store holds a result that :func:`save` has written."""
-    import json
-
     for name in (".zattrs", "zarr.json"):
         try:
             attributes = json.loads((path / name).read_text(encoding="utf-8"))
@@ -118,23 +175,57 @@ def _is_result(path: Path) -> bool:
     return False
 
 
-def _read_netcdf(source: Path) -> xr.Dataset:
-    with xr.open_dataset(source, engine="netcdf4", decode_times=False, decode_timedelta=False) as opened:
-        return opened.load()
+@contextmanager
+def _readable(source: Path) -> Iterator[None]:
+    """One sentence for what a damaged file causes: almost any exception of the libraries below, HDF5's among them."""
+    try:
+        yield
+    except DataFileError:
+        raise
+    except Exception as error:
+        raise DataFileError(f"{source}: cannot be read, it is damaged or cut short ({error}); {_EXPECTED}") from error
 
 
-def _read_zarr(source: Path) -> xr.Dataset:
-    import zarr
-
+def _claimed(source: Path) -> int:
+    if source.suffix == ".nc":
+        if not source.is_file():
+            raise DataFileError(f"{source}: is not a file; {_EXPECTED}")
+        if not bytes_as_written(source):
+            raise DataFileError(f"{source}: {_ALTERED}")
+        return claims.of_netcdf(source)
     if not _is_zarr(source):
         raise DataFileError(f"{source}: is not a Zarr store; {_EXPECTED}")
-    group = zarr.open_group(source, mode="r")
-    for name, array in group.arrays():
-        if array.nchunks_initialized < array.nchunks:
-            missing = array.nchunks - array.nchunks_initialized
-            raise DataFileError(f"{source}: {missing} of {array.nchunks} chunks of {name!r} are missing; {_EXPECTED}")
-    with xr.open_zarr(source, decode_times=False, decode_timedelta=False) as opened:
-        return opened.load()
+    return claims.of_zarr(source)
+
+
+@contextmanager
+def _opened(source: Path) -> Iterator[xr.Dataset]:
+    """The Dataset of a file as it is encoded there, its variables not read yet."""
+    as_it_is: dict[str, Any] = {"decode_times": False, "decode_timedelta": False}
+    if source.suffix == ".nc":
+        with xr.open_dataset(source, engine="h5netcdf", **as_it_is) as raw:
+            yield raw
+    else:
+        with xr.open_zarr(source, chunks=None, **as_it_is) as raw:
+            yield raw
+
+
+def _compare(target: Path, fresh: Path, held: Mapping[str, Any]) -> None:
+    """Read what was written, one variable after the other: a file that would come back as something else is no file."""
+    with _opened(fresh) as raw:
+        found = content({**raw.attrs, ATTRIBUTE: unstamp(raw.attrs[ATTRIBUTE])[1]}, _decoded(raw))
+    if found != held:
+        names = sorted(name for name in {**held, **found} if held.get(name) != found.get(name))
+        raise TypeError(
+            f"{target}: was not written, because this format would not give back as it is: {', '.join(names)}; "
+            "use names without spaces, numbers and text"
+        )
+
+
+def _variables(result: xr.Dataset) -> Iterator[tuple[str, bool, xr.Variable]]:
+    """Name, coordinate or not, and variable."""
+    for name, variable in result.variables.items():
+        yield name, name in result.coords, variable  # type: ignore[misc]
 
 
 def _encode(result: xr.Dataset) -> xr.Dataset:
@@ -143,26 +234,12 @@ def _encode(result: xr.Dataset) -> xr.Dataset:
     for name, variable in list(encoded.variables.items()):
         if variable.dtype.kind == "c":
             encoded[name] = _split(encoded[name])
-    _refuse_bad_attributes(encoded)
     return encoded
 
 
 def _split(array: xr.DataArray) -> xr.DataArray:
     parts = xr.concat([array.real, array.imag], dim="part").transpose(..., "part")
     return parts.assign_coords(part=["re", "im"]).assign_attrs(array.attrs)
-
-
-def _refuse_bad_attributes(result: xr.Dataset) -> None:
-    """NetCDF has no bool, None or mapping attributes; say so here rather than deep below."""
-    owners: list[tuple[Hashable, dict[Any, Any]]] = [("the Dataset", result.attrs)]
-    owners += [(name, variable.attrs) for name, variable in result.variables.items()]
-    for owner, attrs in owners:
-        for key, value in attrs.items():
-            if value is None or isinstance(value, bool | np.bool_ | dict):
-                raise TypeError(
-                    f"attribute {key!r} of {owner!r} is a {type(value).__name__}, which files cannot hold; "
-                    "use a number, a string or an array of numbers"
-                )
 
 
 def _netcdf_encoding(result: xr.Dataset) -> dict[Hashable, dict[str, Any]]:
@@ -174,24 +251,25 @@ def _netcdf_encoding(result: xr.Dataset) -> dict[Hashable, dict[str, Any]]:
     return encoding
 
 
-def _decode(raw: xr.Dataset) -> xr.Dataset:
-    result = raw.drop_encoding()
-    for name in list(result.variables):
-        array = result[name]
-        if array.dtype.kind in ("O", "T"):
-            result[name] = (array.dims, np.array(array.values.tolist(), dtype=str).reshape(array.shape), array.attrs)
-        elif "part" in array.dims and name != "part":
-            result[name] = _join(array)
-    if "part" in result.coords:
-        result = result.drop_vars("part")
-    for variable in result.variables.values():
+def _decoded(raw: xr.Dataset) -> Iterator[tuple[str, bool, xr.Variable]]:
+    """Name, coordinate or not, and variable as it was before it was encoded, read one after the other."""
+    for name, lazy in raw.variables.items():
+        if name == "part":
+            continue
+        variable = lazy.to_base_variable().load()
+        variable.encoding = {}
+        if variable.dtype.kind in ("O", "T"):
+            words = np.array(variable.values.tolist(), dtype=str).reshape(variable.shape)
+            variable = xr.Variable(variable.dims, words, variable.attrs)
+        elif variable.dims[-1:] == ("part",):
+            variable = _join(variable)
         if "flag_values" in variable.attrs:
             variable.attrs["flag_values"] = np.atleast_1d(np.asarray(variable.attrs["flag_values"], variable.dtype))
-    return result
+        yield str(name), name in raw.coords, variable
 
 
-def _join(array: xr.DataArray) -> xr.DataArray:
-    values = np.empty(array.shape[:-1], dtype=np.complex128)
-    values.real, values.imag = array.isel(part=0).values, array.isel(part=1).values
-    kept = {name: coord for name, coord in array.coords.items() if "part" not in coord.dims}
-    return xr.DataArray(values, kept, array.dims[:-1], attrs=array.attrs)
+def _join(variable: xr.Variable) -> xr.Variable:
+    parts = variable.values
+    values = np.empty(parts.shape[:-1], np.result_type(parts.dtype, np.complex64))
+    values.real, values.imag = parts[..., 0], parts[..., 1]
+    return xr.Variable(variable.dims[:-1], values, variable.attrs)

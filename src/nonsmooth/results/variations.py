@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from nonsmooth.results.labels import Labels
 from nonsmooth.results.schema import floats, parameter_coords, varied
-from nonsmooth.results.statuses import flag_attributes, status_attributes
+from nonsmooth.results.statuses import EQUILIBRIA, flag_attributes, status_attributes
 
 __all__ = ["derivatives_of_run", "spectrum"]
 
@@ -56,7 +56,7 @@ def derivatives_of_run(
 def spectrum(
     labels: Labels, attrs: Mapping[str, str], parameter: str | None, values: ArrayLike | None, *,
     exponents: ArrayLike, standard_error: ArrayLike, running: ArrayLike, trace_defect: ArrayLike,
-    kaplan_yorke: ArrayLike, nearest_graze: ArrayLike, elapsed: ArrayLike, status: ArrayLike,
+    kaplan_yorke: ArrayLike, nearest_graze: ArrayLike, elapsed: ArrayLike, equilibrium: ArrayLike, status: ArrayLike,
 ) -> xr.Dataset:  # fmt: skip
     """The result of ``lyapunov``. All arrays have the points as leading dim, also where there is one."""
     d = labels
@@ -72,8 +72,12 @@ def spectrum(
         "kaplan_yorke": (point, floats(kaplan_yorke), {"long_name": "Kaplan-Yorke dimension"}),
         "nearest_graze": (point, floats(nearest_graze), {"long_name": graze}),
         "elapsed": (point, floats(elapsed), {"long_name": "length of the run", "units": d.time_unit}),
+        "equilibrium": (
+            point, np.asarray(equilibrium, np.int8),
+            {"long_name": "equilibrium at which the run stayed", **flag_attributes(EQUILIBRIA)},
+        ),
         "status": (point, np.asarray(status, np.int8), status_attributes()),
-    }
+    }  # fmt: skip
     coords: dict[str, Any] = {
         "exponent": ("exponent", np.arange(1, table.shape[-1] + 1), {"long_name": "number of the exponent"}),
         **parameter_coords(d, without=parameter or ""),

@@ -54,7 +54,7 @@ def impulse_response(finding: Any, ax: Axes | None = None) -> Axes:
         if np.isfinite(step):
             drawn.axvspan(
                 frequency[top] - step / 2, frequency[top] + step / 2, color=style.COLORS["zone"], alpha=0.25,
-                linewidth=0, zorder=0, label=f"largest line {frequency[top]:.4f} Hz ± half a step",
+                linewidth=0, zorder=0, label=f"largest line {frequency[top]:.4f} Hz, half a step to each side",
             )  # fmt: skip
         places = (
             ("peak_frequency", "interpolated peak", "first", "-"), ("decay_frequency", "decay fit", "second", "--"),

@@ -59,7 +59,7 @@ def branches(figure: str) -> dict[str, xr.Dataset]:
     """
     begin = BEGINNINGS[figure]
     system = EXACT.system(**begin.parameters)
-    orbit = find_orbit(system.with_parameters({begin.parameter: begin.at}))
+    orbit = find_orbit(system.with_parameters({begin.parameter: begin.at}), progress=False)
     first = continue_orbit(orbit, begin.parameter, begin.range)
     found = {"branch": first}
     if begin.longest > 1:

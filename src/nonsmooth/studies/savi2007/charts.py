@@ -81,7 +81,8 @@ def curves(plane: Plane) -> list[xr.Dataset]:
     lines = list(branches(plane.figure).values())
     for period, value in plane.further.items():
         orbit = find_orbit(
-            EXACT.system(**begin.parameters).with_parameters({begin.parameter: value}), period_number=period
+            EXACT.system(**begin.parameters).with_parameters({begin.parameter: value}), period_number=period,
+            progress=False,
         )
         lines.append(continue_orbit(orbit, begin.parameter, begin.range))
     for branch in lines:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from nonsmooth.studies.savi2007.coexisting import names_of
 from nonsmooth.studies.savi2007.measure import APERIODIC
-from nonsmooth.studies.savi2007.rows import NOT_ASKED, Data, Row
+from nonsmooth.studies.savi2007.rows import Data, Row
+from nonsmooth.studies.savi2007.verdicts import Verdict
 
 __all__ = ["f13_basins", "f17_basins"]
 
@@ -34,7 +35,7 @@ def _row(data: Data, figure: str, claim: str, place: str, says: str, period: int
     others = ", ".join(name for name, number in zip(names, periods, strict=True) if number != period)
     return Row(
         claim, place, says, f"attractors of {starts} starts: {'; '.join(names)}; none reached by {lost}",
-        f"{NOT_ASKED}: of the exact flow", "none" if alone else f"not alone: {others}",
-        "differs" if period not in periods else "agrees" if alone else "agrees in part",
+        "not asked: of the exact flow", "none" if alone else f"not alone: {others}",
+        Verdict.DIFFERS if period not in periods else Verdict.AGREES if alone else Verdict.IN_PART,
         f"Starts at phase 0 with {ranges}; the shares, with their binomial standard errors, are those of this plane.",
     )  # fmt: skip

@@ -26,6 +26,7 @@ from nonsmooth.studies.savi2007.portraits import chosen_start, words_of
 from nonsmooth.studies.savi2007.printed import FIGURE_12, FIGURE_14, FIGURE_14_TEXT, FIGURE_17_TEXT, FIGURE_18, NUMBERS
 from nonsmooth.studies.savi2007.resonance import grazing_of
 from nonsmooth.studies.savi2007.rows import Data, Row, against_closed_form, against_printed
+from nonsmooth.studies.savi2007.verdicts import Cause, Verdict, agreed
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,12 +40,15 @@ def f11(data: Data) -> list[Row]:
     """The ranges of period 1, 2, 4 and of chaos over the forcing amplitude (slowly rising)."""
     swept = [data["fig11"][flow] for flow in FLOWS]
     why = {1: "", 2: _hysteresis(swept[0]), 4: "Longer periods follow below."}
+    late = "A rise passes a flip late, at a larger forcing; how fast the paper's rise is, it does not say."
     says = {1: "period 1 for rho of at least", 2: "period 2 down to", 4: "period 4 down to"}
     rows = []
     for n in (1, 2, 4):
         printed = NUMBERS[f"period {n} from"]
         found = [highest(changes(one, n, 2 * n, "up")) for one in swept]
-        rows.append(against_printed("F11", f"{says[n]} {printed}", printed, found[0], found[1], why[n]))
+        beyond = found[0] is not None and found[0].high < printed.value
+        words = f"{late if beyond else ''} {why[n]}".strip()
+        rows.append(against_printed("F11", f"{says[n]} {printed}", printed, found[0], found[1], words))
     printed = NUMBERS["period 4 from"]
     edges = [_chaos_from(one) for one in swept]
     values, regime = regimes(swept[0], "up")
@@ -115,7 +119,7 @@ def f12(data: Data) -> list[Row]:
         Row(
             "F12", "Fig. 12 with the ranges of Fig. 11", f"orbits and section points at rho = {wanted}",
             _reached(surveys[0], FIGURE_12), _reached(surveys[1], FIGURE_12), _apart(data, "fig12", FIGURE_12),
-            "agrees" if met else "differs", "The phase of the paper's section is not stated; 0 here.",
+            agreed(met), "The phase of the paper's section is not stated; 0 here.",
         )
     ]  # fmt: skip
 
@@ -132,9 +136,9 @@ def f13(data: Data) -> list[Row]:
         others.append(_coexisting(data["fig13"][f"{flow}_starts"], data["fig13"][flow]))
     return [
         Row("F13", "Section 4, on Fig. 13", "periodic and chaotic responses as the gap varies", texts[0], texts[1],
-            "none in kind", "agrees" if "no period" in texts[0] else "differs"),
+            "none in kind", agreed("no period" in texts[0])),
         Row("F13", "not in the paper", "coexisting motions (several starts)", others[0], others[1], "none in kind",
-            "adds to the paper", "One sweep follows one motion; the paper shows one at each gap."),
+            Verdict.ADDS, "One sweep follows one motion; the paper shows one at each gap."),
     ]  # fmt: skip
 
 
@@ -161,7 +165,7 @@ def f14(data: Data) -> list[Row]:
     for g, period in FIGURE_14.items():
         reached = periods_reached(exact, g)
         alone = reached.keys() == {period}
-        verdict = "agrees" if period in reached else "differs"
+        verdict = agreed(period in reached)
         why = "" if alone else "Motions coexist here; which is met depends on the start."
         rows.append(
             Row("F14", "Fig. 14, caption", f"g = {g:g} m: {_name(period)}", words_of(reached),
@@ -174,8 +178,9 @@ def f14(data: Data) -> list[Row]:
             + ", ".join(f"{g:g}: {_name(period)}" for g, period in FIGURE_14_TEXT.items()),
             _reached(exact, FIGURE_14_TEXT), _reached(smoothed, FIGURE_14_TEXT),
             f"{len(right)} of {len(FIGURE_14_TEXT)} as printed",
-            "agrees" if len(right) == len(FIGURE_14_TEXT) else "differs",
+            agreed(len(right) == len(FIGURE_14_TEXT)),
             "The text prints other gaps than the caption; the caption's are those that show what is claimed.",
+            cause=Cause.MISPRINT if all(row.verdict is Verdict.AGREES for row in rows) else None,
         )
     )  # fmt: skip
     return rows
@@ -186,7 +191,7 @@ def _name(period: int) -> str:
 
 
 def f15(data: Data) -> list[Row]:
-    """The strange attractor: neighbours part, and both flows draw the same set."""
+    """The strange attractor: neighbouring trajectories separate, and both flows draw the same set."""
     from scipy.spatial import cKDTree
 
     rates = [separation_rate(data["fig15"][f"{flow}_twins"]) for flow in FLOWS]
@@ -198,14 +203,17 @@ def f15(data: Data) -> list[Row]:
         size = exact.max(axis=0) - exact.min(axis=0)
         distance, _ = cKDTree(exact / size).query(smoothed / size)
         worst = max(worst, float(np.quantile(distance, 0.99)))
-    texts = [f"neighbours part by exp({rate:.3f} ± {error:.3f}) per period" for rate, error in rates]
+    texts = [
+        f"neighbouring trajectories separate by a factor exp({rate:.3f} ± {error:.3f}) per period"
+        for rate, error in rates
+    ]  # fmt: skip
     chaotic = all(rate > 5 * error for rate, error in rates)
     return [
         Row(
             "F15", "Fig. 15", "g = 0.0018 m: a strange attractor, sections at four phases",
             texts[0], texts[1],
             f"99 % of the smoothed points within {100 * worst:.2f} % of the attractor's size of an exact point",
-            "agrees" if chaotic and worst < 0.05 else "differs",
+            agreed(chaotic and worst < 0.05),
             "A mean over the first returns of pairs of neighbours; not a Lyapunov exponent with its error.",
         )
     ]  # fmt: skip
@@ -229,8 +237,9 @@ def _response_at(data: Data, omega: float, says: str) -> Row:
     difference = "another motion" if not right_kind else "contact and no contact swapped" if swapped else "none"
     return Row(
         "F17", "Section 4, on Fig. 17", f"omega = {omega:g} rad/s: {says}", texts[0], texts[1], difference,
-        "agrees" if difference == "none" else "differs",
+        agreed(difference == "none"),
         "Rising sweep; other motions coexist (Fig. 18)." if chaos else _without_support(data, omega, swapped),
+        cause=Cause.MISPRINT if right_kind and swapped else None,
     )  # fmt: skip
 
 
@@ -258,12 +267,13 @@ def _abrupt(data: Data) -> Row:
             continue
         (begin, up), (_, down) = (ends for ends in chaos if ends is not None)
         texts.append(
-            f"into chaos by period doublings from {first.middle:.3f} to {begin:.3f} rad/s; out of it at once, rising "
+            f"into chaos by period doublings from {first.value:.3f} to {begin:.3f} rad/s; out of it at once, rising "
             f"after {up:.4f}, falling into it at {down:.4f} rad/s"
         )
     return Row(
         "F17", "Section 4, on Fig. 17", "abrupt transitions from periodic to chaotic and from chaotic to periodic",
-        texts[0], texts[1], "one of two is abrupt", "agrees in part",
+        texts[0], texts[1], "one of two is abrupt",
+        Verdict.DIFFERS if "not found" in texts else Verdict.IN_PART,
         f"{_lasting(data)} The other is a cascade of flips that looks abrupt on the scale of the figure.",
     )  # fmt: skip
 
@@ -303,7 +313,8 @@ def f18(data: Data) -> list[Row]:
     return [
         Row(
             "F18", "Fig. 18, caption", f"orbits at omega = {wanted}", _reached(surveys[0], FIGURE_18),
-            _reached(surveys[1], FIGURE_18), _apart(data, "fig18", FIGURE_18), "agrees" if met else "differs",
-            f"On the chaotic orbit neighbours part by exp({rate:.2f} ± {error:.2f}) per period (exact).",
+            _reached(surveys[1], FIGURE_18), _apart(data, "fig18", FIGURE_18), agreed(met),
+            "Neighbouring trajectories on the chaotic orbit separate by a factor "
+            f"exp({rate:.2f} ± {error:.2f}) per period (exact).",
         )
     ]  # fmt: skip

@@ -7,12 +7,14 @@ procedure as the paper describes it has a bias.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
-from nonsmooth.studies.savi2007.findings import Found, found_in
+from nonsmooth.studies.savi2007.findings import Found, Number, found_in
 from nonsmooth.studies.savi2007.measure import Interval
-from nonsmooth.studies.savi2007.printed import NUMBERS, TABLE_1, TEST_MASS, Printed
+from nonsmooth.studies.savi2007.printed import NATURAL_FREQUENCY, NUMBERS, TABLE_1, TEST_MASS, Printed
 from nonsmooth.studies.savi2007.rig_parameters import table_rows
-from nonsmooth.studies.savi2007.rows import NOT_ASKED, Cell, Data, Row, compare, printed_cell
+from nonsmooth.studies.savi2007.rows import Cell, Data, Row, against_printed, printed_cell
+from nonsmooth.studies.savi2007.verdicts import Known, Verdict, agreed
 
 __all__ = ["p1", "p2", "p3", "p4", "p5", "p6", "p7", "p8", "r1", "r2"]
 
@@ -24,21 +26,25 @@ _LEAST_LINE = 1e-2  # of the range: a straight line leaves less
 
 def _row(claim: str, place: str, says: str, cell: Cell, why: str = "", model: str = _NO_MODEL) -> Row:
     """A row to which the model has nothing to say."""
-    return Row(claim, place, says, model, model, "see rig", NOT_ASKED, why, cell.text, cell.verdict)
+    return Row(claim, place, says, model, model, "see rig", Verdict.NOT_ASKED, why).measured(cell)
 
 
 def _closed(claim: str, says: str, printed: Printed, model: float, cell: Cell, why: str = "") -> Row:
     """A printed number beside a closed form of the model with Table 1, and beside the rig."""
-    difference, verdict = compare(printed, Interval(model, model))
+    row = against_printed(claim, says, printed, Interval(model, model), None, why)
     text = f"{model:.4g} {printed.unit}".rstrip()
-    return Row(
-        claim, printed.place, says, f"{text} (closed form)", _SAME, f"closed form {difference}", verdict, why,
-        cell.text, cell.verdict,
-    )  # fmt: skip
+    difference = f"closed form {row.exact_beside}"
+    return replace(row, exact=f"{text} (closed form)", smoothed=_SAME, difference=difference).measured(cell)
 
 
-def _natural() -> float:
-    return math.sqrt(2 * TABLE_1["k"].value / TABLE_1["m"].value)
+def _back(printed: Printed, found: Known, note: str = "") -> Cell:
+    """What the rig gives back of a number that it was given, or that follows from such."""
+    return printed_cell(printed, found, note, put_in=True)
+
+
+def _built(good: bool) -> Verdict:
+    """The verdict on a property that the rig was built with."""
+    return Verdict.INPUT if good else Verdict.DIFFERS
 
 
 def r1(data: Data) -> list[Row]:
@@ -51,7 +57,7 @@ def r1(data: Data) -> list[Row]:
             "R1", "Fig. 3", "car, two springs and strings, motor 0-12 V with crank, magnetic damper, support, rotary "
             "sensor: 0.25 degrees, up to 30 rev/s",
             Cell(f"built so: steps of {step:g} degrees in its files, at most {turning:.1f} rev/s, up to {volts:g} V",
-                 "agrees" if good else "differs"),
+                 _built(good)),
             "By construction. Beyond the model it has strings of finite length that cannot push, an uneven motor, dry "
             "friction, a support that takes time to come back, and the errors of its sensors.",
         )
@@ -66,7 +72,7 @@ def r2(data: Data) -> list[Row]:
     return [
         _row(
             "R2", "Section 3.1", "100 Hz; force sensor to 50 N, 1 %, resolution 0.03 N",
-            Cell(f"{rate:.2f} Hz; steps of {step:g} N, {used:.1f} N used", "agrees" if good else "differs"),
+            Cell(f"{rate:.2f} Hz; steps of {step:g} N, {used:.1f} N used", _built(good)),
             "By construction. The 1 % is a gain, the same in all forces: it enters every uncertainty as one.",
         )
     ]  # fmt: skip
@@ -78,9 +84,9 @@ def p1(data: Data) -> list[Row]:
     why = "The slope on the car is 2k: both springs pull. Nearly all of the uncertainty is the force sensor's gain."
     return [
         _row("P1", TABLE_1["k"].place, f"slope of force over displacement: k = {TABLE_1['k']}",
-             printed_cell(TABLE_1["k"], car.number.times(0.5).interval), why, _GIVEN),
+             _back(TABLE_1["k"], car.number.times(0.5)), why, _GIVEN),
         _row("P1", TABLE_1["k_s"].place, f"slope of force over displacement: k_s = {TABLE_1['k_s']}",
-             printed_cell(TABLE_1["k_s"], support.number.interval), "", _GIVEN),
+             _back(TABLE_1["k_s"], support.number), "", _GIVEN),
     ]  # fmt: skip
 
 
@@ -89,14 +95,14 @@ def p2(data: Data) -> list[Row]:
     mass = table_rows(data["table1"])["m"][1]
     slope = found_in(data["fig04"]["oscillator"]).number
     value = math.sqrt(slope.value / mass.value)
-    spread = 0.5 * math.hypot(slope.interval.uncertainty / slope.value, mass.interval.uncertainty / mass.value)
-    natural = Interval(value * (1 - spread), value * (1 + spread))
+    u = 0.5 * value * math.hypot(slope.uncertainty / slope.value, mass.uncertainty / mass.value)
+    natural = Number(value, u, value - 1.96 * u, value + 1.96 * u, "")
     printed = NUMBERS["natural frequency"]
     return [
         _row("P2", TABLE_1["m"].place, f"m = {TABLE_1['m']} by weighing",
-             printed_cell(TABLE_1["m"], mass.interval), "", _GIVEN),
-        _closed("P2", f"natural frequency from stiffness and mass: {printed}", printed, _natural(),
-                printed_cell(printed, natural, ", from the slope of Fig. 4"),
+             _back(TABLE_1["m"], mass), "", _GIVEN),
+        _closed("P2", f"natural frequency from stiffness and mass: {printed}", printed, NATURAL_FREQUENCY,
+                _back(printed, natural, ", from the slope of Fig. 4"),
                 "sqrt(2k/m), by Eq. 2; the formula printed is sqrt(k/m)."),
     ]  # fmt: skip
 
@@ -106,22 +112,22 @@ def p3(data: Data) -> list[Row]:
     found = found_in(data["fig05"]["tap"])
     grid, peak = found.others["dft_grid"], found.others["dft_peak"]
     line, step = NUMBERS["peak of the DFT"], float(data["fig05"]["tap"]["grid_step"])
-    nearest = round(_natural() / (2 * math.pi) / step) * step
+    nearest = round(NATURAL_FREQUENCY / (2 * math.pi) / step) * step
     top = grid.value / (2 * math.pi)
     return [
         _closed(
             "P3", f"impulsive response: peak of the DFT at {line}", line, nearest,
-            printed_cell(line, Interval(top - step / 2, top + step / 2), ", largest line"),
+            _back(line, Interval(top - step / 2, top + step / 2), ", largest line"),
             f"A DFT of 2048 samples at 100 Hz has a line every {step:.4f} Hz; closed form: the line nearest to "
-            f"sqrt(2k/m), {_natural() / (2 * math.pi):.4f} Hz. Damping moves the peak down, on the rig to "
+            f"sqrt(2k/m), {NATURAL_FREQUENCY / (2 * math.pi):.4f} Hz. Damping moves the peak down, on the rig to "
             f"{peak.value / (2 * math.pi):.4f} Hz: which of two lines is the larger depends on where the record "
             "begins.",
         ),
         _closed(
-            "P3", f"natural frequency from it: {TABLE_1['omega_0']}", TABLE_1["omega_0"], _natural(),
-            printed_cell(TABLE_1["omega_0"], found.number.interval, ", fitted in the time domain"),
+            "P3", f"natural frequency from it: {TABLE_1['omega_0']}", TABLE_1["omega_0"], NATURAL_FREQUENCY,
+            _back(TABLE_1["omega_0"], found.number, ", fitted in the time domain"),
             f"The paper's 4.60 is 2 pi times its line, known to half a step, {math.pi * step:.2f} rad/s: 4.50 is "
-            "within that.",
+            "within that resolution.",
         ),
     ]  # fmt: skip
 
@@ -130,23 +136,23 @@ def p4(data: Data) -> list[Row]:
     """Damping by amplitude over frequency."""
     viscous, both = (found_in(data["fig06"][key]) for key in ("viscous", "amplitudes"))
     printed, ratio = TABLE_1["c"], NUMBERS["damping ratio"]
-    per = 1 / (2 * TABLE_1["m"].value * _natural())
+    per = 1 / (2 * TABLE_1["m"].value * NATURAL_FREQUENCY)
     return [
         _closed(
             "P4", f"c = {printed} by fitting the amplitude over frequency (viscous damping alone)", printed,
-            2 * ratio.value * TABLE_1["m"].value * _natural(), printed_cell(printed, viscous.number.interval),
+            2 * ratio.value * TABLE_1["m"].value * NATURAL_FREQUENCY, _back(printed, viscous.number),
             "Closed form: 2 xi m omega_0 with the printed xi and omega_0 = 4.50 rad/s. "
             + viscous.notes[0][0].upper() + viscous.notes[0][1:] + ".",
         ),
         _closed(
             "P4", f"xi = {ratio}", ratio, printed.value * per,
-            printed_cell(ratio, viscous.number.times(per, " ").interval), "c / (2 m omega_0).",
+            _back(ratio, viscous.number.times(per, " ")), "c / (2 m omega_0).",
         ),
         _row(
             "P4", "Section 3.1", "in the considered range the dry friction may be neglected",
             Cell(
                 f"with it c = {both.number} ({100 * (both.number.value / printed.value - 1):+.1f} %), without "
-                f"{viscous.number}", "differs" if _apart(viscous, both) else "agrees",
+                f"{viscous.number}", agreed(not _apart(viscous, both)),
             ),
             "The rig's friction is 5 mN, 3.6 % of the forcing of Fig. 6; that of the paper's rig is not known.",
         ),
@@ -164,9 +170,9 @@ def p5(data: Data) -> list[Row]:
     per = 1 / (2 * math.sqrt(TABLE_1["k_s"].value * TEST_MASS))
     return [
         _closed("P5", f"support with 1.33 kg, free decay: xi_s = {ratio}", ratio, printed.value * per,
-                printed_cell(ratio, found.others["damping_ratio"].interval), "Closed form: c_s / (2 sqrt(k_s M))."),
+                _back(ratio, found.others["damping_ratio"]), "Closed form: c_s / (2 sqrt(k_s M))."),
         _closed("P5", f"logarithmic decrement: c_s = {printed}", printed, ratio.value / per,
-                printed_cell(printed, found.number.interval), "Closed form: from the printed xi_s."),
+                _back(printed, found.number), "Closed form: from the printed xi_s."),
     ]  # fmt: skip
 
 
@@ -178,7 +184,7 @@ def _line(data: Data, key: str) -> tuple[float, Cell]:
     fitted = float(picture["slope"]) * picture["setting"].values + float(picture["intercept"])
     left = float(np.abs(picture["reading"].values - fitted).max() / np.ptp(fitted))
     text = f"a line of slope {found.number}; its {found.runs} points lie within {100 * left:.2g} % of the range"
-    return left, Cell(text, "agrees" if left < _LEAST_LINE else "differs")
+    return left, Cell(text, _built(left < _LEAST_LINE))
 
 
 def p6(data: Data) -> list[Row]:
@@ -209,9 +215,10 @@ def p8(data: Data) -> list[Row]:
         inside = "inside" if number.low <= truth <= number.high else "outside"
         why = f"The rig's truth, {truth:.6g}, lies {inside} the 95 % interval."
         says = f"{name} = {printed}"
-        cell = printed_cell(printed, number.interval)
+        cell = _back(printed, number)
         if name == "omega_0":
-            rows.append(_closed("P8", says, printed, _natural(), cell, why))
+            why += f" Printed to {printed.rounding:g}, but read off a DFT: known to {printed.resolution:.2f} rad/s."
+            rows.append(_closed("P8", says, printed, NATURAL_FREQUENCY, cell, why))
         else:
             rows.append(_row("P8", "Table 1", says, cell, why, _GIVEN))
     return rows

@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth.continuation.special import special_points
+from nonsmooth.studies.savi2007.grazing import grazing_frequencies
 from nonsmooth.studies.savi2007.measure import Interval, changes, jumps, lowest, range_of
-from nonsmooth.studies.savi2007.printed import NUMBERS
+from nonsmooth.studies.savi2007.printed import FIGURE_9, NATURAL_FREQUENCY, NUMBERS, TABLE_1
 from nonsmooth.studies.savi2007.resonance import grazing_of
 from nonsmooth.studies.savi2007.rows import Data, Row, against_closed_form, against_printed
+from nonsmooth.studies.savi2007.verdicts import Cause, Verdict, agreed, judge
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -57,7 +59,7 @@ def f9a(data: Data) -> list[Row]:
         Row(
             "F9a", _9, f"rising frequency: a small period-2 region near {printed}", _range(exact, "up"),
             _range(smoothed, "up"), f"{printed.text} lies {'inside' if inside else 'outside'}",
-            "agrees" if inside else "differs", why,
+            agreed(inside), why,
         ),
         against_printed(
             "F9a", f"rising frequency: dynamical jump near {rising}", rising, main_jump(exact, "up"),
@@ -68,19 +70,34 @@ def f9a(data: Data) -> list[Row]:
     ]  # fmt: skip
 
 
+def _with_printed_frequency() -> list[list[float]]:
+    """Grazing frequencies of Fig. 9 (rad/s) were omega_0 of Table 1 right, and its k, or its m, wrong."""
+    table = {name: TABLE_1[name].value for name in ("m", "k", "c")}
+    ratio = (TABLE_1["omega_0"].value / NATURAL_FREQUENCY) ** 2
+    changes = {"k": table["k"] * ratio}, {"m": table["m"] / ratio}
+    return [grazing_frequencies({**table, **FIGURE_9, **changed}) for changed in changes]
+
+
 def f9b(data: Data) -> list[Row]:
     """Falling frequency: the jump at grazing, and period 2 again."""
     exact, smoothed = data["fig09"]["exact"], data["fig09"]["smoothed"]
     closed = grazing_of(exact)[-1]
     falling = NUMBERS["jump falling"]
+    (below, stiffer), (under, lighter) = _with_printed_frequency()
+    met = [judge(falling.value, Interval(one, one), falling.resolution) for one in (stiffer, lighter)]
     found = range_of(exact, 2, "down")
     return [
         against_printed(
             "F9b", f"falling frequency: dynamical jump at {falling}", falling, main_jump(exact, "down"),
             main_jump(smoothed, "down"),
             f"Falling, the motion without contact ends where it meets the support. With Table 1 that is {closed:.5f} "
-            "rad/s, in closed form and without any integration; both flows jump there. The printed value does not "
-            "follow from the paper's own parameters.",
+            "rad/s, in closed form and without any integration; both flows jump there. Table 1 also prints omega_0 = "
+            f"{TABLE_1['omega_0']}, where its k and m say {NATURAL_FREQUENCY:.3f}: with a stiffer spring, or a lighter "
+            f"car, to give that, the closed form is {stiffer:.3f} or {lighter:.3f} rad/s "
+            f"({100 * (stiffer / falling.value - 1):+.1f} or {100 * (lighter / falling.value - 1):+.1f} %); but the "
+            f"range of period 2 would then begin at {below:.2f} or {under:.2f}, above the printed "
+            f"{NUMBERS['period 2 near']}.",
+            cause=Cause.TABLE_1 if Verdict.AGREES in met else None,
         ),
         against_closed_form(
             "F9b", "closed form, not printed", "falling jump at grazing", (closed, grazing_of(smoothed)[-1]),
@@ -89,7 +106,7 @@ def f9b(data: Data) -> list[Row]:
         ),
         Row(
             "F9b", _9, "falling frequency: period 2 appears again", _range(exact, "down"), _range(smoothed, "down"),
-            "none", "agrees" if found else "differs",
+            "none", agreed(found is not None),
         ),
     ]  # fmt: skip
 
@@ -107,7 +124,7 @@ def f9c(data: Data) -> list[Row]:
         apart = np.abs(x.sel(direction="up") - x.sel(direction="down")) / x.max("direction")
         wide.append(float(apart.min()))
         texts.append(
-            f"{down.middle:.3f} ... {up.middle:.3f} rad/s: two stable motions, amplitudes apart by "
+            f"{down.value:.3f} ... {up.value:.3f} rad/s: two stable motions, amplitudes apart by "
             f"{100 * float(apart.min()):.0f} % at least"
         )
     texts += [""] * (2 - len(texts))
@@ -134,7 +151,7 @@ def f9c(data: Data) -> list[Row]:
     return [
         Row(
             "F9c", _9, "an unstable region between the jumps with rising and falling frequency", texts[0], texts[1],
-            "none in kind", "agrees" if two and unstable else "agrees in part" if two else "differs", why,
+            "none in kind", Verdict.AGREES if two and unstable else Verdict.IN_PART if two else Verdict.DIFFERS, why,
         )
     ]  # fmt: skip
 
@@ -150,7 +167,7 @@ def f10(data: Data) -> list[Row]:
         Row(
             "F10", _10, "jumps as in Fig. 9, elsewhere with rising than with falling frequency",
             _both(exact), _both(smoothed), "no number printed",
-            "agrees" if main_jump(exact, "up") and main_jump(exact, "down") else "differs",
+            agreed(None not in (main_jump(exact, "up"), main_jump(exact, "down"))),
         ),
         against_closed_form(
             "F10", "closed form, not printed", "falling jump at grazing", grazing[-1], main_jump(exact, "down"),
@@ -158,11 +175,11 @@ def f10(data: Data) -> list[Row]:
         ),
         Row(
             "F10", _10, "no period-2 response", f"{doubled[0]} of {count[0]} points with period 2",
-            f"{doubled[1]} of {count[1]} points with period 2", "none", "agrees" if not any(doubled) else "differs",
+            f"{doubled[1]} of {count[1]} points with period 2", "none", agreed(not any(doubled)),
         ),
         Row(
             "F10", _10, "a small jump instead", _small(exact), _small(smoothed), "no number printed",
-            "agrees" if small is not None else "differs",
+            agreed(small is not None),
             "With rising frequency at the grazing of the motion without contact, with falling at a fold of the "
             "motion with contact.",
         ),

@@ -20,7 +20,8 @@ from nonsmooth.studies.savi2007.printed import (
 )
 from nonsmooth.studies.savi2007.rig_amplitude import flip_of, rate_of, slowest
 from nonsmooth.studies.savi2007.rig_motions import measured_periods_at
-from nonsmooth.studies.savi2007.rows import CLOSE, NOT_ASKED, Cell, Data, Row, printed_cell
+from nonsmooth.studies.savi2007.rows import Cell, Data, Row, printed_cell
+from nonsmooth.studies.savi2007.verdicts import CLOSE, Verdict, agreed
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -30,7 +31,7 @@ __all__ = ["c1", "f11", "f12", "f13", "f14", "f15", "f16", "f17", "f17_grazing",
 
 def of_the_model(n: int) -> list[Cell]:
     """Cells of claims that no rig can decide."""
-    return [Cell(f"{NOT_ASKED}: of the model")] * n
+    return [Cell("not asked: of the model")] * n
 
 
 def f11(data: Data) -> list[Cell]:
@@ -45,7 +46,7 @@ def f11(data: Data) -> list[Cell]:
     kinds, counts = np.unique(numbers, return_counts=True)
     kind, share = int(kinds[counts.argmax()]), float(counts.max() / counts.sum())
     text = f"{_words({kind: 1})} in {100 * share:.0f} % of the turns below {end}"
-    return [*cells, Cell(text, "agrees" if kind == APERIODIC else "differs")]
+    return [*cells, Cell(text, agreed(kind == APERIODIC))]
 
 
 def _flip(data: Data, rise: xr.Dataset, n: int) -> Cell:
@@ -75,7 +76,7 @@ def _at_all(data: Mapping[str, xr.Dataset], shown: Mapping[float, int]) -> Cell:
     """All of the periods wanted, each at its value."""
     met = [period in measured_periods_at(data, value) for value, period in shown.items()]
     text = "; ".join(f"{value:g}: {_words(measured_periods_at(data, value))}" for value in shown)
-    return Cell(text, "agrees" if all(met) else "agrees in part" if any(met) else "differs")
+    return Cell(text, Verdict.AGREES if all(met) else Verdict.IN_PART if any(met) else Verdict.DIFFERS)
 
 
 def f12(data: Data) -> list[Cell]:
@@ -92,9 +93,9 @@ def f13(data: Data) -> list[Cell]:
     starts = max(sum(one.values()) for one in numbers.values())
     return [
         Cell("; ".join(f"{g:g}: {_words(one)}" for g, one in numbers.items()),
-             "agrees" if APERIODIC in reached and len(reached) > 1 else "differs"),
+             agreed(APERIODIC in reached and len(reached) > 1)),
         Cell(f"more than one motion at {len(several)} of {len(numbers)} gaps, {starts} starts each",
-             "adds to the paper" if several else "none found")
+             Verdict.ADDS if several else Verdict.NOT_ASKED)
         if starts > 1 else Cell("one start at each gap"),
     ]  # fmt: skip
 
@@ -108,13 +109,13 @@ def f14(data: Data) -> list[Cell]:
     cells = []
     for g, period in FIGURE_14.items():
         found = measured_periods_at(data["fig14_rig"], g)
-        cells.append(Cell(_words(found), "agrees" if period in found else "differs"))
+        cells.append(Cell(_words(found), agreed(period in found)))
     return [*cells, Cell("not recorded at the text's gaps")]
 
 
 def f15(data: Data) -> list[Cell]:
     """Numerical; the rig's is F16."""
-    return [Cell(f"{NOT_ASKED}: see F16")]
+    return [Cell("not asked: see F16")]
 
 
 def f16(data: Data) -> list[Row]:
@@ -129,10 +130,10 @@ def f16(data: Data) -> list[Row]:
         Row(
             "F16", "Fig. 16", "the same attractor from the apparatus, at four phases", "see F15", "see F15",
             f"energy distance {', '.join(f'{r:.2f}' for r in ratio)} of the 95th percentile of the record's halves",
-            NOT_ASKED,
+            Verdict.NOT_ASKED,
             "At phases 0, pi/2, pi, 3 pi/2, to the exact model with the parameters identified; below 2 the clouds can "
             "hardly be told apart by a record of this length.",
-            f"{_words({number: 1})}, {result.sizes['measured_iterate']} turns", "agrees" if alike else "differs",
+            f"{_words({number: 1})}, {result.sizes['measured_iterate']} turns", agreed(alike),
         )
     ]  # fmt: skip
 
@@ -147,7 +148,7 @@ def f17(data: Data) -> list[Cell]:
         right = (number == APERIODIC) == ("chaotic" in says)
         swapped = "chaotic" not in says and touches != ("with contact" in says)
         text = f"{_words({number: 1})}, {'contact' if touches else 'no contact'} (at {float(one['value']):.3f} rad/s)"
-        cells.append(Cell(text, "agrees" if right and not swapped else "differs"))
+        cells.append(Cell(text, agreed(right and not swapped)))
     return [*cells, _transitions(runs)]
 
 
@@ -156,14 +157,14 @@ def _transitions(runs: xr.Dataset) -> Cell:
     omega, number = runs["value"].values[order], runs["period_number"].values[order]
     chaos = np.flatnonzero(number == APERIODIC)
     if not len(chaos) or chaos[-1] + 1 == len(omega):
-        return Cell("no chaos with an end", "differs")
+        return Cell("no chaos with an end", Verdict.DIFFERS)
     doubled = omega[number == 2]
     into = f"period 2 from {doubled[0]:.2f}, " if len(doubled) else ""
     text = (
         f"{into}no period from {omega[chaos[0]]:.2f} rad/s; out of it at once between {omega[chaos[-1]]:.2f} and "
         f"{omega[chaos[-1] + 1]:.2f} rad/s"
     )
-    return Cell(text, "agrees in part" if len(doubled) else "agrees")
+    return Cell(text, Verdict.IN_PART if len(doubled) else Verdict.AGREES)
 
 
 def f17_grazing(data: Data) -> list[Cell]:
@@ -187,10 +188,11 @@ def c1(data: Data) -> list[Cell]:
         (main_jump(tenth, "down"), grazing_of_paper(FIGURE_10)[-1]),
         (small_jump(tenth, "up"), grazing_of_paper(FIGURE_10)[0]),
     ]
-    near = sum(against(found, truth).verdict.startswith("agrees") for found, truth in pairs)
+    near = sum(against(found, truth).verdict is Verdict.AGREES for found, truth in pairs)
     kind = "no period" if chaos else "a period"
     return [
         Cell(f"{count} jumps in Figs. 9-10, {flips} flips in Fig. 11, {kind} in Fig. 16",
-             "agrees" if count and flips and chaos else "agrees in part"),
-        Cell(f"{near} of 3 within {CLOSE:g} % of the closed-form grazing", "agrees" if near == 3 else "agrees in part"),
+             Verdict.AGREES if count and flips and chaos else Verdict.IN_PART),
+        Cell(f"{near} of 3 within {CLOSE:g} % of the closed-form grazing",
+             Verdict.AGREES if near == 3 else Verdict.IN_PART if near else Verdict.UNDECIDED),
     ]  # fmt: skip

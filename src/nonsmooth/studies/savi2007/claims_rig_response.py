@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
@@ -11,7 +10,8 @@ import numpy as np
 from nonsmooth.studies.savi2007.grazing import grazing_frequencies
 from nonsmooth.studies.savi2007.measure import Interval, measured_jumps, measured_periods
 from nonsmooth.studies.savi2007.printed import FIGURE_9, FIGURE_10, NUMBERS, TABLE_1
-from nonsmooth.studies.savi2007.rows import CLOSE, Cell, Data, printed_cell
+from nonsmooth.studies.savi2007.rows import Cell, Data, printed_cell
+from nonsmooth.studies.savi2007.verdicts import Verdict, agreed, judge
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,7 +39,7 @@ def _step(runs: xr.Dataset, direction: str, jump: Interval) -> float:
     mine = runs.isel(run=runs["direction"].values.astype(str) == direction)
     order = np.argsort(mine["omega"].values)
     heights = mine["amplitude"].values[order]
-    i = int(np.searchsorted(mine["omega"].values[order], jump.middle))
+    i = int(np.searchsorted(mine["omega"].values[order], jump.value))
     return float(abs(heights[i] - heights[i - 1]))
 
 
@@ -53,26 +53,22 @@ def _doubled(runs: xr.Dataset, direction: str) -> Interval | None:
 def _range_cell(runs: xr.Dataset, direction: str, wanted: float | None = None) -> Cell:
     found = _doubled(runs, direction)
     if found is None:
-        return Cell("no run with period 2", "differs")
-    n = int(np.count_nonzero(measured_periods(runs, direction)[1] == 2))
-    good = wanted is None or found.low <= wanted <= found.high
+        return Cell("no run with period 2", Verdict.UNDECIDED)
+    omega, number = measured_periods(runs, direction)
+    n = int(np.count_nonzero(number == 2))
     text = f"period 2 from {found.low:.3f} to {found.high:.3f} rad/s ({n} run{'s' if n > 1 else ''})"
-    return Cell(text, "agrees" if good else "differs")
+    if wanted is None or found.low <= wanted <= found.high:
+        return Cell(text, Verdict.AGREES)
+    below, above = omega[omega < found.low], omega[omega > found.high]  # the range ends between two runs
+    outside = (len(below) and wanted <= below[-1]) or (len(above) and wanted >= above[0])
+    return Cell(text, Verdict.DIFFERS if outside else Verdict.UNDECIDED)
 
 
 def against(found: Interval | None, truth: float) -> Cell:
     """A jump beside a closed form with the paper's parameters."""
     if found is None:
-        return Cell("not found", "differs")
-    off = found.middle - truth
-    percent = 100 * abs(off) / truth
-    if abs(off) <= 2 * found.uncertainty:
-        verdict = "agrees"
-    elif percent <= CLOSE:
-        verdict = f"agrees within {math.ceil(10 * percent) / 10:.1f} %"
-    else:
-        verdict = f"differs by {percent:.1f} %"
-    return Cell(f"{found} rad/s ({off:+.3f} rad/s)", verdict)
+        return Cell("not found", Verdict.UNDECIDED)
+    return Cell(f"{found} rad/s ({found.value - truth:+.3f} rad/s)", judge(truth, found))
 
 
 def grazing_of_paper(figure: Mapping[str, float]) -> list[float]:
@@ -104,20 +100,20 @@ def f9c(data: Data) -> list[Cell]:
     runs = data["fig09_rig"]["runs"]
     up, down = main_jump(runs, "up"), main_jump(runs, "down")
     if up is None or down is None:
-        return [Cell("jumps not found", "differs")]
+        return [Cell("jumps not found", Verdict.UNDECIDED)]
     values = {}
     for direction in ("up", "down"):
         mine = runs.isel(run=runs["direction"].values.astype(str) == direction)
         inside = (mine["omega"].values > down.high + 1e-6) & (mine["omega"].values < up.low - 1e-6)
         values[direction] = np.sort(mine["amplitude"].values[inside])
     if not all(len(heights) for heights in values.values()):
-        return [Cell("no run between the jumps", "differs")]
+        return [Cell("no run between the jumps", Verdict.UNDECIDED)]
     apart = 1 - values["down"].max() / values["up"].min()
     return [
         Cell(
-            f"{down.middle:.3f} ... {up.middle:.3f} rad/s: two motions, amplitudes apart by {100 * apart:.0f} % at "
+            f"{down.value:.3f} ... {up.value:.3f} rad/s: two motions, amplitudes apart by {100 * apart:.0f} % at "
             "least",
-            "agrees in part" if apart > _FEWEST_APART else "differs",
+            Verdict.IN_PART if apart > _FEWEST_APART else Verdict.DIFFERS,
         )
     ]  # fmt: skip
 
@@ -129,10 +125,11 @@ def f10(data: Data) -> list[Cell]:
     grazing = grazing_of_paper(FIGURE_10)
     words = [str(jump) if jump is not None else "none found" for jump in (small, small_jump(runs, "down"))]
     return [
-        Cell(f"rising {up}, falling {down} rad/s", "agrees" if up and down else "differs"),
+        Cell(f"rising {up}, falling {down} rad/s", Verdict.UNDECIDED if up is None or down is None else Verdict.AGREES),
         against(down, grazing[-1]),
         _no_doubled(runs),
-        Cell(f"rising {words[0]}, falling {words[1]} rad/s", "agrees" if small is not None else "differs"),
+        Cell(f"rising {words[0]}, falling {words[1]} rad/s",
+             Verdict.UNDECIDED if small is None else Verdict.AGREES),
         against(small, grazing[0]),
     ]
 
@@ -144,7 +141,7 @@ def _no_doubled(runs: xr.Dataset) -> Cell:
     ranges = any((here[1:] & here[:-1]).any() for here in doubled.values())
     text = f"{count} of {runs.sizes['run']} runs with period 2" + ("" if ranges or not count else ", no two neighbours")
     why = "" if ranges or not count else "Rig: a record of some eight turns can show a motion that is still settling."
-    return Cell(text, "differs" if ranges else "agrees", why)
+    return Cell(text, agreed(not ranges), why)
 
 
 def grazing_behind_both(data: Data) -> list[Cell]:

@@ -17,6 +17,10 @@ if TYPE_CHECKING:
 __all__ = ["Figure", "only_outer", "sheet"]
 
 
+#: The procedures on which those parameters rest with which records of the rig are laid over the model.
+RESTS_ON = ("springs", "support", "impulse", "drop", "contact")
+
+
 @dataclass(frozen=True)
 class Figure:
     """One figure.
@@ -40,6 +44,8 @@ class Figure:
         Of a figure that the paper has not: the one of the paper whose parameters it has.
     full : bool
         Whether it is made in a full run only.
+    procedures : tuple of str
+        Of a figure of the rig: the procedures of Section 3.1 whose records it needs.
     """
 
     name: str
@@ -51,6 +57,7 @@ class Figure:
     rig: bool = False
     beside: int | None = None
     full: bool = False
+    procedures: tuple[str, ...] = RESTS_ON
 
     @property
     def place(self) -> float:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from nonsmooth.results.provenance import ATTRIBUTE, package_version, read_provenance
-from nonsmooth.studies.savi2007.measure import Interval
+from nonsmooth.studies.savi2007.measure import with_uncertainty
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -30,10 +30,9 @@ class Number:
     unit: str
 
     @property
-    def interval(self) -> Interval:
-        """The 95 % interval about the value; where it is not even, the wider side counts."""
-        half = max(self.high - self.value, self.value - self.low)
-        return Interval(self.value - half, self.value + half)
+    def expanded(self) -> float:
+        """The expanded uncertainty: half the 95 % interval; where it is not even, the wider side counts."""
+        return max(self.high - self.value, self.value - self.low)
 
     def times(self, factor: float, unit: str = "") -> Number:
         """The number in another unit."""
@@ -41,7 +40,7 @@ class Number:
         return Number(self.value * factor, self.uncertainty * abs(factor), low, high, unit or self.unit)
 
     def __str__(self) -> str:
-        return f"{self.interval} {self.unit}".rstrip()
+        return f"{with_uncertainty(self.value, self.uncertainty)} {self.unit}".rstrip()
 
 
 @dataclass(frozen=True)

@@ -45,7 +45,7 @@ FLOWS = (EXACT, SMOOTHED)
 @dataclass(frozen=True)
 class Settings:
     """How much work: ``quick`` for a first look, ``full`` for the finest. ``laboratory``: where the figures of the rig
-    are measured; ``folder``: where stores of chunks are kept.
+    are measured; ``folder``: where finished figures and stores of chunks are kept.
     """
 
     quick: bool = False
@@ -60,6 +60,13 @@ class Settings:
         if self.laboratory is None:
             raise ValueError("a figure of the rig is measured in a laboratory: give Settings(laboratory=...)")
         return self.laboratory
+
+    @property
+    def place(self) -> Path:
+        """The folder; ValueError where there is none."""
+        if self.folder is None:
+            raise ValueError("figures are kept in a folder: give Settings(folder=...)")
+        return self.folder
 
     def of(self, flow: Flow, *, exact: _Choice, smoothed: _Choice, quick: _Choice) -> _Choice:
         """A number for this flow; ``quick`` takes the place of both in a quick run."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
@@ -53,10 +53,12 @@ class Laboratory:
         (``identification``), and ``truth.toml``.
     quick : bool
         Shorter records and fewer steps.
+    procedures : collection of str, optional
+        Those that are recorded for identification; all where not given.
     """
 
-    def __init__(self, folder: Path, quick: bool = False) -> None:
-        self.folder, self.quick = Path(folder), quick
+    def __init__(self, folder: Path, quick: bool = False, procedures: Collection[str] | None = None) -> None:
+        self.folder, self.quick, self.procedures = Path(folder), quick, procedures
         self.notes: list[str] = []
         self._kept: dict[str, Any] = {}
         self.folder.mkdir(parents=True, exist_ok=True)
@@ -88,7 +90,8 @@ class Laboratory:
         from nonsmooth.experiment.rig import IDENTIFICATION
 
         options: dict[str, Any] = _FEWER if self.quick else {}
-        names = [name for name in IDENTIFICATION if not (self.quick and name == "grazing")]
+        wanted = IDENTIFICATION if self.procedures is None else self.procedures
+        names = [name for name in IDENTIFICATION if name in wanted and not (self.quick and name == "grazing")]
         return self._write("identification", {name: self.rig.record(name, **options.get(name, {})) for name in names})
 
     def _write(self, name: str, made: Mapping[str, Recording]) -> Path:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "APERIODIC", "UNSETTLED", "Interval", "changes", "highest", "jumps", "lowest", "measured_jumps",
-    "measured_periods", "periods_reached", "range_of", "regimes", "separation_rate",
+    "measured_periods", "periods_reached", "range_of", "regimes", "separation_rate", "with_uncertainty",
 ]  # fmt: skip
 
 APERIODIC = 0  # no period found up to the longest looked for
@@ -32,18 +32,30 @@ class Interval:
     high: float
 
     @property
-    def middle(self) -> float:
-        """The best single number."""
+    def value(self) -> float:
+        """The middle, the best single number."""
         return 0.5 * (self.low + self.high)
 
     @property
-    def uncertainty(self) -> float:
-        """Half the width."""
+    def expanded(self) -> float:
+        """Half the width: it lies there for certain."""
         return 0.5 * (self.high - self.low)
 
+    @property
+    def uncertainty(self) -> float:
+        """The standard uncertainty: of something that lies anywhere in it with the same probability."""
+        return float(self.expanded / np.sqrt(3))
+
     def __str__(self) -> str:
-        digits = max(0, 1 - int(np.floor(np.log10(self.uncertainty)))) if self.uncertainty > 0 else 6
-        return f"{self.middle:.{digits}f} ± {self.uncertainty:.{digits}f}"
+        return with_uncertainty(self.value, self.uncertainty)
+
+
+def with_uncertainty(value: float, uncertainty: float) -> str:
+    """``a ± u`` with u the standard uncertainty (GUM), two digits of it; an exact number without."""
+    if not uncertainty > 0:
+        return f"{value:.6g}"
+    digits = max(0, 1 - int(np.floor(np.log10(uncertainty))))
+    return f"{value:.{digits}f} ± {uncertainty:.{digits}f}"
 
 
 def regimes(swept: xr.Dataset, direction: str | None = None) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 __all__ = [
     "FIGURE_9", "FIGURE_10", "FIGURE_11", "FIGURE_12", "FIGURE_13", "FIGURE_14", "FIGURE_14_TEXT", "FIGURE_17",
-    "FIGURE_17_TEXT", "FIGURE_18", "NUMBERS", "TABLE_1", "TEST_MASS", "Printed",
+    "FIGURE_17_TEXT", "FIGURE_18", "NATURAL_FREQUENCY", "NUMBERS", "TABLE_1", "TEST_MASS", "Printed",
 ]  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Printed:
-    """A number as printed: ``text`` keeps its digits, ``place`` says where it stands."""
+    """A number as printed: ``text`` keeps its digits, ``place`` says where it stands.
+
+    ``read_to``: how finely it could be read, where that is coarser than its digits.
+    """
 
     text: str
     unit: str
     place: str
+    read_to: float = 0.0
 
     @property
     def value(self) -> float:
@@ -29,8 +34,18 @@ class Printed:
         digits = len(self.text.partition(".")[2])
         return 0.5 * 10.0**-digits
 
+    @property
+    def resolution(self) -> float:
+        """The coarser of its rounding and of what it was read off."""
+        return max(self.rounding, self.read_to)
+
     def __str__(self) -> str:
         return f"{self.text} {self.unit}".rstrip()
+
+
+#: Half the distance of two lines (Hz) of the DFT of Fig. 5. The printed 0.732 Hz is the 15th line of 2048 samples at
+#: 100 Hz; with more samples another line would be nearer to sqrt(2k/m).
+_HALF_LINE = 0.5 * 100 / 2048
 
 
 # Parameters of the figures (captions and Section 4), with Table 1 for the rest.
@@ -53,15 +68,16 @@ TABLE_1 = {
     "c": Printed("0.87", "N s/m", f"Fig. 6, {_T}"),
     "c_s": Printed("0.60", "N s/m", f"Fig. 7, {_T}"),
     "m": Printed("0.838", "kg", f"Section 3.1, {_T}"),
-    "omega_0": Printed("4.60", "rad/s", f"Fig. 5, {_T}"),
+    "omega_0": Printed("4.60", "rad/s", f"Fig. 5, {_T}", read_to=2 * math.pi * _HALF_LINE),
 }
 TEST_MASS = 1.33  # kg, Fig. 7
+#: sqrt(2k/m) of Table 1 (rad/s); the table prints 4.60 beside it.
+NATURAL_FREQUENCY = math.sqrt(2 * TABLE_1["k"].value / TABLE_1["m"].value)
 
 _9, _11 = "Section 4, on Fig. 9", "Section 4, on Fig. 11"
 NUMBERS = {
     "natural frequency": Printed("4.50", "rad/s", "Section 3.1"),
-    "natural frequency, measured": Printed("4.60", "rad/s", "Section 3.1, Table 1"),
-    "peak of the DFT": Printed("0.732", "Hz", "Fig. 5"),
+    "peak of the DFT": Printed("0.732", "Hz", "Fig. 5", read_to=_HALF_LINE),
     "damping ratio": Printed("0.115", "", "Fig. 6"),
     "damping ratio of the support": Printed("0.0075", "", "Fig. 7"),
     "period 2 near": Printed("3.63", "rad/s", _9),

@@ -1,9 +1,10 @@
-"""The report: one row per statement, the figures, and what the paper leaves open; Markdown, HTML and JSON."""
+"""The report: the verdict in three lines, the printed numbers, the differences with their cause, every statement."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -13,90 +14,194 @@ from nonsmooth.studies.savi2007.flows import ETA, SMOOTHED, Settings
 from nonsmooth.studies.savi2007.pages import (
     Block,
     Bullets,
+    Comparison,
+    Contents,
     Heading,
+    Lines,
+    Notice,
     Paragraph,
     Picture,
     Table,
+    Tally,
     to_html,
     to_markdown,
 )  # fmt: skip
-from nonsmooth.studies.savi2007.printed import NUMBERS
 from nonsmooth.studies.savi2007.rig_parameters import NAMES, table_rows
-from nonsmooth.studies.savi2007.rows import CLOSE, NOT_ASKED, Data, Row
+from nonsmooth.studies.savi2007.rows import Data, Row
 from nonsmooth.studies.savi2007.special import SpecialPoint, ratios, special_table, table_of_points
+from nonsmooth.studies.savi2007.verdicts import CLOSE, MEANING, RULE, Cause, Verdict, judge
 
-__all__ = ["write_report"]
+__all__ = ["REPORTS", "write_report"]
 
-TITLE = "Savi, Divenyi, Franca & Weber (2007): the paper, its model and a virtual rig, side by side"
-_HEADER = (
-    "claim", "where", "paper says", "exact flow", "smoothed switch, RKF45", "difference", "verdict, model",
-    "virtual rig (synthetic)", "verdict, rig", "why",
-)  # fmt: skip
+REPORTS = ("claims.json", "report.md", "report.html")
+
+TITLE = "Savi, Divenyi, Franca & Weber (2007), reproduced"
+_PAPER = (
+    "M.A. Savi, S. Divenyi, L.F.P. Franca, H.I. Weber, Numerical and experimental investigations of the nonlinear "
+    "dynamics and chaos in non-smooth systems, J. Sound Vib. 301 (2007) 59-73, doi:10.1016/j.jsv.2006.09.014."
+)
+#: The long table in parts, by the first letter of a statement's id.
+_PARTS = {
+    "M": "The model (Section 2)", "RP": "Apparatus and parameters (Section 3)", "F": "Results (Section 4)",
+    "C": "Conclusions (Section 5)",
+}  # fmt: skip
+_MODEL, _RIG = "model", "virtual rig (synthetic)"
 
 
 def write_report(
     folder: Path, figures: Sequence[Figure], data: Data, rows: Sequence[Row], settings: Settings, *, complete: bool
 ) -> None:
-    """Write ``report.md``, ``report.html`` and ``claims.json`` into the folder that holds the figures."""
+    """Write ``REPORTS`` into the folder that holds the figures."""
     blocks = _blocks(folder, figures, data, rows, settings, complete)
-    (folder / "report.md").write_text(to_markdown(blocks), encoding="utf-8")
-    (folder / "report.html").write_text(to_html(blocks, TITLE), encoding="utf-8")
-    text = json.dumps([asdict(row) for row in rows], indent=1, ensure_ascii=False)
-    (folder / "claims.json").write_text(text + "\n", encoding="utf-8")
+    text = json.dumps([asdict(row) | {"reason": row.reason} for row in rows], indent=1, ensure_ascii=False)
+    for name, content in zip(REPORTS, (text + "\n", to_markdown(blocks), to_html(blocks, TITLE)), strict=True):
+        (folder / name).write_text(content, encoding="utf-8")
 
 
 def _blocks(
     folder: Path, figures: Sequence[Figure], data: Data, rows: Sequence[Row], settings: Settings, complete: bool
 ) -> list[Block]:
-    blocks: list[Block] = [
-        Heading(TITLE, 1),
-        Paragraph(
-            "M.A. Savi, S. Divenyi, L.F.P. Franca, H.I. Weber, Numerical and experimental investigations of the "
-            "nonlinear dynamics and chaos in non-smooth systems, J. Sound Vib. 301 (2007) 59-73, "
-            "doi:10.1016/j.jsv.2006.09.014. Every statement is measured here on the paper's own model with the "
-            "parameters of its Table 1, none of them tuned: by the exact flow, and by the paper's smoothed switch with "
-            f"eta = {ETA:g} m, integrated by Runge-Kutta-Fehlberg at rtol = {SMOOTHED.options['rtol']:g}. Written by "
-            f"nonsmooth {package_version()}; all numbers are read off the "
-            "datasets beside this file."
-        ),
-    ]
-    if any(figure.rig for figure in figures):
-        blocks.append(Paragraph(_ABOUT_THE_RIG))
+    blocks: list[Block] = [Heading(TITLE, 1), Paragraph(_PAPER)]
     if settings.quick:
-        blocks.append(
-            Paragraph("A quick run: coarse grids and short transients. Intervals are wide, and verdicts provisional.")
-        )
+        blocks.append(Notice("A quick run: coarse grids and short transients. Verdicts are provisional."))
     if not complete:
         names = ", ".join(figure.name for figure in figures)
-        blocks.append(Paragraph(f"A partial run ({names}): only the statements these figures decide are listed."))
+        blocks.append(Notice(f"A partial run ({names}): only the statements that these figures decide are listed."))
     if rows:
-        blocks += [Heading("Statements"), Paragraph(_summary(rows)), Paragraph(_rules()), _table(rows)]
+        blocks += [Lines(_in_short(rows)), Tally(_counts(rows))]
+        blocks += _numbers(rows)
+        blocks += _differences(rows)
+    blocks.append(Contents())
+    if rows:
+        blocks += [Heading("The rule"), Bullets(RULE)]
+        blocks.append(Table(("verdict", "meaning"), tuple((str(one), text) for one, text in MEANING.items())))
+        for letters, title in _PARTS.items():
+            mine = [row for row in rows if row.id[0] in letters]
+            blocks += [Heading(title), _table(mine)] if mine else []
     if "table1" in data:
         blocks += [Heading("Table 1, identified"), _parameters(data)]
     points = table_of_points(data)
     if points:
         blocks += [Heading("Special points"), Paragraph(_about_points(points)), special_table(points)]
-    blocks += [Heading("What the paper leaves open"), Bullets(_OPEN), Heading("Figures")]
+    blocks.append(Heading("Figures"))
     for figure in figures:
         title = figure.title if figure.number is None else f"Fig. {figure.number}: {figure.title}"
         title += f" (not in the paper; beside Fig. {figure.beside})" if figure.beside is not None else ""
         title += " (virtual rig, synthetic)" if figure.rig else ""
         caption = figure.caption(data[figure.name])
         blocks += [Heading(title, 3), Picture(folder / f"{figure.name}.png", f"{figure.name}.pdf", caption)]
-    return blocks
+    blocks += [Heading("The computation"), Paragraph(_about_the_model())]
+    if any(figure.rig for figure in figures):
+        blocks.append(Paragraph(_ABOUT_THE_RIG))
+    return [*blocks, Heading("What the paper leaves open"), Bullets(_OPEN)]
+
+
+def _counts(rows: Sequence[Row]) -> dict[str, dict[Verdict, int]]:
+    """How many statements have each verdict: from the model, from the rig; both sum to all of them."""
+    return {
+        _MODEL: Counter(row.verdict for row in rows),
+        _RIG: Counter(row.rig_verdict for row in rows),
+    }
+
+
+#: Verdicts on statements that count for or against the paper.
+_DECIDING = (Verdict.AGREES, Verdict.IN_PART, Verdict.UNDECIDED, Verdict.DIFFERS)
+
+
+def _in_short(rows: Sequence[Row]) -> tuple[tuple[str, str], ...]:
+    """Three lines: the model, why it differs, the rig."""
+    model, rig = _counts(rows).values()
+    lines = []
+    if any(model[verdict] for verdict in _DECIDING):
+        text = f"{_spread(model)}. Its parameters are those of Table 1, none tuned."
+        pairs = [(row.exact_beside, row.smoothed_beside) for row in rows]
+        both = [
+            judge(a.printed, a, a.resolution) is judge(b.printed, b, b.resolution) for a, b in pairs if a and b
+        ]  # fmt: skip
+        if both:
+            text += f" The paper's smoothed switch: the same verdict on {sum(both)} of {len(both)} printed numbers."
+        lines.append(("The model", text))
+    different = [row for row in rows if row.verdict is Verdict.DIFFERS]
+    if different:
+        words = []
+        for cause in Cause:
+            mine = [row for row in different if row.reason is cause]
+            if mine:
+                names = ", ".join(dict.fromkeys(row.id for row in mine))
+                words.append(f"{len(mine)} {_CAUSES[cause]} ({names})")
+        lines.append(("Where it differs", f"Of {len(different)} statements: {'; '.join(words)}."))
+    if any(rig[verdict] for verdict in (*_DECIDING, Verdict.INPUT)):
+        text = f"{_spread(rig)}. " if any(rig[verdict] for verdict in _DECIDING) else ""
+        if rig[Verdict.INPUT]:
+            text += f"{rig[Verdict.INPUT]} values that were put in came back, which is no evidence on the paper."
+        lines.append(("The virtual rig", f"Synthetic: a computed apparatus with more physics than the model. {text}"))
+    return tuple(lines)
+
+
+#: The causes in a sentence.
+_CAUSES = {
+    Cause.MISPRINT: "misprinted",
+    Cause.TABLE_1: "because Table 1 contradicts itself (omega_0 = 4.60 rad/s; its k and m give 4.50)",
+    Cause.REAL: "real, neither misprinted nor due to Table 1",
+    Cause.RIG: "by the virtual rig",
+}
+
+
+def _spread(counts: Mapping[Verdict, int]) -> str:
+    """``27 of the 34 statements that it can decide agree, 2 in part, 1 undecided, 4 differ``."""
+    n = {verdict: counts.get(verdict, 0) for verdict in _DECIDING}
+    text = f"{n[Verdict.AGREES] or 'None'} of the {sum(n.values())} statements that it can decide agree"
+    text += f", {n[Verdict.IN_PART]} in part" if n[Verdict.IN_PART] else ""
+    text += f", {n[Verdict.UNDECIDED]} undecided" if n[Verdict.UNDECIDED] else ""
+    return text + f", {n[Verdict.DIFFERS] or 'none'} {'differs' if n[Verdict.DIFFERS] == 1 else 'differ'}"
+
+
+def _numbers(rows: Sequence[Row]) -> list[Block]:
+    """The picture of all printed numbers that something was found for."""
+    shown = []
+    for row in rows:
+        mine = (row.exact_beside, row.smoothed_beside, None if row.rig_verdict is Verdict.INPUT else row.rig_beside)
+        if any(one is not None for one in mine):
+            shown.append((f"{row.id}: {row.says}", mine))
+    if not shown:
+        return []
+    caption = (
+        "All printed numbers: what the exact flow, the paper's smoothed switch and the virtual rig (synthetic) give, "
+        "in percent of the printed number. Bars: expanded uncertainty. Grey: the tolerance of the rule. Inputs that "
+        "came back are left out."
+    )
+    sides = ("exact flow", "smoothed switch", "virtual rig")
+    return [Heading("Printed numbers"), Comparison(sides, tuple(shown), CLOSE, caption)]
+
+
+def _differences(rows: Sequence[Row]) -> list[Block]:
+    """The statements that differ, each with its cause."""
+    cells, notes = [], []
+    for row in sorted((row for row in rows if row.differs), key=lambda row: list(Cause).index(row.reason or Cause.RIG)):
+        by = [word for word, verdict in ((_MODEL, row.verdict), ("rig", row.rig_verdict)) if verdict is Verdict.DIFFERS]
+        found = row.exact if row.verdict is Verdict.DIFFERS else row.rig
+        off = row.difference if row.verdict is Verdict.DIFFERS and row.exact_beside is None else ""
+        off = str(row.exact_beside) if row.verdict is Verdict.DIFFERS and row.exact_beside is not None else off
+        cells.append((row.id, row.says, found, off, " and ".join(by), str(row.reason)))
+        notes.append(row.why)
+    if not cells:
+        return []
+    header = ("claim", "the paper says", "found", "difference", "by", "cause")
+    return [Heading("Differences and their cause"), Table(header, tuple(cells), tuple(notes))]
 
 
 def _table(rows: Sequence[Row]) -> Table:
-    cells, last = [], ""
-    for row in rows:
-        name = row.id if row.id != last else ""
-        cells.append((
-            name, row.place, row.says, row.exact, row.smoothed, row.difference, row.verdict, row.rig, row.rig_verdict,
-            row.why,
-        ))  # fmt: skip
-        last = row.id
-    marked = tuple(_HEADER.index(f"verdict, {word}") for word in ("model", "rig"))
-    return Table(_HEADER, tuple(cells), marked=marked)
+    """The long table: a row per statement, its reasons below."""
+    header = (
+        "claim", "the paper says", "exact flow", "smoothed switch", "difference", "verdict, model",
+        "virtual rig (synthetic)", "verdict, rig",
+    )  # fmt: skip
+    cells = tuple(
+        (row.id, f"{row.says} ({row.place})", row.exact, row.smoothed, row.difference, str(row.verdict), row.rig,
+         str(row.rig_verdict))
+        for row in rows
+    )  # fmt: skip
+    return Table(header, cells, tuple(row.why for row in rows))
 
 
 def _parameters(data: Data) -> Table:
@@ -117,34 +222,12 @@ def _parameters(data: Data) -> Table:
     return Table(header, tuple(rows))
 
 
-def _summary(rows: Sequence[Row]) -> str:
-    model = _counted("By the model", [(row, row.verdict) for row in rows])
-    rig = _counted("By the virtual rig", [(row, row.rig_verdict) for row in rows])
-    return f"{len(rows)} statements. {model} {rig}"
-
-
-def _counted(whose: str, judged: Sequence[tuple[Row, str]]) -> str:
-    asked = [(row, verdict) for row, verdict in judged if verdict != NOT_ASKED]
-    within = sum(verdict.startswith("agrees within") for _, verdict in asked)
-    plain, partly = (sum(verdict == word for _, verdict in asked) for word in ("agrees", "agrees in part"))
-    differs = [(row, verdict) for row, verdict in asked if verdict.startswith("differs")]
-    text = (
-        f"{whose}, of {len(asked)} that it can decide: {plain} agree, {within} agree within {CLOSE:g} %, {partly} "
-        f"agree in part, {len(differs)} differ"
-    )
-    if differs:
-        text += ": " + "; ".join(f"{row.id}, {row.says} ({verdict})" for row, verdict in differs)
-    return text + "."
-
-
-def _rules() -> str:
-    one, other = (NUMBERS[key] for key in ("natural frequency", "natural frequency, measured"))
+def _about_the_model() -> str:
     return (
-        "a ± b is the middle and half the width of the step of a sweep (or between two runs of the rig) in which the "
-        "change lies; of a quantity identified, its value and half its 95 % interval. A printed number "
-        f"agrees when it lies there within its own rounding; it agrees within N % up to {CLOSE:g} %, which is about "
-        f"how far the paper's own two natural frequencies ({one} and {other}) lie apart; beyond that it differs. "
-        "Differences are (found - printed) / printed."
+        "Every statement is measured on the paper's own model with the parameters of its Table 1: by the exact flow, "
+        f"and by the paper's smoothed switch with eta = {ETA:g} m, integrated by Runge-Kutta-Fehlberg at rtol = "
+        f"{SMOOTHED.options['rtol']:g}. Written by nonsmooth {package_version()}; all numbers are read off the "
+        "datasets beside this file."
     )
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth import plot
+from nonsmooth.experiment.rig import IDENTIFICATION
 from nonsmooth.plot import identification as pictures
 from nonsmooth.plot.comparison import ABOVE
 from nonsmooth.studies.savi2007.figure import Figure, sheet
@@ -75,7 +76,7 @@ def _caption_4(data: Mapping[str, xr.Dataset]) -> str:
     car, support = found_in(data["oscillator"]), found_in(data["support"])
     return (
         f"Force against displacement, {car.runs} pulls of the car and {support.runs} pushes of the support's spring by "
-        f"hand. (a) Slope 2k = {car.number}, k = {car.number.times(0.5)} (95 %; most of it the force sensor's gain, "
+        f"hand. (a) Slope 2k = {car.number}, k = {car.number.times(0.5)} (most of it the force sensor's gain, "
         f"within 1 %); below, what the mean line leaves, the two ways apart by twice the dry friction. (b) k_s = "
         f"{support.number}. The paper: 8.47 and 1210 N/m."
     )
@@ -102,7 +103,7 @@ def _caption_7(data: Mapping[str, xr.Dataset]) -> str:
     found = found_in(data["drop"])
     return (
         f"Free decay of the support with 1.33 kg on it. (a) One of {found.runs} runs. (b) Logarithm of its turning "
-        f"points: damping ratio {found.others['damping_ratio']}, c_s = {found.number}, from all runs (95 %). "
+        f"points: damping ratio {found.others['damping_ratio']}, c_s = {found.number}, from all runs. "
         "The paper: 0.0075 and 0.60 N s/m."
     )
 
@@ -154,7 +155,7 @@ def _draw_table(data: Mapping[str, xr.Dataset]) -> Canvas:
         ax = canvas.subplots()
         ax.axvline(0, color=plot.COLORS["muted"], linewidth=0.6, zorder=0)
         for i, (name, (printed, number, truth)) in enumerate(rows.items()):
-            middle, half = (100 * (v / truth) for v in (number.value - truth, number.interval.uncertainty))
+            middle, half = (100 * (v / truth) for v in (number.value - truth, number.expanded))
             ax.errorbar(
                 middle, i + 0.12, xerr=half, fmt="o", color=plot.COLORS["first"], markersize=3, capsize=1.5,
                 elinewidth=0.8, label="identified on the virtual rig (synthetic), 95 %" if i == 0 else None,
@@ -190,31 +191,32 @@ FIGURES = (
         _findings({"oscillator": "spring_slope", "support": "support_slope"}),
         _side_by_side(("oscillator", pictures.force_displacement, "(a) oscillator"),
                       ("support", pictures.force_displacement, "(b) support"), height=0.5),
-        _caption_4, rig=True,
+        _caption_4, rig=True, procedures=("springs", "support"),
     ),
     Figure(
         "fig05", 5, "Natural frequency from an impulsive response", _findings({"tap": "omega_0"}),
         _side_by_side(("tap", pictures.impulse_history, "(a) displacement"),
                       ("tap", _spectrum, "(b) magnitude of the DFT"), height=0.5),
-        _caption_5, rig=True,
+        _caption_5, rig=True, procedures=("impulse",),
     ),
     Figure(
         "fig06", 6, "Damping from the amplitude over frequency",
         _findings({"viscous": "c_viscous_only", "amplitudes": "c_response"}),
         _side_by_side(("amplitudes", pictures.amplitude_fit, ""), width=0.62 * plot.PAGE, height=0.5), _caption_6,
-        rig=True,
+        rig=True, procedures=("impulse", "response"),
     ),
     Figure(
         "fig07", 7, "Damping of the support from a free decay", _findings({"drop": "c_s_drop"}),
         _side_by_side(("drop", pictures.impulse_history, "(a) displacement of the test mass"),
                       ("drop", pictures.drop_decay, "(b) turning points")),
-        _caption_7, rig=True,
+        _caption_7, rig=True, procedures=("drop",),
     ),
     Figure(
         "fig08", 8, "Calibrations of the drive", _findings({"voltage": "voltage_frequency", "crank": "crank_force"}),
         _side_by_side(("voltage", pictures.calibration, "(a) motor"), ("crank", pictures.calibration, "(b) crank"),
                       height=0.5),
-        _caption_8, rig=True,
+        _caption_8, rig=True, procedures=("springs", "voltage", "crank"),
     ),
-    Figure("table1", None, "Table 1: parameters identified", _compute_table, _draw_table, _caption_table, rig=True),
+    Figure("table1", None, "Table 1: parameters identified", _compute_table, _draw_table, _caption_table, rig=True,
+           procedures=IDENTIFICATION),
 )  # fmt: skip

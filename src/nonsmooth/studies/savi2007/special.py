@@ -109,7 +109,7 @@ def special_table(points: Sequence[SpecialPoint]) -> Table:
 def _number(value: complex) -> str:
     if abs(value.imag) < 1e-9:
         return f"{value.real:+.6f}"
-    return f"{value.real:.6f} ± {abs(value.imag):.6f}i, modulus {abs(value):.6f}"
+    return f"{value.real:.6f} + {abs(value.imag):.6f}i and its conjugate, modulus {abs(value):.6f}"
 
 
 def ratios(points: Sequence[SpecialPoint]) -> Mapping[str, list[float]]:

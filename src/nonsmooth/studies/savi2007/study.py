@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-import sys
+import tempfile
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from nonsmooth.results.progress import say
 from nonsmooth.studies.savi2007.bench import Bench
 from nonsmooth.studies.savi2007.figure import Figure
+from nonsmooth.studies.savi2007.finished import finish, finished, just_made, refuse_strange
 from nonsmooth.studies.savi2007.flows import Settings
 
 if TYPE_CHECKING:
@@ -21,7 +23,7 @@ if TYPE_CHECKING:
 __all__ = ["Reproduction", "figures_of_the_study", "reproduce"]
 
 PICTURE_DPI = 200
-PARAMETERS = "table1"  # identified for every figure of the rig
+PARAMETERS = "table1"
 
 
 @dataclass(frozen=True)
@@ -67,7 +69,7 @@ def figures_of_the_study(full: bool = False) -> tuple[Figure, ...]:
 
 def reproduce(
     out: str | Path,
-    figures: Sequence[int] | None = None,
+    figures: Sequence[int | str] | None = None,
     quick: bool = False,
     progress: bool = True,
     full: bool = False,
@@ -82,10 +84,12 @@ def reproduce(
     ----------
     out : path
         Folder to write into, made where missing: ``figNN.pdf``, ``figNN.png``, datasets ``figNN_*.nc``,
-        ``report.md``, ``report.html`` (self-contained), ``claims.json``; the rig's sessions in ``rig``.
-    figures : list of int, optional
-        Numbers of the paper's figures, with the basins and charts that belong to them; all, and the effect of eta,
-        where not given. The report then holds the statements that these figures decide.
+        ``report.md``, ``report.html`` (self-contained), ``claims.json``; the rig's sessions in ``rig``. Figures that
+        an earlier run of the same version finished there with the same settings are used again.
+    figures : list of int or str, optional
+        Numbers of the paper's figures (of model and rig), or names of single ones: ``fig11_rig``, ``table1``,
+        ``eta``, ``basins13``. Nothing else is computed, and the report holds the statements that these figures
+        decide, with those of figures that are there already. All where not given.
     quick : bool
         Coarse grids, short transients and records: a first look, whose numbers have wide intervals.
     full : bool
@@ -101,69 +105,83 @@ def reproduce(
     Raises
     ------
     ValueError
-        A figure that is not one of the study.
+        A figure that is not one of the study, or a folder that holds other files, or figures of another kind of run.
+    OSError
+        A folder that cannot be written into.
     RuntimeError
         If the measurement on the virtual rig failed.
     """
     from nonsmooth.studies.savi2007.claims import measure_claims
-    from nonsmooth.studies.savi2007.report import write_report
+    from nonsmooth.studies.savi2007.report import REPORTS, write_report
 
     chosen = _chosen(figures, full)
     folder = Path(out)
-    folder.mkdir(parents=True, exist_ok=True)
+    _make(folder)
     settings = Settings(quick=quick, full=full, progress=progress, folder=folder)
-    data: dict[str, dict[str, xr.Dataset]] = {}
-    seconds: dict[str, float] = {}
-    computed = [figure for figure in chosen if not figure.rig]
-    with Bench(folder, [figure for figure in chosen if figure.rig], quick) as bench:
+    known = figures_of_the_study(full=True)
+    made = {figure.name: found for figure in known if (found := finished(figure.name, settings)) is not None}
+    missing = [figure for figure in chosen if figure.name not in made]
+    if made:
+        say(f"finished before in {folder}: {', '.join(made)}", progress)
+    if missing:
+        for name in REPORTS:  # a report that stands is of the figures beside it
+            (folder / name).unlink(missing_ok=True)
+    computed = [figure for figure in missing if not figure.rig]
+    measured = [figure for figure in missing if figure.rig]
+    with Bench(folder, measured, quick, full) as bench:
         for i, figure in enumerate(computed):
-            _say(progress, f"[{i + 1}/{len(computed)}] {figure.name}: {figure.title}")
+            say(f"[{i + 1}/{len(computed)}] {figure.name}: {figure.title}", progress)
             begin = time.perf_counter()
-            data[figure.name] = figure.compute(settings)
-            _save(figure, data[figure.name], folder)
-            _draw(figure, data[figure.name], folder)
-            seconds[figure.name] = time.perf_counter() - begin
-        _say(progress and bool(bench.figures), "waiting for the records of the virtual rig")
-        measured, times = bench.results()
-    data |= measured
-    seconds |= times
-    for figure in chosen:
-        if figure.rig:
+            datasets = figure.compute(settings)
+            seconds = time.perf_counter() - begin
+            finish(figure.name, datasets, seconds, settings)
+            made[figure.name] = datasets, seconds
+            _draw(figure, datasets, folder)
+        names = ", ".join(one.name for one in measured)
+        say(f"waiting for the virtual rig: {names}", progress and bool(measured))
+        bench.wait(lambda line: say(line, progress))
+    made |= {figure.name: just_made(figure.name, settings) for figure in measured}
+    shown = tuple(figure for figure in known if figure.name in made)
+    data = {figure.name: made[figure.name][0] for figure in shown}
+    for figure in shown:
+        if figure in measured or not _drawn(figure, folder):
             _draw(figure, data[figure.name], folder)
     rows = measure_claims(data)
-    write_report(folder, chosen, data, rows, settings, complete=figures is None)
-    return Reproduction(folder, chosen, data, rows, seconds)
+    write_report(folder, shown, data, rows, settings, complete=set(figures_of_the_study(full)) <= set(shown))
+    return Reproduction(folder, shown, data, rows, {name: seconds for name, (_, seconds) in made.items()})
 
 
-def _chosen(numbers: Sequence[int] | None, full: bool) -> tuple[Figure, ...]:
-    known = figures_of_the_study(full)
-    if numbers is None:
-        return known
-    there = {figure.number for figure in known if figure.number is not None}
-    wrong = sorted(set(numbers) - there)
-    if wrong or not numbers:
+def _make(folder: Path) -> None:
+    """Make the folder, and find out before any work whether it can be written into."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise OSError(f"{folder} cannot be written into ({error.strerror}): give another folder (--out)") from error
+    refuse_strange(folder, [figure.name for figure in figures_of_the_study(full=True)])
+
+
+def _chosen(wanted: Sequence[int | str] | None, full: bool) -> tuple[Figure, ...]:
+    """The figures with these numbers or names, in the order of the report."""
+    if wanted is None:
+        return figures_of_the_study(full)
+    known = figures_of_the_study(full=True)
+    numbers = sorted({figure.number for figure in known if figure.number is not None})
+    names = [figure.name for figure in known]
+    asked = {str(one) for one in wanted}
+    wrong = sorted(asked - set(names) - {str(number) for number in numbers})
+    if wrong or not asked:
         raise ValueError(
-            f"figure {', '.join(map(str, wrong)) or '(none)'} is not among the paper's figures that are reproduced: "
-            f"{', '.join(map(str, sorted(there)))} (1 is a sketch, 3 a photograph)"
+            f"figure {', '.join(wrong) or '(none)'}: the paper's figures that are reproduced are "
+            f"{', '.join(map(str, numbers))} (1 is a sketch, 3 a photograph); a single one of model or rig, or one "
+            f"that the paper has not, goes by its name: {', '.join(names)}"
         )
-    with_rig = any(figure.rig and figure.number in numbers for figure in known)
-    return tuple(
-        figure
-        for figure in known
-        if figure.number in numbers or figure.beside in numbers or (with_rig and figure.name == PARAMETERS)
-    )
+    return tuple(figure for figure in known if figure.name in asked or str(figure.number) in asked)
 
 
-def _say(aloud: bool, text: str) -> None:
-    if aloud and sys.stderr.isatty():
-        print(text, file=sys.stderr)
-
-
-def _save(figure: Figure, data: dict[str, xr.Dataset], folder: Path) -> None:
-    from nonsmooth.results.store import save
-
-    for key, dataset in data.items():
-        save(dataset, folder / f"{figure.name}_{key}.nc")
+def _drawn(figure: Figure, folder: Path) -> bool:
+    return all((folder / f"{figure.name}.{kind}").exists() for kind in ("pdf", "png"))
 
 
 def _draw(figure: Figure, data: dict[str, xr.Dataset], folder: Path) -> None:

@@ -1,7 +1,7 @@
-"""Sign, roots and extrema of the short polynomials on a step of the planar exact flow.
+"""Sign, roots and extrema of the short polynomials on a step of the exact flow.
 
 ``classify`` and ``cubic_root`` see a piece through values and slopes at its ends; the others work on Taylor
-coefficients of degree 7 (``planar_tables.DEGREE``, written out here) in a row of ``scr``.
+coefficients of degree 7 (``linear_tables.DEGREE``, written out here) in a row of ``scr``.
 """
 
 from math import fabs

@@ -1,13 +1,13 @@
-"""True extremes of states, indicators and outputs over the kept window of a planar trajectory.
+"""True extremes of states, indicators and outputs over the kept window of a trajectory.
 
 A step that certainly does not leave the extremes so far costs a dozen multiplications per functional; else the step
 is halved down to two node spacings, where the polynomial's critical points decide.
 """
 
 from .cache import device, inline
-from .planar_polynomial import NEVER, THIRD, classify, critical_points, horner
-from .planar_search import bound_at, compose, slope_of, to_node, value_of
-from .planar_tables import NODES, M
+from .linear_polynomial import NEVER, THIRD, classify, critical_points, horner
+from .linear_search import bound_at, compose, slope_of, to_node, value_of
+from .linear_tables import NODES, ONE, STATES, M
 
 
 @device
@@ -66,9 +66,9 @@ def extreme_slot(f, n_i, maximum, minimum, i_max, i_min, o_max, o_min):
     """Where the extremes of functional f are kept."""
     if f < n_i:
         return i_max, i_min, f
-    if f < n_i + 2:
+    if f < n_i + STATES:
         return maximum, minimum, f - n_i
-    return o_max, o_min, f - n_i - 2
+    return o_max, o_min, f - n_i - STATES
 
 
 @inline
@@ -97,10 +97,10 @@ def find_twins(fun, n_i, twin):
     """Indicators that are a state but for a constant, and which: their extremes follow from the state's."""
     for f in range(n_i):
         twin[f] = -1
-        for k in range(2):
-            same = fun[0, f, k] == 1.0 and fun[0, f, 1 - k] == 0.0
-            for j in range(3, M):
-                same = same and fun[0, f, j] == 0.0
+        for k in range(STATES):
+            same = fun[0, f, k] == 1.0
+            for j in range(M):
+                same = same and (j == k or j == ONE or fun[0, f, j] == 0.0)
             if same:
                 twin[f] = k
 
@@ -110,8 +110,8 @@ def finish(i, fun, n_i, twin, maximum, minimum, i_max, i_min):
     """Extremes of the indicators that are a state but for a constant."""
     for f in range(n_i):
         if twin[f] >= 0:
-            i_max[i, f] = maximum[i, twin[f]] + fun[0, f, 2]
-            i_min[i, f] = minimum[i, twin[f]] + fun[0, f, 2]
+            i_max[i, f] = maximum[i, twin[f]] + fun[0, f, ONE]
+            i_min[i, f] = minimum[i, twin[f]] + fun[0, f, ONE]
 
 
 @device

@@ -1,4 +1,4 @@
-"""Crossings, extremes and dense values on one step of the planar exact flow.
+"""Crossings, extremes and dense values on one step of the exact flow.
 
 On a step the flow is known in closed form, so a functional g (an indicator, a state, an output) is known with
 its slope at any of 33 nodes for a dozen multiplications, and as a Taylor polynomial of degree 7 beside a node
@@ -8,14 +8,15 @@ fourth derivative (K h^4 / 144), keeps its sign; it is *found* where the coeffic
 the piece is halved, and at one node spacing the polynomial's own extrema decide. This finds double roots (grazing)
 and several crossings in one step, and stays sharp when the step starts on the surface.
 
-``scr`` holds Taylor polynomials in rows, one per condition under search (two for x and v in ``dense``).
+``scr`` holds Taylor polynomials in rows: one per condition under search; in ``dense`` and ``refine`` one per state,
+then the condition's.
 """
 
 from math import fabs
 
 from .cache import device, inline
-from .lanes import mix_rows, sum_rows
-from .planar_polynomial import (
+from .lanes import sum_columns, sum_rows
+from .linear_polynomial import (
     NEVER,
     ONCE,
     OPEN,
@@ -26,7 +27,7 @@ from .planar_polynomial import (
     next_upward,
     slope_at,
 )  # fmt: skip
-from .planar_tables import DEGREE, HARMONICS, NODES, M
+from .linear_tables import DEGREE, HARMONICS, NODES, ONE, STATES, WAVE, M
 
 WIDTH = DEGREE + 1
 
@@ -34,78 +35,69 @@ WIDTH = DEGREE + 1
 @inline
 def value_of(fun, mode, f, w):
     """Functional f at w. (Here and below the states come last: they are known later than the harmonics.)"""
-    total = fun[mode, f, 2]
-    for j in range(3, M):
+    total = fun[mode, f, ONE]
+    for j in range(WAVE, M):
         total += fun[mode, f, j] * w[j]
-    return total + fun[mode, f, 1] * w[1] + fun[mode, f, 0] * w[0]
+    for j in range(STATES - 1, -1, -1):
+        total += fun[mode, f, j] * w[j]
+    return total
 
 
 @inline
 def slope_of(fun, mode, f, w):
     """Slope of functional f along the mode at w."""
-    total = fun[mode, f, M + 2]
-    for j in range(3, M):
+    total = fun[mode, f, M + ONE]
+    for j in range(WAVE, M):
         total += fun[mode, f, M + j] * w[j]
-    return total + fun[mode, f, M + 1] * w[1] + fun[mode, f, M] * w[0]
+    for j in range(STATES - 1, -1, -1):
+        total += fun[mode, f, M + j] * w[j]
+    return total
 
 
 @inline
 def bound_at(fun, info, mode, f, w):
     """Bound on the fourth derivative of functional f on the step that starts at w."""
-    dx = fabs(w[0] - info[mode, 2])
-    dv = fabs(w[1] - info[mode, 3])
-    return fun[mode, f, 2 * M] * dx + fun[mode, f, 2 * M + 1] * dv + fun[mode, f, 2 * M + 2]
+    total = fun[mode, f, 2 * M + STATES]
+    for j in range(STATES - 1, -1, -1):
+        total += fun[mode, f, 2 * M + j] * fabs(w[j] - info[mode, 2 + j])
+    return total
 
 
 @inline
 def to_node(prop, rot, mode, node, w, out):
     """w at a node of the step, from w at its start."""
-    x = prop[mode, node, 0, 2]
-    v = prop[mode, node, 1, 2]
-    for j in range(3, M):
-        x += prop[mode, node, 0, j] * w[j]
-        v += prop[mode, node, 1, j] * w[j]
-    x = x + prop[mode, node, 0, 1] * w[1] + prop[mode, node, 0, 0] * w[0]
-    v = v + prop[mode, node, 1, 1] * w[1] + prop[mode, node, 1, 0] * w[0]
     for h in range(HARMONICS):
         c = rot[mode, node, 2 * h]
         s = rot[mode, node, 2 * h + 1]
-        out[3 + 2 * h] = w[3 + 2 * h] * c - w[4 + 2 * h] * s
-        out[4 + 2 * h] = w[4 + 2 * h] * c + w[3 + 2 * h] * s
-    out[0] = x
-    out[1] = v
-    out[2] = 1.0
+        out[WAVE + 2 * h] = w[WAVE + 2 * h] * c - w[WAVE + 1 + 2 * h] * s
+        out[WAVE + 1 + 2 * h] = w[WAVE + 1 + 2 * h] * c + w[WAVE + 2 * h] * s
+    sum_columns(out, prop, mode, node, w, STATES, M)
+    out[ONE] = 1.0
 
 
 @inline
 def compose(tay, mode, f, wn, scr, row):
     """Taylor coefficients of functional f at a node where w is ``wn``, into a row of scr."""
-    sum_rows(scr, row, tay, mode, f, wn, M)
+    sum_rows(scr, row, tay, mode, f, wn, STATES, M)
+
+
+@inline
+def at_node(prop, rot, mode, w, node, wn, found):
+    """w at a node of the step. ``found[1]``: the node for which it stands there already with the Taylor coefficients of
+    the states (``place``), -2 - node: without them, -1: none."""
+    if found[1] != node and found[1] != -2 - node:
+        to_node(prop, rot, mode, node, w, wn)
+        found[1] = -2 - node
 
 
 @inline
 def place(prop, rot, tay, mode, n_i, w, node, wn, scr, found):
-    """w at a node of the step, and there the Taylor coefficients of x and v (rows 0 and 1 of scr).
-
-    ``found[1]`` is the node for which they stand there already."""
+    """w at a node of the step, and there the Taylor coefficients of the states (the first rows of scr)."""
     if found[1] != node:
-        to_node(prop, rot, mode, node, w, wn)
-        compose(tay, mode, n_i, wn, scr, 0)
-        compose(tay, mode, n_i + 1, wn, scr, 1)
+        at_node(prop, rot, mode, w, node, wn, found)
+        for r in range(STATES):
+            compose(tay, mode, n_i + r, wn, scr, r)
         found[1] = node
-
-
-@inline
-def combine(fun, tay, mode, f, n_i, wn, scr, row):
-    """Like ``compose``, after ``place``: a functional without harmonics of its own is a sum of the states."""
-    plain = f < n_i
-    for j in range(3, M):
-        plain = plain and fun[mode, f, j] == 0.0
-    if plain:
-        mix_rows(scr, row, fun[mode, f, 0], fun[mode, f, 1])
-        scr[row, 0] += fun[mode, f, 2]
-    else:
-        compose(tay, mode, f, wn, scr, row)
 
 
 @inline
@@ -121,22 +113,22 @@ def turn(angle, c, s):
 def dense(prop, rot, tay, info, mode, n_i, rates, w, tau, wn, scr, found, out):
     """w at any instant of the step."""
     spacing = info[mode, 1]
-    node = found[1]
+    node = found[1] if found[1] >= 0 else -2 - found[1]
     if node < 0 or fabs(tau - node * spacing) > 0.75 * spacing:
         node = min(int(tau / spacing + 0.5), NODES)
     place(prop, rot, tay, mode, n_i, w, node, wn, scr, found)
     local = tau - node * spacing
-    out[0] = horner(scr, 0, local)
-    out[1] = horner(scr, 1, local)
-    out[2] = 1.0
+    for r in range(STATES):
+        out[r] = horner(scr, r, local)
+    out[ONE] = 1.0
     for h in range(HARMONICS):
-        c, s = turn(rates[h] * local, wn[3 + 2 * h], wn[4 + 2 * h])
-        out[3 + 2 * h] = c
-        out[4 + 2 * h] = s
+        c, s = turn(rates[h] * local, wn[WAVE + 2 * h], wn[WAVE + 1 + 2 * h])
+        out[WAVE + 2 * h] = c
+        out[WAVE + 1 + 2 * h] = s
 
 
 @inline
-def refine(prop, rot, fun, tay, info, mode, n_i, w, f, sign, zero, guess, wn, scr, found):
+def refine(prop, rot, tay, info, mode, w, f, sign, zero, guess, wn, scr, found):
     """The upward root of a functional near a good guess, on its polynomial beside the nearest node; -1: not found.
 
     Halley's method: of third order, so that two steps mostly do. What has not converged is not found."""
@@ -145,21 +137,21 @@ def refine(prop, rot, fun, tay, info, mode, n_i, w, f, sign, zero, guess, wn, sc
     result = -1.0
     for _ in range(4):
         node = min(max(int(tau / spacing + 0.5), 0), NODES)
-        place(prop, rot, tay, mode, n_i, w, node, wn, scr, found)
-        combine(fun, tay, mode, f, n_i, wn, scr, 2)
+        at_node(prop, rot, mode, w, node, wn, found)
+        compose(tay, mode, f, wn, scr, STATES)
         if node == 0 and zero != 0:
-            scr[2, 0] = 0.0
+            scr[STATES, 0] = 0.0
             if zero == 2:
-                scr[2, 1] = 0.0
+                scr[STATES, 1] = 0.0
         local = tau - node * spacing
         converged = False
         slope = 1.0
         for _k in range(10):
             if not (fabs(local) <= 0.75 * spacing):
                 break
-            value = horner(scr, 2, local)
-            slope = slope_at(scr, 2, local)
-            half = 0.5 * curvature_at(scr, 2, local)
+            value = horner(scr, STATES, local)
+            slope = slope_at(scr, STATES, local)
+            half = 0.5 * curvature_at(scr, STATES, local)
             change = value * slope / (slope * slope - value * half)
             local -= change
             # the next change would be the cube of this one, over the square of the time scale
@@ -305,7 +297,7 @@ def search(
                     f = rows[row, 0]
                     flag = zero[f] if f < zero.shape[0] else 0
                     tau = refine(
-                        prop, rot, fun, tay, info, mode, n_i, w, f, float(rows[row, 1]), flag, tau, wn, scr, found
+                        prop, rot, tay, info, mode, w, f, float(rows[row, 1]), flag, tau, wn, scr, found
                     )
                     # the root of another piece is not the one that is certain here
                     if not ((node - 1e-6) * spacing <= tau <= (last + 1e-6) * spacing):

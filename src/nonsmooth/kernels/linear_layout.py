@@ -1,10 +1,10 @@
-"""Argument types, scratch memory and limits of the two planar kernels."""
+"""Argument types, scratch memory and limits of the kernels of the exact flow."""
 
 import numpy as np
 
 from .block import one_block
-from .planar_search import WIDTH
-from .planar_tables import DEGREE, HARMONICS, NODES, TERMS, M
+from .linear_search import WIDTH
+from .linear_tables import DEGREE, HARMONICS, NODES, STATES, TERMS, M
 
 MOST_CROSSINGS = 1000  # within one section return
 MOST_STEPS = 2_000_000  # on the way to a surface that may never be met again
@@ -26,10 +26,11 @@ def scratch(n_modes, n_indicators, n_outputs, n_rows):
     """Work arrays for one thread: prop, rot, fun, tay, field, info, row, vectors, scr, points, rates, integers.
 
     The last integer is the point for which the tables stand there already, plus one."""
-    n_f = n_indicators + 2 + n_outputs
+    n_f = n_indicators + STATES + n_outputs
     return one_block(
-        np.zeros((n_modes, NODES + 1, 2, M)), np.zeros((n_modes, NODES + 1, 2 * HARMONICS + 1)),
-        np.zeros((n_modes, n_f, 2 * M + 6)), np.zeros((n_modes, n_f, M, DEGREE + 1)), np.zeros((n_modes, 2, M)),
-        np.zeros((n_modes, 4)), np.zeros((TERMS + 1, M)), np.zeros((7, M)), np.zeros((n_rows + 3, WIDTH)),
+        np.zeros((n_modes, NODES + 1, M, STATES)), np.zeros((n_modes, NODES + 1, 2 * HARMONICS + 1)),
+        np.zeros((n_modes, n_f, 2 * (M + STATES + 1))), np.zeros((n_modes, n_f, M, DEGREE + 1)),
+        np.zeros((n_modes, STATES, M)), np.zeros((n_modes, 2 + STATES)), np.zeros((max(TERMS, STATES) + 1, M)),
+        np.zeros((8, M)), np.zeros((n_rows + STATES + 1, WIDTH)),
         np.zeros(4), np.zeros(HARMONICS), np.zeros(2 * n_indicators + 5, dtype=np.int64),
     )  # fmt: skip

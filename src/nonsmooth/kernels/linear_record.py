@@ -1,12 +1,12 @@
-"""One trajectory with its samples, crossings and touches, by the exact flow of planar systems."""
+"""One trajectory with its samples, crossings and touches, by the exact flow."""
 
 from .cache import device, kernel
 from .codes import CHATTER, DIVERGED, LOG_FULL, OK, TOO_MANY_CROSSINGS
-from .planar_layout import _INTEGERS, _LINEAR, _MATRIX, _NET, _SCRATCH, _VECTOR, BURST, MOST_CROSSINGS, SHORT
-from .planar_march import bounded, jump, leg, mark_zeros, next_holding, set_phase, settle, trigger, wrap_phase
-from .planar_polynomial import critical_points, curvature_at, horner
-from .planar_search import compose, dense, to_node
-from .planar_tables import HARMONICS, NODES, M, build
+from .linear_layout import _INTEGERS, _LINEAR, _MATRIX, _NET, _SCRATCH, _VECTOR, BURST, MOST_CROSSINGS, SHORT
+from .linear_march import bounded, jump, leg, mark_zeros, next_holding, set_phase, settle, trigger, wrap_phase
+from .linear_polynomial import critical_points, curvature_at, horner
+from .linear_search import compose, dense, to_node
+from .linear_tables import HARMONICS, NODES, ONE, STATES, M, build
 
 
 @device
@@ -36,9 +36,9 @@ def log_touches(
                     touch_time[n] = base + tau
                     touch_indicator[n] = f
                     touch_gap[n] = -value
-                    for r_ in range(2):
-                        compose(tay, mode, n_i + r_, wn, scr, 1)
-                        touch_u[n, r_] = horner(scr, 1, local)
+                    for j in range(STATES):
+                        compose(tay, mode, n_i + j, wn, scr, 1)
+                        touch_u[n, j] = horner(scr, 1, local)
                     n += 1
     return n
 
@@ -78,9 +78,9 @@ def record(
     s = clock[0]
     whole = clock[1]
     mode = counters[0]
-    w[0] = u[0]
-    w[1] = u[1]
-    w[2] = 1.0
+    for j in range(STATES):
+        w[j] = u[j]
+    w[ONE] = 1.0
     set_phase(w, s, rates)
     code = OK
     mark_zeros(fun, info, mode, w, zero)
@@ -107,8 +107,8 @@ def record(
             found[0] = -1
         while n_s < samples.shape[0] and samples[n_s] - base < step:
             dense(prop, rot, tay, info, mode, n_i, rates, w, max(samples[n_s] - base, 0.0), wn, scr, found, wp)
-            sample_u[n_s, 0] = wp[0]
-            sample_u[n_s, 1] = wp[1]
+            for j in range(STATES):
+                sample_u[n_s, j] = wp[j]
             sample_mode[n_s] = mode
             sample_segment[n_s] = n_c
             n_s += 1
@@ -140,11 +140,11 @@ def record(
                     break
                 crossing_time[n_c] = base
                 crossing_transition[n_c] = t
-                u_before[n_c, 0] = w[0]
-                u_before[n_c, 1] = w[1]
+                for j in range(STATES):
+                    u_before[n_c, j] = w[j]
                 mode = jump(0, t, fired if jumps == 0 else -1, fun, info, w, wn, transitions, ra, rb, rc, rs, zero)
-                u_after[n_c, 0] = w[0]
-                u_after[n_c, 1] = w[1]
+                for j in range(STATES):
+                    u_after[n_c, j] = w[j]
                 n_c += 1
                 jumps += 1
                 t = next_holding(fun, tay, mode, w, rows, row_start, mode_start, mode_list, zero)
@@ -158,13 +158,13 @@ def record(
             code = DIVERGED
     if code == OK:
         while n_s < samples.shape[0] and samples[n_s] <= until:
-            sample_u[n_s, 0] = w[0]
-            sample_u[n_s, 1] = w[1]
+            for j in range(STATES):
+                sample_u[n_s, j] = w[j]
             sample_mode[n_s] = mode
             sample_segment[n_s] = n_c
             n_s += 1
-    u[0] = w[0]
-    u[1] = w[1]
+    for j in range(STATES):
+        u[j] = w[j]
     clock[0] = s
     clock[1] = whole
     clock[2] = T if T < 1e300 else 0.0

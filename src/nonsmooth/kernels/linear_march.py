@@ -1,7 +1,7 @@
-"""One leg of a planar trajectory and what happens at its end: jumps, after-limits, start rules.
+"""One leg of a trajectory and what happens at its end: jumps, after-limits, start rules.
 
 A leg is one step of the mode, or its part up to the first crossing, section return or stop. ``w`` holds
-(x, v, 1, cos k_1 w t, sin k_1 w t, ...), ``s`` is the time since the start of the forcing period.
+(u_1, ..., u_n, 1, cos k_1 w t, sin k_1 w t, ...), ``s`` is the time since the start of the forcing period.
 
 ``transitions`` rows: target, has reset, is contact. ``rows`` rows: functional, sign, strict; the last two belong to
 the Poincare section (rising, falling). ``mode_start``/``mode_list``: outgoing transitions of a mode in declared order.
@@ -11,8 +11,8 @@ from math import cos, fabs, isfinite, sin
 
 from .cache import device, inline
 from .codes import BEYOND_STOP, OK
-from .planar_search import NEVER, bound_at, classify, dense, search, slope_of, to_node, turn, value_of
-from .planar_tables import HARMONICS, NODES, M
+from .linear_search import NEVER, bound_at, classify, dense, search, slope_of, to_node, turn, value_of
+from .linear_tables import HARMONICS, NODES, ONE, STATES, WAVE, M
 
 EPS = 2.3e-16
 
@@ -21,8 +21,8 @@ EPS = 2.3e-16
 def set_phase(w, s, rates):
     """Harmonics of the forcing at the time s in the period."""
     for h in range(HARMONICS):
-        w[3 + 2 * h] = cos(rates[h] * s)
-        w[4 + 2 * h] = sin(rates[h] * s)
+        w[WAVE + 2 * h] = cos(rates[h] * s)
+        w[WAVE + 1 + 2 * h] = sin(rates[h] * s)
 
 
 @inline
@@ -33,15 +33,15 @@ def wrap_phase(w, s, mode, info, rot, rates):
     local = s - node * spacing
     for h in range(HARMONICS):
         c, s_ = turn(rates[h] * local, rot[mode, node, 2 * h], rot[mode, node, 2 * h + 1])
-        w[3 + 2 * h] = c
-        w[4 + 2 * h] = s_
+        w[WAVE + 2 * h] = c
+        w[WAVE + 1 + 2 * h] = s_
 
 
 @inline
 def rounding(fun, mode, f, at, w):
     """Below this the row fun[mode, f, at:] is zero within rounding at w."""
-    total = fabs(fun[mode, f, at] * w[0]) + fabs(fun[mode, f, at + 1] * w[1]) + fabs(fun[mode, f, at + 2])
-    for j in range(3, M):
+    total = 0.0
+    for j in range(M):
         total += fabs(fun[mode, f, at + j] * w[j])
     return 16.0 * EPS * total
 
@@ -72,10 +72,10 @@ def mark_zeros(fun, info, mode, w, zero):
 def sign_of_derivatives(tay, mode, f, w):
     """Sign of the first derivative of functional f, from the second to the fourth, that is not zero."""
     for k in range(2, 5):
-        total = tay[mode, f, 2, k]
+        total = tay[mode, f, ONE, k]
         size = fabs(total)
         for j in range(M):
-            if j != 2:
+            if j != ONE:
                 total += tay[mode, f, j, k] * w[j]
                 size += fabs(tay[mode, f, j, k] * w[j])
         if fabs(total) > 64.0 * EPS * size:
@@ -139,12 +139,14 @@ def jump(i, t, fired, fun, info, w, wn, transitions, ra, rb, rc, rs, zero):
     mode = transitions[t, 0]
     if transitions[t, 1] != 0:
         off = fabs(value_of(fun, mode, fired, w)) if fired >= 0 else 0.0
-        for r in range(2):
-            wn[r] = ra[i, t, r, 0] * w[0] + ra[i, t, r, 1] * w[1] + rb[i, t, r]
+        for r in range(STATES):
+            wn[r] = rb[i, t, r]
+            for j in range(STATES):
+                wn[r] += ra[i, t, r, j] * w[j]
             for h in range(HARMONICS):
-                wn[r] += rc[i, t, h, r] * w[3 + 2 * h] + rs[i, t, h, r] * w[4 + 2 * h]
-        w[0] = wn[0]
-        w[1] = wn[1]
+                wn[r] += rc[i, t, h, r] * w[WAVE + 2 * h] + rs[i, t, h, r] * w[WAVE + 1 + 2 * h]
+        for r in range(STATES):
+            w[r] = wn[r]
         if fired >= 0 and fabs(value_of(fun, mode, fired, w)) > 2.0 * off:
             fired = -1
     mark_zeros(fun, info, mode, w, zero)
@@ -223,7 +225,10 @@ def stride(
             s -= period
             whole += 1.0
             wrap_phase(w, s, mode, info, rot, rates)
-            if not (fabs(w[0]) < 1e300 and fabs(w[1]) < 1e300):
+            lost = False
+            for r in range(STATES):
+                lost = lost or not fabs(w[r]) < 1e300
+            if lost:
                 break
         for f in range(zero.shape[0]):
             zero[f] = 0
@@ -290,4 +295,7 @@ def leg(
 @inline
 def bounded(w, limit):
     """Finite and below the limits of divergence."""
-    return isfinite(w[0]) and isfinite(w[1]) and fabs(w[0]) < limit[0] and fabs(w[1]) < limit[1]
+    within = True
+    for r in range(STATES):
+        within = within and isfinite(w[r]) and fabs(w[r]) < limit[r]
+    return within

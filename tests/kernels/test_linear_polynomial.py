@@ -1,4 +1,4 @@
-"""What the planar search is certain of on a piece, against quartics whose fourth derivative is the bound."""
+"""What the exact flow's search is certain of on a piece, against quartics whose fourth derivative is the bound."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ import pytest
 from numba import njit
 from numpy.polynomial import polynomial as P
 
-from nonsmooth.kernels import planar_polynomial as planar
+from nonsmooth.kernels import linear_polynomial as linear
 
-NAMES = {planar.NEVER: "never", planar.ALWAYS: "always", planar.ONCE: "once", planar.OPEN: "open"}
+NAMES = {linear.NEVER: "never", linear.ALWAYS: "always", linear.ONCE: "once", linear.OPEN: "open"}
 
 
 @njit
 def _classify(g0: float, s0: float, g1: float, s1: float, h: float, bound: float) -> int:
-    return planar.classify(g0, s0, g1, s1, h, bound)
+    return linear.classify(g0, s0, g1, s1, h, bound)
 
 
 @njit
 def _bracketed(row: np.ndarray, lo: float, hi: float) -> float:
-    return planar.bracketed(row, 0, 0, lo, hi)
+    return linear.bracketed(row, 0, 0, lo, hi)
 
 
 def classify(g: np.ndarray, h: float, bound: float) -> str:

@@ -1,6 +1,6 @@
-"""The engine of the exact flow for two states: affine indicators and resets, harmonic forcing.
+"""The engine of the exact flow: linear modes with harmonic forcing, affine indicators and resets, any number of states.
 
-It only packs a system into the arrays of ``kernels.planar_module`` and unpacks what comes back.
+It only packs a system into the arrays of ``kernels.linear_module`` and unpacks what comes back.
 """
 
 from __future__ import annotations
@@ -19,19 +19,20 @@ if TYPE_CHECKING:
     from nonsmooth.system.linear import LinearForm
     from nonsmooth.system.traced import Traced
 
-__all__ = ["PlanarEngine", "is_planar"]
+__all__ = ["LinearEngine", "PlanarEngine", "is_linear"]
 
 DIVERGENCE = 1e9  # in units of a state's scale
+LARGEST = 64e6  # bytes of the tables of all modes
 
 
-def is_planar(traced: Traced, form: LinearForm | None) -> bool:
-    """Whether the fast kernel covers the system: two states, everything affine, no memory, no mode that lacks one.
+def is_linear(traced: Traced, form: LinearForm | None) -> bool:
+    """Whether the fast kernel covers the system: everything affine, no memory, no mode that lacks a state.
 
     It notes the modes of a start rule as bits of one integer: 62 modes at most."""
     return (
         form is not None
         and len(traced.mode_names) <= 62
-        and len(traced.u) == 2
+        and table_bytes(len(traced.u), len(form.multiples), len(traced.mode_names)) <= LARGEST
         and form.affine_indicators
         and form.affine_resets
         and not traced.memory_names
@@ -39,10 +40,16 @@ def is_planar(traced: Traced, form: LinearForm | None) -> bool:
     )
 
 
+def table_bytes(states: int, harmonics: int, modes: int) -> int:
+    """Memory of the propagators, which are most of the tables."""
+    return 8 * modes * 33 * states * (states + 1 + 2 * harmonics)
+
+
 @dataclass
 class Tables:
     """Arrays of the kernel for P parameter points, and scratch memory for each thread that asks for it."""
 
+    points: FloatArray
     linear: tuple[Any, ...]
     period: FloatArray
     module: ModuleType
@@ -59,12 +66,12 @@ class Tables:
 
 
 @dataclass
-class PlanarEngine:
-    """``Engine`` over ``kernels.planar_module`` for one system's traced form."""
+class LinearEngine:
+    """``Engine`` over ``kernels.linear_module`` for one system's traced form."""
 
     traced: Traced
     form: LinearForm
-    scale: FloatArray  # (2,)
+    scale: FloatArray  # (n,)
     name: str = "exact"
     net: tuple[Any, ...] = field(init=False)
 
@@ -79,7 +86,8 @@ class PlanarEngine:
             outputs = (t.oa, t.ob, t.oc, t.os)
         else:
             shape = (n_points, 0, n_modes)
-            outputs = (np.zeros((*shape, 2)), np.zeros(shape), np.zeros((*shape, n_h)), np.zeros((*shape, n_h)))
+            waves = np.zeros((*shape, n_h))
+            outputs = (np.zeros((*shape, len(self.scale))), np.zeros(shape), waves, waves)
         multiples = np.array(self.form.multiples, dtype=np.int64)
         with np.errstate(divide="ignore"):
             period = np.where(t.omega > 0.0, 2.0 * np.pi / t.omega, np.inf)
@@ -88,12 +96,12 @@ class PlanarEngine:
             t.ia, t.ib, t.ic, t.is_, *outputs, t.ra, t.rb, t.rc, t.rs,
         )  # fmt: skip
         from nonsmooth.kernels.cache import compiled
-        from nonsmooth.kernels.planar_module import planar_module
+        from nonsmooth.kernels.linear_module import linear_module
 
-        module = planar_module(n_h)
+        module = linear_module(len(self.scale), n_h)
         if n_points > 1:  # threads may share them
             compiled(module.chain)
-        return Tables(linear, period, module, (n_modes, n_i, outputs[0].shape[1], len(self.net[1])))
+        return Tables(points, linear, period, module, (n_modes, n_i, outputs[0].shape[1], len(self.net[1])))
 
     def chain(
         self, tables: Tables, first: int, last: int, state: State, starts: FloatArray | None,
@@ -107,7 +115,7 @@ class PlanarEngine:
             state.keep_phase(float(tables.period[first]), plan.phase if plan.indicator < 0 else -1.0)
             state.clock[2] = 0.0  # for the kernel: done, take the time as it stands
         tables.module.chain(
-            first, last, int(carry), np.zeros((1, 2)) if starts is None else starts,
+            first, last, int(carry), np.zeros((1, len(self.scale))) if starts is None else starts,
             state.u, state.clock, state.counters,
             *tables.linear, self.net[0], rows, *self.net[2:],
             plan.phase, section, plan.t_max, transient, keep, DIVERGENCE * self.scale,
@@ -122,10 +130,10 @@ class PlanarEngine:
 
     def record(self, tables: Tables, state: State, until: float, samples: FloatArray) -> Log:
         n = len(samples)
-        sample_u, sample_mode = np.full((n, 2), np.nan), np.full(n, -1, dtype=np.int64)
+        sample_u, sample_mode = np.full((n, len(self.scale)), np.nan), np.full(n, -1, dtype=np.int64)
         sample_segment = np.zeros(n, dtype=np.int64)
         size = 1024
-        logs = [*_crossing_log(size), *_touch_log(size)]
+        logs = self._logs(size)
         progress = np.zeros(5, dtype=np.int64)
         scratch = tables.scratch()
         state.counters[1] = int(state.settled)
@@ -138,7 +146,7 @@ class PlanarEngine:
             if code != codes.LOG_FULL:
                 break
             size *= 2
-            grown = [*_crossing_log(size), *_touch_log(size)]
+            grown = self._logs(size)
             for old, new in zip(logs, grown, strict=True):
                 new[: len(old)] = old
             logs = grown
@@ -152,6 +160,12 @@ class PlanarEngine:
             touch_times, indicators, touch_u, clearances, int(code),
         )  # fmt: skip
 
+    def _logs(self, size: int) -> list[np.ndarray]:
+        """Room for crossings (time, transition, states before, after), and touches (time, indicator, states, gap)."""
+        n = len(self.scale)
+        crossings = [np.zeros(size), np.zeros(size, dtype=np.int64), np.zeros((size, n)), np.zeros((size, n))]
+        return [*crossings, np.zeros(size), np.zeros(size, dtype=np.int64), np.zeros((size, n)), np.zeros(size)]
+
     def _with_section(self, plan: SectionPlan) -> np.ndarray:
         """The rows of the net, its last two being the section's (rising, falling)."""
         rows: np.ndarray = self.net[1].copy()
@@ -159,12 +173,8 @@ class PlanarEngine:
         return rows
 
 
-def _crossing_log(n: int) -> list[np.ndarray]:
-    return [np.zeros(n), np.zeros(n, dtype=np.int64), np.zeros((n, 2)), np.zeros((n, 2))]
-
-
-def _touch_log(n: int) -> list[np.ndarray]:
-    return [np.zeros(n), np.zeros(n, dtype=np.int64), np.zeros((n, 2)), np.zeros(n)]
+class PlanarEngine(LinearEngine):
+    """That of two states: its spectrum, its judging of many jobs and its GPU kernels are compiled as well."""
 
 
 def pack_net(traced: Traced) -> tuple[Any, ...]:

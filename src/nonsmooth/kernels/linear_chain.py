@@ -1,9 +1,9 @@
-"""The points of a sweep one after the other, by the exact flow of planar systems."""
+"""The points of a sweep one after the other, by the exact flow."""
 
 from .cache import inline, kernel
 from .codes import CHATTER, DIVERGED, NO_CONVERGENCE, OK, TOO_MANY_CROSSINGS
-from .planar_extremes import find_twins, finish, include, widen
-from .planar_layout import (
+from .linear_extremes import find_twins, finish, include, widen
+from .linear_layout import (
     _INTEGERS,
     _LINEAR,
     _MATRIX,
@@ -16,9 +16,9 @@ from .planar_layout import (
     MOST_STEPS,
     SHORT,
 )  # fmt: skip
-from .planar_march import bounded, jump, leg, next_holding, set_phase, settle, sign_after, stride, trigger, wrap_phase
-from .planar_search import dense, value_of
-from .planar_tables import HARMONICS, M, build
+from .linear_march import bounded, jump, leg, next_holding, set_phase, settle, sign_after, stride, trigger, wrap_phase
+from .linear_search import dense, value_of
+from .linear_tables import HARMONICS, ONE, STATES, M, build
 
 
 @inline
@@ -53,14 +53,14 @@ def chain(
     on.
     """
     n_i = ia.shape[1]
-    w, w1, wn, wp, wq, end, there = (
-        vectors[0], vectors[1], vectors[2], vectors[3], vectors[4], vectors[5], vectors[6],
+    w, w1, wn, wp, wq, end, there, before = (
+        vectors[0], vectors[1], vectors[2], vectors[3], vectors[4], vectors[5], vectors[6], vectors[7],
     )  # fmt: skip
     zero = integers[0:n_i]
     found = integers[n_i : n_i + 4]
     twin = integers[n_i + 4 : 2 * n_i + 4]
     surface, direction, surface_mode, after, every, extremes = plan[0], plan[1], plan[2], plan[3], plan[4], plan[5]
-    w[2] = 1.0
+    w[ONE] = 1.0
     # whole steps at a stride: only where nothing but a crossing can end a step
     strides = surface < 0 and period[first] < 1e300
     for k in range(at.shape[0]):
@@ -78,15 +78,15 @@ def chain(
         whole = 0.0
         mode = 0
         if carry != 0:
-            w[0] = u[0]
-            w[1] = u[1]
+            for j in range(STATES):
+                w[j] = u[j]
             mode = counters[0]
             whole = clock[1]
             # carried at equal phase of the forcing, also where its frequency changes
             s = clock[0] / clock[2] * T if clock[2] > 0.0 else clock[0]
         else:
-            w[0] = starts[i, 0]
-            w[1] = starts[i, 1]
+            for j in range(STATES):
+                w[j] = starts[i, j]
         for k in range(maximum.shape[1]):
             maximum[i, k] = -1e300
             minimum[i, k] = 1e300
@@ -157,8 +157,8 @@ def chain(
                     if is_open:
                         k = returns - transient - 1
                         dense(prop, rot, tay, info, mode, n_i, rates, w, r, wn, scr, found, wp)
-                        section[i, k, 0] = wp[0]
-                        section[i, k, 1] = wp[1]
+                        for j in range(STATES):
+                            section[i, k, j] = wp[j]
                         section_mode[i, k] = mode
                         turn = whole if s < target and target <= s1 else whole + 1.0
                         section_time[i, k] = turn * T + target
@@ -178,8 +178,8 @@ def chain(
                 elapsed[i] += b_ - a
             if closed:
                 s = target
-                w[0] = section[i, keep - 1, 0]
-                w[1] = section[i, keep - 1, 1]
+                for j in range(STATES):
+                    w[j] = section[i, keep - 1, j]
                 break
             waited += step
             tries += 1
@@ -198,8 +198,8 @@ def chain(
                 zero[f] = 0
             if t >= 0 or crossed != 0:
                 fired = found[0]
-                before0 = w[0]
-                before1 = w[1]
+                for j in range(STATES):
+                    before[j] = w[j]
                 before_mode = mode
                 jumps = 0
                 sense = 0
@@ -245,8 +245,8 @@ def chain(
                         returns += 1
                         if returns > transient:
                             k = returns - transient - 1
-                            section[i, k, 0] = w[0] if after != 0 else before0
-                            section[i, k, 1] = w[1] if after != 0 else before1
+                            for j in range(STATES):
+                                section[i, k, j] = w[j] if after != 0 else before[j]
                             section_mode[i, k] = mode if after != 0 else before_mode
                             section_time[i, k] = (whole * T if T < 1e300 else 0.0) + s
             if late and code == OK:
@@ -255,8 +255,8 @@ def chain(
                 n_here = 0
                 if returns > transient:
                     k = returns - transient - 1
-                    section[i, k, 0] = w[0]
-                    section[i, k, 1] = w[1]
+                    for j in range(STATES):
+                        section[i, k, j] = w[j]
                     section_mode[i, k] = mode
                     section_time[i, k] = whole * T + target
             if surface >= 0:
@@ -273,8 +273,8 @@ def chain(
         finish(i, fun, n_i, twin, maximum, minimum, i_max, i_min)
         status[i] = code
         if code == OK:
-            u[0] = w[0]
-            u[1] = w[1]
+            for j in range(STATES):
+                u[j] = w[j]
             clock[0] = s
             clock[1] = whole
             clock[2] = T if T < 1e300 else 0.0

@@ -1,0 +1,228 @@
+"""Equilibria: states from which nothing moves, their eigenvalues, and what a verb says of one.
+
+A state is an equilibrium of a mode where its vector field vanishes, at every time, and no transition leads out. Beside
+it neighbours separate like exp(Re(lambda) t), lambda the eigenvalues of the field's Jacobian (under a forcing: the
+multipliers of one period, lambda = log(mu) / T).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from nonsmooth.system.system import System
+    from nonsmooth.system.traced import Traced
+
+__all__ = ["AT_REST", "ROUNDING", "Equilibrium", "ModeField", "equilibrium_at", "refuse_resting", "sorted_eigenvalues"]
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+AT_REST = 1e-7  # of a state's size: nearer to an equilibrium than this is at it
+ROUNDING = 1e-14  # and nearer than this nothing but rounding leads away
+VANISHING = 1e-9  # of an eigenvalue's size, of an indicator's: zero
+STEPS = 256  # of a forcing period, over which the Jacobian is taken as constant
+SURE = 1e-3  # of a multiplier found so
+
+
+class ModeField:
+    """The vector field of one mode and the indicators, with their derivatives, as functions of numbers.
+
+    Parameters
+    ----------
+    traced : Traced
+    mode : int
+    places : sequence of int
+        Parameters in which derivatives are wanted.
+    """
+
+    def __init__(self, traced: Traced, mode: int, places: Sequence[int] = ()) -> None:
+        import sympy as sp
+
+        self.traced, self.mode, self._n_places = traced, mode, len(places)
+        # States that the mode lacks stay zero.
+        self.own = [i for i in range(len(traced.u)) if not traced.lacking[mode][i]]
+        u = [traced.u[i] for i in self.own]
+        f = [sp.sympify(traced.fields[mode][i]) for i in self.own]
+        h = [sp.sympify(e) for e in traced.indicators]
+        arguments = [traced.t, list(traced.u), list(traced.p), list(traced.m)]
+        derived = [*(e.diff(s) for e in f for s in u), *(e.diff(traced.p[k]) for e in f for k in places)]
+        self._field = sp.lambdify(arguments, [*f, *derived], modules="numpy")
+        self._indicators = sp.lambdify(arguments, [*h, *(e.diff(s) for e in h for s in traced.u)], modules="numpy")
+
+    def evaluate(
+        self, u: FloatArray, values: FloatArray, memory: FloatArray, t: float = 0.0
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """f (n,), its Jacobian (n, n) and its derivatives in the parameters (n, n_places), of the mode's own states."""
+        with np.errstate(all="ignore"):
+            found: Any = np.array(self._field(t, u, values, memory), dtype=float)
+        n = len(self.own)
+        return found[:n], found[n : n + n * n].reshape(n, n), found[n + n * n :].reshape(n, self._n_places)
+
+    def indicators(self, u: FloatArray, values: FloatArray, memory: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Indicators (n_indicators,) and their gradients (n_indicators, n_u)."""
+        with np.errstate(all="ignore"):
+            found: Any = np.array(self._indicators(0.0, u, values, memory), dtype=float)
+        n, n_u = len(self.traced.indicators), len(self.traced.u)
+        return found[:n], found[n:].reshape(n, n_u)
+
+    def margins(self, h: FloatArray) -> FloatArray:
+        """How far each transition's condition holds (n_transitions,), -inf for those that are not of the mode."""
+        return np.array([
+            min(row.sign * h[row.indicator] for row in jump.rows) if jump.source == self.mode and jump.rows else -np.inf
+            for jump in self.traced.transitions
+        ])  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """A state from which nothing moves.
+
+    ``eigenvalues`` stand largest real part first; under a forcing log|mu| / T stands in their place. ``kind`` is
+    "stable", "unstable", or "undecided" where a real part is zero, the state lies on a boundary of its mode, or the
+    eigenvalues are not known (transitions at phases).
+    """
+
+    u: FloatArray
+    mode: str
+    eigenvalues: ComplexArray
+    kind: str
+    forced: bool
+
+    def words(self, states: Sequence[str]) -> str:
+        """The equilibrium as part of a sentence."""
+        place = ", ".join(f"{name} = {value:.6g}" for name, value in zip(states, self.u, strict=True))
+        kind = {"stable": "a stable equilibrium", "unstable": "an unstable equilibrium"}.get(
+            self.kind, "an equilibrium whose eigenvalues do not decide its stability"
+        )
+        told = "exponents" if self.forced else "eigenvalues"
+        numbers = ", ".join(_number(one) for one in self.eigenvalues)
+        return f"{place} (mode {self.mode!r}) is {kind}" + (f", {told} {numbers}" if numbers else "")
+
+
+def equilibrium_at(
+    system: System, u: FloatArray, mode: int, *, values: FloatArray | None = None, memory: FloatArray | None = None,
+    near: float = AT_REST,
+) -> Equilibrium | None:  # fmt: skip
+    """The equilibrium of a mode at the state u, or nearer to it than ``near`` of its size; None where there is none."""
+    traced = system.traced
+    values = system.parameter_vector() if values is None else values
+    memory = system.memory_vector() if memory is None else memory
+    field, scale = mode_field(traced, mode), system.scale_vector()
+    u = np.where(np.array(traced.lacking[mode], dtype=bool), 0.0, np.nan_to_num(u))
+    size = (scale + np.abs(u))[field.own]
+    f, J, _ = field.evaluate(u, values, memory)
+    if not (np.isfinite(f).all() and np.isfinite(J).all()) or (np.abs(f) > near * (np.abs(J) @ size)).any():
+        return None
+    if not system.depends_on_time:
+        step = np.linalg.lstsq(J * size, -f, rcond=None)[0]
+        if np.abs(step).max(initial=0.0) > near:
+            return None
+        u[field.own] += step * size
+        f, J, _ = field.evaluate(u, values, memory)
+        if (np.abs(f) > VANISHING * (np.abs(J) @ size)).any():
+            return None
+        eigenvalues = sorted_eigenvalues(J)
+    else:
+        found = _under_forcing(system, field, u, values, memory)
+        if found is None:
+            return None
+        eigenvalues = found
+    u[np.abs(u) <= ROUNDING * scale] = 0.0
+    h, h_u = field.indicators(u, values, memory)
+    edge = VANISHING * (np.abs(h_u) @ (scale + np.abs(u)))
+    margins = field.margins(np.sign(h) * np.maximum(np.abs(h) - edge, 0.0))
+    if (margins > 0.0).any():
+        return None  # a transition leads away
+    kind = "undecided" if (margins == 0.0).any() else _kind(eigenvalues, system.period_at(values))
+    return Equilibrium(u, traced.mode_names[mode], eigenvalues, kind, system.depends_on_time)
+
+
+def refuse_resting(system: System, starts: FloatArray, points: FloatArray, verb: str) -> None:
+    """ValueError where a system without forcing begins at an equilibrium, whatever the parameters: it never returns.
+
+    Parameters
+    ----------
+    starts : array (S, n)
+    points : array (P, n_parameters)
+        The first, the last and some between are looked at.
+    """
+    if system.depends_on_time:
+        return
+    memory, some = system.memory_vector(), np.unique(np.linspace(0, len(points) - 1, 8).astype(int))
+    at: Equilibrium | None = None
+    for start in starts:
+        for i in some:
+            at = equilibrium_at(system, start, 0, values=points[i], memory=memory, near=ROUNDING)
+            if at is None:
+                return
+    if at is not None:
+        raise ValueError(
+            f"{verb} of {system.name!r} from an equilibrium: {at.words(list(system.states))}; from there no motion "
+            "ever meets the section. Give start=, a state beside it"
+        )
+
+
+@lru_cache(maxsize=256)
+def mode_field(traced: Traced, mode: int) -> ModeField:
+    """The functions of a mode, made once."""
+    return ModeField(traced, mode)
+
+
+def sorted_eigenvalues(J: FloatArray) -> ComplexArray:
+    """Eigenvalues (n,) of a Jacobian, largest real part first."""
+    found = np.linalg.eigvals(J).astype(complex)
+    return np.asarray(found[np.lexsort((-found.imag, -found.real))])
+
+
+def _under_forcing(
+    system: System, field: ModeField, u: FloatArray, values: FloatArray, memory: FloatArray
+) -> ComplexArray | None:
+    """log|mu| / T at a state that the forcing leaves alone; empty where unknown, None where it moves."""
+    traced, period = system.traced, system.period_at(values)
+    span = 1.0 if period is None else period
+    n = len(field.own)
+    M: NDArray[np.floating[Any]] = np.eye(n)
+    for k in range(STEPS):
+        f, J, _ = field.evaluate(u, values, memory, (k + 0.5) * span / STEPS)
+        size = np.abs(J) @ (system.scale_vector() + np.abs(u))[field.own]
+        if not np.isfinite(J).all() or (np.abs(f) > 1e-12 * size).any():
+            return None
+        half = 0.5 * span / STEPS * J
+        M = np.linalg.solve(np.eye(n) - half, (np.eye(n) + half) @ M)
+    timed = [jump for jump in traced.transitions if jump.at is not None and jump.source == field.mode]
+    for jump in timed:
+        if jump.target != field.mode or (jump.reset is not None and not _fixed(traced, jump.reset, u, values, memory)):
+            return None
+    if period is None or timed:
+        return np.empty(0, dtype=complex)
+    with np.errstate(divide="ignore"):
+        return np.sort(np.log(np.abs(np.linalg.eigvals(M))) / period)[::-1].astype(complex)
+
+
+def _fixed(traced: Traced, reset: Sequence[Any], u: FloatArray, values: FloatArray, memory: FloatArray) -> bool:
+    """Whether a reset leaves the state alone."""
+    import sympy as sp
+
+    image = sp.lambdify([traced.t, list(traced.u), list(traced.p), list(traced.m)], list(reset), modules="numpy")
+    moved = np.abs(np.array(image(0.0, u, values, memory), dtype=float) - u)
+    return bool((moved <= 1e-12 * np.abs(u)).all())
+
+
+def _kind(eigenvalues: ComplexArray, period: float | None) -> str:
+    if not len(eigenvalues):
+        return "undecided"
+    zero = VANISHING * np.abs(eigenvalues).max() if period is None else SURE / period
+    growth = eigenvalues.real.max()
+    return "unstable" if growth > zero else "stable" if growth < -zero else "undecided"
+
+
+def _number(value: complex) -> str:
+    if not value.imag:
+        return f"{value.real:.6g}"
+    return f"{value.real:.6g}{value.imag:+.6g}i"
