@@ -1,5 +1,8 @@
 """Multiple shooting against SciPy's integration of the same equations: contact parameters, gap, one contact alone."""
 
+from functools import cache
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from tests.identification.made import (
@@ -19,14 +22,21 @@ from tests.identification.made import (
 
 from nonsmooth.experiment.session import Quantity
 from nonsmooth.identification.contact_findings import contact_finding, one_contact
-from nonsmooth.identification.multiple_shooting import shoot_contacts
+from nonsmooth.identification.multiple_shooting import _grazes, shoot_contacts
+from nonsmooth.identification.pieces import Piece
+from nonsmooth.identification.referral import counted_gap
+
+
+@cache
+def three_runs():
+    return driven(11.15, 0.039), driven(8.0, 0.030), driven(4.6, 0.0165)
 
 
 @pytest.fixture(scope="module")
 def fitted():
-    runs = [driven(11.15, 0.039), driven(8.0, 0.030), driven(4.6, 0.0165)]
+    decay = decay_of(W, B, F, PLACE)
     return shoot_contacts(
-        runs, decay_of(W, B, F, PLACE), resolution=COUNT, kappa=1.1 * KAPPA, gamma=0.5 * GAMMA, pieces_per_run=12
+        three_runs(), decay, resolution=COUNT, kappa=1.1 * KAPPA, gamma=0.5 * GAMMA, pieces_per_run=12
     )
 
 
@@ -72,6 +82,68 @@ def test_one_contact_tells_less_than_all_together(fitted):
     used = shown["segment"].values >= 0
     assert np.all(np.isfinite(shown["fitted"].values) == used) and used.any()
     assert np.nanmax(np.abs(shown["residual"].values)) < 3 * COUNT
+
+
+def test_the_fit_is_the_same_from_another_first_guess(fitted):
+    decay = decay_of(W, B, F, PLACE)
+    other = shoot_contacts(
+        three_runs(), decay, resolution=COUNT, kappa=0.9 * KAPPA, gamma=1.6 * GAMMA, pieces_per_run=12
+    )
+    error = np.sqrt(np.diag(fitted.covariance))
+    assert np.all(np.abs(other.values - fitted.values) < 0.1 * error)
+
+
+def test_a_motor_that_wanders_is_in_the_uncertainty():
+    def wandering(omega, size=3e-3):  # within a turn or so: the gate sees it, and not all of it
+        rate = omega / 1.2
+        return lambda t: omega * t + omega * size / rate * np.sin(rate * t + omega)
+
+    runs = [driven(omega, crank, phase=wandering(omega)) for omega, crank in ((11.15, 0.039), (8.0, 0.030))]
+    found = shoot_contacts(
+        runs, decay_of(W, B, F, PLACE), resolution=COUNT, kappa=1.1 * KAPPA, gamma=0.5 * GAMMA, pieces_per_run=12
+    )
+    error, by_scatter = (np.sqrt(np.diag(matrix)) for matrix in (found.covariance, found.fit.covariance))
+    assert abs(found.values[3] - KAPPA) < 3 * error[3] and abs(found.values[4] - GAMMA) < 3 * error[4]
+    for i in range(2):
+        gap = found.place(i, 0)
+        assert abs(found.values[gap] - GAP) < 3 * error[gap]
+    # how far a line over two turns is off adds to what the residuals show
+    moved = found.covariance - found.fit.covariance
+    assert np.linalg.matrix_rank(moved, tol=1e-12 * np.trace(moved)) == 1
+    assert np.max(np.diag(moved) / by_scatter**2) > 0.05
+
+
+def test_pieces_that_graze_are_left_out():
+    time, gap = np.linspace(0.0, 1.0, 101), GAP
+    motion = np.column_stack([gap + 1e-5 - 0.01 * (time - 0.503) ** 2, -0.02 * (time - 0.503)])
+    piece = Piece(time, motion[:, 0], time, np.arange(11), None, motion[0])
+    assert _grazes(piece, motion, gap, 2e-5) and not _grazes(piece, motion, gap, 0.5e-5)
+    assert not _grazes(piece, motion, gap - 1e-3, 2e-5)
+
+
+def told(values, errors, readings):
+    """What `counted_gap` looks at: a gap per run, independent of each other."""
+    runs = tuple(SimpleNamespace(name=f"Run #{i + 1}", settings={"gap": r}) for i, r in enumerate(readings))
+    return SimpleNamespace(
+        runs=runs, values=np.array(values), covariance=np.diag(np.square(errors)), place=lambda run, which: run
+    )
+
+
+def test_the_gap_of_one_setting_is_the_mean_of_its_runs():
+    off = 1e-6 * np.array([1.0, -1.0, 1.0, -1.0, 500.0])
+    found = counted_gap(told(1.8e-3 + off, [2e-6] * 5, [0.0018] * 4 + [0.0024]), 0.0018)
+    assert found.value == pytest.approx(1.8e-3, abs=1e-12) and found.notes == ()
+    assert found.error == pytest.approx(2e-6 / np.sqrt(4))
+    assert counted_gap(told([1.8e-3], [1e-6], [0.0018]), 0.0024) is None
+
+
+def test_a_run_whose_gap_disagrees_is_named_and_left_out():
+    values = 1.8e-3 + 1e-6 * np.array([1.0, -1.0, 55.0, 0.0])
+    found = counted_gap(told(values, [2e-6] * 4, [0.0018] * 4), 0.0018)
+    assert found.places == [0, 1, 3] and found.value == pytest.approx(1.8e-3, abs=1e-12)
+    assert "contact Run #3: left out" in found.notes[0] and "+55 µm" in found.notes[0]
+    halves = counted_gap(told(1.8e-3 + 1e-5 * np.array([5.0, 5.0, -5.0, -5.0]), [2e-6] * 4, [0.0018] * 4), 0.0018)
+    assert halves.error > 5e-5 and "no majority agrees" in halves.notes[0]
 
 
 def test_records_without_contact_are_refused():

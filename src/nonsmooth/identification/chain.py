@@ -379,8 +379,8 @@ class _Chain:
             found = shoot_contacts(
                 runs, decay, resolution=resolution, kappa=rough["k_s"] / m, gamma=gamma, mark=mark
             )
-        except SolveError as failure:
-            self.say(f"contact: not used, so that the gap is not known: {failure}")
+        except SolveError as reason:
+            self.say(f"contact: not used, so that the gap is not known: {reason}")
             return None, None
         self.observe(("kappa", "gamma"), found.values[3:5], found.covariance[3:5, 3:5], "multiple shooting")
         own = Quantity(m, float(np.sqrt(rough.covariance[rough.names.index("m"), rough.names.index("m")])))

@@ -16,7 +16,6 @@ References: R.T. Birge, Phys. Rev. 40 (1932) 207; M.G. Cox, Metrologia 44 (2007)
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -68,7 +67,7 @@ def birge_ratio(chi2: float, freedom: int) -> tuple[float, bool]:
     return float(np.sqrt(chi2 / freedom)), bool(distribution.sf(chi2, freedom) >= CHANCE)
 
 
-def consistent(values: Sequence[Any], covariances: Sequence[Any]) -> Consistent:
+def consistent(values: Any, covariances: Any) -> Consistent:
     """Largest set of measurements that agree, found by leaving out one after another.
 
     Parameters

@@ -64,7 +64,7 @@ def decay_damping(runs: Sequence[Run], decay: DecayFit, mass: Quantity, *, resol
     """
     viscous = free_decay(
         [(runs[i].time, runs[i].positions) for i in decay.runs], resolution=resolution, friction=False,
-        doubt_law=False, check=False,
+        doubt_law=False, check=False, jitter=decay.fit.jitter,
     )  # fmt: skip
     c, friction = mass.value * float(decay.values[1]), mass.value * float(decay.values[2])
     plain = mass.value * float(viscous.values[1])

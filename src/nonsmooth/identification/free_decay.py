@@ -161,18 +161,18 @@ def free_decay(
         used = _used(friction)
         values[used], covariance[np.ix_(used, used)] = apart.mean, apart.covariance + apart.scatter
     elif doubt_law:
-        slower = _records([runs[r.index] for r in records], resolution, slowest / 2, None)[0]
+        slower = _records([runs[r.number] for r in records], resolution, slowest / 2, None)[0]
         moved = _fit(slower, friction, resolution, jitter)[0] - values
         covariance += np.outer(moved, moved)
     return DecayFit(
-        values, covariance, tuple(r.index for r in records), tuple(r.span for r in records), fit, tuple(notes)
+        values, covariance, tuple(r.number for r in records), tuple(r.span for r in records), fit, tuple(notes)
     )
 
 
 class _Record(NamedTuple):
     """The used part of a record: number of its run, name, first and last+1 sample, times (s) and positions (m)."""
 
-    index: int
+    number: int
     name: str
     span: tuple[int, int]
     time: FloatArray
@@ -208,7 +208,9 @@ def _fit(
     used = _used(friction)
     which = np.arange(len(used))
     pieces = [
-        Piece(r.time, r.x, np.zeros_like(r.time), which, _build(friction), start_state(r.time, r.x), label=str(r.index))
+        Piece(
+            r.time, r.x, np.zeros_like(r.time), which, _build(friction), start_state(r.time, r.x), label=str(r.number)
+        )
         for r in records
     ]
     steps = np.array([1e-4, 1e-4, 1e-5, 1e-6])[used]
@@ -232,7 +234,7 @@ def _agreeing(
     for r in records:
         try:
             values, covariance, fit = _fit([r], friction, resolution, jitter)
-            slower = _records([runs[r.index]], resolution, slowest / 2, None)[0]
+            slower = _records([runs[r.number]], resolution, slowest / 2, None)[0]
             moved = _fit(slower, friction, resolution, jitter)[0] - values
             alone.append((values, covariance + np.outer(moved, moved), fit))
         except SolveError:

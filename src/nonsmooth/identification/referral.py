@@ -34,13 +34,13 @@ _HELD = 1e-3  # m: half width within which dry friction may hold a car of which 
 class CountedGap(NamedTuple):
     """The gap in the sensor's count at one reading of the screw, by the runs with contact there.
 
-    ``index`` and ``weight``: the places of the runs' gaps among the parameters of the contacts' fit, and how much each
+    ``places`` and ``weight``: the places of the runs' gaps among the parameters of the contacts' fit, and how much each
     counts; ``notes``: a sentence on each run that is left out.
     """
 
     value: float
     error: float
-    index: list[int]
+    places: list[int]
     weight: FloatArray
     notes: tuple[str, ...]
 
@@ -61,8 +61,8 @@ def counted_gap(contacts: ContactFit, reading: float) -> CountedGap | None:
     ]  # fmt: skip
     index = [j for j, keep in zip(index, apart.used, strict=True) if keep]
     block = contacts.covariance[np.ix_(index, index)]
-    weight = np.linalg.solve(block, np.ones(len(index)))
-    weight /= weight.sum()
+    solved = np.linalg.solve(block, np.ones(len(index)))
+    weight: FloatArray = np.asarray(solved / solved.sum(), dtype=np.float64)
     counted = float(weight @ contacts.values[index])
     off = contacts.values[index] - counted
     chi2 = float(off @ np.linalg.solve(block, off))
@@ -204,7 +204,7 @@ def refer(
     gap, at_rest, by, place = (
         Estimate(float(value), float(np.sqrt(covariance[i, i])), "m") for i, value in enumerate(values)
     )
-    with_counted = _cross(adjusted, ("kappa", "gamma"), contacts.covariance[3:5][:, counted.index] @ counted.weight)
+    with_counted = _cross(adjusted, ("kappa", "gamma"), contacts.covariance[3:5][:, counted.places] @ counted.weight)
     with_zero = _cross(adjusted, ("omega_0", "b", "f"), decay.covariance[:3, 3])
     cross = rows @ np.array([with_counted, *np.outer(found.by_zero, with_zero)])
     return Referred(gap, at_rest, by, place, covariance, cross, crank, reading, counted, found.notes)

@@ -28,6 +28,7 @@ from nonsmooth.identification.sandwich import sandwich
 __all__ = ["ShootingFit", "shoot"]
 
 FloatArray = NDArray[np.float64]
+_UNEVEN = 0.2  # steps of the clock: the most that its instants are taken to jitter
 _ROUNDS = 10  # of weights from residuals and residuals from weights
 
 
@@ -128,7 +129,8 @@ def shoot(
             again = bool(worse.any())
             used = used & ~worse
         if jitter is None:
-            wider = _jitter(state, used, resolution)
+            # a clock that is off by more than a part of its step is none: then the law does not fit
+            wider = min(_jitter(state, used, resolution), _UNEVEN * float(np.median(np.diff(pieces[0].time))))
             again |= abs(wider - spread) > 0.05 * max(wider, spread)
             spread = wider
         if not again or rough:

@@ -46,6 +46,23 @@ def test_phase_runs_from_turn_to_turn() -> None:
     assert len(at) == 29
 
 
+@pytest.mark.parametrize(("size", "seen"), [(0.0, False), (1e-3, True)])
+def test_a_motor_that_wanders_is_seen_in_the_gate(size: float, seen: bool) -> None:
+    omega, rate = 9.0, 0.7
+    fine = np.linspace(0, 40, 400_001)
+    turns = np.interp(2 * np.pi * np.arange(1, 57), omega * fine + omega * size / rate * np.sin(rate * fine), fine)
+    drive = drive_phase(np.round(turns, 4))
+    found, steady = drive.wander()
+    assert steady is not seen
+    # omega (1 + size cos): its standard deviation is size / sqrt 2
+    assert found == pytest.approx(size / np.sqrt(2), rel=0.1, abs=5e-5)
+    # every other turn says where the crank is to the second difference of its times
+    between = 2 * np.pi * drive.turns[1:-1:2]
+    off = drive.coarser.phase(drive.turn_times[1:-1:2]) - between
+    expected = omega * (drive.turn_times[1:-1:2] - 0.5 * (drive.turn_times[:-2:2] + drive.turn_times[2::2]))
+    np.testing.assert_allclose(off, expected, atol=0.02 * np.max(np.abs(expected)) + 1e-9)
+
+
 def test_a_turn_that_the_gate_missed_is_counted_and_said() -> None:
     times = np.delete(gate(5.0, 20, 1), [7, 8])
     given = xr.DataArray(np.ones(18), {"time": times}, ("time",), name="Turn", attrs={"run": "Run #4"})
