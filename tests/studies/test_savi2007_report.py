@@ -112,7 +112,10 @@ def test_a_photograph_is_refused(tmp_path) -> None:
     assert not (tmp_path / "none").exists()
 
 
-def test_a_failed_measurement_says_where_to_look(tmp_path) -> None:
+def test_a_failed_measurement_says_where_to_look(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And its process takes no library from the folder that it is started in."""
+    (tmp_path / "numpy.py").write_text("raise RuntimeError('this is the numpy.py of the folder')")
+    monkeypatch.chdir(tmp_path)
     (sketch,) = (figure for figure in figures_of_the_study() if figure.name == "fig02")  # not of the rig
     with Bench(tmp_path, [sketch], quick=True) as bench, pytest.raises(RuntimeError, match="log.txt.*fig02: not meas"):
         bench.wait(print)

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from nonsmooth.analysis.chart_work import ChartWork
 from nonsmooth.campaign.run import run
+from nonsmooth.campaign.work import check_room
 from nonsmooth.flow.arguments import real_number
 from nonsmooth.flow.engine import IntArray
 from nonsmooth.kernels import codes
@@ -69,6 +70,7 @@ def refined(
         )
     if work.carried or len(work.starts) > 1:
         raise ValueError("refine needs points that stand alone: leave carry out and give one start")
+    check_room(work, label)
     return _Refinement(work, share, threads, progress, label).result()
 
 

@@ -15,7 +15,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from nonsmooth.cli import compare, identify, models, plan, reproduce, rig, run, show
 from nonsmooth.cli.terminal import printable
-from nonsmooth.errors import SolveError
+from nonsmooth.errors import SolveError, shortened
 from nonsmooth.results.provenance import package_version
 
 __all__ = ["main"]
@@ -39,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except _USER_ERRORS as error:
         if options.traceback:
             raise
-        print(f"nonsmooth: {printable(str(error))}", file=sys.stderr)
+        print(f"nonsmooth: {printable(shortened(error, quoted=False, most=4000))}", file=sys.stderr)
         return 2
 
 
