@@ -12,8 +12,8 @@ export OPENBLAS_NUM_THREADS ?= 1
 PYTEST_ARGS ?= -n auto --dist loadfile --no-loadscope-reorder
 
 .DEFAULT_GOAL := help
-.PHONY: help reproduce reproduce-full test slow mutants fuzz altered coverage rig-against-model check bench gpu \
-	gpu-compiler docs clean distclean
+.PHONY: help reproduce reproduce-full test slow mutants fuzz altered coverage coverage-awkward rig-against-model check \
+	bench gpu gpu-compiler docs clean distclean
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 26
@@ -41,6 +41,9 @@ altered: $(VENV)/.installed-test  ## alter bytes of 400 saved files of each form
 
 coverage: $(VENV)/.installed-run  ## identify 40 virtual rigs; writes docs/measured_coverage.md
 	$(BIN)/python -m nonsmooth.identification.coverage --seeds 0-39 --out docs/measured_coverage.md
+
+coverage-awkward: $(VENV)/.installed-run  ## the same on rigs where much goes wrong; writes docs/measured_coverage_awkward.md
+	$(BIN)/python -m nonsmooth.identification.coverage --awkward --seeds 0-39 --out docs/measured_coverage_awkward.md
 
 rig-against-model: $(VENV)/.installed-run  ## lay virtual rigs over the model; writes docs/measured_rig_against_model.md
 	$(BIN)/python -m nonsmooth.identification.compare.rig_against_model --seeds 2 3 --out docs/measured_rig_against_model.md

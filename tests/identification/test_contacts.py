@@ -51,6 +51,22 @@ def test_contact_parameters_and_gap_lie_within_their_uncertainty(fitted):
     assert fitted.n_contacts > 25
 
 
+@pytest.mark.parametrize("mark", [np.pi, 1.0])
+def test_the_gates_mark_may_be_anywhere(mark):
+    # the crank stands at `mark` when the gate sees it: a motor on the other side is a mark at half a turn
+    runs = [driven(8.0, 0.030, phase=lambda t: 8.0 * t)]
+    period = 2 * np.pi / 8.0
+    turned = run("contact", runs[0].time, runs[0].positions, turns=runs[0].turns[:-1] + period * mark / (2 * np.pi),
+                 crank_length=0.030, gap=GAP)  # fmt: skip
+    found = shoot_contacts(
+        [turned], decay_of(W, B, F, PLACE), resolution=COUNT, kappa=KAPPA, gamma=GAMMA, pieces_per_run=12, mark=mark
+    )
+    error = np.sqrt(np.diag(found.covariance))
+    drive = found.values[7:9]
+    np.testing.assert_allclose(drive, 0.030 * np.array([np.cos(mark), -np.sin(mark)]), atol=4 * error[7:9].max() + 2e-5)
+    assert abs(found.values[3] - KAPPA) < 3.5 * error[3] and found.fit.used.all() and found.fit.reduced < 2
+
+
 def test_one_contact_tells_less_than_all_together(fitted):
     m = 0.84
     many = contact_finding(fitted, Quantity(m), resolution=COUNT)

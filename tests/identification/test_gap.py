@@ -29,11 +29,12 @@ def test_fig_13_with_half_a_metre_of_string_is_off_by_0_4_mm():
     assert mean_of_drive(0.33 / 8.47, 0.5) / 2 == pytest.approx(0.38e-3, abs=1e-5)
 
 
-def moved(length, ripple_part, zero, n=6, seed=0):
+def moved(length, ripple_part, zero, n=6, seed=0, cranks=(0.0165, 0.035)):
+    """Steady runs whose mean is moved by a string of this length; a negative one: the motor is on the other side."""
     rng = np.random.default_rng(seed)
     return steady([
         swinging(omega, 0.01, 0.3, zero + a**2 / (8 * length) + ripple_part * a, crank=a, rng=rng)
-        for a in (0.0165, 0.035) for omega in np.linspace(3, 7, n)
+        for a in cranks for omega in np.linspace(3, 7, n)
     ])  # fmt: skip
 
 
@@ -42,17 +43,48 @@ def test_the_shift_is_that_of_string_and_ripple():
     value, error = found.at(0.039)
     assert abs(value - (0.039**2 / (8 * 0.7) + 2e-3 * 0.039)) < 3.5 * error < 2e-5
     assert found.runs == 12
-    nothing = mean_shift(moved(0.7, 0, 0).only([]), 0.0, 1e-6, string_length=0.5, string_error=0.005)
-    value, error = nothing.at(0.039)
-    assert value == pytest.approx(mean_of_drive(0.039, 0.5) / 2) and error > 0.03 / 4 * 0.03
+    assert found.side == 1 and found.notes == ()
 
 
-def test_a_wrong_zero_moves_the_shift_as_stated():
-    seen, step = moved(0.7, 2e-3, 0.0), 1e-6
-    one, other = (mean_shift(seen, zero, 1e-6, string_length=0.7, string_error=0.005) for zero in (0.0, step))
-    slope = one.parts(0.039)[2]
-    assert other.at(0.039)[0] - one.at(0.039)[0] == pytest.approx(slope * step, rel=1e-2)
-    assert one.at(0.039)[1] == pytest.approx(np.hypot(one.parts(0.039)[1], slope * 1e-6))
+@pytest.mark.parametrize("side", [1, -1])
+def test_the_motors_side_is_read_off_the_runs_and_not_off_the_string(side):
+    found = mean_shift(moved(side * 0.7, 2e-3, 1e-4), 1e-4, 1e-6, string_length=0.705, string_error=0.005)
+    true = side * 0.039**2 / (8 * 0.7) + 2e-3 * 0.039
+    value, error = found.at(0.039)
+    assert found.side == side and abs(value - true) < 3.5 * error < 2e-5
+    assert ["away from the support" in note for note in found.notes] == ([True] if side < 0 else [])
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_where_no_run_tells_the_side_the_shift_is_uncertain_by_it_and_that_is_said(side):
+    for seen, words in ((moved(0.7, 0, 0).only([]), "no run without the support tells"),
+                        (moved(side * 0.7, 1e-3, 0, cranks=(0.02,)), "the 6 runs without the support do not tell")):
+        found = mean_shift(seen, 0.0, 1e-6, string_length=0.7, string_error=0.005)
+        assert found.side == 0 and words in found.notes[0]
+        value, error = found.at(0.039)
+        assert abs(value - side * mean_of_drive(0.039, 0.7) / 2) < 2 * error
+    value, error = found.at(0.02)  # where there are runs, they tell the shift whatever the side is
+    assert abs(value - side * 0.02**2 / 5.6 - 2e-5) < 3.5 * error < 1e-5
+
+
+def test_a_string_that_the_runs_contradict_is_not_used_and_named():
+    found = mean_shift(moved(0.7, 0, 0), 0.0, 1e-6, string_length=1.4, string_error=0.005)
+    value, error = found.at(0.039)
+    assert abs(value - mean_of_drive(0.039, 0.7) / 2) < 3.5 * error < 1e-5
+    assert "the notebook 1.4 m" in found.notes[0] and "string_length is not used" in found.notes[0]
+
+
+def test_rest_sensor_zero_and_mean_position_are_three_things():
+    # zeroed 0.4 mm beside rest: the mean position in the sensor's count moves with it, the shift from rest does not
+    one, other = (
+        mean_shift(moved(0.7, 2e-3, rest), rest, 1e-6, string_length=0.7, string_error=0.005) for rest in (0.0, -4e-4)
+    )
+    assert other.rest == pytest.approx(-4e-4, abs=3e-6)
+    assert other.at(0.039)[0] == pytest.approx(one.at(0.039)[0], abs=3 * one.at(0.039)[1])
+    assert other.place(0.039)[0] - one.place(0.039)[0] == pytest.approx(-4e-4, abs=3e-6)
+    # runs at two cranks and the string tell the place of rest too, where no tap does
+    without = mean_shift(moved(0.7, 2e-3, -4e-4), 0.0, 1e-3, string_length=0.7, string_error=0.005)
+    assert abs(without.rest + 4e-4) < 3 * np.sqrt(without.covariance[0, 0]) < 3e-4
 
 
 def test_friction_moves_the_place_of_a_car_that_goes_longer_one_way():

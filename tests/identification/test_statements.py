@@ -5,7 +5,7 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.identification.coverage import drive_mean
-from nonsmooth.identification.coverage_tables import ASKED, BESIDE, misses, page, to_dataset
+from nonsmooth.identification.coverage_tables import ASKED, BESIDE, misses, page, pooled, to_dataset, unnamed
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.gap import mean_of_drive
 from nonsmooth.identification.parameter_set import ParameterSet
@@ -77,8 +77,8 @@ def results(bias=0.0, n=40, seed=0):
             return [truth, value, error, value - 1.96 * error, value + 1.96 * error]
 
         rows.append({
-            "seed": i, "rows": {name: row(1.0, 1e-3 if name not in ("g", "gap_at_rest") else 1e-6) for name in ASKED},
-            "beside": {label: row(1.0, 1e-3) for label in BESIDE}, "friction": rng.uniform(0, 0.02),
+            "seed": i, "rows": {name: row(1.0, 1e-6 if name == "g" or "gap" in name else 1e-3) for name in ASKED},
+            "beside": {label: row(1.0, 1e-3) for label in BESIDE}, "truth": {"friction": rng.uniform(0, 0.02)},
         })  # fmt: skip
     return rows
 
@@ -102,6 +102,24 @@ def test_the_page_counts_what_it_was_given():
     data = to_dataset(rows)
     assert data["estimate"].dims == ("rig", "parameter") and data.attrs["synthetic"] == "yes"
     assert float(data["low"].sel(parameter="k", rig=0)) == 2.0
+
+
+def test_an_awkward_rig_has_its_anomalies_counted_in_the_notes():
+    truth = {
+        "sensor_zero": 4e-4, "motor_side": -1.0, "motor_wander": 0.0, "slipped_tap": 3.0, "angle_sign": 1.0,
+        "force_sign": 1.0, "turn_sign": 1.0, "friction": 0.01,
+    }  # fmt: skip
+    notes = ["impulse: run 'Run #3', channel 'Angle': left out: ...", "it rests ..., and not where it was zeroed",
+             "the photogate counts backwards in 3 runs"]  # fmt: skip
+    one = {"truth": truth, "notes": notes}
+    assert unnamed(one) == {"motor on the other side": True, "photogate reversed": False}
+    rows = [row | one for row in results()]
+    rows[0]["rows"]["k"][3:] = [2.0, 3.0]
+    inside = sum(low <= true <= high for row in rows for true, _, _, low, high in row["rows"].values())
+    assert pooled(rows) == (inside, 40 * len(ASKED))
+    text = page(rows, awkward=True)
+    assert "| motor on the other side | 40 | 0 | 0 |" in text and "| photogate reversed | 0 | 0 | 40 |" in text
+    assert f"{inside} of {40 * len(ASKED)} truths" in text and "Anomalies" not in page(rows)
 
 
 def test_the_campaigns_own_mean_of_the_drive():

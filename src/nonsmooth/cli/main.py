@@ -26,7 +26,7 @@ _USER_ERRORS = (ValueError, TypeError, OSError, MemoryError, SolveError)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; returns the exit code: 0 done, 2 wrong input, 130 interrupted."""
+    """Run the command line; returns the exit code: 0 done, 2 wrong input, 3 done with anomalies, 130 interrupted."""
     parser = _parser()
     options = parser.parse_args(arguments)
     try:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -14,6 +14,7 @@ from nonsmooth.experiment.recording import Recording
 from nonsmooth.experiment.session import PROCEDURES, SETTINGS, Quantity, Session, load_session
 from nonsmooth.experiment.signals.checks import take
 from nonsmooth.experiment.signals.displacement import position, resolution
+from nonsmooth.identification.directions import oriented
 from nonsmooth.system.names import unknown
 
 __all__ = ["Evidence", "Run", "gather"]
@@ -34,7 +35,8 @@ _PASSAGES = 3  # of the photogate: fewer give no frequency and no scatter
 class Run:
     """One run: settings, position x (m) and force (N) each over its time (s), times of the photogate (s).
 
-    ``x`` is a DataArray that knows its run and channel; ``x_time`` and ``x_values`` are its arrays.
+    ``x`` is a DataArray that knows its run and channel; ``time`` and ``positions`` are its arrays. ``backwards``: the
+    photogate's count falls.
     """
 
     procedure: str
@@ -44,6 +46,7 @@ class Run:
     force: Any = None
     turns: FloatArray | None = None
     synthetic: bool = False
+    backwards: bool = False
 
     @property
     def time(self) -> FloatArray:
@@ -72,7 +75,10 @@ class Run:
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """All runs by procedure, and what is known of the apparatus."""
+    """All runs by procedure, what is known of the apparatus, and what was turned (`oriented`).
+
+    ``direction`` is -1 where the rotary sensor counts away from the support: positions have the other sign then.
+    """
 
     runs: Mapping[str, tuple[Run, ...]]
     apparatus: Mapping[str, Quantity]
@@ -80,6 +86,8 @@ class Evidence:
     source: str = ""
     synthetic: bool = False
     missing: tuple[str, ...] = field(default=())
+    direction: int = 1
+    notes: tuple[str, ...] = field(default=())
 
     @property
     def resolution(self) -> float:
@@ -103,9 +111,10 @@ class Evidence:
 
 
 def gather(
-    recordings: Session | str | os.PathLike[str] | Mapping[str, Any], *, apparatus: Mapping[str, Any] | None = None
-) -> Evidence:
-    """Take the channels of all runs out of a session or a mapping of recordings.
+    recordings: Session | str | os.PathLike[str] | Mapping[str, Any], *, apparatus: Mapping[str, Any] | None = None,
+    procedures: Sequence[str] | None = None,
+) -> Evidence:  # fmt: skip
+    """Take the channels of all runs out of a session or a mapping of recordings, sensors brought to one direction.
 
     Parameters
     ----------
@@ -115,19 +124,23 @@ def gather(
     apparatus : mapping, optional
         What is known, as in a notebook's ``[apparatus]``: numbers, or pairs of value and standard uncertainty.
         Needed with a mapping; with a session it replaces single entries.
+    procedures : sequence of str, optional
+        Of a session, those whose files are read; all where not given.
 
     Raises
     ------
     ValueError, TypeError
         A procedure that is not known, a run without a channel or setting that its procedure needs: the message names
-        run and channel.
+        run and channel. Sensors that count one way in some runs and the other way in others, recordings of springs and
+        support that look swapped.
     """
     if isinstance(recordings, str | os.PathLike):
         recordings = load_session(recordings)
     taken: dict[str, list[Any]]
     if isinstance(recordings, Session):
         known = dict(recordings.apparatus)
-        taken = {name: [tuple(row) for row in recordings.recordings(name)] for name in recordings.procedures}
+        names = [name for name in recordings.procedures if procedures is None or name in procedures]
+        taken = {name: [tuple(row) for row in recordings.recordings(name)] for name in names}
         title, source, synthetic = recordings.title, str(recordings.folder), recordings.synthetic
     elif isinstance(recordings, Mapping):
         known, title, source, synthetic = {}, "", "recordings in memory", False
@@ -148,8 +161,10 @@ def gather(
         if procedure not in PROCEDURES:
             raise ValueError(unknown(procedure, "a procedure", "the experiment", PROCEDURES.keys()))
         runs[procedure] = tuple(_run(procedure, row[0], row[1], row[2], known) for row in rows)
+    runs, direction, notes = oriented(runs)
     synthetic = synthetic or any(run.synthetic for rows in runs.values() for run in rows)
-    return Evidence(runs, known, title, source, synthetic, tuple(p for p in PROCEDURES if p not in runs))
+    missing = tuple(p for p in PROCEDURES if p not in runs)
+    return Evidence(runs, known, title, source, synthetic, missing, direction, notes)
 
 
 def _rows(procedure: str, given: Any) -> list[Any]:
@@ -188,6 +203,7 @@ def _run(
         else:
             passages = take(recording, channel, name, samples=_PASSAGES)
             found["turns"] = np.asarray(passages["time"].values, dtype=np.float64)
+            found["backwards"] = bool(np.all(np.diff(np.asarray(passages.values, dtype=np.float64)) < 0))
     return Run(procedure, name, dict(settings), synthetic=recording.synthetic, **found)
 
 

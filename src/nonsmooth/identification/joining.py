@@ -19,7 +19,7 @@ _BESIDE = ("friction", "gain")
 
 def joined(
     adjusted: Adjusted, gap: Referred | None, *, findings: Sequence[Finding], identifiability: Mapping[str, str],
-    notes: Sequence[str], synthetic: bool,
+    notes: Sequence[str], synthetic: bool, anomalies: Sequence[str] = (),
 ) -> ParameterSet:  # fmt: skip
     """The model's parameters, then what is beside them: rows over the unknowns of the adjustment, and the gap as it is.
 
@@ -28,7 +28,7 @@ def joined(
     adjusted : Adjusted
     gap : Referred, optional
         With its covariance with the unknowns.
-    findings, identifiability, notes, synthetic
+    findings, identifiability, notes, anomalies, synthetic
         Of the :class:`ParameterSet`.
     """
     size, names = len(adjusted.names), adjusted.names
@@ -49,11 +49,12 @@ def joined(
         n = len(inner)
         cross = gap.cross @ jacobian.T
         stacked = np.block([[covariance, cross.T], [cross, gap.covariance]])
-        order = [*range(n), len(covariance), *range(n, len(covariance)), len(covariance) + 1, len(covariance) + 2]
+        m = len(covariance)
+        order = [*range(n), m, *range(n, m), *range(m + 1, m + 4)]
         covariance = stacked[np.ix_(order, order)]
         estimates["g"] = gap.gap
-        extra |= {"gap_at_rest": gap.at_rest, "mean_shift": gap.shift}
+        extra |= {"gap_at_rest": gap.at_rest, "mean_shift": gap.shift, "rest_position": gap.rest}
     return ParameterSet(
         estimates, covariance, extra=extra, findings=findings, identifiability=identifiability, notes=notes,
-        synthetic=synthetic,
+        anomalies=anomalies, synthetic=synthetic,
     )

@@ -62,14 +62,20 @@ class ContactFit:
         return _SHARED + _PER_RUN * run + which
 
     @property
+    def poor(self) -> bool:
+        """Whether the motion is another than the model's: chi^2, or half of its pieces as outliers."""
+        return bool(self.fit.reduced > _LARGE or np.mean(~self.fit.used) > 0.5)
+
+    @property
     def n_contacts(self) -> int:
         """Pieces, each with at least one contact."""
         return int(np.count_nonzero(self.fit.used))
 
 
 def shoot_contacts(
-    runs: Sequence[Run], decay: DecayFit, *, resolution: float, kappa: float, gamma: float, pieces_per_run: int = 25
-) -> ContactFit:
+    runs: Sequence[Run], decay: DecayFit, *, resolution: float, kappa: float, gamma: float, pieces_per_run: int = 25,
+    mark: float = 0.0,
+) -> ContactFit:  # fmt: skip
     """Fit the runs with contact together.
 
     Parameters
@@ -84,6 +90,8 @@ def shoot_contacts(
         First guess of k_s/m (1/s^2) and c_s/m (1/s).
     pieces_per_run : int
         Pieces taken from each run, spread over it.
+    mark : float
+        About the crank's angle at the photogate (rad), from where it pulls towards the support.
 
     Raises
     ------
@@ -102,16 +110,20 @@ def shoot_contacts(
         crank, gap = float(run.settings["crank_length"]), float(run.settings["gap"])
         own = _SHARED + _PER_RUN * len(taken)
         which = np.array([*range(_SHARED), *range(own, own + _PER_RUN)])
-        here = _pieces(run, which, gap, pieces_per_run, decay.values, crank)
+        here = _pieces(run, which, gap, float(decay.values[3]), pieces_per_run)
         if not here:
             continue
         pieces += here
         taken.append(run)
-        values += [gap, decay.values[3], crank, 0.0, 0.0, 0.0]
+        along = np.array([np.cos(mark), -np.sin(mark)])  # a cos(phi + mark)
+        values += [gap + decay.values[3], decay.values[3], *(crank * along), 0.0, 0.0]
         steps += [3e-8, 3e-8, 1e-7, 1e-7, 1e-7, 1e-7]
         # the drive: amplitude as set to 0.5 %, a phase of the mark to 0.05 rad, a second harmonic to 3 %
         spread = np.array([1.5e-3, 1e-3, 5e-3 * crank, 0.05 * crank, 0.03 * crank, 0.03 * crank])
-        precision.append(np.diag(spread**-2.0))
+        own_precision = np.diag(spread**-2.0)
+        turned = np.array([along, [-along[1], along[0]]])
+        own_precision[2:4, 2:4] = turned.T @ own_precision[2:4, 2:4] @ turned
+        precision.append(own_precision)
     if not pieces:
         raise ValueError("no run shows a contact: the gap and the support cannot be found from them")
     joint = _Joint(pieces, np.array(values), np.array(steps), precision, resolution, decay.fit.jitter)
@@ -244,9 +256,7 @@ def _build(p: FloatArray) -> tuple[Any, Any, Any]:
     )  # fmt: skip
 
 
-def _pieces(
-    run: Run, which: Any, gap: float, most: int, decay: FloatArray, crank: float
-) -> list[Piece]:
+def _pieces(run: Run, which: Any, gap: float, rest: float, most: int) -> list[Piece]:
     """Pieces from one low turning point to the next, in each of which the car rises above the gap."""
     t, x = run.time, run.positions
     drive = drive_phase(run.passages)
@@ -254,7 +264,7 @@ def _pieces(
     low = _turning_points(x)
     found: list[Piece] = []
     # the screw's reading may be off by a millimetre: what rises above half of it is taken
-    level = gap - 1e-3 if gap < 2e-3 else 0.5 * gap
+    level = rest + (gap - 1e-3 if gap < 2e-3 else 0.5 * gap)
     i = 0
     while i < len(low) - 1:
         j = i + 1

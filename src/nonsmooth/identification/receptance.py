@@ -24,7 +24,7 @@ from nonsmooth.identification.free_decay import DecayFit
 from nonsmooth.identification.gap import grazing_amplitude
 from nonsmooth.identification.steady import Steady
 
-__all__ = ["receptance", "receptance_fit"]
+__all__ = ["crank_mark", "receptance", "receptance_fit"]
 
 FloatArray = NDArray[np.float64]
 LEAST = 8  # runs
@@ -115,7 +115,7 @@ def _fit(seen: Steady, decay: DecayFit) -> tuple[FloatArray, FloatArray]:
     parameters.add("omega_0", value=float(decay.values[0]), min=1e-6)
     parameters.add("f", value=float(max(decay.values[2], 1e-4)), min=-0.1)
     parameters.add("scale", value=1.0, min=0.1)
-    parameters.add("mark", value=_mark(seen, decay))
+    parameters.add("mark", value=crank_mark(seen, decay))
 
     def residual(p: Any) -> FloatArray:
         b, natural, f, scale, mark = (p[name].value for name in _NAMES)
@@ -130,8 +130,12 @@ def _fit(seen: Steady, decay: DecayFit) -> tuple[FloatArray, FloatArray]:
     return values, np.asarray(fitted.covar)[np.ix_(order, order)]
 
 
-def _mark(seen: Steady, decay: DecayFit) -> float:
-    """First guess of the mark: the mean angle between what is seen and what a mark at zero would give."""
+def crank_mark(seen: Steady, decay: DecayFit) -> float:
+    """Return the crank's angle at the photogate (rad): the mean angle between what is seen and what 0 would give.
+
+    Angles count from where the crank pulls the car towards the support. A motor on the other side has the same mark at
+    half a turn.
+    """
     expected = receptance(seen.omega, seen.crank, *(float(v) for v in decay.values[:3]))
     return float(np.angle(np.sum(seen.response * np.conj(expected))))
 

@@ -1,4 +1,8 @@
-"""The gap referred to the mean position: multiple shooting's gap in the sensor's count, the zero, and the shift."""
+"""The gap referred to the mean position: multiple shooting's gap in the sensor's count, and the car's own places.
+
+Where the car rests and about which place it swings comes from one function, :func:`places`, for `identify` and
+`compare` alike.
+"""
 
 from __future__ import annotations
 
@@ -13,13 +17,18 @@ from nonsmooth.identification.consistency import consistent
 from nonsmooth.identification.evidence import Evidence
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.free_decay import DecayFit
-from nonsmooth.identification.gap import mean_shift
+from nonsmooth.identification.gap import MeanShift, mean_shift
 from nonsmooth.identification.multiple_shooting import ContactFit
+from nonsmooth.identification.receptance import crank_mark
 from nonsmooth.identification.steady import Steady
+from nonsmooth.identification.uncertainty import uniform
 
-__all__ = ["CountedGap", "Referred", "counted_gap", "refer"]
+__all__ = ["CountedGap", "Referred", "counted_gap", "mark_of", "places", "refer"]
 
 FloatArray = NDArray[np.float64]
+
+_MOUNTED = 0.15  # rad: within which a mark is taken as put where it should be
+_HELD = 1e-3  # m: half width within which dry friction may hold a car of which nothing is known
 
 
 class CountedGap(NamedTuple):
@@ -74,11 +83,12 @@ class Referred:
 
     Attributes
     ----------
-    gap, at_rest, shift : Estimate
-        Counted from the mean position under the drive, from where the car rests, and the one less the other (m).
-    covariance : array (3, 3)
-        Of gap, at_rest and shift.
-    cross : array (3, p)
+    gap, at_rest, shift, rest : Estimate
+        Counted from the mean position under the drive, from where the car rests, the one less the other, and where the
+        car rests in the sensor's count (m).
+    covariance : array (4, 4)
+        Of gap, at_rest, shift and rest.
+    cross : array (4, p)
         With the unknowns of the adjustment: the same records tell the gap and k_s/m, the same decays zero and omega_0.
     crank_length, reading : float
         The crank to which the gap is referred, and the screw's reading that it stands for (m).
@@ -89,11 +99,13 @@ class Referred:
     gap: Estimate
     at_rest: Estimate
     shift: Estimate
+    rest: Estimate
     covariance: FloatArray
     cross: FloatArray
     crank_length: float
     reading: float
     counted: CountedGap
+    notes: tuple[str, ...] = ()
 
     def finding(self, contacts: ContactFit) -> Finding:
         """The gap as a finding."""
@@ -105,11 +117,60 @@ class Referred:
             f"{1e6 * (self.at_rest.value - self.reading):+.0f} µm",
             *self.counted.notes,
         ]
-        others = {"gap_at_rest": self.at_rest, "mean_shift": self.shift}
+        others = {"gap_at_rest": self.at_rest, "mean_shift": self.shift, "rest_position": self.rest}
         return Finding(
             "g", self.gap, "multiple shooting over records with contact, referred to the mean position",
             contacts.fit.samples, tuple(run.name for run in contacts.runs), tuple(notes), others, self.covariance,
         )  # fmt: skip
+
+
+def places(evidence: Evidence, decay: DecayFit | None, seen: Steady, *, held: float | None = None) -> MeanShift:
+    """Where the car rests and swings, in the sensor's count, from taps, steady runs and the string.
+
+    Parameters
+    ----------
+    decay : DecayFit, optional
+        Of taps with the same zero of the sensor. Without it the sensor's zero stands for the place of rest, as far as
+        friction holds the car off it.
+    seen : Steady
+        Steady runs without contact.
+    held : float, optional
+        Half width (m) of the range in which dry friction holds the car, F_C/2k; a millimetre where it is not known.
+    """
+    if decay is not None:
+        zero, error, dry = float(decay.values[3]), decay.error("x_e"), float(decay.values[2] / decay.values[0] ** 2)
+    else:
+        zero, dry = 0.0, held or 0.0
+        error = float(np.hypot(uniform(_HELD if held is None else held), uniform(evidence.resolution / 2)))
+    length = evidence.apparatus.get("string_length")
+    found = mean_shift(
+        seen, zero, error, string_length=length.value if length else None,
+        string_error=length.uncertainty if length else 0.0, dry=dry,
+    )  # fmt: skip
+    if decay is None or abs(found.rest) < evidence.resolution:
+        return found
+    said = (
+        f"the car rests at {1e3 * found.rest:+.3f} mm of the rotary sensor's count, and not where it was zeroed (dry "
+        f"friction holds it within ±{1e3 * dry:.2f} mm): gap and mean position count from where it rests"
+    )
+    return found._replace(notes=(said, *found.notes))
+
+
+def mark_of(seen: Steady, decay: DecayFit) -> tuple[float, str]:
+    """The crank's angle at the photogate (rad), and a sentence where it is far from 0; 0 where no run shows it.
+
+    A mark that is a few hundredths off, as gates are mounted, stays 0: fits with a free phase find it better.
+    """
+    if not len(seen):
+        return 0.0, ""
+    angle = crank_mark(seen, decay)
+    if abs(angle) < _MOUNTED:
+        return 0.0, ""
+    return angle, (
+        f"at the photogate's mark the crank stands {angle:+.2f} rad from where it pulls the car towards the support"
+        + (": the motor is on the other side, or the mark half a turn round" if abs(angle) > np.pi - _MOUNTED else "")
+        + "; phases are counted from there"
+    )
 
 
 def refer(
@@ -129,26 +190,24 @@ def refer(
     reading = max(set(readings), key=readings.count)
     counted = counted_gap(contacts, reading)
     assert counted is not None
-    zero, zero_error = float(decay.values[3]), decay.error("x_e")
-    length = evidence.apparatus.get("string_length")
-    shift = mean_shift(
-        seen, zero, zero_error, string_length=length.value if length else None,
-        string_error=length.uncertainty if length else 0.0, dry=float(decay.values[2] / decay.values[0] ** 2),
-    )  # fmt: skip
+    found = places(evidence, decay, seen)
     longest = max(float(run.settings["crank_length"]) for run in contacts.runs)
     crank = longest if crank_length is None else crank_length
-    moved, own, slope = shift.parts(crank)
-    # gap = counted - zero - moved, at rest = counted - zero; moved itself goes with the zero
-    rows = np.array([[1.0, -1.0 - slope, -1.0], [1.0, -1.0, 0.0], [0.0, slope, 1.0]])
-    covariance = rows @ np.diag([counted.error**2, zero_error**2, own**2]) @ rows.T
-    gap, at_rest, by = (
-        Estimate(float(value), float(np.sqrt(covariance[i, i])), "m")
-        for i, value in enumerate((counted.value - zero - moved, counted.value - zero, moved))
+    moved = found.row(crank)
+    # gap = counted - rest - shift, at rest = counted - rest, of counted and (rest, alpha, beta)
+    rest = np.array([1.0, 0.0, 0.0])
+    rows = np.array([[1.0, *(-rest - moved)], [1.0, *-rest], [0.0, *moved], [0.0, *rest]])
+    known = np.zeros((4, 4))
+    known[0, 0], known[1:, 1:] = counted.error**2, found.covariance
+    covariance = rows @ known @ rows.T
+    values = rows @ [counted.value, found.rest, found.alpha, found.beta]
+    gap, at_rest, by, place = (
+        Estimate(float(value), float(np.sqrt(covariance[i, i])), "m") for i, value in enumerate(values)
     )
     with_counted = _cross(adjusted, ("kappa", "gamma"), contacts.covariance[3:5][:, counted.places] @ counted.weight)
     with_zero = _cross(adjusted, ("omega_0", "b", "f"), decay.covariance[:3, 3])
-    cross = rows @ np.array([with_counted, with_zero, np.zeros(len(adjusted.names))])
-    return Referred(gap, at_rest, by, covariance, cross, crank, reading, counted)
+    cross = rows @ np.array([with_counted, *np.outer(found.by_zero, with_zero)])
+    return Referred(gap, at_rest, by, place, covariance, cross, crank, reading, counted, found.notes)
 
 
 def _cross(adjusted: Adjusted, labels: tuple[str, ...], shared: FloatArray) -> FloatArray:

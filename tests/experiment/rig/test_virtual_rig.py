@@ -11,6 +11,7 @@ from nonsmooth.experiment.rig import FEATURES, UNITS, VirtualRig, sensors
 from nonsmooth.experiment.rig.driven import Setting, records
 from nonsmooth.experiment.rig.figures import RELEASES, stairs
 from nonsmooth.experiment.rig.motor import frequency, passages, voltage_for
+from nonsmooth.experiment.rig.physics import crank_angle
 from nonsmooth.experiment.rig.truth import published
 from nonsmooth.experiment.session import PROCEDURES
 
@@ -339,3 +340,81 @@ def test_the_rise_in_steps_carries_the_motion() -> None:
     cranks = [recording.tree[run].attrs["crank_length"] for run in recording.runs]
     assert cranks == [round(rho / 8.47, 5) for rho in (0.38, 0.39)]
     assert {recording.tree[run].attrs["gap"] for run in recording.runs} == {-0.0045}
+
+
+# What goes wrong on request
+
+
+def test_friction_that_holds_keeps_the_car_off_the_place_where_its_springs_balance() -> None:
+    """It stops within F_C/2k of rest and stays to a count; a friction that creeps lets it come back."""
+    truth = {"friction": 0.015, "encoder_zero": 0.0}
+    holding, creeping = (VirtualRig(2, truth=truth, holding=on).impulse(velocities=(0.2, -0.2)) for on in (True, False))
+    reach = 0.015 / (2 * VirtualRig(2).truth["k"])
+    for run in holding.runs:
+        end = position(holding, run)[-500:]
+        assert np.ptp(end) <= sensors.COUNT * 1.01 and sensors.COUNT < np.abs(end).max() < reach + sensors.COUNT
+        assert np.abs(position(creeping, run)[-1]) <= sensors.COUNT
+    assert position(holding, "Run #2")[0] != position(holding, "Run #1")[0]  # tapped where it came to rest
+
+
+def test_the_sensor_counts_from_where_it_was_zeroed() -> None:
+    shifted, plain = (
+        VirtualRig(2, quantisation=False, truth={"sensor_zero": zero}).impulse(**SHORT["impulse"]) for zero in (4e-4, 0)
+    )
+    np.testing.assert_allclose(position(shifted, "Run #1"), position(plain, "Run #1") - 4e-4, atol=1e-12)
+
+
+@pytest.mark.parametrize(("sign", "channel", "procedure"), [
+    ("angle_sign", "Angle", "springs"), ("force_sign", "Force", "springs"), ("turn_sign", "Turn", "voltage"),
+])  # fmt: skip
+def test_a_sensor_counts_the_other_way(sign: str, channel: str, procedure: str) -> None:
+    usual, other = (
+        VirtualRig(2, quantisation=False, truth={sign: s}).record(procedure, **SHORT[procedure]) for s in (1.0, -1.0)
+    )
+    np.testing.assert_array_equal(other.channel(channel, "Run #1").values, -usual.channel(channel, "Run #1").values)
+    with pytest.raises(ValueError, match="must be 1 or -1"):
+        VirtualRig(2, truth={sign: 0.5})
+
+
+def test_the_motor_on_the_other_side_drives_a_mirrored_car() -> None:
+    """Without a support the rig is symmetric but for the motor."""
+    options = {"voltages": (5.0,), "crank_lengths": (0.03,), "duration": 3.0}
+    exact = {"quantisation": False, "jitter": False}
+    here, there = (VirtualRig(2, **exact, truth={"motor_side": side}).response(**options) for side in (1, -1))
+    np.testing.assert_allclose(position(there, "Run #1"), -position(here, "Run #1"), atol=1e-8)
+    np.testing.assert_array_equal(there.channel("Turn", "Run #1")["time"], here.channel("Turn", "Run #1")["time"])
+
+
+def test_a_motor_that_wanders_turns_by_its_own_angle() -> None:
+    """The gate sees whole turns of the angle that drives the car; its frequency varies by 0.1 % about the mean."""
+    rig, omega = VirtualRig(2, truth={"motor_wander": 1e-3}), 6.0
+    wander = rig.wander("response", 0, omega)
+    at = passages(rig, omega, 3.0, 4000.0, wander)
+    turned = crank_angle(at, rig.named_parameters(omega=omega), wander) / (2 * np.pi)
+    np.testing.assert_allclose(turned, np.rint(turned), atol=1e-10)
+    assert np.all(np.diff(np.rint(turned)) == 1)
+    instants = np.linspace(0, 4000, 400_001)
+    rate = np.gradient(crank_angle(instants, rig.named_parameters(omega=omega, ripple=0.0), wander), instants)
+    assert np.std(rate) / omega == pytest.approx(1e-3, rel=0.05) and np.mean(rate) == pytest.approx(omega, rel=1e-4)
+    assert rig.wander("response", 1, omega) != wander and VirtualRig(2).wander("response", 0, omega) == ()
+
+
+def test_one_tap_slips_and_the_others_do_not() -> None:
+    options = {"velocities": (0.4, -0.4, 0.3), "duration": 4.0}
+    plain, slipped = (VirtualRig(2, truth={"slipped_tap": n}).impulse(**options) for n in (0, 2))
+    off = [position(slipped, run) - position(plain, run) for run in plain.runs]
+    assert not off[0].any() and not off[2].any()
+    assert off[1][0] == 0 and abs(off[1][-1]) > 1e-3 and np.ptp(off[1][-50:]) <= sensors.COUNT * 1.01
+
+
+def test_an_awkward_rig_is_its_seed_and_the_car_of_that_seed() -> None:
+    one, again, plain = VirtualRig.awkward(5), VirtualRig.awkward(5), VirtualRig(5)
+    assert one.truth == again.truth and one.holding
+    beside = ("sensor_zero", "motor_side", "motor_wander", "slipped_tap", "angle_sign", "force_sign", "turn_sign",
+              "creep_velocity")  # fmt: skip
+    assert all(one.truth[name] == plain.truth[name] for name in UNITS if name not in beside)
+    drawn = [VirtualRig.awkward(seed).truth for seed in range(40)]
+    for name in ("motor_side", "angle_sign", "force_sign", "turn_sign"):
+        assert {truth[name] for truth in drawn} == {1.0, -1.0}
+    assert {truth["slipped_tap"] for truth in drawn} == set(range(1, 7))
+    assert all(abs(truth["sensor_zero"]) < truth["friction"] / (2 * truth["k"]) for truth in drawn)

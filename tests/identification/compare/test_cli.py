@@ -11,7 +11,7 @@ import nonsmooth as ns
 from nonsmooth.cli.main import main
 from nonsmooth.experiment.rig import VirtualRig
 from nonsmooth.experiment.rig.driven import Setting, records
-from nonsmooth.experiment.rig.figures import without_support
+from nonsmooth.experiment.rig.figures import TAPS, without_support
 from nonsmooth.experiment.rig.motor import mean_position, voltage_for
 from nonsmooth.experiment.rig.notebook import write_session
 
@@ -27,7 +27,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     settings = [Setting(voltage_for(rig, 11.15), length, gap, 25.0, (), place) for place in (None, -0.02)]
     made = {
         "section": records(rig, "section", settings, settle=30.0),
-        "response": records(rig, "response", without_support(rig, 14)),
+        "response": records(rig, "response", without_support(rig, 14)), "impulse": rig.impulse(velocities=TAPS),
     }
     top = tmp_path_factory.mktemp("lab")
     write_session(rig, top / "session", made, title="a test")

@@ -30,9 +30,21 @@ def impulse(
     runs = []
     for i, velocity in enumerate(velocities):
         rng = rig.generator("impulse", i)
-        start = {"v": velocity * float(rng.uniform(0.9, 1.1))}
-        runs.append(_decay(rig, rng, f"Run #{i + 1}", system, start, duration))
+        start = {"v": velocity * float(rng.uniform(0.9, 1.1)), **_stuck(rig, i)}
+        slips = rig.truth["slipped_tap"] == i + 1
+        runs.append(_decay(rig, rng, f"Run #{i + 1}", system, start, duration, slips=slips))
     return rig.recording("impulse", runs)
+
+
+def _stuck(rig: VirtualRig, run: int) -> dict[str, float]:
+    """Where friction that holds keeps the car before a tap: the first is made where the sensor was zeroed."""
+    if not rig.holding:
+        return {}
+    held = rig.truth["friction"] / (2 * rig.truth["k"])
+    place = rig.truth["sensor_zero"]
+    if run:
+        place = held * float(np.random.default_rng([rig.seed, 4, run]).uniform(-0.9, 0.9))
+    return {"x": place}
 
 
 def drop(rig: VirtualRig, *, n: int = 6, duration: float = 20.0) -> Recording:
@@ -49,15 +61,28 @@ def drop(rig: VirtualRig, *, n: int = 6, duration: float = 20.0) -> Recording:
 
 
 def _decay(
-    rig: VirtualRig, rng: np.random.Generator, name: str, system: System, start: dict[str, float], duration: float
-) -> tuple[str, dict[str, Any], dict[str, Any]]:
+    rig: VirtualRig, rng: np.random.Generator, name: str, system: System, start: dict[str, float], duration: float, *,
+    slips: bool = False,
+) -> tuple[str, dict[str, Any], dict[str, Any]]:  # fmt: skip
     """A run that begins to record a little before the motion begins."""
     begin = float(rng.uniform(0.4, 1.0))
     time, at = sensors.instants(rig, rng, begin + duration)
     moving = at >= begin
-    states = sampled(system, name, start=start, duration=duration + 0.01, instants=at[moving] - begin)
+    states = sampled(
+        system, name, start=start, duration=duration + 0.01, instants=at[moving] - begin, side=rig.truth["motor_side"]
+    )
     held = np.zeros((2, len(at)))
     held[0] = start.get("x", 0.0)  # held there until it is let go
     motion: NDArray[np.float64] = held
     motion[:, moving] = states
+    if slips:
+        motion[0] -= _slip(rig, at - begin, states)
     return name, rig.channels(rng, name, time, motion[0], motion[1]), {}
+
+
+def _slip(rig: VirtualRig, since: NDArray[np.float64], states: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Travel (m) that the sensor misses: within 50 ms the string slips on its wheel, in one of the first swings."""
+    rng = np.random.default_rng([rig.seed, 5])
+    begin = float(rng.uniform(0.5, 2.5))
+    missed = float(rng.uniform(0.03, 0.3)) * float(np.max(np.abs(states[0]))) * float(rng.choice([-1.0, 1.0]))
+    return np.asarray(missed * np.clip((since - begin) / 0.05, 0.0, 1.0))

@@ -10,7 +10,7 @@ import numpy as np
 
 from nonsmooth.experiment.rig import sensors
 from nonsmooth.experiment.rig.motor import frequency, passages
-from nonsmooth.experiment.rig.physics import NO_SUPPORT
+from nonsmooth.experiment.rig.physics import NO_SUPPORT, Wander
 from nonsmooth.experiment.rig.sampled import simulated
 
 if TYPE_CHECKING:
@@ -51,18 +51,21 @@ def records(
     last: xr.Dataset | None = None
     for i, setting in enumerate(settings):
         rng, name = rig.generator(procedure, i), f"Run #{i + 1}"
-        channels, ended = _steady(rig, rng, name, setting, settle, last)
+        wander = rig.wander(procedure, i, frequency(rig, setting.voltage))
+        channels, ended = _steady(rig, rng, name, setting, settle, last, wander)
         last = ended if carry else None
         runs.append((name, channels, setting.stated()))
     return rig.recording(procedure, runs)
 
 
 def _steady(
-    rig: VirtualRig, rng: np.random.Generator, name: str, setting: Setting, settle: float, last: xr.Dataset | None
-) -> tuple[Mapping[str, Any], xr.Dataset]:
+    rig: VirtualRig, rng: np.random.Generator, name: str, setting: Setting, settle: float, last: xr.Dataset | None,
+    wander: Wander,
+) -> tuple[Mapping[str, Any], xr.Dataset]:  # fmt: skip
     omega = frequency(rig, setting.voltage)
     gap = NO_SUPPORT if setting.gap is None else rig.true_gap(setting.gap)
-    system = rig.system().with_parameters(rig.parameters(omega=omega, crank_length=setting.crank_length, g=gap))
+    set_to = rig.parameters(omega=omega, crank_length=setting.crank_length, g=gap) | named(wander)
+    system = rig.system().with_parameters(set_to)
     period = 2 * np.pi / omega
     before, phase = int(np.ceil(settle / period)), float(rng.uniform())
     # Whole periods in all, so that the next run can begin where this one ends.
@@ -71,10 +74,10 @@ def _steady(
     begin = (before + phase) * period
     start = _at_rest(gap, setting.release or 0.0) if last is None else last
     (x, v), result = simulated(
-        system, name, instants=begin + at, end=_end(system, before, recorded), periods=recorded, transient=before,
-        start=start,
+        system, name, instants=begin + at, end=_end(omega, before, recorded), start=start, side=rig.truth["motor_side"],
+        **_length(system, before, recorded, period),
     )  # fmt: skip
-    crossed = passages(rig, omega, begin, begin + setting.duration) - begin
+    crossed = passages(rig, omega, begin, begin + setting.duration, wander) - begin
     return rig.channels(rng, name, time, x, v, crossed=crossed), result
 
 
@@ -88,17 +91,22 @@ def rise(
     period = 2 * np.pi / omega
     first, last = crank_length
     rate = (last - first) / duration
-    system = rig.system(rising=True).with_parameters(rig.parameters(rising=True, omega=omega, g=rig.true_gap(gap)))
+    wander = rig.wander("rise", 0, omega)
+    set_to = rig.parameters(rising=True, omega=omega, g=rig.true_gap(gap)) | named(wander)
+    system = rig.system(rising=True).with_parameters(set_to)
     whole = int(np.ceil(settle / period))
     start: Any = {**_at_rest(rig.true_gap(gap)), "a": first}
+    side = rig.truth["motor_side"]
     _, settled = simulated(
-        system, name, instants=np.array([0.0]), end=_end(system, 0, whole), periods=whole, start=start
+        system, name, instants=np.array([0.0]), end=_end(omega, 0, whole), start=start, side=side,
+        **_length(system, 0, whole, period),
     )  # fmt: skip
     time, at = sensors.instants(rig, rng, duration)
     x, v = simulated(
-        system.with_parameters(crank_rate=rate), name, instants=at, duration=duration + 1 / sensors.RATE, start=settled
-    )[0]
-    channels = rig.channels(rng, name, time, x, v, crossed=passages(rig, omega, 0.0, duration))
+        system.with_parameters(crank_rate=rate), name, instants=at, duration=duration + 1 / sensors.RATE, start=settled,
+        side=side,
+    )[0]  # fmt: skip
+    channels = rig.channels(rng, name, time, x, v, crossed=passages(rig, omega, 0.0, duration, wander))
     note = f"crank grows evenly, {rate:.3e} m/s, {rate * period:.3e} m per turn"
     stated = {
         "crank_length": first, "crank_length_end": last, "voltage": voltage, "gap": gap, "figure": 11, "note": note,
@@ -106,11 +114,23 @@ def rise(
     return rig.recording("rise", [(name, channels, stated)])
 
 
-def _end(system: System, before: int, recorded: int) -> float:
-    """The end of a run over whole periods, as ``simulate`` computes it."""
-    period = system.period()
-    assert period is not None
+def named(wander: Wander) -> dict[str, float]:
+    """The slow terms of the motor's angle as parameters of the system."""
+    words = ("wander", "wander_rate", "wander_phase")
+    return {f"{word}_{j}": term[i] for j, term in enumerate(wander, 1) for i, word in enumerate(words)}
+
+
+def _end(omega: float, before: int, recorded: int) -> float:
+    """The end of a run over whole turns, as ``simulate`` computes it."""
+    period = 2 * np.pi / omega
     return before * period + recorded * period
+
+
+def _length(system: System, before: int, recorded: int, period: float) -> dict[str, float]:
+    """The length of a run for ``simulate``: in periods, or in time where a wandering motor leaves no period."""
+    if system.period() is None:
+        return {"transient": before * period, "duration": recorded * period}
+    return {"transient": before, "periods": recorded}
 
 
 def _at_rest(gap: float, place: float = 0.0) -> dict[str, float]:

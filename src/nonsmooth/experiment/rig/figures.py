@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from nonsmooth.experiment.rig.virtual_rig import VirtualRig
 
 __all__ = [
-    "FIGURES", "RELEASES", "SECTIONS", "crank_for", "figure", "rise", "screw_for", "section", "stairs",
+    "FIGURES", "RELEASES", "SECTIONS", "TAPS", "crank_for", "figure", "rise", "screw_for", "section", "stairs",
     "without_support",
 ]  # fmt: skip
 
@@ -41,12 +41,15 @@ RELEASES: dict[int, tuple[float, ...]] = {14: (-0.01, -0.02, -0.03, -0.04)}
 _RISE = (3.69, 0.2, 0.5, -0.0045)  # rad/s, N, N, m
 _RESPONSES = {9: (0.14, 0.02), 10: (0.16, 0.0145)}
 _STEPS = {9: (3.0, 6.6), 10: (2.4, 7.4)}  # rad/s
-#: What each figure needs. Those with the support mounted also need a few runs without it, in ``response``: where the
-#: car swings about, from which the gap is counted.
+#: What each figure needs. Those with the support mounted also need a few runs without it, in ``response``, and taps:
+#: where the car swings about, from which the gap is counted, and where it rests, from which the screw counts.
 FIGURES: dict[int, tuple[str, ...]] = {
     4: ("springs", "support"), 5: ("impulse",), 6: ("response",), 7: ("drop",), 8: ("voltage", "crank"),
-    9: ("response",), 10: ("response",), 11: ("rise", "response"), **dict.fromkeys(SECTIONS, ("section", "response")),
+    9: ("response", "impulse"), 10: ("response", "impulse"), 11: ("rise", "response", "impulse"),
+    **dict.fromkeys(SECTIONS, ("section", "response", "impulse")),
 }  # fmt: skip
+#: Velocities (m/s) of the taps that show where the car rests.
+TAPS = (0.3, -0.3, 0.2)
 
 
 def crank_for(rig: VirtualRig, rho: float) -> float:
@@ -136,9 +139,9 @@ def figure(rig: VirtualRig, number: int, **options: Any) -> dict[str, Recording]
         raise ValueError(f"figure {number!r}: measurements stand behind Figs. {', '.join(map(str, sorted(FIGURES)))}")
     if number in SECTIONS or number == 11:
         options = {"figure": number, **options} if number in SECTIONS else options
-        shown, _ = FIGURES[number]
+        shown = FIGURES[number][0]
         free = records(rig, "response", without_support(rig, number))
-        return {shown: rig.record(shown, **options), "response": free}
+        return {shown: rig.record(shown, **options), "response": free, "impulse": rig.impulse(velocities=TAPS)}
     if number == 6:
         options = {"crank_lengths": (crank_for(rig, 0.14),), **options}
     if number in _RESPONSES:
@@ -149,4 +152,5 @@ def figure(rig: VirtualRig, number: int, **options: Any) -> dict[str, Recording]
             "crank_lengths": (length,), "gap": screw_for(rig, gap, length), "duration": 20.0,
             "voltages": [voltage_for(rig, omega) for omega in steps], "after": without_support(rig, number), **options,
         }  # fmt: skip
+        return {"response": rig.record("response", **options), "impulse": rig.impulse(velocities=TAPS)}
     return {procedure: rig.record(procedure, **options) for procedure in FIGURES[number]}

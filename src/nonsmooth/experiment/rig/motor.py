@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.experiment.rig import sensors
-from nonsmooth.experiment.rig.physics import drive
+from nonsmooth.experiment.rig.physics import Wander, crank_angle, drive
 
 if TYPE_CHECKING:
     from nonsmooth.experiment.recording import Recording
@@ -49,14 +49,17 @@ def voltage_for(rig: VirtualRig, omega: float) -> float:
 def mean_position(rig: VirtualRig, crank_length: float) -> float:
     r"""Mean position (m) of the car that swings freely under the drive: half the mean of the driven end.
 
-    To first order :math:`a^2 / (8 L) - a \epsilon \cos(\beta) / 4`: the string's part and the uneven turning's.
+    To first order :math:`s [a^2 / (8 L) - a \epsilon \cos(\beta) / 4]`: the string's part and the uneven turning's.
     """
     turn = np.arange(4096) * (2 * np.pi / 4096)
-    return float(np.mean(drive(turn, rig.named_parameters(omega=1.0), crank_length))) / 2
+    moved = float(np.mean(drive(turn, rig.named_parameters(omega=1.0), crank_length))) / 2
+    return rig.truth["motor_side"] * moved
 
 
-def passages(rig: VirtualRig, omega: float, begin: float, end: float) -> NDArray[np.float64]:
+def passages(rig: VirtualRig, omega: float, begin: float, end: float, wander: Wander = ()) -> NDArray[np.float64]:
     """The times in [begin, end] at which the crank's angle is a multiple of 2 pi."""
+    if wander:
+        return _uneven(rig, omega, begin, end, wander)
     ripple, phase = rig.truth["ripple"], rig.truth["ripple_phase"]
     angle = 0.0  # omega t of the passage near t = 0, by Newton's method: angle + ripple sin(angle + phase) = 0
     for _ in range(50):
@@ -69,6 +72,20 @@ def passages(rig: VirtualRig, omega: float, begin: float, end: float) -> NDArray
     return first + period * n
 
 
+def _uneven(rig: VirtualRig, omega: float, begin: float, end: float, wander: Wander) -> NDArray[np.float64]:
+    """The same for a motor that wanders: each passage by Newton's method from where even turning has it."""
+    p = rig.named_parameters(omega=omega)
+    first, last = crank_angle(np.array([begin, end]), p, wander) / (2 * np.pi)
+    target = 2 * np.pi * np.arange(np.ceil(first), np.floor(last) + 1)
+    at = target / omega
+    for _ in range(50):  # the slope is omega (1 +- the ripple): this contracts
+        off = crank_angle(at, p, wander) - target
+        at = at - off / omega
+        if np.max(np.abs(off), initial=0.0) < 1e-12:
+            break
+    return np.asarray(at)
+
+
 def voltage(
     rig: VirtualRig, *, voltages: Sequence[float] = (2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12), turns: int = 40
 ) -> Recording:
@@ -78,7 +95,8 @@ def voltage(
         rng = rig.generator("voltage", i)
         omega = frequency(rig, float(setting))
         begin = float(rng.uniform(0, 2 * np.pi / omega))
-        crossed = passages(rig, omega, begin, begin + turns * 2 * np.pi / omega) - begin
+        wander = rig.wander("voltage", i, omega)
+        crossed = passages(rig, omega, begin, begin + turns * 2 * np.pi / omega, wander) - begin
         runs.append((f"Run #{i + 1}", {"Turn": sensors.turns(rig, crossed)}, {"voltage": float(setting)}))
     return rig.recording("voltage", runs)
 
@@ -95,8 +113,9 @@ def crank(
         begin = float(rng.uniform(0, 2 * np.pi / omega))
         time, at = sensors.instants(rig, rng, duration)
         p = rig.named_parameters(omega=omega, crank_length=float(length))
-        pulled = p.k * drive(begin + at, p, p.crank_length)
-        crossed = passages(rig, omega, begin, begin + duration) - begin
+        wander = rig.wander("crank", i, omega)
+        pulled = rig.truth["motor_side"] * p.k * drive(begin + at, p, p.crank_length, wander)
+        crossed = passages(rig, omega, begin, begin + duration, wander) - begin
         channels = {"Force": sensors.force(rig, rng, name, time, pulled), "Turn": sensors.turns(rig, crossed)}
         runs.append((name, channels, {"crank_length": float(length), "voltage": voltage}))
     return rig.recording("crank", runs)

@@ -97,7 +97,7 @@ def _apparatus(rig: VirtualRig) -> list[str]:
 def _truth(rig: VirtualRig) -> list[str]:
     from nonsmooth.experiment.rig.truth import FEATURES, UNITS
 
-    on = ", ".join(name for name in FEATURES if getattr(rig, name)) or "none"
+    on = ", ".join(name for name in (*FEATURES, "holding") if getattr(rig, name)) or "none"
     lines = [f"# What the virtual rig with seed {rig.seed} really is. Features that are on: {on}.", "[truth]"]
     return lines + [f"{name} = {value!r}    # {UNITS[name]}".rstrip(" #") for name, value in rig.truth.items()]
 

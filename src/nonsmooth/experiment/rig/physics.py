@@ -4,16 +4,21 @@ Car between two springs on strings, one of them driven by a crank; a support wit
 
 .. math::
 
-    m \dot v = T_d - T_f - c v - F_C \tanh(v / v_s) + f, \quad
-    T_d = T_0 + k (d(\varphi) - x), \quad T_f = T_0 + k x
+    m \dot v = s\,(T_d - T_f) - c v - F + f, \quad
+    T_d = T_0 + k (d(\varphi) - s x), \quad T_f = T_0 + k s x, \quad F = F_C \tanh(v / v_s)
 
     d(\varphi) = a \cos\varphi + L - \sqrt{L^2 - a^2 \sin^2\varphi}, \quad
-    \varphi = \omega t + \epsilon \sin(\omega t + \beta)
+    \varphi = \theta + \epsilon \sin(\theta + \beta), \quad
+    \theta = \omega t + \sum_j a_j \sin(\nu_j t + \beta_j)
+
+The motor is on the support's side (s = 1) or on the other (s = -1); the slow terms of :math:`\theta` are those of a
+motor that wanders. Friction lets the car creep to where the springs balance, at about v_s; on request it holds: v_s is
+then 0.1 µm/s, and a car that stops stays, within F_C/2k of that place, for as long as anything is recorded.
 
 A string cannot push: a tension that would be negative is zero. In contact :math:`y = x - g` and
 :math:`f = -(k_s y + c_s v)`; contact ends where f vanishes, and then :math:`k_s y + c_s \dot y = 0`. The driven end
 moves by d, so that to first order :math:`\rho = k a`, and its mean :math:`a^2 / (4 L)` moves the car's mean position
-by :math:`a^2 / (8 L)`.
+by :math:`s a^2 / (8 L)`.
 
 The same functions serve symbols (the ``System``) and numbers (the hand that pulls, the force sensor).
 """
@@ -29,22 +34,29 @@ if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
 __all__ = [
-    "AT_REST", "NO_SUPPORT", "car", "crank_angle", "drive", "driven_tension", "fixed_tension", "friction",
-    "hanging_mass", "support_force",
+    "AT_REST", "NO_SUPPORT", "WANDERING", "Wander", "car", "crank_angle", "drive", "driven_tension", "fixed_tension",
+    "friction", "hanging_mass", "support_force", "wander_of",
 ]  # fmt: skip
 
 NO_SUPPORT = 10.0  # m: a gap that the car never closes
 AT_REST = 1e-9  # m: a relaxing support that is nearer to its rest than this is there
+WANDERING = 3  # slow terms of a motor that wanders
+
+#: Slow terms of the motor's angle: size (rad), rate (rad/s) and phase (rad) of each.
+Wander = tuple[tuple[Any, Any, Any], ...]
 
 
-def crank_angle(t: Any, p: Any) -> Any:
-    """The crank's angle: even turning and a ripple that repeats with each turn."""
-    return p.omega * t + p.ripple * np.sin(p.omega * t + p.ripple_phase)
+def crank_angle(t: Any, p: Any, wander: Wander = ()) -> Any:
+    """The crank's angle: even turning, a motor's slow wander, and a ripple that repeats with each turn."""
+    turned = p.omega * t
+    for size, rate, phase in wander:
+        turned = turned + size * np.sin(rate * t + phase)
+    return turned + p.ripple * np.sin(turned + p.ripple_phase)
 
 
-def drive(t: Any, p: Any, crank_length: Any) -> Any:
+def drive(t: Any, p: Any, crank_length: Any, wander: Wander = ()) -> Any:
     """Displacement d of the driven end, with the string's curvature 1/L; exact also for 1/L = 0."""
-    phi = crank_angle(t, p)
+    phi = crank_angle(t, p, wander)
     square = (crank_length * np.sin(phi)) ** 2 * p.curvature
     return crank_length * np.cos(phi) + square / (1.0 + np.sqrt(1.0 - square * p.curvature))
 
@@ -54,14 +66,14 @@ def friction(v: Any, p: Any) -> Any:
     return p.c * v + p.friction * np.tanh(v / p.creep_velocity)
 
 
-def driven_tension(t: Any, x: Any, p: Any, crank_length: Any) -> Any:
+def driven_tension(t: Any, x: Any, p: Any, crank_length: Any, side: float = 1.0, wander: Wander = ()) -> Any:
     """Tension of the string at the driven spring; below zero it would have to push."""
-    return p.pretension + p.k * (drive(t, p, crank_length) - x)
+    return p.pretension + p.k * (drive(t, p, crank_length, wander) - side * x)
 
 
-def fixed_tension(x: Any, p: Any) -> Any:
+def fixed_tension(x: Any, p: Any, side: float = 1.0) -> Any:
     """Tension of the string at the spring whose other end is fixed."""
-    return p.pretension + p.k * x
+    return p.pretension + p.k * side * x
 
 
 def support_force(x: Any, v: Any, p: Any) -> Any:
@@ -74,7 +86,17 @@ def hanging_mass() -> System:
     return _hanging_mass()
 
 
-def car(*, relaxing: bool = True, rising: bool = False) -> System:
+def wander_of(p: Any) -> Wander:
+    """The slow terms of the motor's angle among the parameters of a system whose motor wanders."""
+    return tuple(
+        (getattr(p, f"wander_{j}"), getattr(p, f"wander_rate_{j}"), getattr(p, f"wander_phase_{j}"))
+        for j in range(1, WANDERING + 1)
+    )
+
+
+def car(
+    *, relaxing: bool = True, rising: bool = False, wandering: bool = False, side: int = 1
+) -> System:
     """The car with its springs, strings and support.
 
     Parameters
@@ -85,6 +107,10 @@ def car(*, relaxing: bool = True, rising: bool = False) -> System:
     rising : bool
         Whether the length of the crank grows at ``crank_rate`` (state ``a`` in place of the parameter
         ``crank_length``), for quasi-static rises of the forcing.
+    wandering : bool
+        Whether the motor wanders: further parameters, and no forcing period.
+    side : {1, -1}
+        Side of the motor: that of the support, or the other.
 
     Returns
     -------
@@ -93,7 +119,7 @@ def car(*, relaxing: bool = True, rising: bool = False) -> System:
         ``relaxing``. It has no outputs, which would cost every run more than its integration; the forces are
         functions of this file.
     """
-    return _car(relaxing, rising)
+    return _car(relaxing, rising, wandering, side)
 
 
 @cache
@@ -113,16 +139,16 @@ def _hanging_mass() -> System:
 
 
 @cache
-def _car(relaxing: bool, rising: bool) -> System:
+def _car(relaxing: bool, rising: bool, wandering: bool, side: int) -> System:
     from nonsmooth.system.mode import Mode
     from nonsmooth.system.system import System
     from nonsmooth.system.transition import Transition
 
     def driven(t: Any, u: Any, p: Any) -> Any:
-        return driven_tension(t, u.x, p, u.a if rising else p.crank_length)
+        return driven_tension(t, u.x, p, u.a if rising else p.crank_length, side, wander_of(p) if wandering else ())
 
     def fixed(t: Any, u: Any, p: Any) -> Any:
-        return fixed_tension(u.x, p)
+        return fixed_tension(u.x, p, side)
 
     def from_support(t: Any, u: Any, p: Any) -> Any:
         return support_force(u.x, u.v, p)
@@ -142,12 +168,12 @@ def _car(relaxing: bool, rising: bool) -> System:
         return -p.k_s / p.c_s * u.y
 
     on_car = ["x", "v", "a"] if rising else ["x", "v"]
-    both, support = ((1, driven), (-1, fixed)), (1, from_support)
+    both, support = ((side, driven), (-side, fixed)), (1, from_support)
     modes: dict[str, Any] = {
         "free": Mode(field(*both), states=on_car),
         "contact": Mode(field(*both, support), states=on_car),
-        "slack_driven": Mode(field((-1, fixed)), states=on_car),
-        "slack_fixed": Mode(field((1, driven)), states=on_car),
+        "slack_driven": Mode(field((-side, fixed)), states=on_car),
+        "slack_fixed": Mode(field((side, driven)), states=on_car),
     }
     indicators = {
         "penetration": lambda t, u, p: u.x - p.g,
@@ -182,6 +208,9 @@ def _car(relaxing: bool, rising: bool) -> System:
         "curvature": (1.0, "1/m"), "omega": (4.5, "rad/s"), "ripple": (0.01, "rad"), "ripple_phase": (0.0, "rad"),
     }  # fmt: skip
     parameters |= {"crank_rate": (0.0, "m/s")} if rising else {"crank_length": (0.0165, "m")}
+    for j in range(1, WANDERING + 1) if wandering else ():
+        parameters |= {f"wander_{j}": (0.0, "rad"), f"wander_phase_{j}": (0.0, "rad")}
+        parameters |= {f"wander_rate_{j}": (1.0, "rad/s")}
     states = {"x": "m", "v": "m/s"} | ({"y": "m"} if relaxing else {}) | ({"a": "m"} if rising else {})
     return System(
         name="virtual rig",
@@ -191,5 +220,5 @@ def _car(relaxing: bool, rising: bool) -> System:
         indicators=indicators,
         transitions=transitions,
         scale={name: {"x": 1e-3, "v": 1e-2, "y": 1e-5, "a": 1e-2}[name] for name in states},
-        period=lambda p: 2 * np.pi / p.omega,
+        period=None if wandering else lambda p: 2 * np.pi / p.omega,
     )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.experiment.rig.physics import driven_tension, fixed_tension
+from nonsmooth.experiment.rig.physics import driven_tension, fixed_tension, wander_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -24,7 +24,7 @@ METHOD: dict[str, Any] = {"method": "rkf45", "rtol": 1e-9}
 
 
 def simulated(
-    system: System, run: str, *, instants: FloatArray, end: float | None = None, **options: Any
+    system: System, run: str, *, instants: FloatArray, end: float | None = None, side: float = 1.0, **options: Any
 ) -> tuple[FloatArray, xr.Dataset]:
     """Position and velocity at the instants, (2, n), and the whole result of ``simulate``.
 
@@ -43,7 +43,7 @@ def simulated(
     samples = instants if end is None else np.append(instants, end)
     result = simulate(system, samples=samples, **options, **(METHOD if with_strings else {}))
     if with_strings:
-        _check_strings(system, run, result)
+        _check_strings(system, run, result, side)
     # Crossings stand twice in the result's time; each instant that was asked for is there exactly.
     rows = np.searchsorted(result["time"].values, instants)
     u = result["u"].values[rows]
@@ -55,7 +55,7 @@ def sampled(system: System, run: str, *, instants: FloatArray, **options: Any) -
     return simulated(system, run, instants=instants, **options)[0]
 
 
-def _check_strings(system: System, run: str, result: xr.Dataset) -> None:
+def _check_strings(system: System, run: str, result: xr.Dataset, side: float) -> None:
     """Slack strings are modes of the car away from the support only."""
     p = SimpleNamespace(**system.values)
     u = {str(name): result["u"].sel(state=name).values for name in system.states}
@@ -64,8 +64,10 @@ def _check_strings(system: System, run: str, result: xr.Dataset) -> None:
         return
     length = p.crank_length if "crank_length" in system.parameters else u["a"]
     tensions = {
-        "driven": driven_tension(result["time"].values, u["x"], p, length),
-        "fixed": fixed_tension(u["x"], p),
+        "driven": driven_tension(
+            result["time"].values, u["x"], p, length, side, wander_of(p) if hasattr(p, "wander_1") else ()
+        ),
+        "fixed": fixed_tension(u["x"], p, side),
     }
     for which, tension in tensions.items():
         if tension[at_support].min() < 0:

@@ -74,7 +74,7 @@ def angle(rig: VirtualRig, run: str, time: FloatArray, x: FloatArray, v: FloatAr
             f"{run}: the wheel of the rotary sensor would turn {fastest:.1f} times per second; it counts up to "
             f"{MAX_TURNS_PER_SECOND:.0f}: use less forcing"
         )
-    counts = x / COUNT
+    counts = rig.truth["angle_sign"] * (x - rig.truth["sensor_zero"]) / COUNT
     if rig.quantisation:
         counts = np.rint(counts + rig.truth["encoder_zero"])
     return _sensor(time, "Angle", "rad", counts * (2 * np.pi / COUNTS_PER_TURN))
@@ -85,6 +85,7 @@ def force(
 ) -> xr.Dataset:
     """The channel ``Force`` (N) of a sensor that is pulled with the force ``pulled``; saturation is a warning."""
     reading = rig.truth["force_gain"] * pulled + rig.truth["force_noise"] * rng.standard_normal(len(pulled))
+    reading = rig.truth["force_sign"] * reading
     if rig.quantisation:
         reading = FORCE_STEP * np.rint(reading / FORCE_STEP)
     beyond = int(np.count_nonzero(np.abs(reading) > FORCE_RANGE))
@@ -102,7 +103,7 @@ def force(
 def turns(rig: VirtualRig, crossed: FloatArray) -> xr.Dataset:
     """The channel ``Turn``: the number of each passage of the crank, over the time at which the photogate saw it."""
     time = TURN_STEP * np.rint(crossed / TURN_STEP) if rig.quantisation else crossed
-    return _sensor(np.round(time, 12), "Turn", "turns", np.arange(1.0, len(time) + 1.0))
+    return _sensor(np.round(time, 12), "Turn", "turns", rig.truth["turn_sign"] * np.arange(1.0, len(time) + 1.0))
 
 
 def _sensor(time: FloatArray, name: str, unit: str, values: FloatArray) -> xr.Dataset:

@@ -14,7 +14,7 @@ import numpy as np
 from nonsmooth.errors import DataFileError
 from nonsmooth.system.names import unknown
 
-__all__ = ["FEATURES", "NOMINAL_GAP", "UNITS", "drawn", "load_truth", "published", "switched"]
+__all__ = ["FEATURES", "HOLDING", "NOMINAL_GAP", "UNITS", "awkward", "drawn", "load_truth", "published", "switched"]
 
 #: Reading of the support's screw at which the true gap is ``truth["g"]`` (Fig. 15).
 NOMINAL_GAP = 0.0018
@@ -25,6 +25,8 @@ UNITS: Mapping[str, str] = MappingProxyType({
     "friction": "N", "creep_velocity": "m/s", "pretension": "N", "string_length": "m", "test_mass": "kg",
     "motor_slope": "rad/(s V)", "motor_offset": "V", "ripple": "rad", "ripple_phase": "rad",
     "force_gain": "", "force_noise": "N", "clock_jitter": "s", "encoder_zero": "counts",
+    "sensor_zero": "m", "motor_side": "", "motor_wander": "", "angle_sign": "", "force_sign": "",
+    "turn_sign": "", "slipped_tap": "",
 })  # fmt: skip
 
 #: Each feature of the rig that can be switched off, and what the truth is without it.
@@ -39,6 +41,10 @@ FEATURES: Mapping[str, Mapping[str, float]] = MappingProxyType({
     "gain_error": {"force_gain": 1.0},
 })  # fmt: skip
 
+#: Creep velocity (m/s) of a friction that holds: 2 µm in a record of 20 s, a thirtieth of a count.
+HOLDING = 1e-7
+
+_NOT_NEGATIVE = ("c", "friction", "ripple", "force_noise", "clock_jitter", "force_gain", "slipped_tap")
 _SPREAD = 0.2  # around Table 1
 
 
@@ -54,6 +60,8 @@ def published() -> dict[str, float]:
         "friction": 0.005, "creep_velocity": 1e-3, "pretension": 2.0, "string_length": 1.0, "test_mass": 1.33,
         "motor_slope": 1.25, "motor_offset": 1.0, "ripple": 0.01, "ripple_phase": 0.7,
         "force_gain": 1.0, "force_noise": 0.02, "clock_jitter": 5e-5, "encoder_zero": 0.0,
+        "sensor_zero": 0.0, "motor_side": 1.0, "motor_wander": 0.0, "angle_sign": 1.0,
+        "force_sign": 1.0, "turn_sign": 1.0, "slipped_tap": 0.0,
     }  # fmt: skip
 
 
@@ -74,6 +82,18 @@ def drawn(seed: int) -> dict[str, float]:
     truth["ripple_phase"] = rng.uniform(0.0, 2 * np.pi)
     truth["encoder_zero"] = rng.uniform(-0.5, 0.5)
     return {name: float(value) for name, value in truth.items()}
+
+
+def awkward(seed: int) -> dict[str, float]:
+    """What a careless experimenter's rig has besides: see :meth:`VirtualRig.awkward`."""
+    rng = np.random.default_rng([seed, 3])
+    truth = drawn(seed)
+    held = truth["friction"] / (2 * truth["k"])
+    found = {
+        "sensor_zero": rng.uniform(-0.9, 0.9) * held, "motor_side": rng.choice([-1.0, 1.0]), "motor_wander": 1e-3,
+        "slipped_tap": rng.integers(1, 7),
+    } | {name: rng.choice([-1.0, 1.0]) for name in ("angle_sign", "force_sign", "turn_sign")}  # fmt: skip
+    return {name: float(value) for name, value in found.items()}
 
 
 def switched(truth: Mapping[str, float], given: Mapping[str, Any] | None, on: Mapping[str, bool]) -> dict[str, float]:
@@ -105,8 +125,12 @@ def _check(truth: Mapping[str, float]) -> None:
             raise ValueError(f"truth[{name!r}] = {value!r} must be finite")
         if name in positive and value <= 0:
             raise ValueError(f"truth[{name!r}] = {value!r} must be positive")
-        if name in ("c", "friction", "ripple", "force_noise", "clock_jitter", "force_gain") and value < 0:
+        if name in _NOT_NEGATIVE and value < 0:
             raise ValueError(f"truth[{name!r}] = {value!r} must not be negative")
+        if name in ("motor_side", "angle_sign", "force_sign", "turn_sign") and abs(value) != 1:
+            raise ValueError(f"truth[{name!r}] = {value!r} must be 1 or -1")
+    if not 0 <= truth["motor_wander"] <= 0.05:
+        raise ValueError(f"truth['motor_wander'] = {truth['motor_wander']!r} must lie between 0 and 0.05 (relative)")
     if truth["ripple"] >= 1:
         raise ValueError(f"truth['ripple'] = {truth['ripple']!r}: from 1 on the motor would turn back")
 

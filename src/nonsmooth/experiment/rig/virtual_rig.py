@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.experiment.rig import sensors
-from nonsmooth.experiment.rig.truth import FEATURES, NOMINAL_GAP, drawn, published, switched
+from nonsmooth.experiment.rig.physics import WANDERING, Wander
+from nonsmooth.experiment.rig.truth import FEATURES, HOLDING, NOMINAL_GAP, awkward, drawn, published, switched
 from nonsmooth.experiment.session import PROCEDURES
 from nonsmooth.system.names import unknown
 
@@ -40,7 +41,15 @@ class VirtualRig:
         Draws the truth and all noise. Each run of each procedure has its own stream, so that a record does not
         depend on which others were made.
     truth : mapping, optional
-        Values in place of those drawn; names and units are those of ``nonsmooth.experiment.rig.UNITS``.
+        Values in place of those drawn; names and units are those of ``nonsmooth.experiment.rig.UNITS``. Not drawn but
+        at request: ``motor_side`` (1: the motor pulls from the support's side, -1: from the other), ``motor_wander``
+        (standard deviation of the frequency about its mean, relative, slow against a turn), ``sensor_zero`` (the place
+        at which the rotary sensor was zeroed, from where the springs balance), ``angle_sign``, ``force_sign`` and
+        ``turn_sign`` (-1: the sensor counts the other way), ``slipped_tap`` (the impulse run, counted from 1, in which
+        the string slips on the sensor's wheel; 0: none).
+    holding : bool
+        Dry friction that holds the car where it stops, within F_C/2k of where the springs balance, in place of one that
+        lets it creep there (``creep_velocity`` is then 0.1 µm/s).
     ripple, string, friction, support_relaxation, jitter, noise, quantisation, gain_error : bool
         Features that can be switched off: the motor's uneven turning, the finite length of the crank's string, dry
         friction, the time the support takes to come back, the jitter of the clock, the noise of the force sensor,
@@ -63,6 +72,7 @@ class VirtualRig:
     noise: bool = True
     quantisation: bool = True
     gain_error: bool = True
+    holding: bool = False
 
     def __post_init__(self) -> None:
         if not isinstance(self.truth, Mapping):
@@ -74,7 +84,10 @@ class VirtualRig:
             on[name] = getattr(self, name)
             if not isinstance(on[name], bool):
                 raise TypeError(f"{name} = {on[name]!r}: a feature is on (True) or off (False)")
-        truth = switched(drawn(self.seed), self.truth, on)
+        if not isinstance(self.holding, bool):
+            raise TypeError(f"holding = {self.holding!r}: friction holds the car (True) or lets it creep (False)")
+        held = {"creep_velocity": HOLDING} if self.holding else {}
+        truth = switched(drawn(self.seed), {**self.truth, **held}, on)
         object.__setattr__(self, "truth", MappingProxyType(truth))
 
     @classmethod
@@ -82,13 +95,39 @@ class VirtualRig:
         """The paper's rig: Table 1 and a gap as read, with the features beside the model at typical values."""
         return cls(seed, truth={**published(), **options.pop("truth", {})}, **options)
 
+    @classmethod
+    def awkward(cls, seed: int, **options: Any) -> VirtualRig:
+        """The rig of this seed with all that goes wrong in a laboratory at once.
+
+        Friction holds the car and the sensor is zeroed where it sticks, the motor is on either side and wanders by
+        0.1 %, each sensor counts one way or the other, and in one of the first six taps the wheel slips.
+        """
+        return cls(seed, truth={**awkward(seed), **options.pop("truth", {})}, **{"holding": True, **options})
+
     # The system
 
     def system(self, *, rising: bool = False) -> System:
         """The rig as a ``System`` with the truth's parameters; ``rising`` with the crank's length as a slow state."""
         from nonsmooth.experiment.rig.physics import car
 
-        return car(relaxing=self.support_relaxation, rising=rising).with_parameters(self.parameters(rising=rising))
+        side = int(self.truth["motor_side"])
+        equations = car(relaxing=self.support_relaxation, rising=rising, wandering=self.wanders, side=side)
+        return equations.with_parameters(self.parameters(rising=rising))
+
+    @property
+    def wanders(self) -> bool:
+        """Whether the motor's frequency wanders."""
+        return self.truth["motor_wander"] > 0
+
+    def wander(self, procedure: str, run: int, omega: float) -> Wander:
+        """The slow terms of the motor's angle in one run: periods of 2 to 60 s, the same part of the variance each."""
+        if not self.wanders:
+            return ()
+        rng = np.random.default_rng([self.seed, 2, list(PROCEDURES).index(procedure), run])
+        rates = 2 * np.pi / np.exp(rng.uniform(np.log(2.0), np.log(60.0), WANDERING))
+        phases = rng.uniform(0.0, 2 * np.pi, WANDERING)
+        sizes = omega * self.truth["motor_wander"] * np.sqrt(2 / WANDERING) / rates
+        return tuple(zip(sizes.tolist(), rates.tolist(), phases.tolist(), strict=True))
 
     def parameters(self, *, rising: bool = False, **settings: float) -> dict[str, float]:
         """Values of the system's parameters: the truth, and the settings of a run (omega, crank_length, g)."""
@@ -134,7 +173,7 @@ class VirtualRig:
 
         record = {
             "file": "", "format": "virtual rig", "procedure": procedure, "seed": self.seed,
-            "features": [name for name in FEATURES if getattr(self, name)],
+            "features": [name for name in (*FEATURES, *(("holding",) if self.holding else ())) if getattr(self, name)],
         }  # fmt: skip
         return Recording.from_runs(
             {name: dict(channels) for name, channels, _ in runs},
@@ -226,7 +265,7 @@ class VirtualRig:
 
     def write_session(
         self, folder: str | os.PathLike[str], procedures: Sequence[str] | None = None, *,
-        truth: str | os.PathLike[str] | None = None,
+        truth: str | os.PathLike[str] | None = None, options: Mapping[str, Mapping[str, Any]] | None = None,
     ) -> Path:  # fmt: skip
         """Record and write a session folder; the truth goes to a file beside it, ``<folder>.truth.toml``.
 
@@ -238,6 +277,8 @@ class VirtualRig:
             Default: those that identification needs (``IDENTIFICATION``), without ``rise`` and ``section``.
         truth : path, optional
             Where the truth goes; never into the folder.
+        options : mapping, optional
+            Options of procedures, as ``{"impulse": {"velocities": (0.5, -0.5)}}``.
 
         Returns
         -------
@@ -245,7 +286,11 @@ class VirtualRig:
             The folder.
         """
         names = IDENTIFICATION if procedures is None else tuple(procedures)
-        return self._write(folder, {name: self.record(name) for name in names}, truth, f"virtual rig, seed {self.seed}")
+        chosen = options or {}
+        if strange := [name for name in chosen if name not in names]:
+            raise ValueError(f"options of {', '.join(strange)}: not recorded here; there are {', '.join(names)}")
+        made = {name: self.record(name, **chosen.get(name, {})) for name in names}
+        return self._write(folder, made, truth, f"virtual rig, seed {self.seed}")
 
     def write_figure(
         self, number: int, folder: str | os.PathLike[str], *, truth: str | os.PathLike[str] | None = None,

@@ -25,6 +25,7 @@ def measured_motion(
     distance_per_turn: float,
     counts_per_turn: int = 1440,
     zero: float = 0.0,
+    mark: float = 0.0,
     support: bool = True,
     angle: str = "Angle",
     turn: str = "Turn",
@@ -40,12 +41,14 @@ def measured_motion(
     run : str, optional
         Needed where there are several.
     distance_per_turn : float
-        Travel per turn of the sensor's wheel (m).
+        Travel per turn of the sensor's wheel (m); negative where it counts away from the support.
     counts_per_turn : int
         Counts of the encoder per turn.
     zero : float
         Position (m) that becomes x = 0: the car's mean position under the drive. A string of length L lets it move by
         :math:`a^2 / (8 L)` from where it rested, and the model knows nothing of this.
+    mark : float
+        The crank's angle (rad) at which the photogate sees it; 0 where it pulls the car towards the support.
     support : bool
         Whether the support was mounted.
     angle, turn : str
@@ -75,7 +78,7 @@ def measured_motion(
     x = position(turned, distance_per_turn=distance_per_turn, zero=zero)
     time = x[x.dims[0]].values
     drive = drive_phase(turns, span=(float(time[0]), float(time[-1])))
-    step = resolution(distance_per_turn=distance_per_turn, counts_per_turn=counts_per_turn)
+    step = resolution(distance_per_turn=abs(distance_per_turn), counts_per_turn=counts_per_turn)
     smoothed = _smoothed(time, x, step, drive.omega, support)
     # Beyond the first and last turn the phase would be a guess.
     inside = (time >= turns[0]) & (time <= turns[-1])
@@ -87,7 +90,7 @@ def measured_motion(
         {
             "u": (("time", "state"), u, {"long_name": "measured state"}),
             "u_error": (("time", "state"), error, {"long_name": "standard error of the measured state"}),
-            "phase": ("time", drive.phase(time[inside]) / (2 * np.pi), {
+            "phase": ("time", (drive.phase(time[inside]) + mark % (2 * np.pi)) / (2 * np.pi), {
                 "long_name": "phase of the drive", "units": "forcing periods"}),
         },
         {

@@ -2,7 +2,7 @@ r"""From a notebook's settings to the model's parameters, for rigs whose spring 
 
 The crank of length a moves the end of one spring by :math:`a \cos\varphi`: to first order the force is
 :math:`\rho = k a`. The model's x and g count from the car's mean position under the drive, the screw's reading and the
-sensor's zero from elsewhere: both are referred (:mod:`nonsmooth.identification.compare.reference`).
+sensor's count from elsewhere: both are referred (:mod:`nonsmooth.identification.compare.reference`).
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.identification.compare.measured import measured_motion
-from nonsmooth.identification.compare.reference import GapReference, gap_reference
+from nonsmooth.identification.compare.reference import GapOffset, GapReference, gap_reference
 from nonsmooth.identification.compare.series import measured_response, measured_rise, measured_sections
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def session_measurement(
     *,
     k: float,
     crank_force: float | None = None,
-    gap_offset: float | tuple[float, float] = 0.0,
+    gap_offset: float | Sequence[float] | GapOffset = 0.0,
     referred: bool = True,
     reference: GapReference | None = None,
 ) -> tuple[xr.Dataset, dict[str, Any]]:
@@ -52,12 +52,12 @@ def session_measurement(
         The spring's stiffness (N/m), for the parameter over which a rise is drawn.
     crank_force : float, optional
         Force per crank length from a calibration (N/m); the spring's ``k`` where not given.
-    gap_offset : float or (value, standard uncertainty)
+    gap_offset : float, (value, standard uncertainty) or GapOffset
         What the gap is more than the screw's reading (m); see
         :func:`nonsmooth.identification.compare.gap_offset`.
     referred : bool
-        Refer x and g to the mean position under the drive: by the runs of ``response`` without the support where the
-        session has them, else by the string's length.
+        Refer x and g to the mean position under the drive: by the taps (``impulse``) and the runs of ``response``
+        without the support where the session has them.
     reference : GapReference, optional
         Another session's, in place of ``gap_offset`` and ``referred``.
 
@@ -87,10 +87,11 @@ def session_measurement(
     # The crank of a rise grows, and the mean position moves with it: it is referred point by point.
     shift = 0.0 if shows == "diagram" else reference.mean(length)[0]
     counts = int(float(apparatus["counts_per_turn"])) if "counts_per_turn" in apparatus else 1440
+    travel = reference.direction * float(apparatus["distance_per_turn"])
     motions = [
         measured_motion(
-            item.recording, item.run, distance_per_turn=float(apparatus["distance_per_turn"]),
-            counts_per_turn=counts, zero=shift, support="gap" in item.settings,
+            item.recording, item.run, distance_per_turn=travel,
+            counts_per_turn=counts, zero=shift, mark=reference.mark, support="gap" in item.settings,
         )
         for item in chosen
     ]  # fmt: skip

@@ -1,146 +1,166 @@
 r"""Where the car swings about, and the gap counted from there.
 
-The model's drive has no mean, so its x and g count from the car's mean position under the drive. The rig's position
-counts from where the sensor was zeroed, its screw from a zero of its own. To second order in the crank's length a, a
-string of length L and a motor with the ripple :math:`\epsilon \sin(\omega t + \beta)` move the driven end by
+Three places are told apart. The rig's position counts from where the *sensor was zeroed*; the car *rests* where its
+springs balance, and a car with dry friction stops, and is zeroed, anywhere within :math:`F_C/2k` of it; under the drive
+it swings about a *mean position*, which string and uneven turning move away from rest
+(:mod:`nonsmooth.identification.gap`). The model's drive has no mean, so its x and g count from the mean position. The
+screw has a zero of its own: identification tells the gap at rest.
 
-.. math::
-
-    d = a \cos(\omega t) - \tfrac12 a \epsilon [\cos\beta - \cos(2 \omega t + \beta)]
-        + \frac{a^2}{4 L} [1 - \cos(2 \omega t)]
-
-Its mean is :math:`a^2/(4L) - a \epsilon \cos(\beta)/2`, and the car between two equal springs is moved by half of it,
-:math:`\bar x = a^2/(8L) - a \epsilon \cos(\beta)/4`. The ripple cannot be seen by a photogate with one mark a turn;
-the mean position of steady runs without the support shows both terms.
+Taps of the session tell where the car rests, its steady runs without the support where it swings; `identify` takes both
+from the same function.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from nonsmooth.experiment.session import Session
+    from nonsmooth.identification.gap import MeanShift
 
-__all__ = ["GapReference", "gap_offset", "gap_reference"]
+__all__ = ["GapOffset", "GapReference", "gap_offset", "gap_reference"]
 
-FloatArray = NDArray[np.float64]
-
-RIPPLE = 0.03  # rad: standard deviation of what a motor's ripple may be where no run shows it
-STRING = 1.0  # m: alpha = 1/(8 L) is taken as 0 +- 1/(8 STRING) where no string's length is known
+#: Procedures that tell the reference: taps, steady runs, and those that show the sensor's direction.
+_TELLING = ("impulse", "response", "contact", "grazing", "section", "rise")
 
 
-@dataclass(frozen=True)
+class GapOffset(NamedTuple):
+    """What the gap at rest is more than the screw reads (m), its standard uncertainty, and what it goes with.
+
+    ``rest`` is the place of rest in the count of the session that was identified from: another session with the same
+    taps has the same, and its errors cancel. ``held`` is F_C/2k: as far as dry friction may hold a car off its rest.
+    """
+
+    value: float
+    uncertainty: float
+    rest: float | None = None
+    held: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
 class GapReference:
-    r"""What the screw's reading and the sensor's zero are to be referred to.
+    r"""What the screw's reading and the sensor's count are to be referred to.
 
     Attributes
     ----------
-    alpha, beta : float
-        Mean position in the sensor's count, :math:`\bar x = \alpha a^2 + \beta a` (1/m, 1).
-    covariance : array (2, 2)
-        Of alpha and beta.
-    runs : int
-        Runs without the support behind them.
-    zero_error : float
-        Standard uncertainty (m) of the sensor's zero against the true rest position, from which the screw counts.
-    offset, offset_error : float
-        What the gap at rest is more than the screw reads (m).
+    places : MeanShift, optional
+        Place of rest, and about which the car swings, in the sensor's count. None: x and g stay as read.
+    offset : GapOffset
+        What the gap at rest is more than the screw reads.
+    direction : int
+        -1 where the sensor counts away from the support.
+    mark : float
+        The crank's angle (rad) at the photogate, from where it pulls towards the support; 0 where it is near that.
+    taps : bool
+        Whether taps told the place of rest.
+    notes : tuple of str
     """
 
-    alpha: float = 0.0
-    beta: float = 0.0
-    covariance: FloatArray | None = None
-    runs: int = 0
-    zero_error: float = 0.0
-    offset: float = 0.0
-    offset_error: float = 0.0
+    places: MeanShift | None = None
+    offset: GapOffset = field(default_factory=lambda: GapOffset(0.0, 0.0))
+    direction: int = 1
+    mark: float = 0.0
+    taps: bool = False
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def runs(self) -> int:
+        """Runs without the support behind it."""
+        return 0 if self.places is None else self.places.runs
 
     def mean(self, crank_length: float) -> tuple[float, float]:
         """The car's mean position (m) in the sensor's count, and its standard uncertainty."""
-        row = np.array([crank_length**2, crank_length])
-        error = 0.0 if self.covariance is None else float(np.sqrt(row @ self.covariance @ row))
-        return float(row @ [self.alpha, self.beta]), error
+        return (0.0, 0.0) if self.places is None else self.places.place(crank_length)
 
     def gap(self, reading: float, crank_length: float) -> tuple[float, float]:
         """The gap (m) from the mean position at a reading of the screw, and its standard uncertainty."""
-        mean, error = self.mean(crank_length)
-        return reading + self.offset - mean, float(np.sqrt(error**2 + self.zero_error**2 + self.offset_error**2))
+        if self.places is None:
+            return reading + self.offset.value, self.offset.uncertainty
+        shift, error = self.places.at(crank_length)
+        variance = self.offset.uncertainty**2 + error**2
+        if self.offset.rest is not None and abs(self.offset.rest - self.places.rest) < 1e-12:
+            # the taps that the gap at rest was counted from: rest falls out of the difference
+            own = self.offset.uncertainty**2 - float(self.places.covariance[0, 0])
+            variance = max(own, 0.0) + self.places.place(crank_length)[1] ** 2
+        return reading + self.offset.value - shift, float(np.sqrt(variance))
 
 
 def gap_reference(
-    session: Session, *, referred: bool = True, offset: float | tuple[float, float] = 0.0
+    session: Session, *, referred: bool = True, offset: float | Sequence[float] | GapOffset = 0.0
 ) -> GapReference:
-    """Read the reference off the runs of a session without the support, and off its string's length.
+    """Read the reference off the taps of a session, its runs without the support, and its string's length.
 
     Parameters
     ----------
     session : Session
-        Its runs of ``response`` without the setting ``gap`` show the mean positions. Without such runs the string's
-        length gives the larger part, and the ripple's is unknown within what motors do.
+        Its runs of ``impulse`` show where the car rests, those of ``response`` without the setting ``gap`` where it
+        swings. Without taps the sensor's zero is taken for rest, as uncertain as dry friction holds the car (``offset``
+        says how far; a millimetre where it does not). Without runs the string and the ripple are unknown within what
+        they may be.
     referred : bool
         Without it x and g stay as read.
-    offset : float or (value, standard uncertainty)
+    offset : float, (value, standard uncertainty), or GapOffset
         What the gap at rest is more than the screw reads (m); see :func:`gap_offset`.
+
+    Warns
+    -----
+    RecordingWarning
+        Where the sensor counts away from the support, or no tap tells the place of rest.
 
     Raises
     ------
     ValueError
         A run without the channels that it needs; the message names run and channel.
     """
-    value, error = offset if isinstance(offset, tuple) else (offset, 0.0)
+    from nonsmooth.experiment.recording import RecordingWarning
+    from nonsmooth.identification.evidence import gather
+    from nonsmooth.identification.free_decay import free_decay
+    from nonsmooth.identification.referral import mark_of, places
+    from nonsmooth.identification.steady import steady
+
+    given = _offset(offset)
+    evidence = gather(session, procedures=_TELLING)
+    notes = list(evidence.notes)
     if not referred:
-        return GapReference(offset=float(value), offset_error=float(error))
-    count = _count(session)
-    free = [item for item in session.recordings("response") if "gap" not in item.settings]
-    length = session.apparatus.get("string_length")
-    prior = (1 / (8 * length.value), length.uncertainty / (8 * length.value**2)) if length else (0.0, 1 / (8 * STRING))
-    weight = np.diag([1 / max(prior[1], 1e-6) ** 2, (4 / RIPPLE) ** 2])
-    right = weight @ [prior[0], 0.0]
-    for item in free:
-        a = float(item.settings["crank_length"])
-        mean, mean_error = _mean(session, item, count)
-        row = np.array([a**2, a])
-        weight = weight + np.outer(row, row) / mean_error**2
-        right = right + row * mean / mean_error**2
-    alpha, beta = np.linalg.solve(weight, right)
-    return GapReference(
-        float(alpha), float(beta), np.linalg.inv(weight), len(free), float(count / np.sqrt(12)), float(value),
-        float(error),
-    )  # fmt: skip
+        return GapReference(offset=given, direction=evidence.direction, notes=tuple(notes))
+    decay = None
+    if taps := evidence.runs.get("impulse", ()):
+        decay = free_decay(
+            [(run.time, run.positions) for run in taps], resolution=evidence.resolution,
+            names=[run.name for run in taps],
+        )  # fmt: skip
+        notes += [f"impulse: {note}" for note in decay.notes]
+    free = [run for run in evidence.runs.get("response", ()) if "gap" not in run.settings]
+    seen, mark = steady(free), 0.0
+    found = places(evidence, decay, seen, held=given.held)
+    if decay is not None:
+        mark, said = mark_of(seen, decay)
+        notes += [said] if said else []
+    else:
+        notes.append(
+            f"no taps of the car (impulse) in {session.folder}: where it rests is taken from the sensor's zero, to "
+            f"±{1e3 * float(np.sqrt(found.covariance[0, 0])):.2g} mm, since a car with dry friction is zeroed where it "
+            "sticks. Record a few taps in each session"
+        )
+    notes += found.notes
+    for note in notes:
+        warnings.warn(note, RecordingWarning, stacklevel=3)
+    return GapReference(found, given, evidence.direction, mark, decay is not None, tuple(notes))
 
 
-def _count(session: Session) -> float:
-    from nonsmooth.experiment.signals.displacement import resolution
-
-    apparatus = session.apparatus
-    counts = apparatus["counts_per_turn"].value if "counts_per_turn" in apparatus else 1440
-    travel = apparatus["distance_per_turn"].value
-    return float(resolution(distance_per_turn=travel, counts_per_turn=round(counts)))
+def _offset(given: float | Sequence[float] | GapOffset) -> GapOffset:
+    if isinstance(given, GapOffset):
+        return given
+    value, error = (given, 0.0) if np.ndim(given) == 0 else given  # type: ignore[misc]
+    return GapOffset(float(value), float(error))  # type: ignore[arg-type]
 
 
-def _mean(session: Session, item: Any, count: float) -> tuple[float, float]:
-    """Mean position of a steady run over whole turns, and its standard error."""
-    from nonsmooth.experiment.signals.checks import take
-    from nonsmooth.experiment.signals.displacement import position
-    from nonsmooth.experiment.signals.harmonics import fit
-    from nonsmooth.experiment.signals.phase import drive_phase
-
-    angle = take(item.recording, "Angle", item.run, units=("rad", "deg", "rev"), samples=64)
-    gate = take(item.recording, "Turn", item.run, samples=3)
-    x = position(angle, distance_per_turn=session.apparatus["distance_per_turn"].value)
-    time = x[x.dims[0]].values
-    drive = drive_phase(gate[gate.dims[0]].values)
-    inside = time <= time[0] + np.floor((time[-1] - time[0]) / drive.period) * drive.period
-    fitted = fit(time[inside], x.values[inside], drive.omega, 3)
-    # Counts of a steady motion repeat with it: their errors do not average out beyond a hundredth of a count.
-    return float(fitted.mean), float(np.hypot(fitted.mean_error, 0.01 * count))
-
-
-def gap_offset(parameters: Any, session: Session) -> tuple[float, float]:
+def gap_offset(parameters: Any, session: Session) -> GapOffset:
     """What the identified gap at rest is more than the screw read, and its standard uncertainty.
 
     Parameters
@@ -161,4 +181,10 @@ def gap_offset(parameters: Any, session: Session) -> tuple[float, float]:
         raise ValueError(f"{session.folder} has no run of 'contact': what the screw read at the identified gap is lost")
     reading = max(set(readings), key=readings.count)
     at_rest = parameters.estimate("gap_at_rest")
-    return float(at_rest.value) - reading, float(at_rest.uncertainty)
+    rest = parameters.extra.get("rest_position")
+    held = None
+    if "friction" in parameters.extra and "k" in parameters:
+        held = max(float(parameters.extra["friction"].value), 0.0) / (2 * float(parameters["k"]))
+    return GapOffset(
+        float(at_rest.value) - reading, float(at_rest.uncertainty), None if rest is None else float(rest.value), held
+    )

@@ -29,7 +29,7 @@ from nonsmooth.identification.compare.fold import fold
 from nonsmooth.identification.compare.measured import measured_motion
 from nonsmooth.identification.compare.notebook import session_measurement
 from nonsmooth.identification.compare.periods import measured_period
-from nonsmooth.identification.compare.reference import gap_offset, gap_reference
+from nonsmooth.identification.compare.reference import GapOffset, gap_offset, gap_reference
 from nonsmooth.identification.compare.rig_tables import STEP
 from nonsmooth.identification.compare.series import measured_sections
 
@@ -63,7 +63,7 @@ class RigTrial:
     rig: VirtualRig
     folder: Path
     parameters: ParameterSet | None = None
-    offset: tuple[float, float] | None = None
+    offset: GapOffset | None = None
     _sessions: dict[str, Session] = field(default_factory=dict, repr=False)
 
     def without(self, feature: str) -> RigTrial:
@@ -89,7 +89,7 @@ class RigTrial:
             return identify(self.session)
 
     @cached_property
-    def reading(self) -> tuple[float, float]:
+    def reading(self) -> GapOffset:
         """What the gap is more than the screw reads, with its uncertainty."""
         return gap_offset(self.identified, self.session) if self.offset is None else self.offset
 
@@ -160,17 +160,22 @@ class RigTrial:
     def _stairs(self, steps: NDArray[np.float64]) -> dict[str, Any]:
         forcing = steps[steps > 0.05].round(4).tolist()
         free = records(self.rig, "response", figures.without_support(self.rig, 11))
-        made = {"section": figures.stairs(self.rig, forcing=forcing), "response": free}
+        made = {
+            "section": figures.stairs(self.rig, forcing=forcing), "response": free,
+            "impulse": self.rig.impulse(velocities=figures.TAPS),
+        }  # fmt: skip
         folder = write_session(self.rig, self.folder / "stairs", made, title="Fig. 11 in steps")
         session = load_session(folder)
         reference = gap_reference(session, offset=self.reading)
         runs = session.recordings("section")
         k = self.identified["k"]
-        travel = session.apparatus["distance_per_turn"].value
+        travel = reference.direction * session.apparatus["distance_per_turn"].value
         lengths = [float(item.settings["crank_length"]) for item in runs]
         with _quiet():
             motions = [
-                measured_motion(item.recording, item.run, distance_per_turn=travel, zero=reference.mean(a)[0])
+                measured_motion(
+                    item.recording, item.run, distance_per_turn=travel, zero=reference.mean(a)[0], mark=reference.mark
+                )
                 for item, a in zip(runs, lengths, strict=True)
             ]
         measured = measured_sections(motions, "rho", [k * a for a in lengths], unit="N")

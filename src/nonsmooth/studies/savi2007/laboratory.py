@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from nonsmooth.experiment.recording import Recording
     from nonsmooth.experiment.rig import VirtualRig
     from nonsmooth.experiment.session import Session
+    from nonsmooth.identification.compare import GapOffset
     from nonsmooth.identification.parameter_set import ParameterSet
     from nonsmooth.system.system import System
 
@@ -169,7 +170,7 @@ class Laboratory:
         return discontinuous_support()
 
     @cached_property
-    def _gap_offset(self) -> tuple[float, float]:
+    def _gap_offset(self) -> GapOffset:
         """What the gap is more than the screw's reading, from the records with contact, and its uncertainty."""
         from nonsmooth.identification.compare import gap_offset
 
