@@ -84,6 +84,18 @@ def test_one_contact_tells_less_than_all_together(fitted):
     assert np.nanmax(np.abs(shown["residual"].values)) < 3 * COUNT
 
 
+def test_a_piece_in_which_friction_all_but_holds_the_car_has_a_corner():
+    # x = -A cos(w t) passes +-0.5 mm/s within 2 v / (A w^2) = 5 ms; x = -A cos^3 lingers where it turns in the middle
+    time = np.arange(0, 1.4, 0.01)
+    piece = Piece(time, time, time, np.arange(11), lambda p: (p, p, p), np.zeros(2))
+    angle = 4.5 * time
+    swift = 0.01 * np.column_stack([-np.cos(angle), 4.5 * np.sin(angle)])
+    slow = 0.01 * np.column_stack([-np.cos(angle) ** 3, 3 * 4.5 * np.cos(angle) ** 2 * np.sin(angle)])
+    assert not _grazes(piece, swift, 1.0, 2e-5, 0.015) and _grazes(piece, slow, 1.0, 2e-5, 0.015)
+    assert not _grazes(piece, slow, 1.0, 2e-5, np.inf)
+    assert _grazes(piece, swift, 0.01 + 1e-5, 2e-5, np.inf)  # turns 10 um short of the gap
+
+
 def test_the_fit_is_the_same_from_another_first_guess(fitted):
     decay = decay_of(W, B, F, PLACE)
     other = shoot_contacts(

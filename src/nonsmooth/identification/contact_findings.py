@@ -64,7 +64,9 @@ def contact_finding(found: ContactFit, mass: Quantity, *, resolution: float) -> 
         "one contact is 8 samples at 100 Hz: what is known of c_s comes from many fitted together",
     ]
     if found.grazing:
-        notes.append(f"{found.grazing} pieces in which the car only grazes the support are left out")
+        notes.append(
+            f"{found.grazing} pieces in which the car grazes the support, or friction all but holds it, are left out"
+        )
     if left:
         notes.append(f"{left} of {len(found.pieces)} pieces are left out: they fit far worse than the others")
     return Finding(

@@ -55,18 +55,22 @@ def one_rig(seed: int, folder: str, awkward: bool = False) -> dict[str, Any]:
         result = identify(session)
         runs = session.recordings("contact")
         shortest = min(runs, key=lambda item: float(item.settings["crank_length"]))
-        value, error = session_measurement(
-            session, "contact", shortest.run, k=result["k"], gap_offset=gap_offset(result, session)
-        )[1]["g"]
+        used = None
+        if "g" in result:
+            offset = gap_offset(result, session)
+            used = session_measurement(session, "contact", shortest.run, k=result["k"], gap_offset=offset)[1]["g"]
         truth = load_truth(truth_file)
         cranks = [float(item.settings["crank_length"]) for item in runs]
     expected = {
         **truth, "omega_0": float(np.sqrt(2 * truth["k"] / truth["m"])), "gain": truth["force_gain"],
         "gap_at_rest": truth["g"], "g": truth["g"] - _moved(truth, max(cranks)),
     }  # fmt: skip
-    rows = {name: _row(expected[name], result.estimate(name)) for name in ASKED if name != COMPARED}
+    known = [name for name in ASKED if name in result or name in result.extra]
+    rows = {name: _row(expected[name], result.estimate(name)) for name in known}
     reading = float(shortest.settings["gap"]) - NOMINAL_GAP
-    rows[COMPARED] = _row(truth["g"] + reading - _moved(truth, min(cranks)), Estimate(value, error, "m"))
+    if used is not None:
+        value, error = used
+        rows[COMPARED] = _row(truth["g"] + reading - _moved(truth, min(cranks)), Estimate(value, error, "m"))
     findings = {finding.name: finding for finding in result.findings}
     beside = {}
     for label, (name, other, of) in BESIDE.items():

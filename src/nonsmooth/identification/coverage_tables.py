@@ -56,6 +56,11 @@ _LENGTHS = ("g", "gap_at_rest", "gap of compare", "gap by the grazing frequency"
 _FACTORS = ("c_s",)
 
 
+def _rows(name: str, results: Sequence[Mapping[str, Any]]) -> list[Sequence[float]]:
+    """Of the rigs on which the parameter was identified."""
+    return [result["rows"][name] for result in results if name in result["rows"]]
+
+
 class _Counted:
     """One parameter over all rigs."""
 
@@ -80,7 +85,9 @@ def misses(results: Sequence[Mapping[str, Any]]) -> list[str]:
     """Where the limits are not met, one sentence each; empty: all are."""
     found = []
     for name, limit in ASKED.items():
-        counted = _Counted(name, [result["rows"][name] for result in results])
+        counted = _Counted(name, _rows(name, results))
+        if counted.n < len(results):
+            found.append(f"{name}: not identified on {len(results) - counted.n} of {len(results)} rigs")
         if counted.inside < SHARE * counted.n:
             found.append(f"{name}: {counted.inside} of {counted.n} truths lie in their intervals")
         if not SPREAD[0] <= counted.spread <= SPREAD[1]:
@@ -93,7 +100,7 @@ def misses(results: Sequence[Mapping[str, Any]]) -> list[str]:
 
 def pooled(results: Sequence[Mapping[str, Any]]) -> tuple[int, int]:
     """Truths within their 95 % intervals over all parameters and rigs, and their number."""
-    counted = [_Counted(name, [result["rows"][name] for result in results]) for name in ASKED]
+    counted = [_Counted(name, _rows(name, results)) for name in ASKED]
     return sum(c.inside for c in counted), sum(c.n for c in counted)
 
 
@@ -138,7 +145,7 @@ def page(results: Sequence[Mapping[str, Any]], *, awkward: bool = False) -> str:
         "|---|---|---|---|---|---|",
     ]  # fmt: skip
     for name in ASKED:
-        c = _Counted(name, [result["rows"][name] for result in results])
+        c = _Counted(name, _rows(name, results))
         lines.append(
             f"| {name} | {c.inside} of {c.n} | {c.spread:.2f} | {c.written(float(np.median(c.off)))} | "
             f"{c.written(float(np.max(c.off)))} | {c.written(c.stated)} |"
@@ -193,7 +200,9 @@ def to_dataset(results: Sequence[Mapping[str, Any]]) -> xr.Dataset:
     import xarray as xr
 
     names = list(ASKED)
-    table: FloatArray = np.array([[result["rows"][name] for name in names] for result in results], dtype=np.float64)
+    table: FloatArray = np.array(
+        [[result["rows"].get(name, [np.nan] * 5) for name in names] for result in results], dtype=np.float64
+    )
     over = ("rig", "parameter")
     columns = ("truth", "estimate", "uncertainty", "low", "high")
     label = "c by amplitude, viscous only (Fig. 6)"

@@ -36,7 +36,10 @@ FloatArray = NDArray[np.float64]
 _SHARED = 5  # omega_0, b, f, kappa, gamma
 _PER_RUN = 6  # gap, place, cosine and sine of the drive, its second harmonic
 LONGEST = 2.5  # s: of a piece
-_GRAZING = (2e-5, 6e-5)  # m: from the gap, within which a turning point is a graze; the second where the first fails
+#: Distance (m) from the gap within which a turning point is a graze, and time (s) for which friction may all but hold
+#: the car on its way; each pair where the one before fails.
+_GRAZING = ((2e-5, np.inf), (2e-5, 0.015), (6e-5, 0.015))
+_SLOW = 5e-4  # m/s: a car that is slower is all but held
 _LARGE, _LEFT_OUT = 3.0, 0.2  # chi^2 per degree of freedom, and share of pieces, from which a fit is doubted
 
 
@@ -166,18 +169,18 @@ class _Joint:
             again = self.fit(self.one_by_one(runs), rough=True)
             rows = [again] if first is None else [first, again]
             first = min(rows, key=lambda found: (float(np.mean(~found.used)), found.reduced))
-        for margin in _GRAZING:
+        for limits in _GRAZING:
             kept = [
                 replace(piece, start=start)
                 for piece, start, motion in zip(self.pieces, first.starts, first.fitted, strict=True)
-                if not _grazes(piece, motion, float(first.values[piece.which[_SHARED]]), margin)
+                if not _grazes(piece, motion, float(first.values[piece.which[_SHARED]]), *limits)
             ]
             if not kept:
                 raise SolveError("every piece with contact grazes the support only: use more forcing, or a smaller gap")
             try:
                 return replace(self, pieces=kept).fit(first.values), kept
             except SolveError:
-                if margin == _GRAZING[-1]:
+                if limits == _GRAZING[-1]:
                     raise
         raise AssertionError
 
@@ -231,9 +234,16 @@ class _Joint:
         )  # fmt: skip
 
 
-def _grazes(piece: Piece, motion: FloatArray, gap: float, margin: float) -> bool:
-    """Whether the car turns within a margin of the gap."""
+def _grazes(piece: Piece, motion: FloatArray, gap: float, margin: float, lingers: float = np.inf) -> bool:
+    """Whether the car turns within a margin of the gap, or dry friction all but holds it on the way for so long.
+
+    A start that changes by a micrometre then decides whether the car touches, or turns: there the sum of squares has
+    a corner.
+    """
     x, v = motion[:, 0], motion[:, 1]
+    slow = np.flatnonzero(np.diff(np.r_[0, np.abs(v) < _SLOW, 0]))
+    if np.any(piece.time[slow[1::2] - 1] - piece.time[slow[::2]] > lingers):
+        return True
     i = np.flatnonzero(v[:-1] * v[1:] < 0)
     slowing = (v[i + 1] - v[i]) / np.diff(piece.time)[i]
     turned = x[i] - v[i] ** 2 / (2 * slowing)
