@@ -156,8 +156,10 @@ def gap_reference(
 def _offset(given: float | Sequence[float] | GapOffset) -> GapOffset:
     if isinstance(given, GapOffset):
         return given
-    value, error = (given, 0.0) if np.ndim(given) == 0 else given  # type: ignore[misc]
-    return GapOffset(float(value), float(error))  # type: ignore[arg-type]
+    if isinstance(given, Sequence | np.ndarray):
+        value, error = list(given)
+        return GapOffset(float(value), float(error))
+    return GapOffset(float(given), 0.0)
 
 
 def gap_offset(parameters: Any, session: Session) -> GapOffset:
