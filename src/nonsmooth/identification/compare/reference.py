@@ -156,10 +156,9 @@ def gap_reference(
 def _offset(given: float | Sequence[float] | GapOffset) -> GapOffset:
     if isinstance(given, GapOffset):
         return given
-    if isinstance(given, Sequence | np.ndarray):
-        value, error = list(given)
-        return GapOffset(float(value), float(error))
-    return GapOffset(float(given), 0.0)
+    both = np.atleast_1d(np.asarray(given, dtype=float))
+    value, error = (*both, 0.0) if len(both) == 1 else both
+    return GapOffset(float(value), float(error))
 
 
 def gap_offset(parameters: Any, session: Session) -> GapOffset:
