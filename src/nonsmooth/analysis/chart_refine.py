@@ -80,7 +80,7 @@ def confidence_of(
 ) -> NDArray[np.float64]:  # fmt: skip
     """The chance that a label is right: (n + 1 - errors) / (n + 2) by the probes of its class, 1 where computed.
 
-    A class is a pair of numbers for each point; ``rates`` has (errors, n) of those that were probed. Nothing is known of
+    """The chance that a label is right: (n + 1 - errors) / (n + 2) by the probes of its class, 1 if computed.
     the others: 0.5."""
     confidence = np.where(computed, 1.0, 0.5)
     for place, (errors, n) in rates.items():
