@@ -17,12 +17,26 @@ from numpy.typing import NDArray
 from nonsmooth.errors import SolveError
 from nonsmooth.identification.pieces import Problem, State
 
-__all__ = ["reduced", "settle"]
+__all__ = ["Unsettled", "reduced", "settle"]
 
 FloatArray = NDArray[np.float64]
 _SETTLED = 1e-3  # of a standard uncertainty
 _LITTLE = 1e-4  # of the sum of squares: what a rough fit leaves to be gained
 _ACCURACY = 0.05  # of a standard uncertainty: how near the minimum is told where the derivatives' accuracy ends
+
+
+class Unsettled(SolveError):
+    """A fit that did not settle; ``distance``: how far its minimum seems, in standard uncertainties.
+
+    Of the parameters first, then of each piece's start. ``step``: what is left of the way, in the parameters;
+    ``values`` and ``starts``: where it stood.
+    """
+
+    def __init__(
+        self, message: str, distance: FloatArray, step: FloatArray, values: FloatArray, starts: FloatArray
+    ) -> None:
+        super().__init__(message)
+        self.distance, self.step, self.values, self.starts = distance, step, values, starts
 
 
 def reduced(
@@ -54,7 +68,8 @@ def settle(
     Raises
     ------
     SolveError
-        If it does not settle, within the iterations or at all, or a direction of the parameters is not determined.
+        If it does not settle (`Unsettled`), within the iterations or at all, or a direction of the parameters is not
+        determined.
     """
     damping = 1e-4
     p = len(theta)
@@ -90,34 +105,40 @@ def settle(
                 break
             damping *= 8
             if damping > 1e8:  # no smaller sum of squares: the derivatives' own accuracy is reached, or nothing fits
-                if (far := _distance(problem, state, weights, used, theta, centre, prior)) < _ACCURACY or rough:
+                distance, rest = _distance(problem, state, weights, used, theta, centre, prior)
+                if (far := float(np.max(distance))) < _ACCURACY or rough:
                     return theta, starts, state, count
-                raise SolveError(
+                raise Unsettled(
                     f"the fit over {len(problem.pieces)} pieces did not settle: no step lowers the sum of squares, "
-                    f"though its minimum should be {far:.2g} standard uncertainties away; look at the records for jumps"
-                )
+                    f"though its minimum should be {far:.2g} standard uncertainties away; look at the records for "
+                    "jumps", distance, rest, theta, starts,
+                )  # fmt: skip
         theta, starts, gain, best = theta + step, moved, best - found, found
         state = problem.derivatives(theta, starts)
         # by the undamped step: a damped one is short wherever it is taken
-        far = _distance(problem, state, weights, used, theta, centre, prior)
+        distance, rest = _distance(problem, state, weights, used, theta, centre, prior)
+        far = float(np.max(distance))
         if far < _SETTLED or (far < _ACCURACY and gain < 1e-7 * best) or (rough and gain < _LITTLE * best):
             return theta, starts, state, count
         damping = max(damping / 10, 1e-9)
     if rough:
         return theta, starts, state, iterations
-    raise SolveError(f"the fit over {len(problem.pieces)} pieces did not settle in {iterations} iterations")
+    raise Unsettled(
+        f"the fit over {len(problem.pieces)} pieces did not settle in {iterations} iterations",
+        distance, rest, theta, starts,
+    )  # fmt: skip
 
 
 def _distance(
     problem: Problem, state: State, weights: list[FloatArray], used: Any, theta: FloatArray, centre: FloatArray,
     prior: FloatArray,
-) -> float:  # fmt: skip
-    """Largest undamped step of a parameter or a used start, in standard uncertainties."""
+) -> tuple[FloatArray, FloatArray]:  # fmt: skip
+    """Undamped steps in standard uncertainties: the largest of the parameters, then of each start; the parameters'."""
     normal, right, back = reduced(problem, state, weights, used, len(theta))
     covariance = np.linalg.inv(normal + prior)
     step = covariance @ (right - prior @ (theta - centre))
-    far = [np.abs(step) / np.sqrt(np.maximum(np.diag(covariance), 1e-300))]
+    far = [float(np.max(np.abs(step) / np.sqrt(np.maximum(np.diag(covariance), 1e-300))))]
     for piece, (block, cross, part), use in zip(problem.pieces, back, used, strict=True):
-        if use:
-            far.append(np.abs(block @ (part - cross @ step[piece.which])) / np.sqrt(np.diag(block)))
-    return float(np.max(np.concatenate(far)))
+        own = np.abs(block @ (part - cross @ step[piece.which])) / np.sqrt(np.diag(block))
+        far.append(float(np.max(own)) if use else 0.0)
+    return np.array(far), np.asarray(step)

@@ -63,6 +63,11 @@ def contact_finding(found: ContactFit, mass: Quantity, *, resolution: float) -> 
         f"{1e6 * found.fit.jitter:.0f} µs",
         "one contact is 8 samples at 100 Hz: what is known of c_s comes from many fitted together",
     ]
+    if found.short:
+        notes.append(
+            f"the fit stands {found.short:.2g} standard uncertainties short of its minimum, where friction or a graze "
+            "gives the sum of squares a corner; what is left of the way is in the uncertainties"
+        )
     if found.grazing:
         notes.append(
             f"{found.grazing} pieces in which the car grazes the support, or friction all but holds it, are left out"

@@ -30,7 +30,7 @@ ANOMALIES: Mapping[str, tuple[Callable[[Mapping[str, float]], bool], str]] = {
     "motor on the other side": (lambda truth: truth["motor_side"] < 0, "the motor pulls from the side away"),
     "motor wanders": (lambda truth: truth["motor_wander"] > 0, "wanders"),
     "slipped tap": (
-        lambda truth: truth["slipped_tap"] > 0, "impulse: run 'Run #{slipped_tap:.0f}', channel 'Angle': left out"
+        lambda truth: truth["slipped_tap"] > 0, "impulse: run 'Run #{slipped_tap:.0f}', channel 'Angle': "
     ),
     "rotary sensor reversed": (lambda truth: truth["angle_sign"] < 0, "the rotary sensor counts away from the support"),
     "force sensor reversed": (lambda truth: truth["force_sign"] < 0, "the force sensor counts against"),

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from nonsmooth.errors import SolveError
 from nonsmooth.experiment.signals.phase import drive_phase
-from nonsmooth.identification.arrow import reduced
+from nonsmooth.identification.arrow import Unsettled, reduced
 from nonsmooth.identification.evidence import Run
 from nonsmooth.identification.free_decay import DecayFit
 from nonsmooth.identification.pieces import Piece, Problem, start_state
@@ -37,9 +37,10 @@ _SHARED = 5  # omega_0, b, f, kappa, gamma
 _PER_RUN = 6  # gap, place, cosine and sine of the drive, its second harmonic
 LONGEST = 2.5  # s: of a piece
 #: Distance (m) from the gap within which a turning point is a graze, and time (s) for which friction may all but hold
-#: the car on its way; each pair where the one before fails.
-_GRAZING = ((2e-5, np.inf), (2e-5, 0.015), (6e-5, 0.015))
+#: the car on its way; the second pair where the first fails.
+_GRAZING = ((2e-5, np.inf), (6e-5, 0.015))
 _SLOW = 5e-4  # m/s: a car that is slower is all but held
+_NEAR = 1.0  # standard uncertainties from its minimum, within which a fit that no step improves is taken
 _LARGE, _LEFT_OUT = 3.0, 0.2  # chi^2 per degree of freedom, and share of pieces, from which a fit is doubted
 
 
@@ -48,7 +49,8 @@ class ContactFit:
     """Outcome: ``kappa`` = k_s/m, ``gamma`` = c_s/m, and for each run the gap and the place of the swing.
 
     ``values`` and ``covariance``: omega_0, b, f, kappa, gamma, then per run g, x_e, cosine, sine, cosine_2, sine_2;
-    ``known`` and ``precision``: what was known of them before; ``grazing``: how many pieces are left out as grazes.
+    ``known`` and ``precision``: what was known of them before; ``grazing``: how many pieces are left out as grazes;
+    ``short``: how far short of its minimum the fit stands, in standard uncertainties.
     """
 
     values: FloatArray
@@ -59,6 +61,7 @@ class ContactFit:
     known: FloatArray
     precision: FloatArray
     grazing: int = 0
+    short: float = 0.0
 
     def place(self, run: int, which: int) -> int:
         """Index of a run's own parameter: 0 gap, 1 place, 2-5 drive."""
@@ -130,11 +133,11 @@ def shoot_contacts(
     if not pieces:
         raise ValueError("no run shows a contact: the gap and the support cannot be found from them")
     joint = _Joint(pieces, np.array(values), np.array(steps), precision, resolution, decay.fit.jitter)
-    fit, kept = joint.best(len(taken))
+    fit, kept, short = joint.best(len(taken))
     moved = joint.by_turns(fit, kept)
     return ContactFit(
         fit.values, fit.covariance + np.outer(moved, moved), tuple(taken), tuple(kept), fit, joint.values,
-        _blocks(precision), len(pieces) - len(kept),
+        _blocks(precision), len(pieces) - len(kept), short,
     )  # fmt: skip
 
 
@@ -154,10 +157,11 @@ class _Joint:
     resolution: float
     jitter: float
 
-    def best(self, runs: int) -> tuple[ShootingFit, list[Piece]]:
-        """The joint fit, and the pieces that are no grazes; where it does not get there, from fits of each run alone.
+    def best(self, runs: int) -> tuple[ShootingFit, list[Piece], float]:
+        """The joint fit, the pieces that are no grazes, and how far short of its minimum the fit stands.
 
-        Far from the solution the cost is rough, the rougher the more runs: each alone finds the way.
+        Far from the solution the cost is rough, the rougher the more runs: where all together do not get there, each
+        alone finds the way.
         """
         first: ShootingFit | None = None
         try:
@@ -178,11 +182,31 @@ class _Joint:
             if not kept:
                 raise SolveError("every piece with contact grazes the support only: use more forcing, or a smaller gap")
             try:
-                return replace(self, pieces=kept).fit(first.values), kept
+                return replace(self, pieces=kept).fit(first.values), kept, 0.0
+            except Unsettled as reason:
+                if limits == _GRAZING[-1]:
+                    return self.near(kept, reason)
             except SolveError:
                 if limits == _GRAZING[-1]:
                     raise
         raise AssertionError
+
+    def near(self, kept: list[Piece], reason: Unsettled) -> tuple[ShootingFit, list[Piece], float]:
+        """The fit where it stands short of its minimum, with what is left of the way as a further uncertainty.
+
+        Where friction holds the car or a contact grazes, the sum of squares has corners, and no step leads on.
+
+        Raises
+        ------
+        SolveError
+            If more than a standard uncertainty of a parameter or a start is left.
+        """
+        short = float(np.max(reason.distance))
+        if short > _NEAR:
+            raise reason
+        pieces = [replace(piece, start=start) for piece, start in zip(kept, reason.starts, strict=True)]
+        found = replace(self, pieces=pieces).fit(reason.values, rough=True)
+        return replace(found, covariance=found.covariance + np.outer(reason.step, reason.step)), pieces, short
 
     def by_turns(self, fit: ShootingFit, kept: list[Piece]) -> FloatArray:
         """How far the parameters move when the crank's angle is known from every other turn only, to first order.
