@@ -12,8 +12,8 @@ export OPENBLAS_NUM_THREADS ?= 1
 PYTEST_ARGS ?= -n auto --dist loadfile --no-loadscope-reorder
 
 .DEFAULT_GOAL := help
-.PHONY: help reproduce reproduce-full test slow mutants fuzz altered coverage coverage-awkward rig-against-model check bench gpu \
-	gpu-compiler docs clean distclean
+.PHONY: help reproduce reproduce-full test slow mutants fuzz altered coverage coverage-awkward rig-against-model check \
+	bench gpu gpu-compiler docs clean distclean
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 26

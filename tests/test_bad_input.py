@@ -144,7 +144,7 @@ SIMULATE = {
     "short start": ({"periods": 1, "start": [1.0]}, ValueError, r"2 numbers \(x, v\), not shape \(1,\).*'x': 0\.0"),
     "long start": ({"periods": 1, "start": [1.0, 2, 3]}, ValueError, r"2 numbers \(x, v\), not shape \(3,\)"),
     "empty start": ({"periods": 1, "start": []}, ValueError, r"2 numbers \(x, v\), not shape \(0,\)"),
-    "NaN start": ({"periods": 1, "start": [math.nan, 0]}, ValueError, r"state 'x' is not finite"),
+    "NaN start": ({"periods": 1, "start": [math.nan, 0]}, ValueError, r"state 'x' must be a finite number: \[nan, 0"),
     "text start": ({"periods": 1, "start": "rest"}, TypeError, r"start must be a state \({'x': 0\.0, 'v': 0\.0}\)"),
     "text in a start": (
         {"periods": 1, "start": {"x": "a"}},

@@ -9,6 +9,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from nonsmooth.kernels.forking import watch_forks
 from nonsmooth.results import progress as _progress  # noqa: F401  it says when kernels are compiled
 
 if TYPE_CHECKING:
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from nonsmooth.continuation.orbit import Orbit as Orbit
     from nonsmooth.continuation.special import special_points as special_points
     from nonsmooth.errors import DataFileError as DataFileError
+    from nonsmooth.errors import Interrupted as Interrupted
     from nonsmooth.errors import SolveError as SolveError
     from nonsmooth.errors import SystemDefinitionError as SystemDefinitionError
     from nonsmooth.experiment.load import load_recording as load_recording
@@ -90,10 +92,14 @@ _WHERE = {
     "SystemDefinitionError": "errors",
     "SolveError": "errors",
     "DataFileError": "errors",
+    "Interrupted": "errors",
 }
 _ROOMS = ("models", "plot")
 
 __all__ = sorted([*_WHERE, *_ROOMS, "__version__"])
+
+
+watch_forks()
 
 
 def __getattr__(name: str) -> Any:
@@ -107,7 +113,19 @@ def __getattr__(name: str) -> Any:
         value = getattr(import_module(f"nonsmooth.{_WHERE[name]}"), name)
         globals()[name] = value
         return value
-    raise AttributeError(f"module 'nonsmooth' has no attribute {name!r}; it has: {', '.join(__all__)}")
+    raise AttributeError(_not_there(name), name=name)
+
+
+def _not_there(name: str) -> str:
+    """The sentence for a name that is not here; private names are asked for by machines."""
+    text = f"module 'nonsmooth' has no attribute {name!r}"
+    if name.startswith("_"):
+        return text
+    from nonsmooth.system.names import nearest
+
+    elsewhere = [f"ns.{room}.{name}" for room in _ROOMS if name in import_module(f"nonsmooth.{room}").__all__]
+    near = elsewhere or [f"ns.{one}" for one in nearest(name, __all__)]
+    return text + (f"; nearest: {', '.join(near)}" if near else "") + "; dir(nonsmooth) lists all"
 
 
 def __dir__() -> list[str]:

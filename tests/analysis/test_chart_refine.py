@@ -9,7 +9,7 @@ from scipy import ndimage
 
 import nonsmooth as ns
 from nonsmooth.analysis.chart import chart
-from nonsmooth.analysis.chart_refine import labels_of_points
+from nonsmooth.analysis.chart_refine import confidence_of, labels_of_points
 
 FIGURE_9 = {"g": 0.02}, {"omega": (3.0, 7.0), "rho": (0.1, 0.3)}
 GAP = {"omega": 11.15}, {"g": (-0.0015, 0.002), "rho": (0.2, 0.5)}
@@ -52,6 +52,14 @@ def agree(case, n: int, part: float, least: float) -> None:
     confidence = refined["confidence"].values
     assert (confidence[~computed] < 1.0).all() and (confidence[computed] == 1.0).all()
     assert not missed
+
+
+def test_confidence_is_laplaces_rule_of_each_class() -> None:
+    """After n probes with e errors (n + 1 - e) / (n + 2); one half without a probe; 1 for what was computed."""
+    size, mixed = np.array([[1, 1, 2], [2, 2, 1]]), np.array([[0, 0, 0], [1, 1, 0]])
+    computed = np.array([[True, False, False], [False, False, False]])
+    found = confidence_of((size, mixed), computed, {(1, 0): (1, 8), (2, 1): (0, 3)})
+    assert found == pytest.approx(np.array([[1.0, 0.8, 0.5], [0.8, 0.8, 0.8]]))
 
 
 @pytest.mark.parametrize(("case", "n", "part", "least"), [(FIGURE_9, 128, 0.15, 0.999), (GAP, 96, 0.4, 0.98)])

@@ -146,7 +146,7 @@ def test_what_a_gpu_does_not_take_is_said_at_the_door() -> None:
 
 def test_without_the_package_the_door_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
-    with pytest.raises(ImportError, match=r'pip install "nonsmooth\[cuda\]"'):
+    with pytest.raises(ImportError, match=r'pip install "\.\[cuda\]"'):
         ns.sweep(ns.models.discontinuous_support(), "rho", [0.1, 0.2], direction=None, device="cuda")
 
 

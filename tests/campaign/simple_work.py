@@ -32,6 +32,9 @@ class Squares:
     def bounds(self, chunk: int) -> tuple[int, int]:
         return chunk * self.step, min((chunk + 1) * self.step, self.size)
 
+    def load(self) -> None:
+        pass
+
     def compute(self, chunk: int) -> dict[str, Any]:
         if chunk == self.fails_at:
             raise RuntimeError(f"chunk {chunk}")

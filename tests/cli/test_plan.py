@@ -42,7 +42,7 @@ def test_without_the_package_it_says_so(planned: Any, monkeypatch: pytest.Monkey
     found = planned(*PAPER, f'device = "{device}"')
     assert "of one core" in found["work"]
     assert found["gpu"].startswith("gpu         not measured, so no estimate: ")
-    assert 'pip install "nonsmooth[cuda]"' in found["gpu"]
+    assert 'pip install ".[cuda]"' in found["gpu"]
 
 
 def test_a_chart_that_no_gpu_takes(planned: Any) -> None:

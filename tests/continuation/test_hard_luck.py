@@ -52,12 +52,20 @@ def test_an_unstable_orbit_whose_motion_diverges() -> None:
 
 
 def test_a_branch_that_is_interrupted(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Ctrl-C returns what was found, which goes on from there to the same ends."""
+    """Ctrl-C raises with what was found, which goes on from there to the same ends, interrupted again on the way."""
     orbit = ns.find_orbit(support(rho=0.14, g=0.02, omega=3.3))
     whole = ns.continue_orbit(orbit, "omega", (3.0, 3.5))
     _interrupt_after(5, Curve, monkeypatch)
-    part = ns.continue_orbit(orbit, "omega", (3.0, 3.5))
+    with pytest.raises(ns.Interrupted, match="points that were found are in `result`") as first:
+        ns.continue_orbit(orbit, "omega", (3.0, 3.5))
     monkeypatch.undo()
+    assert isinstance(first.value, KeyboardInterrupt)
+    _interrupt_after(5, Curve, monkeypatch)
+    with pytest.raises(ns.Interrupted) as second:  # Ctrl-C on the first side ends the second one too
+        ns.continue_orbit(first.value.result)
+    monkeypatch.undo()
+    part = second.value.result
+    assert first.value.result.sizes["point"] < part.sizes["point"] <= first.value.result.sizes["point"] + 10
     assert ends(part) == ["interrupted", "interrupted"] and 3 < part.sizes["point"] < whole.sizes["point"]
     rest = ns.continue_orbit(part)
     assert ends(rest) == ends(whole) and rest["omega"].values[[0, -1]] == pytest.approx(whole["omega"].values[[0, -1]])
@@ -65,9 +73,11 @@ def test_a_branch_that_is_interrupted(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_curve_that_is_interrupted(flip: xr.Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Ctrl-C returns what was found, and the end says so."""
+    """Ctrl-C raises with what was found, and its end says so."""
     _interrupt_after(5, Locus, monkeypatch)
-    curve = ns.continue_curve(flip, {"omega": (3.9, 5.0), "rho": (0.1, 0.2)})
+    with pytest.raises(ns.Interrupted) as raised:
+        ns.continue_curve(flip, {"omega": (3.9, 5.0), "rho": (0.1, 0.2)})
+    curve = raised.value.result
     assert curve.sizes["point"] == 6  # the first, and one for each step
     assert [str(text)[:11] for text in curve["ended_because"].values] == ["Interrupted"] * 2
 
@@ -76,18 +86,20 @@ def test_a_branch_of_equilibria_that_is_interrupted(monkeypatch: pytest.MonkeyPa
     """x^2 = a has equilibria at x = -sqrt(a) and sqrt(a)."""
     system = ns.System(states=["x"], parameters={"a": 1.0}, modes={"one": lambda t, u, p: p.a - u.x * u.x})
     _interrupt_after(4, Equilibria, monkeypatch)
-    branch = ns.continue_equilibrium(system, "a", (0.5, 2.0), start={"x": 0.9})
+    with pytest.raises(ns.Interrupted) as raised:
+        ns.continue_equilibrium(system, "a", (0.5, 2.0), start={"x": 0.9})
+    branch = raised.value.result
     assert branch.sizes["point"] == 5
     assert branch["u"].values[:, 0] == pytest.approx(np.sqrt(branch["a"].values), abs=1e-12)
     assert [str(text)[:11] for text in branch["ended_because"].values] == ["Interrupted"] * 2
 
 
 def _interrupt_after(n: int, owner: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Ctrl-C at the step after the n-th."""
-    steps, step = iter(range(n)), owner.step
+    """Ctrl-C once, at the step after the n-th."""
+    steps, step = iter(range(n + 1)), owner.step
 
     def interrupted(*arguments: Any, **options: Any) -> Any:
-        if next(steps, None) is None:
+        if next(steps, None) == n:
             raise KeyboardInterrupt
         return step(*arguments, **options)
 

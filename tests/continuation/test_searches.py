@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 import sys
 import time
 from typing import Any
@@ -104,8 +105,10 @@ def test_a_family_of_cycles_is_said_to_be_one() -> None:
 
 def test_a_motion_that_dies_out_too_slowly_is_nearly_neutral() -> None:
     """x'' = -x - 2e-4 x': once round its multipliers are exp(-2e-4 pi), and nothing rests for long."""
-    with pytest.raises(ns.SolveError, match=f"a multiplier is {np.exp(-2e-4 * np.pi):.5g}") as caught:
+    with pytest.raises(ns.SolveError, match=r"a multiplier is 0\.9\d+") as caught:
         ns.find_orbit(CYCLE.with_parameters(push=-2e-4), start={"x": 0.5}, transient=10, **QUIET)
+    told = float(re.search(r"a multiplier is ([\d.]+),", str(caught.value)).group(1))
+    assert told == pytest.approx(np.exp(-2e-4 * np.pi), abs=5e-5)  # where Newton's method was given up
     assert caught.value.status == "neutral" and str(caught.value).count("Newton") == 1
     assert "nearly 1" in str(caught.value) and "dies out or grows very slowly" in str(caught.value)
 

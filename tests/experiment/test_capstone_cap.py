@@ -11,6 +11,7 @@ import pytest
 
 from nonsmooth.errors import DataFileError
 from nonsmooth.experiment.load import parse_recording
+from nonsmooth.experiment.reading import Options
 
 VALUES = [0.1, -2.5, 1e-300, 3.0]
 
@@ -170,3 +171,24 @@ def test_cut_archive_and_foreign_archive() -> None:
         archive.writestr("word/document.xml", "<a/>")
     with pytest.raises(DataFileError, match=r"without main\.xml; expected a PASCO Capstone"):
         parse_recording(other.getvalue(), "x.docx")
+
+
+@pytest.mark.parametrize("key", ["Angle", "Angle, Ch P2"])
+def test_a_unit_that_is_a_number_is_no_unit(key: str) -> None:
+    """BaseUnit="2560": unknown without a table, said so, and given by the channel's name or its quantity."""
+    named = main_xml().replace('"Position" BaseUnit="m"', '"Angle" ChannelIDName="Ch P2" BaseUnit="2560"')
+    packed = pack(named, {"data/a.tmp": records(VALUES)})
+    recording = parse_recording(packed, "x.cap")
+    assert recording.units == {"Angle, Ch P2": ""}
+    said = [w for w in recording.warnings if "unit" in w]
+    assert "its unit is number 2560 of a table" in said[0] and "units={'Angle, Ch P2': ...}" in said[0]
+    given = parse_recording(packed, "x.cap", Options(units={key: "rad"}))
+    assert given.units == {"Angle, Ch P2": "rad"}
+    assert given.channel("Angle").attrs["measurement"] == "Angle" and not [w for w in given.warnings if "no unit" in w]
+
+
+def test_the_number_of_a_unit_is_looked_up_in_the_files_own_table() -> None:
+    table = '<Units><UnitDefinition UnitID="2559" Symbol="N"/><UnitDefinition UnitID="2560" Symbol="rad"/></Units>'
+    xml = main_xml(extra=table).replace('BaseUnit="m"', 'BaseUnit="2560"')
+    recording = parse_recording(pack(xml, {"data/a.tmp": records(VALUES)}), "x.cap")
+    assert recording.units == {"Position": "rad"} and not [w for w in recording.warnings if "unit" in w]

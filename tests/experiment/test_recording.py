@@ -149,7 +149,7 @@ def test_datasets_that_are_no_sensor() -> None:
 
 def test_a_missing_library_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "nptdms", None)
-    with pytest.raises(DataFileError, match=r"needs the package npTDMS.*pip install 'nonsmooth\[experiment\]'"):
+    with pytest.raises(DataFileError, match=r"needs the package npTDMS.*pip install \"\.\[experiment\]\""):
         parse_recording(b"TDSm" + b"\0" * 24, "x.tdms")
 
 

@@ -62,6 +62,7 @@ def test_a_small_file_that_claims_8_GB(ending: str, tmp_path: Path) -> None:
 def test_a_file_larger_than_memory_is_named(ending: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = small(tmp_path / f"r.{ending}")
     monkeypatch.setattr(memory, "free_memory", lambda: 20)
+    monkeypatch.setattr(memory, "SMALL", 0)
     with pytest.raises(MemoryError, match=rf"the content of .*r\.{ending} takes .* more memory"):
         load(path)
 

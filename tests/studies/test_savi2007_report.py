@@ -112,18 +112,21 @@ def test_a_photograph_is_refused(tmp_path) -> None:
     assert not (tmp_path / "none").exists()
 
 
-def test_a_failed_measurement_says_where_to_look(tmp_path) -> None:
+def test_a_failed_measurement_says_where_to_look(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And its process takes no library from the folder that it is started in."""
+    (tmp_path / "numpy.py").write_text("raise RuntimeError('this is the numpy.py of the folder')")
+    monkeypatch.chdir(tmp_path)
     (sketch,) = (figure for figure in figures_of_the_study() if figure.name == "fig02")  # not of the rig
     with Bench(tmp_path, [sketch], quick=True) as bench, pytest.raises(RuntimeError, match="log.txt.*fig02: not meas"):
         bench.wait(print)
 
 
 def test_what_a_figure_needs_is_all_that_is_measured(quick: Reproduction, tmp_path: Path) -> None:
-    """Fig. 11 by itself: the records of five procedures, and the same data as beside Table 1 with all of them."""
+    """Fig. 11 by itself: the records of six procedures, and the same data as beside Table 1 with all of them."""
     alone = reproduce(tmp_path, figures=["fig11_rig"], quick=True, progress=False)
     assert [figure.name for figure in alone.figures] == ["fig11_rig"]
     session = load_session(tmp_path / "rig" / "identification")
-    assert set(session.procedures) == {"springs", "support", "impulse", "drop", "contact"}
+    assert set(session.procedures) == {"springs", "support", "impulse", "response", "drop", "contact"}
     assert {path.name for path in (tmp_path / "rig").iterdir()} == {
         "fig11_300_s", "identification", "log.txt", "truth.toml",
     }  # fmt: skip
@@ -151,7 +154,7 @@ def test_a_run_of_another_kind_is_not_mixed_with_it(quick: Reproduction) -> None
 
 def test_a_damaged_or_an_unfinished_figure_is_made_again(tmp_path: Path) -> None:
     settings = Settings(quick=True, folder=tmp_path)
-    data = {"one": xr.Dataset({"x": ("n", [1.0, 2.0])}, attrs={"nonsmooth": "{}"})}
+    data = {"one": xr.Dataset({"x": ("n", [1.0, 2.0])}, attrs={"nonsmooth": '{"verb": "test"}'})}
     finish("fig02", data, 1.5, settings)
     kept = finished("fig02", settings)
     assert kept is not None and kept[1] == 1.5 and kept[0]["one"].identical(data["one"])

@@ -61,9 +61,11 @@ def test_a_given_period_is_checked():
         4 * np.pi / 3
     )
     assert forced(lambda t, u, p: 0, period=2.5).period() == 2.5
+    vast = forced(lambda t, u, p: (9999 - p.w) ** 99 * np.cos(p.w * t), period=lambda p: 2 * np.pi / p.w, w=0.3)
+    assert vast.period() == pytest.approx(2 * np.pi / 0.3)  # 1e396 is no number that could be compared, and no accident
     with pytest.raises(SystemDefinitionError, match="does not repeat after the period"):
         forced(lambda t, u, p: np.cos(p.w * t), period=lambda p: 3 * np.pi / p.w)
-    with pytest.raises(SystemDefinitionError, match="failed when it was called"):
+    with pytest.raises(SystemDefinitionError, match=r"are \(t, u, p\), but it is called as f\(p\): parameters"):
         forced(lambda t, u, p: np.cos(p.w * t), period=lambda t, u, p: t)
 
 

@@ -150,6 +150,65 @@ def test_only_the_white_list_is_read(text):
         read_expression(text, {"u.x": sp.Symbol("u_x", real=True)})
 
 
+#: Texts that ask for more than can be worked out, and what is said of each.
+HOSTILE = {
+    "((9**9999)**9999)*u.x": "9 to the power 9999 is not accepted",
+    "floor(exp(exp(exp(3))))": "exp of a number as large as exp(exp(3)) is not accepted",
+    "floor(exp(1e300*((2**53 + 1) - 2**53)))": "is not accepted",  # 0 in floating point, 1e300 in fact
+    "(1 + 1/2**1000)**(2**1000)": "is not accepted",  # 1 in floating point
+    "pi**pi**pi**pi": "is not accepted",
+    "9" * 4000: "more digits than a float can have",
+    "where(" + " and ".join(f"u.x > {i}" for i in range(3000)) + ", 1, 2)": "joins 3000 parts at once; at most 40",
+    "where(" + "(" * 150 + "u.x > 1" + " and u.x < 9)" * 150 + ", 1, 2)": "nested at most 60 deep",
+    "max(" + ", ".join(f"{i}*u.x" for i in range(500)) + ")": "joins 500 parts at once",
+    "cos((u.x + t + 1 + sin(t))**99)": "terms when it is multiplied out; at most 5000",
+    "u.x**9999": "u_x to the power 9999 is not accepted",
+    "+".join(f"sin({i}*u.x)" for i in range(20000)): "characters is too long",
+    "sin(" * 90 + "u.x" + ")" * 90: "nested at most 60 deep",
+}
+
+
+def test_what_takes_for_ever_is_refused_before_it_is_worked_out():
+    """In a process of its own: a power that is worked out cannot be interrupted."""
+    code = (
+        "import json, sys, sympy\n"
+        "from nonsmooth.system.expressions import read_expression\n"
+        "symbols = {'u.x': sympy.Symbol('u_x', real=True), 't': sympy.Symbol('t_', real=True)}\n"
+        "for text in json.load(sys.stdin):\n"
+        "    try:\n        print(read_expression(text, symbols))\n"
+        "    except ValueError as error:\n        print(error)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], input=json.dumps(list(HOSTILE)), capture_output=True, text=True, timeout=60
+    )
+    said = done.stdout.splitlines()
+    assert not done.stderr and len(said) == len(HOSTILE)
+    for sentence, expected in zip(said, HOSTILE.values(), strict=True):
+        assert expected in sentence and len(sentence) < 700
+
+
+@pytest.mark.parametrize(("given", "read"), [("\u00b5", "\u03bc"), ("\ufb01", "fi"), ("e\u0301", "\u00e9")])
+def test_a_name_is_what_python_reads(given, read):
+    """The micro sign of a keyboard is another character than the Greek letter that ``p.µ`` asks for in code."""
+    with pytest.raises(SystemDefinitionError, match=f"in code Python reads the name as '{read}'.*Name it '{read}'"):
+        System(states=["x"], parameters={given: 1.0}, modes={"m": lambda t, u, p: -u.x * getattr(p, given)})
+    system = System(states=["x"], parameters={read: 1.0}, modes={"m": lambda t, u, p: -u.x * getattr(p, read)})
+    assert System.from_text(system.to_text()) == system
+
+
+def test_a_number_too_large_arises_in_a_product():
+    with pytest.raises(SystemDefinitionError, match="component 'v', holds a number beyond"):
+        System.from_text(damaged(lambda d: d["modes"]["free"].update(v="(9999*u.x*p.m)**99")))
+
+
+def test_what_is_said_of_a_text_is_short():
+    vast = [1] * 10**5, "a" * 10**6
+    for change in (lambda d: d["states"].update(x=vast[0]), lambda d: d["transitions"][0].update(target=vast[1])):
+        with pytest.raises(SystemDefinitionError) as raised:
+            System.from_text(damaged(change))
+        assert len(str(raised.value)) < 1500
+
+
 def damaged(change):
     content = json.loads(models.discontinuous_support().to_text())
     change(content)

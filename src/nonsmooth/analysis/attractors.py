@@ -26,6 +26,7 @@ from nonsmooth.flow.engine import Chain, Engine, FloatArray, IntArray, SectionPl
 from nonsmooth.flow.linear import PlanarEngine
 from nonsmooth.flow.methods import engine_for
 from nonsmooth.kernels import codes
+from nonsmooth.results.memory import room_for
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
@@ -65,6 +66,7 @@ class Settler:
     width: int = field(init=False)  # numbers that say where a run stands on the section (``attractors_trace``)
 
     def __post_init__(self) -> None:
+        room_for(16.0 * self.keep * len(self.system.states), f"keep = {self.keep:.6g} section points", "keep fewer")
         object.__setattr__(self, "tolerance", tolerance_of(self.engine, self.rtol))
         u, m, forced = self.system.traced.u, self.system.traced.m, self.system.traced.period is not None
         object.__setattr__(self, "width", len(u) + len(m) + int(forced and self.plan.indicator >= 0))

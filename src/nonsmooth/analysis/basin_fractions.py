@@ -18,11 +18,13 @@ from nonsmooth.analysis.chart_work import CHUNK, STORED
 from nonsmooth.analysis.settle import warn_if_small
 from nonsmooth.analysis.sweep import swept_values
 from nonsmooth.campaign.run import run
+from nonsmooth.errors import shortened
 from nonsmooth.flow.arguments import check_options, check_system, real_number, whole_number
 from nonsmooth.flow.devices import BATCH, workers_of
 from nonsmooth.flow.sections import Poincare, Stroboscopic
 from nonsmooth.flow.starts import random_starts, start_states
 from nonsmooth.results.memory import room_for
+from nonsmooth.system.names import by_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -33,6 +35,7 @@ if TYPE_CHECKING:
 __all__ = ["basin_fractions"]
 
 
+@by_name
 def basin_fractions(
     system: System,
     parameter: str,
@@ -96,7 +99,7 @@ def basin_fractions(
     numbers = swept_values(system, parameter, values)
     n_starts = whole_number(n_starts, "n_starts", 1)
     # a start is named, state by state; of each run at each value a row is kept
-    room_for((500.0 + 64.0 * len(numbers)) * n_starts, f"{n_starts} starts at {len(numbers)} values", "take fewer")
+    room_for((500.0 + 64.0 * len(numbers)) * n_starts, f"{n_starts:.6g} starts at {len(numbers)} values", "take fewer")
     starts = start_states(system, _starts(system, box, n_starts, seed))
     section, settler = settler_of(
         system, section, transient, keep, max_period, method, rtol, atol, expert, threads=threads, device=device,
@@ -143,10 +146,10 @@ def basin_fractions(
 def _starts(system: System, box: Any, n_starts: int, seed: int) -> Any:
     form = ", ".join(f'"{name}": (low, high)' for name in system.states)
     if not isinstance(box, Mapping) or not box:
-        raise ValueError(f"box = {box!r}: give the box from which starts are drawn, box={{{form}}}")
+        raise ValueError(f"box = {shortened(box)}: give the box from which starts are drawn, box={{{form}}}")
     for name, ends in box.items():
         if np.shape(ends) != (2,):
-            raise ValueError(f"box[{name!r}] = {ends!r}: give its lowest and highest value; box={{{form}}}")
+            raise ValueError(f"box[{name!r}] = {shortened(ends)}: give its lowest and highest value; box={{{form}}}")
     low, high = ({name: real_number(ends[k], f"box[{name!r}]") for name, ends in box.items()} for k in (0, 1))
     return random_starts(n_starts, low, high, whole_number(seed, "seed", 0))
 

@@ -24,12 +24,14 @@ from nonsmooth.analysis.classify import longest_period
 from nonsmooth.analysis.settle import warn_if_small
 from nonsmooth.analysis.settled import usable
 from nonsmooth.campaign.run import run
+from nonsmooth.errors import shortened
 from nonsmooth.flow.arguments import check_options, check_system, float_array, real_number, whole_number
 from nonsmooth.flow.devices import BATCH, engine_on, on_gpu, workers_of
 from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.kernels import codes
 from nonsmooth.results.memory import room_for
+from nonsmooth.system.names import by_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -40,6 +42,7 @@ if TYPE_CHECKING:
 __all__ = ["basins", "by_share", "failed", "settler_of"]
 
 
+@by_name
 def basins(
     system: System,
     grid: Mapping[str, Any],
@@ -213,7 +216,6 @@ def settler_of(
     settler = Settler(
         system, engine, plan, transient, keep, max_period, rtol=rtol, atol=atol, expert=expert, device=device
     )  # fmt: skip
-    settler.load()
     return section, settler
 
 
@@ -238,7 +240,7 @@ def _plane(system: System, grid: Any) -> dict[str, FloatArray]:
     names = dict(system.states)
     if not isinstance(grid, Mapping) or len(grid) != 2:
         given = list(grid) if isinstance(grid, Mapping) else grid
-        raise ValueError(f"grid must name two of the states {list(names)} with their values; given: {given!r}")
+        raise ValueError(f"grid must name two of the states {list(names)} with their values; given: {shortened(given)}")
     values = {}
     for name, numbers in grid.items():
         if name not in names:
@@ -256,7 +258,7 @@ def _fixed(system: System, values: Mapping[str, Any], fixed: Any) -> FloatArray:
     names = list(system.states)
     rest = np.zeros(len(names))
     if not isinstance(fixed, Mapping | None):
-        raise TypeError(f"fixed = {fixed!r}: name the states that are not in the grid, fixed={{name: value}}")
+        raise TypeError(f"fixed = {shortened(fixed)}: name the states that are not in the grid, fixed={{name: value}}")
     for name, value in (fixed or {}).items():
         if name not in names:
             raise ValueError(unknown(name, "a state", repr(system.name), dict(system.states)))

@@ -48,6 +48,9 @@ class StartsWork:
     def describe(self) -> dict[str, Any]:
         return dict(self.described)
 
+    def load(self) -> None:
+        self.settler.load()
+
     def compute(self, chunk: int) -> dict[str, Any]:
         place = np.arange(*self.bounds(chunk))
         rows, which = np.divmod(place, len(self.starts))

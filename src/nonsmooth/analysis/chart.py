@@ -14,6 +14,7 @@ from nonsmooth.analysis.classify import longest_period
 from nonsmooth.analysis.settle import warn_if_small
 from nonsmooth.analysis.sweep import swept_values
 from nonsmooth.campaign.run import run
+from nonsmooth.errors import shortened
 from nonsmooth.flow.arguments import check_options, check_system, whole_number, yes_or_no
 from nonsmooth.flow.devices import BATCH, engine_on, on_gpu, workers_of
 from nonsmooth.flow.equilibria import refuse_resting
@@ -21,6 +22,7 @@ from nonsmooth.flow.linear import PlanarEngine
 from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.flow.starts import is_one_start, plain_start, start_states
+from nonsmooth.system.names import by_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -33,6 +35,7 @@ __all__ = ["PlannedChart", "chart", "described", "plan_chart"]
 EXPONENT_RETURNS = 1000
 
 
+@by_name
 def chart(
     system: System,
     grid: Mapping[str, Any],
@@ -196,7 +199,6 @@ def plan_chart(
     settler = Settler(
         system, engine, plan, transient, keep, max_period, stop_early, extremes, rtol, atol, expert, device
     )
-    settler.load()
     options = {
         "grid": values, "start": plain_start(system, start), "carry": None if carry is None else dict(carry),
         "section": section, "transient": transient, "keep": keep, "max_period": max_period,
@@ -224,7 +226,8 @@ def described(system: System, verb: str, options: Mapping[str, Any]) -> dict[str
 def _grid(system: System, grid: Any) -> dict[str, FloatArray]:
     if not isinstance(grid, Mapping) or len(grid) != 2:
         given = list(grid) if isinstance(grid, Mapping) else grid
-        raise ValueError(f'grid must name two parameters, {{"omega": values, "rho": values}}; given: {given!r}')
+        form = '{"omega": values, "rho": values}'
+        raise ValueError(f"grid must name two parameters, {form}; given: {shortened(given)}")
     return {str(name): swept_values(system, name, values) for name, values in grid.items()}
 
 
@@ -248,10 +251,10 @@ def _carry(values: Mapping[str, FloatArray], carry: Any) -> tuple[str, str] | No
         return None
     form = f'carry={{"{next(iter(values))}": "up"}} (or "down")'
     if not isinstance(carry, Mapping) or len(carry) != 1:
-        raise ValueError(f"carry = {carry!r}: the state is carried along one parameter; write {form}")
+        raise ValueError(f"carry = {shortened(carry)}: the state is carried along one parameter; write {form}")
     ((name, direction),) = carry.items()
     if name not in values or direction not in ("up", "down"):
-        raise ValueError(f"carry = {carry!r}: allowed are the grid's parameters {list(values)}; write {form}")
+        raise ValueError(f"carry = {shortened(carry)}: allowed are the grid's parameters {list(values)}; write {form}")
     return name, direction
 
 

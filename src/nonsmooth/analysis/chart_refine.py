@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from nonsmooth.analysis.chart_work import ChartWork
 from nonsmooth.campaign.run import run
+from nonsmooth.campaign.work import check_room
 from nonsmooth.flow.arguments import real_number
 from nonsmooth.flow.engine import IntArray
 from nonsmooth.kernels import codes
@@ -69,7 +70,22 @@ def refined(
         )
     if work.carried or len(work.starts) > 1:
         raise ValueError("refine needs points that stand alone: leave carry out and give one start")
+    check_room(work, label)
     return _Refinement(work, share, threads, progress, label).result()
+
+
+def confidence_of(
+    classes: tuple[NDArray[Any], NDArray[Any]], computed: NDArray[np.bool_],
+    rates: dict[tuple[int, int], tuple[int, int]],
+) -> NDArray[np.float64]:  # fmt: skip
+    """The chance that a label is right: (n + 1 - errors) / (n + 2) by the probes of its class, 1 where computed.
+
+    """The chance that a label is right: (n + 1 - errors) / (n + 2) by the probes of its class, 1 if computed.
+    the others: 0.5."""
+    confidence = np.where(computed, 1.0, 0.5)
+    for place, (errors, n) in rates.items():
+        confidence[(classes[0] == place[0]) & (classes[1] == place[1]) & ~computed] = 1.0 - (errors + 1) / (n + 2)
+    return confidence
 
 
 class _Refinement:
@@ -100,11 +116,7 @@ class _Refinement:
         self._halve(step)
         nearest, classes = self._inferred()
         computed = self.label != UNKNOWN
-        confidence = np.ones(self.shape)
-        for place, (errors, n) in rates.items():
-            confidence[(classes[0] == place[0]) & (classes[1] == place[1]) & ~computed] = 1.0 - (errors + 1) / (n + 2)
-        untested = ~computed & ~np.isin(classes[0] * 2 + classes[1], [a * 2 + b for a, b in rates])
-        confidence[untested] = 0.5
+        confidence = confidence_of(classes, computed, rates)
         for name in ("period_number", "status", "crossings_per_period", "contacts_per_period"):
             self.columns[name] = self.columns[name][tuple(nearest)]
         return {**self.columns, "confidence": confidence, "computed": computed.astype(np.int8)}

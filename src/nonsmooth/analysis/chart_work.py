@@ -93,6 +93,9 @@ class ChartWork:
     def describe(self) -> dict[str, Any]:
         return dict(self.described)
 
+    def load(self) -> None:
+        self.settler.load()
+
     def compute(self, chunk: int) -> dict[str, Any]:
         """Every run of the places of one chunk."""
         first, last = self.bounds(chunk)

@@ -17,8 +17,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nonsmooth.errors import shortened
 from nonsmooth.flow.arguments import float_array, real_number, whole_number
 from nonsmooth.flow.engine import FloatArray
+from nonsmooth.system.names import by_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -32,6 +34,7 @@ WIDEST = 0.2  # of the extent: larger distances see the attractor's edges
 LEAST_DECADES = 0.8
 
 
+@by_name
 def correlation_dimension(
     section: Any, *, window: int = 1, scale: Any = None, range: tuple[float, float] | None = None
 ) -> xr.Dataset:
@@ -73,7 +76,9 @@ def correlation_dimension(
     window = whole_number(window, "window", 0)
     size = points.std(axis=0) if scale is None else float_array(scale, "scale")
     if np.shape(size) != points.shape[1:] or not np.isfinite(size).all() or (np.asarray(size) < 0).any():
-        raise ValueError(f"scale must be one positive number for each of the {points.shape[1]} states, not {scale!r}")
+        raise ValueError(
+            f"scale must be one positive number for each of the {points.shape[1]} states, not {shortened(scale)}"
+        )
     moving = np.asarray(size) > 0
     if not moving.any():
         raise ValueError("all section points are the same: there are no distances to count (a period-1 orbit)")
@@ -184,7 +189,7 @@ def _given(limits: Any, radius: FloatArray) -> tuple[float, float]:
     try:
         low, high = (real_number(value, "an end of the range") for value in limits)
     except (TypeError, ValueError):
-        raise ValueError(f"range = {limits!r}: give its two ends, (low, high)") from None
+        raise ValueError(f"range = {shortened(limits)}: give its two ends, (low, high)") from None
     if not radius[0] <= low < high <= radius[-1] * (1 + 1e-9):
-        raise ValueError(f"range = {limits!r} must rise and lie within {radius[0]:.3g} ... {radius[-1]:.3g}")
+        raise ValueError(f"range = {shortened(limits)} must rise and lie within {radius[0]:.3g} ... {radius[-1]:.3g}")
     return low, high

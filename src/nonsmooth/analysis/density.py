@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.analysis.settle import Attractors
+from nonsmooth.errors import shortened
 from nonsmooth.flow.arguments import real_number, whole_number
 from nonsmooth.flow.engine import Chain, FloatArray, IntArray
 
@@ -40,13 +41,13 @@ def given_ranges(system: System, density: Any, bins: Any) -> tuple[dict[str, tup
     first = next(iter(system.states))
     form = f'density=True, or density={{"{first}": (lowest, highest)}}'
     if not isinstance(density, Mapping):
-        raise TypeError(f"density = {density!r}; allowed: {form}")
+        raise TypeError(f"density = {shortened(density)}; allowed: {form}")
     ranges = {}
     for name, limits in density.items():
         if name not in system.states:
             raise ValueError(f"density names {name!r}, which is not a state; states: {', '.join(system.states)}")
         if not isinstance(limits, Sequence | np.ndarray) or isinstance(limits, str) or len(limits) != 2:
-            raise ValueError(f"density of {name!r} is {limits!r}; write {form}")
+            raise ValueError(f"density of {name!r} is {shortened(limits)}; write {form}")
         low, high = (real_number(one, f"a limit of {name!r}") for one in limits)
         if not (np.isfinite([low, high]).all() and low < high):
             raise ValueError(f"density of {name!r} from {low} to {high}: the first limit must be less than the second")

@@ -38,6 +38,7 @@ from nonsmooth.flow.starts import first_state, is_one_start, plain_start
 from nonsmooth.kernels import codes
 from nonsmooth.results.progress import progress as progress_bar
 from nonsmooth.results.statuses import EQUILIBRIA
+from nonsmooth.system.names import by_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -49,6 +50,7 @@ __all__ = ["kaplan_yorke", "lyapunov"]
 UNITS = 4096  # pieces into which a duration is cut
 
 
+@by_name
 def lyapunov(
     system: System,
     *,
@@ -145,6 +147,7 @@ def lyapunov(
     points = system.parameter_points({} if numbers is None else {str(parameter): numbers})
     forced = system.period() is not None
     count, length, wait = _length(system, periods, duration, transient, forced)
+    first_state(system, start, mode)  # refused before anything is compiled
     engine = engine_for(system, method, rtol, atol, **expert)
     options = {
         "parameter": parameter, "values": values, "direction": direction, "periods": periods, "duration": duration,

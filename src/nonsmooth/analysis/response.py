@@ -9,6 +9,7 @@ import numpy as np
 from nonsmooth.analysis.sweep import sweep
 from nonsmooth.flow.arguments import check_system
 from nonsmooth.flow.engine import FloatArray
+from nonsmooth.system.names import by_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -21,6 +22,7 @@ STEEPER = 5.0  # a jump's step in amplitude exceeds both neighbouring steps by t
 LEAST = 5e-3  # and this fraction of the amplitude
 
 
+@by_name
 def frequency_response(
     system: System,
     values: Any,

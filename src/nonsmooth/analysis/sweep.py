@@ -11,6 +11,7 @@ from nonsmooth.analysis.classify import longest_period
 from nonsmooth.analysis.density import bin_edges, coarse_values, given_ranges
 from nonsmooth.analysis.settle import Attractors, tolerance_of, warn_if_small
 from nonsmooth.analysis.sweep_pieces import Report, Slot, ended, largest_of, pieces_of, run_on_gpu, run_pieces
+from nonsmooth.errors import shortened
 from nonsmooth.flow.arguments import check_options, check_system, float_array, whole_number
 from nonsmooth.flow.devices import engine_on, on_gpu, workers_of
 from nonsmooth.flow.engine import FloatArray, State
@@ -19,6 +20,7 @@ from nonsmooth.flow.methods import engine_for, warn_if_coarse
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.flow.starts import is_one_start, plain_start, start_states
 from nonsmooth.results.memory import room_for
+from nonsmooth.system.names import by_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -32,6 +34,7 @@ DIRECTIONS: dict[str | None, tuple[str, ...]] = {
 }  # fmt: skip
 
 
+@by_name
 def sweep(
     system: System,
     parameter: str,
@@ -130,15 +133,16 @@ def sweep(
     points = system.parameter_points({parameter: numbers})
     if plan.indicator >= 0:
         refuse_resting(system, starts, points, "sweep")
-    attractors = Attractors(
-        engine, engine.prepare(points), plan, transient, keep, max_period, tolerance_of(engine, rtol),
-        system.scale_vector(),
-    )  # fmt: skip
     traced = system.traced
     sizes = len(traced.u), len(traced.indicators), len(traced.outputs)
+    ranges, n_bins = ({}, 0) if density is False else given_ranges(system, density, bins)
+    width = keep * (len(traced.u) + 2) if density is False else len(traced.u) * (n_bins + 1) / 2
+    room_for(
+        16.0 * width * len(points) * len(directions) * len(starts), f"a sweep over {len(points)} values",
+        "take fewer values, starts or bins, keep fewer returns, or count them with density=True",
+    )  # fmt: skip
     edges = None
     if density is not False:
-        ranges, n_bins = given_ranges(system, density, bins)
         coarse = None
         if len(ranges) < len(system.states):
             few = min(keep, 1000)
@@ -148,10 +152,9 @@ def sweep(
                 atol=atol, threads=threads, progress=False, **expert,
             )["section"].transpose(..., "state").values  # fmt: skip
         edges = bin_edges(system, ranges, n_bins, coarse)
-    width = keep * (len(traced.u) + 2) if edges is None else edges.size // 2
-    room_for(
-        16.0 * width * len(points) * len(directions) * len(starts), f"a sweep over {len(points)} values",
-        "take fewer values, starts or bins, keep fewer returns, or count them with density=True",
+    attractors = Attractors(
+        engine, engine.prepare(points), plan, transient, keep, max_period, tolerance_of(engine, rtol),
+        system.scale_vector(),
     )  # fmt: skip
     slots = {
         (d, k): Slot(attractors, points, sizes, edges) for d in range(len(directions)) for k in range(len(starts))
@@ -195,11 +198,17 @@ def swept_values(system: System, parameter: str, values: Any) -> FloatArray:
     ValueError, TypeError
         A parameter that does not exist; values that are no list of finite numbers, each there once.
     """
+    if not isinstance(parameter, str):
+        raise TypeError(
+            f'the parameter that is varied is given by its name in quotes, as "{next(iter(system.values), "rho")}", '
+            f"before its values; not {shortened(parameter)}"
+        )
     if parameter not in system.values:
         system.with_parameters({parameter: 0.0})  # raises with the names there are
     numbers = float_array(values, f"values of {parameter!r}")
     if numbers.ndim != 1 or not len(numbers):
-        hint = "; for one value write [value]" if numbers.ndim == 0 else ""
+        hints = ["for one value write [value]", "give at least one", "give one axis, no mesh of two"]
+        hint = f"; {hints[min(numbers.ndim, 2)]}"
         raise ValueError(f"values of {parameter!r} must be a list of numbers, not of shape {numbers.shape}{hint}")
     if not np.isfinite(numbers).all():
         where = int(np.argmin(np.isfinite(numbers)))

@@ -21,6 +21,8 @@ import numpy as np
 
 from nonsmooth.flow.arguments import float_array, whole_number
 from nonsmooth.flow.engine import FloatArray
+from nonsmooth.results.memory import room_for
+from nonsmooth.system.names import by_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -30,6 +32,7 @@ __all__ = ["zero_one_test"]
 LEAST = 100
 
 
+@by_name
 def zero_one_test(section: Any, *, n_frequencies: int = 100, seed: int = 0) -> xr.DataArray:
     """K of the 0-1 test for every state: near 0 for regular motion, near 1 for chaos.
 
@@ -71,6 +74,7 @@ def zero_one_test(section: Any, *, n_frequencies: int = 100, seed: int = 0) -> x
     n = data.sizes["iterate"]
     if n < LEAST:
         raise ValueError(f"the 0-1 test needs {LEAST} observations or more, better 1000; there are {n}")
+    room_for(40.0 * n_frequencies * n, f"n_frequencies = {n_frequencies:.6g} over {n} observations", "take fewer")
     c = np.random.default_rng(seed).uniform(np.pi / 5, 4 * np.pi / 5, n_frequencies)
     series = data.values.reshape(-1, n)
     k = np.array([_k(one, c) for one in series]).reshape(data.shape[:-1])

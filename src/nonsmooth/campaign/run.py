@@ -9,13 +9,10 @@ from numpy.typing import NDArray
 
 from nonsmooth.campaign.processors import clock
 from nonsmooth.campaign.threads import on_threads
-from nonsmooth.campaign.work import Work, bytes_of, empty_columns
-from nonsmooth.results.memory import room_for
+from nonsmooth.campaign.work import Work, check_room, empty_columns
 from nonsmooth.results.progress import progress as progress_bar
 
 __all__ = ["run"]
-
-LISTED = 40  # bytes of a chunk's number in a list
 
 
 def run(
@@ -37,7 +34,7 @@ def run(
     any_cpu : bool
         See :func:`nonsmooth.campaign.store.open_store`.
     """
-    room_for(bytes_of(work) + LISTED * work.n_chunks(), label or "the result", "ask for fewer points")
+    check_room(work, label)
     keeper = None
     if store is not None:
         from nonsmooth.campaign.store import open_store
@@ -65,6 +62,8 @@ def run(
 
             on_cluster(work, missing, keep, client, keeper)
         else:
+            if missing:
+                work.load()
             on_threads(_Kept(work, keeper) if keeper else work, missing, keep, threads)
     return columns if keeper is None else keeper.read(work)
 
@@ -80,7 +79,7 @@ class _Kept:
     def __init__(self, work: Work, keeper: Any) -> None:
         self.work, self.keeper, self.device = work, keeper, work.device
         self.columns, self.n_chunks, self.bounds = work.columns, work.n_chunks, work.bounds
-        self.describe = work.describe
+        self.describe, self.load = work.describe, work.load
 
     def compute(self, chunk: int) -> Mapping[str, NDArray[Any]]:
         self.keeper.note_start(chunk)

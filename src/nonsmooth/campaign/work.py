@@ -9,7 +9,11 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Column", "Work", "bytes_of", "empty_columns"]
+from nonsmooth.results.memory import room_for
+
+__all__ = ["Column", "Work", "check_room", "empty_columns"]
+
+LISTED = 40  # bytes of a chunk's number in a list
 
 
 @dataclass(frozen=True)
@@ -25,6 +29,7 @@ class Work(Protocol):
 
     ``describe`` is everything that the outcome depends on, as plain data (JSON): two works with equal descriptions
     give equal results. A work can be pickled and sent to another process. ``device`` is ``"cpu"`` or ``"cuda"``.
+    ``load`` compiles what ``compute`` calls: Ctrl-C cannot stop a compile in a thread.
     """
 
     @property
@@ -36,16 +41,19 @@ class Work(Protocol):
 
     def bounds(self, chunk: int) -> tuple[int, int]: ...
 
+    def load(self) -> None: ...
+
     def compute(self, chunk: int) -> Mapping[str, NDArray[Any]]: ...
 
     def describe(self) -> Mapping[str, Any]: ...
 
 
-def bytes_of(work: Work) -> int:
-    """Bytes of a work's columns over all places."""
+def check_room(work: Work, label: str) -> None:
+    """MemoryError where a work's columns over all places would not fit into memory."""
     chunks = work.n_chunks()
     width = sum(np.dtype(item.dtype).itemsize * int(np.prod(item.shape)) for item in work.columns().values())
-    return width * (work.bounds(chunks - 1)[1] if chunks else 0)
+    size = work.bounds(chunks - 1)[1] if chunks else 0
+    room_for(width * size + LISTED * chunks, label or "the result", "ask for fewer points")
 
 
 def empty_columns(work: Work) -> dict[str, NDArray[Any]]:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import argparse
 import inspect
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -65,10 +66,12 @@ def _run(options: argparse.Namespace) -> int:
 def _run_folder(options: argparse.Namespace) -> int:
     """Everything in a session that a model can be laid over: a response, a rise, and each section by itself."""
     from nonsmooth.experiment.session import load_session
+    from nonsmooth.identification.compare import gap_reference
     from nonsmooth.identification.compare.notebook import SHOWS
 
     here = Path()
-    session = load_session(options.study)
+    read = cache(load_session)  # each file once, however many runs of it are compared
+    session = read(options.study.resolve())
     wanted: list[dict[str, Any]] = []
     for procedure in session.procedures:
         runs = [item for item in session.recordings(procedure) if "gap" in item.settings]
@@ -85,23 +88,28 @@ def _run_folder(options: argparse.Namespace) -> int:
         study["identified"] = {"data": str(options.identified.resolve())}
         if options.identified_from is not None:
             study["identified"]["session"] = str(options.identified_from.resolve())
+    _, parameters = _theory(study, here)
+    reference = gap_reference(session, offset=_offset(study, parameters, session, here, read))
     for measured in wanted:
-        _run_study({**study, "measured": measured}, here, options.quiet, keep=False)
+        whole = {**study, "measured": {**measured, "reference": reference}}
+        _run_study(whole, here, options.quiet, keep=False, read=read)
     return 0
 
 
-def _run_study(study: Mapping[str, Any], folder: Path, quiet: bool, keep: bool = True) -> int:
+def _run_study(
+    study: Mapping[str, Any], folder: Path, quiet: bool, keep: bool = True, read: Callable[[Path], Any] | None = None
+) -> int:
     from nonsmooth.experiment.session import load_session
     from nonsmooth.identification.compare import compare, session_measurement
 
     system, parameters = _theory(study, folder)
     table = dict(study["measured"])
-    session = load_session(folder / table.pop("session"))
+    read = read or load_session
+    session = read(folder / table.pop("session"))
     procedure, runs = table.pop("procedure"), table.pop("run", None)
     k = float((parameters or system.values).get("k", system.values.get("k", 1.0)))
-    if "gap_offset" not in table and "gap_at_rest" in getattr(parameters, "extra", {}):
-        source = study["identified"].get("session")
-        table["gap_offset"] = _offset(parameters, session if source is None else load_session(folder / source))
+    if "gap_offset" not in table and "reference" not in table:
+        table["gap_offset"] = _offset(study, parameters, session, folder, read)
     measured, settings = session_measurement(session, procedure, runs, k=k, **table)
     given = dict(study.get("compare", {}))
     settings |= given.pop("settings", {})
@@ -119,11 +127,17 @@ def _run_study(study: Mapping[str, Any], folder: Path, quiet: bool, keep: bool =
     return 0
 
 
-def _offset(parameters: Any, session: Any) -> Any:
-    """What the identified gap is more than the screw read; 0 where the session has no runs with contact."""
+def _offset(
+    study: Mapping[str, Any], parameters: Any, session: Any, folder: Path, read: Callable[[Path], Any]
+) -> Any:
+    """What the identified gap is more than the screw read; 0 where it was not identified, or not from contact."""
     from nonsmooth.identification.compare import gap_offset
 
-    return gap_offset(parameters, session) if session.recordings("contact") else 0.0
+    if "gap_at_rest" not in getattr(parameters, "extra", {}):
+        return 0.0
+    source = study["identified"].get("session")
+    origin = session if source is None else read(folder / source)
+    return gap_offset(parameters, origin) if origin.recordings("contact") else 0.0
 
 
 def _read(path: Path) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -44,7 +45,8 @@ def add(commands: Any) -> None:
         description="Identify the parameters of the oscillator from recordings. A study file says which: [identify] "
         "with `session`, the folder of session.toml, and optionally `model`, `parameters` that must be found, "
         "`crank_length` and `apparatus`; [output] with `data` (.nc or .zarr), `table` (.md) and `figures` (a folder). "
-        "Paths in the file are relative to the file. A session folder in its place prints what is found.",
+        "Paths in the file are relative to the file. A session folder in its place prints what is found. "
+        "The exit code is 3 where something contradicts itself: each such anomaly is named.",
     )
     parser.add_argument("study", type=Path, metavar="STUDY.toml", help="the study file, or a session folder")
     parser.add_argument("--out", type=Path, help="write the parameters with their covariance (.nc or .zarr)")
@@ -72,7 +74,14 @@ def _run(options: argparse.Namespace) -> int:
             print(f"{name}: {sentence}")
     for path in _write(found, study, study.data if options.out is None else options.out):
         print(f"written to {path}")
-    return 0
+    return said(found)
+
+
+def said(found: Any) -> int:
+    """The exit code of identified parameters: 0, or 3 where anomalies stand, each named on the error stream."""
+    for sentence in found.anomalies:
+        print(f"nonsmooth: anomaly: {sentence}", file=sys.stderr)
+    return 3 if found.anomalies else 0
 
 
 def _read(path: Path) -> _Study:

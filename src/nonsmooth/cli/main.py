@@ -15,7 +15,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from nonsmooth.cli import compare, identify, models, plan, reproduce, rig, run, show
 from nonsmooth.cli.terminal import printable
-from nonsmooth.errors import SolveError
+from nonsmooth.errors import SolveError, shortened
 from nonsmooth.results.provenance import package_version
 
 __all__ = ["main"]
@@ -26,7 +26,7 @@ _USER_ERRORS = (ValueError, TypeError, OSError, MemoryError, SolveError)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; returns the exit code: 0 done, 2 wrong input, 130 interrupted."""
+    """Run the command line; returns the exit code: 0 done, 2 wrong input, 3 done with anomalies, 130 interrupted."""
     parser = _parser()
     options = parser.parse_args(arguments)
     try:
@@ -39,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except _USER_ERRORS as error:
         if options.traceback:
             raise
-        print(f"nonsmooth: {printable(str(error))}", file=sys.stderr)
+        print(f"nonsmooth: {printable(shortened(error, quoted=False, most=4000))}", file=sys.stderr)
         return 2
 
 

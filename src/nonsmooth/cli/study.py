@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 from nonsmooth.cli.keep import keep, kept_whatever_comes
 from nonsmooth.cli.tables import read_tables, with_folder
+from nonsmooth.errors import shortened
 from nonsmooth.system.names import check_keys, unknown
 
 if TYPE_CHECKING:
@@ -155,10 +156,10 @@ def load_model(text: str, folder: Path) -> Any:
         return named_model(text)
     source = folder / file
     if not source.is_file():
-        raise ValueError(f"{source}: no such file (asked for by model = {text!r})")
+        raise ValueError(f"{source}: no such file (asked for by model = {shortened(text)})")
     spec = importlib.util.spec_from_file_location(source.stem, source)
     if spec is None or spec.loader is None:
-        raise ValueError(f"{source}: is not a Python file (model = {text!r})")
+        raise ValueError(f"{source}: is not a Python file (model = {shortened(text)})")
     module = importlib.util.module_from_spec(spec)
     _told(source, partial(spec.loader.exec_module, module))
     if not hasattr(module, name):
@@ -194,7 +195,7 @@ def _check_output(output: Mapping[str, Any], path: Path) -> None:
     place = f"{path}, table [output]"
     for name, value in output.items():
         if not isinstance(value, str):
-            raise ValueError(f"{place}: {name} is {value!r}; give a name in quotes")
+            raise ValueError(f"{place}: {name} is {shortened(value)}; give a name in quotes")
     for name, endings in (("data", (".nc", ".zarr")), ("figure", _FORMATS), ("store", (".zarr",))):
         if name not in output:
             continue
@@ -279,20 +280,23 @@ def _values(value: Any, place: str) -> Any:
     import numpy as np
 
     from nonsmooth.flow.arguments import float_array, real_number, whole_number
+    from nonsmooth.results.memory import room_for
 
     if isinstance(value, dict):
         check_keys(value, ("from", "to", "n"), f"{place}, values", "a key")
         if set(value) == {"from", "to", "n"}:
             low, high = (real_number(value[key], f"{place}, values: {key}") for key in ("from", "to"))
-            return np.linspace(low, high, whole_number(value["n"], f"{place}, values: n", 1))
+            n = whole_number(value["n"], f"{place}, values: n", 1)
+            room_for(8.0 * n, f"{place}, values: a list of n = {n:.6g} numbers", "take fewer")
+            return np.linspace(low, high, n)
     elif isinstance(value, list):
         return float_array(value, f"{place}: values")
-    raise ValueError(f"{place}: values is {value!r}; give a list or {{ from = ..., to = ..., n = ... }}")
+    raise ValueError(f"{place}: values is {shortened(value)}; give a list or {{ from = ..., to = ..., n = ... }}")
 
 
 def _grid(value: Any, place: str) -> Any:
     if not isinstance(value, dict):
-        raise ValueError(f"{place}: grid is {value!r}; give {{ name = VALUES, other = VALUES }}")
+        raise ValueError(f"{place}: grid is {shortened(value)}; give {{ name = VALUES, other = VALUES }}")
     return {name: _values(values, f"{place}, grid, {name}") for name, values in value.items()}
 
 
@@ -300,7 +304,8 @@ def _section(value: Any, place: str) -> Any:
     import nonsmooth
 
     if not isinstance(value, dict):
-        raise ValueError(f"{place}: section is {value!r}; give {{ phase = 0.25 }} or {{ indicator = \"name\" }}")
+        form = '{ phase = 0.25 } or { indicator = "name" }'
+        raise ValueError(f"{place}: section is {shortened(value)}; give {form}")
     kind = nonsmooth.Poincare if "indicator" in value else nonsmooth.Stroboscopic
     check_keys(value, list(inspect.signature(kind).parameters), f"{place}, section", "a key")
     return kind(**value)

@@ -24,7 +24,7 @@ def read_tables(path: Path, allowed: Iterable[str], what: str = "study file") ->
         document = tomllib.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise ValueError(f"{path}: no such {what}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:  # TOML's and Unicode's own errors, thousands of digits or brackets
         raise ValueError(f"{path}: is not a TOML file: {error}") from None
     check_keys(document, allowed, str(path), "a table")
     for name, table in document.items():

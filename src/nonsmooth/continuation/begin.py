@@ -15,6 +15,7 @@ from nonsmooth.continuation.orbit import Orbit
 from nonsmooth.continuation.records import BranchRecord, PointRecord
 from nonsmooth.continuation.shooting import Shooting
 from nonsmooth.continuation.surfaces import look_at_surfaces
+from nonsmooth.errors import shortened
 from nonsmooth.flow.arguments import real_number
 
 if TYPE_CHECKING:
@@ -66,9 +67,9 @@ def limits(
     try:
         low, high = (real_number(x, "an end of the range") for x in given)
     except (TypeError, ValueError):
-        raise ValueError(f"{word} = {given!r}: give its two ends, (low, high)") from None
+        raise ValueError(f"{word} = {shortened(given)}: give its two ends, (low, high)") from None
     if not low < high:
-        raise ValueError(f"{word} = {given!r}: the first end must be below the second")
+        raise ValueError(f"{word} = {shortened(given)}: the first end must be below the second")
     if here is not None and not low <= here <= high:
         raise ValueError(f"{what} lies at {name} = {here!r}, outside the range {low!r} ... {high!r}")
     return low, high

@@ -18,7 +18,7 @@ from nonsmooth.continuation.events import (
     swing,
 )
 from nonsmooth.continuation.leaving import change_of_signature, passed_by
-from nonsmooth.continuation.marches import Limits, March
+from nonsmooth.continuation.marches import Limits, March, march_until
 from nonsmooth.continuation.path import VIOLATIONS
 from nonsmooth.errors import SystemDefinitionError
 
@@ -34,12 +34,7 @@ SMALL = 2e-3  # of the first orbit's size: a cycle this small is about to vanish
 
 def march(curve: Curve, point: Point, limits: Limits, first_step: float) -> March:
     """Follow a branch from a point along its tangent until it ends; the first row is the point after it."""
-    found = March()
-    try:
-        _follow(found, curve, point, limits, first_step)
-    except KeyboardInterrupt:  # what was found stands
-        found.ending = "interrupted"
-    return found
+    return march_until(March(), _follow, curve, point, limits, first_step)
 
 
 def _follow(found: March, curve: Curve, point: Point, limits: Limits, first_step: float) -> None:

@@ -11,14 +11,16 @@ import numpy as np
 from nonsmooth.continuation.anchor import anchor_at
 from nonsmooth.continuation.arclength import Point
 from nonsmooth.continuation.begin import largest_step, limits, size_of
-from nonsmooth.continuation.curve_march import ENDS, CurveMarch, march_curve
+from nonsmooth.continuation.curve_march import ENDS, march_curve
 from nonsmooth.continuation.locus import KINDS, Locus
+from nonsmooth.continuation.marches import in_turn, unless_interrupted
 from nonsmooth.continuation.physical import allowed_range
 from nonsmooth.continuation.reading import special_row
 from nonsmooth.continuation.shooting import Shooting
 from nonsmooth.continuation.surfaces import look_at_surfaces
-from nonsmooth.errors import SolveError
+from nonsmooth.errors import SolveError, shortened
 from nonsmooth.flow.arguments import whole_number
+from nonsmooth.system.names import by_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
 __all__ = ["continue_curve"]
 
 
+@by_name
 def continue_curve(
     special_point: Any, ranges: Mapping[str, tuple[float, float]], *, step: float = 0.05, points: int = 1000
 ) -> xr.Dataset:
@@ -53,7 +56,7 @@ def continue_curve(
         ``resonance_1_1`` to ``resonance_1_4``, ``fold_neimark_sacker``, ``flip_neimark_sacker``; ``grazing_fold``,
         ``grazing_flip``, ``grazing_neimark_sacker`` where such a curve meets a grazing curve or Feigin's signs change,
         ``double_grazing`` (a second touch), ``corner``. Over ``end`` how the curve ends: ``ended`` and, in a sentence,
-        ``ended_because``; Ctrl-C ends it with what was found until then.
+        ``ended_because``.
 
     Raises
     ------
@@ -61,6 +64,8 @@ def continue_curve(
         A kind that has no curve, parameters that do not exist, a special point outside the box.
     SolveError
         The curve could not be begun.
+    Interrupted
+        Ctrl-C; what was found until then is its ``result``.
     """
     largest, most = largest_step(step), whole_number(points, "points", 1)
     system, kind, own, point, period_number, _ = special_row(special_point, "continue_curve")
@@ -79,10 +84,11 @@ def continue_curve(
     if first is None:
         raise SolveError(f"the curve of the {kind} could not be begun at this point", status="no_convergence")
     allowed = tuple(allowed_range(start, name, *ends) for name, ends in zip(names, box, strict=True))
-    ahead = march_curve(locus, first, allowed, largest, most, begin=first)
-    back = CurveMarch(ending=ahead.ending)
-    if ahead.ending not in ("closed", "interrupted"):
-        back = march_curve(locus, replace(first, tangent=-first.tangent), allowed, largest, most)
+    turned = replace(first, tangent=-first.tangent)
+    ahead, back = in_turn(
+        lambda: march_curve(locus, first, allowed, largest, most, begin=first),
+        lambda: march_curve(locus, turned, allowed, largest, most),
+    )
     n = len(back.places)
     places = [*back.places[::-1], first, *ahead.places]
     special = [(name, n - 1 - i) for name, i in back.special[::-1]] + [(name, n + 1 + i) for name, i in ahead.special]
@@ -96,7 +102,8 @@ def _box(system: System, ranges: Any) -> tuple[tuple[str, str], list[tuple[float
     """The two parameters and their ranges, which hold the system's own values."""
     if not isinstance(ranges, Mapping) or len(ranges) != 2:
         raise ValueError(
-            f'ranges names two parameters with their ends, {{"omega": (3, 7), "rho": (0.1, 0.3)}}; not {ranges!r}'
+            'ranges names two parameters with their ends, {"omega": (3, 7), "rho": (0.1, 0.3)}; '
+            f"not {shortened(ranges)}"
         )
     box = [
         limits(system, name, ends, system.values.get(name), word=f"the range of {name}", what="the special point")
@@ -124,8 +131,9 @@ def _dataset(
         "floquet_multipliers": np.array([place.multipliers for place in places]),
     }
     attrs = provenance(labels, "continue_curve", options, method="multiple shooting")
-    return curve(
+    found = curve(
         labels, attrs, {name: [float(place.X[-2 + i]) for place in places] for i, name in enumerate(names)}, arrays,
         special, kind=locus.kind, period_number=locus.shooting.period_number,
         signature=locus.shooting.signature.text(system.traced), endings=ENDS, ended=ended,
     )  # fmt: skip
+    return unless_interrupted(found, ended)

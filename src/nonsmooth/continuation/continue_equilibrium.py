@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nonsmooth.continuation.begin import largest_step, limits
 from nonsmooth.continuation.equilibrium import Equilibria, Rest
-from nonsmooth.continuation.equilibrium_march import ENDS, RestMarch, march_rest
+from nonsmooth.continuation.equilibrium_march import ENDS, march_rest
+from nonsmooth.continuation.marches import in_turn, unless_interrupted
 from nonsmooth.continuation.physical import allowed_range
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.arguments import check_system, whole_number
 from nonsmooth.flow.starts import first_state
+from nonsmooth.system.names import by_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -23,6 +26,7 @@ if TYPE_CHECKING:
 __all__ = ["continue_equilibrium"]
 
 
+@by_name
 def continue_equilibrium(
     system: System,
     parameter: str,
@@ -56,7 +60,7 @@ def continue_equilibrium(
         Over ``point``: the parameter, ``u(point, state)``, ``eigenvalues``, ``stable``, ``mode``; special points as in
         :func:`nonsmooth.special_points`: ``fold``, ``branch_point``, ``hopf`` (a row given to ``continue_orbit`` gives
         the cycles born there), ``boundary_equilibrium``. Over ``end`` how the branch ends: ``ended`` and, in a
-        sentence, ``ended_because``; Ctrl-C ends it with what was found until then.
+        sentence, ``ended_because``.
 
     Raises
     ------
@@ -64,6 +68,8 @@ def continue_equilibrium(
         A system with time in its equations, arguments that do not fit.
     SolveError
         No equilibrium was found near the guess.
+    Interrupted
+        Ctrl-C; what was found until then is its ``result``.
     """
     check_system(system, "continue_equilibrium")
     if system.depends_on_time:
@@ -90,11 +96,7 @@ def continue_equilibrium(
         )
     bounds = allowed_range(system, parameter, low, high)
     curve, rest = first
-    rest = _facing(rest, 1.0)
-    up = march_rest(curve, rest, bounds, largest, most)
-    down = RestMarch(ending=up.ending)
-    if up.ending != "interrupted":
-        down = march_rest(curve, _facing(rest, -1.0), bounds, largest, most)
+    up, down = in_turn(*(partial(march_rest, curve, _facing(rest, way), bounds, largest, most) for way in (1.0, -1.0)))
     n = len(down.rests)
     rests = [*down.rests[::-1], (curve, rest), *up.rests]
     special = [(kind, n - 1 - i) for kind, i in down.special[::-1]] + [(kind, n + 1 + i) for kind, i in up.special]
@@ -132,4 +134,5 @@ def _dataset(
         "mode": np.array([curve.mode for curve, _ in rests]),
     }
     values = np.array([rest.value for _, rest in rests])
-    return equilibria(labels, attrs, parameter, values, arrays, special, endings=ENDS, ended=ended)
+    found = equilibria(labels, attrs, parameter, values, arrays, special, endings=ENDS, ended=ended)
+    return unless_interrupted(found, ended)

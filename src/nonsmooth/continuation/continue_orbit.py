@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,7 +15,7 @@ from nonsmooth.continuation.branch import march
 from nonsmooth.continuation.detection import Tests
 from nonsmooth.continuation.events import BESIDE
 from nonsmooth.continuation.files import branch_dataset
-from nonsmooth.continuation.marches import ENDINGS, March
+from nonsmooth.continuation.marches import ENDINGS, March, in_turn
 from nonsmooth.continuation.orbit import Orbit
 from nonsmooth.continuation.other_branches import born, straight_on, switched
 from nonsmooth.continuation.physical import allowed_range
@@ -21,6 +23,7 @@ from nonsmooth.continuation.reading import read_branch
 from nonsmooth.continuation.records import BranchRecord, PointRecord, SpecialRecord, from_march, joined, point_record
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.arguments import whole_number
+from nonsmooth.system.names import by_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -32,6 +35,7 @@ Records = tuple[list[PointRecord], list[SpecialRecord]]
 ZERO = 1e-6  # of the numbers beside it: the first orbit is a special point
 
 
+@by_name
 def continue_orbit(
     start: Any,
     parameter: str | None = None,
@@ -47,9 +51,9 @@ def continue_orbit(
     ----------
     start : Orbit, branch, or one row of ``special_points``
         An orbit is followed both ways from its parameter. A branch goes on at each end that stopped at the edge of
-        its range (give a wider ``range``), at the largest number of points or by Ctrl-C (what was found until then is
-        returned). A flip gives the branch of twice the period, a pitchfork or branch_point the other branch through
-        it, a Hopf point of ``continue_equilibrium`` the cycles that are born there.
+        its range (give a wider ``range``), at the largest number of points or by Ctrl-C. A flip gives the branch of
+        twice the period, a pitchfork or branch_point the other branch through it, a Hopf point of
+        ``continue_equilibrium`` the cycles that are born there.
     parameter : str
         Name of the parameter; that of the branch where not given.
     range : (low, high)
@@ -76,6 +80,8 @@ def continue_orbit(
         Arguments that do not fit: the orbit lies outside the range, a parameter that does not exist.
     SolveError
         The first point could not be computed.
+    Interrupted
+        Ctrl-C; its ``result`` is the branch that was found until then, which ``continue_orbit`` takes to go on.
 
     Notes
     -----
@@ -127,12 +133,11 @@ def _from_orbit(orbit: Orbit, name: str | None, given: Any, asked: Asked) -> xr.
 
 def _both_ways(curve: Curve, first: Point, bounds: tuple[float, float], asked: Asked) -> tuple[March, March]:
     """Marches with rising and with falling parameter; a closed branch needs only one."""
-    up = march(curve, first, asked.limits(bounds, (curve, first)), asked.first)
-    if up.ending == "closed":
-        return up, March(ending="closed")
-    if up.ending == "interrupted":
-        return up, March(ending="interrupted")
-    return up, march(curve, _facing(first, -1.0), asked.limits(bounds), asked.first)
+    up, down = in_turn(
+        lambda: march(curve, first, asked.limits(bounds, (curve, first)), asked.first),
+        lambda: march(curve, _facing(first, -1.0), asked.limits(bounds), asked.first),
+    )
+    return up, down
 
 
 def _at_the_start(curve: Curve, first: Point, down: March, up: March) -> list[str]:
@@ -182,10 +187,10 @@ def _go_on(start: xr.Dataset, name: str | None, given: Any, asked: Asked) -> xr.
     name = record.parameter
     low, high = limits(system, name, record.range if given is None else given, None)
     bounds = allowed_range(system, name, low, high)
-    ends: list[Records] = []
+    ends: list[Records] = [([], []), ([], [])]
+    begun: dict[int, Callable[[], March]] = {}
     endings, sentences = list(record.endings), list(record.sentences)
     for side, point in ((0, record.points[0]), (1, record.points[-1])):
-        ends.append(([], []))
         open_end = record.endings[side] in ("points", "interrupted") or (
             record.endings[side] in ("range", "physical") and bounds[0] < point.value < bounds[1]
         )
@@ -200,7 +205,8 @@ def _go_on(start: xr.Dataset, name: str | None, given: Any, asked: Asked) -> xr.
         if begin is None:
             endings[side], sentences[side] = "no_convergence", ENDINGS["no_convergence"]
             continue
-        more = march(curve, begin, asked.limits(bounds), asked.first)
+        begun[side] = partial(march, curve, begin, asked.limits(bounds), asked.first)
+    for side, more in zip(begun, in_turn(*begun.values()), strict=True):
         ends[side] = from_march(more)
         sentences[side] = sentence(more, bounds, name, (low, high))
         endings[side] = more.ending

@@ -13,6 +13,7 @@ from nonsmooth.continuation.arclength import Point, passes_through
 from nonsmooth.continuation.codimension_two import ENDED, root, sign_changes
 from nonsmooth.continuation.codimension_two import numbers as numbers_of
 from nonsmooth.continuation.locus import Locus
+from nonsmooth.continuation.marches import INTERRUPTED, march_until
 from nonsmooth.continuation.path import VIOLATIONS
 
 __all__ = ["ENDS", "CurveMarch", "march_curve"]
@@ -26,7 +27,7 @@ ENDS = {
     "grazing": "A contact begins or ends here: beyond this point the orbit has another signature.",
     "corner": "The orbit meets the corner of two boundaries: beyond this point it has another signature.",
     "resonance": "Both multipliers meet on the real axis: beyond this point they are real, and no torus is born.",
-    "interrupted": "Interrupted: what was found until then stands.",
+    "interrupted": f"{INTERRUPTED}.",
 }
 #: The point of codimension two at which a curve meets a graze (another one, for a grazing curve).
 MEETS = {
@@ -61,12 +62,7 @@ def march_curve(
     locus: Locus, place: Point, box: Any, largest: float, most: int, begin: Point | None = None
 ) -> CurveMarch:
     """Follow a curve from a place along its tangent until it ends; ``begin``: where it would close."""
-    found = CurveMarch()
-    try:
-        _follow(found, locus, place, box, largest, most, begin)
-    except KeyboardInterrupt:  # what was found stands
-        found.ending = "interrupted"
-    return found
+    return march_until(CurveMarch(), _follow, locus, place, box, largest, most, begin)
 
 
 def _follow(

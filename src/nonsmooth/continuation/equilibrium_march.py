@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from nonsmooth.continuation.equilibrium import Equilibria, Rest, hopf_number
+from nonsmooth.continuation.marches import INTERRUPTED, march_until
 from nonsmooth.continuation.roots import zero_on
 
 __all__ = ["ENDS", "RestMarch", "march_rest"]
@@ -20,7 +21,7 @@ ENDS = {
         "The equilibrium meets the boundary of its mode, and no equilibrium of the mode beyond continues it: on the "
         "other side it is virtual."
     ),
-    "interrupted": "Interrupted: what was found until then stands.",
+    "interrupted": f"{INTERRUPTED}.",
 }
 FIRST, LEAST, COSINE = 1e-3, 1e-9, 0.98
 
@@ -45,12 +46,7 @@ def march_rest(
     curve: Equilibria, rest: Rest, bounds: tuple[float, float], largest: float, most: int
 ) -> RestMarch:
     """Follow an equilibrium along its tangent until the branch ends."""
-    found = RestMarch()
-    try:
-        _follow(found, curve, rest, bounds, largest, most)
-    except KeyboardInterrupt:  # what was found stands
-        found.ending = "interrupted"
-    return found
+    return march_until(RestMarch(), _follow, curve, rest, bounds, largest, most)
 
 
 def _follow(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -124,6 +125,13 @@ def smooth_events(
         if not was * now < 0.0:
             continue
         there = locate(curve, a, b, tests.one(kind)) if kind != "branch" else _branch_point(curve, a, b, tests)
+        if there is None and kind != "branch":
+            warnings.warn(
+                f"a {kind.replace('_', '-')} between the parameter's values {float(a.X[-1])!r} and {float(b.X[-1])!r} "
+                "was met but not located, and is not listed",
+                RuntimeWarning,
+                stacklevel=2,
+            )
         # At a change of signature the parameter may turn too: that belongs to the change.
         if there is None or there[0] > stop - (BESIDE if reason == "change" else 0.0):
             continue

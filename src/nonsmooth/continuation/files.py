@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.continuation.marches import ENDINGS
+from nonsmooth.continuation.marches import ENDINGS, unless_interrupted
 from nonsmooth.continuation.records import BranchRecord
 from nonsmooth.continuation.signature import Signature
 
@@ -88,11 +88,12 @@ def branch_dataset(system: System, record: BranchRecord, options: dict[str, Any]
     attrs = provenance(labels, "continue_orbit", options, method="multiple shooting")
     attrs["parameter"] = record.parameter
     attrs["layouts"] = json.dumps([signature_data(s) for s in layouts])
-    return branch(
+    found = branch(
         labels, attrs, record.parameter, np.array([p.value for p in points]), arrays, marks,
         period_number=record.period_number, signatures=texts, endings=list(ENDINGS),
         ended=record.endings, sentences=record.sentences,
     )  # fmt: skip
+    return unless_interrupted(found, record.endings)
 
 
 def orbit_dataset(orbit: Orbit) -> xr.Dataset:

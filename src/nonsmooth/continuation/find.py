@@ -22,6 +22,7 @@ from nonsmooth.flow.failure import solve_error
 from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.starts import first_state, plain_start
 from nonsmooth.kernels import codes
+from nonsmooth.system.names import by_name
 
 if TYPE_CHECKING:
     from nonsmooth.continuation.search import Search
@@ -39,6 +40,7 @@ NEUTRAL = 1e-2  # a multiplier nearer to 1 than this explains that Newton's meth
 SLOW = 3.0  # or of the distance that its multipliers give for that gap
 
 
+@by_name
 def find_orbit(
     system: System,
     *,

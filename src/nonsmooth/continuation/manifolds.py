@@ -37,6 +37,7 @@ from nonsmooth.continuation.orbit import Orbit
 from nonsmooth.continuation.section_map import SectionMap
 from nonsmooth.flow.arguments import real_number, whole_number
 from nonsmooth.flow.sections import Stroboscopic
+from nonsmooth.system.names import by_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -55,6 +56,7 @@ ENDS = {
 RETURN = 1e-6
 
 
+@by_name
 def manifolds(
     orbit: Orbit,
     *,

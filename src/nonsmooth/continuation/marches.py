@@ -1,15 +1,23 @@
-"""What a march along a branch collects: rows, special points, and how it ended."""
+"""What a march along a branch collects, how it ended, and what Ctrl-C does to it."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from nonsmooth.continuation.arclength import Curve, Point
 from nonsmooth.continuation.grazing import Graze
+from nonsmooth.errors import Interrupted
 
-__all__ = ["ENDINGS", "Limits", "March", "Row", "Special"]
+if TYPE_CHECKING:
+    import xarray as xr
 
+__all__ = [
+    "ENDINGS", "INTERRUPTED", "Limits", "March", "Row", "Special", "in_turn", "march_until", "unless_interrupted",
+]  # fmt: skip
+
+INTERRUPTED = "Interrupted: what was found until then stands"
 #: How a branch can end, with the sentence for each.
 ENDINGS = {
     "range": "The branch reached the edge of the range.",
@@ -34,8 +42,50 @@ ENDINGS = {
         "A reset leads just onto a boundary: beyond this point it leads behind it, where another transition follows at "
         "the same instant."
     ),
-    "interrupted": "Interrupted: what was found until then stands; continue the branch with continue_orbit(branch).",
+    "interrupted": INTERRUPTED + "; continue the branch with continue_orbit(branch).",
 }
+
+
+class Marched(Protocol):
+    """Any march: of orbits, of special points, of equilibria."""
+
+    ending: str
+
+
+M = TypeVar("M", bound=Marched)
+
+
+def march_until(found: M, follow: Callable[..., None], *arguments: Any) -> M:
+    """March into ``found`` by ``follow(found, *arguments)`` until the branch ends, or Ctrl-C ends it."""
+    try:
+        follow(found, *arguments)
+    except KeyboardInterrupt:  # unless_interrupted raises it again, with what was found
+        found.ending = "interrupted"
+    return found
+
+
+def in_turn(*begin: Callable[[], M]) -> list[M]:
+    """Marches, one after the other; empty ones after one that came round to its beginning or was interrupted."""
+    found: list[M] = []
+    for one in begin:
+        if found and found[-1].ending in ("closed", "interrupted"):
+            empty = type(found[-1])()
+            empty.ending = found[-1].ending
+            found.append(empty)
+        else:
+            found.append(one())
+    return found
+
+
+def unless_interrupted(result: xr.Dataset, endings: Sequence[str]) -> xr.Dataset:
+    """Return a branch, or raise ``Interrupted`` with it where Ctrl-C ended a march: no caller goes on with a part."""
+    if "interrupted" not in endings:
+        return result
+    raise Interrupted(
+        f"interrupted: the {result.sizes['point']} points that were found are in `result` of this exception "
+        "(at a prompt: import sys; branch = sys.last_value.result). continue_orbit(branch) goes on with orbits",
+        result,
+    )
 
 
 @dataclass

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from nonsmooth.continuation.arclength import Curve, Point
 from nonsmooth.continuation.begin import Asked, limits, resumed_at, sentence
 from nonsmooth.continuation.branch import march
 from nonsmooth.continuation.files import branch_dataset
+from nonsmooth.continuation.marches import in_turn
 from nonsmooth.continuation.multipliers import multipliers_of
 from nonsmooth.continuation.physical import allowed_range
 from nonsmooth.continuation.reading import hopf_row, one_row, special_row
@@ -54,7 +56,7 @@ def switched(start: xr.Dataset, name: str | None, given: Any, asked: Asked) -> x
                 break
     if not begun:
         raise SolveError(f"no other branch was found at this {kind}", status="no_convergence")
-    marches = [march(fresh, first, asked.limits(bounds), asked.first) for fresh, first in begun]
+    marches = in_turn(*(partial(march, *point, asked.limits(bounds), asked.first) for point in begun))
     number = begun[0][0].shooting.period_number
     sentences = [sentence(one, bounds, own, (low, high)) for one in marches]
     forward = from_march(marches[0])
@@ -91,7 +93,7 @@ def straight_on(start: xr.Dataset, name: str | None, given: Any, asked: Asked) -
     if first is None:
         raise SolveError(f"Newton's method did not converge at this {kind}", status="no_convergence")
     back = replace(first, tangent=-first.tangent, orientation=-first.orientation)
-    marches = [march(curve, one, asked.limits(bounds), asked.first) for one in (back, first)]
+    marches = in_turn(*(partial(march, curve, one, asked.limits(bounds), asked.first) for one in (back, first)))
     points, special = joined(from_march(marches[0]), [point_record(curve, first)], from_march(marches[1]))
     here = one_row(start, "continue_orbit")
     mark = SpecialRecord(

@@ -162,7 +162,7 @@ def _compare_units(traces: list[Trace], remarks: Remarks) -> None:
     for name, found in units.items():
         if set(found) == {""}:
             (run,) = runs[name] if len(runs[name]) == 1 else ("",)
-            remarks.of(run, name, "the file gives no unit; say it with units={channel: unit}")
+            remarks.of(run, name, f"the file gives no unit; say it with units={{{name!r}: ...}}")
         if len(found) > 1:
             remarks.of(
                 "", name,

@@ -3,13 +3,14 @@
 ``DataSource`` is a measurement, ``DataSet`` one run of it, ``DataSegmentElement`` a stretch. A member is a row of
 12-byte records, a valid flag (u32) and a value (f64), little-endian; the members are longer than what was measured, so
 trailing records have the flag 0, and the number of valid ones equals ``DataCacheDataSize``. A flag of 2 begins text
-that a user typed into a table; it is no measurement and is left out with a remark.
+that a user typed into a table; it is no measurement and is left out with a remark. ``BaseUnit`` is a unit, or the
+number of one in a table of the file (an element whose name holds ``Unit``, with that number as its ``...ID``).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -46,7 +47,7 @@ def read(data: bytes, source: Source, options: Options) -> Reading:
     comma = experiment.header.get("DecimalSeparator", ".") == ","
     traces = []
     for group in _groups(experiment, reading):
-        trace = _trace(group, archive, comma, reading.remarks, source)
+        trace = _trace(group, archive, comma, experiment.units, reading.remarks, source)
         if trace is not None:
             traces.append(trace)
     runs = dict.fromkeys(trace.run for trace in traces)
@@ -70,7 +71,9 @@ def _run(segment: Segment) -> str:
     return f"Run #{segment.run}"
 
 
-def _trace(group: list[Segment], archive: Archive, comma: bool, remarks: Remarks, source: Source) -> Trace | None:
+def _trace(
+    group: list[Segment], archive: Archive, comma: bool, units: Mapping[str, str], remarks: Remarks, source: Source
+) -> Trace | None:
     first = group[0]
     place = f"main.xml, line {first.line}"
     if not (first.run.isascii() and first.run.isdigit() and len(first.run) < 10):
@@ -94,7 +97,13 @@ def _trace(group: list[Segment], archive: Archive, comma: bool, remarks: Remarks
     attrs = {"measurement": first.measurement} | ({"port": port} if port else {})
     origin = ", ".join(segment.values for segment in group[:4]) + (", ..." if len(group) > 4 else "")
     axis, column = (np.concatenate(times), np.concatenate(values)) if len(values) > 1 else (times[0], values[0])
-    return Trace(run, name, first.unit, axis, column, origin, attrs=attrs)
+    unit = first.unit.strip()
+    if unit.isdigit():  # the number of a unit, not a unit
+        remedy = f"say it with units={{{name!r}: ...}}"
+        unit = units.get(unit, "")
+        if not unit:
+            remarks.of(run, name, f"its unit is number {first.unit} of a table that is not in the file; {remedy}")
+    return Trace(run, name, unit, axis, column, origin, attrs=attrs)
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,6 +17,7 @@ from nonsmooth.experiment.reading import Source
 __all__ = ["Experiment", "Segment", "parse"]
 
 _MAX_NESTING = 256
+_UNIT_WORDS = ("UnitSymbol", "SymbolName", "Symbol", "ShortName", "UnitName", "Name")
 
 
 @dataclass
@@ -39,12 +40,13 @@ class Segment:
 
 @dataclass
 class Experiment:
-    """What ``main.xml`` says."""
+    """What ``main.xml`` says; ``units`` are those that its own tables name by a number."""
 
     header: dict[str, str] = field(default_factory=dict)
     sensors: list[dict[str, str]] = field(default_factory=list)
     segments: list[Segment] = field(default_factory=list)
     empty: list[tuple[str, str]] = field(default_factory=list)
+    units: dict[str, str] = field(default_factory=dict)
 
 
 def parse(pieces: Iterable[bytes], source: Source) -> Experiment:
@@ -99,6 +101,8 @@ class _Handler:
             self.found.sensors.append({key: attributes[key] for key in kept if key in attributes})
         elif name == "DataSource":
             self._data_sources.append(attributes)
+        elif "Unit" in name and len(self.found.units) < MAX_COLUMNS:
+            self._unit(attributes)
         elif name == "DataSet" and self._data_sources:
             self._data_set = attributes
             self._data_sets += 1
@@ -111,6 +115,13 @@ class _Handler:
             self._segment.times = _path(attributes.get("FileName", ""))
             self._segment.start = attributes.get("IntervalCacheStartValue", "")
             self._segment.interval = attributes.get("IntervalCacheInterval", "")
+
+    def _unit(self, attributes: dict[str, str]) -> None:
+        """A row of a table of units: a number, and the symbol or name that it stands for."""
+        code = next((value for key, value in attributes.items() if key.endswith("ID") and value.isdigit()), None)
+        text = next((attributes[key] for key in _UNIT_WORDS if attributes.get(key)), None)
+        if code is not None and text is not None:
+            self.found.units.setdefault(code, text)
 
     def _begin(self, data_source: dict[str, Any], data_set: dict[str, str]) -> None:
         self._segment = Segment(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 import os
+import stat
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -17,10 +18,10 @@ import numpy as np
 from nonsmooth.errors import DataFileError
 from nonsmooth.experiment.assemble import assemble
 from nonsmooth.experiment.limits import MAX_FILE_BYTES
-from nonsmooth.experiment.reading import Column, Options, Reading, Source, names_of
+from nonsmooth.experiment.reading import Column, Options, Reading, Source, Trace, names_of
 from nonsmooth.experiment.recording import Recording, RecordingWarning
 
-__all__ = ["FORMATS", "load_recording", "parse_recording"]
+__all__ = ["FORMATS", "content_of", "load_recording", "parse_recording"]
 
 #: Each format, and the module whose ``read`` reads it.
 FORMATS = {
@@ -66,7 +67,8 @@ def load_recording(
     rate : float, optional
         Sample rate in Hz, for files that have no time column; time then begins at 0.
     units : mapping, optional
-        Units of channels, by channel, for what the file does not say; they replace what it says.
+        Units of channels, for what the file does not say; they replace what it says. By channel (``"Angle, Ch P2"``),
+        or by quantity for all channels that measure it (``"Angle"``).
     delimiter, decimal : str, optional
         For tables: the character between fields and the decimal mark, where they are not to be guessed.
 
@@ -92,7 +94,7 @@ def load_recording(
     """
     options = _checked(format, columns, axis, rate, units, delimiter, decimal)
     file = Path(path)
-    recording = parse_recording(_content(file), file.name, options, format=format)
+    recording = parse_recording(content_of(file), file.name, options, format=format)
     for remark in recording.warnings[:_SPOKEN]:
         warnings.warn(f"{file.name}: {remark}", RecordingWarning, stacklevel=2)
     if len(recording.warnings) > _SPOKEN:
@@ -149,18 +151,32 @@ def _checked(
     return Options(columns, axis, None if rate is None else float(rate), dict(units or {}), delimiter, decimal)
 
 
-def _content(file: Path) -> bytes:
+def content_of(file: Path) -> bytes:
+    """The bytes of a regular file of at most 1 GiB.
+
+    Raises
+    ------
+    DataFileError
+        If it cannot be opened, is empty, too large, or no file: a pipe would wait for who writes into it.
+    """
     try:
-        with file.open("rb") as opened:
-            size = os.fstat(opened.fileno()).st_size
-            data = opened.read(MAX_FILE_BYTES + 1) if size <= MAX_FILE_BYTES else b""
+        with open(file, "rb", opener=_without_waiting) as opened:
+            state = os.fstat(opened.fileno())
+            if not stat.S_ISREG(state.st_mode):
+                raise DataFileError(f"{file}: is a pipe, a socket or a device, no file; copy what it gives into a file")
+            data = opened.read(MAX_FILE_BYTES + 1) if state.st_size <= MAX_FILE_BYTES else b""
     except OSError as error:
         raise DataFileError(f"{file}: cannot be opened ({error.strerror or error})") from error
-    if max(size, len(data)) > MAX_FILE_BYTES:
+    size = max(state.st_size, len(data))
+    if size > MAX_FILE_BYTES:
         raise DataFileError(f"{file}: has {size} bytes; at most {MAX_FILE_BYTES} are read: export fewer runs per file")
     if not data:
         raise DataFileError(f"{file}: is empty")
     return data
+
+
+def _without_waiting(path: str, flags: int) -> int:
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
 
 
 def _detect(data: bytes, source: Source, options: Options) -> str:
@@ -185,11 +201,17 @@ def _detect(data: bytes, source: Source, options: Options) -> str:
 
 def _replace_units(reading: Reading, source: Source, options: Options) -> None:
     names = {trace.name for trace in reading.traces}
+    quantities = {trace.attrs.get("measurement", trace.name) for trace in reading.traces}
     for name in options.units:
-        if name not in names:
+        if name not in names | quantities:
             raise source.error("", f"units names {name!r}, which is no channel; there are: {names_of(sorted(names))}")
+
+    def unit(trace: Trace) -> str:
+        given = options.units.get(trace.name, options.units.get(trace.attrs.get("measurement", "")))
+        return trace.unit if given is None else given
+
     if options.units:
-        reading.traces = [replace(t, unit=options.units.get(t.name, t.unit)) for t in reading.traces]
+        reading.traces = [replace(trace, unit=unit(trace)) for trace in reading.traces]
 
 
 def _given(options: Options) -> dict[str, Any]:

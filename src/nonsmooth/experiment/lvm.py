@@ -127,6 +127,7 @@ def _segments(lines: Lines, clocks: str, decimal: str, source: Source, ends: boo
     segment: _Segment | None = None
     count = 0
     last = 0
+    channels = 0
     for line, fields in lines:
         if not any(f.strip() for f in fields):
             continue
@@ -138,6 +139,10 @@ def _segments(lines: Lines, clocks: str, decimal: str, source: Source, ends: boo
             if count > _MAX_SEGMENTS:
                 raise source.error(f"line {line}", f"holds more than {_MAX_SEGMENTS} segments")
             segment = _begin(line, fields, lines, clocks, source)
+            channels += len(segment.names)
+            if channels > MAX_COLUMNS:
+                held = f"its {count} segments hold {channels} channels so far"
+                raise source.error(f"line {line}", f"{held}; at most {MAX_COLUMNS} are read")
             last = 0
         elif segment is None:
             raise source.error(f"line {line}", "holds values before any segment's header")

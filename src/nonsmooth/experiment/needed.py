@@ -5,6 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 from types import ModuleType
 
+from nonsmooth.errors import not_installed
 from nonsmooth.experiment.reading import Source
 
 __all__ = ["needed"]
@@ -15,6 +16,4 @@ def needed(module: str, package: str, source: Source) -> ModuleType:
     try:
         return import_module(module)
     except ImportError as error:
-        raise source.error(
-            "", f"reading it needs the package {package}, which is not installed: pip install 'nonsmooth[experiment]'"
-        ) from error
+        raise source.error("", f"reading it needs {not_installed(package, 'experiment')}") from error

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from nonsmooth.errors import DataFileError
-from nonsmooth.experiment.load import load_recording
+from nonsmooth.experiment.load import content_of, load_recording
 from nonsmooth.experiment.notebook import (
     APPARATUS,
     NOTEBOOK,
@@ -153,10 +153,9 @@ def load_session(folder: str | os.PathLike[str]) -> Session:
     place = Path(folder)
     notebook = place / NOTEBOOK
     try:
-        document = tomllib.loads(notebook.read_text(encoding="utf-8"))
-    except OSError as error:
-        reason = error.strerror or error
-        raise DataFileError(f"{notebook}: cannot be opened ({reason}); a session has a {NOTEBOOK}") from error
+        document = tomllib.loads(content_of(notebook).decode("utf-8"))
+    except DataFileError as error:
+        raise DataFileError(f"{error}; a session has a {NOTEBOOK}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise DataFileError(f"{notebook}: is not a TOML file: {error}") from None
     where = str(notebook)

@@ -8,12 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nonsmooth.errors import shortened
 from nonsmooth.flow.engine import FloatArray
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
 __all__ = ["check_options", "check_system", "float_array", "real_number", "whole_number", "yes_or_no"]
+
+_MOST = 2**53  # whole numbers up to here are exact in floating point
 
 
 def check_system(system: Any, verb: str) -> None:
@@ -26,7 +29,7 @@ def check_system(system: Any, verb: str) -> None:
     hint = f"; call it: {name}()" if callable(system) and name else ""
     if isinstance(system, str):
         hint = f"; a ready model is called by its name: ns.models.{system}()"
-    raise TypeError(f"{verb} takes an ns.System, not {system!r}{hint}")
+    raise TypeError(f"{verb} takes an ns.System, not {shortened(system)}{hint}")
 
 
 def check_options(system: System, given: Mapping[str, Any], verb: Callable[..., Any]) -> None:
@@ -66,14 +69,16 @@ def whole_number(value: Any, name: str, least: int) -> int:
     """``value`` as an integer of at least ``least``; 3.0 passes, 2.5, True, "3" and NaN do not."""
     number = real_number(value, name)
     if number != int(number) or number < least:
-        raise ValueError(f"{name} = {value!r} must be a whole number, at least {least}")
+        raise ValueError(f"{name} = {shortened(value)} must be a whole number, at least {least}")
+    if number > _MOST:
+        raise ValueError(f"{name} = {shortened(value)} is more than can be counted: at most {_MOST}")
     return int(number)
 
 
 def yes_or_no(value: Any, name: str) -> bool:
     """``value`` as a bool: a word would pass for True, whatever it says."""
     if not isinstance(value, bool | np.bool_) and value not in (0, 1):
-        raise TypeError(f"{name} = {value!r}; allowed: True, False")
+        raise TypeError(f"{name} = {shortened(value)}; allowed: True, False")
     return bool(value)
 
 
@@ -86,5 +91,5 @@ def float_array(values: Any, name: str) -> FloatArray:
         if array.dtype.kind == "O":
             return np.array([real_number(value, name) for value in array.ravel()]).reshape(array.shape)
     except (TypeError, ValueError) as error:
-        raise TypeError(f"{name} must be real numbers, not {values!r} ({error})") from None
-    raise TypeError(f"{name} must be real numbers, not {values!r}")
+        raise TypeError(f"{name} must be real numbers, not {shortened(values)} ({error})") from None
+    raise TypeError(f"{name} must be real numbers, not {shortened(values)}")

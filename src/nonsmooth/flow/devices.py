@@ -6,6 +6,7 @@ import importlib.util
 import os
 from typing import Any
 
+from nonsmooth.errors import not_installed
 from nonsmooth.flow.engine import Engine, SectionPlan
 from nonsmooth.flow.linear import LinearEngine, PlanarEngine
 from nonsmooth.flow.series import SeriesEngine
@@ -134,8 +135,7 @@ def on_gpu(device: Any, verb: str, engine: Engine, plan: SectionPlan | None, *, 
         )
     if importlib.util.find_spec("numba_cuda") is None:
         raise ImportError(
-            'device="cuda" needs the package numba-cuda, which is not installed: pip install "nonsmooth[cuda]", '
-            'or use device="cpu"'
+            f'device="cuda" needs {not_installed("numba-cuda", "cuda")}, or use device="cpu"'
         )
     if not _simulated():
         _find_gpu()

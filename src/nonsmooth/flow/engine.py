@@ -12,6 +12,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.results.memory import room_for
+
 __all__ = ["Chain", "Engine", "Log", "SectionPlan", "State"]
 
 FloatArray = NDArray[np.float64]
@@ -91,6 +93,7 @@ class Chain:
 
     @classmethod
     def empty(cls, points: int, keep: int, n: int, n_indicators: int, n_outputs: int) -> Chain:
+        room_for(8.0 * points * keep * (n + 2), f"{points:.6g} x {keep:.6g} section points", "ask for fewer of them")
         nan, zero = np.nan, np.int64
         return cls(
             np.full((points, keep, n), nan), np.full((points, n), nan), np.full((points, n), nan),

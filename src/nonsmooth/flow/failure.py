@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from nonsmooth.errors import SolveError
 from nonsmooth.kernels import codes
 
-__all__ = ["solve_error"]
+if TYPE_CHECKING:
+    from nonsmooth.flow.engine import Log
+    from nonsmooth.system.system import System
+
+__all__ = ["solve_error", "wrong_way"]
 
 BEYOND_STOP = (
     "the start lies beyond a stop: a transition with a reset holds there already; "
@@ -15,11 +19,39 @@ BEYOND_STOP = (
 )
 
 
-def solve_error(code: int, **where: Any) -> SolveError:
+def solve_error(code: int, because: str = "", **where: Any) -> SolveError:
     """The error for a kernel's code; ``where`` (time, state, mode) as :class:`SolveError` takes it."""
     from nonsmooth.results.statuses import by_code
 
     if code == codes.BEYOND_STOP:
         return SolveError(BEYOND_STOP, status="beyond_stop", **where)
     status = by_code(code)
-    return SolveError(status.sentence, status=status.name, **where)
+    return SolveError(because or status.sentence, status=status.name, **where)
+
+
+def wrong_way(system: System, log: Log) -> str:
+    """A sentence where the last reset of a failed run left the state on its way on through the surface; else nothing.
+
+    An impact turns the rate of its indicator round. With the wrong sign it does not, and follows itself without end.
+    """
+    if log.status not in (codes.CHATTER, codes.TOO_MANY_CROSSINGS) or not len(log.crossing_time):
+        return ""
+    t, jump = system.traced, system.transitions[int(log.crossing_transition[-1])]
+    if jump.reset is None or jump.source != jump.target:
+        return ""
+    fixed = {t.t: float(log.crossing_time[-1]), **dict(zip(t.p, system.parameter_vector(), strict=True))}
+    fixed |= dict(zip(t.m, log.memory_after[-1], strict=True))
+    for row in jump.rows:
+        rate = system.derivatives.lie(row.indicator, jump.source, 1)
+        before, after = (
+            row.sign * float(rate.subs({**fixed, **dict(zip(t.u, map(float, u[-1]), strict=True))}))
+            for u in (log.u_before, log.u_after)
+        )
+        if before > 0.0 and after > 1e-6 * before:
+            name = system.indicators[row.indicator]
+            return (
+                f"The reset of {jump.label} leaves the state on its way on through the surface: d({name})/dt is "
+                f"{row.sign * before:.4g} before it and {row.sign * after:.4g} after it. Give the velocity that it "
+                "returns the other sign."
+            )
+    return ""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.errors import SystemDefinitionError, shortened
 from nonsmooth.flow.arguments import float_array, real_number, whole_number
 from nonsmooth.flow.engine import Engine, FloatArray
 
@@ -57,7 +57,7 @@ def engine_for(
         A system with sliding surfaces.
     """
     if not isinstance(method, str) or method not in METHODS:
-        raise ValueError(f"method = {method!r} does not exist; allowed: {', '.join(map(repr, METHODS))}")
+        raise ValueError(f"method = {shortened(method)} does not exist; allowed: {', '.join(map(repr, METHODS))}")
     if getattr(system, "surfaces", ()):
         names = ", ".join(repr(system.indicators[surface.indicator]) for surface in system.surfaces)
         raise SystemDefinitionError(

@@ -15,6 +15,7 @@ from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.flow.starts import is_one_start, plain_start, start_states
 from nonsmooth.kernels import codes
+from nonsmooth.system.names import by_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,6 +30,7 @@ def result_status(code: int) -> int:
     return codes.NO_CONVERGENCE if code < 0 else int(code)
 
 
+@by_name
 def poincare(
     system: System,
     *,
@@ -74,10 +76,10 @@ def poincare(
     n, transient = whole_number(n, "n", 1), whole_number(transient, "transient", 0)
     section, plan = section_plan(system, section)
     plan = replace(plan, extremes=False)
-    engine = engine_for(system, method, rtol, atol, **expert)
     starts = start_states(system, start)
     if plan.indicator >= 0:
         refuse_resting(system, starts, system.parameter_vector()[None, :], "poincare")
+    engine = engine_for(system, method, rtol, atol, **expert)
     traced = system.traced
     out = Chain.empty(len(starts), n, len(traced.u), len(traced.indicators), len(traced.outputs))
     tables = engine.prepare(np.tile(system.parameter_vector(), (len(starts), 1)))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nonsmooth.errors import shortened
 from nonsmooth.flow.arguments import real_number
 
 if TYPE_CHECKING:
@@ -48,7 +49,7 @@ def with_ramps(system: System, ramps: Mapping[str, Any], t_begin: float, t_end: 
 
     traced = system.traced
     if not isinstance(ramps, Mapping):
-        raise TypeError(f'ramps must map parameters to ramps, {{"rho": (0.2, 0.5)}}, not {ramps!r}')
+        raise TypeError(f'ramps must map parameters to ramps, {{"rho": (0.2, 0.5)}}, not {shortened(ramps)}')
     changes: dict[Any, Any] = {}
     for name, ramp in ramps.items():
         if name not in traced.parameter_names:
@@ -59,7 +60,7 @@ def with_ramps(system: System, ramps: Mapping[str, Any], t_begin: float, t_end: 
             refuse_corners(changes[symbol], {traced.t}, f"the ramp of {name!r}")
         else:
             if np.shape(ramp) != (2,):
-                raise TypeError(f"ramps[{name!r}] must be (first, last) or a function of time, not {ramp!r}")
+                raise TypeError(f"ramps[{name!r}] must be (first, last) or a function of time, not {shortened(ramp)}")
             first, last = (real_number(value, f"ramps[{name!r}]") for value in ramp)
             system.parameter_points({name: np.linspace(first, last, WATCHED)})
             slope = Float((last - first) / (t_end - t_begin))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from nonsmooth.errors import shortened
 from nonsmooth.flow.arguments import real_number, whole_number
 from nonsmooth.flow.engine import SectionPlan
 
@@ -95,7 +96,7 @@ def section_plan(system: System, section: Any) -> tuple[Stroboscopic | Poincare,
             raise ValueError(f"{system.name!r} has no forcing period: use ns.Poincare(...) in place of {section}")
         return section, SectionPlan(phase=section.phase)
     if not isinstance(section, Poincare):
-        raise TypeError(f"section must be ns.Stroboscopic(...) or ns.Poincare(...), not {section!r}")
+        raise TypeError(f"section must be ns.Stroboscopic(...) or ns.Poincare(...), not {shortened(section)}")
     from nonsmooth.system.names import unknown
 
     indicators, modes = list(system.indicators), list(system.modes)

@@ -14,6 +14,7 @@ from nonsmooth.flow.saltation import Jump
 from nonsmooth.flow.simulate import check_complete, run_length
 from nonsmooth.flow.starts import first_state, plain_start
 from nonsmooth.flow.variational import Legs, VariationalFlow
+from nonsmooth.system.names import by_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -129,6 +130,7 @@ def variation(system: System, flow: VariationalFlow, state: State, t_end: float)
     return Variation(flow, values, log, start, 0.0, t_end), log
 
 
+@by_name
 def sensitivity(
     system: System,
     *,

@@ -11,10 +11,12 @@ import numpy as np
 from nonsmooth.flow.arguments import check_options, check_system, float_array, real_number, whole_number
 from nonsmooth.flow.engine import FloatArray, Log, State
 from nonsmooth.flow.equilibria import ROUNDING, equilibrium_at
-from nonsmooth.flow.failure import solve_error
+from nonsmooth.flow.failure import solve_error, wrong_way
 from nonsmooth.flow.methods import engine_for, warn_if_coarse
 from nonsmooth.flow.starts import first_state, is_one_start, plain_start
 from nonsmooth.kernels import codes
+from nonsmooth.results.memory import room_for
+from nonsmooth.system.names import by_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -27,6 +29,7 @@ SAMPLES_PER_PERIOD = 256
 SAMPLES = 4096
 
 
+@by_name
 def simulate(
     system: System,
     *,
@@ -97,9 +100,10 @@ def simulate(
         if method == "exact":
             raise ValueError('method="exact" needs constant parameters; with ramps use "taylor" or "rkf45"')
         traced = with_ramps(system, ramps, t_begin, t_end)
-    engine = engine_for(system, method, rtol, atol, step, traced=traced if ramps else None, **expert)
-    instants = _instants(samples, t_begin, t_end, None if ramps and period is None else period)
+    width = 2 * len(traced.u) + len(traced.outputs) + 3  # of the log and of the result
+    instants = _instants(samples, t_begin, t_end, None if ramps and period is None else period, width)
     state = first_state(system, start, mode)
+    engine = engine_for(system, method, rtol, atol, step, traced=traced if ramps else None, **expert)
     begun = np.abs(state.u)
     tables = engine.prepare(system.parameter_vector()[None, :])
     if t_begin > 0:
@@ -156,10 +160,13 @@ def run_length(
     return unit, number * unit
 
 
-def _instants(samples: Any, t_begin: float, t_end: float, period: float | None) -> FloatArray:
+def _instants(samples: Any, t_begin: float, t_end: float, period: float | None, width: int) -> FloatArray:
+    """The instants that are recorded, each with ``width`` numbers."""
     if samples is None:
-        samples = SAMPLES + 1 if period is None else int(np.ceil((t_end - t_begin) / period * SAMPLES_PER_PERIOD)) + 1
+        samples = SAMPLES + 1 if period is None else np.ceil((t_end - t_begin) / period * SAMPLES_PER_PERIOD) + 1
     if np.ndim(samples) == 0:
+        n = real_number(samples, "samples")
+        room_for(8.0 * n * width, f"a run with {n:.6g} samples", "give samples=, a number of instants or the instants")
         return np.linspace(t_begin, t_end, whole_number(samples, "samples", 2))
     instants = float_array(samples, "samples")
     if instants.ndim != 1 or not np.isfinite(instants).all() or (np.diff(instants) <= 0).any():
@@ -178,7 +185,9 @@ def check_complete(log: Log, system: System, state: State, period: float | None)
         return
     time = state.clock[0] + (state.clock[1] * period if period is not None else 0.0)
     where = dict(zip(system.states, map(float, state.u), strict=True))
-    raise solve_error(log.status, time=float(time), state=where, mode=system.modes[int(state.counters[0])])
+    raise solve_error(
+        log.status, wrong_way(system, log), time=float(time), state=where, mode=system.modes[int(state.counters[0])]
+    )
 
 
 def _dataset(

@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nonsmooth.errors import shortened
 from nonsmooth.flow.arguments import float_array, real_number, whole_number
 from nonsmooth.flow.engine import FloatArray, State
-from nonsmooth.system.names import unknown
+from nonsmooth.results.memory import room_for
+from nonsmooth.system.names import by_name, unknown
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
@@ -17,6 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["first_state", "is_one_start", "plain_start", "random_starts", "start_states"]
 
 
+@by_name
 def random_starts(n: int, low: Any, high: Any, seed: int) -> list[Any]:
     """``n`` states drawn uniformly from a box, the same for the same seed.
 
@@ -45,10 +48,11 @@ def random_starts(n: int, low: Any, high: Any, seed: int) -> list[Any]:
     [{'x': 0.005...}, {'x': 0.009...}]
     """
     n = whole_number(n, "n (the number of starts)", 1)
+    room_for(300.0 * n, f"a list of {n:.6g} starts", "draw fewer")
     rng = np.random.default_rng(seed)
     if isinstance(low, Mapping) or isinstance(high, Mapping):
         if not (isinstance(low, Mapping) and isinstance(high, Mapping)) or set(low) != set(high):
-            raise ValueError(f"low and high must name the same states, not {low!r} and {high!r}")
+            raise ValueError(f"low and high must name the same states, not {shortened(low)} and {shortened(high)}")
         names = list(low)
         a, b = (np.array([real_number(corner[k], k) for k in names]) for corner in (low, high))
         _check_box(a, b, low, high)
@@ -63,7 +67,9 @@ def random_starts(n: int, low: Any, high: Any, seed: int) -> list[Any]:
 
 def _check_box(a: FloatArray, b: FloatArray, low: Any, high: Any) -> None:
     if not (np.isfinite(a).all() and np.isfinite(b).all() and (a <= b).all()):
-        raise ValueError(f"low must be finite and not above high, got low = {low!r} and high = {high!r}")
+        raise ValueError(
+            f"low must be finite and not above high, got low = {shortened(low)} and high = {shortened(high)}"
+        )
 
 
 def is_one_start(start: Any) -> bool:
@@ -149,7 +155,7 @@ def _state(system: System, start: Any) -> FloatArray:
         return _finite(np.array([_number(start.get(name, 0.0), name) for name in names]), names)
     if not _is_list(start):
         raise TypeError(
-            f"start must be a state ({_form(names)}), a result of simulate, or a list of states, not {start!r}"
+            f"start must be a state ({_form(names)}), a result of simulate, or a list of states, not {shortened(start)}"
         )
     values = float_array(start, "the numbers of a start")
     if values.shape != (len(names),):
@@ -174,5 +180,5 @@ def _number(value: Any, name: str) -> float:
 def _finite(values: FloatArray, names: Sequence[str]) -> FloatArray:
     if not np.isfinite(values).all():
         bad = names[int(np.flatnonzero(~np.isfinite(values))[0])]
-        raise ValueError(f"the start of state {bad!r} is not finite: {values.tolist()}")
+        raise ValueError(f"the start of state {bad!r} must be a finite number: {shortened(values.tolist())}")
     return values

@@ -26,6 +26,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from nonsmooth.identification.blas import one_blas_thread
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.nonlinear_mode import NonlinearMode, interpolation
 from nonsmooth.identification.response_fit import FEWEST_CURVES, ResponseFit
@@ -104,6 +105,7 @@ def response_curves(
     return tuple(curves)
 
 
+@one_blas_thread()
 def amplitude_dependent(
     curves: Sequence[ResponseCurve], *, knots: int | ArrayLike = 5, residual: bool = False, mass: float | None = None
 ) -> tuple[Finding, NonlinearMode]:

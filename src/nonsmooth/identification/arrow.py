@@ -88,6 +88,11 @@ def settle(
             pull = right - prior @ (theta - centre)
             scale = np.sqrt(np.maximum(np.diag(full), 1e-300))
             shrunk = full / np.outer(scale, scale)
+            if not np.isfinite(shrunk).all():
+                raise SolveError(
+                    f"the motion of this fit over {len(problem.pieces)} pieces grows without bound: its records "
+                    "are not of the motion that they are taken for"
+                )
             if np.linalg.cond(shrunk) > 1e13:
                 raise SolveError("the records do not determine all parameters of this fit; give one its value")
             step = np.linalg.solve(shrunk + damping * np.eye(p), pull / scale) / scale

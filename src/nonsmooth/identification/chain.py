@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,6 +17,7 @@ from nonsmooth.experiment.recording import RecordingWarning
 from nonsmooth.experiment.session import Quantity, Session
 from nonsmooth.experiment.signals.phase import drive_phase
 from nonsmooth.identification.adjustment import Adjusted, Observation, adjust
+from nonsmooth.identification.blas import one_blas_thread
 from nonsmooth.identification.calibrations import crank_force, voltage_frequency
 from nonsmooth.identification.contact_findings import contact_finding, one_contact
 from nonsmooth.identification.cross_checks import cross_checks, sentences
@@ -30,9 +32,10 @@ from nonsmooth.identification.joining import joined
 from nonsmooth.identification.multiple_shooting import ContactFit, shoot_contacts
 from nonsmooth.identification.natural_frequency import natural_frequency
 from nonsmooth.identification.parameter_set import ParameterSet
+from nonsmooth.identification.plausibility import check_plausible, not_driven
 from nonsmooth.identification.receptance import receptance_fit
 from nonsmooth.identification.referral import counted_gap, mark_of, refer
-from nonsmooth.identification.statements import agreement, for_model, identifiability
+from nonsmooth.identification.statements import agreement, disagreement, for_model, identifiability, impossible
 from nonsmooth.identification.steady import Steady, steady
 from nonsmooth.identification.stiffness import stiffness
 from nonsmooth.identification.support_damping import support_damping
@@ -40,8 +43,12 @@ from nonsmooth.identification.support_damping import support_damping
 __all__ = ["identify"]
 
 FloatArray = NDArray[np.float64]
+#: The findings that name the runs of a procedure which were used.
+_FOUND_BY = {"impulse": ("omega_0", "c_decay"), "drop": ("c_s_drop",), "springs": ("spring_slope",),
+             "support": ("support_slope",)}  # fmt: skip
 
 
+@one_blas_thread()
 def identify(
     recordings: Session | str | os.PathLike[str] | Mapping[str, Any],
     model: Any = None,
@@ -94,6 +101,7 @@ def identify(
     if crank_length is not None and not 0 < crank_length < np.inf:
         raise ValueError(f"crank_length = {crank_length!r} must be a positive length in m")
     chain = _Chain(gather(recordings, apparatus=apparatus))
+    check_plausible(chain.evidence)
     for note in chain.evidence.notes:
         chain.say(note)
     chain.motor()
@@ -112,11 +120,24 @@ def identify(
         for note in (*gap.notes, *gap.counted.notes):
             chain.say(note)
     chain.checks(adjusted, decay, contacts, grazing)
+    chain.doubts(adjusted, contacts)
     found = joined(
         adjusted, gap, findings=chain.findings, identifiability=identifiability(adjusted, contacts, single),
-        notes=[*agreement(adjusted, chain.evidence), *chain.notes], synthetic=chain.evidence.synthetic,
+        notes=[*agreement(adjusted, chain.evidence), *chain.notes], anomalies=chain.anomalies,
+        synthetic=chain.evidence.synthetic,
     )  # fmt: skip
     return found if model is None else for_model(found, model)
+
+
+@contextmanager
+def _of(procedure: str) -> Iterator[None]:
+    """Put the procedure before the message of what goes wrong in its fit, and what to look at behind it."""
+    try:
+        yield
+    except (ValueError, SolveError) as error:
+        raise type(error)(
+            f"{procedure}: {error}. Are these the recordings of {procedure!r}, each one tap with its free decay?"
+        ) from error
 
 
 @dataclass(eq=False)
@@ -127,6 +148,7 @@ class _Chain:
     findings: list[Finding] = field(default_factory=list)
     observations: list[Observation] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    anomalies: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.observations.append(self.weighed("mass"))
@@ -164,6 +186,9 @@ class _Chain:
         except (ValueError, SolveError) as error:
             self.say(f"{what}: not found: {error}")
             return None
+        if not np.isfinite([found.value, found.uncertainty] if isinstance(found, Finding) else 0.0).all():
+            self.say(f"{what}: not found: the recordings do not determine it")
+            return None
         self.findings += found if isinstance(found, list) else [found]
         return found[0] if isinstance(found, list) else found
 
@@ -171,6 +196,43 @@ class _Chain:
         """Say which decays were not used, and why."""
         for note in decay.notes:
             self.say(f"{procedure}: {note}")
+
+    def doubt(self, sentence: str) -> None:
+        """Say what contradicts itself: a parameter may be wrong by more than its uncertainty."""
+        self.anomalies.append(sentence)
+        warnings.warn(sentence, RecordingWarning, stacklevel=5)
+
+    def doubts(self, adjusted: Adjusted, contacts: ContactFit | None) -> None:
+        """What cannot be, what disagrees, and procedures of which most runs could not be used."""
+        self.unused(contacts)
+        sentences = [disagreement(adjusted), *impossible(adjusted)]
+        if contacts is not None and contacts.poor:
+            sentences.append(
+                f"contact: the motion is not that of the model: root of chi^2 per degree of freedom "
+                f"{contacts.fit.reduced ** 0.5:.3g}, {np.count_nonzero(~contacts.fit.used)} of {len(contacts.pieces)} "
+                "pieces left out. Look at the crank's length, the photogate and the gap of these runs"
+            )
+        for sentence in sentences:
+            if sentence:
+                self.doubt(sentence)
+
+    def unused(self, contacts: ContactFit | None) -> None:
+        """Name the runs that no finding rests on; where they are most of a procedure, that is an anomaly."""
+        used = {
+            procedure: {name for finding in self.findings if finding.name in names for name in finding.runs}
+            for procedure, names in _FOUND_BY.items()
+        }  # fmt: skip
+        used["contact"] = set() if contacts is None else {run.name for run in contacts.runs}
+        for procedure, kept in used.items():
+            given = [run.name for run in self.runs(procedure)]
+            idle = [name for name in given if name not in kept]
+            if not idle or (procedure == "contact" and contacts is None):
+                continue
+            sentence = f"{procedure}: {len(idle)} of {len(given)} runs were not used: {', '.join(idle)}"
+            if 2 * len(idle) > len(given):
+                self.doubt(sentence)
+            elif any(not any(procedure in note and repr(name) in note for note in self.notes) for name in idle):
+                self.say(sentence)
 
     def say(self, sentence: str) -> None:
         self.notes.append(sentence)
@@ -197,9 +259,10 @@ class _Chain:
         runs, resolution = self.runs("impulse"), self.evidence.resolution
         if not runs:
             return None
-        decay = free_decay(
-            [(run.time, run.positions) for run in runs], resolution=resolution, names=[run.name for run in runs]
-        )
+        with _of("impulse"):
+            decay = free_decay(
+                [(run.time, run.positions) for run in runs], resolution=resolution, names=[run.name for run in runs]
+            )
         self.left_out("impulse", decay)
         self.slipped_late(runs, decay)
         self.observe(("omega_0", "b", "f"), decay.values[:3], decay.covariance[:3, :3], "free decay")
@@ -227,6 +290,8 @@ class _Chain:
                 f"{mounted} runs of the response state a gap: the support was mounted, no damping from them"
             )
         seen = steady(free)
+        if sentence := not_driven(seen, self.evidence.resolution):
+            raise ValueError(sentence)
         if free and decay is not None:
             self.beside("damping by amplitude (Fig. 6)", lambda: amplitude_fit(seen, decay, self.mass))
             self.beside("complex frequency response", lambda: receptance_fit(seen, decay, self.mass))
@@ -254,7 +319,8 @@ class _Chain:
         if not runs:
             return
         mass = self.evidence.quantity("test_mass")
-        found, decay = support_damping(runs, resolution=self.evidence.resolution, test_mass=mass)
+        with _of("drop"):
+            found, decay = support_damping(runs, resolution=self.evidence.resolution, test_mass=mass)
         self.left_out("drop", decay)
         self.findings.append(found)
         self.observations.append(self.weighed("test_mass"))
@@ -280,7 +346,7 @@ class _Chain:
         agree, disagree = sentences(found)
         self.notes += agree
         for sentence in disagree:
-            self.say(sentence)
+            self.doubt(sentence)
 
     def calibrations(self, adjusted: Adjusted) -> None:
         if runs := self.runs("voltage"):
@@ -316,6 +382,9 @@ class _Chain:
             return None, None
         if decay is None or "k_s" not in rough.names:
             self.say("contact: not used: needs taps of the car (impulse), and the support's stiffness")
+            return None, None
+        if impossible(rough):  # said of the final values
+            self.say("contact: not used: what the other procedures say of the car and the support cannot be")
             return None, None
         m = rough["m"]
         gamma = rough["c_s"] / m if "c_s" in rough.names else 1e-3 * rough["k_s"] / m

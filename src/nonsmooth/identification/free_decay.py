@@ -240,8 +240,9 @@ def _agreeing(
         except SolveError:
             alone.append(None)
     said = []
-    fitted = [i for i, one in enumerate(alone) if one is not None]
-    left = _unfitting([alone[i][2] for i in fitted], resolution)  # type: ignore[index]
+    fits = {i: one[2] for i, one in enumerate(alone) if one is not None}
+    fitted = list(fits)
+    left = _unfitting(list(fits.values()), resolution)
     typical = float(np.median(np.sqrt(left))) if len(left) else 1.0
     good = [i for i, excess in zip(fitted, left, strict=True) if excess <= _UNFITTING * typical**2]
     if 2 * len(good) <= len(records):

@@ -19,7 +19,7 @@ _BESIDE = ("friction", "gain")
 
 def joined(
     adjusted: Adjusted, gap: Referred | None, *, findings: Sequence[Finding], identifiability: Mapping[str, str],
-    notes: Sequence[str], synthetic: bool,
+    notes: Sequence[str], synthetic: bool, anomalies: Sequence[str] = (),
 ) -> ParameterSet:  # fmt: skip
     """The model's parameters, then what is beside them: rows over the unknowns of the adjustment, and the gap as it is.
 
@@ -28,7 +28,7 @@ def joined(
     adjusted : Adjusted
     gap : Referred, optional
         With its covariance with the unknowns.
-    findings, identifiability, notes, synthetic
+    findings, identifiability, notes, anomalies, synthetic
         Of the :class:`ParameterSet`.
     """
     size, names = len(adjusted.names), adjusted.names
@@ -56,5 +56,5 @@ def joined(
         extra |= {"gap_at_rest": gap.at_rest, "mean_shift": gap.shift, "rest_position": gap.rest}
     return ParameterSet(
         estimates, covariance, extra=extra, findings=findings, identifiability=identifiability, notes=notes,
-        synthetic=synthetic,
+        anomalies=anomalies, synthetic=synthetic,
     )

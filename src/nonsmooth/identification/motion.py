@@ -40,32 +40,35 @@ _SWITCHES = 20  # in one step
 
 
 @njit(cache=True)
-def _force(phi, oscillator, drive, x):
-    w2 = oscillator[0] * oscillator[0]
-    d = drive[0] * cos(phi) + drive[1] * sin(phi) + drive[2] * cos(2 * phi) + drive[3] * sin(2 * phi)
-    return w2 * (0.5 * d - (x - oscillator[3]))
+def _place(phi, drive):
+    """D at the crank's angle; where nothing drives, no cosine is computed."""
+    if drive[0] == 0.0 and drive[1] == 0.0 and drive[2] == 0.0 and drive[3] == 0.0:
+        return 0.0
+    c, s = cos(phi), sin(phi)
+    return drive[0] * c + drive[1] * s + drive[2] * (c * c - s * s) + drive[3] * (2 * s * c)
 
 
 @njit(cache=True)
-def _rate(phi, x, v, sign, touching, oscillator, drive, contact):
-    a = _force(phi, oscillator, drive, x) - oscillator[1] * v - sign * oscillator[2]
+def _rate(d, x, v, sign, touching, oscillator, contact):
+    w2 = oscillator[0] * oscillator[0]
+    a = w2 * (0.5 * d - (x - oscillator[3])) - oscillator[1] * v - sign * oscillator[2]
     if touching:
         a -= contact[0] * (x - contact[2]) + contact[1] * v
     return a
 
 
 @njit(cache=True)
-def _step(h, phi, turning, x, v, sign, touching, oscillator, drive, contact):
-    """One Runge-Kutta step of order 4 with a fixed direction of friction and a fixed mode."""
-    a1 = _rate(phi, x, v, sign, touching, oscillator, drive, contact)
-    middle = phi + 0.5 * h * turning
+def _step(h, d, phi, turning, x, v, sign, touching, oscillator, drive, contact):
+    """x, v, and D where it ends, of a Runge-Kutta step of order 4 with fixed direction of friction and fixed mode."""
+    middle, end = _place(phi + 0.5 * h * turning, drive), _place(phi + h * turning, drive)
+    a1 = _rate(d, x, v, sign, touching, oscillator, contact)
     v2 = v + 0.5 * h * a1
-    a2 = _rate(middle, x + 0.5 * h * v, v2, sign, touching, oscillator, drive, contact)
+    a2 = _rate(middle, x + 0.5 * h * v, v2, sign, touching, oscillator, contact)
     v3 = v + 0.5 * h * a2
-    a3 = _rate(middle, x + 0.5 * h * v2, v3, sign, touching, oscillator, drive, contact)
+    a3 = _rate(middle, x + 0.5 * h * v2, v3, sign, touching, oscillator, contact)
     v4 = v + h * a3
-    a4 = _rate(phi + h * turning, x + h * v3, v4, sign, touching, oscillator, drive, contact)
-    return x + h * (v + 2 * v2 + 2 * v3 + v4) / 6, v + h * (a1 + 2 * a2 + 2 * a3 + a4) / 6
+    a4 = _rate(end, x + h * v3, v4, sign, touching, oscillator, contact)
+    return x + h * (v + 2 * v2 + 2 * v3 + v4) / 6, v + h * (a1 + 2 * a2 + 2 * a3 + a4) / 6, end
 
 
 @njit(cache=True)
@@ -100,8 +103,9 @@ def march(time, phase, x, v, touching, oscillator, drive, contact, out):
     begun = 0
     sign = 1.0 if v > 0 else -1.0
     stuck = False
+    d = _place(phase[0], drive)  # where the present step begins
     if v == 0.0:
-        net = _rate(phase[0], x, 0.0, 0.0, touching, oscillator, drive, contact)
+        net = _rate(d, x, 0.0, 0.0, touching, oscillator, contact)
         stuck = abs(net) <= oscillator[2]
         sign = 1.0 if net > 0 else -1.0
     for i in range(1, len(time)):
@@ -117,29 +121,30 @@ def march(time, phase, x, v, touching, oscillator, drive, contact, out):
                     break
                 phi = phase[i - 1] + turning * (j * h + done)
                 if stuck:  # held until the springs overcome friction; judged once per step
-                    net = _rate(phi, x, 0.0, 0.0, touching, oscillator, drive, contact)
+                    net = _rate(d, x, 0.0, 0.0, touching, oscillator, contact)
                     if abs(net) <= oscillator[2]:
+                        d = _place(phi + turning * left, drive)
                         break
                     stuck = False
                     sign = 1.0 if net > 0 else -1.0
-                x1, v1 = _step(left, phi, turning, x, v, sign, touching, oscillator, drive, contact)
+                x1, v1, d1 = _step(left, d, phi, turning, x, v, sign, touching, oscillator, drive, contact)
                 if not _beyond(x1, v1, sign, touching, contact):
-                    x, v = x1, v1
+                    x, v, d = x1, v1, d1
                     break
                 low, high = 0.0, left
                 for _ in range(_HALVINGS):
                     middle = 0.5 * (low + high)
-                    x1, v1 = _step(middle, phi, turning, x, v, sign, touching, oscillator, drive, contact)
+                    x1, v1, _ = _step(middle, d, phi, turning, x, v, sign, touching, oscillator, drive, contact)
                     if _beyond(x1, v1, sign, touching, contact):
                         high = middle
                     else:
                         low = middle
                     if high - low < 1e-9:
                         break
-                x, v = _step(high, phi, turning, x, v, sign, touching, oscillator, drive, contact)
+                x, v, d = _step(high, d, phi, turning, x, v, sign, touching, oscillator, drive, contact)
                 done += high
                 if sign * v < 0:
-                    net = _rate(phi + turning * high, x, 0.0, 0.0, touching, oscillator, drive, contact)
+                    net = _rate(d, x, 0.0, 0.0, touching, oscillator, contact)
                     stuck = abs(net) <= oscillator[2]
                     sign = 1.0 if net > 0 else -1.0
                     if stuck or sign * v < 0:

@@ -68,6 +68,11 @@ class ContactFit:
         return _SHARED + _PER_RUN * run + which
 
     @property
+    def poor(self) -> bool:
+        """Whether the motion is another than the model's: chi^2, or half of its pieces as outliers."""
+        return bool(self.fit.reduced > _LARGE or np.mean(~self.fit.used) > 0.5)
+
+    @property
     def n_contacts(self) -> int:
         """Pieces, each with at least one contact."""
         return int(np.count_nonzero(self.fit.used))

@@ -32,16 +32,21 @@ class ParameterSet(Mapping[str, float]):
     findings : sequence of Finding
     identifiability : mapping of str to str
         For each parameter a sentence: what its value rests on, and what the data do not say.
+    notes : sequence of str
+    anomalies : sequence of str
+        What contradicts itself, in the recordings or between them and the notebook: while one stands, a parameter may
+        be wrong by more than its uncertainty.
     synthetic : bool
         Whether it was identified from computed recordings.
     """
 
-    __slots__ = ("_covariance", "estimates", "extra", "findings", "identifiability", "notes", "synthetic")
+    __slots__ = ("_covariance", "anomalies", "estimates", "extra", "findings", "identifiability", "notes", "synthetic")
     estimates: Mapping[str, Estimate]
     extra: Mapping[str, Estimate]
     findings: tuple[Finding, ...]
     identifiability: Mapping[str, str]
     notes: tuple[str, ...]
+    anomalies: tuple[str, ...]
     synthetic: bool
     _covariance: NDArray[np.float64]
 
@@ -54,6 +59,7 @@ class ParameterSet(Mapping[str, float]):
         findings: Sequence[Finding] = (),
         identifiability: Mapping[str, str] | None = None,
         notes: Sequence[str] = (),
+        anomalies: Sequence[str] = (),
         synthetic: bool = False,
     ) -> None:
         put = object.__setattr__
@@ -62,6 +68,7 @@ class ParameterSet(Mapping[str, float]):
         put(self, "findings", tuple(findings))
         put(self, "identifiability", MappingProxyType(dict(identifiability or {})))
         put(self, "notes", tuple(notes))
+        put(self, "anomalies", tuple(anomalies))
         put(self, "synthetic", bool(synthetic))
         matrix = np.array(covariance, dtype=np.float64)
         n = len(self.estimates) + len(self.extra)
@@ -132,7 +139,7 @@ class ParameterSet(Mapping[str, float]):
             {name: self.estimates[name] for name in kept}, self._covariance[np.ix_(order, order)],
             extra={**{name: self.estimates[name] for name in moved}, **self.extra}, findings=self.findings,
             identifiability=self.identifiability, notes=[*self.notes, note] if note else self.notes,
-            synthetic=self.synthetic,
+            anomalies=self.anomalies, synthetic=self.synthetic,
         )  # fmt: skip
 
     def draw(self, n: int, seed: int = 0) -> dict[str, NDArray[np.float64]]:
@@ -157,6 +164,7 @@ class ParameterSet(Mapping[str, float]):
         rows = [*self.estimates.values(), *self.extra.values()]
         record = {
             "version": package_version(), "verb": "identify", "synthetic": self.synthetic, "notes": list(self.notes),
+            "anomalies": list(self.anomalies),
             "n_parameters": len(self.estimates), "identifiability": dict(self.identifiability),
             "units": [row.unit for row in rows], "findings": [_as_record(finding) for finding in self.findings],
         }  # fmt: skip
@@ -198,14 +206,16 @@ class ParameterSet(Mapping[str, float]):
             {name: rows[name] for name in names[:n]}, dataset["covariance"].values,
             extra={name: rows[name] for name in names[n:]},
             findings=[_from_record(item) for item in record["findings"]],
-            identifiability=record["identifiability"], notes=record["notes"], synthetic=record["synthetic"],
+            identifiability=record["identifiability"], notes=record["notes"],
+            anomalies=record.get("anomalies", ()), synthetic=record["synthetic"],
         )  # fmt: skip
 
     def __repr__(self) -> str:
         lines = [f"ParameterSet{' (synthetic recordings)' if self.synthetic else ''}"]
         lines += [f"  {name} = {estimate}" for name, estimate in self.estimates.items()]
         lines += [f"  ({name} = {estimate})" for name, estimate in self.extra.items()]
-        return "\n".join(lines + [f"  {note}" for note in self.notes])
+        lines += [f"  {note}" for note in self.notes]
+        return "\n".join(lines + [f"  ANOMALY: {sentence}" for sentence in self.anomalies])
 
 
 def _as_record(finding: Finding) -> dict[str, Any]:

@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 
 from nonsmooth.identification.adjustment import Adjusted
+from nonsmooth.identification.consistency import birge_ratio
 from nonsmooth.identification.evidence import Evidence
 from nonsmooth.identification.finding import Finding
 from nonsmooth.identification.multiple_shooting import ContactFit
 from nonsmooth.identification.parameter_set import ParameterSet
 from nonsmooth.system.names import unknown
 
-__all__ = ["agreement", "for_model", "identifiability", "require"]
+__all__ = ["agreement", "disagreement", "for_model", "identifiability", "impossible", "require"]
 
 #: What must have been recorded to know a parameter.
 _RESTS_ON = {
@@ -25,23 +26,44 @@ _NEEDED = ("springs", "support", "impulse", "drop", "response", "contact")
 
 
 def agreement(adjusted: Adjusted, evidence: Evidence) -> list[str]:
-    """Whether the procedures agree, and which were not recorded."""
+    """That the procedures agree, and which were not recorded."""
     notes = []
-    if np.isfinite(adjusted.birge):
-        if adjusted.birge < 2:
-            notes.append(
-                f"the procedures agree: Birge ratio {adjusted.birge:.2f}, {adjusted.freedom} degree"
-                f"{'s' if adjusted.freedom > 1 else ''} of freedom"
-            )
-        else:
-            name, pull = max(adjusted.pulls.items(), key=lambda row: abs(row[1]))
-            notes.append(
-                f"the procedures disagree: Birge ratio {adjusted.birge:.2f}; {name} is off by {pull:+.1f} of its "
-                "uncertainties. Something is not as the notebook says: a crank, a wheel, a mass"
-            )
+    if np.isfinite(adjusted.birge) and not disagreement(adjusted):
+        notes.append(
+            f"the procedures agree: Birge ratio {adjusted.birge:.2f}, {adjusted.freedom} degree"
+            f"{'s' if adjusted.freedom > 1 else ''} of freedom"
+        )
     if lacking := [name for name in _NEEDED if name in evidence.missing]:
         notes.append(f"no recordings of: {', '.join(lacking)}")
     return notes
+
+
+def disagreement(adjusted: Adjusted) -> str:
+    """A sentence where the procedures disagree by more than chance, else an empty one."""
+    freedom = adjusted.freedom
+    if freedom < 1 or not np.isfinite(adjusted.birge) or birge_ratio(freedom * adjusted.birge**2, freedom)[1]:
+        return ""
+    name, pull = max(adjusted.pulls.items(), key=lambda row: abs(row[1]))
+    return (
+        f"the procedures disagree: Birge ratio {adjusted.birge:.2f}; {name} is off by {pull:+.1f} of its "
+        "uncertainties. Something is not as the notebook says: a crank, a wheel, a mass"
+    )
+
+
+def impossible(adjusted: Adjusted) -> list[str]:
+    """A sentence for each value that no rig has: below zero, or a support softer than the springs."""
+    said = []
+    for name in ("m", "k", "k_s", "c", "c_s"):
+        if name in adjusted.names:
+            found = adjusted.estimate(name)
+            if not np.isfinite([found.value, found.uncertainty]).all() or found.value < -3 * found.uncertainty:
+                said.append(f"{name} = {found} cannot be")
+    if {"k", "k_s"} <= set(adjusted.names) and 0 < adjusted["k_s"] < 2 * adjusted["k"]:
+        said.append(
+            f"the support ({adjusted['k_s']:.4g} N/m) is softer than the car's springs (2k = {2 * adjusted['k']:.4g} "
+            "N/m): are recordings of the car and of the support exchanged?"
+        )
+    return said
 
 
 def identifiability(adjusted: Adjusted, contacts: ContactFit | None, single: Finding | None) -> dict[str, str]:

@@ -3,6 +3,8 @@
 Those of identified parameters stand in ``plot.identification``. Matplotlib is loaded when the first figure is drawn.
 """
 
+from typing import Any
+
 from nonsmooth.plot import identification
 from nonsmooth.plot.basin_fractions import basin_fractions
 from nonsmooth.plot.basins import basins
@@ -58,3 +60,9 @@ __all__ = [
     "section",
     "time_history",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    from nonsmooth.system.names import unknown
+
+    raise AttributeError(unknown(name, "a figure", "nonsmooth.plot", __all__), name=name)

@@ -48,7 +48,8 @@ STATUSES: tuple[Status, ...] = (
     Status(
         codes.CHATTER, "chatter",
         "Transitions followed each other in ever shorter times without end (an infinite number in finite time).",
-        "Describe what happens when they have accumulated: a mode that sticks, or a sliding surface.",
+        "Check the signs of the reset first: after it the state must move away from the surface. Where impacts do "
+        "accumulate, describe what happens then: a mode that sticks, or a sliding surface.",
     ),
     Status(
         codes.TOO_MANY_CROSSINGS, "too_many_crossings",

@@ -225,7 +225,7 @@ def _compare(target: Path, fresh: Path, held: Mapping[str, Any]) -> None:
 def _variables(result: xr.Dataset) -> Iterator[tuple[str, bool, xr.Variable]]:
     """Name, coordinate or not, and variable."""
     for name, variable in result.variables.items():
-        yield name, name in result.coords, variable  # type: ignore[misc]
+        yield str(name), name in result.coords, variable
 
 
 def _encode(result: xr.Dataset) -> xr.Dataset:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.errors import SystemDefinitionError, shortened
 from nonsmooth.system.names import unknown
 
 __all__ = ["GRAMMAR", "condition_text", "read_condition"]
@@ -32,20 +32,22 @@ def read_condition(text: object, indicators: Sequence[str], label: str) -> tuple
         Outside the grammar, an unknown indicator, or the same indicator asked to have both signs.
     """
     if not isinstance(text, str):
-        raise SystemDefinitionError(f"{label}: `when` must be a string of the form: {GRAMMAR}; not {text!r}")
+        raise SystemDefinitionError(f"{label}: `when` must be a string of the form: {GRAMMAR}; not {shortened(text)}")
     signs: dict[str, int] = {}
     for part in re.split(r"\band\b", text):
         match = _SIGN.match(part)
         if match is None:
             raise SystemDefinitionError(
-                f"{label}: cannot read {part.strip()!r} in the condition {text!r}; the grammar is: {GRAMMAR}. "
-                f"('or' is a second transition; anything else is a new indicator.)"
+                f"{label}: cannot read {shortened(part.strip())} in the condition {shortened(text)}; the grammar is: "
+                f"{GRAMMAR}. "
+                "('or' is a second transition; anything else is a new indicator: for x > g declare "
+                'indicators={"gap": lambda t, u, p: u.x - p.g} and write "gap > 0".)'
             )
         name, sign = match[1], 1 if match[2] == ">" else -1
         if name not in indicators:
             raise SystemDefinitionError(f"{label}: {unknown(name, 'an indicator', 'this system', indicators)}")
         if signs.setdefault(name, sign) != sign:
-            raise SystemDefinitionError(f"{label}: {text!r} asks for both signs of {name!r} at once")
+            raise SystemDefinitionError(f"{label}: {shortened(text)} asks for both signs of {name!r} at once")
     return tuple(signs.items())
 
 

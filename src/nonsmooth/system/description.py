@@ -12,7 +12,7 @@ from typing import Any
 
 import sympy as sp
 
-from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.errors import SystemDefinitionError, shortened
 from nonsmooth.system.domain import Domain
 from nonsmooth.system.equations import TracedBand, TracedSurface, trace_band, trace_surface, trace_system
 from nonsmooth.system.mode import Band, Mode
@@ -117,13 +117,16 @@ def describe(
 
 def _is_mapping(given: Any, what: str, system: str, example: str) -> None:
     if not isinstance(given, Mapping):
-        raise SystemDefinitionError(f"{system!r}: `{what}` must be a mapping such as {example}, not {given!r}")
+        raise SystemDefinitionError(f"{system!r}: `{what}` must be a mapping such as {example}, not {shortened(given)}")
 
 
 def _units(given: Any, what: str, system: str, raw: bool = False) -> dict[str, Any]:
     """Names with units from a mapping, or from a sequence of names (no units)."""
     if isinstance(given, str) or not isinstance(given, (Mapping, Sequence)):
-        raise SystemDefinitionError(f"{system!r}: `{what}` must map names to units, not {given!r}")
+        raise SystemDefinitionError(
+            f'{system!r}: `{what}` must map names to units, as {{"x": "m"}}, or be a list of names; '
+            f"not {shortened(given)}"
+        )
     if not isinstance(given, Mapping):
         return dict.fromkeys(given, "")
     for key, unit in given.items():
@@ -146,7 +149,7 @@ def _output(key: str, given: Any) -> tuple[Any, str]:
     if not (callable(function) or isinstance(function, Mapping)) or not isinstance(unit, str):
         raise SystemDefinitionError(
             f"output {key!r} must be a function f(t, u, p) or a mapping mode -> function, alone or as "
-            f"(function, unit); not {given!r}"
+            f"(function, unit); not {shortened(given)}"
         )
     return function, unit
 

@@ -8,12 +8,12 @@ from typing import Any
 
 import sympy as sp
 
-from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.errors import SystemDefinitionError, shortened
 from nonsmooth.system.condition import read_condition
 from nonsmooth.system.mode import Band
 from nonsmooth.system.names import unknown
 from nonsmooth.system.parameter import Parameter
-from nonsmooth.system.scalar import Scalar
+from nonsmooth.system.scalar import Scalar, as_written
 from nonsmooth.system.traced import Row, Traced, TracedTransition
 from nonsmooth.system.tracing import Symbols, call_scalar, call_vector, refuse_corners
 from nonsmooth.system.transition import Surface, Transition
@@ -69,11 +69,16 @@ def trace_system(
         refuse_corners(expression, moving, what)
         if not expression.free_symbols & set(symbols.u.values()):
             raise SystemDefinitionError(
-                f"{what} never involves the state ({expression}): nothing can cross it. "
+                f"{what} never involves the state ({as_written(expression)}): nothing can cross it. "
                 f"For a switch at a given time use Transition(..., at=phase)"
             )
         surfaces_of.append(expression)
     owned = {key: own for key, (_, own) in modes.items()}
+    if isinstance(transitions, Transition | Surface):
+        raise SystemDefinitionError(
+            f"{name!r}: `transitions` is a list of ns.Transition and ns.Surface, not {transitions.label} alone: put it "
+            "into [ ]"
+        )
     jumps = []
     for item in transitions:
         if isinstance(item, Surface):
@@ -82,7 +87,8 @@ def trace_system(
             jumps.append(_jump(item, symbols, time, owned, indicators, surfaces_of))
         else:
             raise SystemDefinitionError(
-                f"{name!r}: `transitions` is a list of ns.Transition and ns.Surface, not {item!r}"
+                f"{name!r}: `transitions` is a list of ns.Transition and ns.Surface, not {shortened(item)}; "
+                'write ns.Transition("free", "contact", when="gap > 0")'
             )
     return Traced(
         name=name, t=symbols.t, u=tuple(symbols.u.values()), p=tuple(symbols.p.values()),
@@ -96,7 +102,7 @@ def trace_system(
 
 def _mode_index(name: str, label: str, modes: Mapping[str, Any]) -> int:
     if name not in modes:
-        raise SystemDefinitionError(f"transition {label}: {unknown(name, 'a mode', 'this system', modes)}")
+        raise SystemDefinitionError(f"transition {label}: {unknown(name, 'a mode', 'this system', list(modes))}")
     return list(modes).index(name)
 
 
@@ -106,7 +112,7 @@ def _surface_jumps(
     below, above = (_mode_index(end, item.label, modes) for end in (item.below, item.above))
     if item.indicator not in indicators:
         raise SystemDefinitionError(
-            f"{item.label}: {unknown(item.indicator, 'an indicator', 'this system', indicators)}"
+            f"{item.label}: {unknown(item.indicator, 'an indicator', 'this system', list(indicators))}"
         )
     if set(modes[item.below]) != set(modes[item.above]):
         raise SystemDefinitionError(f"{item.label}: both modes must have the same states")
@@ -173,7 +179,7 @@ def _trace_output(
     if isinstance(given, Mapping):
         for mode in given:
             if mode not in modes:
-                raise SystemDefinitionError(f"output {key!r}: {unknown(mode, 'a mode', 'this system', modes)}")
+                raise SystemDefinitionError(f"output {key!r}: {unknown(mode, 'a mode', 'this system', list(modes))}")
         if missing := [mode for mode in modes if mode not in given]:
             raise SystemDefinitionError(f"output {key!r} is not given in mode {missing[0]!r}")
         return tuple(

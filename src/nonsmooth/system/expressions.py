@@ -7,11 +7,14 @@ SymPy prints floats with 15 digits and reads text by executing it; both are unus
 from __future__ import annotations
 
 import ast
+import cmath
+import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
 import sympy as sp
 
+from nonsmooth.errors import shortened
 from nonsmooth.system.scalar import to_expression
 
 __all__ = ["read_expression", "write_expression"]
@@ -32,7 +35,16 @@ _COMPARE: dict[type, Callable[[Any, Any], Any]] = {
     ast.Eq: sp.Eq, ast.NotEq: sp.Ne,
 }  # fmt: skip
 _SUM, _PRODUCT, _SIGN, _POWER, _ATOM = range(5)
-_LARGEST_POWER = 10_000  # of numbers: text must not be able to ask for 9**9**9
+# Text may come with a file of somebody else: what it asks for is bounded before SymPy works it out.
+_LONGEST = 200_000  # characters
+_NODES = 10_000
+_DEEPEST = 60  # sums and products count once, however many terms they have
+_JOINED = 40  # operands of `and`, `or`, max and min: SymPy compares all pairs of them
+_BITS = 1100  # of a whole number: a float has 1024
+_LARGEST_EXPONENT = 100  # of anything but a number
+_TERMS = 5_000  # when multiplied out
+_STEEP = ("exp", "sinh", "cosh")
+_LARGEST_LOGARITHM = 709.0  # of a float
 
 
 def write_expression(expression: sp.Basic, names: Mapping[sp.Symbol, str]) -> str:
@@ -125,15 +137,55 @@ def read_expression(text: str, symbols: Mapping[str, sp.Symbol]) -> Any:
         Anything but numbers, the known names, arithmetic, comparisons and the known functions.
     """
     if not isinstance(text, str):
-        raise ValueError(f"an expression must be a string, not {text!r}")
+        raise ValueError(f"an expression must be a string, not {shortened(text)}")
+    if len(text) > _LONGEST:
+        raise ValueError(f"an expression of {len(text)} characters is too long; at most {_LONGEST} are read")
     try:
         tree = ast.parse(text.strip(), mode="eval")
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        raise ValueError(f"cannot read the expression {text!r}: {error}") from None
+        raise ValueError(f"cannot read the expression {shortened(text)}: {error}") from None
     try:
-        return _read(tree.body, symbols)
-    except (ValueError, TypeError, RecursionError) as error:
-        raise ValueError(f"{error} (in the expression {text!r})") from None
+        _check_size(tree.body)
+        expression = _read(tree.body, symbols)
+        _multiplied_out(expression)
+        return expression
+    except (ValueError, TypeError, ArithmeticError, RecursionError) as error:
+        raise ValueError(f"{error} (in the expression {shortened(text)})") from None
+
+
+def _check_size(tree: ast.AST) -> None:
+    """ValueError for a tree that SymPy would take long to build."""
+    nodes, pending = 0, [(tree, 1)]
+    while pending:
+        node, depth = pending.pop()
+        nodes += 1
+        if nodes > _NODES or depth > _DEEPEST:
+            raise ValueError(f"it is too large: at most {_NODES} parts, nested at most {_DEEPEST} deep, are read")
+        if isinstance(node, ast.BoolOp | ast.Call):
+            joined = len(node.values if isinstance(node, ast.BoolOp) else node.args)
+            if joined > _JOINED:
+                raise ValueError(f"it joins {joined} parts at once; at most {_JOINED} are read")
+        for child in ast.iter_child_nodes(node):
+            if not isinstance(child, ast.expr_context | ast.operator | ast.unaryop | ast.boolop | ast.cmpop):
+                chained = isinstance(node, ast.BinOp) and child is node.left and isinstance(child, ast.BinOp)
+                pending.append((child, depth + (not chained)))
+
+
+def _multiplied_out(e: sp.Basic) -> int:
+    """Terms of an expression when it is multiplied out, as its derivatives are; ValueError for very many."""
+    counts = [_multiplied_out(part) for part in e.args]
+    if e.is_Add:
+        count = sum(counts)
+    elif e.is_Mul:
+        count = math.prod(counts)
+    elif e.is_Pow and e.exp.is_Rational:
+        power = int(abs(e.exp))
+        count = math.comb(counts[0] + power - 1, power)
+    else:
+        count = 1
+    if count > _TERMS:
+        raise ValueError(f"it has {count} terms when it is multiplied out; at most {_TERMS} are read")
+    return count
 
 
 def _read(node: ast.AST, symbols: Mapping[str, sp.Symbol]) -> Any:
@@ -141,7 +193,7 @@ def _read(node: ast.AST, symbols: Mapping[str, sp.Symbol]) -> Any:
         case ast.Constant(value=bool() as value):
             return sp.true if value else sp.false
         case ast.Constant(value=int() as value):
-            return sp.Integer(value)
+            return _bounded(sp.Integer(value))
         case ast.Constant(value=float() as value):
             return to_expression(value)
         case ast.Name(id="pi"):
@@ -153,23 +205,57 @@ def _read(node: ast.AST, symbols: Mapping[str, sp.Symbol]) -> Any:
         case ast.UnaryOp(op=ast.Not(), operand=operand):
             return sp.Not(_read(operand, symbols))
         case ast.BinOp(op=ast.Add() | ast.Sub()):
-            return sp.Add(*_terms(node, symbols))
+            return _bounded(sp.Add(*_terms(node, symbols)))
         case ast.BinOp(op=ast.Mult() | ast.Div()) | ast.UnaryOp(op=ast.USub() | ast.UAdd()):
-            return sp.Mul(*_factors(node, symbols))
+            return _bounded(sp.Mul(*_factors(node, symbols)))
         case ast.BinOp(left=left, op=ast.Pow(), right=right):
-            base, exponent = _read(left, symbols), _read(right, symbols)
-            if base.is_number and exponent.is_number and abs(float(exponent)) > _LARGEST_POWER:
-                raise ValueError(f"a number to the power {exponent} is not accepted")
-            return sp.Pow(base, exponent)
+            return _power(_read(left, symbols), _read(right, symbols))
         case ast.Call(func=ast.Name(id="where"), args=[condition, a, b], keywords=[]):
             return sp.Piecewise((_read(a, symbols), _read(condition, symbols)), (_read(b, symbols), sp.true))
         case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]) if name in _FUNCTIONS:
-            return _FUNCTIONS[name](*(_read(argument, symbols) for argument in arguments))
+            values = [_read(argument, symbols) for argument in arguments]
+            if name in _STEEP and any(value.is_number and abs(_number(value)) > _LARGEST_LOGARITHM for value in values):
+                raise ValueError(f"{name} of a number as large as {shortened(values[0])} is not accepted")
+            return _bounded(_FUNCTIONS[name](*values))
         case ast.Compare(left=left, ops=[op], comparators=[right]) if type(op) in _COMPARE:
             return _COMPARE[type(op)](_read(left, symbols), _read(right, symbols))
         case ast.BoolOp(op=op, values=values):
             return (sp.And if isinstance(op, ast.And) else sp.Or)(*(_read(value, symbols) for value in values))
-    raise ValueError(f"`{ast.unparse(node)}` is not allowed")
+    raise ValueError(f"`{shortened(ast.unparse(node), quoted=False)}` is not allowed")
+
+
+def _power(base: Any, exponent: Any) -> Any:
+    """A power whose value, and whose digits where it is exact, are bounded before they are worked out."""
+    if exponent.is_number:
+        size = abs(_number(exponent))
+        if not base.is_number:
+            fits = size <= _LARGEST_EXPONENT
+        elif base.is_Rational and exponent.is_Rational:
+            fits = size * max(base.p.bit_length(), base.q.bit_length()) <= _BITS
+        else:
+            value = abs(_number(base))
+            fits = size * abs(math.log(value) if value else 0.0) <= _LARGEST_LOGARITHM
+        if not fits:
+            raise ValueError(f"{shortened(base)} to the power {shortened(exponent)} is not accepted: it is too large")
+    return _bounded(sp.Pow(base, exponent))
+
+
+def _bounded(expression: Any) -> Any:
+    """The expression; ValueError where it is a number beyond those of floating point."""
+    if getattr(expression, "is_Rational", False):
+        if max(expression.p.bit_length(), expression.q.bit_length()) > _BITS:
+            raise ValueError("it holds a number with more digits than a float can have")
+    elif getattr(expression, "is_number", False):
+        _number(expression)
+    return expression
+
+
+def _number(expression: Any) -> complex:
+    """The value of an expression without symbols, in floating point."""
+    value = complex(expression.evalf(15))
+    if not cmath.isfinite(value):
+        raise ValueError(f"it holds the number {shortened(expression)}, which is not finite")
+    return value
 
 
 def _terms(node: ast.AST, symbols: Mapping[str, sp.Symbol], sign: int = 1) -> list[Any]:

@@ -1,4 +1,4 @@
-"""Which names may be used, and helpful answers to those that may not.
+"""Which names may be used, and helpful answers to those that may not, in calls too.
 
 A parameter's name becomes a dim of a result and a state's name a coordinate, so that the names the
 results use themselves are reserved.
@@ -7,12 +7,18 @@ results use themselves are reserved.
 from __future__ import annotations
 
 import difflib
+import inspect
 import keyword
-from collections.abc import Iterable, Mapping
+import unicodedata
+from collections.abc import Callable, Iterable, Mapping
+from functools import wraps
+from typing import Any, TypeVar, cast
 
-from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.errors import SystemDefinitionError, shortened
 
-__all__ = ["RESERVED", "check_keys", "check_names", "unknown"]
+__all__ = ["RESERVED", "by_name", "check_keys", "check_names", "nearest", "unknown"]
+
+F = TypeVar("F", bound=Callable[..., Any])
 
 RESERVED = frozenset(
     [
@@ -50,6 +56,12 @@ def check_names(groups: Mapping[str, Iterable[str]], system: str) -> None:
                 raise SystemDefinitionError(
                     f"{system!r}: {name!r} cannot name a {what}: it must be a Python identifier that is no keyword "
                     f"and does not begin with an underscore{hint}"
+                )
+            if (read := unicodedata.normalize("NFKC", name)) != name:
+                letters = ", ".join(unicodedata.name(a, "?") for a in name if a not in read)
+                raise SystemDefinitionError(
+                    f"{system!r}: {name!r} cannot name a {what}: it holds {letters}, and in code Python reads the name "
+                    f"as {read!r} (p.{name} is p.{read}). Name it {read!r}, or in plain letters (mu)"
                 )
             if name in RESERVED:
                 raise SystemDefinitionError(
@@ -93,15 +105,60 @@ def unknown(name: object, what: str, of: str, known: Mapping[str, str] | Iterabl
     """
     units = known if isinstance(known, Mapping) else dict.fromkeys(known, "")
     ordered = sorted(units)
-    text = f"`{name}` is not {what} of {of}"
-    near = max(ordered, key=lambda candidate: _likeness(str(name), candidate), default=None)
-    if near is not None and _likeness(str(name), near) >= 0.5:
-        unit = units[near]
-        text += f"; nearest: {near}" + (f" [{unit}]" if unit else "")
+    text = f"`{shortened(name, quoted=False)}` is not {what} of {of}"
+    for near in nearest(str(name), ordered)[:1]:
+        text += f"; nearest: {near}" + (f" [{units[near]}]" if units[near] else "")
     return text + (f"; all: {', '.join(ordered)}" if ordered else f"; {of} has none")
+
+
+def nearest(name: str, known: Iterable[str]) -> list[str]:
+    """Return the known names that are like ``name``, the nearest first, at most three."""
+    likeness = {candidate: _likeness(name[:100], candidate) for candidate in known}
+    return sorted((one for one in likeness if likeness[one] >= 0.5), key=lambda one: -likeness[one])[:3]
 
 
 def _likeness(given: str, candidate: str) -> float:
     """Similarity, 0 to about 1; the same beginning counts (``gap`` means g rather than omega)."""
     begins = given[:1].lower() == candidate[:1].lower()
     return difflib.SequenceMatcher(None, given.lower(), candidate.lower()).ratio() + 0.2 * begins
+
+
+def by_name(function: F) -> F:
+    """Decorate a verb: arguments that do not fit its signature are answered with how it is called."""
+    signature = inspect.signature(function)
+    verb = function.__qualname__.removesuffix(".__init__")
+
+    @wraps(function)
+    def called(*given: Any, **named: Any) -> Any:
+        try:
+            return function(*given, **named)
+        except TypeError:
+            try:
+                signature.bind(*given, **named)
+            except TypeError as error:
+                misfit = _misfit(verb, signature, given, named, str(error))
+            else:
+                raise  # the function's own
+        raise TypeError(misfit)
+
+    return cast(F, called)
+
+
+def _misfit(verb: str, signature: inspect.Signature, given: tuple[Any, ...], named: dict[str, Any], error: str) -> str:
+    items = {key: item for key, item in signature.parameters.items() if key != "self"}
+    given = given[len(signature.parameters) - len(items) :]
+    first = [key for key, item in items.items() if item.kind in (item.POSITIONAL_ONLY, item.POSITIONAL_OR_KEYWORD)]
+    options = [key for key, item in items.items() if item.kind is item.KEYWORD_ONLY]
+    usage = f"{verb}({', '.join([*first, *(f'{key}=' for key in options or ['name'])])})"
+    if len(given) > len(first):
+        count = f"{len(first) or 'no'} argument{'s' * (len(first) != 1)}"
+        over = shortened(given[len(first)])
+        return f"{verb} takes {count} by position, not {len(given)}: give {over} by its name; {usage}"
+    missing = [key for key in first[len(given) :] if key not in named and items[key].default is inspect.Parameter.empty]
+    missing += [key for key in options if key not in named and items[key].default is inspect.Parameter.empty]
+    if missing:
+        return f"{verb} needs {' and '.join(missing)}: {usage}"
+    for key in named:
+        if key not in items:
+            return unknown(key, "an option", verb, [*first, *options])
+    return f"{verb}: {error}; {usage}"

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from numbers import Real
 from typing import Any
 
-from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.errors import SystemDefinitionError, shortened
 
 __all__ = ["Parameter", "finite_number", "latex_name"]
 
@@ -41,8 +41,11 @@ def latex_name(name: str) -> str:
 def finite_number(value: Any, what: str) -> float:
     """Return ``value`` as a float, or raise: TypeError for what is no real number, ValueError for NaN and inf."""
     if isinstance(value, bool) or not (isinstance(value, Real) or (hasattr(value, "__float__") and _scalar(value))):
-        raise TypeError(f"{what} must be a real number, not {value!r}")
-    number = float(value)
+        raise TypeError(f"{what} must be a real number, not {shortened(value)}")
+    try:
+        number = float(value)
+    except OverflowError:  # a whole number of hundreds of digits
+        number = math.inf
     if not math.isfinite(number):
         raise ValueError(f"{what} must be finite, not {number}")
     return number
@@ -81,7 +84,13 @@ class Parameter:
             parts = (given,)
         if not 1 <= len(parts) <= 3 or not all(isinstance(part, str) for part in parts[1:]):
             raise SystemDefinitionError(
-                f"parameter {name!r} is {given!r}; give a number, (number, unit) or (number, unit, LaTeX symbol)"
+                f"parameter {name!r} is {shortened(given)}; give a number, (number, unit) or (number, unit, LaTeX "
+                "symbol)"
+            )
+        if isinstance(parts[0], str):
+            raise TypeError(
+                f"parameter {name!r} must be a real number, not {shortened(parts[0])}; its unit stands beside it: "
+                f'{{"{name}": (8.47, "N/m")}}'
             )
         value = finite_number(parts[0], f"parameter {name!r}")
         unit = parts[1] if len(parts) > 1 else ""

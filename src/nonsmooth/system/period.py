@@ -109,7 +109,8 @@ def check_period(
         order = [t, *free, *others]
         function = sp.lambdify(order, expression, modules="numpy")
         for instant in random.uniform(0, 3 * period, 7):
-            values = [*random.uniform(0.1, 0.9, len(free)), *others.values()]
+            # NumPy's numbers: a power that is too large for Python's floats is an exception
+            values = np.array([*random.uniform(0.1, 0.9, len(free)), *others.values()])
             with np.errstate(all="ignore"):
                 now, later = (complex(function(time, *values)) for time in (instant, instant + period))
             if np.isfinite(now) and abs(later - now) > 1e-7 * (1 + abs(now)):

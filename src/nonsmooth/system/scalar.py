@@ -8,15 +8,16 @@ from the tracing: ``if``, ``max()``, ``np.where``, ``math.cos``.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import sympy as sp
 
-from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.errors import SystemDefinitionError, shortened
 
-__all__ = ["Condition", "Scalar", "to_expression", "where"]
+__all__ = ["Condition", "Scalar", "as_written", "to_expression", "where"]
 
 _DECISION = (
     "`{}` cannot be decided while the function is traced: a Python `if`, `max()`, `min()`, `np.where` on a state or "
@@ -49,10 +50,19 @@ def to_expression(value: Any) -> sp.Expr:
             return sp.Rational(int(number * 2), 2)
         return sp.Float(number)
     if isinstance(value, Condition):
-        raise SystemDefinitionError(f"`{value}` is a condition, not a number: wrap it in ns.where(condition, a, b)")
+        raise SystemDefinitionError(
+            f"`{value}` is a condition, not a number. For an indicator write the difference of both sides, whose sign "
+            "is the condition; elsewhere ns.where(condition, a, b)"
+        )
     if isinstance(value, (complex, np.complexfloating)):
         raise SystemDefinitionError(f"the function contains the complex number {value}; only real numbers are known")
-    raise TypeError(f"expected a number, got {value!r} ({type(value).__name__})")
+    raise TypeError(f"expected a number, got {shortened(value)} ({type(value).__name__})")
+
+
+def as_written(expression: Any) -> str:
+    """Return an expression as its author writes it: ``u.x``, ``p.k`` and ``t`` for the symbols of a system."""
+    text = re.sub(r"\b([upm])_(?=\w)", lambda match: "u." if match[1] == "u" else "p.", str(expression))
+    return re.sub(r"\bt_\b", "t", text)
 
 
 def _binary(make: Callable[[Any, Any], Any]) -> tuple[Callable[..., Any], Callable[..., Any]]:
@@ -96,13 +106,19 @@ class Scalar:
         self.expression = expression
 
     def __repr__(self) -> str:
-        return str(self.expression)
+        return as_written(self.expression)
 
     __add__, __radd__ = _binary(lambda a, b: a + b)
     __sub__, __rsub__ = _binary(lambda a, b: a - b)
     __mul__, __rmul__ = _binary(lambda a, b: a * b)
     __truediv__, __rtruediv__ = _binary(lambda a, b: a / b)
     __pow__, __rpow__ = _binary(lambda a, b: a**b)
+    def __xor__(self, other: Any) -> Any:
+        raise SystemDefinitionError(
+            "`^` is not a power in Python (it is the exclusive or of bits): write x**3 for x to the third"
+        )
+
+    __rxor__ = __xor__
     __lt__ = _compare(sp.StrictLessThan)
     __le__ = _compare(sp.LessThan)
     __gt__ = _compare(sp.StrictGreaterThan)
@@ -166,7 +182,7 @@ class Condition:
         self.relation = relation
 
     def __repr__(self) -> str:
-        return str(self.relation)
+        return as_written(self.relation)
 
     def __bool__(self) -> bool:
         if self.relation in (sp.true, sp.false):
@@ -190,7 +206,7 @@ def _relation(value: Any) -> Any:
         return value.relation
     if isinstance(value, (bool, np.bool_)):
         return sp.true if value else sp.false
-    raise TypeError(f"ns.where needs a condition such as p.a > 0, not {value!r}")
+    raise TypeError(f"ns.where needs a condition such as p.a > 0, not {shortened(value)}")
 
 
 def where(condition: Any, a: Any, b: Any) -> Any:

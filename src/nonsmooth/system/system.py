@@ -13,6 +13,7 @@ from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.system.description import Description, describe
 from nonsmooth.system.equations import TracedSurface
 from nonsmooth.system.mode import Band, Mode
+from nonsmooth.system.names import by_name, nearest
 from nonsmooth.system.parameter import Parameter
 from nonsmooth.system.transition import Surface, Transition
 from nonsmooth.system.values import changed_values, parameter_rows, smoothed_values
@@ -70,6 +71,7 @@ class System:
     _values: dict[str, float]
     _variant: Variant
 
+    @by_name
     def __init__(
         self,
         *,
@@ -111,6 +113,15 @@ class System:
 
     def __setattr__(self, name: str, value: Any) -> None:
         raise AttributeError(f"a System does not change: use with_parameters(...) (tried to set {name!r})")
+
+    def __getattr__(self, name: str) -> Any:
+        text = f"a System has no {name!r}"
+        if not name.startswith("_"):
+            if name in self._values:
+                text += f": the value of a parameter is system.values[{name!r}], set by with_parameters({name}=...)"
+            elif near := nearest(name, [word for word in dir(type(self)) if not word.startswith("_")]):
+                text += f"; nearest: {', '.join(near)}"
+        raise AttributeError(text)
 
     def __delattr__(self, name: str) -> None:
         raise AttributeError("a System does not change")
@@ -257,6 +268,7 @@ class System:
 
     # Copies
 
+    @by_name
     def with_parameters(self, given: Any = None, /, **values: float) -> System:
         """Return the same system at other values of its parameters.
 

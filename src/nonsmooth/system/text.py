@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import sympy as sp
 
-from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.errors import SystemDefinitionError, shortened
 from nonsmooth.system.condition import condition_text
 from nonsmooth.system.description import Description
 from nonsmooth.system.expressions import read_expression, write_expression
@@ -29,6 +29,7 @@ __all__ = ["read_system", "write_system"]
 
 _FORMAT = "nonsmooth system"
 _VERSION = 1
+_SAID = 1000  # characters of what is wrong with a text
 
 
 _GAP = "\0value\0"  # stands where a number is to be written; no name or unit holds it
@@ -149,17 +150,19 @@ def read_system(text: str) -> System:
         raise SystemDefinitionError(f'this is not the text of a system: "format": "{_FORMAT}" is missing')
     if content.get("version") != _VERSION:
         raise SystemDefinitionError(
-            f"the text of the system has version {content.get('version')!r}; this version of nonsmooth reads {_VERSION}"
+            f"the text of the system has version {shortened(content.get('version'))}; this version of nonsmooth reads "
+            f"{_VERSION}"
         )
     try:
         system = System(**_Reader(content).arguments())
         smoothing = content.get("smoothing")
         return system if smoothing is None else system.smoothed(smoothing["eta"])
-    except SystemDefinitionError:
-        raise
-    except (KeyError, TypeError, AttributeError, ValueError) as error:
-        what = f"{error} is missing" if isinstance(error, KeyError) else str(error)
-        raise SystemDefinitionError(f"the text of the system {content.get('name')!r} is damaged: {what}") from error
+    except SystemDefinitionError as error:  # names and units in it may be of any length
+        raise SystemDefinitionError(shortened(error, quoted=False, most=_SAID)) from error
+    except (KeyError, TypeError, AttributeError, ValueError, ArithmeticError) as error:
+        what = f"{error} is missing" if isinstance(error, KeyError) else shortened(error, quoted=False, most=_SAID)
+        name = shortened(content.get("name"))
+        raise SystemDefinitionError(f"the text of the system {name} is damaged: {what}") from error
 
 
 def _no_constant(name: str) -> float:

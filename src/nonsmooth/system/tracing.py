@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import inspect
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NoReturn
 
 import numpy as np
 import sympy as sp
 
-from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.errors import SystemDefinitionError, shortened
 from nonsmooth.system.names import unknown
-from nonsmooth.system.scalar import Scalar, to_expression
+from nonsmooth.system.scalar import Scalar, as_written, to_expression
 
 __all__ = ["Parameters", "States", "Symbols", "call_scalar", "call_vector", "refuse_corners"]
 
 # What no method can see inside a mode: the derivative jumps and nothing says where.
 _CORNERS = (sp.Abs, sp.sign, sp.Max, sp.Min, sp.Piecewise, sp.floor, sp.ceiling, sp.Heaviside)
+
+_LARGEST = sp.Integer(int(sys.float_info.max))
 
 
 class Symbols:
@@ -159,15 +163,44 @@ def _call(function: Callable[..., Any], arguments: Sequence[Any], what: str) -> 
     if not callable(function):
         raise SystemDefinitionError(f"{what} must be a function, not {function!r}")
     name = getattr(function, "__name__", "")
+    called = f" (function `{name}`)" if name and name != "<lambda>" else ""
+    how = _order(function, arguments)
+    if how.startswith("its arguments"):
+        raise SystemDefinitionError(f"{what}{called}: {how}")
     try:
         return function(*arguments)
     except SystemDefinitionError as error:
         raise SystemDefinitionError(f"{what}: {error}") from error
     except Exception as error:
-        called = f" (function `{name}`)" if name and name != "<lambda>" else ""
+        said = str(error).replace("'Scalar' object", "a symbolic number")
         raise SystemDefinitionError(
-            f"{what}{called} failed when it was called with symbols: {type(error).__name__}: {error}"
+            f"{what}{called} failed when it was called with symbols: {type(error).__name__}: {said}{how}"
         ) from error
+
+
+#: What a function is called with, by the type of the argument.
+_ROLES = {"Scalar": ("t", "time"), "States": ("u", "states"), "Parameters": ("p", "parameters")}
+
+
+def _order(function: Callable[..., Any], arguments: Sequence[Any]) -> str:
+    """How a function is called, where its own arguments do not look like it: a sentence, or what to add to one."""
+    try:
+        signature = inspect.signature(function)
+    except (TypeError, ValueError):  # a function of C
+        return ""
+    roles = [_ROLES.get(type(argument).__name__, ("x", "number")) for argument in arguments]
+    expected = [letter for letter, _ in roles]
+    own = list(signature.parameters)
+    if own == expected:
+        return ""
+    form = f"f({', '.join(expected)}): {', '.join(word for _, word in roles)}"
+    try:
+        signature.bind(*arguments)
+    except TypeError:
+        return f"its arguments are ({', '.join(own)}), but it is called as {form}; write them so"
+    if sorted(own) == sorted(expected):
+        return f"its arguments are ({', '.join(own)}), in another order than it is called: {form}; write them so"
+    return f" (it is called as {form}, and its arguments are ({', '.join(own)}))"
 
 
 def _entry(value: Any, what: str) -> sp.Expr:
@@ -176,9 +209,12 @@ def _entry(value: Any, what: str) -> sp.Expr:
     except (TypeError, SystemDefinitionError) as error:
         raise SystemDefinitionError(f"{what} did not give a real number: {error}") from error
     if expression.has(sp.nan, sp.zoo, sp.oo, -sp.oo):
-        raise SystemDefinitionError(f"{what} divides by zero or is not finite: {expression}")
+        text = shortened(as_written(expression), quoted=False)
+        raise SystemDefinitionError(f"{what} divides by zero or is not finite: {text}")
     if expression.has(sp.I):
-        raise SystemDefinitionError(f"{what} is not real: {expression}")
+        raise SystemDefinitionError(f"{what} is not real: {shortened(as_written(expression), quoted=False)}")
+    if any(abs(number) > _LARGEST for number in expression.atoms(sp.Number)):
+        raise SystemDefinitionError(f"{what} holds a number beyond {float(_LARGEST):.3g}, more than a float can hold")
     return expression
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from nonsmooth.errors import shortened
 from nonsmooth.system.description import Description
 from nonsmooth.system.names import unknown
 from nonsmooth.system.parameter import finite_number
@@ -23,7 +24,9 @@ def changed_values(
     if given is not None:
         mapping = given if isinstance(given, Mapping) else getattr(given, "values", None)
         if not isinstance(mapping, Mapping):
-            raise TypeError(f"with_parameters takes a mapping or an object with a mapping `values`, not {given!r}")
+            raise TypeError(
+                f"with_parameters takes a mapping or an object with a mapping `values`, not {shortened(given)}"
+            )
         changes = {**mapping, **changes}
     new = dict(values)
     for key, value in changes.items():

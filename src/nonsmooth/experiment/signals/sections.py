@@ -110,7 +110,7 @@ def poincare(
     up = (values[:-1] < 0) & (values[1:] >= 0)
     down = (values[:-1] > 0) & (values[1:] <= 0)
     wanted = up | down if rising is None else up if rising else down
-    instants = np.array([between.passing(int(i), which, level) for i in np.flatnonzero(wanted)])
+    instants = between.passing(np.flatnonzero(wanted), which, level)
     rate = np.abs(between.at(instants, derivative=1)[:, which])
     own = between.error_at(instants)[:, which]
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -192,19 +192,26 @@ class _Between:
         p[:, 2] = b
         return p
 
-    def passing(self, i: int, which: int, level: float) -> float:
-        """The time in step i at which x or v passes a level."""
-        from scipy.optimize import brentq
+    def passing(self, i: NDArray[np.intp], which: int, level: float) -> Floats:
+        """The times in steps i at which x or v passes a level, by halving until no number lies between."""
 
-        def away(t: float) -> float:
-            return float(self.at(np.array([t]))[0, which] - level)
+        def away(times: Floats) -> Floats:
+            return np.asarray(self.at(times)[:, which] - level)
 
-        low, high = float(self.t[i]), float(np.nextafter(self.t[i + 1], self.t[i]))
-        if away(low) == 0 or away(low) * away(high) > 0:
-            # Only an impact in this step, or rounding at its end, leaves no root inside.
-            inside = self.hits[(self.hits > low) & (self.hits < high)]
-            return float(inside[0]) if len(inside) else (low if abs(away(low)) <= abs(away(high)) else high)
-        return float(brentq(away, low, high, xtol=1e-14 * max(1.0, abs(high))))
+        low, high = self.t[i], np.nextafter(self.t[i + 1], self.t[i])
+        at_low, at_high = away(low), away(high)
+        # Only an impact in this step, or rounding at its end, leaves no root inside.
+        rootless = (at_low == 0) | (at_low * at_high > 0)
+        after = np.searchsorted(self.hits, low, side="right")
+        hit = np.append(self.hits, np.inf)[after]
+        end = np.where(hit < high, hit, np.where(np.abs(at_low) <= np.abs(at_high), low, high))
+        while True:
+            middle = low + 0.5 * (high - low)
+            inside = (middle > low) & (middle < high)
+            if not inside.any():
+                return np.where(rootless, end, high)
+            behind = inside & (np.sign(away(middle)) == np.sign(at_low))
+            low, high = np.where(behind, middle, low), np.where(inside & ~behind, middle, high)
 
     def error_at(self, times: Floats) -> Floats:
         """Errors of x and v between samples: the larger one of the two ends."""

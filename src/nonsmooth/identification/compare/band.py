@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from nonsmooth.identification.compare.clouds import energy_distance
 from nonsmooth.identification.compare.orbits import common_length, orbit_distance
-from nonsmooth.identification.compare.predict import Attractor, attractors, cloud, orbit
+from nonsmooth.identification.compare.predict import Attractor, Motions
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
@@ -56,23 +56,22 @@ def motion_band(
     theirs.
     """
     rng = np.random.default_rng(seed)
-    draws, plain = len(systems), dict(options)
+    draws = len(systems)
     numbers = np.zeros(draws, dtype=np.int64)
     distances = np.full((draws, len(phases)), np.nan)
     to_measured = np.full(draws, np.nan)
     orbits: list[FloatArray] = []
-    for i, system in enumerate(systems):
-        (one,) = attractors(
-            system, nearest.point[None, :], transient=transient, keep=64, max_period=max_period, options=plain
-        )
+    motions = Motions(systems, transient=transient, keep=64, max_period=max_period, options=options)
+    for i in range(draws):
+        (one,) = motions.attractors(i, nearest.point)
         numbers[i] = one.period_number
         for j, phase in enumerate(phases):
-            points = cloud(system, one, phase, POINTS, plain)
+            points = motions.cloud(i, one, phase, POINTS)
             points = points + noise * rng.standard_normal(points.shape)
             distances[i, j] = energy_distance(sections[j][-POINTS:] / scale, points / scale)
         length = 0 if closed is None else len(closed[0]) // grid
         if closed is not None and one.period_number and length % one.period_number == 0:
-            motion = common_length(orbit(system, one, grid, one.period_number, plain), one.period_number, length)
+            motion = common_length(motions.orbit(i, one, grid, one.period_number), one.period_number, length)
             motion = np.roll(motion, orbit_distance(closed[1], motion, length).whole_shift * grid, axis=0)
             orbits.append(motion)
             to_measured[i] = orbit_distance(closed[0], motion, length).distance

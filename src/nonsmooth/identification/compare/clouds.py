@@ -154,23 +154,24 @@ def cloud_distance(
     others = [_parts(len(y), length, size, rng) for _ in range(splits)]
     left, right = (np.array([pair[i] for pair in pairs], dtype=float).T for i in (0, 1))
     first, second = (np.array([pair[i] for pair in others], dtype=float).T for i in (0, 1))
-    halves = _weighted(xx, left, right, xx, xx)
-    other_halves = _weighted(yy, first, second, yy, yy)
-    matched = float(np.median(_weighted(xy, left, first, xx, yy)))
+    to_left, to_right, to_first, to_second = xx @ left, xx @ right, yy @ first, yy @ second
+    within, beyond = _mean(left, to_left, left), _mean(first, to_first, first)
+    halves = _energy(_mean(left, to_right, right), within, _mean(right, to_right, right))
+    other_halves = _energy(_mean(first, to_second, second), beyond, _mean(second, to_second, second))
+    matched = _energy(_mean(left, xy @ first, first), within, beyond)
     return CloudDistance(
-        _root(2 * xy.mean() - xx.mean() - yy.mean()), matched, halves, other_halves, length, size
+        _root(2 * xy.mean() - xx.mean() - yy.mean()), float(np.median(matched)), halves, other_halves, length, size
     )
 
 
-def _weighted(
-    across: FloatArray, left: FloatArray, right: FloatArray, own: FloatArray, other: FloatArray
-) -> FloatArray:
-    """E for many pairs of parts at once; the columns of ``left`` and ``right`` say which points are in."""
-    n, m = left.sum(axis=0), right.sum(axis=0)
-    between = np.einsum("ij,ij->j", left, across @ right) / (n * m)
-    within = np.einsum("ij,ij->j", left, own @ left) / n**2
-    beyond = np.einsum("ij,ij->j", right, other @ right) / m**2
-    return np.sqrt(np.maximum(2 * between - within - beyond, 0.0))
+def _mean(part: FloatArray, product: FloatArray, other: FloatArray) -> FloatArray:
+    """Mean distance between two parts, for many pairs at once: columns say which points are in, ``product`` is the
+    matrix of distances times ``other``."""
+    return np.asarray(np.einsum("ij,ij->j", part, product) / (part.sum(axis=0) * other.sum(axis=0)))
+
+
+def _energy(between: FloatArray, within: FloatArray, beyond: FloatArray) -> FloatArray:
+    return np.asarray(np.sqrt(np.maximum(2 * between - within - beyond, 0.0)))
 
 
 def _halves(n: int, block: int, rng: np.random.Generator) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.flow.arguments import real_number, whole_number
+from nonsmooth.identification.blas import one_blas_thread
 from nonsmooth.identification.compare.draws import nominal, read_settings
 from nonsmooth.system.names import unknown
 
@@ -24,6 +25,7 @@ DRAWS = 60
 NEGLIGIBLE = 1e-4  # relative uncertainties of settings below this ask for no band
 
 
+@one_blas_thread()
 def compare(
     measured: xr.Dataset,
     theory: System | xr.Dataset,

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.analysis.sweep import sweep
-from nonsmooth.flow.sections import Stroboscopic
-from nonsmooth.identification.compare.draws import Setting, Settings, draw_systems, drawn_variables, nominal
+from nonsmooth.identification.compare.draws import Settings, draw_systems, drawn_variables, nominal
 from nonsmooth.identification.compare.flips import Flip, delayed_flips
 from nonsmooth.identification.compare.periods import flips, measured_period, period_numbers
+from nonsmooth.identification.compare.predict import Motions
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -50,19 +50,13 @@ def compare_diagram(
     grid = np.linspace(at.min(), at.max(), FINE) if values is None else np.asarray(values, dtype=float)
     is_system = not hasattr(theory, "data_vars")
 
+    words = ["up", "down"] if direction == "both" else [direction]
+
     def diagram(system: System) -> tuple[FloatArray, NDArray[np.int64]]:
-        common: dict[str, Any] = {"section": Stroboscopic(phase), "transient": transient, "keep": KEEP,
-                                  "max_period": max_period, "progress": False, **options}  # fmt: skip
-        if rules := _following(settings, system, name, grid):
-            return _marched(system, name, grid, rules, direction, common)
-        found = sweep(system, name, grid, direction=direction, **common)
-        sections = found["section"].transpose(..., name, "iterate", "state").values
-        periods = found["period_number"].transpose(..., name).values
-        return sections.reshape(-1, *sections.shape[-3:]), periods.reshape(-1, periods.shape[-1])
+        return _marched(system, name, grid, settings, words, transient, max_period, options, phase)
 
     if is_system:
         sections, periods = diagram(nominal(theory, parameters, settings))
-        words = ["up", "down"] if direction == "both" else [direction]
     else:
         grid = np.asarray(theory[name].values, dtype=float)
         words = np.atleast_1d(theory["direction"].values).astype(str).tolist()
@@ -102,33 +96,22 @@ def compare_diagram(
     return variables | _flips(seen, flips(grid, periods[0]), drawn_flips, unit, level)
 
 
-def _following(settings: Settings, system: System, name: str, grid: FloatArray) -> dict[str, Setting]:
-    """The settings that change along the diagram, because they follow from its parameter."""
-    ends = [{**system.values, name: float(value)} for value in (grid.min(), grid.max())]
-    rules = {key: setting for key, setting in settings.items() if setting.follows}
-    return {key: rule for key, rule in rules.items() if rule.at(ends[0]) != rule.at(ends[1])}
-
-
 def _marched(
-    system: System, name: str, grid: FloatArray, rules: dict[str, Setting], direction: str, common: dict[str, Any]
-) -> tuple[FloatArray, NDArray[np.int64]]:
-    """The diagram point by point, the state carried along, where other parameters change with this one."""
-    words = ["up", "down"] if direction == "both" else [direction]
-    sections = np.full((len(words), len(grid), KEEP, len(system.states)), np.nan)
-    periods = np.zeros((len(words), len(grid)), dtype=np.int64)
+    system: System, name: str, grid: FloatArray, settings: Settings, words: Sequence[str], transient: int,
+    max_period: int, options: dict[str, Any], phase: float = 0.0,
+) -> tuple[FloatArray, NDArray[np.int64]]:  # fmt: skip
+    """The diagram, the state carried along; settings that follow from the parameter change with it."""
+    rules = {key: setting for key, setting in settings.items() if setting.follows and key != name}
     # A drawn system is off its rule by an error that stays the same along the diagram.
     beside = {key: system.values[key] - rule.at(system.values) for key, rule in rules.items()}
-    for d, word in enumerate(words):
-        state = None
-        for i in np.argsort(grid, kind="stable")[:: 1 if word == "up" else -1]:
-            here = system.with_parameters({name: float(grid[i])})
-            here = here.with_parameters({key: rule.at(here.values) + beside[key] for key, rule in rules.items()})
-            found = sweep(here, name, [float(grid[i])], direction=None, start=state, **common)
-            sections[d, i] = found["section"].isel({name: 0}).values
-            periods[d, i] = int(found["period_number"].values.ravel()[0])
-            last = sections[d, i, -1]
-            state = last.tolist() if np.isfinite(last).all() else None
-    return sections, periods
+    systems = []
+    for value in grid:
+        here = {**system.values, name: float(value)}
+        systems.append(system.with_parameters(here | {k: rule.at(here) + beside[k] for k, rule in rules.items()}))
+    motions = Motions(systems, transient=transient, keep=KEEP, max_period=max_period, options=options, phase=phase)
+    rising = np.argsort(grid, kind="stable").tolist()
+    found = [motions.carried(rising if word == "up" else rising[::-1]) for word in words]
+    return np.stack([sections for sections, _ in found]), np.stack([periods for _, periods in found])
 
 
 def _measured(

@@ -14,7 +14,7 @@ from nonsmooth.identification.compare.draws import Settings, draw_systems, drawn
 from nonsmooth.identification.compare.fold import fold, mean_orbit
 from nonsmooth.identification.compare.orbits import common_length, orbit_distance
 from nonsmooth.identification.compare.periods import measured_period
-from nonsmooth.identification.compare.predict import Attractor, orbit
+from nonsmooth.identification.compare.predict import Attractor, Motions
 from nonsmooth.identification.compare.theory import Prediction, from_result, predict
 
 if TYPE_CHECKING:
@@ -24,6 +24,7 @@ __all__ = ["compare_motion"]
 
 FloatArray = NDArray[np.float64]
 
+KEEP = 128  # section points by which a predicted motion is judged
 CLOUD = 2000  # section points of a predicted motion without a period number
 SHOWN = 16  # forcing periods of the record that are kept for overlays
 MEASURED_STARTS = 4
@@ -55,17 +56,17 @@ def compare_motion(
     rng = np.random.default_rng(seed)
     is_system = not hasattr(theory, "data_vars")
     system = nominal(theory, parameters, settings) if is_system else None
+    motions = None
     if system is not None:
         starts = _starts(sections[0] if phases[0] == 0 else None, folded, len(states), start)
-        common: dict[str, Any] = {"n": max(CLOUD, len(sections[0])), "grid": grid, "transient": transient,
-                                  "max_period": max_period, "options": options}  # fmt: skip
-        predicted = predict(system, sections, phases, scale, starts=starts, **common)
+        motions = Motions([system], transient=transient, keep=KEEP, max_period=max_period, options=options)
+        predicted = predict(motions, sections, phases, scale, starts=starts, n=max(CLOUD, len(sections[0])), grid=grid)
     else:
         predicted = from_result(theory, states, phases, grid, max_period)
     blurred = [points + noise * rng.standard_normal(points.shape) for points in predicted.sections]
     variables = _clouds(sections, blurred, predicted.sections, scale, splits, seed)
     variables |= _periods(number, predicted)
-    predicted = _begun_with_the_measurement(system, folded, number, predicted, grid, options)
+    predicted = _begun_with_the_measurement(motions, folded, number, predicted, grid)
     variables |= _orbits(folded, number, predicted, grid)
     if system is not None and draws:
         assert predicted.attractor is not None  # a System's prediction has one
@@ -170,16 +171,16 @@ def _periods(number: int, predicted: Prediction) -> dict[str, Any]:
 
 
 def _begun_with_the_measurement(
-    system: Any, folded: FloatArray | None, number: int, predicted: Prediction, grid: int, options: dict[str, Any]
+    motions: Motions | None, folded: FloatArray | None, number: int, predicted: Prediction, grid: int
 ) -> Prediction:
     """Where neither motion has a period, the predicted one shown begins at the first measured state that is shown."""
-    if system is None or folded is None or number or predicted.period_number:
+    if motions is None or folded is None or number or predicted.period_number:
         return predicted
     whole = folded[np.isfinite(folded).all(axis=(1, 2))][-SHOWN:]
     if not len(whole):
         return predicted
     begun = Attractor(0, whole[0, 0], 0)
-    return replace(predicted, orbit=orbit(system, begun, grid, len(whole), options))
+    return replace(predicted, orbit=motions.orbit(0, begun, grid, len(whole)))
 
 
 def _orbits(folded: FloatArray | None, number: int, predicted: Prediction, grid: int) -> dict[str, Any]:

@@ -80,16 +80,17 @@ def orbit_distance(a: ArrayLike, b: ArrayLike, periods: int) -> OrbitDistance:
         likeness = float((cross * np.exp(-2j * np.pi * order * lead)).real.sum())
         return float(np.sqrt(max(power - 2 * likeness, 0.0) / states))
 
-    whole = [distance(k / periods) for k in range(periods)]
+    # At the n leads i / n the likeness is one Fourier sum.
+    grid = np.sqrt(np.maximum(power - 2 * np.fft.fft(cross, n).real, 0.0) / states)
+    whole = grid[:: n // periods]
     best = int(np.argmin(whole))
-    grid = np.array([distance(i / n) for i in range(n)])
     near = int(np.argmin(grid)) / n
     found = minimize_scalar(distance, bounds=(near - 1 / n, near + 1 / n), method="bounded", options={"xatol": 1e-10})
     if not found.success:
         raise SolveError(f"the shift between two orbits was not found: {found.message}")
     lead = float(found.x) if found.fun <= grid.min() else near
     shift = (lead * periods + 0.5) % 1.0 - 0.5
-    return OrbitDistance(whole[best], min(float(found.fun), float(grid.min())), best, shift)
+    return OrbitDistance(float(whole[best]), min(float(found.fun), float(grid.min())), best, shift)
 
 
 def common_length(orbit: ArrayLike, periods: int, length: int) -> FloatArray:

@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.analysis.sweep import sweep
-from nonsmooth.flow.poincare import poincare
-from nonsmooth.flow.sections import Stroboscopic
-from nonsmooth.flow.simulate import simulate
+from nonsmooth.analysis.classify import longest_period
+from nonsmooth.analysis.settle import Attractors, tolerance_of
+from nonsmooth.analysis.settled import usable
+from nonsmooth.flow.engine import Chain, SectionPlan, State
+from nonsmooth.flow.failure import solve_error
+from nonsmooth.flow.methods import engine_for
+from nonsmooth.flow.sections import Stroboscopic, section_plan
+from nonsmooth.flow.simulate import check_complete
 from nonsmooth.identification.compare.fold import fold
+from nonsmooth.kernels import codes
+from nonsmooth.results.statuses import by_code
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["Attractor", "attractors", "cloud", "forcing_period", "orbit"]
+__all__ = ["Attractor", "Motions"]
 
 FloatArray = NDArray[np.float64]
 
@@ -33,71 +41,121 @@ class Attractor:
     start: int
 
 
-def forcing_period(system: System) -> float:
-    """The forcing period; ValueError where there is none."""
-    period = system.period()
-    if period is None:
-        raise ValueError(f"{system.name!r} has no forcing period; compare takes forced systems")
-    return float(period)
+class Motions:
+    """Steady motions of systems that differ in their parameters only: one engine, tables for all, no labels.
 
-
-def attractors(
-    system: System, starts: Any, *, transient: int, keep: int, max_period: int, options: dict[str, Any]
-) -> list[Attractor]:
-    """The different motions that the starts settle on, in the order of the starts.
-
-    All motions without a period number count as one. A start that diverges leads to none.
+    Parameters
+    ----------
+    systems : sequence of System
+    transient, keep, max_period : int
+        See :func:`nonsmooth.sweep`.
+    options : mapping
+        ``method``, ``rtol``, ``atol``.
+    phase : float
+        Of the stroboscopic section, in forcing periods.
 
     Raises
     ------
     ValueError
-        No start leads to a motion.
+        Systems that are not forced.
     """
-    forcing_period(system)
-    name = next(iter(system.parameters))
-    kept = max(keep, max_period + 1)
-    result = sweep(
-        system, name, [system.values[name]], direction=None, start=[list(start) for start in np.atleast_2d(starts)],
-        transient=transient, keep=kept, max_period=max_period, progress=False, **options,
-    )  # fmt: skip
-    sections = result["section"].isel({name: 0}).values
-    numbers = result["period_number"].isel({name: 0}).values
-    found: list[Attractor] = []
-    orbits: list[FloatArray] = []
-    for k, (points, number) in enumerate(zip(sections, numbers, strict=True)):
-        if not np.isfinite(points).all():
-            continue
-        size = np.maximum(np.ptp(points, axis=0), 1e-3 * system.scale_vector())
-        cycle = points[-max(int(number), 1) :]
-        if any(
-            one.period_number == number and (number == 0 or _apart(cycle[-1], other, size) < SAME)
-            for one, other in zip(found, orbits, strict=True)
-        ):
-            continue
-        found.append(Attractor(int(number), points[-1].copy(), k))
-        orbits.append(cycle)
-    if not found:
-        statuses = sorted({int(code) for code in np.ravel(result["status"].values)})
-        from nonsmooth.results.statuses import by_code
 
-        words = "; ".join(by_code(code).sentence for code in statuses)
-        raise ValueError(f"no start of {system.name!r} leads to a motion that can be compared: {words}")
-    return found
+    def __init__(
+        self, systems: Sequence[System], *, transient: int, keep: int, max_period: int, options: Mapping[str, Any],
+        phase: float = 0.0,
+    ) -> None:  # fmt: skip
+        self.system = systems[0]
+        if self.system.period() is None:
+            raise ValueError(f"{self.system.name!r} has no forcing period; compare takes forced systems")
+        self.periods = [float(one.period() or np.nan) for one in systems]
+        self.engine = engine_for(self.system, **options)
+        self.points = np.array([one.parameter_vector() for one in systems])
+        keep = max(keep, max_period + 1)
+        self.rules = Attractors(
+            self.engine, self.engine.prepare(self.points), self._plan(phase), transient, keep,
+            longest_period(keep, max_period), tolerance_of(self.engine, options.get("rtol")),
+            self.system.scale_vector(),
+        )  # fmt: skip
+        self.out = self._buffers(len(systems), keep)
 
+    def _plan(self, phase: float) -> SectionPlan:
+        return section_plan(self.system, Stroboscopic(phase))[1]
 
-def orbit(system: System, attractor: Attractor, grid: int, periods: int, options: dict[str, Any]) -> FloatArray:
-    """The motion from phase 0 over whole forcing periods: (periods * grid, states)."""
-    run = simulate(system, periods=periods, samples=periods * grid + 1, start=attractor.point, **options)
-    phase = run["time"].values / forcing_period(system)
-    return fold(phase, run["u"].values, grid)[:periods].reshape(periods * grid, -1)
+    def _buffers(self, points: int, keep: int) -> Chain:
+        traced = self.system.traced
+        return Chain.empty(points, keep, len(traced.u), len(traced.indicators), len(traced.outputs))
 
+    def _state(self, start: Any = None) -> State:
+        u = np.zeros(len(self.system.states)) if start is None else np.array(start, dtype=np.float64)
+        return State(u, self.system.memory_vector())
 
-def cloud(system: System, attractor: Attractor, phase: float, n: int, options: dict[str, Any]) -> FloatArray:
-    """Successive points of the section at ``phase``: (n, states); those of a periodic motion come round again."""
-    count = attractor.period_number or n
-    section = Stroboscopic(phase)
-    points = poincare(system, section=section, n=count, start=attractor.point, **options)["section"].values
-    return np.resize(points, (n, points.shape[1])) if count < n else points
+    def _alone(self, i: int) -> Any:
+        return self.engine.prepare(self.points[i : i + 1])
+
+    def carried(self, order: Iterable[int]) -> tuple[FloatArray, NDArray[np.int64]]:
+        """Section points and period numbers of all systems, the state carried from one to the next, from rest."""
+        periods = np.zeros(len(self.periods), dtype=np.int64)
+        sections = np.full_like(self.out.section, np.nan)
+        state = self._state()
+        for i in order:
+            verdict = self.rules.settle(i, state, self.out, self._state)
+            periods[i] = verdict.period_number
+            if usable(verdict.status):
+                sections[i] = self.out.section[i]
+        return sections, periods
+
+    def attractors(self, i: int, starts: Any) -> list[Attractor]:
+        """The different motions of system i that the starts settle on, in the order of the starts.
+
+        All motions without a period number count as one. A start that diverges leads to none.
+
+        Raises
+        ------
+        ValueError
+            No start leads to a motion.
+        """
+        found: list[Attractor] = []
+        orbits: list[FloatArray] = []
+        statuses = set()
+        for k, start in enumerate(np.atleast_2d(starts)):
+            verdict = self.rules.settle(i, self._state(start), self.out, partial(self._state, start))
+            statuses.add(int(verdict.status))
+            points, number = self.out.section[i].copy(), verdict.period_number
+            if not usable(verdict.status) or not np.isfinite(points).all():
+                continue
+            size = np.maximum(np.ptp(points, axis=0), 1e-3 * self.system.scale_vector())
+            cycle = points[-max(int(number), 1) :]
+            if any(
+                one.period_number == number and (number == 0 or _apart(cycle[-1], other, size) < SAME)
+                for one, other in zip(found, orbits, strict=True)
+            ):
+                continue
+            found.append(Attractor(int(number), points[-1].copy(), k))
+            orbits.append(cycle)
+        if not found:
+            words = "; ".join(by_code(code).sentence for code in sorted(statuses))
+            raise ValueError(f"no start of {self.system.name!r} leads to a motion that can be compared: {words}")
+        return found
+
+    def cloud(self, i: int, attractor: Attractor, phase: float, n: int) -> FloatArray:
+        """Successive points of the section at ``phase``: (n, states); those of a periodic motion come round again."""
+        count = attractor.period_number or n
+        out = self._buffers(1, count)
+        plan = replace(self._plan(phase), extremes=False)
+        start = attractor.point[None, :]
+        self.engine.chain(self._alone(i), 0, 1, self._state(start[0]), start, plan, 0, count, out)
+        if out.status[0] not in (codes.OK, codes.NOT_GUARANTEED):
+            raise solve_error(int(out.status[0]))
+        return np.resize(out.section[0], (n, out.section.shape[2])) if count < n else out.section[0]
+
+    def orbit(self, i: int, attractor: Attractor, grid: int, periods: int) -> FloatArray:
+        """The motion from phase 0 over whole forcing periods: (periods * grid, states)."""
+        end = periods * self.periods[i]
+        instants = np.linspace(0.0, end, periods * grid + 1)
+        state = self._state(attractor.point)
+        log = self.engine.record(self._alone(i), state, end, instants)
+        check_complete(log, self.system, state, self.periods[i])
+        return fold(instants / self.periods[i], log.sample_u, grid)[:periods].reshape(periods * grid, -1)
 
 
 def _apart(point: FloatArray, cycle: FloatArray, size: FloatArray) -> float:

@@ -156,8 +156,9 @@ def gap_reference(
 def _offset(given: float | Sequence[float] | GapOffset) -> GapOffset:
     if isinstance(given, GapOffset):
         return given
-    value, error = (given, 0.0) if np.ndim(given) == 0 else given  # type: ignore[misc]
-    return GapOffset(float(value), float(error))  # type: ignore[arg-type]
+    both = np.atleast_1d(np.asarray(given, dtype=float))
+    value, error = (*both, 0.0) if len(both) == 1 else both
+    return GapOffset(float(value), float(error))
 
 
 def gap_offset(parameters: Any, session: Session) -> GapOffset:

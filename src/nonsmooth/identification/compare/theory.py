@@ -11,12 +11,10 @@ from numpy.typing import NDArray
 from nonsmooth.identification.compare.clouds import energy_distance
 from nonsmooth.identification.compare.fold import fold, mean_orbit
 from nonsmooth.identification.compare.periods import measured_period
-from nonsmooth.identification.compare.predict import Attractor, attractors, cloud, orbit
+from nonsmooth.identification.compare.predict import Attractor, Motions
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from nonsmooth.system.system import System
 
 __all__ = ["Prediction", "from_result", "predict"]
 
@@ -51,7 +49,7 @@ class Prediction:
 
 
 def predict(
-    system: System,
+    motions: Motions,
     measured: list[FloatArray],
     phases: list[float],
     scale: FloatArray,
@@ -59,15 +57,12 @@ def predict(
     starts: Any,
     n: int,
     grid: int,
-    transient: int,
-    max_period: int,
-    options: dict[str, Any],
 ) -> Prediction:
     """Of all motions that the starts lead to the one whose section clouds lie nearest to the measured ones."""
-    found = attractors(system, starts, transient=transient, keep=128, max_period=max_period, options=options)
+    found = motions.attractors(0, starts)
     best: tuple[float, Attractor, list[FloatArray]] | None = None
     for one in found:
-        sections = [cloud(system, one, phase, n, options) for phase in phases]
+        sections = [motions.cloud(0, one, phase, n) for phase in phases]
         away = sum(
             energy_distance(a[-400:] / scale, b[-400:] / scale) for a, b in zip(measured, sections, strict=True)
         )
@@ -75,7 +70,7 @@ def predict(
             best = (away, one, sections)
     assert best is not None  # `attractors` raises where there is none
     _, one, sections = best
-    motion = orbit(system, one, grid, one.period_number or SHOWN, options)
+    motion = motions.orbit(0, one, grid, one.period_number or SHOWN)
     numbers = np.array([item.period_number for item in found], dtype=np.int64)
     return Prediction(one.period_number, sections, motion, numbers, one)
 

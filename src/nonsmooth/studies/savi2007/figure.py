@@ -18,7 +18,7 @@ __all__ = ["Figure", "only_outer", "sheet"]
 
 
 #: The procedures on which those parameters rest with which records of the rig are laid over the model.
-RESTS_ON = ("springs", "support", "impulse", "drop", "contact")
+RESTS_ON = ("springs", "support", "impulse", "response", "drop", "contact")
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,62 @@
+"""A child that is forked while another thread compiles can compile too."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import uuid
+
+import pytest
+
+SCRIPT = '''
+import os, sys, threading, time, warnings
+import nonsmooth
+from nonsmooth.kernels import cache
+
+warnings.simplefilter("ignore")  # later Pythons warn of any fork beside threads
+SOURCE = """
+from math import sin
+from nonsmooth.kernels.cache import callback
+
+@callback("float64(float64)")
+def value(x):
+    for i in range(10):
+        x += sin({0} * x) * sin(x + {0}) / (2.0 + sin(x - {0}) * sin({0} * x) ** 3)
+    return x
+"""
+
+def compile_one(number):
+    return cache.load_module(SOURCE.format(number), "forked")
+
+compile_one(NUMBER)
+thread = threading.Thread(target=lambda: compile_one(NUMBER + 1.0))
+thread.start()
+while not cache._lock.locked():
+    time.sleep(0.001)
+assert thread.is_alive()
+child = os.fork()
+if child == 0:
+    compile_one(NUMBER + 2.0)
+    os._exit(7)
+end = time.time() + 30
+while time.time() < end:
+    done, status = os.waitpid(child, os.WNOHANG)
+    if done:
+        break
+    time.sleep(0.05)
+else:
+    os.kill(child, 9)
+    os.waitpid(child, 0)
+    sys.exit("the child waits for a lock that nobody will give back")
+thread.join()
+compile_one(NUMBER + 3.0)  # the locks are free in the parent too
+print(os.waitstatus_to_exitcode(status))
+'''
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system does not fork")
+def test_a_fork_beside_a_compile() -> None:
+    script = SCRIPT.replace("NUMBER", repr(uuid.uuid4().int % 10**9 / 1e9))  # not in the cache of compiled code
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=90)
+    assert (done.stdout.strip(), done.stderr) == ("7", "")

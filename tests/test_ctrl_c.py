@@ -1,0 +1,59 @@
+"""Ctrl-C ends what was asked for: no verb and no caller goes on with a part of a result as if it were whole."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import nonsmooth
+from nonsmooth.cli import main as cli
+from nonsmooth.continuation.arclength import Curve
+
+SOURCES = Path(nonsmooth.__file__).parent
+#: Who may catch Ctrl-C without raising it at once, and why.
+CATCHES = {
+    "continuation/marches.py: march_until",  # unless_interrupted raises it with what was found
+    "campaign/threads.py: run",  # a worker hands it to the thread that waits, which raises it
+    "cli/main.py: main",  # the exit code 130
+}
+
+
+def test_ctrl_c_is_caught_in_three_places_only() -> None:
+    found = set()
+    for path in SOURCES.rglob("*.py"):
+        for function in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(function, ast.FunctionDef):
+                own = [node for node in ast.walk(function) if isinstance(node, ast.ExceptHandler)]
+                if any(_catches(one) and not isinstance(one.body[-1], ast.Raise) for one in own):
+                    found.add((function.name, path.relative_to(SOURCES).as_posix()))
+    found.discard(("over_items", "campaign/threads.py"))  # it holds `run`
+    assert {f"{path}: {name}" for name, path in found} == CATCHES
+
+
+def _catches(handler: ast.ExceptHandler) -> bool:
+    return handler.type is None or any(
+        isinstance(node, ast.Name) and node.id in ("KeyboardInterrupt", "BaseException", "Interrupted")
+        for node in ast.walk(handler.type)
+    )
+
+
+def test_ctrl_c_while_a_study_follows_a_branch(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Exit code 130, and neither a figure of a part of the branch nor a report."""
+    steps, step = iter(range(11)), Curve.step
+
+    def interrupted(*arguments: Any) -> Any:
+        if next(steps, None) == 10:
+            raise KeyboardInterrupt
+        return step(*arguments)
+
+    monkeypatch.setattr(Curve, "step", interrupted)
+    arguments = ["reproduce", "savi2007", "--quick", "--quiet", "--figure", "13", "--out", str(tmp_path)]
+    assert cli.main(arguments) == 130
+    assert capsys.readouterr().err.splitlines()[-1] == "nonsmooth: interrupted"
+    assert next(steps, None) is None  # it was a branch that was interrupted
+    assert not [path for path in tmp_path.rglob("*") if path.suffix in (".nc", ".md", ".html", ".pdf", ".png")]
