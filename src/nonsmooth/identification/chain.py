@@ -277,9 +277,9 @@ class _Chain:
             end = float(np.median(runs[i].positions[-max(10, len(runs[i].time) // 20) :]))
             if abs(end - decay.values[3]) > held:
                 self.say(
-                    f"impulse: run {runs[i].name!r}, channel 'Angle': ends {1e3 * (end - decay.values[3]):+.2f} mm from "
-                    f"where the car rests, and friction holds it within ±{1e3 * held:.2f} mm: the string slipped on "
-                    "the wheel after the part that is used"
+                    f"impulse: run {runs[i].name!r}, channel 'Angle': ends {1e3 * (end - decay.values[3]):+.2f} mm "
+                    f"from where the car rests, and friction holds it within ±{1e3 * held:.2f} mm: the string slipped "
+                    "on the wheel after the part that is used"
                 )
 
     def response(self, decay: DecayFit | None) -> Steady:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -199,6 +200,8 @@ def to_dataset(results: Sequence[Mapping[str, Any]]) -> xr.Dataset:
     """Truth, estimate, standard uncertainty and 95 % interval over rig and parameter, as the picture takes them."""
     import xarray as xr
 
+    from nonsmooth.results.provenance import ATTRIBUTE, package_version
+
     names = list(ASKED)
     table: FloatArray = np.array(
         [[result["rows"].get(name, [np.nan] * 5) for name in names] for result in results], dtype=np.float64
@@ -210,5 +213,5 @@ def to_dataset(results: Sequence[Mapping[str, Any]]) -> xr.Dataset:
     return xr.Dataset(
         {**{name: (over, table[..., i]) for i, name in enumerate(columns)}, "viscous_only_c": ("rig", viscous)},
         {"rig": [result["seed"] for result in results], "parameter": names},
-        {"synthetic": "yes"},
+        {ATTRIBUTE: json.dumps({"version": package_version(), "verb": "coverage"}), "synthetic": "yes"},
     )
