@@ -78,10 +78,10 @@ def confidence_of(
     classes: tuple[NDArray[Any], NDArray[Any]], computed: NDArray[np.bool_],
     rates: dict[tuple[int, int], tuple[int, int]],
 ) -> NDArray[np.float64]:  # fmt: skip
-    """The chance that a label is right: (n + 1 - errors) / (n + 2) by the probes of its class, 1 where computed.
-
     """The chance that a label is right: (n + 1 - errors) / (n + 2) by the probes of its class, 1 if computed.
-    the others: 0.5."""
+
+    A class is a pair of numbers for each point; ``rates`` has (errors, n) of those that were probed. Nothing is known
+    of the others: 0.5."""
     confidence = np.where(computed, 1.0, 0.5)
     for place, (errors, n) in rates.items():
         confidence[(classes[0] == place[0]) & (classes[1] == place[1]) & ~computed] = 1.0 - (errors + 1) / (n + 2)

@@ -275,10 +275,10 @@ class _Chain:
         held = float(decay.values[2] / decay.values[0] ** 2) + 2 * self.evidence.resolution
         for i in decay.runs:
             end = float(np.median(runs[i].positions[-max(10, len(runs[i].time) // 20) :]))
-            if abs(end - decay.values[3]) > held:
+            off = end - decay.values[3]
+            if abs(off) > held:
                 self.say(
-                    f"impulse: run {runs[i].name!r}, channel 'Angle': ends {1e3 * (end - decay.values[3]):+.2f} mm "
-                    f"from where the car rests, and friction holds it within ±{1e3 * held:.2f} mm: the string slipped "
+                    f"impulse: run {runs[i].name!r}, channel 'Angle': ends {1e3 * off:+.2f} mm from where the car rests, and friction holds it within ±{1e3 * held:.2f} mm: the string slipped "
                     "on the wheel after the part that is used"
                 )
 
