@@ -279,8 +279,8 @@ class _Chain:
             if abs(off) > held:
                 self.say(
                     f"impulse: run {runs[i].name!r}, channel 'Angle': ends {1e3 * off:+.2f} mm from where the car "
-                    f"rests, and friction holds it within ±{1e3 * held:.2f} mm: the string slipped on the wheel after the "
-                    "part that is used"
+                    f"rests, and friction holds it within ±{1e3 * held:.2f} mm: the string slipped on the wheel after "
+                    "the part that is used"
                 )
 
     def response(self, decay: DecayFit | None) -> Steady:
