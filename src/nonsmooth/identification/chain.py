@@ -278,9 +278,9 @@ class _Chain:
             off = end - decay.values[3]
             if abs(off) > held:
                 self.say(
-                    f"impulse: run {runs[i].name!r}, channel 'Angle': ends {1e3 * off:+.2f} mm from where the car rests, "
-                    f"and friction holds it within ±{1e3 * held:.2f} mm: the string slipped on the wheel after the part "
-                    "that is used"
+                    f"impulse: run {runs[i].name!r}, channel 'Angle': ends {1e3 * off:+.2f} mm from where the car "
+                    f"rests, and friction holds it within ±{1e3 * held:.2f} mm: the string slipped on the wheel after "
+                    "the part that is used"
                 )
 
     def response(self, decay: DecayFit | None) -> Steady:
