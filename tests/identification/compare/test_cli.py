@@ -93,10 +93,12 @@ def test_quiet_is_quiet(folder: Path, capsys: pytest.CaptureFixture[str]) -> Non
     ],
 )
 def test_what_a_study_gets_wrong_is_named(
-    old: str, new: str, message: str, folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+    old: str, new: str, message: str, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
     import re
 
+    monkeypatch.chdir(tmp_path)  # a result whose picture fails is kept in the current folder
     text = MOTION.replace('data = "out/motion.nc"\n', "").replace("out/motion.png", "out/never.png")
     assert main(["compare", study(folder, "wrong.toml", text.replace(old, new))]) == 2
     assert re.search(message, capsys.readouterr().err)
