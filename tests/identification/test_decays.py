@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from tests.identification.made import COUNT, counted, run
 
+from nonsmooth.errors import SolveError
 from nonsmooth.experiment.session import Quantity
 from nonsmooth.identification.decay_damping import decay_damping, envelope
 from nonsmooth.identification.free_decay import free_decay
@@ -145,3 +146,14 @@ def test_viscous_and_dry_are_told_apart():
     data = found.data
     at_peaks = np.interp(data["peak_time"], data["fine_time"], data["envelope_both"])
     assert np.all(np.abs(at_peaks - data["peak_height"]) < COUNT)
+
+
+def test_what_fails_in_a_fit_names_the_procedure() -> None:
+    """Whatever the kind of failure: one with facts of its own too."""
+    from nonsmooth.identification.arrow import Unsettled
+    from nonsmooth.identification.chain import _of
+
+    for failure in (Unsettled("did not settle", *[np.zeros(1)] * 4), SolveError("did not end"), ValueError("is empty")):
+        kind = SolveError if isinstance(failure, SolveError) else ValueError
+        with pytest.raises(kind, match=f"^impulse: {failure}. Are these the recordings of 'impulse'"), _of("impulse"):
+            raise failure

@@ -135,7 +135,8 @@ def _of(procedure: str) -> Iterator[None]:
     try:
         yield
     except (ValueError, SolveError) as error:
-        raise type(error)(
+        kind = SolveError if isinstance(error, SolveError) else ValueError
+        raise kind(
             f"{procedure}: {error}. Are these the recordings of {procedure!r}, each one tap with its free decay?"
         ) from error
 
