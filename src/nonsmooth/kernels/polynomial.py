@@ -26,6 +26,7 @@ NONE = 2.0  # "no crossing on [0, 1]"
 DEPTH = 44  # halvings; below, neighbouring doubles cannot be told apart any more
 WIDEST = 40  # highest degree + 1
 EPS = 2.3e-16
+HALVINGS = 60  # of a bracket: nothing in it can be told apart then
 
 _INVERSE_BINOMIAL = np.zeros((WIDEST, WIDEST))
 for _m in range(WIDEST):
@@ -156,13 +157,12 @@ def _halve(b, base, left, m):
 def _zero(a, m, lo, hi, way):
     """The one zero in [lo, hi] of a, passed in the direction ``way``: Newton, kept inside its bracket.
 
-    Where a change is not below half of the one before the bracket is halved instead: the bound is never reached."""
+    Where a hundred rounds do not get there, the bracket is halved to rounding."""
     f_lo, f_hi = dense(a, m, lo), dense(a, m, hi)
     x = 0.5 * (lo + hi)
     if f_lo * f_hi < 0.0:
         x = min(max(lo + (hi - lo) * f_lo / (f_lo - f_hi), lo), hi)
-    last = hi - lo
-    for _ in range(200):
+    for _ in range(100):
         f, d = a[m], 0.0
         for k in range(m - 1, -1, -1):
             d = d * x + f
@@ -174,12 +174,17 @@ def _zero(a, m, lo, hi, way):
         else:
             lo = x
         new = x - f / d if d != 0.0 else -1.0
-        if not (lo <= new <= hi and 2.0 * fabs(new - x) <= last):
+        if not (lo <= new <= hi):
             new = 0.5 * (lo + hi)
-        last = fabs(new - x)
-        if last <= 2.0 * EPS * new or new == lo == hi:
+        if fabs(new - x) <= 2.0 * EPS * new or new == lo == hi:
             return new
         x = new
+    for _ in range(HALVINGS):
+        x = 0.5 * (lo + hi)
+        if dense(a, m, x) * way > 0.0:
+            hi = x
+        else:
+            lo = x
     return x
 
 
@@ -191,8 +196,7 @@ def _extremum(a, m, lo, hi, way):
     x = 0.5 * (lo + hi)
     if lo == 0.0 and hi == 1.0 and a[1] != a[1] + 2.0 * a[2]:
         x = min(max(-a[1] / (2.0 * a[2]), 0.0), 1.0)
-    last = hi - lo
-    for _ in range(200):
+    for _ in range(100):
         d, dd = m * a[m], 0.0
         for k in range(m - 1, 0, -1):
             dd = dd * x + d
@@ -204,12 +208,20 @@ def _extremum(a, m, lo, hi, way):
         else:
             hi = x
         new = x - d / dd if dd != 0.0 else -1.0
-        if not (lo <= new <= hi and 2.0 * fabs(new - x) <= last):
+        if not (lo <= new <= hi):
             new = 0.5 * (lo + hi)
-        last = fabs(new - x)
-        if last <= 1e-9 or new == lo == hi:
+        if fabs(new - x) <= 1e-9 or new == lo == hi:
             return new
         x = new
+    for _ in range(HALVINGS):  # Newton's method did not get there
+        x = 0.5 * (lo + hi)
+        d = m * a[m]
+        for k in range(m - 1, 0, -1):
+            d = d * x + k * a[k]
+        if d * way > 0.0:
+            lo = x
+        else:
+            hi = x
     return x
 
 
