@@ -36,6 +36,7 @@ from numba.core.compiler_lock import global_compiler_lock
 
 from nonsmooth.kernels import before_compiling
 from nonsmooth.kernels.folder import cache_folder, make_private, mark_used, prune, read_private, write_atomically
+from nonsmooth.kernels.target import Function
 
 __all__ = ["cache_statistics", "callback", "compiled", "device", "inline", "kernel", "load_module"]
 
@@ -45,7 +46,7 @@ _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {
 _INNER: dict[str, Any] = {**_OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 _DIGEST = hashlib.sha256().digest_size
 _GENERATED = "nonsmooth_generated_"
-_MACHINERY = {"cache", "folder"}
+_MACHINERY = {"cache", "folder", "target"}
 _lock = threading.Lock()
 
 
@@ -233,10 +234,14 @@ def compiled(function: Any) -> Any:
 
 
 def _cached(function: Callable[..., Any], options: dict[str, Any]) -> Any:
-    dispatcher = numba.njit(**{**_OPTIONS, **options})(function)
+    dispatcher = _jitted(function, {**_OPTIONS, **options})
     if dispatcher is not function:
         dispatcher._cache = _ContentCache(function, options)
     return dispatcher
+
+
+def _jitted(function: Callable[..., Any], options: dict[str, Any]) -> Any:
+    return function if numba.config.DISABLE_JIT else Function(function, options)
 
 
 def _compile_once(dispatcher: Any, signature: Any) -> None:
@@ -265,7 +270,7 @@ def device(function: Callable[..., Any]) -> Any:
 
     It has no signature and no cache entry of its own, and costs nothing when its callers are loaded from disk.
     """
-    return numba.njit(**_INNER)(function)
+    return _jitted(function, _INNER)
 
 
 def inline(function: Callable[..., Any]) -> Any:
@@ -274,7 +279,7 @@ def inline(function: Callable[..., Any]) -> Any:
     An array argument is seven machine words and a reference count; a call that passes ten arrays costs more than
     the dozen multiplications behind it. Every call site grows the caller and its compile time, so use it sparingly.
     """
-    return numba.njit(**_INNER, forceinline=True)(function)
+    return _jitted(function, {**_INNER, "forceinline": True})
 
 
 def load_module(source: str, stem: str) -> ModuleType:
