@@ -223,6 +223,6 @@ def _floats(x: Any) -> FloatArray:
     return np.ascontiguousarray(x, dtype=np.float64)
 
 
-@lru_cache(maxsize=128)
+@lru_cache(maxsize=32)  # as many as of what it is made of
 def _flow(traced: Traced, names: tuple[str, ...], scale: tuple[float, ...]) -> VariationalFlow:
     return VariationalFlow(traced, names, np.array(scale))

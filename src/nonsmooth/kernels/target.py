@@ -1,14 +1,16 @@
 """What our code is made for, and the engines that hold it: a level of the processor's architecture, an engine per file.
 
 Numba makes code for one processor. Ours is made for a level of the architecture, so that it can be made on one machine,
-travel with the package and run on another; what the level costs is in ``docs/decisions.md``. And Numba keeps all code in
-one engine until the process ends; here each file has its own, which goes with the file's last function.
+travel with the package and run on another; what the level costs stands in ``docs/decisions.md``. And Numba keeps all
+code in one engine until the process ends; here each file has its own, which goes with the file's last function.
 
-Leans on private parts of Numba (``JITCPUCodegen``, a target context's ``_internal_codegen``); checked with 0.62 and 0.68.
+Leans on private parts of Numba: ``JITCPUCodegen``, a target context's ``_internal_codegen``, a dispatcher's
+``add_overload``, ``_make_finalizer`` and ``targetdescr``. Checked with 0.68.
 """
 
 from __future__ import annotations
 
+import os
 import platform
 from collections.abc import Callable
 from functools import cache
@@ -19,7 +21,7 @@ import numba
 from numba.core.codegen import JITCPUCodegen, get_host_cpu_features
 from numba.core.registry import CPUDispatcher, CPUTarget, cpu_target
 
-__all__ = ["AHEAD", "LEVELS", "Function", "level"]
+__all__ = ["AHEAD", "LEVELS", "Function", "level", "made_ahead"]
 
 AHEAD = Path(__file__).parent / "ahead"  # a folder for each level; what they hold comes with the package
 
@@ -38,8 +40,14 @@ _SAME = {"amd64": "x86_64", "arm64": "aarch64"}
 def level() -> str:
     """The level that code is made for: that of the code that came with the package, else this processor's highest.
 
-    Empty where the processor has none of ``LEVELS``, or where ``NUMBA_CPU_NAME`` and the like say what code is made for:
-    then it is made as Numba makes it."""
+    ``NONSMOOTH_LEVEL`` chooses another. Empty where the processor has none of ``LEVELS``, or where ``NUMBA_CPU_NAME``
+    and the like say what code is made for: then it is made as Numba makes it.
+
+    Raises
+    ------
+    ValueError
+        ``NONSMOOTH_LEVEL`` is not a level of this processor.
+    """
     if numba.config.CPU_NAME is not None or numba.config.CPU_FEATURES is not None:
         return ""
     machine = platform.machine().lower()
@@ -48,8 +56,21 @@ def level() -> str:
         name for name, needed in LEVELS.get(_SAME.get(machine, machine), {}).items()
         if there.issuperset(f"+{feature}" for feature in needed.split())
     ]  # fmt: skip
+    chosen = os.environ.get("NONSMOOTH_LEVEL", "")
+    if chosen and chosen not in possible:
+        raise ValueError(f"NONSMOOTH_LEVEL={chosen}: this processor has {', '.join(possible) or 'no level'}; unset it")
     with_code = [name for name in possible if (AHEAD / name).is_dir()]
-    return [*with_code, *possible, ""][0]
+    return chosen or [*with_code, *possible, ""][0]
+
+
+def made_ahead(entry: str) -> bytes:
+    """The content of an entry that came with the package; empty where there is none.
+
+    Who may write there may write the package's sources as well: nothing is asked but the entry's own hash."""
+    try:
+        return (AHEAD / level() / entry).read_bytes() if level() else b""
+    except OSError:
+        return b""
 
 
 class _Codegen(JITCPUCodegen):
@@ -97,6 +118,15 @@ class Function(CPUDispatcher):
             names["_target"] = _Target()
         self.targetdescr = names["_target"]
         super().__init__(py_func=function, targetoptions={"nopython": True, "boundscheck": None, **options})
+
+    def add_overload(self, found: Any) -> None:
+        """Without what Numba noted on every line, half of what a compile leaves in memory."""
+        super().add_overload(found._replace(type_annotation=None))
+
+    def never_inlined(self) -> None:
+        """Forget the code where other kernels would look for it: it is called by address alone, and ends with this."""
+        for found in self.overloads.values():
+            self.targetctx.remove_user_function(found.entry_point)
 
     def _make_finalizer(self) -> Callable[[], None]:
         """Numba's holds the code, which holds the names of its file, which hold this function: it would never end."""

@@ -19,7 +19,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from nonsmooth.system.generate import SIGNATURES
+from nonsmooth.system.generate import MOST_MODELS, SIGNATURES
 from nonsmooth.system.jet import jet_code
 from nonsmooth.system.printing import Printer, assignments
 from nonsmooth.system.traced import Traced, TracedTransition
@@ -58,7 +58,7 @@ class VariationalModel:
     n_scratch: int
 
 
-@lru_cache(maxsize=128)
+@lru_cache(maxsize=MOST_MODELS)
 def variational_model(traced: Traced, active: tuple[int, ...]) -> VariationalModel:
     """Generate and compile (or load from the cache) for some active parameters, given by index."""
     from nonsmooth.kernels.cache import load_module
@@ -86,7 +86,7 @@ def variational_model(traced: Traced, active: tuple[int, ...]) -> VariationalMod
         _function("field", SIGNATURES["field"], "mode, t, u, q, du", traced, [lines for lines, _ in fields]),
         _function("switch", _SWITCH, "transition, t, u, q, out", traced, [lines for lines, _ in switches]),
     ]
-    module = load_module("\n".join(part for part in parts if part) + "\n", "variations")
+    module = load_module("\n".join(part for part in parts if part) + "\n", "variations", lasting=False)
     return VariationalModel(
         module.jet, module.field, module.switch,
         np.array(entries, dtype=np.int64).reshape(-1, 2),
