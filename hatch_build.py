@@ -1,6 +1,6 @@
 """Compiles what no model changes when the package is built: into a wheel for this Python and this kind of processor.
 
-Nothing depends on it. Where it fails (or `HATCH_BUILD_NO_HOOKS=true` leaves it out) the wheel has the sources alone, and
+Nothing depends on it. Where it fails, or `HATCH_BUILD_NO_HOOKS=true` leaves it out, the wheel has the sources alone and
 kernels are compiled when they are first called. `NONSMOOTH_LEVELS` names the levels of the architecture to be made (by
 default the highest that this processor has): "x86-64-v3 x86-64-v4" for a wheel that is to travel.
 """

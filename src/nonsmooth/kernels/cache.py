@@ -51,6 +51,7 @@ _GENERATED = "nonsmooth_generated_"
 _MACHINERY = {"ahead", "cache", "folder", "target"}
 _lock = threading.Lock()
 _passing: WeakValueDictionary[str, ModuleType] = WeakValueDictionary()  # modules of models, while somebody has them
+_most_passing = 16
 
 
 # --------------------------------------------------------------------------------------------------------------
@@ -340,9 +341,19 @@ def load_module(source: str, stem: str, *, lasting: bool = True) -> ModuleType:
             del sys.modules[full_name]
             raise
         if not lasting:
+            vars(module)["_itself"] = module  # it lives as long as its functions
             _passing[full_name] = module
             del sys.modules[full_name]
+            _collect_models()
     return module
+
+
+def _collect_models() -> None:
+    """Code of models hangs in cycles, and Python looks for these by the number of objects, however large they are."""
+    global _most_passing
+    if len(_passing) > _most_passing:
+        gc.collect()
+        _most_passing = len(_passing) + 16
 
 
 def cache_statistics(module: ModuleType) -> Iterator[tuple[str, int, int]]:

@@ -32,7 +32,6 @@ LEVELS: dict[str, dict[str, str]] = {
     "x86_64": {"x86-64-v4": f"{_V3} avx512f avx512bw avx512cd avx512dq avx512vl", "x86-64-v3": _V3},
     "aarch64": {"generic": "neon"},
 }
-_passes: list[Any] = []
 _SAME = {"amd64": "x86_64", "arm64": "aarch64"}
 
 
@@ -84,11 +83,14 @@ class _Codegen(JITCPUCodegen):
 
     def _function_pass_manager(self, **options: Any) -> Any:
         """One for all functions: Numba makes one for each, and llvmlite never frees it (15 kB)."""
-        if options:
-            return super()._function_pass_manager(**options)
-        if not _passes:
-            _passes.append((super()._function_pass_manager(), self))  # it needs this engine's description of the target
-        return _passes[0][0]
+        return super()._function_pass_manager(**options) if options else _function_passes()[0]
+
+
+@cache
+def _function_passes() -> tuple[Any, Any]:
+    """The passes, and an engine that does nothing but live as long: they need its description of the processor."""
+    engine = _Codegen("passes")
+    return JITCPUCodegen._function_pass_manager(engine), engine
 
 
 class _Target(CPUTarget):
