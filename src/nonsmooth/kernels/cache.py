@@ -35,6 +35,7 @@ import numba
 from numba.core.caching import _Cache
 from numba.core.compiler import CompileResult
 from numba.core.compiler_lock import global_compiler_lock
+from numba.core.registry import cpu_target
 
 from nonsmooth.kernels import before_compiling
 from nonsmooth.kernels.folder import cache_folder, make_private, mark_used, prune, read_private, write_atomically
@@ -145,7 +146,7 @@ class _ContentCache(_Cache):
         return f"{self._name}-{hashlib.sha256(key.encode()).hexdigest()[:32]}.nbc"
 
     def load_overload(self, sig: Any, target_context: Any) -> CompileResult | None:
-        target_context.refresh()
+        cpu_target.target_context.refresh()  # of Numba's own: what all engines share is not to live in this one
         name = self.entry(sig, target_context.codegen())
         payload = _checked(made_ahead(name))
         if not payload:
@@ -344,7 +345,8 @@ def load_module(source: str, stem: str, *, lasting: bool = True) -> ModuleType:
             vars(module)["_itself"] = module  # it lives as long as its functions
             _passing[full_name] = module
             del sys.modules[full_name]
-            _collect_models()
+    if not lasting:
+        _collect_models()
     return module
 
 

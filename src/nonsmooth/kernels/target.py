@@ -98,9 +98,7 @@ class _Target(CPUTarget):
 
     def __init__(self) -> None:
         super().__init__("cpu")
-        numbas = cpu_target.target_context
-        numbas.refresh()  # what all engines share is not to live in this one
-        self._context = numbas.subtarget(_internal_codegen=_Codegen("nonsmooth"))
+        self._context = cpu_target.target_context.subtarget(_internal_codegen=_Codegen("nonsmooth"))
 
     @property
     def target_context(self) -> Any:
