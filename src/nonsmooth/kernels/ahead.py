@@ -91,7 +91,7 @@ def compile_ahead(into: Path, chosen: str, work: Sequence[_Task]) -> int:
     processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     with TemporaryDirectory() as cache:
         with ProcessPoolExecutor(
-            processors, mp_context=get_context("spawn"), initializer=_begin, initargs=(chosen, cache)
+            min(processors, len(work)), mp_context=get_context("spawn"), initializer=_begin, initargs=(chosen, cache)
         ) as pool:
             wanted = [name for names in pool.map(_compile, work) for name in names]
         for name in wanted:
