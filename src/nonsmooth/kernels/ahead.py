@@ -14,6 +14,8 @@ import re
 import shutil
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from inspect import signature
+from itertools import product
 from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -27,7 +29,7 @@ __all__ = ["compile_ahead", "kernels_of", "plain_files", "tasks"]
 #: Numbers of states and of harmonics that the exact flow is compiled for ahead; others when they are first met.
 SHAPES = ("2,1", "2,0")
 _ROOT = Path(__file__).parents[1]
-_Task = tuple[str, tuple[Any, ...]]  # a module to be imported, or one of the functions below with its arguments
+_Task = tuple[str, str, tuple[Any, ...]]  # a module, or a function in it that makes one and its arguments
 
 
 def plain_files() -> Iterator[str]:
@@ -43,25 +45,26 @@ def plain_files() -> Iterator[str]:
 
 
 def tasks(shapes: Sequence[str] = SHAPES) -> list[_Task]:
-    """What is compiled, each by one process, the longest first."""
-    from nonsmooth.kernels.linear_module import OBSERVERS
+    """What is compiled, each by one process: the plain files, then what every ``*_module`` function makes.
 
-    shaped: list[_Task] = []
-    for states, harmonics in (map(int, shape.split(",")) for shape in shapes):
-        shaped += [("linear_module", (states, harmonics, observer)) for observer in OBSERVERS]
-        shaped += [("settle_module", (harmonics,))] if states == 2 else []
-    plain = sorted(plain_files(), key=lambda name: name != "nonsmooth.kernels.series")
-    return [(plain[0], ()), *shaped, *((name, ()) for name in plain[1:])]
+    Its arguments are told by their names: ``states`` and ``harmonics`` of a shape, and each of the file's observers."""
+    found: list[_Task] = [(name, "", ()) for name in plain_files()]
+    for path in sorted(Path(__file__).parent.glob("*_module.py"), reverse=True):
+        if path.stem.startswith("cuda_"):
+            continue
+        file = importlib.import_module(f"nonsmooth.kernels.{path.stem}")
+        for name in (name for name in file.__all__ if name.endswith("_module")):
+            for states, harmonics in (map(int, shape.split(",")) for shape in shapes):
+                choices = {"states": [states], "harmonics": [harmonics], "observer": getattr(file, "OBSERVERS", [])}
+                given = product(*(choices[parameter] for parameter in signature(getattr(file, name)).parameters))
+                found += [(file.__name__, name, arguments) for arguments in given]
+    return list(dict.fromkeys(found))
 
 
 def _module(task: _Task) -> ModuleType:
-    from nonsmooth.kernels import linear_module
-
-    name, arguments = task
-    if not arguments:
-        return importlib.import_module(name)
-    module: ModuleType = getattr(linear_module, name)(*arguments)
-    return module
+    file, name, arguments = task
+    module = importlib.import_module(file)
+    return getattr(module, name)(*arguments) if name else module
 
 
 def kernels_of(module: ModuleType) -> list[Any]:
