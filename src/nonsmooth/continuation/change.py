@@ -65,7 +65,7 @@ def _touched(curve: Curve, point: Point) -> list[Change]:
     place, k = path.touched
     traced = curve.shooting.system.traced
     jump = traced.transitions[k]
-    row = int(path.which[place, k] - curve.walk.transitions[k, 2])
+    row = int(path.which[place, k] - curve.walk.net.row_start[k])
     t = float(path.place[place, k])
     begin = float(point.solved.times[place])
     z = flow.legs(values, [visits[place].mode], [begin], [t - begin], states[place][None, :]).z[0]

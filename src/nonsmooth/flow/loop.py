@@ -89,7 +89,7 @@ class LoopEngine:
         spare, code = self.touches_of_a_leg(), codes.LOG_FULL
         work.tally[BEGUN] = 0
         while code in (codes.LOG_FULL, codes.PAUSED):
-            code = kernel(*rest, records.Log(*sampled, *crossings, *touches, spare), own, work)
+            code = kernel(*rest, records.Log(*(*sampled, *crossings, *touches, spare)), own, work)
             if code == codes.LOG_FULL:
                 crossings = _longer(crossings, _crossings(2 * len(crossings[0]), n_u, n_m))
                 touches = _longer(touches, _touches(2 * len(touches[0]) + spare, n_u))
