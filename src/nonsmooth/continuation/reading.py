@@ -48,13 +48,13 @@ def _undamaged(what: str) -> Iterator[None]:
 def recorded(dataset: xr.Dataset, what: str) -> tuple[dict[str, Any], System]:
     """The record of how a result was made, and its system at the parameters of the record."""
     from nonsmooth.results.provenance import read_provenance
-    from nonsmooth.system.system import System
+    from nonsmooth.system.origin import recorded_system
 
     if not hasattr(dataset, "data_vars"):
         raise TypeError(f"this {what} is read from its Dataset, not from {type(dataset).__name__}")
     source = read_provenance(dataset)
     with _undamaged(what):
-        system = System.from_text(source["system"]["text"]).with_parameters(source["system"]["parameters"])
+        system = recorded_system(source)
     return source, system
 
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.results.provenance import ATTRIBUTE
+from nonsmooth.results.provenance import ATTRIBUTE, COORDINATE
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -151,6 +151,8 @@ class Recording:
         """
         import xarray as xr
 
+        from nonsmooth.results.provenance import with_short_record
+
         variables: dict[str, Any] = {}
         coords: dict[str, Any] = {}
         for i, (run, sensor, ds) in enumerate(self._sensors(), 1):
@@ -163,18 +165,22 @@ class Recording:
                 variables[f"channel_{i}_{k}"] = (dim, array.values, {**array.attrs, **here, "channel": str(name)})
         runs = {run: dict(self.tree[run].attrs) for run in self.runs}
         attrs = {**self.tree.attrs, "run_attributes": json.dumps(runs, ensure_ascii=False)}
-        return xr.Dataset(variables, coords, attrs)
+        return with_short_record(xr.Dataset(variables, coords, attrs))
 
     @classmethod
     def from_dataset(cls, dataset: xr.Dataset) -> Recording:
         """The recording that :meth:`to_dataset` made the Dataset from; ValueError for any other Dataset."""
         import xarray as xr
 
+        from nonsmooth.results.provenance import read_provenance
+
         if "run_attributes" not in dataset.attrs or ATTRIBUTE not in dataset.attrs:
             raise ValueError("this Dataset was not made by Recording.to_dataset")
         run_attrs = json.loads(dataset.attrs["run_attributes"])
         runs: dict[str, dict[str, xr.Dataset]] = {run: {} for run in run_attrs}
         for axis_name, axis in dataset.coords.items():
+            if axis_name == COORDINATE:
+                continue
             own = dict(axis.attrs)
             run, sensor, dim = own.pop("run"), own.pop("sensor"), own.pop("axis")
             attrs = {key.removeprefix("sensor_"): own.pop(key) for key in list(own) if key.startswith("sensor_")}
@@ -185,7 +191,7 @@ class Recording:
                     kept = {key: value for key, value in array.attrs.items() if key not in ("run", "sensor", "channel")}
                     data[array.attrs["channel"]] = (dim, array.values, kept)
             runs[run][sensor] = xr.Dataset(data, {dim: (dim, axis.values, own)}, attrs)
-        record = json.loads(dataset.attrs[ATTRIBUTE])
+        record = read_provenance(dataset)
         return cls.from_runs(
             runs, synthetic=record["synthetic"], source=record["source"], warnings=tuple(record["warnings"]),
             run_attrs=run_attrs,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -158,7 +157,7 @@ class ParameterSet(Mapping[str, float]):
         """All numbers and texts as a Dataset that ``nonsmooth.save`` takes; the findings' pictures stay behind."""
         import xarray as xr
 
-        from nonsmooth.results.provenance import ATTRIBUTE, package_version
+        from nonsmooth.results.provenance import attribute, package_version, with_short_record
 
         names = [*self.estimates, *self.extra]
         rows = [*self.estimates.values(), *self.extra.values()]
@@ -168,7 +167,7 @@ class ParameterSet(Mapping[str, float]):
             "n_parameters": len(self.estimates), "identifiability": dict(self.identifiability),
             "units": [row.unit for row in rows], "findings": [_as_record(finding) for finding in self.findings],
         }  # fmt: skip
-        return xr.Dataset(
+        return with_short_record(xr.Dataset(
             {
                 "value": ("parameter", [row.value for row in rows]),
                 "uncertainty": ("parameter", [row.uncertainty for row in rows]),
@@ -177,8 +176,8 @@ class ParameterSet(Mapping[str, float]):
                 "covariance": (("parameter", "other"), self._covariance.copy()),
             },
             {"parameter": names, "other": names},
-            {ATTRIBUTE: json.dumps(record, ensure_ascii=False), "synthetic": "yes" if self.synthetic else "no"},
-        )
+            attribute(record) | {"synthetic": "yes" if self.synthetic else "no"},
+        ))  # fmt: skip
 
     @classmethod
     def from_dataset(cls, dataset: xr.Dataset) -> ParameterSet:
@@ -189,9 +188,9 @@ class ParameterSet(Mapping[str, float]):
         ValueError
             If the Dataset was not made so.
         """
-        from nonsmooth.results.provenance import ATTRIBUTE
+        from nonsmooth.results.provenance import ATTRIBUTE, read_provenance
 
-        record = json.loads(dataset.attrs.get(ATTRIBUTE, "{}"))
+        record = read_provenance(dataset) if ATTRIBUTE in dataset.attrs else {}
         if record.get("verb") != "identify":
             raise ValueError("this Dataset was not made by ParameterSet.to_dataset")
         columns = [dataset[name].values for name in ("value", "uncertainty", "half_width", "logarithmic")]
@@ -230,7 +229,11 @@ def _as_record(finding: Finding) -> dict[str, Any]:
 
 
 def _from_record(item: Mapping[str, Any]) -> Finding:
+    def estimate(row: Sequence[Any]) -> Estimate:
+        value, uncertainty, unit, half_width, logarithmic = row
+        return Estimate(float(value), float(uncertainty), unit, float(half_width), logarithmic)  # "inf" is a text there
+
     return Finding(
-        item["name"], Estimate(*item["estimate"]), item["method"], item["samples_used"], tuple(item["runs"]),
-        tuple(item["notes"]), {name: Estimate(*row) for name, row in item["others"].items()}, plot=item["plot"],
+        item["name"], estimate(item["estimate"]), item["method"], item["samples_used"], tuple(item["runs"]),
+        tuple(item["notes"]), {name: estimate(row) for name, row in item["others"].items()}, plot=item["plot"],
     )  # fmt: skip

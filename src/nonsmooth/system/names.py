@@ -28,7 +28,7 @@ RESERVED = frozenset(
         # variables of results
         "section", "maximum", "minimum", "amplitude", "residual", "period", "period_number", "crossings_per_period",
         "contacts_per_period", "clearance", "signature", "stable", "label", "kind", "transition",
-        "floquet_multipliers", "start_state", "state_unit", "state_symbol",
+        "floquet_multipliers", "start_state", "state_unit", "state_symbol", "provenance",
         # arguments of the user's functions
         "u", "t", "p",
     ]
