@@ -135,7 +135,8 @@ def test_a_record_too_long_for_the_attribute_is_a_coordinate(labels: Labels, end
 def test_a_record_from_before_it_was_compressed_is_read() -> None:
     """As version 0.1.0 wrote it until then: all in plain JSON."""
     system = {"name": "s", "text": "the text", "parameters": {"k": 2.0}}
-    record = {"version": "0.1.0", "verb": "sweep", "system": system, "options": {"values": [0.1, 0.2]}, "method": "exact",
+    options = {"values": [0.1, 0.2]}
+    record = {"version": "0.1.0", "verb": "sweep", "system": system, "options": options, "method": "exact",
               "seed": None, "created": None}  # fmt: skip
     assert read_provenance(xr.Dataset(attrs={ATTRIBUTE: json.dumps(record)})) == record
 

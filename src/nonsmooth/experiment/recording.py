@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.results.provenance import ATTRIBUTE, COORDINATE
+from nonsmooth.results.representation import cut, html_table
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -198,20 +199,34 @@ class Recording:
         )  # fmt: skip
 
     def __repr__(self) -> str:
-        name = self.source.get("file") or "in memory"
-        lines = [f"Recording of {name} ({self.source.get('format')}{', synthetic' if self.synthetic else ''})"]
-        rows = list(self._sensors())
-        for run, _, ds in rows[:20]:
-            (axis,) = ds.dims
-            rate = float(ds.attrs.get("rate", np.nan))
-            clock = f" at {rate:.6g} Hz" if np.isfinite(rate) else ""
-            shown = ", ".join(f"{c} [{a.attrs['units'] or '?'}]" for c, a in ds.data_vars.items())
-            lines.append(f"  {run}: {ds.sizes[axis]} samples{clock}: {shown}")
+        rows = self._rows()
+        lines = [
+            f"  {run}: {n} samples{f' at {clock}' if clock else ''}: {cut(names)}" for run, n, clock, names in rows[:20]
+        ]
         if len(rows) > 20:
             lines.append(f"  and {len(rows) - 20} more sensors")
         if self.warnings:
             lines.append(f"  {len(self.warnings)} warnings: see .warnings")
-        return "\n".join(lines)
+        return "\n".join([self._title(), *lines])
+
+    def _repr_html_(self) -> str:
+        header = ("run", "samples", "rate", "channels")
+        return html_table(self._title(), self._rows(), header=header, details=self.warnings, of="warnings")
+
+    def _title(self) -> str:
+        name = self.source.get("file") or "in memory"
+        return f"Recording of {name} ({self.source.get('format')}{', synthetic' if self.synthetic else ''})"
+
+    def _rows(self) -> list[tuple[str, str, str, str]]:
+        """Run, number of samples, rate and channels of each sensor."""
+        rows = []
+        for run, _, ds in self._sensors():
+            (axis,) = ds.dims
+            rate = float(ds.attrs.get("rate", np.nan))
+            clock = f"{rate:.6g} Hz" if np.isfinite(rate) else ""
+            names = ", ".join(f"{c} [{a.attrs['units'] or '?'}]" for c, a in ds.data_vars.items())
+            rows.append((run, str(ds.sizes[axis]), clock, names))
+        return rows
 
     def _sensors(self) -> Iterator[tuple[str, str, xr.Dataset]]:
         for run, node in self.tree.children.items():

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.identification.finding import Estimate, Finding
+from nonsmooth.results.representation import cut, html_table, text_table
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -209,12 +210,70 @@ class ParameterSet(Mapping[str, float]):
             anomalies=record.get("anomalies", ()), synthetic=record["synthetic"],
         )  # fmt: skip
 
-    def __repr__(self) -> str:
-        lines = [f"ParameterSet{' (synthetic recordings)' if self.synthetic else ''}"]
+    def to_dataframe(self, level: float = 0.95) -> Any:  # a pandas.DataFrame
+        """Return a table with a row for each parameter, then for each quantity in ``extra``.
+
+        Parameters
+        ----------
+        level : float
+            Probability of the interval from ``low`` to ``high``.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns ``value``, ``uncertainty`` (standard), ``low``, ``high``, ``unit``, ``parameter_of_the_model`` and
+            ``identifiability`` (the sentence, "" where there is none); the index holds the names.
+
+        Examples
+        --------
+        >>> import nonsmooth as ns
+        >>> from nonsmooth.identification.finding import Estimate
+        >>> ns.ParameterSet({"k": Estimate(8.5, 0.1, "N/m")}, [[0.01]]).to_dataframe().loc["k", "unit"]
+        'N/m'
+        """
+        import xarray as xr
+
+        rows = {**self.estimates, **self.extra}
+        low, high = zip(*(row.interval(level) for row in rows.values()), strict=True) if rows else ((), ())
+        columns: dict[str, Any] = {
+            "value": [row.value for row in rows.values()],
+            "uncertainty": [row.uncertainty for row in rows.values()],
+            "low": list(low), "high": list(high),
+            "unit": np.array([row.unit for row in rows.values()], dtype=object),
+            "parameter_of_the_model": [name in self.estimates for name in rows],
+            "identifiability": np.array([self.identifiability.get(name, "") for name in rows], dtype=object),
+        }  # fmt: skip
+        names = np.array(list(rows), dtype=object)
+        return xr.Dataset({key: ("name", values) for key, values in columns.items()}, {"name": names}).to_dataframe()
+
+    def __str__(self) -> str:
+        lines = [self._title()]
         lines += [f"  {name} = {estimate}" for name, estimate in self.estimates.items()]
         lines += [f"  ({name} = {estimate})" for name, estimate in self.extra.items()]
         lines += [f"  {note}" for note in self.notes]
         return "\n".join(lines + [f"  ANOMALY: {sentence}" for sentence in self.anomalies])
+
+    def __repr__(self) -> str:
+        rows = [(name, f"= {estimate}") for name, estimate in self.estimates.items()]
+        rows += [(f"({name}", f"= {estimate})") for name, estimate in self.extra.items()]
+        lines = [text_table(self._title(), rows, whole=False)]
+        lines += [f"  ANOMALY: {cut(sentence)}" for sentence in self.anomalies]
+        counts = {"findings": len(self.findings), "notes": len(self.notes)}
+        if any(counts.values()):
+            lines.append(f"  {', '.join(f'{n} {word}' for word, n in counts.items() if n)}: see .findings, .notes")
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        rows = [
+            (name, str(row), self.identifiability.get(name, ""))
+            for name, row in {**self.estimates, **{f"({name})": row for name, row in self.extra.items()}}.items()
+        ]
+        anomalies = [("ANOMALY", sentence, "") for sentence in self.anomalies]
+        header = ("", "value", "rests on")
+        return html_table(self._title(), anomalies + rows, header=header, details=self.notes, of="notes")
+
+    def _title(self) -> str:
+        return f"ParameterSet{' (synthetic recordings)' if self.synthetic else ''}"
 
 
 def _as_record(finding: Finding) -> dict[str, Any]:

@@ -7,8 +7,8 @@ It is the attribute ``nonsmooth`` of every Dataset. :func:`read_provenance` retu
 ``text`` is the system's data-only text form (``System.from_text`` reads it), ``options`` the verb's arguments
 as given, ``method`` the method that "auto" resolved to.
 
-The attribute itself is at most `LIMIT` characters, so that a result shows well in a notebook: text and parameters of the
-system are compressed (``system["zlib"]``, base64 of zlib of JSON), and an option that stands in a coordinate is a
+The attribute itself is at most `LIMIT` characters, so that a result shows well in a notebook: text and parameters of
+the system are compressed (``system["zlib"]``, base64 of zlib of JSON), and an option that stands in a coordinate is a
 reference to it. A record that is longer all the same (an option of many numbers that stand nowhere else) is the scalar
 coordinate ``provenance``, and the attribute says so.
 """
@@ -123,8 +123,8 @@ def read_provenance(result: xr.Dataset) -> dict[str, Any]:
     if record.get("record") == COORDINATE:
         if COORDINATE not in result.coords:
             raise ValueError(
-                f"the record of this Dataset was its coordinate {COORDINATE!r}, which has been dropped; take it from the "
-                "result as it was computed"
+                f"the record of this Dataset was its coordinate {COORDINATE!r}, which has been dropped; take it from "
+                "the result as it was computed"
             )
         record = _object(str(result.coords[COORDINATE].values), f"coordinate {COORDINATE!r}")
     record = _opened(record)

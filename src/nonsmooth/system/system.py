@@ -354,7 +354,17 @@ class System:
     def __repr__(self) -> str:
         from nonsmooth.system.show import table
 
+        return table(self, whole=False)
+
+    def __str__(self) -> str:
+        from nonsmooth.system.show import table
+
         return table(self)
+
+    def _repr_html_(self) -> str:
+        from nonsmooth.system.show import page
+
+        return page(self)
 
     def to_latex(self) -> str:
         """Return the equations as LaTeX (an ``align*`` environment)."""
