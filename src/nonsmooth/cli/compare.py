@@ -40,6 +40,9 @@ def add(commands: Any) -> None:
         help="compare a measurement with a model",
         description="Lay a measurement of a session over a model, as the study file describes it: [system], "
         "[identified], [measured], [compare], [output]. Paths in the file are relative to the file.",
+        epilog="examples:\n"
+        "  nonsmooth compare compare.toml\n"
+        "  nonsmooth compare session/ --identified parameters.nc",
     )
     parser.add_argument(
         "study", type=Path, metavar="STUDY.toml",
