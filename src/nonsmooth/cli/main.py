@@ -75,7 +75,9 @@ def _answer(arguments: Sequence[str] | None) -> int:
     except Exception as error:
         if options.traceback:
             raise
-        text = printable(shortened(error, quoted=False, most=4000))
+        named = isinstance(error, OSError) and error.filename is not None and error.strerror
+        said = f"{error.filename}: {error.strerror}" if named else error
+        text = printable(shortened(said, quoted=False, most=4000))
         if isinstance(error, _USER_ERRORS):
             print(f"nonsmooth: {text}", file=sys.stderr)
             return WRONG_INPUT
@@ -118,6 +120,9 @@ class _Format(argparse.HelpFormatter):
 class _Parser(argparse.ArgumentParser):
     def __init__(self, **settings: Any) -> None:
         super().__init__(**{"formatter_class": _Format, **settings})
+
+    def _print_message(self, message: str, file: Any = None) -> None:
+        (file or sys.stderr).write(message)  # the library passes over a closed pipe
 
 
 def parser() -> argparse.ArgumentParser:

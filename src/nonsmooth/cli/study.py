@@ -175,7 +175,9 @@ def _told(source: Path, call: Callable[[], Any]) -> Any:
         return call()
     except ValueError as error:  # the package's own sentences among them
         raise ValueError(f"{source}: {error}") from error
-    except (Exception, SystemExit) as error:
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
         frames = traceback.extract_tb(error.__traceback__)
         lines = [frame.lineno for frame in frames if Path(frame.filename).resolve() == source.resolve()]
         what: object = error
