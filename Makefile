@@ -21,7 +21,7 @@ help:  ## list the targets
 reproduce: $(VENV)/.installed-run  ## reproduce Savi et al. (2007): figures, data and report in out/savi2007
 	$(BIN)/nonsmooth reproduce savi2007 --out $(OUT)
 
-reproduce-full: $(VENV)/.installed-run  ## the same with charts of a million points; an interrupted run goes on
+reproduce-full: $(VENV)/.installed-zarr  ## the same with charts of a million points; an interrupted run goes on
 	$(BIN)/nonsmooth reproduce savi2007 --full --out $(OUT)
 
 test: $(VENV)/.installed-test  ## run the tests
@@ -80,6 +80,15 @@ $(BIN)/python:
 
 $(VENV)/.installed-run: pyproject.toml | $(BIN)/python
 	$(PIP) --editable .
+	@touch $@
+
+# Groups of packages for work on this one, which need pip 25.1; all others are extras.
+$(VENV)/.pip: | $(BIN)/python
+	$(PIP) 'pip>=25.1'
+	@touch $@
+
+$(patsubst %,$(VENV)/.installed-%,test dev docs bench): $(VENV)/.installed-%: pyproject.toml | $(VENV)/.pip
+	$(PIP) --editable . --group $*
 	@touch $@
 
 $(VENV)/.installed-%: pyproject.toml | $(BIN)/python

@@ -36,6 +36,7 @@ from nonsmooth.campaign.processors import processor_type
 from nonsmooth.campaign.work import Work
 from nonsmooth.errors import DataFileError
 from nonsmooth.results.content import digest, seal, sealed
+from nonsmooth.results.store import needs_zarr
 from nonsmooth.results.whole import beside, told, write_whole
 
 __all__ = ["ChunkStore", "describe_store", "open_store", "stored_bytes"]
@@ -144,6 +145,8 @@ def open_store(path: str | os.PathLike[str], work: Work, *, any_cpu: bool = Fals
 
     Raises
     ------
+    ImportError
+        Where the package zarr is not installed.
     ValueError
         A name that does not end in .zarr.
     DataFileError
@@ -155,6 +158,7 @@ def open_store(path: str | os.PathLike[str], work: Work, *, any_cpu: bool = Fals
     target = Path(path)
     if target.suffix != ".zarr":
         raise ValueError(f"{target}: the name of a store must end in .zarr")
+    needs_zarr(target)
     wanted = described(work)
     key = hashlib.sha256(json.dumps(wanted, sort_keys=True).encode()).hexdigest()
     if not target.exists():
@@ -184,9 +188,10 @@ def describe_store(path: str | os.PathLike[str]) -> dict[str, Any]:
     DataFileError
         Not a store of chunks, or its description was altered.
     """
+    target = Path(path)
+    needs_zarr(target)
     import zarr
 
-    target = Path(path)
     try:
         record: dict[str, Any] = dict(json.loads(str(zarr.open_group(target, mode="r").attrs[ATTRIBUTE])))
     except Exception as error:

@@ -75,8 +75,9 @@ def _answer(arguments: Sequence[str] | None) -> int:
     except Exception as error:
         if options.traceback:
             raise
-        named = isinstance(error, OSError) and error.filename is not None and error.strerror
-        said = f"{error.filename}: {error.strerror}" if named else error
+        said: object = error
+        if isinstance(error, OSError) and error.filename is not None and error.strerror:
+            said = f"{error.filename}: {error.strerror}"
         text = printable(shortened(said, quoted=False, most=4000))
         if isinstance(error, _USER_ERRORS):
             print(f"nonsmooth: {text}", file=sys.stderr)

@@ -189,7 +189,7 @@ def _told(source: Path, call: Callable[[], Any]) -> Any:
 
 def _check_output(output: Mapping[str, Any], path: Path) -> None:
     """What would fail after hours of computing is told before."""
-    from nonsmooth.results.store import check_place
+    from nonsmooth.results.store import check_place, needs_zarr
 
     place = f"{path}, table [output]"
     for name, value in output.items():
@@ -201,6 +201,8 @@ def _check_output(output: Mapping[str, Any], path: Path) -> None:
         target = path.parent / output[name]
         if target.suffix.lower() not in endings:
             raise ValueError(f"{place}: {name} = {output[name]!r} must end in {', '.join(endings)}")
+        if target.suffix.lower() == ".zarr":
+            needs_zarr(target)
         folder = next((one for one in target.parents if one.exists()), path.parent)
         if not (folder.is_dir() and os.access(folder, os.W_OK)):
             raise ValueError(f"{place}: {name} = {output[name]!r}: nothing may be written into {folder}")

@@ -37,15 +37,18 @@ def nonlinear_fit(
     """
     from scipy.optimize import least_squares
 
+    begin = np.asarray(start, dtype=np.float64)
+    size = np.where(begin != 0, np.abs(begin), 1.0)  # the steps of its differences are relative to numbers of order 1
     found = least_squares(
-        residual, np.asarray(start, dtype=np.float64), jac="3-point", bounds=(lower, np.inf), x_scale="jac",
-        ftol=1e-12, xtol=1e-12, gtol=1e-12,
+        lambda scaled: residual(scaled * size), begin / size, jac="3-point", bounds=(np.asarray(lower) / size, np.inf),
+        x_scale="jac", ftol=1e-12, xtol=1e-12, gtol=1e-12,
     )  # fmt: skip
     n, p = found.jac.shape
     if not found.success or n <= p:
         return None
     scale = np.linalg.norm(found.jac, axis=0)
     if not np.all(scale > 0) or np.linalg.cond(found.jac / scale) > 1 / np.sqrt(np.finfo(float).eps):
-        return found.x, np.diag(np.full(p, np.inf))
+        return found.x * size, np.diag(np.full(p, np.inf))
     inverse = np.linalg.pinv(found.jac / scale)
-    return found.x, inverse @ inverse.T / np.outer(scale, scale) * (2 * found.cost / (n - p))
+    covariance = inverse @ inverse.T / np.outer(scale, scale) * (2 * found.cost / (n - p))
+    return found.x * size, covariance * np.outer(size, size)

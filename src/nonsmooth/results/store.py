@@ -13,20 +13,21 @@ import os
 import warnings
 from collections.abc import Hashable, Iterator, Mapping
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from nonsmooth.errors import DataFileError
+from nonsmooth.errors import DataFileError, not_installed
 from nonsmooth.results import claims
 from nonsmooth.results.content import bytes_as_written, content, digest, stamp, trailer, unstamp
 from nonsmooth.results.memory import room_for
 from nonsmooth.results.provenance import ATTRIBUTE
 from nonsmooth.results.whole import beside, replace, told
 
-__all__ = ["check_place", "load", "save"]
+__all__ = ["check_place", "load", "needs_zarr", "save"]
 
 _EXPECTED = "expected a result written by nonsmooth.save (.nc or .zarr)"
 _ALTERED = (
@@ -47,6 +48,8 @@ def save(result: xr.Dataset, path: str | os.PathLike[str]) -> Path:
 
     Raises
     ------
+    ImportError
+        If the path ends in ``.zarr`` and the package zarr is not installed.
     TypeError
         If ``result`` is not a Dataset, or holds something that files do not give back as it is.
     ValueError
@@ -152,10 +155,18 @@ def check_place(target: Path) -> None:
         )
 
 
+def needs_zarr(path: Path) -> None:
+    """Refuse a Zarr store where the package zarr is not installed: ImportError that names the extra."""
+    if find_spec("zarr") is None:
+        raise ImportError(f"{path}: a Zarr store needs {not_installed('zarr', 'zarr')}")
+
+
 def _suffix(path: Path) -> str:
     if path.suffix not in (".nc", ".zarr"):
         given = path.suffix or "no ending"
         raise ValueError(f"{path}: the name must end in .nc (NetCDF) or .zarr (Zarr), got {given!r}")
+    if path.suffix == ".zarr":
+        needs_zarr(path)
     return path.suffix
 
 
