@@ -17,7 +17,6 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from nonsmooth.cli import compare, completion, identify, init, models, plan, reproduce, rig, run, schema, show
 from nonsmooth.cli.terminal import printable
 from nonsmooth.errors import SolveError, shortened
-from nonsmooth.results.provenance import package_version
 
 __all__ = ["main", "parser"]
 
@@ -126,6 +125,16 @@ class _Parser(argparse.ArgumentParser):
         (file or sys.stderr).write(message)  # the library passes over a closed pipe
 
 
+class _Version(argparse.Action):
+    """The version, looked up where it is asked for."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+        from nonsmooth.results.provenance import package_version
+
+        print(f"nonsmooth {package_version()}")
+        parser.exit()
+
+
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command line, with all sub-commands."""
     known = _Parser(
@@ -133,7 +142,7 @@ def parser() -> argparse.ArgumentParser:
         description="Piecewise-smooth dynamical systems: simulate, sweep, and reproduce published studies.",
         epilog=_EPILOG,
     )
-    known.add_argument("--version", action="version", version=f"nonsmooth {package_version()}")
+    known.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
     known.add_argument("--traceback", action="store_true", help="show where in the program an error arose")
     known.set_defaults(run=None)
     commands = known.add_subparsers(title="commands", metavar="COMMAND")
