@@ -60,7 +60,7 @@ class ChunkStore:
         return {mark["chunk"] for mark in marks_of(self.path) if mark["key"] == self._key(mark["chunk"])}
 
     def has(self, chunk: int) -> bool:
-        """Whether a chunk is there, whole."""
+        """Return whether a chunk is there, whole."""
         mark = mark_in(self.path / "run" / f"{chunk:06d}.json")
         return mark is not None and mark["key"] == self._key(chunk)
 
@@ -120,7 +120,7 @@ class ChunkStore:
         return columns or {name: np.asarray(group[name][...]) for name in work.columns()}
 
     def _is_whole(self, work: Work, mark: Mapping[str, Any], columns: Any) -> bool:
-        """Whether a chunk's arrays are those that were written."""
+        """Return whether a chunk's arrays are those that were written."""
         first, last = work.bounds(mark["chunk"])
         try:
             found = _content({name: np.asarray(columns[name][first:last]) for name in work.columns()})
@@ -179,7 +179,7 @@ def open_store(path: str | os.PathLike[str], work: Work, *, any_cpu: bool = Fals
 
 
 def describe_store(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """What a store is of, and how far it is: ``verb``, ``system``, ``options``, ``chunks``, ``done``, ``seconds``.
+    """Describe a store's work and its progress: ``verb``, ``system``, ``options``, ``chunks``, ``done``, ``seconds``.
 
     ``content``: once all chunks are there, the hash of their hashes; else None.
 

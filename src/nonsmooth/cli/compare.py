@@ -135,7 +135,7 @@ def _run_study(
 def _offset(
     study: Mapping[str, Any], parameters: Any, session: Any, folder: Path, read: Callable[[Path], Any]
 ) -> Any:
-    """What the identified gap is more than the screw read; 0 where it was not identified, or not from contact."""
+    """Identified gap less the screw's reading; 0 where the gap was not identified, or not from contact."""
     from nonsmooth.identification.compare import gap_offset
 
     if "gap_at_rest" not in getattr(parameters, "extra", {}):

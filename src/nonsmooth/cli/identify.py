@@ -24,7 +24,7 @@ _FORMATS = ("pdf", "png", "svg")
 
 @dataclass(frozen=True)
 class _Study:
-    """What is asked for, paths already relative to where the command runs."""
+    """Contents of a study file, paths already relative to where the command runs."""
 
     session: Path
     model: Any = None

@@ -37,7 +37,7 @@ def keep(result: xr.Dataset, path: Path) -> Path:
 
 @contextmanager
 def kept_whatever_comes(result: xr.Dataset, saved: list[Path], name: Path) -> Iterator[None]:
-    """What is done with a result besides: where it fails, the message ends with where the result is.
+    """Make an error in further work on a result end with where the result is.
 
     Parameters
     ----------

@@ -52,7 +52,7 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def progress_of(path: Path) -> str:
-    """How far a store of chunks is."""
+    """Progress of a store of chunks, in a few lines."""
     from nonsmooth.campaign.store import describe_store
 
     record = describe_store(path)

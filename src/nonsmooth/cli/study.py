@@ -83,7 +83,7 @@ class Study:
 
     @property
     def store(self) -> Path | None:
-        """Where ``[output]`` says that finished chunks are kept."""
+        """Folder for finished chunks, as ``[output]`` gives it."""
         return self.path.parent / self.output["store"] if "store" in self.output else None
 
     def write(self, result: xr.Dataset) -> list[Path]:
@@ -170,7 +170,7 @@ def load_model(text: str, folder: Path) -> Any:
 
 
 def _told(source: Path, call: Callable[[], Any]) -> Any:
-    """What a user's file does wrong, as one sentence with the line."""
+    """Turn an error of a user's file into one sentence with the line."""
     try:
         return call()
     except ValueError as error:  # the package's own sentences among them
@@ -188,7 +188,7 @@ def _told(source: Path, call: Callable[[], Any]) -> Any:
 
 
 def _check_output(output: Mapping[str, Any], path: Path) -> None:
-    """What would fail after hours of computing is told before."""
+    """Refuse before the computation what would fail after it."""
     from nonsmooth.results.store import check_place, needs_zarr
 
     place = f"{path}, table [output]"
@@ -222,7 +222,7 @@ def _figure(verb: str, options: Mapping[str, Any]) -> str:
 
 
 def _check_axes(output: Mapping[str, Any], figure: str, system: Any, place: str) -> None:
-    """What the figure's axes may be is known from the system."""
+    """Refuse axes that the figure of this system cannot have."""
     if "figure" not in output:
         return
     from nonsmooth import plot

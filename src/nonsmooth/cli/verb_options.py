@@ -44,7 +44,7 @@ class Option:
 
     @property
     def required(self) -> bool:
-        """Whether a study file must give it."""
+        """Return whether a study file must give it."""
         return self.default is inspect.Parameter.empty
 
 

@@ -229,7 +229,7 @@ def _scale(shooting: Shooting, size: FloatArray, period: float) -> FloatArray:
 
 
 def _is_near(orbit: Orbit, guess: Guess, gap: float, left: FloatArray) -> bool:
-    """Whether an orbit is the one that a motion settles on: as near as its gap says.
+    """Return whether an orbit is the one that a motion settles on: as near as its gap says.
 
     A slow motion closes better than it is near: by the multipliers, the orbit is (I - M)^-1 times the gap away.
     """

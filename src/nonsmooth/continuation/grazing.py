@@ -38,7 +38,7 @@ ASIDE = 1e-6  # of the period: the touch is looked at from this far before and b
 
 @dataclass
 class Graze:
-    """What happens at a graze; ``kind`` is ``"persistence"`` or ``"non_smooth_fold"``."""
+    """Outcome of a graze; ``kind`` is ``"persistence"`` or ``"non_smooth_fold"``."""
 
     kind: str
     bounded: bool

@@ -35,7 +35,7 @@ _POINT = ("layout", "unknowns", "tangent", "mode", "section", "maximum", "minimu
 
 @contextmanager
 def _undamaged(what: str) -> Iterator[None]:
-    """What is missing or does not fit together, as one sentence."""
+    """Turn what is missing or does not fit together into one sentence."""
     try:
         yield
     except (AttributeError, IndexError, KeyError, TypeError, ValueError) as error:

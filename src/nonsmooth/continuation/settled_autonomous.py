@@ -118,7 +118,7 @@ def _passages(log: Log, instants: FloatArray, system: System) -> tuple[FloatArra
 
 
 def _at_rest(log: Log, system: System) -> bool:
-    """Whether the motion is as good as still, or shrinks steadily towards it."""
+    """Return whether the motion is as good as still, or shrinks steadily towards it."""
     _, _, half = _swing(log, system)
     return bool((half <= REST * system.scale_vector()).all())
 

@@ -40,7 +40,7 @@ class Segment:
 
 @dataclass
 class Experiment:
-    """What ``main.xml`` says; ``units`` are those that its own tables name by a number."""
+    """Contents of ``main.xml``; ``units`` are those that its own tables name by a number."""
 
     header: dict[str, str] = field(default_factory=dict)
     sensors: list[dict[str, str]] = field(default_factory=list)

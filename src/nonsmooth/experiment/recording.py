@@ -28,7 +28,7 @@ class RecordingWarning(UserWarning):
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """What was recorded, by run and sensor, with units, rates and where each channel came from.
+    """Recorded signals by run and sensor, with units, rates and where each channel came from.
 
     Read one with :func:`nonsmooth.load_recording`, or build one with :meth:`from_runs`.
 

@@ -204,7 +204,7 @@ class _Chain:
         warnings.warn(sentence, RecordingWarning, stacklevel=5)
 
     def doubts(self, adjusted: Adjusted, contacts: ContactFit | None) -> None:
-        """What cannot be, what disagrees, and procedures of which most runs could not be used."""
+        """Anomalies: impossible values, disagreements, and procedures of which most runs could not be used."""
         self.unused(contacts)
         sentences = [disagreement(adjusted), *impossible(adjusted)]
         if contacts is not None and contacts.poor:

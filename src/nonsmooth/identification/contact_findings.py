@@ -1,4 +1,4 @@
-r"""What multiple shooting says of the support: gap and contact parameters, and how much of them one contact tells.
+r"""Findings of multiple shooting on the support: gap and contact parameters, and how much of them one contact tells.
 
 :math:`c_s/k_s` is half a millisecond and a contact eight samples: no sample shows it, but the speed that a contact
 takes, some 3 %, shows in the free motion after it. The profile over one contact says what that is worth; what many

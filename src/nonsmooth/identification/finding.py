@@ -1,4 +1,4 @@
-"""What one procedure found: a value, its standard uncertainty, how, and from which samples."""
+"""Outcome of one procedure: a value, its standard uncertainty, how, and from which samples."""
 
 from __future__ import annotations
 

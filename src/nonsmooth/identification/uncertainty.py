@@ -35,7 +35,7 @@ def uniform(half_width: float) -> float:
 
 
 def coverage_factor(level: float = 0.95) -> float:
-    """How many standard uncertainties hold a normal quantity with this probability: 1.96 for 0.95."""
+    """Number of standard uncertainties that hold a normal quantity with this probability: 1.96 for 0.95."""
     from scipy.special import ndtri
 
     if not 0 < level < 1:
@@ -94,7 +94,7 @@ def factor_interval(value: float, relative: float, level: float = 0.95) -> tuple
 
 
 def correlation_times(residuals: Any, *, longest: int | None = None) -> float:
-    r"""How many samples share one independent error: :math:`\tau = 1 + 2 \sum \rho_k`, at least 1.
+    r"""Number of samples that share one independent error: :math:`\tau = 1 + 2 \sum \rho_k`, at least 1.
 
     The sum stops at the first lag that is not positive (Geyer's initial sequence, Statist. Sci. 7 (1992) 473).
     """

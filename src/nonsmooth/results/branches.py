@@ -157,7 +157,7 @@ def _special_value(d: Labels, parameter: str, along: NDArray[np.float64], places
 
 
 def _ends(endings: Sequence[str], ended: Sequence[str], sentences: Sequence[str]) -> dict[str, Any]:
-    """How both ends came about: one of ``endings``, and a sentence."""
+    """Endings of both ends: one of ``endings``, and a sentence."""
     codes = np.array([endings.index(word) for word in ended], dtype=np.int8)
     return {
         "ended": ("end", codes, {"long_name": "how it ends", **flag_attributes(endings)}),

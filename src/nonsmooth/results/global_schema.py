@@ -128,7 +128,7 @@ def basins(
 
 
 def attractor_variables(labels: Labels, attractors: Sequence[Any]) -> dict[str, Any]:
-    """What is known of each attractor; their section points one after the other over ``section_point``."""
+    """Properties of each attractor; their section points one after the other over ``section_point``."""
     n = len(labels.states)
     rows = {name: [getattr(item, name) for item in attractors] for name in ("maximum", "minimum", "points")}
     points = [item[:SHOWN] for item in rows["points"]]

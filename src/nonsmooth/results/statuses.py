@@ -1,4 +1,4 @@
-"""What a status code of the kernels means: its name in results, what happened, and what to do about it."""
+"""Meanings of the kernels' status codes: name in results, what happened, and what to do about it."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Status:
 
     @property
     def sentence(self) -> str:
-        """What happened and what to do, in one line."""
+        """Sentence on what happened and what to do."""
         return f"{self.happened} {self.remedy}".strip()
 
 

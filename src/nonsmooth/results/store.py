@@ -175,7 +175,7 @@ def _is_zarr(path: Path) -> bool:
 
 
 def _is_result(path: Path) -> bool:
-    """Whether a Zarr store holds a result that :func:`save` has written."""
+    """Return whether a Zarr store holds a result that :func:`save` has written."""
     for name in (".zattrs", "zarr.json"):
         try:
             attributes = json.loads((path / name).read_text(encoding="utf-8"))
@@ -240,7 +240,7 @@ def _variables(result: xr.Dataset) -> Iterator[tuple[str, bool, xr.Variable]]:
 
 
 def _encode(result: xr.Dataset) -> xr.Dataset:
-    """What both formats can hold. Encodings left by an earlier read are dropped."""
+    """Return a Dataset that both formats can hold. Encodings left by an earlier read are dropped."""
     encoded = result.drop_encoding()
     for name, variable in list(encoded.variables.items()):
         if variable.dtype.kind == "c":

@@ -1,4 +1,4 @@
-"""Which names may be used, and helpful answers to those that may not, in calls too.
+"""Names that may be used, and helpful answers to those that may not, in calls too.
 
 A parameter's name becomes a dim of a result and a state's name a coordinate, so that the names the
 results use themselves are reserved.

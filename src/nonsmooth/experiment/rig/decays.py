@@ -37,7 +37,7 @@ def impulse(
 
 
 def _stuck(rig: VirtualRig, run: int) -> dict[str, float]:
-    """Where friction that holds keeps the car before a tap: the first is made where the sensor was zeroed."""
+    """Place at which friction holds the car before a tap: the first is made where the sensor was zeroed."""
     if not rig.holding:
         return {}
     held = rig.truth["friction"] / (2 * rig.truth["k"])

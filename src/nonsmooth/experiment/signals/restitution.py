@@ -203,7 +203,7 @@ class _Side:
 
 
 def _meeting(d: Floats, length: float) -> float:
-    """Where the difference of two parabolas vanishes within (0, length); the middle if it does not."""
+    """Zero of the difference of two parabolas within (0, length); the middle if there is none."""
     roots = np.roots(d[::-1])
     real = np.real(roots[np.abs(np.imag(roots)) < 1e-9])
     inside = real[(real >= 0.0) & (real <= length)]

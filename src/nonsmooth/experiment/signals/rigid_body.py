@@ -165,7 +165,7 @@ def corner_restitution(
 
 
 def _nearest_zero(t: Floats, y: Floats) -> float:
-    """Where y vanishes, between two of its samples; where it does not, the sample nearest to zero."""
+    """Zero of y between two of its samples; where there is none, the sample nearest to zero."""
     k = np.flatnonzero(np.sign(y[:-1]) != np.sign(y[1:]))
     if len(k) == 0:
         return float(t[int(np.argmin(np.abs(y)))])

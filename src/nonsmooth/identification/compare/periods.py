@@ -96,7 +96,7 @@ def period_numbers(
 
 
 def flips(values: ArrayLike, numbers: ArrayLike, *, last: int = 4) -> dict[str, float]:
-    """Where the period number doubles: ``{"1-2": value, "2-4": value, ...}`` up to period ``last``.
+    """Values at which the period number doubles: ``{"1-2": value, "2-4": value, ...}`` up to period ``last``.
 
     Parameters
     ----------

@@ -76,7 +76,7 @@ def predict(
 
 
 def from_result(result: xr.Dataset, states: list[str], phases: list[float], grid: int, max_period: int) -> Prediction:
-    """What a result of ``simulate``, ``poincare`` or ``sweep`` at one setting holds.
+    """Theory read from a result of ``simulate``, ``poincare`` or ``sweep`` at one setting.
 
     Raises
     ------
