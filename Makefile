@@ -48,11 +48,12 @@ coverage-awkward: $(VENV)/.installed-run  ## the same on rigs where much goes wr
 rig-against-model: $(VENV)/.installed-run  ## lay virtual rigs over the model; writes docs/measured_rig_against_model.md
 	$(BIN)/python -m nonsmooth.identification.compare.rig_against_model --seeds 2 3 --out docs/measured_rig_against_model.md
 
-check: $(VENV)/.installed-dev  ## ruff, mypy, import-linter, codespell
+check: $(VENV)/.installed-dev  ## ruff, mypy, import-linter, codespell, the prose of docstrings
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/codespell README.md CHANGELOG.md CONTRIBUTING.md src tests docs benchmarks examples
+	$(BIN)/python tests/prose.py
 
 bench: $(VENV)/.installed-bench  ## compare with other programs on the same work; writes benchmarks/results.md
 	$(BIN)/python benchmarks/run.py

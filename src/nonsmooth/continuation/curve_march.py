@@ -26,7 +26,7 @@ ENDS = {
     "no_convergence": "Newton's method did not converge, however small the step.",
     "grazing": "A contact begins or ends here: beyond this point the orbit has another signature.",
     "corner": "The orbit meets the corner of two boundaries: beyond this point it has another signature.",
-    "resonance": "Both multipliers meet on the real axis: beyond this point they are real, and no torus is born.",
+    "resonance": "Both multipliers meet on the real axis: beyond this point they are real, and there is no torus.",
     "interrupted": f"{INTERRUPTED}.",
 }
 #: The point of codimension two at which a curve meets a graze (another one, for a grazing curve).

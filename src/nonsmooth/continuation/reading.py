@@ -1,6 +1,6 @@
 """Orbits, branches and rows of special points read back from their Datasets, and refused where they are damaged.
 
-An index that points nowhere would end in a traceback, a negative one in another orbit without a word; so the signatures
+An index that points nowhere would end in a traceback, a negative one silently in another orbit; so the signatures
 are checked against the system, and the unknowns against the signatures.
 """
 

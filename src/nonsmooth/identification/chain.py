@@ -181,7 +181,7 @@ class _Chain:
         return Observation((name,), np.array([quantity.value]), np.array([[quantity.uncertainty**2]]), "weighed")
 
     def beside(self, what: str, find: Callable[[], Finding | list[Finding]]) -> Finding | None:
-        """A finding that no parameter rests on: where it cannot be had, say why and go on."""
+        """Make a finding that no parameter rests on; on failure, record a note and continue."""
         try:
             found = find()
         except (ValueError, SolveError) as error:

@@ -9,7 +9,7 @@ swing with it, so that their difference, the gap *referred to the car's mean pos
 A piece in which the car turns at the support itself, a graze, is left out: its motion has no derivative in the
 parameters there (the push grows as the power 3/2 of a depth of micrometres), and the fit would stop at it wherever its
 minimum lies. How far the estimate moves with every other turn of the crank alone is added to its uncertainty: it is
-what a motor that wanders is worth.
+the uncertainty that a wandering motor causes.
 """
 
 from __future__ import annotations

@@ -129,7 +129,7 @@ def correlated(jacobian: Any, residuals: Any, pieces: Sequence[int] | None = Non
     residuals : array (n,)
         Weighted residuals, in the order of time.
     pieces : sequence of int, optional
-        Lengths of independent records that follow one another; no correlation is looked for across them.
+        Lengths of independent records that follow one another; no correlation is assumed across them.
 
     Returns
     -------

@@ -39,7 +39,7 @@ def regions(
     y: str | None = None,
     t: float = 0.0,
 ) -> Axes:
-    """Draw the regions of a system's first mode (G-), of the mode it changes to (G+), and what parts them.
+    """Draw the regions of a system's first mode (G-), of the mode it changes to (G+), and the borders between them.
 
     Parameters
     ----------

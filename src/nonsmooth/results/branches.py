@@ -40,7 +40,7 @@ _MARKS: dict[str, tuple[str, tuple[str, ...], str]] = {
     "indicator": ("special_indicator", (), "indicator that is touched"),
     "grazing": ("special_grazing", (), "what happens at the graze (Feigin)"),
     "bounded": ("special_bounded", (), "multipliers stay bounded at the graze"),
-    "doubled": ("special_doubled", (), "an orbit of twice the period is born at the graze"),
+    "doubled": ("special_doubled", (), "an orbit of twice the period branches off at the graze"),
     "contact": ("special_contact_multipliers", ("multiplier",), "multipliers with the contact, in the limit"),
     "determinants": (
         "special_determinant", ("matrix",), "det(I - M-), det(I - M+), det(I + M-), det(I + M+) at the graze",

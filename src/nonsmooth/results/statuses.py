@@ -63,8 +63,8 @@ STATUSES: tuple[Status, ...] = (
     ),
     Status(
         codes.NO_CONVERGENCE, "no_convergence",
-        "The trajectory did not return to the section (it may have come to rest), it began beyond a stop, or an "
-        "equation did not converge.",
+        "The trajectory did not return to the section (it may have reached an equilibrium), it began beyond a stop, or "
+        "an equation did not converge.",
         "Check that the start lies on the admissible side of every stop, and that the motion meets the section's "
         "surface in the direction asked for; otherwise lower `rtol`.",
     ),

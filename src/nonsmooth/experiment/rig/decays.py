@@ -25,7 +25,7 @@ def impulse(
     rig: VirtualRig, *, velocities: tuple[float, ...] = (0.5, -0.5, 0.35, -0.35, 0.2, -0.2, 0.1, -0.1),
     duration: float = 20.0,
 ) -> Recording:  # fmt: skip
-    """Tap the resting car, no support, and let it come to rest: about these velocities (m/s), one run each."""
+    """Tap the resting car, no support, and let it stop: about these velocities (m/s), one run each."""
     system = rig.system().with_parameters(rig.parameters(crank_length=0.0, g=NO_SUPPORT))
     runs = []
     for i, velocity in enumerate(velocities):

@@ -34,7 +34,7 @@ class Prediction:
     sections : list of array (n, states)
         Section points, one cloud for each phase asked for.
     orbit : array (periods * grid, states), optional
-        Over ``period_number`` forcing periods, or a stretch of a motion without one; from phase 0.
+        Over ``period_number`` forcing periods, or an interval of a motion without one; from phase 0.
     coexisting : array of int
         Period numbers of all motions found.
     attractor : Attractor, optional

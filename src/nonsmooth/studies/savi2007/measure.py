@@ -137,7 +137,7 @@ def periods_reached(survey: xr.Dataset, value: float) -> dict[int, int]:
 def separation_rate(twins: xr.Dataset, scale: tuple[float, float] = (1e-3, 1e-2)) -> tuple[float, float]:
     """Mean growth of ln(distance) per period between each start and its twin, with its standard error.
 
-    The first half of the starts and the second are pairs. A mean over a finite stretch, not a Lyapunov exponent: it
+    The first half of the starts and the second are pairs. A mean over a finite time, not a Lyapunov exponent: it
     leaves out the first return, in which the distance turns into the growing direction.
     """
     points = twins["section"].transpose("start", "iterate", "state").values / np.asarray(scale)
