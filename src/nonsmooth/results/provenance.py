@@ -81,9 +81,10 @@ def provenance(
 
 
 def attribute(record: Mapping[str, Any]) -> dict[str, str]:
-    """The attribute that holds a record, the text of its system compressed."""
+    """The attribute that holds a record, the text of its system compressed, behind what a person reads."""
     plain = _plain(record)
     if isinstance(system := plain.get("system"), dict) and isinstance(system.get("text"), str):
+        del plain["system"]
         rest = {key: value for key, value in system.items() if key != "name"}
         plain["system"] = {"name": system.get("name"), "zlib": _compressed(_json(rest))}
     return {ATTRIBUTE: _json(plain)}
