@@ -1,4 +1,4 @@
-"""Where a march leaves its signature: what is recorded there, and the curve on which it goes on."""
+"""End of a signature on a march: the record of it, and the curve on which the march goes on."""
 
 from __future__ import annotations
 

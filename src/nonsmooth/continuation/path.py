@@ -26,7 +26,7 @@ VIOLATIONS = ("touch", "short", "slow", "own", "others", "landed")
 
 @dataclass
 class Path:
-    """What a walk along an orbit saw; see ``kernels.orbit_path`` for the arrays over (visit, transition)."""
+    """Extremes and margins along an orbit; see ``kernels.orbit_path`` for the arrays over (visit, transition)."""
 
     maximum: FloatArray  # (n_u,)
     minimum: FloatArray
