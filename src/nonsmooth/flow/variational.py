@@ -197,12 +197,14 @@ class VariationalFlow:
         found = getattr(self._local, "work", None)
         if found is None:
             from nonsmooth.kernels.block import one_block
+            from nonsmooth.kernels.lanes import FOUR
             from nonsmooth.kernels.legs import ORDER, Steps
 
             columns, width = self.n + self.n_active, ORDER + 1
-            rows, changes = self.n_u + len(self.model.entries) + columns * columns, np.zeros((self.n_u, columns))
+            rows, changes = 2 * self.n_u + len(self.model.entries), np.zeros((self.n_u, columns))
             found = self._local.work = Steps(*one_block(
-                np.zeros((rows, width)), np.zeros((self.model.n_scratch, width)), changes, changes, changes,
+                np.zeros((rows, width)), np.zeros((width, columns, -(-columns // FOUR) * FOUR)),
+                np.zeros((self.model.n_scratch, width)), changes, changes, changes,
                 np.zeros(width), np.zeros(self.n_u), np.zeros(self.n_p + len(self.traced.m)),
             ))  # fmt: skip
         return found

@@ -18,6 +18,7 @@ from numba import types
 from .cache import device, kernel
 from .codes import DIVERGED, NO_CONVERGENCE, OK
 from .frame import saltation
+from .lanes import FOUR, load, plus, store
 from .pointers import function_at
 from .records import type_of
 
@@ -29,7 +30,7 @@ MOST_STEPS = 100_000  # in one leg
 
 _i, _f = types.int64, types.float64
 _f1, _f2, _f3, _i1, _i2 = _f[::1], _f[:, ::1], _f[:, :, ::1], _i[::1], _i[:, ::1]
-JET = types.FunctionType(types.void(_i, _i, _f, _f1, _f1, _f2, _f2))
+JET = types.FunctionType(types.void(_i, _i, _f, _f1, _f1, _f2, _f2, _f3))
 FIELD = types.FunctionType(types.void(_i, _f, _f1, _f1, _f1))
 jet_at, field_at, switch_at = function_at(JET), function_at(FIELD), function_at(FIELD)
 
@@ -46,7 +47,8 @@ class Equations(NamedTuple):
 class Steps(NamedTuple):
     """Working memory of a Taylor step with small changes."""
 
-    C: Any  # (n_u + entries + N N, order + 1) series of the states, the entries, and the small changes row by row
+    C: Any  # (n_u + entries + n_u, order + 1) series of the states and the entries, sizes of the small changes
+    D: Any  # (order + 1, N, columns in whole blocks) series of the small changes, zero in columns without one
     W: Any  # scratch of the jet
     X: Any  # (n_u, N) small changes at the end of a step
     Y: Any  # (n_u, N) scratch
@@ -79,59 +81,13 @@ class Crossing(NamedTuple):
 
 
 EQUATIONS = type_of(Equations, _i1, _i2, _i2, _i2)
-STEPS = type_of(Steps, *[_f2] * 5, *[_f1] * 3)
+STEPS = type_of(Steps, _f2, _f3, *[_f2] * 4, *[_f1] * 3)
 ENDS = type_of(Ends, _f2, _f3, _f3, _f2, _f2, _f1, _i1)
 CROSSING = type_of(Crossing, *[_f2] * 4, _f1)
 
 
 @device
-def small_changes(C, equations, mode, n_u, columns, order):
-    """Series of small changes from their first coefficients and the series of the Jacobians' entries.
-
-    That of number i in column c stands in the row n_u + entries + i columns + c of C. Four columns at once: so many sums
-    keep the processor busy; where fewer are left the last one is computed again."""
-    entries, kinds = equations.entries, equations.kinds
-    first = n_u + entries.shape[0]
-    for k in range(order):
-        for row in range(first, first + n_u * columns):
-            C[row, k + 1] = 0.0
-        for e in range(entries.shape[0]):
-            kind = kinds[mode, e]
-            if kind == 0:
-                continue
-            m, a = entries[e, 1], n_u + e
-            to, of = first + entries[e, 0] * columns, first + m * columns
-            if m >= n_u:  # memory and parameters stay
-                for c in range(columns):
-                    C[to + c, k + 1] += C[a, k] * C[of + c, 0]
-            elif kind == 1:
-                for c in range(columns):
-                    C[to + c, k + 1] += C[a, 0] * C[of + c, k]
-            else:
-                for c in range(0, columns, 4):
-                    left = columns - 1 - c
-                    r0, r1, r2, r3 = of + c, of + c + min(1, left), of + c + min(2, left), of + c + min(3, left)
-                    s0, s1, s2, s3 = 0.0, 0.0, 0.0, 0.0
-                    for j in range(k + 1):
-                        x = C[a, k - j]
-                        s0 += x * C[r0, j]
-                        s1 += x * C[r1, j]
-                        s2 += x * C[r2, j]
-                        s3 += x * C[r3, j]
-                    C[to + c, k + 1] += s0
-                    if left > 0:
-                        C[to + c + 1, k + 1] += s1
-                    if left > 1:
-                        C[to + c + 2, k + 1] += s2
-                    if left > 2:
-                        C[to + c + 3, k + 1] += s3
-        r = 1.0 / (k + 1)
-        for row in range(first, first + n_u * columns):
-            C[row, k + 1] *= r
-
-
-@device
-def excess(C, first, n_u, columns, powers):
+def excess(C, D, n_u, columns, powers):
     """The last two terms of every series against the largest of its first ones: the worst of them.
 
     Small changes of one number are judged together in the columns of the states, and alone in the others."""
@@ -140,12 +96,19 @@ def excess(C, first, n_u, columns, powers):
     high, low = powers[order], powers[order - 1]
     for i in range(n_u):
         top, last = 0.0, 0.0
-        for c in range(-1, columns):
-            row = i if c < 0 else first + i * columns + c
+        for k in range(half):
+            top = max(top, fabs(C[i, k]) * powers[k])
+        last = fabs(C[i, order]) * high + fabs(C[i, order - 1]) * low
+        if not (last < inf):
+            return inf
+        if top > 0.0:
+            worst = max(worst, last / top)
+        top, last = 0.0, 0.0
+        for c in range(columns):
             for k in range(half):
-                top = max(top, fabs(C[row, k]) * powers[k])
-            last = max(last, fabs(C[row, order]) * high + fabs(C[row, order - 1]) * low)
-            if c < 0 or c >= n_u - 1:
+                top = max(top, fabs(D[k, i, c]) * powers[k])
+            last = max(last, fabs(D[order, i, c]) * high + fabs(D[order - 1, i, c]) * low)
+            if c >= n_u - 1:
                 if not (last < inf):
                     return inf
                 if top > 0.0:
@@ -155,7 +118,7 @@ def excess(C, first, n_u, columns, powers):
 
 
 @device
-def step_for(C, first, n_u, columns, remaining, guess, powers):
+def step_for(C, D, n_u, columns, remaining, guess, powers):
     """A step on which all series have converged, at most ``remaining``; negative where there is none."""
     order = C.shape[1] - 1
     h = min(guess, remaining)
@@ -163,7 +126,7 @@ def step_for(C, first, n_u, columns, remaining, guess, powers):
         powers[0] = 1.0
         for k in range(order):
             powers[k + 1] = powers[k] * h
-        worst = excess(C, first, n_u, columns, powers)
+        worst = excess(C, D, n_u, columns, powers)
         if not (worst < inf):
             return -1.0
         # after four attempts a step may be shorter than it could be, but not longer
@@ -175,36 +138,39 @@ def step_for(C, first, n_u, columns, remaining, guess, powers):
 
 
 @device
-def step_end(C, equations, mode, n_u, columns, order, s, u, X):
+def step_end(C, D, equations, mode, order, s, u, X):
     """State and small changes at s from the step's begin; returns the integral of the divergence up to there."""
     entries, kinds = equations.entries, equations.kinds
+    n_u, columns = X.shape[0], X.shape[1]
     divergence = 0.0
     for e in range(entries.shape[0]):
         if entries[e, 0] == entries[e, 1] and kinds[mode, e] != 0:
-            v = 0.0
-            for k in range(order - 1, -1, -1):
-                v = v * s + C[n_u + e, k] / (k + 1)
+            v = C[n_u + e, 0]
+            if kinds[mode, e] == 2:
+                v = 0.0
+                for k in range(order - 1, -1, -1):
+                    v = v * s + C[n_u + e, k] / (k + 1)
             divergence += v * s
-    first = n_u + entries.shape[0]
     for i in range(n_u):
-        for c in range(-1, columns):
-            row = i if c < 0 else first + i * columns + c
-            v = C[row, order]
+        v = C[i, order]
+        for k in range(order - 1, -1, -1):
+            v = v * s + C[i, k]
+        u[i] = v
+        for c in range(0, D.shape[2], FOUR):
+            x = load(D, order, i, c)
             for k in range(order - 1, -1, -1):
-                v = v * s + C[row, k]
-            if c < 0:
-                u[i] = v
-            else:
-                X[i, c] = v
+                x = plus(load(D, k, i, c), s, x)
+            store(D, order, i, c, x)
+        for c in range(columns):
+            X[i, c] = D[order, i, c]
     return divergence
 
 
 @device
 def march_one(jet, mode, t0, tau, equations, work, guess):
     """March u over the time tau; ``total`` is multiplied up. Returns (status, integral of div f, next guess)."""
-    C, X, Y, total, u = work.C, work.X, work.Y, work.total, work.u
+    C, D, X, Y, total, u = work.C, work.D, work.X, work.Y, work.total, work.u
     n_u, n_c, order = X.shape[0], X.shape[1], C.shape[1] - 1
-    first = n_u + equations.entries.shape[0]
     for i in range(n_u):
         for c in range(n_c):
             total[i, c] = 1.0 if i == c else 0.0
@@ -215,19 +181,18 @@ def march_one(jet, mode, t0, tau, equations, work, guess):
         remaining = length - done
         if remaining <= 0.0:
             return OK, divergence, guess
-        jet(mode, order, t0 + sign * done, u, work.q, C, work.W)
         for i in range(n_c):
             for c in range(n_c):
-                C[first + i * n_c + c, 0] = 1.0 if i == c else 0.0
-        small_changes(C, equations, mode, n_u, n_c, order)
-        h = step_for(C, first, n_u, n_c, remaining, guess, work.powers)
+                D[0, i, c] = 1.0 if i == c else 0.0
+        jet(mode, order, t0 + sign * done, u, work.q, C, work.W, D)
+        h = step_for(C, D, n_u, n_c, remaining, guess, work.powers)
         if not (h > 1e-15 * length):
             return DIVERGED, divergence, guess
         if h < remaining:
             guess = h
             h = remaining / float(int(remaining / h) + 1)  # equal steps to the end, were all alike
         s = sign * h
-        divergence += step_end(C, equations, mode, n_u, n_c, order, s, u, X)
+        divergence += step_end(C, D, equations, mode, order, s, u, X)
         for i in range(n_u):
             for c in range(n_c):
                 v = X[i, c] if c >= n_u else 0.0

@@ -15,7 +15,7 @@ from numba import types
 from .cache import device, kernel
 from .codes import DIVERGED, NO_CONVERGENCE, OK
 from .frame import log_determinant, multiply, settle
-from .legs import EQUATIONS, MOST_STEPS, STEPS, add, begin, instant_of, jet_at, jump_at, put, small_changes, step_end
+from .legs import EQUATIONS, MOST_STEPS, STEPS, add, begin, instant_of, jet_at, jump_at, put, step_end
 from .records import GROWTH, type_of
 from .taylor import step_length
 
@@ -53,37 +53,53 @@ PACE = type_of(Pace, _i, _f, _f1, _f1, _f1)
 
 
 @device
+def largest(C, D, first, n_u, columns, begin, end):
+    """Rows ``first + i`` of C, orders begin to end: the largest coefficient of the small changes of number i.
+
+    Returns the largest of all."""
+    whole = 0.0
+    for i in range(n_u):
+        for k in range(begin, end + 1):
+            top = 0.0
+            for c in range(columns):
+                top = max(top, fabs(D[k, i, c]))
+            C[first + i, k] = top
+            whole = max(whole, top)
+    return whole
+
+
+@device
 def frame_along(jet, mode, t0, tau, unit, equations, pace, seen, work):
     """March state and frame over the time tau, into the row ``unit`` of ``growth``. Returns a status."""
-    C, X, u, Q, scale = work.C, work.X, work.u, seen.frame, seen.scale
-    n, columns, n_u, order = Q.shape[0], Q.shape[1], u.shape[0], pace.order
-    first = n_u + equations.entries.shape[0]
+    C, D, X, u, Q, scale = work.C, work.D, work.X, work.u, seen.frame, seen.scale
+    n, columns, n_u, order, entries = Q.shape[0], Q.shape[1], u.shape[0], pace.order, equations.entries.shape[0]
     done = 0.0
     for _ in range(MOST_STEPS):
         remaining = tau - done
         if remaining <= 0.0:
             settle(Q, n, columns, seen.lengths, False, True, seen.growth[unit])
             return OK
-        jet(mode, order, t0 + done, u, work.q, C, work.W)
         for i in range(n):
             for c in range(columns):
-                C[first + i * columns + c, 0] = scale[i] * Q[i, c]
-        small_changes(C, equations, mode, n_u, columns, order)
-        h = step_length(
-            C, order, n_u, pace.sizes.shape[0], u, pace.weight, pace.sizes, pace.log_tolerance
-        )
+                D[0, i, c] = scale[i] * Q[i, c]
+        jet(mode, order, t0 + done, u, work.q, C, work.W, D)
+        if largest(C, D, n_u + entries, n_u, columns, order - 1, order) == 0.0:
+            largest(C, D, n_u + entries, n_u, columns, 1, order)
+        h = step_length(C, order, n_u, entries + n_u, u, pace.weight, pace.sizes, pace.log_tolerance)
         if not (h > 1e-15 * tau):
             return DIVERGED
         if h < remaining:
             h = remaining / float(int(remaining / h) + 1)  # equal steps to the end, were all alike
         else:
             h = remaining
-        seen.sums[0] += step_end(C, equations, mode, n_u, columns, order, h, u, X)
+        seen.sums[0] += step_end(C, D, equations, mode, order, h, u, X)
         for i in range(n_u):
             if not (fabs(u[i]) <= pace.limit[i]):
                 return DIVERGED
             for c in range(columns):
                 Q[i, c] = X[i, c] / scale[i]
+                if not (fabs(Q[i, c]) < inf):
+                    return DIVERGED
         settle(Q, n, columns, seen.lengths, False, False, seen.growth[unit])
         done = tau if h >= remaining else done + h
     return NO_CONVERGENCE
