@@ -35,8 +35,8 @@ __all__ = ["Frame", "Growth", "frame_for"]
 CHUNK = 250  # units of time recorded at once
 APART = 1e3  # times the engine's tolerance: what a piece may end away from the record
 DENSEST = 4096  # samples per unit of time
-FINER = 1e-2  # of the engine's tolerance: a step of the frame
-FINEST = 1e-12  # and no coarser than this
+FINER = 0.1  # of the engine's tolerance: a step of the frame
+FINEST = 1e-11  # and no coarser than this
 
 
 @dataclass
@@ -109,7 +109,7 @@ class _SeriesFrame:
         if isinstance(engine, SeriesEngine):
             weight, _, limit = engine.norms
         tolerance = max(min(FINER * self.rtol, FINEST), 1e-16)
-        self.pace = Pace(order_for(tolerance, True), float(np.log(tolerance)), weight, np.zeros(0), limit)
+        self.pace = Pace(order_for(tolerance), float(np.log(tolerance)), weight, np.zeros(0), limit)
 
     def advance(self, state: State, count: int, unit: float) -> Growth:
         total = Growth(np.zeros((count, self.flow.n)), 0.0, 0.0, 1.0, codes.OK)

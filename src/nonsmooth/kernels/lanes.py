@@ -49,14 +49,14 @@ def _sum_columns(out: Any, table: Any, mode: Any, node: Any, w: Any, n: Any, m: 
         out[r] = total
 
 
-def _load(D: Any, k: Any, i: Any, c: Any) -> Any:
-    """The four numbers D[k, i, c : c + FOUR]."""
-    return D[k, i, c : c + FOUR].copy()
+def _load(D: Any, place: Any) -> Any:
+    """Four numbers of an array from a place in its memory on."""
+    return D.reshape(-1)[place : place + FOUR].copy()
 
 
-def _store(D: Any, k: Any, i: Any, c: Any, x: Any) -> None:
-    """D[k, i, c : c + FOUR] = x."""
-    D[k, i, c : c + FOUR] = x
+def _store(D: Any, place: Any, x: Any) -> None:
+    """Four numbers to an array."""
+    D.reshape(-1)[place : place + FOUR] = x
 
 
 def _times(a: Any, x: Any) -> Any:
@@ -205,21 +205,26 @@ class _FourModel(models.PrimitiveModel):
         super().__init__(manager, kind, _vector)
 
 
-@intrinsic
-def _load_four(typing: Any, D: Any, k: Any, i: Any, c: Any) -> Any:
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return _Array(context, builder, D, arguments[0]).load(_vector, *arguments[1:])
-
-    return _four(D, *[types.int64] * 3), generate
+def _at(context: Any, builder: Any, kind: Any, array: Any, place: Any) -> Any:
+    data = context.make_array(kind)(context, builder, array).data
+    return builder.bitcast(builder.gep(data, [place]), _vector.as_pointer())
 
 
 @intrinsic
-def _store_four(typing: Any, D: Any, k: Any, i: Any, c: Any, x: Any) -> Any:
+def _load_four(typing: Any, D: Any, place: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        _Array(context, builder, D, arguments[0]).store(arguments[4], *arguments[1:4])
+        return builder.load(_at(context, builder, D, *arguments), align=8)
+
+    return _four(D, types.int64), generate
+
+
+@intrinsic
+def _store_four(typing: Any, D: Any, place: Any, x: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        builder.store(arguments[2], _at(context, builder, D, *arguments[:2]), align=8)
         return context.get_dummy_value()
 
-    return types.void(D, *[types.int64] * 3, x), generate
+    return types.void(D, types.int64, x), generate
 
 
 @intrinsic

@@ -141,7 +141,7 @@ def step_for(C, D, n_u, columns, remaining, guess, powers):
 def step_end(C, D, equations, mode, order, s, u, X):
     """State and small changes at s from the step's begin; returns the integral of the divergence up to there."""
     entries, kinds = equations.entries, equations.kinds
-    n_u, columns = X.shape[0], X.shape[1]
+    n_u, columns, rows, width = X.shape[0], X.shape[1], D.shape[1], D.shape[2]
     divergence = 0.0
     for e in range(entries.shape[0]):
         if entries[e, 0] == entries[e, 1] and kinds[mode, e] != 0:
@@ -156,11 +156,11 @@ def step_end(C, D, equations, mode, order, s, u, X):
         for k in range(order - 1, -1, -1):
             v = v * s + C[i, k]
         u[i] = v
-        for c in range(0, D.shape[2], FOUR):
-            x = load(D, order, i, c)
+        for c in range(0, width, FOUR):
+            x = load(D, (order * rows + i) * width + c)
             for k in range(order - 1, -1, -1):
-                x = plus(load(D, k, i, c), s, x)
-            store(D, order, i, c, x)
+                x = plus(load(D, (k * rows + i) * width + c), s, x)
+            store(D, (order * rows + i) * width + c, x)
         for c in range(columns):
             X[i, c] = D[order, i, c]
     return divergence
