@@ -88,8 +88,9 @@ class _LinearFrame:
 
 
 class _SeriesFrame:
-    """Taylor series for the frame, along pieces of a trajectory that the engine records; where nothing can happen to the
-    motion, along one that it marches itself."""
+    """Taylor series for the frame, along pieces of a trajectory that the engine records.
+
+    Where nothing can happen to the motion nothing is recorded: state and frame are marched as one."""
 
     def __init__(
         self, engine: Engine, tables: Any, flow: VariationalFlow, values: FloatArray, period: float | None, timed: bool
@@ -244,8 +245,9 @@ def _pieces(traced: Traced, log: Log, instants: FloatArray, density: int) -> Any
 
 def _smooth(engine: Engine, traced: Traced) -> bool:
     """Whether the motion is one Taylor series after the other, with steps of the engine's own choice."""
-    taylor = isinstance(engine, SeriesEngine) and engine.name == "taylor"
-    return taylor and not traced.transitions and engine.step is None and engine.order is None
+    if not isinstance(engine, SeriesEngine) or engine.name != "taylor" or traced.transitions:
+        return False
+    return engine.step is None and engine.order is None
 
 
 def frame_for(system: System, engine: Engine, tables: Any, i: int) -> Frame:

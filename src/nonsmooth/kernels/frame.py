@@ -8,7 +8,7 @@ from math import fabs, inf, log, sqrt
 
 from .cache import inline
 
-__all__ = ["log_determinant", "multiply", "saltation", "settle"]
+__all__ = ["log_determinant", "multiply", "saltation", "straighten"]
 
 SINGULAR = 1e-13  # a pivot below this part of its row's size is that of a matrix without full rank
 
@@ -67,7 +67,7 @@ def put_away(lengths, columns, growth):
 
 
 @inline
-def settle(Q, n, columns, lengths, singular, ended, growth):
+def straighten(Q, n, columns, lengths, singular, ended, growth):
     """Make the frame orthonormal; its lengths go to ``growth`` where the unit of time has ended, or before they
     overflow."""
     orthonormal(Q, n, columns, lengths, singular)

@@ -10,7 +10,7 @@ from numba import types
 
 from .cache import inline, kernel
 from .codes import OK, PAUSED
-from .frame import log_determinant, multiply, saltation, settle
+from .frame import log_determinant, multiply, saltation, straighten
 from .hybrid import leave, march
 from .linear_search import slope_of
 from .linear_tables import DEGREE, HARMONICS, NODES, STATES, WAVE, M
@@ -99,7 +99,7 @@ def mark(i, wrapped, ended, crossed, step, form, goal, seen, work):
         memo[DONE] = memo[PERIODS] * T + memo[TIME] - memo[WAITED] if T < 1e300 else memo[DONE] + step
     if not crossed:
         unit = tally[RETURNS] - 1 if ended else tally[RETURNS]
-        settle(seen.frame, STATES, STATES, seen.lengths, False, ended, seen.growth[unit])
+        straighten(seen.frame, STATES, STATES, seen.lengths, False, ended, seen.growth[unit])
 
 
 @inline
@@ -164,7 +164,7 @@ def depart(jumps, seen, work):
     seen.sums[1] += size
     seen.sums[2] += jumps
     multiply(S, seen.frame, STATES, STATES, seen.scratch)
-    settle(seen.frame, STATES, STATES, seen.lengths, size == -inf, False, seen.growth[work.tally[RETURNS]])
+    straighten(seen.frame, STATES, STATES, seen.lengths, size == -inf, False, seen.growth[work.tally[RETURNS]])
 
 
 @inline

@@ -14,7 +14,7 @@ from numba import types
 
 from .cache import device, kernel
 from .codes import DIVERGED, NO_CONVERGENCE, OK
-from .frame import log_determinant, multiply, settle
+from .frame import log_determinant, multiply, straighten
 from .legs import EQUATIONS, MOST_STEPS, STEPS, add, begin, instant_of, jet_at, jump_at, put, step_end
 from .records import GROWTH, type_of
 from .taylor import step_length
@@ -77,7 +77,7 @@ def frame_along(jet, mode, t0, tau, unit, equations, pace, seen, work):
     for _ in range(MOST_STEPS):
         remaining = tau - done
         if remaining <= 0.0:
-            settle(Q, n, columns, seen.lengths, False, True, seen.growth[unit])
+            straighten(Q, n, columns, seen.lengths, False, True, seen.growth[unit])
             return OK
         for i in range(n):
             for c in range(columns):
@@ -100,7 +100,7 @@ def frame_along(jet, mode, t0, tau, unit, equations, pace, seen, work):
                 Q[i, c] = X[i, c] / scale[i]
                 if not (fabs(Q[i, c]) < inf):
                     return DIVERGED
-        settle(Q, n, columns, seen.lengths, False, False, seen.growth[unit])
+        straighten(Q, n, columns, seen.lengths, False, False, seen.growth[unit])
         done = tau if h >= remaining else done + h
     return NO_CONVERGENCE
 
@@ -125,7 +125,7 @@ def transitions_at(m, t, pieces, equations, out, seen, work):
     size = log_determinant(S, n, seen.matrix)
     seen.sums[1] += size
     multiply(S, seen.frame, n, seen.frame.shape[1], seen.scratch)
-    settle(seen.frame, n, seen.frame.shape[1], seen.lengths, size == -inf, True, seen.growth[pieces.unit[m]])
+    straighten(seen.frame, n, seen.frame.shape[1], seen.lengths, size == -inf, True, seen.growth[pieces.unit[m]])
 
 
 @kernel(types.int64(EQUATIONS, PIECES, PACE, _f1, GROWTH, _f1, STEPS))
