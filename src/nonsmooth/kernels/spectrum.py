@@ -53,19 +53,27 @@ PACE = type_of(Pace, _i, _f, _f1, _f1, _f1)
 
 
 @device
-def largest(C, D, first, n_u, columns, begin, end):
-    """Rows ``first + i`` of C, orders begin to end: the largest coefficient of the small changes of number i.
+def largest(C, D, first, n_u, columns, order):
+    """Rows ``first + i`` of C: the largest coefficients of the small changes of number i.
 
-    Returns the largest of all."""
-    whole = 0.0
-    for i in range(n_u):
-        for k in range(begin, end + 1):
-            top = 0.0
-            for c in range(columns):
-                top = max(top, fabs(D[k, i, c]))
-            C[first + i, k] = top
-            whole = max(whole, top)
-    return whole
+    Of the last two orders, or of all where these vanish (see ``taylor.step_length``)."""
+    begin, whole = order - 1, 0.0
+    while whole == 0.0 and begin > 0:
+        for i in range(n_u):
+            for k in range(begin, order + 1):
+                top = 0.0
+                for c in range(columns):
+                    top = max(top, fabs(D[k, i, c]))
+                C[first + i, k] = top
+                whole = max(whole, top)
+        begin = 1 if begin > 1 else 0
+
+
+@device
+def upright(size, remaining, unit, seen):
+    """The frame orthonormal again, after a step (``size`` 0) or transitions with this log|det S|."""
+    n, columns = seen.frame.shape
+    straighten(seen.frame, n, columns, seen.lengths, size == -inf, remaining <= 0.0, seen.growth[unit])
 
 
 @device
@@ -77,14 +85,12 @@ def frame_along(jet, mode, t0, tau, unit, equations, pace, seen, work):
     for _ in range(MOST_STEPS):
         remaining = tau - done
         if remaining <= 0.0:
-            straighten(Q, n, columns, seen.lengths, False, True, seen.growth[unit])
             return OK
         for i in range(n):
             for c in range(columns):
                 D[0, i, c] = scale[i] * Q[i, c]
         jet(mode, order, t0 + done, u, work.q, C, work.W, D)
-        if largest(C, D, n_u + entries, n_u, columns, order - 1, order) == 0.0:
-            largest(C, D, n_u + entries, n_u, columns, 1, order)
+        largest(C, D, n_u + entries, n_u, columns, order)
         h = step_length(C, order, n_u, entries + n_u, u, pace.weight, pace.sizes, pace.log_tolerance)
         if not (h > 1e-15 * tau):
             return DIVERGED
@@ -100,8 +106,8 @@ def frame_along(jet, mode, t0, tau, unit, equations, pace, seen, work):
                 Q[i, c] = X[i, c] / scale[i]
                 if not (fabs(Q[i, c]) < inf):
                     return DIVERGED
-        straighten(Q, n, columns, seen.lengths, False, False, seen.growth[unit])
         done = tau if h >= remaining else done + h
+        upright(0.0, tau - done, unit, seen)
     return NO_CONVERGENCE
 
 
@@ -125,7 +131,7 @@ def transitions_at(m, t, pieces, equations, out, seen, work):
     size = log_determinant(S, n, seen.matrix)
     seen.sums[1] += size
     multiply(S, seen.frame, n, seen.frame.shape[1], seen.scratch)
-    straighten(seen.frame, n, seen.frame.shape[1], seen.lengths, size == -inf, True, seen.growth[pieces.unit[m]])
+    upright(size, 0.0, pieces.unit[m], seen)
 
 
 @kernel(types.int64(EQUATIONS, PIECES, PACE, _f1, GROWTH, _f1, STEPS))

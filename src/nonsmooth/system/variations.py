@@ -204,4 +204,4 @@ def _function(name: str, signature: str, arguments: str, traced: Traced, branche
         lines.append(f"{'el' if i else ''}if {selector} == {i}:")
         lines += [f"    {line}" for line in branch or ["pass"]]
     body = "".join(f"    {line}\n" for line in lines or ["pass"])
-    return f'\n\n@callback("{signature}")\ndef {name}({arguments}):\n{body}'.rstrip("\n")
+    return f'\n\n@callback("{signature}", no_cpython_wrapper=True, no_cfunc_wrapper=True)\ndef {name}({arguments}):\n{body}'.rstrip("\n")
