@@ -22,19 +22,35 @@ class _Spectrum:
 
     def run(self, start: tuple[float, ...], transient: float, duration: float, unit: float) -> NDArray[np.float64]:
         """The exponents over ``duration``, after a ``transient`` that turns the frame into the directions of growth."""
-        ta, frame, qr, log, diagonal = self.ta, self.frame, np.linalg.qr, np.log, np.diagonal
-        ta.time = 0.0
-        ta.state[:3], frame[:] = start, np.eye(3)
-        if ta.with_events:
-            ta.reset_cooldowns()
+        frame, qr, log, diagonal = self.frame, np.linalg.qr, np.log, np.diagonal
+        self._begin(start, np.eye(3))
         for length in (transient, duration):
             sums, count = np.zeros(3), round(length / unit)
             for _ in range(count):
-                ta.propagate_for(unit)
+                self.ta.propagate_for(unit)
                 q, r = qr(frame)
                 sums += log(abs(diagonal(r)))
                 frame[:] = q
         return np.sort(sums / (count * unit))[::-1]
+
+    def short(
+        self, start: tuple[float, ...], duration: float, unit: float, scale: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """The same without a transient, angles being measured in units of the states' scales."""
+        self._begin(start, np.diag(scale))
+        sums, count = np.zeros(3), round(duration / unit)
+        for _ in range(count):
+            self.ta.propagate_for(unit)
+            q, r = np.linalg.qr(self.frame / scale[:, None])
+            sums += np.log(abs(np.diagonal(r)))
+            self.frame[:] = q * scale[:, None]
+        return np.sort(sums / (count * unit))[::-1]
+
+    def _begin(self, start: tuple[float, ...], frame: NDArray[np.float64]) -> None:
+        self.ta.time = 0.0
+        self.ta.state[:3], self.frame[:] = start, frame
+        if self.ta.with_events:
+            self.ta.reset_cooldowns()
 
 
 def lorenz(tolerance: float) -> _Spectrum:
