@@ -37,9 +37,8 @@ def run(effort: float) -> tuple[list[str], list[Verdict]]:
         "",
         f"heyoka: variational equations at {TOLERANCE:g}, NumPy's QR every {UNITS['Lorenz']} units of time (Lorenz) and"
         f" {UNITS['valve']} (valve), the valve's",
-        f"saltation by hand; ours: `rtol` {RTOL:g}. Errors: the largest of the three exponents over {SHORT:g} units from"
-        " the same start and frame,",
-        "against heyoka at 1e-16 with a QR every 1/32.",
+        f"saltation by hand; ours: `rtol` {RTOL:g}. Errors: the largest of the three exponents over {SHORT:g} units",
+        "from the same start and frame, against heyoka at 1e-16 with a QR every 1/32.",
         "",
         "| case | exponents | standard error | trace defect | seconds | heyoka, seconds | heyoka / ours | error"
         " | heyoka's error |",

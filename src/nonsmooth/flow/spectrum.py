@@ -2,9 +2,9 @@ r"""How small changes grow along a trajectory: frames carried through legs and t
 
 The sums of the logarithms of what is divided out, over the elapsed time, are finite-time Lyapunov exponents. Their sum
 is :math:`\frac1t \log|\det\Phi(t)|`, which must equal
-:math:`\frac1t(\int \operatorname{div} f\,dt + \sum \log|\det S|)`. Two ways lead there: linear systems with an exact
-flow are marched with their frame in one kernel; every other trajectory is recorded by its engine piece by piece, and
-the frame follows it with Taylor legs.
+:math:`\frac1t(\int \operatorname{div} f\,dt + \sum \log|\det S|)`. Linear systems with an exact flow are marched with
+their frame in one kernel, and so is a motion of Taylor series without transitions. Every other trajectory is recorded
+by its engine piece by piece, and the frame follows it.
 
 References
 ----------
@@ -244,10 +244,10 @@ def _pieces(traced: Traced, log: Log, instants: FloatArray, density: int) -> Any
 
 
 def _smooth(engine: Engine, traced: Traced) -> bool:
-    """Whether the motion is one Taylor series after the other, with steps of the engine's own choice."""
+    """Whether the motion is one Taylor series after the other, of steps that the engine chooses and need not check."""
     if not isinstance(engine, SeriesEngine) or engine.name != "taylor" or traced.transitions:
         return False
-    return engine.step is None and engine.order is None
+    return engine.step is None and engine.order is None and not engine.layers.checked
 
 
 def frame_for(system: System, engine: Engine, tables: Any, i: int) -> Frame:

@@ -204,4 +204,5 @@ def _function(name: str, signature: str, arguments: str, traced: Traced, branche
         lines.append(f"{'el' if i else ''}if {selector} == {i}:")
         lines += [f"    {line}" for line in branch or ["pass"]]
     body = "".join(f"    {line}\n" for line in lines or ["pass"])
-    return f'\n\n@callback("{signature}", no_cpython_wrapper=True, no_cfunc_wrapper=True)\ndef {name}({arguments}):\n{body}'.rstrip("\n")
+    decorator = f'@callback("{signature}", no_cpython_wrapper=True, no_cfunc_wrapper=True)'  # only kernels call it
+    return f"\n\n{decorator}\ndef {name}({arguments}):\n{body}".rstrip("\n")
