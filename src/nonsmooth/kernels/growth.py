@@ -10,7 +10,7 @@ from numba import types
 
 from .cache import inline, kernel, once
 from .codes import OK, PAUSED
-from .frame import log_determinant, orthonormal, put_away, saltation
+from .frame import log_determinant, multiply, saltation, straighten
 from .hybrid import leave, march
 from .linear_search import slope_of
 from .linear_stepper import STEPPER
@@ -61,20 +61,6 @@ def hurry(i, form, net, section, goal, seen, tables, work, patience):
     return False, False, patience
 
 
-@inline
-def times(X, seen):
-    """frame = X frame, for X in units of the scales."""
-    Q, scratch = seen.frame, seen.scratch
-    for c in range(STATES):
-        for r in range(STATES):
-            total = X[r, 0] * Q[0, c]
-            for j in range(1, STATES):
-                total += X[r, j] * Q[j, c]
-            scratch[r] = total
-        for r in range(STATES):
-            Q[r, c] = scratch[r]
-
-
 @once
 def observe(i, step, stop, triggered, form, net, section, goal, seen, tables, work):
     """Carry the frame over the leg: X = exp(A tau), from the nearest node and the Taylor rows of the states."""
@@ -98,7 +84,7 @@ def observe(i, step, stop, triggered, form, net, section, goal, seen, tables, wo
         seen.sums[0] += tables.field[mode, r, r] * step
         for c in range(STATES):
             X[r, c] *= scale[c] / scale[r]
-    times(X, seen)
+    multiply(X, seen.frame, STATES, STATES, seen.scratch)
     return OPEN_RUN
 
 
@@ -113,19 +99,8 @@ def mark(i, wrapped, ended, crossed, step, form, goal, seen, work):
     else:
         memo[DONE] = memo[PERIODS] * T + memo[TIME] - memo[WAITED] if T < NO_END else memo[DONE] + step
     if not crossed:
-        settle_frame(tally[RETURNS] - 1 if ended else tally[RETURNS], ended, False, seen)
-
-
-@inline
-def settle_frame(unit, ended, singular, seen):
-    """Make the frame orthonormal; its lengths go to the unit's logarithms at its end, or before they overflow."""
-    lengths = seen.lengths
-    orthonormal(seen.frame, STATES, STATES, lengths, singular)
-    away = ended
-    for c in range(STATES):
-        away = away or not (1e-100 < lengths[c] < 1e100)
-    if away:
-        put_away(lengths, STATES, seen.growth[unit])
+        unit = tally[RETURNS] - 1 if ended else tally[RETURNS]
+        straighten(seen.frame, STATES, STATES, seen.lengths, False, ended, seen.growth[unit])
 
 
 @inline
@@ -189,8 +164,8 @@ def depart(jumps, seen, work):
     size = log_determinant(S, STATES, seen.matrix)
     seen.sums[1] += size
     seen.sums[2] += jumps
-    times(S, seen)
-    settle_frame(work.tally[RETURNS], False, size == -inf, seen)
+    multiply(S, seen.frame, STATES, STATES, seen.scratch)
+    straighten(seen.frame, STATES, STATES, seen.lengths, size == -inf, False, seen.growth[work.tally[RETURNS]])
 
 
 @once

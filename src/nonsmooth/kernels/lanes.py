@@ -15,11 +15,12 @@ from typing import Any
 import numba
 from llvmlite import ir
 from numba.core import cgutils, types
-from numba.extending import intrinsic
+from numba.extending import intrinsic, models, register_model
 
-__all__ = ["LANES", "plain", "sum_columns", "sum_rows"]
+__all__ = ["FOUR", "LANES", "load", "plain", "plus", "store", "sum_columns", "sum_rows", "times"]
 
 LANES = 8
+FOUR = 4  # numbers of a vector that is a value in a kernel
 WIDEST = 32  # lanes of one sum: what the vector registers hold
 LONGEST = 24  # sums of more terms are loops
 FEW = 2  # so many columns' entries go one by one: joining them costs more than it gains
@@ -46,6 +47,26 @@ def _sum_columns(out: Any, table: Any, mode: Any, node: Any, w: Any, n: Any, m: 
         for j in range(n - 1, -1, -1):
             total += table[mode, node, j, r] * w[j]
         out[r] = total
+
+
+def _load(D: Any, place: Any) -> Any:
+    """Four numbers of an array from a place in its memory on."""
+    return D.reshape(-1)[place : place + FOUR].copy()
+
+
+def _store(D: Any, place: Any, x: Any) -> None:
+    """Four numbers to an array."""
+    D.reshape(-1)[place : place + FOUR] = x
+
+
+def _times(a: Any, x: Any) -> Any:
+    """A number times four."""
+    return a * x
+
+
+def _plus(y: Any, a: Any, x: Any) -> Any:
+    """y + a x."""
+    return y + a * x
 
 
 plain = SimpleNamespace(sum_rows=_sum_rows, sum_columns=_sum_columns)
@@ -168,9 +189,65 @@ def _sum_columns_in_lanes(typing: Any, out: Any, table: Any, mode: Any, node: An
     return signature, generate
 
 
+class _Four(types.Type):
+    """Four numbers in a vector register."""
+
+    def __init__(self) -> None:
+        super().__init__(name="Four")
+
+
+_four, _vector = _Four(), ir.VectorType(ir.DoubleType(), FOUR)
+
+
+@register_model(_Four)
+class _FourModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, kind: Any) -> None:
+        super().__init__(manager, kind, _vector)
+
+
+def _at(context: Any, builder: Any, kind: Any, array: Any, place: Any) -> Any:
+    data = context.make_array(kind)(context, builder, array).data
+    return builder.bitcast(builder.gep(data, [place]), _vector.as_pointer())
+
+
+@intrinsic
+def _load_four(typing: Any, D: Any, place: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.load(_at(context, builder, D, *arguments), align=8)
+
+    return _four(D, types.int64), generate
+
+
+@intrinsic
+def _store_four(typing: Any, D: Any, place: Any, x: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        builder.store(arguments[2], _at(context, builder, D, *arguments[:2]), align=8)
+        return context.get_dummy_value()
+
+    return types.void(D, types.int64, x), generate
+
+
+@intrinsic
+def _times_four(typing: Any, a: Any, x: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return _scaled(builder, arguments[1], arguments[0])
+
+    return _four(types.float64, x), generate
+
+
+@intrinsic
+def _plus_four(typing: Any, y: Any, a: Any, x: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.fadd(arguments[0], _scaled(builder, arguments[2], arguments[1]), flags=_CONTRACT)
+
+    return _four(y, types.float64, x), generate
+
+
 def _choose(compiled: Any, loops: Callable[..., None]) -> Any:
     return loops if numba.config.DISABLE_JIT else compiled
 
 
 sum_rows = _choose(_sum_rows_in_lanes, _sum_rows)
 sum_columns = _choose(_sum_columns_in_lanes, _sum_columns)
+load, store = _choose(_load_four, _load), _choose(_store_four, _store)
+times, plus = _choose(_times_four, _times), _choose(_plus_four, _plus)
