@@ -34,7 +34,7 @@ extensions = [
     "sphinx_design",
 ]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
-exclude_patterns = ["_build", "guides/measured_methods.md"]  # the latter is included by a page
+exclude_patterns = ["_build", "theory/measured_methods.md"]  # the latter is included by a page
 templates_path: list[str] = []
 
 myst_enable_extensions = ["amsmath", "dollarmath", "deflist", "colon_fence", "substitution"]
