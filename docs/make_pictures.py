@@ -27,6 +27,7 @@ from nonsmooth import plot
 DOCS = Path(__file__).resolve().parent
 PICTURES = DOCS / "pictures"
 PIXELS = 1400  # wide: twice what a page shows, for screens of two pixels per point
+RAISES = re.compile(r"```text\n\w+Error: ")  # below a block of Python: it ends in this error
 INCHES = 5.2  # a figure of one column is drawn this wide, its letters as they are
 
 
@@ -67,9 +68,11 @@ def comparison_section() -> Any:
 def drawn_by(page: Path, elsewhere: set[str]) -> list[tuple[str, str]]:
     """(name of the picture, all code of the page above it) for each picture of a page that its own code draws as ``ax``."""
     text = page.read_text(encoding="utf-8")
-    code, found = "", []
-    for block, picture in re.findall(r"^```python\n(.*?)^```|^!\[.*?\]\(\S*pictures/(\w+)\.png\)", text, re.M | re.S):
-        code += block
+    code = ""
+    found = []
+    parts = r"^```python\n(.*?)^```(?=\n*(.{0,40}))|^!\[.*?\]\(\S*pictures/(\w+)\.png\)"
+    for block, after, picture in re.findall(parts, text, re.M | re.S):
+        code += "" if RAISES.match(after) else block
         if picture and picture not in elsewhere and "ax = " in code:
             found.append((picture, code))
     return found
