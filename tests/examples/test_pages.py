@@ -9,7 +9,7 @@ import pytest
 from page_code import blocks, run_page
 
 ROOT = Path(__file__).parents[2]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+PAGES = [ROOT / "README.md", *sorted(page for page in (ROOT / "docs").rglob("*.md") if "_build" not in page.parts)]
 NEED_A_FILE = {"recordings", "your_rig"}  # of the reader's own
 PAGES = [page for page in PAGES if page.stem not in NEED_A_FILE and blocks(page.read_text(encoding="utf-8"))]
 FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
