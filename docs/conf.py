@@ -45,7 +45,7 @@ myst_substitutions = {"statuses": "\n".join(["| name | what happened | what to d
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "description"
-autodoc_typehints_description_target = "documented"
+autodoc_typehints_description_target = "documented_params"
 napoleon_google_docstring = False
 napoleon_use_rtype = False
 

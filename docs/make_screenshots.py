@@ -21,11 +21,12 @@ BUILT = Path(__file__).resolve().parent / "_build"
 PAGES = ["index", "gallery/index", "gallery/branch", "tutorials/impact_oscillator", "api/verbs"]
 WIDTHS = {1280: 900, 400: 800}
 BROWSERS = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome"]
-LONGEST = 4000  # pixels of a page that a picture shows
+LONGEST = 6000  # pixels of a page that a picture shows
 
-# Text that stands beyond the right edge and is not in a box of its own that scrolls or is hidden.
+# Opens what is folded up, then looks for text beyond the right edge that is not in a box which scrolls or is hidden.
 BEYOND = """
 (() => {
+  document.querySelectorAll("article details").forEach(answer => { answer.open = true; });
   const edge = document.documentElement.clientWidth;
   const boxed = element => {
     for (let e = element; e && e !== document.body; e = e.parentElement) {
