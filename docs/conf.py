@@ -1,7 +1,7 @@
 """Sphinx configuration: MyST pages, the reference taken from the docstrings, warnings are errors.
 
-Built pages need no network: formulas become MathML, and copy buttons and cards are files of the pages' own. Links to the
-documentation of NumPy and others need their inventories, so they are made only with ``INTERSPHINX=1 make docs``.
+Built pages need no network: formulas become MathML, and copy buttons and cards are files of the pages' own. Links to
+the documentation of NumPy and others need their inventories, so they are made only with ``INTERSPHINX=1 make docs``.
 """
 
 import os
@@ -74,7 +74,8 @@ html_math_renderer = "mathml"
 def _formula(self: Any, node: nodes.Element) -> None:
     """Write a formula as MathML, which browsers draw themselves."""
     block = isinstance(node, nodes.math_block)
-    text = re.sub(r"frac(\d)(\d)", r"frac{\1}{\2}", node.astext().replace(r"\dots", r"\ldots"))  # not known to tex2mathml
+    # What tex2mathml does not know.
+    text = re.sub(r"frac(\d)(\d)", r"frac{\1}{\2}", node.astext().replace(r"\dots", r"\ldots"))
     try:
         formula = tex2mathml(text, as_block=block)
     except MathError as error:

@@ -66,7 +66,7 @@ def comparison_section() -> Any:
 
 
 def drawn_by(page: Path, elsewhere: set[str]) -> list[tuple[str, str]]:
-    """(name of the picture, all code of the page above it) for each picture of a page that its own code draws as ``ax``."""
+    """(name, all code of the page above it) for each picture of a page that its own code draws as ``ax``."""
     text = page.read_text(encoding="utf-8")
     code = ""
     found = []

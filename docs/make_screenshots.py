@@ -1,8 +1,9 @@
 """Take pictures of the built pages in headless Chromium, wide and narrow, and check that they fit.
 
 ``make screenshots`` builds the pages first. Pictures go to ``docs/_build/screenshots``: look at them. The program fails
-where a page is wider than its window, or where text outside of code and tables stands beyond the window's edge. Names of
-pages (``guides/maps``) take these only; ``all`` checks every page and keeps no picture. ``CHROMIUM`` names the browser.
+where a page is wider than its window, or where text outside of code and tables stands beyond the window's edge. With
+names of pages (``guides/maps``) it takes these only; with ``all`` it checks every page and keeps no picture.
+``CHROMIUM`` names the browser.
 """
 
 from __future__ import annotations
@@ -106,7 +107,8 @@ class Browser:
 
     def look(self, page: Path, width: int, height: int, picture: Path | None) -> list[str]:
         """Open a page in a window of this size, keep a picture of it, and return what does not fit."""
-        self.ask("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=width < 600)
+        window = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600}
+        self.ask("Emulation.setDeviceMetricsOverride", **window)
         self.ask("Page.navigate", until="Page.loadEventFired", url=page.as_uri())
         told = json.loads(self.ask("Runtime.evaluate", expression=BEYOND)["result"]["value"])
         if picture:
@@ -128,7 +130,8 @@ def main(wanted: list[str]) -> int:
     if not (html / "index.html").is_file():
         raise SystemExit("the pages are not built: make docs")
     everything = wanted == ["all"]
-    names = [str(file.relative_to(html))[:-5] for file in sorted(html.rglob("*.html"))] if everything else wanted or PAGES
+    built = [str(file.relative_to(html))[:-5] for file in sorted(html.rglob("*.html"))]
+    names = built if everything else wanted or PAGES
     names = [name for name in names if not name.startswith(("_modules/", "genindex", "py-modindex", "search"))]
     shots = BUILT / "screenshots"
     shots.mkdir(parents=True, exist_ok=True)
