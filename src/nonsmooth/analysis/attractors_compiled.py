@@ -40,12 +40,12 @@ def run_compiled(
     tables, traced = engine.prepare(points), engine.traced
     _, keep, max_period, *_ = choice
     sizes = len(traced.u), len(traced.indicators), tables.sizes[2]
-    out, probe = (_buffers(Chain.empty(len(points), k, *sizes)) for k in (keep, max_period))
+    out, probe = (Chain.empty(len(points), k, *sizes).record() for k in (keep, max_period))
     norms = np.concatenate([[tolerance], least, np.zeros(2)])
     plan, quiet = (np.array([-1, 1, -1, 1, 1, extremes], dtype=np.int64) for extremes in (1, 0))
     found = Settled.empty(len(rows), 2)
     load(engine).settle_many(
-        rows, starts, np.full(len(rows), begin), modes, np.array(choice, dtype=np.int64), norms, tables.linear,
+        rows, starts, np.full(len(rows), begin), modes, np.array(choice, dtype=np.int64), norms, tables.form,
         engine.net, plan, quiet, phase, np.inf, DIVERGENCE * engine.scale, out, probe, tables.scratch(),
         _work(max_period), tuple(getattr(found, item.name) for item in fields(found)),
     )  # fmt: skip
@@ -63,10 +63,10 @@ def exponents_compiled(
     """Largest exponents of jobs and their standard errors (:meth:`nonsmooth.analysis.attractors.Settler.exponents`)."""
     tables = engine.prepare(points)
     largest, error = np.full(len(rows), np.nan), np.full(len(rows), np.nan)
-    out = _buffers(Chain.empty(len(points), 1, 2, len(engine.traced.indicators), tables.sizes[2]))
+    out = Chain.empty(len(points), 1, 2, len(engine.traced.indicators), tables.sizes[2]).record()
     quiet = np.array([-1, 1, -1, 1, 1, 0], dtype=np.int64)
     load(engine).exponents_of(
-        rows, starts, modes, n_returns, scale, tables.linear, engine.net, quiet, phase, np.inf,
+        rows, starts, modes, n_returns, scale, tables.form, engine.net, quiet, phase, np.inf,
         DIVERGENCE * engine.scale, out, tables.scratch(), _work(max_period), largest, error,
     )  # fmt: skip
     return largest, error
@@ -77,11 +77,3 @@ def _work(max_period: int) -> tuple[Any, ...]:
     one, other = ((np.zeros(2), np.zeros(3), np.zeros(4, dtype=np.int64)) for _ in range(2))
     return *one, *other, np.zeros((3, 2)), np.zeros(max(max_period, 3))
 
-
-def _buffers(chain: Chain) -> tuple[Any, ...]:
-    """A chain's arrays in the order in which the planar kernel takes them."""
-    return (
-        chain.section, chain.maximum, chain.minimum, chain.indicator_max, chain.indicator_min, chain.output_max,
-        chain.output_min, chain.crossings, chain.contacts, chain.elapsed, chain.section_time, chain.section_mode,
-        chain.status,
-    )  # fmt: skip

@@ -10,13 +10,14 @@ from .codes import OK
 from .cuda_tables import tabled
 from .cuda_target import cuda, device, entry
 from .planar_settle import go
+from .records import Kept, Net
 
 
 @device
 def row_of(buffers, row):
     """What ``chain`` writes for one trajectory, from the buffers of all."""
     section, maximum, minimum, i_max, i_min, o_max, o_min, crossings, contacts, elapsed, times, modes, status = buffers
-    return (
+    return Kept(
         section[row : row + 1], maximum[row : row + 1], minimum[row : row + 1], i_max[row : row + 1],
         i_min[row : row + 1], o_max[row : row + 1], o_min[row : row + 1], crossings[row : row + 1],
         contacts[row : row + 1], elapsed[row : row + 1], times[row : row + 1], modes[row : row + 1],
@@ -46,7 +47,7 @@ def advance(
         row = j + leg * apart
         again = leg > 0 and apart == 0
         code = go(
-            0, u[row], clock[row], counters[row], linear, net, full if again else plan, phase, 1e300,
+            0, u[row], clock[row], counters[row], linear, Net(*net), full if again else plan, phase, 1e300,
             0 if again else n_transient, 1 if again else n_keep, limit, row_of(other if leg > 0 else out, row), scratch,
             u[row : row + 1],
         )  # fmt: skip

@@ -16,17 +16,15 @@ from numba import types
 
 from .cache import device, inline, kernel
 from .codes import BEYOND_STOP, NOT_PERIODIC, OK, SLOW
-from .linear_chain import chain
+from .records import FORM, KEPT, NET, TABLES, Goal, Motion, Section
+from .records import WORK as RUN_WORK
+from .sections import chain
 
 _i, _f = types.int64, types.float64
 _f1, _f2, _f3, _f4, _i1, _i2 = _f[::1], _f[:, ::1], _f[:, :, ::1], _f[:, :, :, ::1], _i[::1], _i[:, ::1]
 
-LINEAR = types.Tuple((
-    _f4, _f3, _f4, _f4, _i1, _f1, _f1, _f3, _f2, _f3, _f3, _f4, _f3, _f4, _f4, _f4, _f3, _f4, _f4,
-))  # fmt: skip
-NET = types.Tuple((_i2, _i2, _i1, _i1, _i1, _f1))
-BUFFERS = types.Tuple((_f3, _f2, _f2, _f2, _f2, _f2, _f2, _i1, _i1, _f1, _f2, _i2, _i1))
-SCRATCH = types.Tuple((_f4, _f3, _f3, _f4, _f3, _f2, _f2, _f2, _f2, _f1, _f1, _i1))
+LINEAR, BUFFERS = FORM, KEPT
+SCRATCH = types.Tuple((TABLES, RUN_WORK))
 WORK = types.Tuple((_f1, _f1, _i1, _f1, _f1, _i1, _f2, _f1))
 RESULTS = types.Tuple((_i1, _i1, _f1, _f1, _f1, _f1, _f2, _f2, _f2, _i1, _i1))
 
@@ -38,15 +36,17 @@ APART = 10.0
 KICK = 1e-3
 NUDGE = 1e-6
 ROUNDED = 1e-4
+FOR_EVER = 1 << 62  # steps without a pause
 
 
 @device
 def go(i, u, clock, counters, linear, net, plan, phase, t_max, transient, keep, limit, out, scratch, rest):
     """Run parameter row i on from (u, clock, counters), which are left where it ends. Returns the status."""
     clock[2] = 0.0  # the time stands as it is: the kernel must not scale it to another period
-    head = (i, i + 1, 1, rest, u, clock, counters)
-    tail = (phase, plan, t_max, transient, keep, limit)
-    chain(*(head + linear + net + tail + out + scratch))
+    section = Section(plan[0], plan[1], plan[2], plan[3], plan[4], plan[5], phase, t_max)
+    goal = Goal(transient, keep, 0.0, 0.0, limit, FOR_EVER)
+    motion = Motion(u, clock, counters)
+    chain(i, i + 1, rest[0:0], linear, net, section, goal, motion, out, scratch[0], scratch[1])
     return out[12][i]
 
 
