@@ -1,4 +1,4 @@
-"""Every example has a page in the gallery, with its picture, what it teaches and its code, and a card that leads there."""
+"""Every example has a page in the gallery with its picture, what it teaches and its code, and a card leads to it."""
 
 from __future__ import annotations
 
