@@ -47,7 +47,7 @@ autodoc_member_order = "bysource"
 autodoc_typehints = "description"
 autodoc_typehints_description_target = "documented_params"
 napoleon_google_docstring = False
-napoleon_use_rtype = False
+napoleon_use_rtype = True  # so that types of results are links
 
 _ELSEWHERE = {
     "python": "https://docs.python.org/3",
