@@ -30,8 +30,9 @@ BEYOND = """
   document.querySelectorAll("article details").forEach(answer => { answer.open = true; });
   const edge = document.documentElement.clientWidth;
   const boxed = element => {
+    const table = element.closest("table");  // small tables of text must fit, whatever scrolls round them
+    if (table && !table.querySelector("th:nth-child(4), td.text-right")) return false;
     for (let e = element; e && e !== document.body; e = e.parentElement) {
-      if (e.tagName === "PRE" || e.tagName === "TABLE" || e.tagName === "MATH") return true;
       const style = getComputedStyle(e);
       if (["auto", "scroll", "hidden"].includes(style.overflowX) || style.position === "fixed") return true;
       if (style.display === "none" || style.visibility === "hidden") return true;
