@@ -166,7 +166,7 @@ def smoothed_grazing(eta: float, g: float = 0.02, rho: float = 0.14) -> float:
 
 
 def grazing_table() -> tuple[list[str], np.ndarray]:
-    """Where the smoothed model of Fig. 9 grazes, against the closed forms of the gaps g - eta and g."""
+    """Grazing frequencies of the smoothed model of Fig. 9, against the closed forms of the gaps g - eta and g."""
     found = np.array([smoothed_grazing(eta) for eta in ETAS])
     lines = [
         "| eta | smoothed model grazes at | closed form, gap g - eta | closed form, gap g |", "|---|---|---|---|",
