@@ -81,8 +81,11 @@ def _formula(self: Any, node: nodes.Element) -> None:
     except MathError as error:
         logging.getLogger(__name__).warning("this formula cannot be written: %s: %s", text, error, location=node)
         formula = f"<code>{text}</code>"
-    # A space behind sin and its like, none around a slash.
-    formula = re.sub(r"<mo>&ApplyFunction;</mo>(?!\s*<m(o|row))", '<mspace width="0.1667em"></mspace>', formula)
+    # A space before and behind sin and its like, none around a slash.
+    space = '<mspace width="0.1667em"></mspace>'
+    formula = re.sub(r"<mo>&ApplyFunction;</mo>(?!\s*<m(o|row))", space, formula)
+    named = r"(</m(?:i|n|sub|sup)>)\s*((?:<msup>\s*)?<mi>(?:sin|cos|tan|tanh|exp|log|ln|det)</mi>)"
+    formula = re.sub(named, rf"\1{space}\2", formula)
     formula = formula.replace('<mo stretchy="false">/</mo>', '<mo lspace="0" rspace="0">/</mo>')
     self.body.append(f'<div class="math">{formula}</div>' if block else formula)
     raise nodes.SkipNode
