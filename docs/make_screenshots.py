@@ -24,23 +24,18 @@ WIDTHS = {1280: 900, 400: 800}
 BROWSERS = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome"]
 LONGEST = 6000  # pixels of a page that a picture shows
 
-# Opens what is folded up, then looks for text beyond the right edge that is not in a box which scrolls or is hidden.
+# Opens what is folded up, then looks for text beyond the right edge.
 BEYOND = """
 (() => {
   document.querySelectorAll("article details").forEach(answer => { answer.open = true; });
-  const edge = document.documentElement.clientWidth;
-  const boxed = element => {
-    const table = element.closest("table");  // small tables of text must fit, whatever scrolls round them
-    if (table && !table.querySelector("th:nth-child(4), td.text-right")) return false;
-    for (let e = element; e && e !== document.body; e = e.parentElement) {
-      const style = getComputedStyle(e);
-      if (["auto", "scroll", "hidden"].includes(style.overflowX) || style.position === "fixed") return true;
-      if (style.display === "none" || style.visibility === "hidden") return true;
-    }
-    return false;
+  const edge = window.innerWidth;
+  const boxed = element => {  // code, formulas and tables of numbers may scroll in themselves; text may not
+    const table = element.closest("table");
+    const numbers = table && table.querySelector("th:nth-child(4), td.text-right");
+    return element.closest("pre, .math") || numbers || getComputedStyle(element).visibility === "hidden";
   };
   const found = [];
-  const walker = document.createTreeWalker(document.querySelector(".page") || document.body, NodeFilter.SHOW_TEXT);
+  const walker = document.createTreeWalker(document.querySelector("article"), NodeFilter.SHOW_TEXT);
   while (walker.nextNode()) {
     if (!walker.currentNode.data.trim()) continue;
     const range = document.createRange();
@@ -108,7 +103,7 @@ class Browser:
 
     def look(self, page: Path, width: int, height: int, picture: Path | None) -> list[str]:
         """Open a page in a window of this size, keep a picture of it, and return what does not fit."""
-        window = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600}
+        window = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
         self.ask("Emulation.setDeviceMetricsOverride", **window)
         self.ask("Page.navigate", until="Page.loadEventFired", url=page.as_uri())
         told = json.loads(self.ask("Runtime.evaluate", expression=BEYOND)["result"]["value"])
