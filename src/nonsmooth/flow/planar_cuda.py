@@ -10,7 +10,8 @@ import numpy as np
 
 from nonsmooth.flow.engine import FloatArray, IntArray
 from nonsmooth.flow.launches import launch
-from nonsmooth.flow.linear import DIVERGENCE, PlanarEngine
+from nonsmooth.flow.linear import PlanarEngine
+from nonsmooth.flow.loop import DIVERGENCE
 from nonsmooth.kernels import codes
 
 __all__ = ["SLICE", "Buffers", "PlanarOnGpu", "States"]
