@@ -38,3 +38,13 @@ def test_every_page_stands_in_one_table_of_contents() -> None:
 def test_every_picture_is_shown() -> None:
     shown = "\n".join(page.read_text(encoding="utf-8") for page in PAGES)
     assert not [file.name for file in (DOCS / "pictures").glob("*.png") if f"pictures/{file.name}" not in shown]
+
+
+def test_every_name_of_the_reference_is_there() -> None:
+    import pkgutil
+
+    reference = "\n".join(page.read_text(encoding="utf-8") for page in (DOCS / "api").glob("*.md"))
+    names = re.findall(r"^\.\. auto(?:function|class|module):: (\S+)$", reference, flags=re.M)
+    assert len(names) > 50
+    for name in names:
+        pkgutil.resolve_name(name)  # raises where it is not there
