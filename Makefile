@@ -13,7 +13,7 @@ PYTEST_ARGS ?= -n auto --dist loadfile --no-loadscope-reorder
 
 .DEFAULT_GOAL := help
 .PHONY: help reproduce reproduce-full test slow mutants fuzz altered coverage coverage-awkward rig-against-model check \
-	bench gpu gpu-compiler docs clean distclean
+	bench gpu gpu-compiler docs screenshots clean distclean
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 26
@@ -67,6 +67,10 @@ gpu-compiler: $(VENV)/.installed-gpu  ## registers, spills and operations of the
 docs: $(VENV)/.installed-docs  ## build the documentation into docs/_build/html
 	$(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html
 	@echo "docs/_build/html/index.html"
+
+screenshots: docs  ## pictures of some pages at 1280 and 400 pixels; no page is wider than its window (needs Chromium)
+	$(BIN)/python docs/make_screenshots.py
+	$(BIN)/python docs/make_screenshots.py all
 
 clean:  ## remove results, built documentation and caches
 	rm -rf out docs/_build .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis build dist

@@ -1,4 +1,4 @@
-"""Draw the pictures of the documentation: one per example, and some from a page's own code.
+"""Draw the pictures of the documentation: one per example, and those that a page's own code draws as ``ax``.
 
 Run it from anywhere: ``python docs/make_pictures.py``, with names of pictures for some of them only. It takes some ten
 seconds (longer the first time; minutes for ``comparison_section``, which measures and identifies a virtual rig) and
@@ -27,6 +27,7 @@ from nonsmooth import plot
 DOCS = Path(__file__).resolve().parent
 PICTURES = DOCS / "pictures"
 PIXELS = 1400  # wide: twice what a page shows, for screens of two pixels per point
+RAISES = re.compile(r"```text\n\w+Error: ")  # below a block of Python: it ends in this error
 INCHES = 5.2  # a figure of one column is drawn this wide, its letters as they are
 
 
@@ -53,7 +54,7 @@ def comparison_section() -> Any:
     from nonsmooth.plot import comparison_section as draw
     from nonsmooth.results.store import load
 
-    page = (DOCS / "guides" / "from_your_rig_to_parameters.md").read_text(encoding="utf-8")
+    page = (DOCS / "tutorials" / "your_rig.md").read_text(encoding="utf-8")
     blocks = re.findall(r"^```toml\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
     (study,) = (text for text in blocks if "[measured]" in text)
     commands = re.findall(r"^\$ nonsmooth (rig .*|identify rig_03 .*)$", page, re.MULTILINE)
@@ -64,28 +65,37 @@ def comparison_section() -> Any:
         return draw(load("run4.nc"))
 
 
-def first_code(page: Path) -> str:
-    """The first block of Python of a page."""
-    found = re.search(r"^```python\n(.*?)^```", page.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
-    assert found is not None, f"{page} has no block of Python"
-    return found[1]
+def drawn_by(page: Path, elsewhere: set[str]) -> list[tuple[str, str]]:
+    """(name, all code of the page above it) for each picture of a page that its own code draws as ``ax``."""
+    text = page.read_text(encoding="utf-8")
+    code = ""
+    found = []
+    parts = r"^```python\n(.*?)^```(?=\n*(.{0,40}))|^!\[.*?\]\(\S*pictures/(\w+)\.png\)"
+    for block, after, picture in re.findall(parts, text, re.M | re.S):
+        code += "" if RAISES.match(after) else block
+        if picture and picture not in elsewhere and "ax = " in code:
+            found.append((picture, code))
+    return found
 
 
 def main(wanted: list[str]) -> None:
     """The pictures named, or all."""
     mpl.use("Agg")
     PICTURES.mkdir(exist_ok=True)
-    for page in ("start", "guides/signals"):
-        stem = Path(page).name
-        if wanted and stem not in wanted:
-            continue
-        with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
-            names: dict[str, Any] = {}
-            exec(first_code(DOCS / f"{page}.md"), names)
-            keep(names["ax"], stem)
+    examples = sorted((DOCS.parent / "examples").glob("*.py"))
+    elsewhere = {path.stem for path in examples} | {"comparison_section", "effect_of_eta", "chart_cost"}
+    for page in sorted(DOCS.rglob("*.md")):
+        for name, code in drawn_by(page, elsewhere):
+            if wanted and name not in wanted:
+                continue
+            with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+                names: dict[str, Any] = {}
+                with contextlib.redirect_stdout(None):
+                    exec(code, names)
+                keep(names["ax"], name)
     if not wanted or "comparison_section" in wanted:
         keep(comparison_section(), "comparison_section")
-    for path in sorted((DOCS.parent / "examples").glob("*.py")):
+    for path in examples:
         if wanted and path.stem not in wanted:
             continue
         example = runpy.run_path(str(path))

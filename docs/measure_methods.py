@@ -1,7 +1,7 @@
 """Measure what the guide "which method" states: errors and times of the methods, and the smoothed switch against eta.
 
 Run it from anywhere: ``python docs/measure_methods.py``. It takes about a minute on one core and writes
-``docs/guides/measured_methods.md`` (the tables, included by the guide) and ``docs/pictures/effect_of_eta.png``.
+``docs/theory/measured_methods.md`` (the tables, included by the guide) and ``docs/pictures/effect_of_eta.png``.
 """
 
 from __future__ import annotations
@@ -166,7 +166,7 @@ def smoothed_grazing(eta: float, g: float = 0.02, rho: float = 0.14) -> float:
 
 
 def grazing_table() -> tuple[list[str], np.ndarray]:
-    """Where the smoothed model of Fig. 9 grazes, against the closed forms of the gaps g - eta and g."""
+    """Grazing frequencies of the smoothed model of Fig. 9, against the closed forms of the gaps g - eta and g."""
     found = np.array([smoothed_grazing(eta) for eta in ETAS])
     lines = [
         "| eta | smoothed model grazes at | closed form, gap g - eta | closed form, gap g |", "|---|---|---|---|",
@@ -219,7 +219,7 @@ def main() -> None:
         "**Grazing of the smoothed switch**, Fig. 9 above resonance, in rad/s:",
         "\n".join(graze),
     ]
-    (DOCS / "guides" / "measured_methods.md").write_text("\n\n".join(parts) + "\n", encoding="utf-8")
+    (DOCS / "theory" / "measured_methods.md").write_text("\n\n".join(parts) + "\n", encoding="utf-8")
     print("\n\n".join(parts))
 
 

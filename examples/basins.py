@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def main() -> Axes:
-    """Two attractors, found from the starts alone."""
+    """Two attractors, found from the initial conditions alone."""
     support = ns.models.discontinuous_support(rho=0.23, g=0.0036, omega=9.55)
     found = ns.basins(
         support, {"x": np.linspace(-0.02, 0.02, 160), "v": np.linspace(-0.2, 0.2, 160)}, progress=False

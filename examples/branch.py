@@ -1,8 +1,8 @@
-"""The whole resonance curve of Fig. 9 of Savi et al. (2007), the orbits that repel included.
+"""The whole resonance curve of Fig. 9 of Savi et al. (2007), unstable orbits included.
 
-A sweep shows what attracts, and jumps where that ends. Continuation goes on: beyond the fold at 5.81 rad/s the branch
-turns back, unstable, to the orbit that just touches the support, and at the flip a branch of period 2 begins. The
-motion without contact has a closed form, and with it the two frequencies at which it grazes: the roots of
+A sweep shows attractors, and jumps where one ends. Continuation shows the rest: beyond the fold at 5.81 rad/s the
+branch turns back, unstable, to the orbit that grazes the support, and at the flip a branch of period 2 begins. The
+orbit without contact has a closed form, and with it the two frequencies at which it grazes: the roots of
 (rho / g)^2 = (2 k - m omega^2)^2 + (c omega)^2.
 """
 

@@ -1,4 +1,4 @@
-"""An oscillator and a rigid stop: how near it comes, and when it begins to hit.
+"""An oscillator and a rigid stop: its clearance below grazing, and the first impact.
 
 Dankowicz and Schilder, *Recipes for Continuation* (2013), Ex. 15.2. The motion without impact just touches the stop
 at A = d sqrt((k - omega^2)^2 + (c omega)^2), 0.368782 at omega = 0.8. Below it the clearance is d (1 - A / 0.368782).

@@ -1,4 +1,4 @@
-"""The saddle between the jumps of the oscillator with a support: its manifolds part two stable motions."""
+"""The saddle between the jumps of the oscillator with a support: its stable manifold separates two basins."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def main() -> Axes:
-    """Take the middle orbit between the folds, grow its manifolds, and see where the motions beside them go."""
+    """Compute the manifolds of the middle orbit between the folds, and the orbits reached from points beside them."""
     oscillator = ns.models.discontinuous_support(rho=0.14, g=0.02, omega=4.5)
     branch = ns.continue_orbit(ns.find_orbit(oscillator), "omega", (3.0, 7.0))
     folds = branch.special_point.values[branch.special_kind.values == "fold"]
@@ -29,7 +29,7 @@ def main() -> Axes:
     for end, orbit in zip((first, last), stable, strict=True):
         assert np.abs((end - orbit.u) / arms["size"].values).max() < 1e-3
 
-    # Starts a little to either side of the stable manifold settle on different motions.
+    # Initial conditions on the two sides of the stable manifold reach different orbits.
     for arm in (2, 3):
         curve = arms.section.values[arms.arc_number.values == arm]
         for i in np.linspace(10, len(curve) - 11, 5).astype(int):

@@ -21,7 +21,7 @@ def test_example(path: Path) -> None:
     spec.loader.exec_module(module)
     needs = getattr(module, "NEEDS", "")
     if needs and not (Path(os.environ.get("NONSMOOTH_DATA", "")) / needs).is_file():
-        pytest.skip(f"{needs} is others' work and not shipped: docs/gallery.md says where it is; set NONSMOOTH_DATA")
+        pytest.skip(f"{needs} is others' work and not shipped: docs/gallery says where it is; set NONSMOOTH_DATA")
     drawn = module.main()
     assert hasattr(drawn, "savefig") or hasattr(drawn, "plot")
     plt.close("all")

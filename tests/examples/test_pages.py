@@ -9,13 +9,13 @@ import pytest
 from page_code import blocks, run_page
 
 ROOT = Path(__file__).parents[2]
-PAGES = [ROOT / "README.md", ROOT / "docs" / "start.md", *sorted((ROOT / "docs" / "guides").glob("*.md"))]
-NEED_A_FILE = {"recordings", "from_your_rig_to_parameters"}  # of the reader's own
+PAGES = [ROOT / "README.md", *sorted(page for page in (ROOT / "docs").rglob("*.md") if "_build" not in page.parts)]
+NEED_A_FILE = {"recordings", "your_rig"}  # of the reader's own
 PAGES = [page for page in PAGES if page.stem not in NEED_A_FILE and blocks(page.read_text(encoding="utf-8"))]
 FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).with_suffix("").as_posix())
 def test_code_of_page(page: Path, tmp_path: Path) -> None:
     import matplotlib.pyplot as plt
 

@@ -17,7 +17,7 @@ from nonsmooth.identification.amplitude_dependent import amplitude_dependent, re
 
 FOLDER = os.environ.get("NONSMOOTH_DATA", "")
 pytestmark = [
-    pytest.mark.skipif(not FOLDER, reason="files of others are not shipped: docs/gallery.md; set NONSMOOTH_DATA"),
+    pytest.mark.skipif(not FOLDER, reason="files of others are not shipped: docs/gallery; set NONSMOOTH_DATA"),
     pytest.mark.filterwarnings("ignore::nonsmooth.experiment.RecordingWarning"),
 ]
 

@@ -12,7 +12,7 @@ import nonsmooth as ns
 
 FOLDER = os.environ.get("NONSMOOTH_DATA", "")
 pytestmark = [
-    pytest.mark.skipif(not FOLDER, reason="files of others are not shipped: docs/gallery.md; set NONSMOOTH_DATA"),
+    pytest.mark.skipif(not FOLDER, reason="files of others are not shipped: docs/gallery; set NONSMOOTH_DATA"),
     pytest.mark.filterwarnings("ignore::nonsmooth.experiment.RecordingWarning"),
 ]
 

@@ -17,7 +17,7 @@ from nonsmooth.flow.engine import FloatArray, Log, State
 from nonsmooth.flow.layers import Layers, layers
 from nonsmooth.flow.loop import DIVERGENCE, LoopEngine, pack_net
 from nonsmooth.flow.series_tables import Tables, exact_steps, periods, work_of
-from nonsmooth.kernels import series_places as at
+from nonsmooth.kernels.series_places import METHODS
 
 if TYPE_CHECKING:
     from nonsmooth.system.generate import CompiledModel
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 __all__ = ["SeriesEngine", "order_for"]
 
 EXACT_ORDER = 22
-METHODS = {"taylor": at.TAYLOR, "rkf45": at.RKF45, "exact": at.EXACT}
 
 
 def order_for(rtol: float, fixed_step: bool = False) -> int:
@@ -149,7 +148,7 @@ class SeriesEngine(LoopEngine):
     def module(self, tables: Tables, observer: str) -> ModuleType:
         from nonsmooth.kernels.series_module import series_module
 
-        return series_module(observer)
+        return series_module(observer, self.name)
 
     def given(self, tables: Tables, observer: str) -> tuple[Any, Any, Any]:
         return self.generated(tables), (), self._work()
@@ -175,7 +174,7 @@ class SeriesEngine(LoopEngine):
         weight, absolute, _ = self.norms
         return Generated(
             self.functions, tables.points, tables.period, tables.steps, self.lacking, self.kinds, weight, absolute,
-            float(self.rtol), 0.0 if self.step is None else float(self.step), METHODS[self.name], self.series_order,
+            float(self.rtol), 0.0 if self.step is None else float(self.step), self.series_order,
             int(self.locate), int(self.layers.checked), int(not all(self.smooth_outputs)), int(tables.nonlinear_rows),
             self.layers.count, len(traced.indicators), len(traced.outputs),
         )  # fmt: skip

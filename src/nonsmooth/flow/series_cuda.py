@@ -12,6 +12,7 @@ from nonsmooth.flow.launches import launch
 from nonsmooth.flow.series import SeriesEngine
 from nonsmooth.flow.series_tables import Tables
 from nonsmooth.kernels import codes
+from nonsmooth.kernels.series_places import METHODS
 
 __all__ = ["PART", "STEPS", "Buffers", "SeriesOnGpu", "States", "module_of"]
 
@@ -80,7 +81,7 @@ def module_of(engine: SeriesEngine, tables: Tables) -> Any:
 
     net, form = engine.net, engine.generated(tables)
     sizes = {
-        "METHOD": form.method, "ORDER": form.order, "CHECKED": form.checked, "CORNERS": form.corners,
+        "METHOD": METHODS[engine.name], "ORDER": form.order, "CHECKED": form.checked, "CORNERS": form.corners,
         "NONLINEAR_ROWS": form.nonlinear_rows, "N_GUARDS": form.guards, "N_PARAMETERS": len(engine.traced.p),
         "N_INDICATORS": form.indicators, "N_OUTPUTS": form.outputs, "N_MEMORY": len(engine.traced.m),
         "N_SCRATCH_ROWS": engine.model.n_scratch,

@@ -31,6 +31,14 @@ __all__ = ["campaign", "main", "one_rig"]
 #: Taps of the car on an awkward rig (m/s): in one of the six the string slips.
 _TAPS = {"impulse": {"velocities": (0.5, -0.5, 0.35, -0.35, 0.2, -0.2)}}
 
+#: Meaning of the tables, above them on the page.
+MEANING = """\
+Each virtual rig has drawn parameters, writes its recordings to files, and is identified from these files alone. The
+tables count how many true values lie in the stated 95 % intervals: 38 of 40 are expected. A normalised error is the
+error divided by the stated standard uncertainty; its root mean square (rms) is 1 where uncertainties are neither too
+large nor too small.
+"""
+
 
 def one_rig(seed: int, folder: str, awkward: bool = False) -> dict[str, Any]:
     """Write a session, identify from it, and only then compare with the truth; the result stays in ``folder``."""
@@ -141,7 +149,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.awkward:
             title, flag = "Measured coverage on awkward rigs", " --awkward"
         head = f"# {title}\n\nPrinted by `python -m nonsmooth.identification.coverage{flag}`: synthetic rigs.\n\n"
-        options.out.write_text(head + text, encoding="utf-8")
+        options.out.write_text(head + MEANING + "\n" + text, encoding="utf-8")
     return 0
 
 

@@ -69,11 +69,16 @@ def mean_of_drive(crank_length: float, string_length: float, ripple: float = 0.0
 
     .. math::
 
-        \langle d \rangle = \frac{a^2}{4L}\Big(1 + \frac{3a^2}{16L^2}\Big) - \frac{a\,\epsilon}{2}\cos\beta
+        \langle d \rangle = \frac{a^2}{4L}\left(1 + \frac{3a^2}{16L^2}\right) - \frac{a\,\epsilon}{2}\cos\beta
 
-    since :math:`L - \sqrt{L^2 - a^2\sin^2\varphi} = a^2\sin^2\varphi/2L + a^4\sin^4\varphi/8L^3 + \ldots` with the
-    means 1/2 and 3/8, and :math:`\cos(\theta + \epsilon\sin(\theta + \beta)) \approx \cos\theta - \epsilon \sin\theta
-    \sin(\theta + \beta)`, whose mean is :math:`-\epsilon\cos\beta/2`. The car between two equal springs moves by half.
+    since (with the means 1/2, 3/8 and :math:`\cos\beta/2`)
+
+    .. math::
+
+        L - \sqrt{L^2 - a^2\sin^2\varphi} = \frac{a^2\sin^2\varphi}{2L} + \frac{a^4\sin^4\varphi}{8L^3} + \ldots, \qquad
+        \cos(\theta + \epsilon\sin(\theta + \beta)) \approx \cos\theta - \epsilon \sin\theta \sin(\theta + \beta) .
+
+    The car between two equal springs moves by half.
     """
     a = crank_length
     string = a**2 / (4 * string_length) * (1 + 3 * a**2 / (16 * string_length**2))

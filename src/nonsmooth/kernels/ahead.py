@@ -47,7 +47,8 @@ def plain_files() -> Iterator[str]:
 def tasks(shapes: Sequence[str] = SHAPES) -> list[_Task]:
     """What is compiled, each by one process: the plain files, then what every ``*_module`` function makes.
 
-    Its arguments are told by their names: ``states`` and ``harmonics`` of a shape, and each of the file's observers."""
+    Its arguments are told by their names: ``states`` and ``harmonics`` of a shape, and each of the file's observers and
+    methods."""
     found: list[_Task] = [(name, "", ()) for name in plain_files()]
     for path in sorted(Path(__file__).parent.glob("*_module.py"), reverse=True):
         if path.stem.startswith("cuda_"):
@@ -55,7 +56,8 @@ def tasks(shapes: Sequence[str] = SHAPES) -> list[_Task]:
         file = importlib.import_module(f"nonsmooth.kernels.{path.stem}")
         for name in (name for name in file.__all__ if name.endswith("_module")):
             for states, harmonics in (map(int, shape.split(",")) for shape in shapes):
-                choices = {"states": [states], "harmonics": [harmonics], "observer": getattr(file, "OBSERVERS", [])}
+                choices: dict[str, Any] = {"states": [states], "harmonics": [harmonics]}
+                choices |= {one: getattr(file, f"{one.upper()}S", []) for one in ("observer", "method")}
                 given = product(*(choices[parameter] for parameter in signature(getattr(file, name)).parameters))
                 found += [(file.__name__, name, arguments) for arguments in given]
     return list(dict.fromkeys(found))

@@ -21,7 +21,7 @@ from .run_places import BEGUN
 from .series_places import N_SERIES_MEMO, N_SERIES_TALLY, OPEN_STEP, READY, ZERO_ROW
 
 # Set for each system and method.
-METHOD, ORDER, CHECKED, CORNERS, NONLINEAR_ROWS, N_GUARDS = 0, 16, 0, 0, 0, 0
+ORDER, CHECKED, CORNERS, NONLINEAR_ROWS, N_GUARDS = 16, 0, 0, 0, 0
 N_PARAMETERS, N_MEMORY, N_INDICATORS, N_OUTPUTS, N_SCRATCH_ROWS = 1, 0, 1, 0, 1
 TRANSITIONS = np.array([[0, 0, 0]])
 ROWS = np.array([[0, 1, 0]])
@@ -147,7 +147,7 @@ def advance(
             work.q[N_PARAMETERS + n] = memory[j, n]
     form = Generated(
         periods, own[:, :N_PARAMETERS], periods[i : i + 1], exact_steps[i : i + 1], LACKING, KINDS, norms[0], norms[1],
-        settings[0], settings[1], METHOD, ORDER, 1, CHECKED, CORNERS, NONLINEAR_ROWS, N_GUARDS, N_INDICATORS, N_OUTPUTS,
+        settings[0], settings[1], ORDER, 1, CHECKED, CORNERS, NONLINEAR_ROWS, N_GUARDS, N_INDICATORS, N_OUTPUTS,
     )  # fmt: skip
     section = Section(plan[0], plan[1], plan[2], plan[3], plan[4], 1, settings[2] if plan[0] < 0 else -1.0, settings[3])
     goal = Goal(

@@ -18,7 +18,7 @@ from nonsmooth.kernels.cuda_module import joined, stamp
 __all__ = ["cuda_series_module", "cuda_series_source"]
 
 PARTS = (
-    "circular", "polynomial", "crossing", "rkf45", "taylor", "trust", "watch", "series_step", "series_stepper",
+    "circular", "polynomial", "crossing", "rkf45", "taylor", "trust", "series_step", "watch", "series_stepper",
     "hybrid", "sections", "cuda_series",
 )  # fmt: skip
 
@@ -36,7 +36,7 @@ def cuda_series_source(model: str, sizes: Mapping[str, int], tables: Mapping[str
         The arrays there.
     """
     text = joined(PARTS, model)
-    for names in (("METHOD", "ORDER", "CHECKED", "CORNERS", "NONLINEAR_ROWS", "N_GUARDS"),
+    for names in (("METHOD",), ("ORDER", "CHECKED", "CORNERS", "NONLINEAR_ROWS", "N_GUARDS"),
                   ("N_PARAMETERS", "N_MEMORY", "N_INDICATORS", "N_OUTPUTS", "N_SCRATCH_ROWS")):  # fmt: skip
         line = f"{', '.join(names)} = {', '.join(str(int(sizes[name])) for name in names)}"
         text, found = re.subn(rf"^{', '.join(names)} = [\d, ]+$", line, text, flags=re.MULTILINE)

@@ -109,7 +109,6 @@ class Generated(NamedTuple):
     absolute: Any  # (n,) atol
     rtol: Any
     step: Any  # a fixed one, or 0
-    method: Any  # ``series_places``
     order: Any
     locate: Any  # 0: transitions are judged at the ends of steps
     checked: Any  # 1: polynomials are held against the equations
@@ -248,7 +247,7 @@ FORM = type_of(
 TABLES = type_of(Tables, _f4, _f3, _f3, _f4, _f3, _f2)
 NET = type_of(Net, _i2, _i2, _i1, _i1, _i1, _f1)
 WORK = type_of(Work, *[_f1] * 8, _f2, _f2, _f1, _f1, *[_i1] * 6, _f1)
-GENERATED = type_of(Generated, _i1, _f2, _f1, _f2, _i2, _i1, _f1, _f1, _f, _f, *[_i] * 9)
+GENERATED = type_of(Generated, _i1, _f2, _f1, _f2, _i2, _i1, _f1, _f1, _f, _f, *[_i] * 8)
 SERIES_WORK = type_of(
     SeriesWork, *[_f1] * 7, *[_f2] * 4, types.UniTuple(_f1, 8), *[_f1] * 7, *[_i1] * 3, _f1, _f1, _i1, _f1, _i1, _f1,
     _i1, _f1,

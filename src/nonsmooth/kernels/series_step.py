@@ -10,7 +10,10 @@ from .rkf45 import first_step
 from .run_places import MODE
 from .taylor import dense_states, step_length
 
-__all__ = ["at_end", "judged_at_end", "planned_length", "polished"]
+__all__ = ["METHOD", "at_end", "judged_at_end", "planned_length", "polished"]
+
+# Of ``series_places``: set where the text is joined, so that each method has a kernel of its own.
+METHOD = 0
 
 
 @device
@@ -35,7 +38,7 @@ def polished(form, work, row, t, h, tau):
     stands, which has the error of the step."""
     C, n = work.C, work.w.shape[0]
     values = values_of(form)
-    m = 5 if form.method == place.RKF45 else form.order
+    m = 5 if METHOD == place.RKF45 else form.order
     at = tau
     for _ in range(12):
         dense_states(C, m, n, at, work.dense)
@@ -84,9 +87,9 @@ def planned_length(i, mode, form, J, log_rtol, work):
     n = work.w.shape[0]
     if form.step > 0.0:
         return form.step
-    if form.method == place.RKF45:
+    if METHOD == place.RKF45:
         return work.usual[mode] if work.usual[mode] > 0.0 else first_step(J, work.w, n, form.absolute, form.rtol)
-    if form.method == place.TAYLOR:
+    if METHOD == place.TAYLOR:
         return step_length(J, form.order, n, form.indicators, work.w, form.weight, work.scale, log_rtol)
     if form.nonlinear_rows == 1:
         return converged(J, form.order, n, form.indicators, form.exact_steps[i, mode], work.scale)

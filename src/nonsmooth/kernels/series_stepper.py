@@ -20,10 +20,9 @@ from .polynomial import NONE, row_bounds
 from .records import GENERATED, SERIES_WORK
 from .rkf45 import first_step, hermite, quiet, stages, time_to_transition
 from .run_places import FIRED, MODE, NO_END, RETURNS, TIME, TRIES, WAITED
-from .series_step import at_end, judged_at_end, planned_length, polished
+from .series_step import METHOD, at_end, judged_at_end, planned_length, polished
 from .taylor import copied, dense_states, end_states, fill_powers, step_length
 from .trust import trusted
-from .watch import finish, include, log_touches, widen  # noqa: F401 - for the observers
 
 STEPPER = GENERATED, types.Tuple(()), SERIES_WORK  # the types of this stepper's records: model, tables, work
 
@@ -55,16 +54,16 @@ def look(i, form, tables, work, mode):
     """Jets and after-limits at a start or after a jump."""
     t, u, q, scale = work.memo[TIME], work.w, work.q, work.scale
     n, n_indicators = u.shape[0], form.indicators
-    X = work.J0 if form.method == place.RKF45 else work.C
-    m = 4 if form.method == place.RKF45 else form.order
+    X = work.J0 if METHOD == place.RKF45 else work.C
+    m = 4 if METHOD == place.RKF45 else form.order
     jet = jet_of(form)
     jet(mode, m, t, u, q, X, work.W)
     h = work.usual[mode]
     if form.step > 0.0:
         h = form.step
-    elif form.method == place.EXACT:
+    elif METHOD == place.EXACT:
         h = form.exact_steps[i, mode]
-    elif form.method == place.RKF45:
+    elif METHOD == place.RKF45:
         if h <= 0.0:
             h = first_step(X, u, n, form.absolute, form.rtol)
     else:
@@ -89,7 +88,7 @@ def log_tolerance(form):
 @once
 def start_on_section(form, section, tables, work):
     """A start on the section is no return, nor is a carried state left there."""
-    J = work.J0 if form.method == place.RKF45 else work.C
+    J = work.J0 if METHOD == place.RKF45 else work.C
     s = section.indicator
     if fabs(J[work.w.shape[0] + s, 0]) <= 1e-9 * work.scale[s]:
         J[work.w.shape[0] + s, 0] = 0.0
@@ -136,7 +135,7 @@ def met(t, fired, form, net, section, work):
 
     The direction may be that of the arrival or, where the indicator stays zero, of the departure (an impact does
     both)."""
-    J = work.J0 if form.method == place.RKF45 else work.C
+    J = work.J0 if METHOD == place.RKF45 else work.C
     row = work.w.shape[0] + section.indicator
     noise, way = NOISE * work.scale[section.indicator], section.rising
     if fabs(work.memo[place.VALUE_BEFORE]) > noise:
@@ -190,7 +189,7 @@ def stride(tables, net, work, mode, s, whole, target, period, returns, most, pat
 @once
 def length_of_step(i, form, net, work, r_max):
     """The length of the next step, before crossings in sight shorten it; -1: there is none."""
-    tally, memo, rkf = work.tally, work.memo, form.method == place.RKF45
+    tally, memo, rkf = work.tally, work.memo, METHOD == place.RKF45
     J = work.J0 if rkf else work.C
     n, mode, t = work.w.shape[0], tally[MODE], memo[TIME]
     if tally[place.READY] == 0:
@@ -260,11 +259,11 @@ def forget_signs(n, side):
 @once
 def make_step(i, form, net, section, wanted, work, r_max):
     """A step and its first transition, into ``work``; False where there is none (the motion has left every bound)."""
-    tally, memo, rkf = work.tally, work.memo, form.method == place.RKF45
+    tally, memo, rkf = work.tally, work.memo, METHOD == place.RKF45
     mode, t, n, fixed = tally[MODE], memo[TIME], work.w.shape[0], form.step
     degree, n_i = 5 if rkf else form.order, form.indicators
-    checked = form.checked == 1 and form.method == place.TAYLOR and fixed <= 0.0
-    tail = 1.0 if form.method == place.TAYLOR else 0.0
+    checked = form.checked == 1 and METHOD == place.TAYLOR and fixed <= 0.0
+    tail = 1.0 if METHOD == place.TAYLOR else 0.0
     h = length_of_step(i, form, net, work, r_max)
     pending, hit, x, calm, halvings, error, sure = -1, -1, NONE, False, 0, 0.0, 0.0
     if h < 0.0:
@@ -331,7 +330,7 @@ def next_pass(form, section, work):
     mode, n = tally[MODE], work.w.shape[0]
     if s < 0 or tally[place.CALM] == 1 or not (section.mode < 0 or section.mode == mode):
         return -1.0, 0
-    degree = 5 if form.method == place.RKF45 else form.order
+    degree = 5 if METHOD == place.RKF45 else form.order
     h, part, cursor = memo[place.LENGTH], memo[place.PART], memo[place.CURSOR]
     if cursor == 0.0:
         _, low, high = row_bounds(work.C, n + s, 1.0, degree, work.powers)
@@ -348,7 +347,7 @@ def next_pass(form, section, work):
         return -1.0, 0
     memo[place.AHEAD] = x
     tau = x * h
-    if form.method == place.RKF45:
+    if METHOD == place.RKF45:
         tau = polished(form, work, s, memo[place.BASE], h, tau)
     return tau, 1 if sense >= 0 else -1
 
@@ -363,7 +362,7 @@ def leg(i, form, net, section, goal, tables, work, r_max, ready, clear):
         if not make_step(i, form, net, section, wanted, work, r_max):
             return -1.0, -1, False, 0
     tally[place.OPEN_STEP] = 0
-    rkf, degree = form.method == place.RKF45, 5 if form.method == place.RKF45 else form.order
+    rkf, degree = METHOD == place.RKF45, 5 if METHOD == place.RKF45 else form.order
     h, part, gone = memo[place.LENGTH], memo[place.PART], memo[place.CURSOR] * memo[place.LENGTH]
     tau, sense = next_pass(form, section, work)
     if tau >= 0.0:
@@ -400,7 +399,7 @@ def time_scale(i, since, form, tables, work):
 @once
 def arrive_at(t, since, full, wrapped, form, net, tables, work):
     """State and signs at the end of a leg. Returns its transition, where that is judged there only."""
-    tally, rkf, n = work.tally, form.method == place.RKF45, work.w.shape[0]
+    tally, rkf, n = work.tally, METHOD == place.RKF45, work.w.shape[0]
     copied(work.end, work.w)
     if tally[place.OPEN_STEP] == 1:
         work.memo[place.CURSOR] = work.memo[place.AHEAD]
@@ -477,7 +476,7 @@ def at_rest(form, section, tables, work):
 @once
 def state_at(tau, form, tables, work, out):
     """The state at any instant of the leg."""
-    degree = 5 if form.method == place.RKF45 else form.order
+    degree = 5 if METHOD == place.RKF45 else form.order
     if tau >= work.memo[place.PART]:
         for j in range(work.w.shape[0]):
             out[j] = work.end[j]

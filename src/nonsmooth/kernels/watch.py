@@ -6,6 +6,7 @@ from .crossing import NOISE
 from .generated import values_of
 from .polynomial import DOWN, NONE, dense, first_crossing, largest, load, row_bounds, shift, strip
 from .run_places import DONE, MODE, TOUCHES
+from .series_step import METHOD
 from .taylor import dense_states
 
 __all__ = ["finish", "include", "log_touches", "widen"]
@@ -27,7 +28,7 @@ def widen(i, a, b, form, tables, work, kept):
     if work.tally[place.OPEN_STEP] == 1 or not (b > a):
         return
     C, n, n_i, mode, poly = work.C, work.w.shape[0], form.indicators, work.tally[MODE], work.a
-    m = 5 if form.method == place.RKF45 else form.order
+    m = 5 if METHOD == place.RKF45 else form.order
     for row in range(form.kinds.shape[0]):
         if form.kinds[row] != 1 or (row < n and form.lacking[mode, row] == 1):
             continue
@@ -60,7 +61,7 @@ def widen_corners(i, m, form, work, kept):
 def include(i, mode, form, tables, work, kept):
     """Extend the extremes of point i by the present instant, just after a transition."""
     n = work.w.shape[0]
-    jets = work.J0 if form.method == place.RKF45 else work.C
+    jets = work.J0 if METHOD == place.RKF45 else work.C
     for row in range(form.kinds.shape[0]):
         if row < n and form.lacking[mode, row] == 1:
             continue
@@ -90,7 +91,7 @@ def log_touches(step, form, net, log, tables, work):
     ``work.rise`` is the sign of each row's slope at the end of the step before (0: just after a jump)."""
     C, n, powers, rows, rise = work.C, work.w.shape[0], work.powers, net.rows, work.rise
     a, d, stack, found, u, scale = work.a, work.d, work.stack, work.found, work.dense, work.scale
-    m = 5 if form.method == place.RKF45 else form.order
+    m = 5 if METHOD == place.RKF45 else form.order
     mode, t, h, count = work.tally[MODE], work.memo[DONE], work.memo[place.PART], work.tally[TOUCHES]
     begin = net.mode_start[mode]
     for j in range(begin, net.mode_start[mode + 1]):
