@@ -101,7 +101,7 @@ def test_bits_do_not_depend_on_threads(support: ns.System) -> None:
 
 
 def test_compiled_and_uncompiled_judgement_agree() -> None:
-    """The same rules, twice written: every period, status and count equal, extremes to rounding."""
+    """Two loops around the same rules: every period, status and count equal, extremes to rounding."""
     system = ns.models.discontinuous_support(omega=11.15)
     rng = np.random.default_rng(11)
     n = 120
@@ -115,7 +115,8 @@ def test_compiled_and_uncompiled_judgement_agree() -> None:
     periodic = fast.period_number > 0
     np.testing.assert_allclose(fast.contacts[periodic], slow.contacts[periodic])
     np.testing.assert_allclose(fast.maximum[periodic], slow.maximum[periodic], rtol=1e-6)
-    np.testing.assert_allclose(fast.multiplier[periodic], slow.multiplier[periodic], atol=1e-3)
+    # at points of a cycle one return apart: differences over 1e-6 of its size, curvature in them
+    np.testing.assert_allclose(fast.multiplier[periodic], slow.multiplier[periodic], atol=5e-3)
     early = Settler(system, engine_for(system), plan, 400, 60, 16).run(points, np.arange(n), np.zeros((n, 2)))
     assert (early.period_number == fast.period_number).all()
     assert early.returns.sum() < 0.7 * fast.returns.sum()

@@ -1,4 +1,4 @@
-"""The largest Lyapunov exponent of a run by two neighbours, for engines whose jobs run one by one."""
+"""Largest Lyapunov exponents of runs by two neighbours, with engines whose jobs run one by one."""
 
 from __future__ import annotations
 
@@ -9,15 +9,14 @@ import numpy as np
 
 from nonsmooth.analysis.attractors_trace import period_of, state_at
 from nonsmooth.analysis.settled import ROUNDED
-from nonsmooth.flow.engine import Chain, Engine, FloatArray, SectionPlan
+from nonsmooth.flow.engine import Chain, Engine, FloatArray, IntArray, SectionPlan
 from nonsmooth.kernels import codes
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["BESIDE", "exponent_of", "parting_sizes"]
+__all__ = ["parting_sizes", "rates", "separate_one_by_one"]
 
-BESIDE = 1e-6  # where a neighbour begins, in units of the motion's size
 USUAL = 1.5  # powers of ten: a motion this near to its scale is taken to have that size
 SLENDER = 1e-6  # a state whose motion is smaller than this, beside the largest of the others, is at rest
 RESTING = 1e-9  # in units of the scales: a motion that has come to rest in all states
@@ -40,48 +39,49 @@ def parting_sizes(maximum: FloatArray, minimum: FloatArray, scale: FloatArray) -
     return np.asarray(scale * 10.0**power)
 
 
-def exponent_of(
-    system: System, engine: Engine, plan: SectionPlan, point: FloatArray, start: FloatArray, mode: int, n_returns: int,
-    scale: FloatArray,
-) -> tuple[float, float]:  # fmt: skip
-    """Exponent per unit time of a run that begins on the section, and its standard error; NaN where a run failed.
+def rates(sums: FloatArray, status: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Exponents per unit time and their standard errors (J,) from the sums of J jobs; NaN where a run failed."""
+    from nonsmooth.kernels.exponent import BATCHES, MEAN, SQUARES
 
-    The neighbour is put back to a small distance, in units of ``scale`` (n,), after each of ``n_returns`` returns; the
-    error is that of the mean of ten batches, and a quarter of one before them is left out. A forced system is looked at
-    once per period, whatever the section: neighbours must be compared at equal phase. On a Poincare section of an
-    autonomous system the result is the largest exponent beside the zero along the flow.
+    good = np.isin(status, (codes.OK, codes.NOT_GUARANTEED))
+    error = np.sqrt(sums[:, SQUARES] / (BATCHES * (BATCHES - 1)))
+    return np.where(good, sums[:, MEAN], np.nan), np.where(good, error, np.nan)
+
+
+def separate_one_by_one(
+    system: System, engine: Engine, plan: SectionPlan, points: FloatArray, rows: IntArray, starts: FloatArray,
+    modes: IntArray, returns: int, batch: int, size: FloatArray, offsets: FloatArray, sums: FloatArray,
+) -> IntArray:  # fmt: skip
+    """Growth of neighbours of jobs, taken into their sums (:mod:`nonsmooth.kernels.exponent`); their statuses.
+
+    A forced system is looked at once per period, whatever the section: neighbours must be compared at equal phase. On a
+    Poincare section of an autonomous system the result is the largest exponent beside the zero along the flow.
     """
-    tables, traced = engine.prepare(point), system.traced
-    period = period_of(tables)
-    state = state_at(system, start, mode, plan.phase * period if plan.indicator < 0 else 0.0, period)
-    quiet = replace(plan, extremes=False, every=1)  # a neighbour's count of returns may be one off
-    if period < np.inf and plan.indicator >= 0:
-        quiet = SectionPlan(phase=float(state.clock[0] / period % 1.0), extremes=False)
-    out = Chain.empty(1, 1, len(traced.u), len(traced.indicators), len(traced.outputs))
-    offset = np.full(len(state.u), BESIDE) * scale
-    first = float(np.linalg.norm(offset / scale))
-    batch = n_returns // 10
-    logs, times = [], []
-    for _ in range(batch // 4 + 10 * batch):
-        other = state.copy()
-        other.u += offset
-        other.settled = False
-        taken = []
-        for one in (state, other):
-            engine.chain(tables, 0, 1, one, None, quiet, 0, 1, out)
-            taken.append(float(out.elapsed[0]))
-            if taken[-1] < 0.5 * taken[0]:  # the neighbour was just before the surface: that was no return
+    from nonsmooth.kernels.exponent import separate
+
+    status, traced = np.zeros(len(rows), dtype=np.int64), system.traced
+    for j, i in enumerate(rows):
+        tables = engine.prepare(points[i : i + 1])
+        period = period_of(tables)
+        state = state_at(system, starts[j], int(modes[j]), plan.phase * period if plan.indicator < 0 else 0.0, period)
+        quiet = replace(plan, extremes=False, every=1)  # a neighbour's count of returns may be one off
+        if period < np.inf and plan.indicator >= 0:
+            quiet = SectionPlan(phase=float(state.clock[0] / period % 1.0), extremes=False)
+        out = Chain.empty(1, 1, len(traced.u), len(traced.indicators), len(traced.outputs))
+        for n in range(returns):
+            other, elapsed = state.copy(), 0.0
+            other.u += offsets[j]
+            other.settled = False
+            for one in (state, other):
                 engine.chain(tables, 0, 1, one, None, quiet, 0, 1, out)
-            if out.status[0] not in (codes.OK, codes.NOT_GUARANTEED):
-                return np.nan, np.nan
-        times.append(taken[0])
-        offset = other.u - state.u
-        apart = float(np.linalg.norm(offset / scale))
-        if apart > 0.0:
-            offset *= first / apart
-        else:
-            apart, offset = 1e-16 * first, np.full(len(state.u), BESIDE) * scale
-        logs.append(np.log(apart / first))
-    grown = np.array(logs[batch // 4 :]).reshape(10, batch).sum(axis=1)
-    rates = grown / np.array(times[batch // 4 :]).reshape(10, batch).sum(axis=1)
-    return float(rates.mean()), float(rates.std() / 3.0)
+                elapsed = elapsed or float(out.elapsed[0])
+                if out.elapsed[0] < 0.5 * elapsed:  # the neighbour was just before the surface: that was no return
+                    engine.chain(tables, 0, 1, one, None, quiet, 0, 1, out)
+                status[j] = out.status[0]
+                if status[j] not in (codes.OK, codes.NOT_GUARANTEED):
+                    break
+            else:
+                separate(n, batch, elapsed, state.u, other.u, size, offsets[j], sums[j])
+                continue
+            break
+    return status

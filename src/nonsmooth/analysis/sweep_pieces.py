@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.analysis.classify import Verdict
 from nonsmooth.analysis.density import CountedSlot, Counter
-from nonsmooth.analysis.settle import Attractors
+from nonsmooth.analysis.settle import Attractors, Verdict
 from nonsmooth.analysis.settled import usable
 from nonsmooth.campaign.threads import cores, over_items
 from nonsmooth.flow.engine import Chain, FloatArray

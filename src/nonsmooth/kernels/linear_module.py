@@ -38,13 +38,13 @@ def linear_module(states: int, harmonics: int) -> ModuleType:
 
 
 @cache
-def settle_module(harmonics: int) -> ModuleType:
-    """The module with ``settle_many`` over the kernels of two states and that number of harmonics."""
-    below = linear_module(2, harmonics).__name__
+def settle_module(states: int, harmonics: int) -> ModuleType:
+    """The module with ``settle_many`` over the kernels of those numbers of states and harmonics."""
+    below = linear_module(states, harmonics).__name__
     text = (Path(__file__).parent / "planar_settle.py").read_text(encoding="utf-8")
     text = re.sub(r"^from \.linear_\w+ import", f"from {below} import", text, flags=re.MULTILINE)
     text = re.sub(r"^from \.(\w+) import", r"from nonsmooth.kernels.\1 import", text, flags=re.MULTILINE)
-    return load_module(text, f"planar_settle_{harmonics}")
+    return load_module(text, f"planar_settle_{states}_{harmonics}")
 
 
 @cache

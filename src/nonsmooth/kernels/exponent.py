@@ -1,0 +1,48 @@
+"""The largest Lyapunov exponent by two neighbours, which are put back to a small distance after each section return.
+
+Ten batches of returns give the exponent and its error; a quarter of one before them is left out, in which the
+direction turns in. This is text of the processor and of GPUs alike.
+"""
+
+from math import log, sqrt
+
+from numba import types
+
+from .cache import kernel
+
+_i, _f = types.int64, types.float64
+_f1 = _f[::1]
+
+BATCHES = 10
+NUDGE = 1e-6  # where a neighbour begins, in units of the motion's size
+GROWN, TIME, DONE, MEAN, SQUARES = range(5)  # of a run: in the present batch; batches, mean of their rates, deviations
+N_SUMS = 5
+
+
+@kernel(types.void(_i, _i, _f, _f1, _f1, _f1, _f1, _f1))
+def separate(n, batch, elapsed, u, other, size, offset, sums):
+    """Take return n of a state and its neighbour, ``elapsed`` after the one before it, into the sums.
+
+    ``offset`` (n) becomes where the neighbour begins next, beside the state, NUDGE of ``size`` away in each state."""
+    first, apart = 0.0, 0.0
+    for k in range(size.shape[0]):
+        offset[k] = other[k] - u[k]
+        first += NUDGE * NUDGE
+        apart += (offset[k] / size[k]) ** 2
+    first, apart = sqrt(first), sqrt(apart)
+    for k in range(size.shape[0]):
+        offset[k] = offset[k] * (first / apart) if apart > 0.0 else NUDGE * size[k]
+    if not apart > 0.0:  # fallen together: a direction that vanishes
+        apart = 1e-16 * first
+    if n < batch // 4:
+        return
+    sums[GROWN] += log(apart / first)
+    sums[TIME] += elapsed
+    if (n - batch // 4) % batch == batch - 1:
+        rate = sums[GROWN] / sums[TIME]
+        sums[GROWN] = 0.0
+        sums[TIME] = 0.0
+        sums[DONE] += 1.0
+        away = rate - sums[MEAN]
+        sums[MEAN] += away / sums[DONE]
+        sums[SQUARES] += away * (rate - sums[MEAN])
