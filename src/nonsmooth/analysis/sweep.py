@@ -180,7 +180,7 @@ def sweep(
             report.advance(1)
 
     if gpu:
-        run_on_gpu(engine, points, starts, memory, attractors, slots, progress, parameter)
+        run_on_gpu(points, starts, memory, attractors, slots, progress, parameter)
     else:
         run_pieces(march, pieces_of(directions, len(starts), numbers), threads, progress, parameter)
     largest = largest_of(starts, slots.values())

@@ -36,7 +36,7 @@ def single():
 
 @entry
 def neighbours(
-    jobs, rows, packed, multiples, built, net, u, clock, counters, begin, end, batch, size, apart, sums, plan, phase,
+    jobs, rows, packed, multiples, built, net, u, clock, counters, begin, end, batch, size, offsets, sums, plan, phase,
     limit, status,
 ):  # fmt: skip
     """Returns begin <= n < end of each job and its neighbour: see ``part``."""
@@ -45,13 +45,11 @@ def neighbours(
         return
     j = jobs[k]
     linear, scratch = tabled(packed, multiples, built, rows[j])
-    moved = cuda.local.array(2, float64)
-    moved_clock = cuda.local.array(3, float64)
-    moved_counters = cuda.local.array(4, int64)
+    moved = (cuda.local.array(2, float64), cuda.local.array(3, float64), cuda.local.array(4, int64))
+    flow = (linear, net, phase, 1e300, limit, scratch, u[j : j + 1])
     status[j] = part(
-        begin, end, batch, 0, size, u[j], clock[j], counters[j], moved, moved_clock, moved_counters, apart[j], sums[j],
-        linear, net, plan, phase, 1e300, limit, single(), scratch, u[j : j + 1],
-    )  # fmt: skip
+        begin, end, batch, 0, size, (u[j], clock[j], counters[j]), moved, offsets[j], sums[j], flow, plan, single()
+    )
 
 
 @entry

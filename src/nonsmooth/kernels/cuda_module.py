@@ -19,8 +19,8 @@ __all__ = ["cuda_linear_module", "joined", "stamp"]
 
 PARTS = (
     "linear_tables", "linear_polynomial", "linear_search", "linear_march", "linear_extremes", "linear_layout",
-    "linear_chain", "planar_settle", "planar_spectrum", "cuda_planar", "cuda_tables", "cuda_advance", "cuda_judge",
-    "cuda_growth",
+    "linear_chain", "judge", "settle", "exponent", "planar_settle", "planar_spectrum", "cuda_planar", "cuda_tables",
+    "cuda_advance", "cuda_settle", "cuda_growth",
 )  # fmt: skip
 
 

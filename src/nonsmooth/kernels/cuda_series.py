@@ -98,7 +98,7 @@ def no_log():
 @entry
 def advance(
     jobs, rows, points, periods, exact_steps, norms, plan, settings, u, memory, clock, counters, settled, transient,
-    keep, fresh, pause, whole, real, sections, extremes, crossings, contacts, elapsed, status,
+    keep, fresh, pause, whole, real, section, maximum, minimum, crossings, contacts, elapsed, status,
 ):  # fmt: skip
     """Thread k: march the state of job j = jobs[k] at parameter point rows[j] by transient[j] section returns, then
     keep[j] more, whose points and extremes are kept (one number for all jobs where these arrays are short).
@@ -161,12 +161,12 @@ def advance(
             usual[n] = real[N_MEMO + 2 * N_SIDES + n, j]
             dwell[n] = real[N_MEMO + 2 * N_SIDES + N_MODES + n, j]
         for n in range(SEEN_ROWS):
-            window[0, n] = extremes[j, 0, n]
-            window[1, n] = extremes[j, 1, n]
+            window[0, n] = maximum[j, n]
+            window[1, n] = minimum[j, n]
     code = march(
         field, jet, values, jump,  # noqa: F821 - of the model, whose text stands before this one
         (FIRST, OUTGOING, TRANSITIONS, ROWS, AT), LACKING, KINDS, choice, control, norms,
-        exact_steps[i], state, q, time, counters[j], work, sections[j], window, tally, memo, no_log(),
+        exact_steps[i], state, q, time, counters[j], work, section[j], window, tally, memo, no_log(),
     )  # fmt: skip
     for n in range(N_U):
         u[j, n] = state[n]
@@ -175,8 +175,8 @@ def advance(
     for n in range(3):
         clock[j, n] = time[n]
     for n in range(SEEN_ROWS):
-        extremes[j, 0, n] = window[0, n]
-        extremes[j, 1, n] = window[1, n]
+        maximum[j, n] = window[0, n]
+        minimum[j, n] = window[1, n]
     if code == PAUSED:
         for n in range(N_TALLY):
             whole[n, j] = tally[n]
