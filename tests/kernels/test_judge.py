@@ -33,7 +33,8 @@ class Job:
     """One job that is told what its runs gave."""
 
     def __init__(self, given: Rules, carried: int = 1) -> None:
-        self.rules, self.jobs, self.u = given, new_jobs(1, len(given.least), given.max_period), np.zeros(len(given.least))
+        n = len(given.least)
+        self.rules, self.jobs, self.u = given, new_jobs(1, n, given.max_period), np.zeros(n)
         begin_job(self.jobs, 0, given, carried)
 
     def __getattr__(self, name: str) -> Any:

@@ -186,7 +186,8 @@ class Settler:
         """Exponents of jobs whose motions are of one size."""
         from nonsmooth.kernels.exponent import BATCHES, N_SUMS, NUDGE
 
-        batch, offsets, sums = n_returns // BATCHES, np.tile(NUDGE * size, (len(rows), 1)), np.zeros((len(rows), N_SUMS))
+        batch = n_returns // BATCHES
+        offsets, sums = np.tile(NUDGE * size, (len(rows), 1)), np.zeros((len(rows), N_SUMS))
         jobs = points, rows, starts, modes, batch // 4 + BATCHES * batch, batch
         if self.device == "cuda" and self.width == len(self.system.traced.u) + len(self.system.traced.m):
             from nonsmooth.analysis.settle_cuda import separate_on_gpu

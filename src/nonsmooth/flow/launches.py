@@ -40,7 +40,7 @@ class States:
         shapes = [(times * len(part), *part.shape[1:]) for part in self.all()]
         rows = np.tile(self.rows.copy_to_host(), times)
         arrays = (cuda.device_array(shape, part.dtype) for shape, part in zip(shapes, self.all(), strict=True))
-        return States(*arrays, cuda.to_device(rows))
+        return States(*[*arrays, cuda.to_device(rows)])
 
     def all(self) -> tuple[Any, ...]:
         return self.u, self.memory, self.clock, self.counters

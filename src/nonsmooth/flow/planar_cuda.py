@@ -128,8 +128,8 @@ class PlanarOnGpu:
     def run_beside(
         self, jobs: IntArray, others: States, period: IntArray, whole: Buffers, arrived: Buffers, extremes: bool
     ) -> None:
-        """March jobs j by period[j] returns into ``whole``, and their neighbours, which stand behind them in ``others``;
-        of these the last return goes into ``arrived``."""
+        """March jobs j by period[j] returns into ``whole``, and their neighbours, which stand behind them in
+        ``others``; of these the last return goes into ``arrived``."""
         self._advance(jobs, others, 0, period, whole, extremes, arrived, False, 3, len(period))
 
     def _advance(

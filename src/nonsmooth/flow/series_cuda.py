@@ -146,8 +146,8 @@ class SeriesOnGpu:
     def run_beside(
         self, jobs: IntArray, others: States, period: IntArray, whole: Buffers, arrived: Buffers, extremes: bool
     ) -> None:
-        """March jobs j by period[j] returns into ``whole``, and their neighbours, which stand behind them in ``others``;
-        of these the last return goes into ``arrived``. (Extremes are always there.)"""
+        """March jobs j by period[j] returns into ``whole``, and their neighbours, which stand behind them in
+        ``others``; of these the last return goes into ``arrived``. (Extremes are always there.)"""
         self.run(jobs, others, 0, period, whole, True)
         times = len(others.rows) // len(period)
         neighbours = np.concatenate([jobs + leg * len(period) for leg in range(1, times)])

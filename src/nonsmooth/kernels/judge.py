@@ -119,9 +119,9 @@ def certain(p, mu, residual, returns):
 def spectral_radius(A, B):
     """Largest modulus of the eigenvalues of A (n, n), which is overwritten as B (n, n) is; nan where A is not finite.
 
-    Of two states in closed form; of others as the limit of |A^m|^(1/m), m = 1, 2, 4, ..., with |A| divided out. That is
-    less exact than the QR algorithm for a k-fold defective eigenvalue (1e-3 for k = 3), but no less than the differences
-    which the matrix comes from."""
+    Of two states in closed form; of others as the limit of |A^m|^(1/m), m = 1, 2, 4, ..., with |A| divided out. That
+    is less exact than the QR algorithm for a k-fold defective eigenvalue (1e-3 for k = 3), but no less than the
+    differences which the matrix comes from."""
     n = A.shape[0]
     if n == 2:
         half = 0.5 * (A[0, 0] + A[1, 1])

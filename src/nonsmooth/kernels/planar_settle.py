@@ -107,7 +107,8 @@ def settle_many(
         while jobs.wanted[j] != END:
             code, mu = OK, nan
             if jobs.wanted[j] == PROBE:
-                mu = probe(i, jobs.period_number[j], jobs.size[j], rules, motion, moved, flow, whole, quiet, cycle, work)
+                p, size = jobs.period_number[j], jobs.size[j]
+                mu = probe(i, p, size, rules, motion, moved, flow, whole, quiet, cycle, work)
             else:
                 if jobs.wanted[j] == FRESH:
                     put(motion, i, starts[j], phases[j], modes[j], flow)

@@ -70,10 +70,9 @@ JOBS = types.NamedTuple((*[_i1] * 9, _f1, _f1, *[_f2] * 3), Jobs)
 
 def new_jobs(jobs: int, n: int, max_period: int) -> Jobs:
     """Room for so many jobs of n states."""
-    whole = np.zeros((9, jobs), dtype=np.int64)
-    return Jobs(
-        *whole, np.zeros(jobs), np.zeros(jobs), np.zeros((jobs, n)), np.zeros((jobs, n)), np.zeros((jobs, max_period))
-    )
+    widths = (None, None, n, n, max_period)
+    real = [np.zeros(jobs if width is None else (jobs, width)) for width in widths]
+    return Jobs(*[*np.zeros((9, jobs), dtype=np.int64), *real])
 
 
 @kernel(types.void(JOBS, _i, RULES, _i))
