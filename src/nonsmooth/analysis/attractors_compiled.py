@@ -55,28 +55,23 @@ def exponents_compiled(
     return status
 
 
-def _flow(engine: LinearEngine, tables: Tables, phase: float) -> tuple[Any, ...]:
-    """What runs a system: its tables, its net, the section's phase, and scratch memory."""
-    rest = np.zeros((1, len(engine.scale)))
-    return tables.linear, engine.net, phase, np.inf, DIVERGENCE * engine.scale, tables.scratch(), rest
+def _flow(engine: LinearEngine, tables: Tables, phase: float) -> Any:
+    from nonsmooth.kernels.records import Flow
+
+    none = np.zeros((0, len(engine.scale)))
+    return Flow(tables.form, engine.net, phase, np.inf, DIVERGENCE * engine.scale, *tables.scratch(), none)
 
 
 def _plan(extremes: bool) -> IntArray:
     return np.array([-1, 1, -1, 1, 1, extremes], dtype=np.int64)
 
 
-def _motion(n: int) -> tuple[Any, ...]:
-    """Room for u, clock, counters."""
-    return np.zeros(n), np.zeros(3), np.zeros(4, dtype=np.int64)
+def _motion(n: int) -> Any:
+    from nonsmooth.kernels.records import Motion
+
+    return Motion(np.zeros(n), np.zeros(3), np.zeros(4, dtype=np.int64))
 
 
-def _buffers(engine: LinearEngine, tables: Tables, keep: int) -> tuple[Any, ...]:
-    """A chain's arrays in the order in which the linear kernel takes them."""
-    chain = Chain.empty(
-        len(tables.points), keep, len(engine.scale), len(engine.traced.indicators), tables.sizes[2]
-    )
-    return (
-        chain.section, chain.maximum, chain.minimum, chain.indicator_max, chain.indicator_min, chain.output_max,
-        chain.output_min, chain.crossings, chain.contacts, chain.elapsed, chain.section_time, chain.section_mode,
-        chain.status,
-    )  # fmt: skip
+def _buffers(engine: LinearEngine, tables: Tables, keep: int) -> Any:
+    sizes = len(engine.scale), len(engine.traced.indicators), tables.sizes[2]
+    return Chain.empty(len(tables.points), keep, *sizes).record()

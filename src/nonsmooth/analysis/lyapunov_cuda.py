@@ -53,7 +53,7 @@ def _batch(
 ) -> tuple[FloatArray, FloatArray, IntArray]:  # fmt: skip
     n = len(points)
     gpu = PlanarOnGpu(engine, points, SectionPlan())
-    to_device = gpu.cuda.to_device
+    module, to_device = gpu.growth(), gpu.cuda.to_device
     states = States.of(gpu.cuda, np.arange(n), np.tile(start, (n, 1)), np.zeros((n, 0)), mode, np.zeros((n, 3)))
     status = np.zeros(n, dtype=np.int64)
     jobs = np.arange(n)
@@ -61,15 +61,15 @@ def _batch(
         out = gpu.buffers(n, 1)
         jobs = gpu.run(jobs, states, wait - align - 1, 1, out)
         status[:] = out.status.copy_to_host()
-    frame, sums = to_device(np.tile(np.diag(scale), (n, 1, 1))), to_device(np.tile([0.0, 0.0, 0.0, 1.0], (n, 1)))
+    frame, sums = to_device(np.tile(np.eye(2), (n, 1, 1))), to_device(np.tile([0.0, 0.0, 0.0, 1.0], (n, 1)))
     on_device, lengths = to_device(status), to_device(scale)
 
     def grow(jobs: IntArray, count: int, sums: Any) -> tuple[IntArray, FloatArray]:
         growth = to_device(np.zeros((n, 2)))
         while count > 0 and len(jobs):
-            some = min(count, gpu.module.UNITS)
+            some = min(count, module.UNITS)
             gpu.launch(
-                gpu.module.frames, jobs, states.rows, *gpu.tables, gpu.net, states.u, states.clock, states.counters,
+                module.frames, jobs, states.rows, *gpu.tables, gpu.net, states.u, states.clock, states.counters,
                 some, gpu.periods, gpu.limit, lengths, frame, growth, sums, on_device,
             )  # fmt: skip
             status[:] = on_device.copy_to_host()

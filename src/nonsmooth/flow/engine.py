@@ -103,6 +103,16 @@ class Chain:
             np.full((points, keep), nan), np.zeros((points, keep), zero), np.zeros(points, zero),
         )  # fmt: skip
 
+    def record(self) -> Any:
+        """The same arrays as the kernels of the exact flow take them (``kernels.records.Kept``)."""
+        from nonsmooth.kernels.records import Kept
+
+        return Kept(
+            self.section, self.maximum, self.minimum, self.indicator_max, self.indicator_min, self.output_max,
+            self.output_min, self.crossings, self.contacts, self.elapsed, self.section_time, self.section_mode,
+            self.status,
+        )  # fmt: skip
+
 
 @dataclass
 class Log:

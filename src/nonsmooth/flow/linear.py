@@ -14,6 +14,7 @@ import numpy as np
 
 from nonsmooth.flow.engine import Chain, FloatArray, Log, SectionPlan, State
 from nonsmooth.kernels import codes
+from nonsmooth.kernels.run_places import BEGUN, CROSSINGS, PATIENCE, TOUCHES
 
 if TYPE_CHECKING:
     from nonsmooth.system.linear import LinearForm
@@ -50,18 +51,24 @@ class Tables:
     """Arrays of the kernel for P parameter points, and scratch memory for each thread that asks for it."""
 
     points: FloatArray
-    linear: tuple[Any, ...]
+    form: Any  # ``kernels.records.Form``
     period: FloatArray
-    module: ModuleType
     sizes: tuple[int, int, int, int]
+    harmonics: int
 
     local: threading.local = field(default_factory=threading.local)
 
-    def scratch(self) -> tuple[Any, ...]:
-        """The present thread's work arrays; the kernel keeps the tables of the last point in them."""
+    def module(self, observer: str = "sections") -> ModuleType:
+        """The kernels that observe a run in that way."""
+        from nonsmooth.kernels.linear_module import linear_module
+
+        return linear_module(self.form.A.shape[-1], self.harmonics, observer)
+
+    def scratch(self, observer: str = "sections") -> tuple[Any, Any]:
+        """The present thread's tables and work arrays; the kernel keeps the tables of the last point in them."""
         if not hasattr(self.local, "work"):
-            self.local.work = self.module.scratch(*self.sizes)
-        work: tuple[Any, ...] = self.local.work
+            self.local.work = self.module(observer).scratch(*self.sizes)
+        work: tuple[Any, Any] = self.local.work
         return work
 
 
@@ -73,7 +80,7 @@ class LinearEngine:
     form: LinearForm
     scale: FloatArray  # (n,)
     name: str = "exact"
-    net: tuple[Any, ...] = field(init=False)
+    net: Any = field(init=False)  # ``kernels.records.Net``
 
     def __post_init__(self) -> None:
         self.net = pack_net(self.traced)
@@ -91,74 +98,103 @@ class LinearEngine:
         multiples = np.array(self.form.multiples, dtype=np.int64)
         with np.errstate(divide="ignore"):
             period = np.where(t.omega > 0.0, 2.0 * np.pi / t.omega, np.inf)
-        linear = (
+        from nonsmooth.kernels.cache import compiled
+        from nonsmooth.kernels.linear_module import linear_module
+        from nonsmooth.kernels.records import Form
+
+        form = Form(
             t.A, t.b, t.c, t.s, multiples, t.omega, period,
             t.ia, t.ib, t.ic, t.is_, *outputs, t.ra, t.rb, t.rc, t.rs,
         )  # fmt: skip
-        from nonsmooth.kernels.cache import compiled
-        from nonsmooth.kernels.linear_module import linear_module
-
-        module = linear_module(len(self.scale), n_h)
         if n_points > 1:  # threads may share them
-            compiled(module.chain)
-        return Tables(points, linear, period, module, (n_modes, n_i, outputs[0].shape[1], len(self.net[1])))
+            compiled(linear_module(len(self.scale), n_h).chain)
+        return Tables(points, form, period, (n_modes, n_i, outputs[0].shape[1], len(self.net[1])), n_h)
 
     def chain(
         self, tables: Tables, first: int, last: int, state: State, starts: FloatArray | None,
         plan: SectionPlan, transient: int, keep: int, out: Chain,
     ) -> None:  # fmt: skip
-        rows = self._with_section(plan)
+        from nonsmooth.kernels.records import Goal, Motion, Section
+
         carry = starts is None
-        section = np.array([plan.indicator, plan.rising, plan.mode, plan.after, plan.every, plan.extremes], np.int64)
         clock = state.clock.copy()
         if carry:
             state.keep_phase(float(tables.period[first]), plan.phase if plan.indicator < 0 else -1.0)
             state.clock[2] = 0.0  # for the kernel: done, take the time as it stands
-        tables.module.chain(
-            first, last, int(carry), np.zeros((1, len(self.scale))) if starts is None else starts,
-            state.u, state.clock, state.counters,
-            *tables.linear, self.net[0], rows, *self.net[2:],
-            plan.phase, section, plan.t_max, transient, keep, DIVERGENCE * self.scale,
-            out.section, out.maximum, out.minimum, out.indicator_max, out.indicator_min, out.output_max, out.output_min,
-            out.crossings, out.contacts, out.elapsed, out.section_time, out.section_mode, out.status,
-            *tables.scratch(),
+        kernel = tables.module().chain
+        section = Section(
+            plan.indicator, plan.rising, plan.mode, int(plan.after), plan.every, int(plan.extremes),
+            float(plan.phase), float(plan.t_max),
         )  # fmt: skip
+        arguments = (
+            np.zeros((0, len(self.scale))) if starts is None else starts, tables.form, self._net(plan.indicator),
+            section, Goal(transient, keep, 0.0, 0.0, DIVERGENCE * self.scale, PATIENCE),
+            Motion(state.u, state.clock, state.counters),
+            out.record(), *tables.scratch(),
+        )  # fmt: skip
+        tables.scratch()[1].tally[BEGUN] = 0
+        at = first
+        while at < last:  # Ctrl-C comes in between
+            at = kernel(at, last, *arguments)
         if carry:
             state.settled = True
             if state.clock[2] == 0.0 and tables.period[first] < np.inf:
                 state.clock[:] = clock  # failed at the first point: nothing was written
 
     def record(self, tables: Tables, state: State, until: float, samples: FloatArray) -> Log:
+        from nonsmooth.kernels import records
+
         n = len(samples)
-        sample_u, sample_mode = np.full((n, len(self.scale)), np.nan), np.full(n, -1, dtype=np.int64)
-        sample_segment = np.zeros(n, dtype=np.int64)
+        sampled = (
+            samples, np.full((n, len(self.scale)), np.nan), np.full(n, -1, dtype=np.int64), np.zeros(n, dtype=np.int64),
+        )  # fmt: skip
         size = 1024
         logs = self._logs(size)
-        progress = np.zeros(5, dtype=np.int64)
-        scratch = tables.scratch()
+        kernel = tables.module("record").record
+        form, nowhere, work = tables.form, records.Section(-1, 0, -1, 0, 1, 0, 0.0, 0.0), tables.scratch("record")
+        goal = records.Goal(0, 0, float(until), 0.0, DIVERGENCE * self.scale, PATIENCE)
+        motion = records.Motion(state.u, state.clock, state.counters)
         state.counters[1] = int(state.settled)
+        work[1].tally[:] = 0
         while True:
-            code = tables.module.record(
-                state.u, state.clock, state.counters, *tables.linear, *self.net,
-                until, samples, progress, DIVERGENCE * self.scale,
-                sample_u, sample_mode, sample_segment, *logs, *scratch,
-            )  # fmt: skip
-            if code != codes.LOG_FULL:
+            code = kernel(form, self._net(-1), nowhere, goal, motion, records.Log(*sampled, *logs), *work)
+            if code == codes.LOG_FULL:
+                size *= 2
+                grown = self._logs(size)
+                for old, new in zip(logs, grown, strict=True):
+                    new[: len(old)] = old
+                logs = grown
+            elif code != codes.PAUSED:
                 break
-            size *= 2
-            grown = self._logs(size)
-            for old, new in zip(logs, grown, strict=True):
-                new[: len(old)] = old
-            logs = grown
         state.settled = True
-        _, n_c, n_t = progress[:3]
+        n_c, n_t = work[1].tally[[CROSSINGS, TOUCHES]]
         times, transitions, before, after = (log[:n_c] for log in logs[:4])
         touch_times, indicators, touch_u, clearances = (log[:n_t] for log in logs[4:])
+        _, sample_u, sample_mode, sample_segment = sampled
         return Log(
             sample_u, np.zeros((n, 0)), sample_mode, sample_segment,
             times, transitions, before, after, np.zeros((n_c, 0)),
             touch_times, indicators, touch_u, clearances, int(code),
         )  # fmt: skip
+
+    def grow(self, tables: Tables, i: int, state: State, count: int, unit: float, growth: Any) -> int:
+        """Point i: march ``count`` units of time with a frame (``kernels.records.Growth``). Returns a status.
+
+        The periods in the state's clock count from here."""
+        from nonsmooth.kernels.records import Goal, Motion, Section
+
+        kernel, work = tables.module("growth").grow, tables.scratch("growth")
+        goal = Goal(0, count, 0.0, float(unit), DIVERGENCE * self.scale, PATIENCE)
+        state.counters[1] = 0
+        work[1].tally[BEGUN] = 0
+        code = codes.PAUSED
+        while code == codes.PAUSED:
+            code = kernel(
+                i, tables.form, self._net(-1), Section(-1, 0, -1, 0, 1, 0, 0.0, 0.0), goal,
+                Motion(state.u, state.clock, state.counters), growth, *work,
+            )  # fmt: skip
+        state.settled = True
+        return int(code)
 
     def _logs(self, size: int) -> list[np.ndarray]:
         """Room for crossings (time, transition, states before, after), and touches (time, indicator, states, gap)."""
@@ -166,19 +202,21 @@ class LinearEngine:
         crossings = [np.zeros(size), np.zeros(size, dtype=np.int64), np.zeros((size, n)), np.zeros((size, n))]
         return [*crossings, np.zeros(size), np.zeros(size, dtype=np.int64), np.zeros((size, n)), np.zeros(size)]
 
-    def _with_section(self, plan: SectionPlan) -> np.ndarray:
-        """The rows of the net, its last two being the section's (rising, falling)."""
-        rows: np.ndarray = self.net[1].copy()
-        rows[-2:, 0] = max(plan.indicator, 0)
-        return rows
+    def _net(self, indicator: int) -> Any:
+        """The net, its last two rows being the section's (rising, falling)."""
+        rows: np.ndarray = self.net.rows.copy()
+        rows[-2:, 0] = max(indicator, 0)
+        return self.net._replace(rows=rows)
 
 
 class PlanarEngine(LinearEngine):
     """That of two states: its spectrum, its judging of many jobs and its GPU kernels are compiled as well."""
 
 
-def pack_net(traced: Traced) -> tuple[Any, ...]:
-    """Transitions, rows (and two more for a section), row starts, outgoing lists by mode, trigger phases."""
+def pack_net(traced: Traced) -> Any:
+    """The net of transitions, with two more rows for a section."""
+    from nonsmooth.kernels.records import Net
+
     integer = np.int64
     transitions = np.array(
         [(t.target, t.reset is not None, t.contact) for t in traced.transitions], dtype=integer
@@ -192,4 +230,4 @@ def pack_net(traced: Traced) -> tuple[Any, ...]:
     mode_list = np.array([j for one in leaving for j in one], dtype=integer)
     at = np.array([-1.0 if t.at is None else t.at for t in traced.transitions], dtype=float)
     both = np.array([*rows, (0, 1, 1), (0, -1, 1)], dtype=integer).reshape(-1, 3)
-    return transitions, both, row_start, mode_start, mode_list, at
+    return Net(transitions, both, row_start, mode_start, mode_list, at)

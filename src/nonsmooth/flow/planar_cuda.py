@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,6 @@ from nonsmooth.kernels import codes
 
 __all__ = ["SLICE", "Buffers", "PlanarOnGpu"]
 
-TABLES = 6  # of a thread's work arrays, the first ones: what ``build`` fills (see ``kernels.linear_layout``)
 SLICE = 256  # section returns of one launch, at most: below a second also on a small GPU
 
 
@@ -61,14 +61,14 @@ class PlanarOnGpu:
         n_modes, n_indicators, n_outputs, n_rows = tables.sizes
         self.sizes = max(n_indicators, 1), max(n_outputs, 1)
         self.void = [] if n_indicators else [self.n]  # a row of no indicator: no array is empty there
-        self.module = cuda_linear_module(
-            len(engine.form.multiples), n_modes, *self.sizes, max(len(engine.net[0]), 1), n_rows
-        )
+        shape = len(engine.form.multiples), n_modes, *self.sizes, max(len(engine.net.transitions), 1), n_rows
+        self.module = cuda_linear_module(*shape)
+        self.growth = partial(cuda_linear_module, *shape, "growth")
         self.cuda, self.threads, self.plan, self.phase = cuda, THREADS, plan, float(plan.phase)
         self.period: FloatArray = tables.period
-        multiples = tables.linear[4] if len(tables.linear[4]) else np.ones(1, dtype=np.int64)
-        given = cuda.to_device(_packed(tables.linear)), cuda.to_device(multiples)
-        of_point = sum(part.size for part in self.module.scratch(n_modes, *self.sizes, n_rows)[:TABLES])
+        multiples = tables.form.multiples if len(tables.form.multiples) else np.ones(1, dtype=np.int64)
+        given = cuda.to_device(_packed(tables.form)), cuda.to_device(multiples)
+        of_point = sum(part.size for part in self.module.scratch(n_modes, *self.sizes, n_rows)[0])
         self.tables = *given, cuda.device_array((of_point, len(points)))
         self.launch(self.module.tabulate, np.arange(len(points)), *self.tables)
         self.net = tuple(cuda.to_device(_not_empty(part)) for part in engine.net)
@@ -151,10 +151,10 @@ def _not_empty(array: Any) -> Any:
     return found if found.size else np.zeros([max(n, 1) for n in found.shape], dtype=found.dtype)
 
 
-def _packed(linear: tuple[Any, ...]) -> FloatArray:
+def _packed(form: Any) -> FloatArray:
     """All numbers of a parameter point as one column, in the order in which a thread unpacks them."""
-    n_points = len(linear[0])
-    parts = [linear[5], linear[6], *linear[:4], *linear[7:]]
+    n_points = len(form.A)
+    parts = [form.omega, form.period, *form[:4], *form[7:]]
     columns = []
     for part in parts:
         shape = [n_points, *(max(n, 1) for n in part.shape[1:])]

@@ -2,7 +2,7 @@ r"""How small changes grow along a trajectory: frames carried through legs and t
 
 The sums of the logarithms of what is divided out, over the elapsed time, are finite-time Lyapunov exponents. Their sum
 is :math:`\frac1t \log|\det\Phi(t)|`, which must equal
-:math:`\frac1t(\int \operatorname{div} f\,dt + \sum \log|\det S|)`. Two ways lead there: planar systems with an exact
+:math:`\frac1t(\int \operatorname{div} f\,dt + \sum \log|\det S|)`. Two ways lead there: linear systems with an exact
 flow are marched with their frame in one kernel; every other trajectory is recorded by its engine piece by piece, and
 the frame follows it with Taylor legs.
 
@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.flow.engine import Engine, FloatArray, Log, State
-from nonsmooth.flow.linear import DIVERGENCE, PlanarEngine
+from nonsmooth.flow.linear import LinearEngine
 from nonsmooth.flow.variational import VariationalFlow
 from nonsmooth.kernels import codes
 
@@ -62,26 +62,26 @@ class Frame(Protocol):
         """March ``count`` units of time. ``state`` is left at the end; its clock may be set back by whole periods."""
 
 
-class _PlanarFrame:
-    """One kernel for the trajectory and its frame."""
+class _LinearFrame:
+    """One kernel of the exact flow for the trajectory and its frame."""
 
-    def __init__(self, engine: PlanarEngine, tables: Any, i: int, scale: FloatArray) -> None:
-        from nonsmooth.kernels.linear_module import spectrum_module
+    def __init__(self, engine: LinearEngine, tables: Any, i: int, scale: FloatArray) -> None:
+        from nonsmooth.kernels.records import Growth as Record
 
-        self.engine, self.tables, self.i, self.scale = engine, tables, i, scale
-        module = spectrum_module(len(engine.form.multiples))
-        self.spectrum, self.scratch = module.spectrum, module.scratch(*tables.sizes)
-        self.Q, self.active = np.diag(scale), np.ones(2, dtype=bool)
+        self.engine, self.tables, self.i = engine, tables, i
+        n = len(scale)
+        square, vector = (n, n), np.zeros(n)
+        self.record = Record(
+            scale, np.eye(n), np.zeros((0, n)), np.ones(n), np.array([0.0, 0.0, 0.0, 1.0]), np.zeros(square),
+            np.zeros(square), np.zeros(square), np.zeros((3, n)), vector, vector.copy(),
+        )  # fmt: skip
+        self.active = np.ones(n, dtype=bool)
 
     def advance(self, state: State, count: int, unit: float) -> Growth:
-        growth, sums = np.zeros((count, 2)), np.array([0.0, 0.0, 0.0, 1.0])
-        status = self.spectrum(
-            self.i, state.u, state.clock, state.counters, *self.tables.linear, *self.engine.net, count, unit,
-            DIVERGENCE * self.engine.scale, self.scale, self.Q, np.zeros((4, 2)), growth, np.ones(2), np.zeros(2),
-            sums, *self.scratch,
-        )  # fmt: skip
-        state.settled = True
-        return Growth(growth, float(sums[0]), float(sums[1]), float(sums[3]), int(status))
+        sums = np.array([0.0, 0.0, 0.0, 1.0])
+        record = self.record._replace(growth=np.zeros((count, len(self.active))), sums=sums)
+        status = self.engine.grow(self.tables, self.i, state, count, unit, record)
+        return Growth(record.growth, float(sums[0]), float(sums[1]), float(sums[3]), status)
 
 
 class _RecordedFrame:
@@ -213,8 +213,8 @@ def _pieces(traced: Traced, log: Log, instants: FloatArray, density: int) -> tup
 
 def frame_for(system: System, engine: Engine, tables: Any, i: int) -> Frame:
     """A frame for row ``i`` of an engine's tables."""
-    if isinstance(engine, PlanarEngine):
-        return _PlanarFrame(engine, tables, i, system.scale_vector())
+    if isinstance(engine, LinearEngine):
+        return _LinearFrame(engine, tables, i, system.scale_vector())
     flow = VariationalFlow.of(system)
     points = tables.points[i : i + 1]
     period = system.period_at(points[0])

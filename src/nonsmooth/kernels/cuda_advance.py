@@ -10,13 +10,14 @@ from .codes import OK
 from .cuda_tables import tabled
 from .cuda_target import cuda, device, entry
 from .planar_settle import go
+from .records import Flow, Kept, Motion, Net
 
 
 @device
 def row_of(buffers, row):
     """What ``chain`` writes for one trajectory, from the buffers of all."""
     section, maximum, minimum, i_max, i_min, o_max, o_min, crossings, contacts, elapsed, times, modes, status = buffers
-    return (
+    return Kept(
         section[row : row + 1], maximum[row : row + 1], minimum[row : row + 1], i_max[row : row + 1],
         i_min[row : row + 1], o_max[row : row + 1], o_min[row : row + 1], crossings[row : row + 1],
         contacts[row : row + 1], elapsed[row : row + 1], times[row : row + 1], modes[row : row + 1],
@@ -43,13 +44,13 @@ def advance(
     linear, scratch = tabled(packed, multiples, built, rows[j])
     n_transient = transient[min(j, transient.shape[0] - 1)]
     n_keep = keep[min(j, keep.shape[0] - 1)]
+    flow = Flow(linear, Net(*net), phase, 1e300, limit, scratch[0], scratch[1], u[0:0])
     for leg in range(legs):
         row = j + leg * apart
-        flow = (linear, net, phase, 1e300, limit, scratch, u[row : row + 1])
         if leg > 0:
             n_transient, n_keep = n_transient + n_keep - 1 if apart > 0 else 0, 1
         code = go(
-            0, (u[row], clock[row], counters[row]), flow, after if leg > 0 else plan, n_transient, n_keep,
+            0, Motion(u[row], clock[row], counters[row]), flow, after if leg > 0 else plan, n_transient, n_keep,
             row_of(other if leg > 0 else out, row),
         )  # fmt: skip
         if code != OK:

@@ -17,19 +17,23 @@ from nonsmooth.kernels.cache import load_module
 
 __all__ = ["cuda_linear_module", "joined", "stamp"]
 
-PARTS = (
-    "linear_tables", "linear_polynomial", "linear_search", "linear_march", "linear_extremes", "linear_layout",
-    "linear_chain", "judge", "settle", "exponent", "planar_settle", "planar_spectrum", "cuda_planar", "cuda_tables",
-    "cuda_advance", "cuda_settle", "cuda_growth",
-)  # fmt: skip
+STEPPER = ("linear_tables", "linear_polynomial", "linear_search", "linear_march", "linear_layout", "hybrid")
+OBSERVERS = {
+    "sections": (
+        "linear_extremes", "sections", "judge", "settle", "exponent", "planar_settle", "cuda_planar", "cuda_tables",
+        "cuda_advance", "cuda_settle", "cuda_neighbours",
+    ),
+    "growth": ("frame", "growth", "cuda_planar", "cuda_tables", "cuda_growth"),
+}  # fmt: skip
 
 
 @cache
 def cuda_linear_module(
-    harmonics: int, modes: int, indicators: int, outputs: int, transitions: int, rows: int
-) -> ModuleType:
-    """The module with the entries of the ``cuda_*`` texts; ``rows`` counts those of the section too."""
-    text = joined(PARTS)
+    harmonics: int, modes: int, indicators: int, outputs: int, transitions: int, rows: int,
+    observer: str = "sections",
+) -> ModuleType:  # fmt: skip
+    """The module with the entries of the ``cuda_*`` texts of one observer; ``rows`` counts those of the section too."""
+    text = joined((*STEPPER, *OBSERVERS[observer]))
     sizes = {
         "HARMONICS": harmonics, "N_MODES": modes, "N_INDICATORS": indicators, "N_OUTPUTS": outputs,
         "N_TRANSITIONS": transitions, "N_ROWS": rows,
@@ -37,7 +41,7 @@ def cuda_linear_module(
     for name, size in sizes.items():
         text, found = re.subn(rf"^{name} = \d+$", f"{name} = {size}", text, flags=re.MULTILINE)
         assert found == 1, name
-    return load_module(text + stamp(), "cuda_planar_" + "_".join(str(size) for size in sizes.values()))
+    return load_module(text + stamp(), f"cuda_{observer}_" + "_".join(str(size) for size in sizes.values()))
 
 
 def joined(parts: Sequence[str], before: str = "") -> str:

@@ -10,6 +10,8 @@ from numba import float64, int64
 from .cuda_target import cuda, device, local
 from .linear_search import WIDTH
 from .linear_tables import HARMONICS, NODES, TERMS, M
+from .records import Form, Tables, Work
+from .run_places import N_MEMO, N_TALLY
 
 # Set for each system; none is below 1, so that no array is empty.
 N_MODES = 2
@@ -19,7 +21,6 @@ N_TRANSITIONS = 2
 N_ROWS = 5
 N_HARMONICS = HARMONICS if HARMONICS > 0 else 1
 N_FUNCTIONALS = N_INDICATORS + 2 + N_OUTPUTS
-N_INTEGERS = 2 * N_INDICATORS + 5
 N_NODES = NODES + 1
 N_TURNS = 2 * HARMONICS + 1
 N_SUMS = 2 * M + 6
@@ -59,7 +60,7 @@ def unpack4(target, packed, i, at):
 
 @local
 def arrays_of_thread(packed, multiples, i):
-    """The parameter row i and the scratch memory of a thread, as ``chain`` takes them: (linear, scratch)."""
+    """The parameter row i and the scratch memory of a thread, as ``chain`` takes them: (form, (tables, work))."""
     A = cuda.local.array((1, N_MODES, 2, 2), float64)
     b = cuda.local.array((1, N_MODES, 2), float64)
     c = cuda.local.array((1, N_MODES, N_HARMONICS, 2), float64)
@@ -103,12 +104,27 @@ def arrays_of_thread(packed, multiples, i):
     field = cuda.local.array((N_MODES, 2, M), float64)
     info = cuda.local.array((N_MODES, 4), float64)
     row = cuda.local.array((N_TERMS, M), float64)
-    vectors = cuda.local.array((8, M), float64)
+    w = cuda.local.array(M, float64)
+    w1 = cuda.local.array(M, float64)
+    wn = cuda.local.array(M, float64)
+    wp = cuda.local.array(M, float64)
+    wq = cuda.local.array(M, float64)
+    end = cuda.local.array(M, float64)
+    there = cuda.local.array(M, float64)
+    before = cuda.local.array(M, float64)
     scr = cuda.local.array((N_POLYNOMIALS, WIDTH), float64)
     points = cuda.local.array(4, float64)
     rates = cuda.local.array(N_HARMONICS, float64)
-    integers = cuda.local.array(N_INTEGERS, int64)
-    for n in range(N_INTEGERS):
-        integers[n] = 0
-    linear = (A, b, c, s, multiples, omega, period, ia, ib, ic, is_, oa, ob, oc, os_, ra, rb, rc, rs)
-    return linear, (prop, rot, fun, tay, field, info, row, vectors, scr, points, rates, integers)
+    zero = cuda.local.array(N_INDICATORS, int64)
+    found = cuda.local.array(4, int64)
+    twin = cuda.local.array(N_INDICATORS, int64)
+    built = cuda.local.array(1, int64)
+    tally = cuda.local.array(N_TALLY, int64)
+    memo = cuda.local.array(N_MEMO, float64)
+    built[0] = 0
+    tally[0] = 0
+    form = Form(A, b, c, s, multiples, omega, period, ia, ib, ic, is_, oa, ob, oc, os_, ra, rb, rc, rs)
+    work = Work(
+        w, w1, wn, wp, wq, end, there, before, row, scr, points, rates, zero, found, twin, built, tally, memo,
+    )  # fmt: skip
+    return form, (Tables(prop, rot, fun, tay, field, info), work)

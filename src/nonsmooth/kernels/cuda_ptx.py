@@ -32,7 +32,8 @@ def ptx_of(entry: str, signature: str, shape: tuple[int, ...], capability: tuple
     """
     from nonsmooth.kernels.cuda_module import cuda_linear_module
 
-    return ptx_of_module(cuda_linear_module(*shape), entry, signature, capability)
+    observer = "growth" if entry == "frames" else "sections"
+    return ptx_of_module(cuda_linear_module(*shape, observer), entry, signature, capability)
 
 
 def ptx_of_module(

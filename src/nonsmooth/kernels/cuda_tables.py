@@ -5,9 +5,9 @@ arrays, because arrays of constant shape are what its code is compiled for. Neig
 numbers; where all have one point, as for basins, a read serves a whole warp.
 """
 
-from .cuda_planar import N_MODES, arrays_of_thread
+from .cuda_planar import N_INDICATORS, N_MODES, arrays_of_thread
 from .cuda_target import cuda, device, entry, local
-from .linear_tables import HARMONICS, build
+from .linear_tables import HARMONICS, build, twin_of
 
 
 @device
@@ -28,18 +28,17 @@ def move(array, built, at, i, into):
 @device
 def move_tables(tables, built, i, into):
     """Between a thread's tables and their column."""
-    prop, rot, fun, tay, field, info = tables
-    at = move(rot, built, 0, i, into)
-    at = move(fun, built, at, i, into)
-    at = move(field, built, at, i, into)
+    at = move(tables.rot, built, 0, i, into)
+    at = move(tables.fun, built, at, i, into)
+    at = move(tables.field, built, at, i, into)
     for mode in range(N_MODES):
-        at = move(prop[mode], built, at, i, into)
-        at = move(tay[mode], built, at, i, into)
+        at = move(tables.prop[mode], built, at, i, into)
+        at = move(tables.tay[mode], built, at, i, into)
         for k in range(4):
             if into:
-                built[at, i] = info[mode, k]
+                built[at, i] = tables.info[mode, k]
             else:
-                info[mode, k] = built[at, i]
+                tables.info[mode, k] = built[at, i]
             at += 1
 
 
@@ -50,30 +49,29 @@ def tabulate(jobs, packed, multiples, built):
     if k >= jobs.shape[0]:
         return
     i = jobs[k]
-    linear, scratch = arrays_of_thread(packed, multiples, i)
-    A, b, c, s, _, omega, period, ia, ib, ic, is_, oa, ob, oc, os_ = linear[:15]
-    prop, rot, fun, tay, field, info, row = scratch[:7]
-    rates = scratch[10]
-    for h in range(HARMONICS):
-        rates[h] = multiples[h] * omega[0]
-    fill(0, A, b, c, s, rates, period[0], ia, ib, ic, is_, oa, ob, oc, os_, prop, rot, fun, tay, field, info, row)
-    move_tables(scratch[:6], built, i, True)
+    form, scratch = arrays_of_thread(packed, multiples, i)
+    fill(0, form, scratch[0], scratch[1])
+    move_tables(scratch[0], built, i, True)
 
 
 fill = build
 
 
 @device
-def stands(*_):
-    """In place of ``build``: where ``chain`` and ``spectrum`` would build tables, they stand already."""
+def stand(i, form, tables, work):
+    """In place of ``build``: where a run would build tables, they stand already; what else it prepares."""
+    for h in range(HARMONICS):
+        work.rates[h] = form.multiples[h] * form.omega[0]
+    for f in range(N_INDICATORS):
+        work.twin[f] = twin_of(f, N_INDICATORS, tables.fun)
 
 
-build = stands  # what the joined text's other functions find under this name
+build = stand  # what the joined text's other functions find under this name
 
 
 @local
 def tabled(packed, multiples, built, i):
-    """Parameter row i and scratch memory with its tables in it, as ``chain`` takes them: (linear, scratch)."""
-    linear, scratch = arrays_of_thread(packed, multiples, i)
-    move_tables(scratch[:6], built, i, False)
-    return linear, scratch
+    """Parameter row i and scratch memory with its tables in it, as ``chain`` takes them: (form, (tables, work))."""
+    form, scratch = arrays_of_thread(packed, multiples, i)
+    move_tables(scratch[0], built, i, False)
+    return form, scratch

@@ -13,28 +13,29 @@ from types import ModuleType
 
 from nonsmooth.kernels.cache import load_module
 
-__all__ = ["linear_module", "settle_module", "spectrum_module"]
+__all__ = ["joined", "linear_module", "settle_module"]
 
-PARTS = (
-    "linear_tables", "linear_polynomial", "linear_search", "linear_march", "linear_extremes", "linear_layout",
-    "linear_chain", "linear_record",
-)  # fmt: skip
-SPECTRUM = ("linear_tables", "linear_polynomial", "linear_search", "linear_march", "linear_layout", "planar_spectrum")
+STEPPER = ("linear_tables", "linear_polynomial", "linear_search", "linear_march", "linear_layout", "hybrid")
+OBSERVERS = {"sections": ("linear_extremes", "sections"), "record": ("record",), "growth": ("growth",)}
 
 
-def _joined(parts: tuple[str, ...], states: int, harmonics: int) -> str:
+def joined(parts: tuple[str, ...], states: int, harmonics: int) -> str:
+    """The text of some kernel files in one, with the numbers of states and harmonics set."""
     folder = Path(__file__).parent
     text = "\n".join((folder / f"{part}.py").read_text(encoding="utf-8") for part in parts)
-    text = re.sub(r"^from \.linear_\w+ import (\([^)]*\).*|[^(\n]*)$", "", text, flags=re.MULTILINE)
+    own = "|".join(parts)
+    text = re.sub(rf"^from \.(?:{own}) import (\([^)]*\).*|[^(\n]*)$", "", text, flags=re.MULTILINE)
     text = re.sub(r"^from \.(\w+) import", r"from nonsmooth.kernels.\1 import", text, flags=re.MULTILINE)
     text = re.sub(r"^STATES = 2$", f"STATES = {states}", text, flags=re.MULTILINE)
     return re.sub(r"^HARMONICS = 1$", f"HARMONICS = {harmonics}", text, flags=re.MULTILINE)
 
 
 @cache
-def linear_module(states: int, harmonics: int) -> ModuleType:
-    """The module with ``chain``, ``record`` and ``scratch`` for ``states`` >= 1 and ``harmonics`` >= 0 harmonics."""
-    return load_module(_joined(PARTS, states, harmonics), f"linear_{states}_{harmonics}")
+def linear_module(states: int, harmonics: int, observer: str = "sections") -> ModuleType:
+    """The module for ``states`` >= 1 and ``harmonics`` >= 0 harmonics, with ``scratch`` and one observer's kernel:
+    ``chain`` (sections), ``record`` or ``grow`` (growth)."""
+    text = joined((*STEPPER, *OBSERVERS[observer]), states, harmonics)
+    return load_module(text, f"linear_{observer}_{states}_{harmonics}")
 
 
 @cache
@@ -42,12 +43,6 @@ def settle_module(states: int, harmonics: int) -> ModuleType:
     """The module with ``settle_many`` over the kernels of those numbers of states and harmonics."""
     below = linear_module(states, harmonics).__name__
     text = (Path(__file__).parent / "planar_settle.py").read_text(encoding="utf-8")
-    text = re.sub(r"^from \.linear_\w+ import", f"from {below} import", text, flags=re.MULTILINE)
+    text = re.sub(r"^from \.(?:sections|linear_tables) import", f"from {below} import", text, flags=re.MULTILINE)
     text = re.sub(r"^from \.(\w+) import", r"from nonsmooth.kernels.\1 import", text, flags=re.MULTILINE)
     return load_module(text, f"planar_settle_{states}_{harmonics}")
-
-
-@cache
-def spectrum_module(harmonics: int) -> ModuleType:
-    """The module with ``spectrum`` for two states and ``harmonics`` >= 0 harmonics."""
-    return load_module(_joined(SPECTRUM, 2, harmonics), f"planar_spectrum_{harmonics}")

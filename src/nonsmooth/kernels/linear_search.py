@@ -30,11 +30,16 @@ from .linear_polynomial import (
 from .linear_tables import DEGREE, HARMONICS, NODES, ONE, STATES, WAVE, M
 
 WIDTH = DEGREE + 1
+# Places in ``work.found``: the functional that crossed last; the node whose w stands in ``work.wn``, with the Taylor
+# coefficients of the states in the first rows of ``work.scr`` (-2 - node: without them, -1: none); whether all
+# conditions are positive at a piece's end; the sign of the section's functional where the leg begins.
+FUNCTIONAL, NODE, HELD, SIDE = 0, 1, 2, 3
 
 
 @inline
-def value_of(fun, mode, f, w):
+def value_of(tables, mode, f, w):
     """Functional f at w. (Here and below the states come last: they are known later than the harmonics.)"""
+    fun = tables.fun
     total = fun[mode, f, ONE]
     for j in range(WAVE, M):
         total += fun[mode, f, j] * w[j]
@@ -44,8 +49,9 @@ def value_of(fun, mode, f, w):
 
 
 @inline
-def slope_of(fun, mode, f, w):
+def slope_of(tables, mode, f, w):
     """Slope of functional f along the mode at w."""
+    fun = tables.fun
     total = fun[mode, f, M + ONE]
     for j in range(WAVE, M):
         total += fun[mode, f, M + j] * w[j]
@@ -55,8 +61,9 @@ def slope_of(fun, mode, f, w):
 
 
 @inline
-def bound_at(fun, info, mode, f, w):
+def bound_at(tables, mode, f, w):
     """Bound on the fourth derivative of functional f on the step that starts at w."""
+    fun, info = tables.fun, tables.info
     total = fun[mode, f, 2 * M + STATES]
     for j in range(STATES - 1, -1, -1):
         total += fun[mode, f, 2 * M + j] * fabs(w[j] - info[mode, 2 + j])
@@ -64,40 +71,41 @@ def bound_at(fun, info, mode, f, w):
 
 
 @inline
-def to_node(prop, rot, mode, node, w, out):
+def to_node(tables, mode, node, w, out):
     """w at a node of the step, from w at its start."""
+    rot = tables.rot
     for h in range(HARMONICS):
         c = rot[mode, node, 2 * h]
         s = rot[mode, node, 2 * h + 1]
         out[WAVE + 2 * h] = w[WAVE + 2 * h] * c - w[WAVE + 1 + 2 * h] * s
         out[WAVE + 1 + 2 * h] = w[WAVE + 1 + 2 * h] * c + w[WAVE + 2 * h] * s
-    sum_columns(out, prop, mode, node, w, STATES, M)
+    sum_columns(out, tables.prop, mode, node, w, STATES, M)
     out[ONE] = 1.0
 
 
 @inline
-def compose(tay, mode, f, wn, scr, row):
+def compose(tables, mode, f, wn, scr, row):
     """Taylor coefficients of functional f at a node where w is ``wn``, into a row of scr."""
-    sum_rows(scr, row, tay, mode, f, wn, STATES, M)
+    sum_rows(scr, row, tables.tay, mode, f, wn, STATES, M)
 
 
 @inline
-def at_node(prop, rot, mode, w, node, wn, found):
-    """w at a node of the step. ``found[1]``: the node for which it stands there already with the Taylor coefficients of
-    the states (``place``), -2 - node: without them, -1: none."""
-    if found[1] != node and found[1] != -2 - node:
-        to_node(prop, rot, mode, node, w, wn)
-        found[1] = -2 - node
+def at_node(tables, work, mode, node):
+    """w at a node of the step, into ``work.wn``."""
+    found = work.found
+    if found[NODE] != node and found[NODE] != -2 - node:
+        to_node(tables, mode, node, work.w, work.wn)
+        found[NODE] = -2 - node
 
 
 @inline
-def place(prop, rot, tay, mode, n_i, w, node, wn, scr, found):
+def place(tables, work, mode, node):
     """w at a node of the step, and there the Taylor coefficients of the states (the first rows of scr)."""
-    if found[1] != node:
-        at_node(prop, rot, mode, w, node, wn, found)
+    if work.found[NODE] != node:
+        at_node(tables, work, mode, node)
         for r in range(STATES):
-            compose(tay, mode, n_i + r, wn, scr, r)
-        found[1] = node
+            compose(tables, mode, work.zero.shape[0] + r, work.wn, work.scr, r)
+        work.found[NODE] = node
 
 
 @inline
@@ -110,13 +118,14 @@ def turn(angle, c, s):
 
 
 @inline
-def dense(prop, rot, tay, info, mode, n_i, rates, w, tau, wn, scr, found, out):
+def dense(tables, work, mode, tau, out):
     """w at any instant of the step."""
-    spacing = info[mode, 1]
-    node = found[1] if found[1] >= 0 else -2 - found[1]
+    spacing = tables.info[mode, 1]
+    wn, scr, rates = work.wn, work.scr, work.rates
+    node = work.found[NODE] if work.found[NODE] >= 0 else -2 - work.found[NODE]
     if node < 0 or fabs(tau - node * spacing) > 0.75 * spacing:
         node = min(int(tau / spacing + 0.5), NODES)
-    place(prop, rot, tay, mode, n_i, w, node, wn, scr, found)
+    place(tables, work, mode, node)
     local = tau - node * spacing
     for r in range(STATES):
         out[r] = horner(scr, r, local)
@@ -128,17 +137,17 @@ def dense(prop, rot, tay, info, mode, n_i, rates, w, tau, wn, scr, found, out):
 
 
 @inline
-def refine(prop, rot, tay, info, mode, w, f, sign, zero, guess, wn, scr, found):
+def refine(tables, work, mode, f, sign, zero, guess):
     """The upward root of a functional near a good guess, on its polynomial beside the nearest node; -1: not found.
 
     Halley's method: of third order, so that two steps mostly do. What has not converged is not found."""
-    spacing = info[mode, 1]
+    spacing, scr = tables.info[mode, 1], work.scr
     tau = guess
     result = -1.0
     for _ in range(4):
         node = min(max(int(tau / spacing + 0.5), 0), NODES)
-        at_node(prop, rot, mode, w, node, wn, found)
-        compose(tay, mode, f, wn, scr, STATES)
+        at_node(tables, work, mode, node)
+        compose(tables, mode, f, work.wn, scr, STATES)
         if node == 0 and zero != 0:
             scr[STATES, 0] = 0.0
             if zero == 2:
@@ -169,17 +178,17 @@ def refine(prop, rot, tay, info, mode, w, f, sign, zero, guess, wn, scr, found):
 
 
 @device
-def finest(prop, rot, tay, info, mode, w, rows, lo, hi, zero, node, up, wn, scr, points, found):
+def finest(tables, work, mode, rows, lo, hi, node, up):
     """First instant within one node spacing at which all rows lo..hi become positive, on their polynomials; -1: none.
 
-    ``up``: they are positive at its start already, so one has to fall first. ``found[2]``: whether all are positive at
-    its end, where none is found."""
-    spacing = info[mode, 1]
-    to_node(prop, rot, mode, node, w, wn)
-    found[1] = -1
+    ``up``: they are positive at its start already, so one has to fall first."""
+    spacing = tables.info[mode, 1]
+    wn, scr, points, zero, found = work.wn, work.scr, work.points, work.zero, work.found
+    to_node(tables, mode, node, work.w, wn)
+    found[NODE] = -1
     for r in range(lo, hi):
         row = r - lo
-        compose(tay, mode, rows[r, 0], wn, scr, row)
+        compose(tables, mode, rows[r, 0], wn, scr, row)
         if rows[r, 1] < 0:
             for k in range(WIDTH):
                 scr[row, k] = -scr[row, k]
@@ -201,7 +210,7 @@ def finest(prop, rot, tay, info, mode, w, rows, lo, hi, zero, node, up, wn, scr,
             if first >= 0.0 and first < fall:
                 fall = first
                 current = -2 - r
-        found[2] = 1
+        found[HELD] = 1
         if current == -1:
             return -1.0
         tau = fall
@@ -211,7 +220,7 @@ def finest(prop, rot, tay, info, mode, w, rows, lo, hi, zero, node, up, wn, scr,
             row = r - lo
             if current != -2 - r and (r == current or horner(scr, row, tau) > 0.0):
                 continue
-            found[2] = 0
+            found[HELD] = 0
             tau = next_upward(scr, row, tau, spacing, points)
             if tau < 0.0:
                 return -1.0
@@ -219,24 +228,21 @@ def finest(prop, rot, tay, info, mode, w, rows, lo, hi, zero, node, up, wn, scr,
             moved = True
             break
         if not moved:
-            found[0] = rows[max(current, lo), 0]
+            found[FUNCTIONAL] = rows[max(current, lo), 0]
             return tau
     return -1.0
 
 
 @inline
-def search(
-    prop, rot, fun, tay, info, mode, n_i, rates, w, w1, rows, lo, hi, zero, held, r_max, wn, wp, wq, scr, points, found,
-    end,
-):  # fmt: skip
+def search(tables, work, mode, rows, lo, hi, held, r_max):
     """First instant in [0, r_max] of the step at which all the rows lo..hi become positive; -1: none.
 
     ``held``: they were positive when the step began, so one has to fall first. Not so for transitions: the
     after-limits saw a condition that did not hold, and one that holds now has become true at the start.
-    ``w`` and ``w1`` stand at the ends of the whole step; ``found[0]`` is the functional that crossed last. ``end``
-    receives w at the crossing.
+    ``work.w`` and ``w1`` stand at the ends of the whole step; ``there`` receives w at the crossing.
     """
-    spacing = info[mode, 1]
+    spacing = tables.info[mode, 1]
+    w, w1, wp, wq, end, zero, found = work.w, work.w1, work.wp, work.wq, work.there, work.zero, work.found
     size = NODES
     node = 0
     up = held
@@ -244,8 +250,8 @@ def search(
         last = node + size
         h = size * spacing
         if size < NODES:
-            to_node(prop, rot, mode, node, w, wp)
-            to_node(prop, rot, mode, last, w, wq)
+            to_node(tables, mode, node, w, wp)
+            to_node(tables, mode, last, w, wq)
         n_open = 0
         n_once = 0
         once = lo
@@ -255,20 +261,20 @@ def search(
             f = rows[r, 0]
             sign = float(rows[r, 1])
             if size == NODES:
-                g0 = sign * value_of(fun, mode, f, w)
-                s0 = sign * slope_of(fun, mode, f, w)
-                g1 = sign * value_of(fun, mode, f, w1)
-                s1 = sign * slope_of(fun, mode, f, w1)
+                g0 = sign * value_of(tables, mode, f, w)
+                s0 = sign * slope_of(tables, mode, f, w)
+                g1 = sign * value_of(tables, mode, f, w1)
+                s1 = sign * slope_of(tables, mode, f, w1)
             else:
-                g0 = sign * value_of(fun, mode, f, wp)
-                s0 = sign * slope_of(fun, mode, f, wp)
-                g1 = sign * value_of(fun, mode, f, wq)
-                s1 = sign * slope_of(fun, mode, f, wq)
+                g0 = sign * value_of(tables, mode, f, wp)
+                s0 = sign * slope_of(tables, mode, f, wp)
+                g1 = sign * value_of(tables, mode, f, wq)
+                s1 = sign * slope_of(tables, mode, f, wq)
             if node == 0 and f < zero.shape[0] and zero[f] != 0:
                 g0 = 0.0
                 if zero[f] == 2:
                     s0 = 0.0
-            kind = classify(g0, s0, g1, s1, h, bound_at(fun, info, mode, f, w))
+            kind = classify(g0, s0, g1, s1, h, bound_at(tables, mode, f, w))
             if kind == NEVER:
                 never = True
                 break
@@ -282,8 +288,8 @@ def search(
         if not never:
             if n_open == 0 and n_once == 0:
                 if not up:
-                    found[0] = rows[lo, 0]
-                    dense(prop, rot, tay, info, mode, n_i, rates, w, node * spacing, wn, scr, found, end)
+                    found[FUNCTIONAL] = rows[lo, 0]
+                    dense(tables, work, mode, node * spacing, end)
                     return node * spacing
                 node = last
                 while size < NODES // 2 and node % (2 * size) == 0:
@@ -296,18 +302,16 @@ def search(
                 for _ in range(n_once):
                     f = rows[row, 0]
                     flag = zero[f] if f < zero.shape[0] else 0
-                    tau = refine(
-                        prop, rot, tay, info, mode, w, f, float(rows[row, 1]), flag, tau, wn, scr, found
-                    )
+                    tau = refine(tables, work, mode, f, float(rows[row, 1]), flag, tau)
                     # the root of another piece is not the one that is certain here
                     if not ((node - 1e-6) * spacing <= tau <= (last + 1e-6) * spacing):
                         tau = -1.0
                         break
-                    found[0] = f
-                    dense(prop, rot, tay, info, mode, n_i, rates, w, tau, wn, scr, found, end)
+                    found[FUNCTIONAL] = f
+                    dense(tables, work, mode, tau, end)
                     behind = -1
                     for r in range(lo, hi):
-                        if r != row and rows[r, 1] * value_of(fun, mode, rows[r, 0], end) <= 0.0:
+                        if r != row and rows[r, 1] * value_of(tables, mode, rows[r, 0], end) <= 0.0:
                             behind = r
                     if behind < 0:
                         break
@@ -317,12 +321,12 @@ def search(
             if size > 1:
                 size //= 2
                 continue
-            tau = finest(prop, rot, tay, info, mode, w, rows, lo, hi, zero, node, up, wn, scr, points, found)
+            tau = finest(tables, work, mode, rows, lo, hi, node, up)
             if tau >= 0.0:
                 tau += node * spacing
-                dense(prop, rot, tay, info, mode, n_i, rates, w, tau, wn, scr, found, end)
+                dense(tables, work, mode, tau, end)
                 return tau
-            up = found[2] != 0
+            up = found[HELD] != 0
         else:
             up = False
         node = last

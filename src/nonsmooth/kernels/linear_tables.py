@@ -36,25 +36,25 @@ FREE_STEP = 1.0  # a mode without a time scale of its own moves on polynomials: 
 
 
 @device
-def fastest_rate(i, mode, A, row):
+def fastest_rate(A, row):
     """The largest |eigenvalue| of two states; of more a bound on it (``row`` is scratch)."""
     if STATES == 2:
-        half = 0.5 * (A[i, mode, 0, 0] + A[i, mode, STATES - 1, STATES - 1])
-        det = A[i, mode, 0, 0] * A[i, mode, STATES - 1, STATES - 1]
-        det -= A[i, mode, 0, STATES - 1] * A[i, mode, STATES - 1, 0]
+        half = 0.5 * (A[0, 0] + A[STATES - 1, STATES - 1])
+        det = A[0, 0] * A[STATES - 1, STATES - 1]
+        det -= A[0, STATES - 1] * A[STATES - 1, 0]
         disc = half * half - det
         return fabs(half) + sqrt(disc) if disc >= 0.0 else sqrt(fabs(det))
-    return balanced_norm(i, mode, A, row)
+    return balanced_norm(A, row)
 
 
 @device
-def balanced_norm(i, mode, A, row):
+def balanced_norm(A, row):
     """The largest sum of a row of |A| after a scaling of the states that makes each row as large as its column.
 
     What only leads one way can be scaled away altogether."""
     for r in range(STATES):
         for j in range(STATES):
-            row[r, j] = fabs(A[i, mode, r, j])
+            row[r, j] = fabs(A[r, j])
     for _ in range(4):
         for k in range(STATES):
             across = -row[k, k]
@@ -78,13 +78,13 @@ def balanced_norm(i, mode, A, row):
 
 
 @device
-def find_equilibrium(i, mode, A, b, row, info):
-    """The solution of A u + b = 0 into info[mode, 2:], by elimination in ``row``; the origin where A is singular."""
+def find_equilibrium(A, b, row, info):
+    """The solution of A u + b = 0 into info[2:], by elimination in ``row``; the origin where A is singular."""
     for r in range(STATES):
-        info[mode, 2 + r] = 0.0
+        info[2 + r] = 0.0
         for j in range(STATES):
-            row[r, j] = A[i, mode, r, j]
-        row[r, STATES] = -b[i, mode, r]
+            row[r, j] = A[r, j]
+        row[r, STATES] = -b[r]
     for k in range(STATES):
         best = k
         size = 0.0
@@ -92,7 +92,7 @@ def find_equilibrium(i, mode, A, b, row, info):
             if fabs(row[r, k]) > fabs(row[best, k]):
                 best = r
         for j in range(STATES):
-            size = max(size, fabs(A[i, mode, best, j]))
+            size = max(size, fabs(A[best, j]))
         if not (fabs(row[best, k]) > 1e-9 * size):
             return
         for j in range(k, STATES + 1):
@@ -106,8 +106,8 @@ def find_equilibrium(i, mode, A, b, row, info):
     for k in range(STATES - 1, -1, -1):
         total = row[k, STATES]
         for j in range(k + 1, STATES):
-            total -= row[k, j] * info[mode, 2 + j]
-        info[mode, 2 + k] = total / row[k, k]
+            total -= row[k, j] * info[2 + j]
+        info[2 + k] = total / row[k, k]
 
 
 @inline
@@ -125,16 +125,17 @@ def times_generator(row, k, field, mode, rates, scale):
 
 
 @device
-def fill_mode(i, mode, A, b, c, s, rates, period, field, info, row):
+def fill_mode(i, mode, form, tables, rates, row):
     """The states' rows of M; step, node spacing and equilibrium (the origin where the matrix is singular)."""
+    field, info, period = tables.field, tables.info, form.period[i]
     for r in range(STATES):
         for j in range(STATES):
-            field[mode, r, j] = A[i, mode, r, j]
-        field[mode, r, ONE] = b[i, mode, r]
+            field[mode, r, j] = form.A[i, mode, r, j]
+        field[mode, r, ONE] = form.b[i, mode, r]
         for h in range(HARMONICS):
-            field[mode, r, WAVE + 2 * h] = c[i, mode, h, r]
-            field[mode, r, WAVE + 1 + 2 * h] = s[i, mode, h, r]
-    rate = fastest_rate(i, mode, A, row)
+            field[mode, r, WAVE + 2 * h] = form.c[i, mode, h, r]
+            field[mode, r, WAVE + 1 + 2 * h] = form.s[i, mode, h, r]
+    rate = fastest_rate(form.A[i, mode], row)
     for h in range(HARMONICS):
         rate = max(rate, rates[h])
     if rate > 0.0:
@@ -147,7 +148,7 @@ def fill_mode(i, mode, A, b, c, s, rates, period, field, info, row):
         step = min(step, 0.3 * period)
     info[mode, 0] = step
     info[mode, 1] = step / NODES
-    find_equilibrium(i, mode, A, b, row, info)
+    find_equilibrium(form.A[i, mode], form.b[i, mode], row, info[mode])
 
 
 @device
@@ -208,8 +209,9 @@ def column(row, k, prop, mode, node, j):
 
 
 @device
-def bound_of(row, k, mode, every, prop, rot, info, out, at):
+def bound_of(row, k, mode, every, tables, out, at):
     """Largest |entries| over each ``every``-th node of row[k] exp(M tau) into out[at:]: of each state, of the rest."""
+    prop, rot = tables.prop, tables.rot
     for j in range(STATES + 1):
         out[at + j] = 0.0
     for node in range(0, NODES + 1, every):
@@ -217,7 +219,7 @@ def bound_of(row, k, mode, every, prop, rot, info, out, at):
         for j in range(STATES):
             entry = column(row, k, prop, mode, node, j)
             out[at + j] = max(out[at + j], fabs(entry))
-            rest += entry * info[mode, 2 + j]
+            rest += entry * tables.info[mode, 2 + j]
         rest = fabs(rest)
         for h in range(HARMONICS):
             bc = row[k, WAVE + 2 * h]
@@ -231,50 +233,71 @@ def bound_of(row, k, mode, every, prop, rot, info, out, at):
 
 
 @device
-def fill_functional(mode, f, field, rates, info, prop, rot, fun, tay, row):
+def fill_functional(mode, f, tables, rates, row):
     """Taylor rows, slope row and fourth-derivative bound of the functional whose value row stands in fun[mode, f]."""
+    fun = tables.fun
     for j in range(M):
         row[0, j] = fun[mode, f, j]
     scale = 1.0
     for k in range(DEGREE + 1):
         for j in range(M):
-            tay[mode, f, j, k] = scale * row[k, j]
-        times_generator(row, k, field, mode, rates, 1.0)
+            tables.tay[mode, f, j, k] = scale * row[k, j]
+        times_generator(row, k, tables.field, mode, rates, 1.0)
         scale /= k + 1
     for j in range(M):
         fun[mode, f, M + j] = row[1, j]
     at = 2 * M
-    bound_of(row, 4, mode, 1, prop, rot, info, fun[mode, f], at)
-    bound_of(row, 5, mode, 4, prop, rot, info, fun[mode, f], at + STATES + 1)
+    bound_of(row, 4, mode, 1, tables, fun[mode, f], at)
+    bound_of(row, 5, mode, 4, tables, fun[mode, f], at + STATES + 1)
     for j in range(STATES + 1):  # between two nodes the entries move by at most half a spacing times their slope
-        fun[mode, f, at + j] += 0.7 * info[mode, 1] * fun[mode, f, at + STATES + 1 + j]
+        fun[mode, f, at + j] += 0.7 * tables.info[mode, 1] * fun[mode, f, at + STATES + 1 + j]
 
 
 @device
-def build(i, A, b, c, s, rates, period, ia, ib, ic, is_, oa, ob, oc, os_, prop, rot, fun, tay, field, info, row):
-    """Fill the tables for parameter point ``i``."""
-    n_i = ia.shape[1]
-    for mode in range(A.shape[1]):
-        fill_mode(i, mode, A, b, c, s, rates, period, field, info, row)
-        fill_propagators(mode, field, rates, info[mode, 1], prop, rot, row)
+def build(i, form, tables, work):
+    """Fill the tables for parameter point ``i``, where they do not stand there already."""
+    if work.built[0] == i + 1:
+        return
+    n_i, fun, rates = form.ia.shape[1], tables.fun, work.rates
+    for h in range(HARMONICS):
+        rates[h] = form.multiples[h] * form.omega[i]
+    for mode in range(form.A.shape[1]):
+        fill_mode(i, mode, form, tables, rates, work.row)
+        fill_propagators(mode, tables.field, rates, tables.info[mode, 1], tables.prop, tables.rot, work.row)
         for f in range(fun.shape[1]):
             for j in range(M):
                 fun[mode, f, j] = 0.0
             if f < n_i:
                 for j in range(STATES):
-                    fun[mode, f, j] = ia[i, f, j]
-                fun[mode, f, ONE] = ib[i, f]
+                    fun[mode, f, j] = form.ia[i, f, j]
+                fun[mode, f, ONE] = form.ib[i, f]
                 for h in range(HARMONICS):
-                    fun[mode, f, WAVE + 2 * h] = ic[i, f, h]
-                    fun[mode, f, WAVE + 1 + 2 * h] = is_[i, f, h]
+                    fun[mode, f, WAVE + 2 * h] = form.ic[i, f, h]
+                    fun[mode, f, WAVE + 1 + 2 * h] = form.is_[i, f, h]
             elif f < n_i + STATES:
                 fun[mode, f, f - n_i] = 1.0
             else:
                 o = f - n_i - STATES
                 for j in range(STATES):
-                    fun[mode, f, j] = oa[i, o, mode, j]
-                fun[mode, f, ONE] = ob[i, o, mode]
+                    fun[mode, f, j] = form.oa[i, o, mode, j]
+                fun[mode, f, ONE] = form.ob[i, o, mode]
                 for h in range(HARMONICS):
-                    fun[mode, f, WAVE + 2 * h] = oc[i, o, mode, h]
-                    fun[mode, f, WAVE + 1 + 2 * h] = os_[i, o, mode, h]
-            fill_functional(mode, f, field, rates, info, prop, rot, fun, tay, row)
+                    fun[mode, f, WAVE + 2 * h] = form.oc[i, o, mode, h]
+                    fun[mode, f, WAVE + 1 + 2 * h] = form.os[i, o, mode, h]
+            fill_functional(mode, f, tables, rates, work.row)
+    for f in range(n_i):
+        work.twin[f] = twin_of(f, n_i, fun)
+    work.built[0] = i + 1
+
+
+@device
+def twin_of(f, n_i, fun):
+    """The state that indicator f is but for a constant, so that its extremes follow from the state's; -1: none."""
+    twin = -1
+    for k in range(STATES):
+        same = fun[0, f, k] == 1.0
+        for j in range(M):
+            same = same and (j == k or j == ONE or fun[0, f, j] == 0.0)
+        if same:
+            twin = k
+    return twin

@@ -1,0 +1,207 @@
+"""Observer of small changes along a trajectory of the exact flow: what Lyapunov exponents are.
+
+A leg multiplies the frame by exp(A tau), from the tables of the leg itself; transitions by their saltation
+(``frame.saltation``). The frame is made orthonormal again after each, and what is divided out is multiplied up.
+"""
+
+from math import fabs, inf, sqrt
+
+from numba import types
+
+from .cache import inline, kernel
+from .codes import OK, PAUSED
+from .frame import log_determinant, orthonormal, put_away, saltation
+from .hybrid import leave, march
+from .linear_search import slope_of
+from .linear_tables import DEGREE, HARMONICS, NODES, STATES, WAVE, M
+from .records import FORM, GOAL, GROWTH, MOTION, NET, SECTION, TABLES, WORK
+from .run_places import DONE, JUMPS, MODE, PERIODS, RETURNS, TIME, WAITED
+
+OPEN_RUN, CLOSED = 0, 2
+
+
+@inline
+def open_window(i, form, section, seen, tables, work):
+    """Units of time count from here (``RETURNS`` of them; where in the period the run began: ``WAITED``), and periods
+    with them."""
+    work.memo[PERIODS] = 0.0
+    work.memo[WAITED] = work.memo[TIME]
+    for c in range(STATES):
+        seen.lengths[c] = 1.0
+
+
+@inline
+def reached(goal, work):
+    """Whether the run is over."""
+    return work.tally[RETURNS] >= goal.keep
+
+
+@inline
+def room(seen, work):
+    """Nothing is logged."""
+    return OK
+
+
+@inline
+def remaining(goal, work):
+    """Time to the end of the unit."""
+    return (work.tally[RETURNS] + 1) * goal.unit - work.memo[DONE]
+
+
+@inline
+def may_stride(i, form, net, section):
+    """Every step is followed."""
+    return False
+
+
+@inline
+def hurry(i, form, net, section, goal, seen, tables, work, patience):
+    """Every step is followed."""
+    return False, False, patience
+
+
+@inline
+def times(X, seen):
+    """frame = X frame, for X in units of the scales."""
+    Q, scratch = seen.frame, seen.scratch
+    for c in range(STATES):
+        for r in range(STATES):
+            total = X[r, 0] * Q[0, c]
+            for j in range(1, STATES):
+                total += X[r, j] * Q[j, c]
+            scratch[r] = total
+        for r in range(STATES):
+            Q[r, c] = scratch[r]
+
+
+@inline
+def observe(i, step, full, triggered, form, net, section, goal, seen, tables, work):
+    """Carry the frame over the leg: X = exp(A tau), from the nearest node and the Taylor rows of the states."""
+    prop, tay, X, scale = tables.prop, tables.tay, seen.step, seen.scale
+    mode, n_i = work.tally[MODE], work.zero.shape[0]
+    spacing = tables.info[mode, 1]
+    node = NODES if full else min(int(step / spacing + 0.5), NODES)
+    local = step - node * spacing
+    for r in range(STATES):
+        for c in range(STATES):
+            X[r, c] = prop[mode, node, c, r] if full else 0.0
+    if not full:
+        for r in range(STATES):
+            for q in range(STATES):
+                a = 0.0
+                for k in range(DEGREE, -1, -1):
+                    a = a * local + tay[mode, n_i + r, q, k]
+                for c in range(STATES):
+                    X[r, c] += a * prop[mode, node, c, q]
+    for r in range(STATES):
+        seen.sums[0] += tables.field[mode, r, r] * step
+        for c in range(STATES):
+            X[r, c] *= scale[c] / scale[r]
+    times(X, seen)
+    return OPEN_RUN
+
+
+@inline
+def mark(i, wrapped, ended, crossed, step, form, goal, seen, work):
+    """The time at the end of a leg, on the clock of the forcing: sums of steps would drift away from it."""
+    tally, memo, T = work.tally, work.memo, form.period[i]
+    if ended:
+        tally[RETURNS] += 1
+        tally[JUMPS] = 0
+        memo[DONE] = tally[RETURNS] * goal.unit
+    else:
+        memo[DONE] = memo[PERIODS] * T + memo[TIME] - memo[WAITED] if T < 1e300 else memo[DONE] + step
+    if not crossed:
+        settle_frame(tally[RETURNS] - 1 if ended else tally[RETURNS], ended, False, seen)
+
+
+@inline
+def settle_frame(unit, ended, singular, seen):
+    """Make the frame orthonormal; its lengths go to the unit's logarithms at its end, or before they overflow."""
+    lengths = seen.lengths
+    orthonormal(seen.frame, STATES, STATES, lengths, singular)
+    away = ended
+    for c in range(STATES):
+        away = away or not (1e-100 < lengths[c] < 1e100)
+    if away:
+        put_away(lengths, STATES, seen.growth[unit])
+
+
+@inline
+def slope_along(field, mode, w, out):
+    """The vector field at w."""
+    for r in range(STATES):
+        total = 0.0
+        for j in range(M):
+            total += field[mode, r, j] * w[j]
+        out[r] = total
+
+
+@inline
+def approach(mode, fired, seen, tables, work):
+    """Derivative of the instant of a crossing in the state, and how steeply the surface is met."""
+    t_z, S, f = seen.t_z, seen.step, seen.fields
+    slope_along(tables.field, mode, work.w, f[0])
+    for r in range(STATES):
+        t_z[r] = 0.0
+        for c in range(STATES):
+            S[r, c] = 1.0 if r == c else 0.0
+    if fired >= 0:
+        rate = slope_of(tables, mode, fired, work.w)
+        across, speed = 0.0, 0.0
+        for j in range(STATES):
+            h = tables.fun[mode, fired, j]
+            t_z[j] = -h / rate
+            across += h * h
+            speed += f[0, j] * f[0, j]
+        if across * speed > 0.0:
+            seen.sums[3] = min(seen.sums[3], fabs(rate) / sqrt(across * speed))
+
+
+@inline
+def cross(i, t, mode, jumps, form, net, goal, seen, tables, work):
+    """Saltation of a transition, from the mode in which it was taken to ``mode``."""
+    before, f, R = work.wp, seen.fields, seen.reset
+    slope_along(tables.field, work.tally[MODE], before, f[0])
+    slope_along(tables.field, mode, work.w, f[1])
+    for r in range(STATES):
+        f[2, r] = 0.0
+        for c in range(STATES):
+            R[r, c] = 1.0 if r == c else 0.0
+        if net.transitions[t, 1] != 0:
+            for c in range(STATES):
+                R[r, c] = form.ra[i, t, r, c]
+            for h in range(HARMONICS):
+                f[2, r] += work.rates[h] * (
+                    form.rs[i, t, h, r] * before[WAVE + 2 * h] - form.rc[i, t, h, r] * before[WAVE + 1 + 2 * h]
+                )
+    saltation(R, f[2], f[0], f[1], seen.t_z, STATES, seen.step, seen.matrix)
+
+
+@inline
+def depart(jumps, seen, work):
+    """The transitions of one instant act on the frame."""
+    S, scale = seen.step, seen.scale
+    for r in range(STATES):
+        for c in range(STATES):
+            S[r, c] *= scale[c] / scale[r]
+    size = log_determinant(S, STATES, seen.matrix)
+    seen.sums[1] += size
+    seen.sums[2] += jumps
+    times(S, seen)
+    settle_frame(work.tally[RETURNS], False, size == -inf, seen)
+
+
+@inline
+def arrive(i, code, source, t, sense, state, form, section, goal, seen, tables, work):
+    """No section is looked for."""
+    return code
+
+
+@kernel(types.int64(types.int64, FORM, NET, SECTION, GOAL, MOTION, GROWTH, TABLES, WORK))
+def grow(i, form, net, section, goal, motion, seen, tables, work):
+    """Point i for ``goal.keep`` units of time with the frame. Returns a status: PAUSED asks to be called again."""
+    code = march(i, form, net, section, goal, motion, seen, tables, work)
+    if code != PAUSED:
+        leave(i, form, motion, work)
+    return code

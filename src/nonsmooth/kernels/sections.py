@@ -1,0 +1,236 @@
+"""Observer of section returns: points of a sweep one after the other, with extremes and counts of the kept window.
+
+Of ``transient`` + ``keep`` returns the last ones are kept. The window reaches from the last transient return (or the
+start) to the last kept one; its end is where a carried state goes on.
+"""
+
+from numba import types
+
+from .cache import inline, kernel
+from .codes import NO_CONVERGENCE, OK, PAUSED
+from .hybrid import leave, march
+from .linear_extremes import finish, forget, include, widen
+from .linear_march import sign_after, stride
+from .linear_search import SIDE, dense, value_of
+from .linear_tables import STATES
+from .records import FORM, GOAL, KEPT, MOTION, NET, SECTION, TABLES, WORK
+from .run_places import BEGUN, JUMPS, MODE, MOST_STEPS, PASSES, PERIODS, RETURNS, SINCE, TIME, TRIES, WAITED
+
+OPEN_RUN, LATE, CLOSED = 0, 1, 2
+
+
+@inline
+def stroboscopic_hit(s, s1, target, period):
+    """Time after s at which the section phase is met within (s, s1], or -1; judged on the clock: none counts twice."""
+    if s < target and target <= s1:
+        return target - s
+    if s < target + period and target + period <= s1:
+        return target + period - s
+    return -1.0
+
+
+@inline
+def open_window(i, form, section, seen, tables, work):
+    """Begin the counts of point i."""
+    forget(i, seen)
+    seen.crossings[i] = 0
+    seen.contacts[i] = 0
+    seen.elapsed[i] = 0.0
+
+
+@inline
+def reached(goal, work):
+    """Whether the run is over."""
+    return work.tally[RETURNS] >= goal.transient + goal.keep
+
+
+@inline
+def room(seen, work):
+    """Nothing is logged."""
+    return OK
+
+
+@inline
+def remaining(goal, work):
+    """No time ends a run."""
+    return 1e300
+
+
+@inline
+def may_stride(i, form, net, section):
+    """Whether whole steps may be made at a stride: nothing but a crossing can end one."""
+    strides = section.indicator < 0 and form.period[i] < 1e300
+    for k in range(net.at.shape[0]):
+        strides = strides and net.at[k] < 0.0
+    return strides
+
+
+@inline
+def hurry(i, form, net, section, goal, seen, tables, work, patience):
+    """Whole steps without crossings, where extremes need not be seen. Returns (w1 stands at the end of the step that is
+    next, that step is clear, patience left)."""
+    tally, memo = work.tally, work.memo
+    returns = tally[RETURNS]
+    if not (returns < goal.transient or section.extremes == 0):
+        return False, False, patience
+    T = form.period[i]
+    began, turns = memo[TIME], memo[PERIODS]
+    s, whole, counted, clear, patience = stride(
+        tables, net, work, tally[MODE], began, turns, section.phase * T, T, returns,
+        goal.transient if returns < goal.transient else 0, patience,
+    )  # fmt: skip
+    if counted > returns:
+        tally[RETURNS] = counted
+        tally[JUMPS] = 0
+    if s != began or whole != turns:
+        memo[SINCE] = 1e300
+        if counted >= goal.transient:
+            seen.elapsed[i] += (whole - turns) * T + (s - began)
+        memo[TIME], memo[PERIODS] = s, whole
+    return True, clear, patience
+
+
+@inline
+def keep_point(i, k, u, mode, time, seen):
+    """The k-th kept point of the section."""
+    for j in range(STATES):
+        seen.section[i, k, j] = u[j]
+    seen.section_mode[i, k] = mode
+    seen.section_time[i, k] = time
+
+
+@inline
+def observe(i, step, full, triggered, form, net, section, goal, seen, tables, work):
+    """Returns at a phase of the forcing on the leg, and extremes of its part in the kept window.
+
+    CLOSED: the last return, where the run ends. LATE: a transition at the section's own phase comes first; a run that
+    ends here goes on behind it."""
+    tally, memo = work.tally, work.memo
+    s, T = memo[TIME], form.period[i]
+    is_open = tally[RETURNS] >= goal.transient
+    a, b, state = 0.0, step, OPEN_RUN
+    if section.indicator < 0:
+        target = section.phase * T
+        r = stroboscopic_hit(s, s + step, target, T)
+        if r >= step and triggered:
+            state = LATE
+        elif r >= 0.0:
+            r = min(r, step)
+            tally[RETURNS] += 1
+            tally[JUMPS] = 0
+            if is_open:
+                dense(tables, work, tally[MODE], r, work.wp)
+                turn = memo[PERIODS] if s < target and target <= s + step else memo[PERIODS] + 1.0
+                keep_point(i, tally[RETURNS] - goal.transient - 1, work.wp, tally[MODE], turn * T + target, seen)
+                if reached(goal, work):
+                    state, b = CLOSED, r
+                    memo[PERIODS] = turn
+            elif tally[RETURNS] == goal.transient:
+                is_open, a = True, r
+    if is_open:
+        if section.extremes != 0:
+            widen(i, a, b, tables, work, tally[MODE], seen)
+        seen.elapsed[i] += b - a
+    if state == CLOSED:
+        memo[TIME] = section.phase * T
+        for j in range(STATES):
+            work.w[j] = seen.section[i, goal.keep - 1, j]
+    return state
+
+
+@inline
+def mark(i, wrapped, ended, crossed, step, form, goal, seen, work):
+    """Count a leg."""
+    work.memo[WAITED] += step
+    work.tally[TRIES] += 1
+
+
+@inline
+def approach(mode, fired, seen, tables, work):
+    """Nothing is asked of a crossing before it is made."""
+
+
+@inline
+def cross(i, t, mode, jumps, form, net, goal, seen, tables, work):
+    """Count a transition in the kept window."""
+    if work.tally[RETURNS] >= goal.transient:
+        seen.crossings[i] += 1
+        seen.contacts[i] += net.transitions[t, 2]
+        include(i, tables, work, mode, seen)
+
+
+@inline
+def depart(jumps, seen, work):
+    """Nothing is asked of a crossing after it was made."""
+
+
+@inline
+def arrive(i, code, source, t, sense, state, form, section, goal, seen, tables, work):
+    """Returns at the end of a leg: on a surface, or behind a transition at the section's phase. Gives the status."""
+    tally, memo, T = work.tally, work.memo, form.period[i]
+    mode = tally[MODE]
+    if sense != 0:
+        tally[PASSES] += 1
+        tally[TRIES] = 0
+        tally[JUMPS] = 0
+        memo[WAITED] = 0.0
+        if tally[PASSES] % section.every == 0:
+            tally[RETURNS] += 1
+            if tally[RETURNS] > goal.transient:
+                after = section.after != 0 or t < 0
+                time = (memo[PERIODS] * T if T < 1e300 else 0.0) + memo[TIME]
+                keep_point(
+                    i, tally[RETURNS] - goal.transient - 1, work.w if after else work.before, mode if after else source,
+                    time, seen,
+                )  # fmt: skip
+    if state == LATE and code == OK:
+        memo[TIME] = section.phase * T
+        tally[RETURNS] += 1
+        tally[JUMPS] = 0
+        if tally[RETURNS] > goal.transient:
+            keep_point(
+                i, tally[RETURNS] - goal.transient - 1, work.w, mode, memo[PERIODS] * T + memo[TIME], seen
+            )  # fmt: skip
+    if section.indicator >= 0:
+        if t >= 0:
+            work.found[SIDE] = sign_after(tables, work, mode, section.indicator)
+        elif sense != 0:
+            work.found[SIDE] = sense
+        else:
+            value = value_of(tables, mode, section.indicator, work.w)
+            if value != 0.0:
+                work.found[SIDE] = 1 if value > 0.0 else -1
+        if (memo[WAITED] > section.t_max or tally[TRIES] > MOST_STEPS) and code == OK:
+            code = NO_CONVERGENCE
+    return code
+
+
+@kernel(types.int64(
+    types.int64, types.int64, types.float64[:, ::1], FORM, NET, SECTION, GOAL, MOTION, KEPT, TABLES, WORK
+))  # fmt: skip
+def chain(first, last, starts, form, net, section, goal, motion, seen, tables, work):
+    """Run points first <= i < last into ``seen``; returns the point that has paused, or ``last``.
+
+    Without ``starts`` each point goes on from where the last good one ended, at equal phase of the forcing; else it
+    begins at its own row of them, in the first mode. A point that fails leaves the motion where it was."""
+    for i in range(first, last):
+        T = form.period[i]
+        if work.tally[BEGUN] == 0:
+            motion.counters[1] = 0
+            if starts.shape[0] > 0:
+                for j in range(STATES):
+                    motion.u[j] = starts[i, j]
+                motion.counters[0] = 0
+                motion.clock[0], motion.clock[1], motion.clock[2] = 0.0, 0.0, 0.0
+            elif motion.clock[2] > 0.0:
+                motion.clock[0] = motion.clock[0] / motion.clock[2] * T
+                motion.clock[2] = T if T < 1e300 else 0.0
+        code = march(i, form, net, section, goal, motion, seen, tables, work)
+        if code == PAUSED:
+            return i
+        work.tally[BEGUN] = 0
+        finish(i, tables, work, seen)
+        seen.status[i] = code
+        if code == OK:
+            leave(i, form, motion, work)
+    return last
