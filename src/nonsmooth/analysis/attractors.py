@@ -184,10 +184,10 @@ class Settler:
         self, points: FloatArray, rows: IntArray, starts: FloatArray, modes: IntArray, n_returns: int, size: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Exponents of jobs whose motions are of one size."""
-        from nonsmooth.kernels.exponent import BATCHES, N_SUMS, NUDGE
+        from nonsmooth.kernels.exponent import BATCHES, NUDGE, RATE_SUMS
 
         batch = n_returns // BATCHES
-        offsets, sums = np.tile(NUDGE * size, (len(rows), 1)), np.zeros((len(rows), N_SUMS))
+        offsets, sums = np.tile(NUDGE * size, (len(rows), 1)), np.zeros((len(rows), RATE_SUMS))
         jobs = points, rows, starts, modes, batch // 4 + BATCHES * batch, batch
         if self.device == "cuda" and self.width == len(self.system.traced.u) + len(self.system.traced.m):
             from nonsmooth.analysis.settle_cuda import separate_on_gpu

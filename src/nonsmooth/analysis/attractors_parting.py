@@ -41,11 +41,11 @@ def parting_sizes(maximum: FloatArray, minimum: FloatArray, scale: FloatArray) -
 
 def rates(sums: FloatArray, status: IntArray) -> tuple[FloatArray, FloatArray]:
     """Exponents per unit time and their standard errors (J,) from the sums of J jobs; NaN where a run failed."""
-    from nonsmooth.kernels.exponent import BATCHES, MEAN, SQUARES
+    from nonsmooth.kernels.exponent import BATCHES, MEAN_RATE, SQUARED_RATES
 
     good = np.isin(status, (codes.OK, codes.NOT_GUARANTEED))
-    error = np.sqrt(sums[:, SQUARES] / (BATCHES * (BATCHES - 1)))
-    return np.where(good, sums[:, MEAN], np.nan), np.where(good, error, np.nan)
+    error = np.sqrt(sums[:, SQUARED_RATES] / (BATCHES * (BATCHES - 1)))
+    return np.where(good, sums[:, MEAN_RATE], np.nan), np.where(good, error, np.nan)
 
 
 def separate_one_by_one(

@@ -15,8 +15,9 @@ _f1 = _f[::1]
 
 BATCHES = 10
 NUDGE = 1e-6  # where a neighbour begins, in units of the motion's size
-GROWN, TIME, DONE, MEAN, SQUARES = range(5)  # of a run: in the present batch; batches, mean of their rates, deviations
-N_SUMS = 5
+# Sums of a run: growth and time in the present batch; batches, mean of their rates, squares of the deviations.
+GROWTH_NOW, TIME_NOW, BATCHES_DONE, MEAN_RATE, SQUARED_RATES = range(5)
+RATE_SUMS = 5
 
 
 @kernel(types.void(_i, _i, _f, _f1, _f1, _f1, _f1, _f1))
@@ -36,13 +37,13 @@ def separate(n, batch, elapsed, u, other, size, offset, sums):
         apart = 1e-16 * first
     if n < batch // 4:
         return
-    sums[GROWN] += log(apart / first)
-    sums[TIME] += elapsed
+    sums[GROWTH_NOW] += log(apart / first)
+    sums[TIME_NOW] += elapsed
     if (n - batch // 4) % batch == batch - 1:
-        rate = sums[GROWN] / sums[TIME]
-        sums[GROWN] = 0.0
-        sums[TIME] = 0.0
-        sums[DONE] += 1.0
-        away = rate - sums[MEAN]
-        sums[MEAN] += away / sums[DONE]
-        sums[SQUARES] += away * (rate - sums[MEAN])
+        rate = sums[GROWTH_NOW] / sums[TIME_NOW]
+        sums[GROWTH_NOW] = 0.0
+        sums[TIME_NOW] = 0.0
+        sums[BATCHES_DONE] += 1.0
+        away = rate - sums[MEAN_RATE]
+        sums[MEAN_RATE] += away / sums[BATCHES_DONE]
+        sums[SQUARED_RATES] += away * (rate - sums[MEAN_RATE])
