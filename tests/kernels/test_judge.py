@@ -1,4 +1,4 @@
-"""Period numbers of sequences whose period is known, and the cycle of transient, judgement and push around them."""
+"""Period numbers of sequences whose period is known; the cycle of transient, judgement and perturbation."""
 
 from __future__ import annotations
 
@@ -25,7 +25,8 @@ def cycle(p: int, n: int, decay: float = 0.0, mu: float = 0.5) -> np.ndarray:
 def rules(keep: int, size: np.ndarray = SIZE, max_period: int = 16, **given: Any) -> Rules:
     """Rules under which the motion has this size whatever its extremes."""
     usual = {"transient": 0, "keep": keep, "max_period": max_period, "first_look": 0, "attempts": 0, "beyond": 0,
-             "tolerance": 1e-9, "nudge": 1e-6, "least": size, "rounded": 0.0, "push_least": size, "push_rounded": 0.0}
+             "tolerance": 1e-9, "difference": 1e-6, "least": size, "rounded": 0.0, "perturb_least": size,
+             "perturb_rounded": 0.0}
     return Rules(**(usual | given))  # fmt: skip
 
 
@@ -151,8 +152,8 @@ def test_contraction_is_the_factor_of_the_distance_to_the_cycle(p: int) -> None:
     assert contraction(points, cycle(p, len(k)), SIZE, p, 1e-9) == 0.5
 
 
-def test_what_still_settles_is_run_on_and_pushed_off_an_unstable_orbit() -> None:
-    """Transients of 1, 2 and 4 times the first; a push only where the orbit is unstable, and by its size."""
+def test_what_still_settles_is_run_on_and_perturbed_on_an_unstable_orbit() -> None:
+    """Transients of 1, 2 and 4 times the first; a perturbation only where the orbit is unstable, and by its size."""
     job = Job(rules(100, transient=50, attempts=3))
     waited = []
     for mu in (1.5, 1.0, np.nan):

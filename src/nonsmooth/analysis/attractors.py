@@ -15,9 +15,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.analysis.attractors_compiled import exponents_compiled, load, run_compiled
-from nonsmooth.analysis.attractors_parting import parting_sizes, rates, separate_one_by_one
 from nonsmooth.analysis.attractors_trace import Trace, mode_at, period_of, place_of, state_at, trace
+from nonsmooth.analysis.exponents import rates, separate_one_by_one, separation_sizes
 from nonsmooth.analysis.settle import ATTEMPTS, Attractors, rules_of, tolerance_of
+from nonsmooth.analysis.settle_cuda import separate_on_gpu, settle_on_gpu
 from nonsmooth.analysis.settled import Settled, least_sizes, usable
 from nonsmooth.flow.engine import Chain, Engine, FloatArray, IntArray, SectionPlan, State
 from nonsmooth.flow.linear import LinearEngine
@@ -123,8 +124,6 @@ class Settler:
         modes = np.array(modes, dtype=np.int64)
         points = np.ascontiguousarray(points, dtype=float)
         if self.device == "cuda":
-            from nonsmooth.analysis.settle_cuda import settle_on_gpu
-
             assert not carried  # refused at the door
             return settle_on_gpu(self, points, rows, starts, modes, begin, attempts)
         if self.linear is None:
@@ -173,7 +172,7 @@ class Settler:
         rows = np.ascontiguousarray(rows, dtype=np.int64)
         starts = np.ascontiguousarray(starts, dtype=float)
         modes = np.array(modes, dtype=np.int64)
-        sizes = parting_sizes(maximum, minimum, self.system.scale_vector())
+        sizes = separation_sizes(maximum, minimum, self.system.scale_vector())
         largest, error = np.full(len(rows), np.nan), np.full(len(rows), np.nan)
         for size in np.unique(sizes, axis=0):
             jobs = np.flatnonzero((sizes == size).all(axis=1))
@@ -184,14 +183,12 @@ class Settler:
         self, points: FloatArray, rows: IntArray, starts: FloatArray, modes: IntArray, n_returns: int, size: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Exponents of jobs whose motions are of one size."""
-        from nonsmooth.kernels.exponent import BATCHES, NUDGE, RATE_SUMS
+        from nonsmooth.kernels.exponent import BATCHES, DISTANCE, RATE_SUMS
 
         batch = n_returns // BATCHES
-        offsets, sums = np.tile(NUDGE * size, (len(rows), 1)), np.zeros((len(rows), RATE_SUMS))
+        offsets, sums = np.tile(DISTANCE * size, (len(rows), 1)), np.zeros((len(rows), RATE_SUMS))
         jobs = points, rows, starts, modes, batch // 4 + BATCHES * batch, batch
         if self.device == "cuda" and self.width == len(self.system.traced.u) + len(self.system.traced.m):
-            from nonsmooth.analysis.settle_cuda import separate_on_gpu
-
             status = separate_on_gpu(self, *jobs, size, offsets, sums)
         elif self.linear is not None:
             status = exponents_compiled(self.linear, *jobs, self.plan.phase, size, offsets, sums)

@@ -1,7 +1,7 @@
 """Bring a trajectory to its attractor at one parameter value, and say what was reached.
 
 The state is run through the transient and its section points are judged (``kernels.judge``); a point that is still
-settling is run on, or pushed off an unstable orbit on which a carried state may sit for ever (``kernels.settle``).
+settling is run on, or perturbed on an unstable orbit on which a carried state may sit for ever (``kernels.settle``).
 Here this is done with any engine, one point after the other.
 """
 
@@ -32,7 +32,7 @@ RESTING = 5e-7  # in units of the scales: smaller values of a state are rounding
 NOTHING = 1e-15  # and beside none
 LONGEST = 16  # period number looked for where none is given and as many points are kept
 TOLERANCE = 1e-9  # of a return, in units of the motion's size
-NUDGE = 1e-6  # finite differences of the return map, in units of the motion's size
+DIFFERENCE = 1e-6  # finite differences of the return map, in units of the motion's size
 ATTEMPTS = 3  # further transients for a point that is still settling: of 1, 2 and 4 times the first
 GOOD = (codes.OK, codes.NOT_GUARANTEED)
 
@@ -139,17 +139,17 @@ class Attractors:
         """Largest |multiplier| of the p-th return map of a stroboscopic section, by differences at the last point."""
         from nonsmooth.kernels.judge import multiplier
 
-        n, nudge = len(size), self.rules.nudge
+        n, difference = len(size), self.rules.difference
         images = np.zeros((n + 1, n))
         for j in range(n + 1):
-            probe = self._beside(i, state, nudge * size * (np.arange(n) == j - 1), p - 1, 1, out)
+            probe = self._beside(i, state, difference * size * (np.arange(n) == j - 1), p - 1, 1, out)
             if probe is None:
                 return np.nan
             images[j] = probe.section[i, 0]
-        return float(multiplier(images, size, nudge, np.zeros((2, n, n))))
+        return float(multiplier(images, size, difference, np.zeros((2, n, n))))
 
     def _contraction(self, i: int, p: int, state: State, size: FloatArray, out: Chain) -> float:
-        """The factor by which a nudged state nears the cycle on a Poincare section per p returns."""
+        """The factor by which a perturbed state nears the cycle on a Poincare section per p returns."""
         from nonsmooth.kernels.judge import ROUNDS, contraction
 
         cycle, p = out, p * self.plan.every
@@ -158,7 +158,7 @@ class Attractors:
             if own is None:
                 return np.nan
             cycle = own
-        run = self._beside(i, state, self.rules.nudge * size, 0, ROUNDS * p + 2, out)
+        run = self._beside(i, state, self.rules.difference * size, 0, ROUNDS * p + 2, out)
         return np.nan if run is None else float(contraction(cycle.section[i], run.section[i], size, p, self.tolerance))
 
 
@@ -169,11 +169,11 @@ def rules_of(
     """The rules of judgement and of the cycle for a method; see :class:`nonsmooth.kernels.settle.Rules`."""
     from nonsmooth.kernels.settle import Rules
 
-    # at rest a Runge-Kutta pair errs by atol: a nudge must stand well above that for its growth to mean something
-    clear = min(1e3 * tolerance, 1e-4) if method == "rkf45" else NUDGE
+    # at rest a Runge-Kutta pair errs by atol: a difference must stand well above that for its growth to mean something
+    clear = min(1e3 * tolerance, 1e-4) if method == "rkf45" else DIFFERENCE
     least, rounded = least_sizes(method, scale)
     return Rules(
-        transient, keep, max_period, first_look, attempts, beyond, tolerance, max(NUDGE, 1e2 * tolerance, clear),
+        transient, keep, max_period, first_look, attempts, beyond, tolerance, max(DIFFERENCE, 1e2 * tolerance, clear),
         least, rounded, LEAST * scale, ROUNDED,
     )  # fmt: skip
 

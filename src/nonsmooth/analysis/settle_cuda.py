@@ -100,10 +100,10 @@ class Rounds:
             self._contractions(jobs, period)
             return
         for state in range(gpu.n):
-            self._beside(jobs, state + 1, state, self.rules.nudge)
+            self._beside(jobs, state + 1, state, self.rules.difference)
         gpu.run_beside(jobs, self.others, period, self.cycle, self.arrived, self.extremes)
         gpu.launch(
-            gpu.module.measure, jobs, len(period), self.rules.nudge, sizes, self.others.u, self.cycle.status,
+            gpu.module.measure, jobs, len(period), self.rules.difference, sizes, self.others.u, self.cycle.status,
             self.arrived.status, self.mu,
         )  # fmt: skip
 
@@ -117,7 +117,7 @@ class Rounds:
         from nonsmooth.kernels.judge import ROUNDS
 
         gpu = self.gpu
-        self._beside(jobs, 0, -1, self.rules.nudge)
+        self._beside(jobs, 0, -1, self.rules.difference)
         for p in np.unique(period[jobs]):
             some, run = jobs[period[jobs] == p], gpu.buffers(len(period), ROUNDS * int(p) + 2)
             gpu.run(some, self.others, 0, ROUNDS * int(p) + 2, run, False)

@@ -9,7 +9,7 @@ from numba import float64, int64
 from .cuda_planar import N_INDICATORS, N_OUTPUTS
 from .cuda_tables import tabled
 from .cuda_target import cuda, entry, local
-from .planar_settle import part
+from .planar_settle import follow_pair
 from .records import Flow, Kept, Motion, Net
 
 
@@ -39,7 +39,7 @@ def neighbours(
     jobs, rows, packed, multiples, built, net, u, clock, counters, begin, end, batch, size, offsets, sums, plan, phase,
     limit, status,
 ):  # fmt: skip
-    """Returns begin <= n < end of each job and its neighbour: see ``part``."""
+    """Returns begin <= n < end of each job and its neighbour: see ``follow_pair``."""
     k = cuda.grid(1)
     if k >= jobs.shape[0]:
         return
@@ -48,4 +48,4 @@ def neighbours(
     motion = Motion(u[j], clock[j], counters[j])
     moved = Motion(cuda.local.array(2, float64), cuda.local.array(3, float64), cuda.local.array(4, int64))
     flow = Flow(linear, Net(*net), phase, 1e300, limit, scratch[0], scratch[1], u[0:0])
-    status[j] = part(begin, end, batch, 0, size, motion, moved, offsets[j], sums[j], flow, plan, single())
+    status[j] = follow_pair(begin, end, batch, 0, size, motion, moved, offsets[j], sums[j], flow, plan, single())

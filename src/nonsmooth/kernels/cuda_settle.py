@@ -41,7 +41,7 @@ def beside(jobs, apart, only, factor, offsets, states, others):
 
 
 @entry
-def measure(jobs, apart, nudge, sizes, u, codes_of_job, codes, mu):
+def measure(jobs, apart, difference, sizes, u, codes_of_job, codes, mu):
     """mu[j]: the largest multiplier, from where job j (row j of u) and its neighbours (j + apart, ...) have come."""
     k = cuda.grid(1)
     if k >= jobs.shape[0]:
@@ -56,7 +56,7 @@ def measure(jobs, apart, nudge, sizes, u, codes_of_job, codes, mu):
         good = good and (code == OK or code == NOT_GUARANTEED)
         for d in range(N_STATES):
             images[leg, d] = u[row, d]
-    mu[j] = multiplier(images, sizes[j], nudge, matrices) if good else nan
+    mu[j] = multiplier(images, sizes[j], difference, matrices) if good else nan
 
 
 @entry

@@ -14,7 +14,7 @@ _i, _f = types.int64, types.float64
 _f1 = _f[::1]
 
 BATCHES = 10
-NUDGE = 1e-6  # where a neighbour begins, in units of the motion's size
+DISTANCE = 1e-6  # where a neighbour begins, in units of the motion's size
 # Sums of a run: growth and time in the present batch; batches, mean of their rates, squares of the deviations.
 GROWTH_NOW, TIME_NOW, BATCHES_DONE, MEAN_RATE, SQUARED_RATES = range(5)
 RATE_SUMS = 5
@@ -24,15 +24,15 @@ RATE_SUMS = 5
 def separate(n, batch, elapsed, u, other, size, offset, sums):
     """Take return n of a state and its neighbour, ``elapsed`` after the one before it, into the sums.
 
-    ``offset`` (n) becomes where the neighbour begins next, beside the state, NUDGE of ``size`` away in each state."""
+    ``offset`` (n) becomes where the neighbour begins next: DISTANCE of ``size`` away, in each state, in the mean."""
     first, apart = 0.0, 0.0
     for k in range(size.shape[0]):
         offset[k] = other[k] - u[k]
-        first += NUDGE * NUDGE
+        first += DISTANCE * DISTANCE
         apart += (offset[k] / size[k]) ** 2
     first, apart = sqrt(first), sqrt(apart)
     for k in range(size.shape[0]):
-        offset[k] = offset[k] * (first / apart) if apart > 0.0 else NUDGE * size[k]
+        offset[k] = offset[k] * (first / apart) if apart > 0.0 else DISTANCE * size[k]
     if not apart > 0.0:  # fallen together: a direction that vanishes
         apart = 1e-16 * first
     if n < batch // 4:

@@ -157,15 +157,15 @@ def spectral_radius(A, B):
 
 
 @kernel(types.float64(_f2, _f1, _f, _f3))
-def multiplier(images, size, nudge, work):
+def multiplier(images, size, difference, work):
     """Largest modulus of the multipliers of the map whose images (n + 1, n) of a point and its neighbours these are.
 
-    Neighbour j is ``nudge`` * size[j] away in state j; ``work`` (2, n, n) is scratch."""
+    Neighbour j is ``difference`` * size[j] away in state j; ``work`` (2, n, n) is scratch."""
     n = size.shape[0]
     A, B = work[0], work[1]
     for j in range(n):
         for k in range(n):
-            A[k, j] = (images[j + 1, k] - images[0, k]) / (nudge * size[k])
+            A[k, j] = (images[j + 1, k] - images[0, k]) / (difference * size[k])
     return spectral_radius(A, B)
 
 

@@ -66,7 +66,7 @@ def probe(i, p, size, rules, motion, moved, flow, plan, quiet, cycle, work):
     for leg in range(STATES, -1, -1):
         copy(motion, moved)
         if leg > 0:
-            moved.u[leg - 1] += rules.nudge * size[leg - 1]
+            moved.u[leg - 1] += rules.difference * size[leg - 1]
             code = go(i, moved, flow, quiet, p - 1, 1, cycle)
         else:
             code = go(i, moved, flow, plan, 0, p, cycle)
@@ -74,7 +74,7 @@ def probe(i, p, size, rules, motion, moved, flow, plan, quiet, cycle, work):
             return nan
         for k in range(STATES):
             images[leg, k] = moved.u[k]
-    return multiplier(images, size, rules.nudge, matrices)
+    return multiplier(images, size, rules.difference, matrices)
 
 
 @kernel(types.void(
@@ -134,7 +134,7 @@ def settle_many(
 
 
 @device
-def part(begin, end, batch, i, size, motion, moved, offset, sums, flow, quiet, out):
+def follow_pair(begin, end, batch, i, size, motion, moved, offset, sums, flow, quiet, out):
     """Returns begin <= n < end of a run and of its neighbour; gives a status. See ``exponent``."""
     for n in range(begin, end):
         copy(motion, moved)
@@ -155,4 +155,4 @@ def separate_many(rows, starts, modes, returns, batch, size, flow, quiet, out, m
     Job j begins on the section at starts[j] in the mode modes[j], its neighbour beside it by offsets[j]."""
     for j in range(rows.shape[0]):
         put(motion, rows[j], starts[j], flow.phase, modes[j], flow)
-        status[j] = part(0, returns, batch, rows[j], size, motion, moved, offsets[j], sums[j], flow, quiet, out)
+        status[j] = follow_pair(0, returns, batch, rows[j], size, motion, moved, offsets[j], sums[j], flow, quiet, out)

@@ -1,4 +1,4 @@
-"""The cycle that brings a job to its attractor: transient, judgement, further transients, a push off unstable orbits.
+"""The cycle that brings a job to its attractor: transient, judgement, perturbation where an orbit is unstable.
 
 A job is a trajectory that shall settle. Whoever runs it (a compiled loop, Python, the rounds of a GPU) begins it, runs
 what is wanted and tells ``next_run``, which says what is wanted next; only here is it decided::
@@ -23,7 +23,7 @@ from .codes import BEYOND_STOP, NOT_GUARANTEED, OK, SLOW
 from .judge import MARGIN, candidate, certain, size_of
 
 END, RUN, FRESH, PROBE = 0, 1, 2, 3
-KICK = 1e-3  # what pushes a state off an unstable orbit, in units of the motion's size
+PERTURBATION = 1e-3  # what perturbs a state on an unstable orbit, in units of the motion's size
 
 
 class Rules(NamedTuple):
@@ -36,11 +36,11 @@ class Rules(NamedTuple):
     attempts: Any  # further transients, at most
     beyond: Any  # returns that follow each kept window, for its extremes
     tolerance: Any  # of a return, in units of the motion's size
-    nudge: Any  # of neighbours, in the same units
+    difference: Any  # of neighbours, in the same units
     least: Any  # (n,) the least size of a motion
     rounded: Any  # and as a part of the states' values
-    push_least: Any  # (n,) the same for a push: where errors of a method set the least size, it would be a new motion
-    push_rounded: Any
+    perturb_least: Any  # (n,) for a perturbation: where errors set the least size, it would be a new motion
+    perturb_rounded: Any
 
 
 class Jobs(NamedTuple):
@@ -58,7 +58,7 @@ class Jobs(NamedTuple):
     residual: Any
     multiplier: Any
     size: Any  # (J, n)
-    push: Any  # (J, n)
+    perturbation: Any  # (J, n)
     returns: Any  # (J, max_period)
 
 
@@ -116,7 +116,8 @@ def next_run(jobs, j, rules, code, points, top, bottom, mu, u):
         jobs.spent[j] += jobs.transient[j] + rules.keep + rules.beyond
         for k in range(rules.least.shape[0]):
             jobs.size[j, k] = size_of(top[k], bottom[k], rules.least[k], rules.rounded)
-            jobs.push[j, k] = KICK * size_of(top[k], bottom[k], rules.push_least[k], rules.push_rounded)
+            size = size_of(top[k], bottom[k], rules.perturb_least[k], rules.perturb_rounded)
+            jobs.perturbation[j, k] = PERTURBATION * size
         p, status, residual = candidate(points, jobs.size[j], rules.max_period, rules.tolerance, jobs.returns[j])
         jobs.period_number[j] = p
         jobs.status[j] = status
@@ -131,7 +132,7 @@ def next_run(jobs, j, rules, code, points, top, bottom, mu, u):
     elif jobs.status[j] == SLOW and jobs.attempt[j] < rules.attempts:
         if jobs.multiplier[j] > 1.0 + MARGIN:
             for k in range(rules.least.shape[0]):
-                u[k] += jobs.push[j, k]
+                u[k] += jobs.perturbation[j, k]
             jobs.settled[j] = 0
         jobs.transient[j] = (1 << jobs.attempt[j]) * max(rules.transient, 1)
         jobs.attempt[j] += 1

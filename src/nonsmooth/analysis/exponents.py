@@ -15,7 +15,7 @@ from nonsmooth.kernels import codes
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["parting_sizes", "rates", "separate_one_by_one"]
+__all__ = ["rates", "separate_one_by_one", "separation_sizes"]
 
 USUAL = 1.5  # powers of ten: a motion this near to its scale is taken to have that size
 SLENDER = 1e-6  # a state whose motion is smaller than this, beside the largest of the others, is at rest
@@ -23,7 +23,7 @@ RESTING = 1e-9  # in units of the scales: a motion that has come to rest in all 
 AT_REST = 1e-3
 
 
-def parting_sizes(maximum: FloatArray, minimum: FloatArray, scale: FloatArray) -> FloatArray:
+def separation_sizes(maximum: FloatArray, minimum: FloatArray, scale: FloatArray) -> FloatArray:
     """Sizes (J, n) by which neighbours of J motions are told apart: those of the motions, in powers of ten.
 
     The states' ``scale`` will not do: neighbours of a motion in micrometres would be as far apart as it is wide, and
