@@ -21,7 +21,7 @@ help:  ## list the targets
 reproduce: $(VENV)/.installed-run  ## reproduce Savi et al. (2007): figures, data and report in out/savi2007
 	$(BIN)/nonsmooth reproduce savi2007 --out $(OUT)
 
-reproduce-full: $(VENV)/.installed-run  ## the same with charts of a million points; an interrupted run goes on
+reproduce-full: $(VENV)/.installed-zarr  ## the same with charts of a million points; an interrupted run goes on
 	$(BIN)/nonsmooth reproduce savi2007 --full --out $(OUT)
 
 test: $(VENV)/.installed-test  ## run the tests
@@ -48,11 +48,12 @@ coverage-awkward: $(VENV)/.installed-run  ## the same on rigs where much goes wr
 rig-against-model: $(VENV)/.installed-run  ## lay virtual rigs over the model; writes docs/measured_rig_against_model.md
 	$(BIN)/python -m nonsmooth.identification.compare.rig_against_model --seeds 2 3 --out docs/measured_rig_against_model.md
 
-check: $(VENV)/.installed-dev  ## ruff, mypy, import-linter, codespell
+check: $(VENV)/.installed-dev  ## ruff, mypy, import-linter, codespell, the prose of docstrings
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/codespell README.md CHANGELOG.md CONTRIBUTING.md src tests docs benchmarks examples
+	$(BIN)/python tests/prose.py
 
 bench: $(VENV)/.installed-bench  ## compare with other programs on the same work; writes benchmarks/results.md
 	$(BIN)/python benchmarks/run.py
@@ -80,6 +81,15 @@ $(BIN)/python:
 
 $(VENV)/.installed-run: pyproject.toml | $(BIN)/python
 	$(PIP) --editable .
+	@touch $@
+
+# Groups of packages for work on this one, which need pip 25.1; all others are extras.
+$(VENV)/.pip: | $(BIN)/python
+	$(PIP) 'pip>=25.1'
+	@touch $@
+
+$(patsubst %,$(VENV)/.installed-%,test dev docs bench): $(VENV)/.installed-%: pyproject.toml | $(VENV)/.pip
+	$(PIP) --editable . --group $*
 	@touch $@
 
 $(VENV)/.installed-%: pyproject.toml | $(BIN)/python

@@ -8,7 +8,8 @@ import numpy as np
 
 from nonsmooth.analysis.settled import Settled
 from nonsmooth.flow.engine import Chain, FloatArray, IntArray
-from nonsmooth.flow.linear import DIVERGENCE, LinearEngine, Tables
+from nonsmooth.flow.linear import LinearEngine, Tables
+from nonsmooth.flow.loop import DIVERGENCE
 
 if TYPE_CHECKING:
     from nonsmooth.kernels.settle import Rules
@@ -59,7 +60,8 @@ def _flow(engine: LinearEngine, tables: Tables, phase: float) -> Any:
     from nonsmooth.kernels.records import Flow
 
     none = np.zeros((0, len(engine.scale)))
-    return Flow(tables.form, engine.net, phase, np.inf, DIVERGENCE * engine.scale, *tables.scratch(), none)
+    form, own, work = engine.given(tables, "sections")
+    return Flow(form, engine.net, phase, np.inf, DIVERGENCE * engine.scale, own, work, none)
 
 
 def _plan(extremes: bool) -> IntArray:
@@ -69,7 +71,7 @@ def _plan(extremes: bool) -> IntArray:
 def _motion(n: int) -> Any:
     from nonsmooth.kernels.records import Motion
 
-    return Motion(np.zeros(n), np.zeros(3), np.zeros(4, dtype=np.int64))
+    return Motion(np.zeros(n), np.zeros(0), np.zeros(3), np.zeros(4, dtype=np.int64))
 
 
 def _buffers(engine: LinearEngine, tables: Tables, keep: int) -> Any:

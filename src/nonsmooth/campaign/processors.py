@@ -1,4 +1,4 @@
-"""What computes the chunks of a work: its type, which decides the last digits, and the clock that measures its work."""
+"""Type of the processor that computes chunks, which decides the last digits, and the clock that measures its work."""
 
 from __future__ import annotations
 

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.flow.engine import Chain, FloatArray, Log, SectionPlan, State
+from nonsmooth.flow.engine import FloatArray, State
+from nonsmooth.flow.loop import LoopEngine, nowhere, pack_net
 from nonsmooth.kernels import codes
-from nonsmooth.kernels.run_places import BEGUN, CROSSINGS, PATIENCE, TOUCHES
+from nonsmooth.kernels.run_places import BEGUN
 
 if TYPE_CHECKING:
     from nonsmooth.system.linear import LinearForm
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
 
 __all__ = ["LinearEngine", "PlanarEngine", "is_linear"]
 
-DIVERGENCE = 1e9  # in units of a state's scale
 LARGEST = 64e6  # bytes of the tables of all modes
 
 
@@ -58,22 +58,9 @@ class Tables:
 
     local: threading.local = field(default_factory=threading.local)
 
-    def module(self, observer: str = "sections") -> ModuleType:
-        """The kernels that observe a run in that way."""
-        from nonsmooth.kernels.linear_module import linear_module
-
-        return linear_module(self.form.A.shape[-1], self.harmonics, observer)
-
-    def scratch(self, observer: str = "sections") -> tuple[Any, Any]:
-        """The present thread's tables and work arrays; the kernel keeps the tables of the last point in them."""
-        if not hasattr(self.local, "work"):
-            self.local.work = self.module(observer).scratch(*self.sizes)
-        work: tuple[Any, Any] = self.local.work
-        return work
-
 
 @dataclass
-class LinearEngine:
+class LinearEngine(LoopEngine):
     """``Engine`` over ``kernels.linear_module`` for one system's traced form."""
 
     traced: Traced
@@ -99,135 +86,45 @@ class LinearEngine:
         with np.errstate(divide="ignore"):
             period = np.where(t.omega > 0.0, 2.0 * np.pi / t.omega, np.inf)
         from nonsmooth.kernels.cache import compiled
-        from nonsmooth.kernels.linear_module import linear_module
         from nonsmooth.kernels.records import Form
 
         form = Form(
             t.A, t.b, t.c, t.s, multiples, t.omega, period,
             t.ia, t.ib, t.ic, t.is_, *outputs, t.ra, t.rb, t.rc, t.rs,
         )  # fmt: skip
+        tables = Tables(points, form, period, (n_modes, n_i, outputs[0].shape[1], len(self.net.rows)), n_h)
         if n_points > 1:  # threads may share them
-            compiled(linear_module(len(self.scale), n_h).chain)
-        return Tables(points, form, period, (n_modes, n_i, outputs[0].shape[1], len(self.net[1])), n_h)
+            compiled(self.module(tables, "sections").chain)
+        return tables
 
-    def chain(
-        self, tables: Tables, first: int, last: int, state: State, starts: FloatArray | None,
-        plan: SectionPlan, transient: int, keep: int, out: Chain,
-    ) -> None:  # fmt: skip
-        from nonsmooth.kernels.records import Goal, Motion, Section
+    def module(self, tables: Tables, observer: str) -> ModuleType:
+        from nonsmooth.kernels.linear_module import linear_module
 
-        carry = starts is None
-        clock = state.clock.copy()
-        if carry:
-            state.keep_phase(float(tables.period[first]), plan.phase if plan.indicator < 0 else -1.0)
-            state.clock[2] = 0.0  # for the kernel: done, take the time as it stands
-        kernel = tables.module().chain
-        section = Section(
-            plan.indicator, plan.rising, plan.mode, int(plan.after), plan.every, int(plan.extremes),
-            float(plan.phase), float(plan.t_max),
-        )  # fmt: skip
-        arguments = (
-            np.zeros((0, len(self.scale))) if starts is None else starts, tables.form, self._net(plan.indicator),
-            section, Goal(transient, keep, 0.0, 0.0, DIVERGENCE * self.scale, PATIENCE),
-            Motion(state.u, state.clock, state.counters),
-            out.record(), *tables.scratch(),
-        )  # fmt: skip
-        tables.scratch()[1].tally[BEGUN] = 0
-        at = first
-        while at < last:  # Ctrl-C comes in between
-            at = kernel(at, last, *arguments)
-        if carry:
-            state.settled = True
-            if state.clock[2] == 0.0 and tables.period[first] < np.inf:
-                state.clock[:] = clock  # failed at the first point: nothing was written
+        return linear_module(len(self.scale), tables.harmonics, observer)
 
-    def record(self, tables: Tables, state: State, until: float, samples: FloatArray) -> Log:
-        from nonsmooth.kernels import records
+    def given(self, tables: Tables, observer: str) -> tuple[Any, Any, Any]:
+        """The present thread's tables and work; the kernel keeps the tables of the last point in them."""
+        if not hasattr(tables.local, "work"):
+            tables.local.work = self.module(tables, observer).scratch(*tables.sizes)
+        return tables.form, *tables.local.work
 
-        n = len(samples)
-        sampled = (
-            samples, np.full((n, len(self.scale)), np.nan), np.full(n, -1, dtype=np.int64), np.zeros(n, dtype=np.int64),
-        )  # fmt: skip
-        size = 1024
-        logs = self._logs(size)
-        kernel = tables.module("record").record
-        form, nowhere, work = tables.form, records.Section(-1, 0, -1, 0, 1, 0, 0.0, 0.0), tables.scratch("record")
-        goal = records.Goal(0, 0, float(until), 0.0, DIVERGENCE * self.scale, PATIENCE)
-        motion = records.Motion(state.u, state.clock, state.counters)
-        state.counters[1] = int(state.settled)
-        work[1].tally[:] = 0
-        while True:
-            code = kernel(form, self._net(-1), nowhere, goal, motion, records.Log(*sampled, *logs), *work)
-            if code == codes.LOG_FULL:
-                size *= 2
-                grown = self._logs(size)
-                for old, new in zip(logs, grown, strict=True):
-                    new[: len(old)] = old
-                logs = grown
-            elif code != codes.PAUSED:
-                break
-        state.settled = True
-        n_c, n_t = work[1].tally[[CROSSINGS, TOUCHES]]
-        times, transitions, before, after = (log[:n_c] for log in logs[:4])
-        touch_times, indicators, touch_u, clearances = (log[:n_t] for log in logs[4:])
-        _, sample_u, sample_mode, sample_segment = sampled
-        return Log(
-            sample_u, np.zeros((n, 0)), sample_mode, sample_segment,
-            times, transitions, before, after, np.zeros((n_c, 0)),
-            touch_times, indicators, touch_u, clearances, int(code),
-        )  # fmt: skip
+    def touches_of_a_leg(self) -> int:
+        return 64 * len(self.net.rows)
 
     def grow(self, tables: Tables, i: int, state: State, count: int, unit: float, growth: Any) -> int:
         """Point i: march ``count`` units of time with a frame (``kernels.records.Growth``). Returns a status.
 
         The periods in the state's clock count from here."""
-        from nonsmooth.kernels.records import Goal, Motion, Section
-
-        kernel, work = tables.module("growth").grow, tables.scratch("growth")
-        goal = Goal(0, count, 0.0, float(unit), DIVERGENCE * self.scale, PATIENCE)
-        state.counters[1] = 0
-        work[1].tally[BEGUN] = 0
-        code = codes.PAUSED
+        form, own, work = self.given(tables, "growth")
+        kernel = self.module(tables, "growth").grow
+        goal, motion = self._goal(0, count, 0.0, unit), self._motion(state, False)
+        work.tally[BEGUN], code = 0, codes.PAUSED
         while code == codes.PAUSED:
-            code = kernel(
-                i, tables.form, self._net(-1), Section(-1, 0, -1, 0, 1, 0, 0.0, 0.0), goal,
-                Motion(state.u, state.clock, state.counters), growth, *work,
-            )  # fmt: skip
+            code = kernel(i, form, self.net, nowhere(), goal, motion, growth, own, work)
         state.settled = True
         return int(code)
-
-    def _logs(self, size: int) -> list[np.ndarray]:
-        """Room for crossings (time, transition, states before, after), and touches (time, indicator, states, gap)."""
-        n = len(self.scale)
-        crossings = [np.zeros(size), np.zeros(size, dtype=np.int64), np.zeros((size, n)), np.zeros((size, n))]
-        return [*crossings, np.zeros(size), np.zeros(size, dtype=np.int64), np.zeros((size, n)), np.zeros(size)]
-
-    def _net(self, indicator: int) -> Any:
-        """The net, its last two rows being the section's (rising, falling)."""
-        rows: np.ndarray = self.net.rows.copy()
-        rows[-2:, 0] = max(indicator, 0)
-        return self.net._replace(rows=rows)
 
 
 class PlanarEngine(LinearEngine):
     """That of two states: its spectrum, its judging of many jobs and its GPU kernels are compiled as well."""
 
-
-def pack_net(traced: Traced) -> Any:
-    """The net of transitions, with two more rows for a section."""
-    from nonsmooth.kernels.records import Net
-
-    integer = np.int64
-    transitions = np.array(
-        [(t.target, t.reset is not None, t.contact) for t in traced.transitions], dtype=integer
-    ).reshape(-1, 3)
-    rows = [(r.indicator, r.sign, r.strict) for t in traced.transitions for r in t.rows]
-    row_start = np.cumsum([0] + [len(t.rows) for t in traced.transitions], dtype=integer)
-    leaving = [
-        [j for j, t in enumerate(traced.transitions) if t.source == mode] for mode in range(len(traced.mode_names))
-    ]
-    mode_start = np.cumsum([0] + [len(one) for one in leaving], dtype=integer)
-    mode_list = np.array([j for one in leaving for j in one], dtype=integer)
-    at = np.array([-1.0 if t.at is None else t.at for t in traced.transitions], dtype=float)
-    both = np.array([*rows, (0, 1, 1), (0, -1, 1)], dtype=integer).reshape(-1, 3)
-    return Net(transitions, both, row_start, mode_start, mode_list, at)

@@ -10,7 +10,8 @@ import numpy as np
 
 from nonsmooth.flow.engine import FloatArray, IntArray, SectionPlan
 from nonsmooth.flow.launches import States, launch
-from nonsmooth.flow.linear import DIVERGENCE, PlanarEngine
+from nonsmooth.flow.linear import PlanarEngine
+from nonsmooth.flow.loop import DIVERGENCE
 from nonsmooth.kernels import codes
 
 __all__ = ["SLICE", "Buffers", "PlanarOnGpu"]

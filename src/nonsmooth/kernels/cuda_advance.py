@@ -49,9 +49,9 @@ def advance(
         row = j + leg * apart
         if leg > 0:
             n_transient, n_keep = n_transient + n_keep - 1 if apart > 0 else 0, 1
+        motion = Motion(u[row], u[row, 0:0], clock[row], counters[row])
         code = go(
-            0, Motion(u[row], clock[row], counters[row]), flow, after if leg > 0 else plan, n_transient, n_keep,
-            row_of(other if leg > 0 else out, row),
-        )  # fmt: skip
+            0, motion, flow, after if leg > 0 else plan, n_transient, n_keep, row_of(other if leg > 0 else out, row)
+        )
         if code != OK:
             break

@@ -117,6 +117,7 @@ def arrays_of_thread(packed, multiples, i):
     rates = cuda.local.array(N_HARMONICS, float64)
     zero = cuda.local.array(N_INDICATORS, int64)
     found = cuda.local.array(4, int64)
+    visited = cuda.local.array(N_MODES, int64)
     twin = cuda.local.array(N_INDICATORS, int64)
     built = cuda.local.array(1, int64)
     tally = cuda.local.array(N_TALLY, int64)
@@ -125,6 +126,6 @@ def arrays_of_thread(packed, multiples, i):
     tally[0] = 0
     form = Form(A, b, c, s, multiples, omega, period, ia, ib, ic, is_, oa, ob, oc, os_, ra, rb, rc, rs)
     work = Work(
-        w, w1, wn, wp, wq, end, there, before, row, scr, points, rates, zero, found, twin, built, tally, memo,
+        w, w1, wn, wp, wq, end, there, before, row, scr, points, rates, zero, found, visited, twin, built, tally, memo,
     )  # fmt: skip
     return form, (Tables(prop, rot, fun, tay, field, info), work)

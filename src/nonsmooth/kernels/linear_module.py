@@ -15,16 +15,17 @@ from nonsmooth.kernels.cache import load_module
 
 __all__ = ["joined", "linear_module", "settle_module"]
 
-STEPPER = ("linear_tables", "linear_polynomial", "linear_search", "linear_march", "linear_layout", "hybrid")
-OBSERVERS = {"sections": ("linear_extremes", "sections"), "record": ("record",), "growth": ("growth",)}
+STEPPER = ("linear_tables", "linear_polynomial", "linear_search", "linear_stepper", "linear_layout", "hybrid")
+OBSERVERS = {"sections": ("linear_extremes", "sections"), "record": ("linear_touches", "record"), "growth": ("growth",)}
 
 
-def joined(parts: tuple[str, ...], states: int, harmonics: int) -> str:
+def joined(parts: tuple[str, ...], states: int = 2, harmonics: int = 1) -> str:
     """The text of some kernel files in one, with the numbers of states and harmonics set."""
     folder = Path(__file__).parent
     text = "\n".join((folder / f"{part}.py").read_text(encoding="utf-8") for part in parts)
-    own = "|".join(parts)
+    own = "|".join({*parts, *STEPPER, "linear_extremes", "linear_touches"})
     text = re.sub(rf"^from \.(?:{own}) import (\([^)]*\).*|[^(\n]*)$", "", text, flags=re.MULTILINE)
+    text = re.sub(r"^from \. import", "from nonsmooth.kernels import", text, flags=re.MULTILINE)
     text = re.sub(r"^from \.(\w+) import", r"from nonsmooth.kernels.\1 import", text, flags=re.MULTILINE)
     text = re.sub(r"^STATES = 2$", f"STATES = {states}", text, flags=re.MULTILINE)
     return re.sub(r"^HARMONICS = 1$", f"HARMONICS = {harmonics}", text, flags=re.MULTILINE)

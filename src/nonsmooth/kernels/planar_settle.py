@@ -51,6 +51,8 @@ def copy(motion, moved):
     """``moved`` becomes ``motion``."""
     for k in range(STATES):
         moved.u[k] = motion.u[k]
+    for k in range(motion.memory.shape[0]):
+        moved.memory[k] = motion.memory[k]
     for k in range(3):
         moved.clock[k] = motion.clock[k]
     for k in range(4):

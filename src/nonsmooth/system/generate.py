@@ -169,7 +169,7 @@ def _values(traced: Traced, mode: int) -> tuple[list[str], set[str]]:
 
 
 def _jump(traced: Traced, index: int) -> tuple[list[str], set[str]]:
-    """What a transition changes; the rest has been copied before."""
+    """Code for what a transition changes; the rest has been copied before."""
     transition = traced.transitions[index]
     reset = traced.u if transition.reset is None else transition.reset
     targets = [(f"u_new[{i}]", e) for i, e in enumerate(reset) if e != traced.u[i]]
