@@ -129,12 +129,14 @@ def compared(plane: str, side: int) -> list[str]:
 
 def one_launch(plane: str, side: int, returns: int = 256) -> float:
     """Forcing periods per second while all trajectories of a chart are marched, tables included."""
+    from nonsmooth.flow.launches import States
     from nonsmooth.flow.planar_cuda import PlanarOnGpu
 
     _, settler, points, starts = settlers(side, plane)
-    gpu = PlanarOnGpu(settler.planar, points, settler.plan.phase)
+    gpu = PlanarOnGpu(settler.engine, points, settler.plan)
     jobs = np.arange(len(points))
-    states, out = gpu.states(jobs, starts, np.zeros(len(jobs), dtype=np.int64), 0.0), gpu.buffers(len(jobs), 1)
+    states = States.of(gpu.cuda, jobs, starts, np.zeros((len(jobs), 0)), 0, np.zeros((len(jobs), 3)))
+    out = gpu.buffers(len(jobs), 1)
     best = np.inf
     for _ in range(4):
         gpu.cuda.synchronize()

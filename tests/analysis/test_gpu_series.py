@@ -33,13 +33,14 @@ from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.series_cuda import module_of
 from nonsmooth.kernels.cuda_ptx import ptx_of_module
 
-name, signature = json.load(sys.stdin)
+name, signatures = json.load(sys.stdin)
 system = {"valve": ns.models.relief_valve, "two wells": two_wells, "filtered": filtered}[name]()
 engine = engine_on("cuda", engine_for(system, "auto" if name == "filtered" else "taylor", None, None), None)
 module = module_of(engine, engine.prepare(system.parameter_vector()[None, :]))
-text = ptx_of_module(module, "advance", signature)
-print(json.dumps([text.count(".visible .entry"), ".target sm_90" in text]))
+texts = [ptx_of_module(module, entry, signature) for entry, signature in signatures.items()]
+print(json.dumps([[text.count(".visible .entry"), ".target sm_90" in text] for text in texts]))
 """
+ENTRIES = {"advance", "beside", "measure", "contract", "decide", "separated"}
 
 
 def run(code: list[str], given: str = "", **environment: str) -> str:
@@ -115,13 +116,13 @@ def test_basins_have_the_labels_and_attractors_of_the_processor(simulated: dict[
 @pytest.mark.slow  # half a minute of processor time each
 @pytest.mark.skipif(not COMPILER[1], reason="nvidia-nvvm is not installed (extra `test`, Linux only)")
 @pytest.mark.parametrize("name", ["valve", "two wells", "filtered"])
-def test_the_kernel_compiles_for_the_types_it_is_launched_with(simulated: dict[str, Any], name: str) -> None:
-    printed = run(["-c", COMPILE], json.dumps([name, simulated["launched"]["advance"]]))
-    assert json.loads(printed.splitlines()[-1]) == [1, True]
+def test_the_kernels_compile_for_the_types_they_are_launched_with(simulated: dict[str, Any], name: str) -> None:
+    printed = run(["-c", COMPILE], json.dumps([name, simulated["launched"]]))
+    assert json.loads(printed.splitlines()[-1]) == [[1, True]] * len(ENTRIES)
 
 
 def test_no_kernel_is_left_out(simulated: dict[str, Any]) -> None:
-    assert set(simulated["launched"]) == {"advance"}
+    assert set(simulated["launched"]) == ENTRIES
 
 
 def test_what_a_gpu_does_not_take_is_said_at_the_door() -> None:

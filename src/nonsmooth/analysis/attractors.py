@@ -1,34 +1,32 @@
 """Many starts brought to their attractors and judged: the work behind charts and basins.
 
-A *job* is a start at one parameter point. Systems of two states with the exact flow and a stroboscopic section run
-their jobs in one compiled call (``attractors_compiled``); all others go through ``analysis.settle`` one by one. The
-rules of judgement are the same: a period number is granted with a certificate only.
+A *job* is a start at one parameter point. Linear systems with the exact flow and a stroboscopic section run their jobs
+in one compiled call (``attractors_compiled``); all others go through ``analysis.settle`` one by one. What is done is
+decided in one place (``kernels.settle``): a period number is granted with a certificate only.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nonsmooth.analysis.attractors_compiled import exponents_compiled, load, run_compiled
-from nonsmooth.analysis.attractors_cuda import exponents_on_gpu, run_on_gpu
-from nonsmooth.analysis.attractors_parting import exponent_of, parting_sizes
 from nonsmooth.analysis.attractors_trace import Trace, mode_at, period_of, place_of, state_at, trace
-from nonsmooth.analysis.classify import Verdict
-from nonsmooth.analysis.series_cuda import series_exponents_on_gpu, settle_series_on_gpu
-from nonsmooth.analysis.settle import LONGER, Attractors, tolerance_of
+from nonsmooth.analysis.exponents import rates, separate_one_by_one, separation_sizes
+from nonsmooth.analysis.settle import ATTEMPTS, Attractors, rules_of, tolerance_of
+from nonsmooth.analysis.settle_cuda import separate_on_gpu, settle_on_gpu
 from nonsmooth.analysis.settled import Settled, least_sizes, usable
 from nonsmooth.flow.engine import Chain, Engine, FloatArray, IntArray, SectionPlan, State
-from nonsmooth.flow.linear import PlanarEngine
+from nonsmooth.flow.linear import LinearEngine
 from nonsmooth.flow.methods import engine_for
-from nonsmooth.kernels import codes
 from nonsmooth.results.memory import room_for
 
 if TYPE_CHECKING:
+    from nonsmooth.kernels.settle import Rules
     from nonsmooth.system.system import System
 
 __all__ = ["FIRST_LOOK", "Settler"]
@@ -79,16 +77,16 @@ class Settler:
         return _remade, (text, values, options["engine"].name, given)
 
     @property
-    def planar(self) -> PlanarEngine | None:
+    def linear(self) -> LinearEngine | None:
         """The engine whose jobs run in one compiled call; None where they run one by one."""
-        return self.engine if isinstance(self.engine, PlanarEngine) and self.plan.indicator < 0 else None
+        return self.engine if isinstance(self.engine, LinearEngine) and self.plan.indicator < 0 else None
 
     def load(self) -> None:
         """Compile or load the kernel now, before threads ask for it."""
-        if self.planar is not None and self.device == "cpu":
+        if self.linear is not None and self.device == "cpu":
             from nonsmooth.kernels.cache import compiled
 
-            compiled(load(self.planar).settle_many)
+            compiled(load(self.linear).settle_many)
 
     def run(
         self,
@@ -99,7 +97,7 @@ class Settler:
         carried: bool = False,
         modes: Any = None,
         begin: float = 0.0,
-        attempts: int = len(LONGER),
+        attempts: int = ATTEMPTS,
     ) -> Settled:
         """Run J jobs one after the other.
 
@@ -125,18 +123,22 @@ class Settler:
             modes = np.full(len(rows), mode_at(self.system, begin))
         modes = np.array(modes, dtype=np.int64)
         points = np.ascontiguousarray(points, dtype=float)
-        if self.planar is None and self.device == "cuda":
+        if self.device == "cuda":
             assert not carried  # refused at the door
-            return settle_series_on_gpu(self, points, rows, starts, modes, begin, attempts, FIRST_LOOK)
-        if self.planar is None:
+            return settle_on_gpu(self, points, rows, starts, modes, begin, attempts)
+        if self.linear is None:
             return self._run_one_by_one(points, rows, starts, carried, modes, begin, attempts)
-        choice = (
-            self.transient, self.keep, self.max_period, FIRST_LOOK if self.stop_early else 0, attempts, carried,
-            self.extremes,
+        return run_compiled(
+            self.linear, points, rows, starts, modes, begin, self.plan.phase, carried, self.extremes,
+            self.rules(attempts, beyond=1),
         )  # fmt: skip
-        return (run_on_gpu if self.device == "cuda" else run_compiled)(
-            self.planar, points, rows, starts, modes, begin, self.plan.phase, choice, self.tolerance, self.least
-        )
+
+    def rules(self, attempts: int = ATTEMPTS, beyond: int = 0) -> Rules:
+        """The rules of judgement; ``beyond`` as in :class:`nonsmooth.kernels.settle.Rules`."""
+        return rules_of(
+            self.engine.name, self.transient, self.keep, self.max_period, self.tolerance, self.system.scale_vector(),
+            FIRST_LOOK if self.stop_early else 0, attempts, beyond,
+        )  # fmt: skip
 
     @property
     def least(self) -> FloatArray:
@@ -170,7 +172,7 @@ class Settler:
         rows = np.ascontiguousarray(rows, dtype=np.int64)
         starts = np.ascontiguousarray(starts, dtype=float)
         modes = np.array(modes, dtype=np.int64)
-        sizes = parting_sizes(maximum, minimum, self.system.scale_vector())
+        sizes = separation_sizes(maximum, minimum, self.system.scale_vector())
         largest, error = np.full(len(rows), np.nan), np.full(len(rows), np.nan)
         for size in np.unique(sizes, axis=0):
             jobs = np.flatnonzero((sizes == size).all(axis=1))
@@ -181,22 +183,18 @@ class Settler:
         self, points: FloatArray, rows: IntArray, starts: FloatArray, modes: IntArray, n_returns: int, size: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Exponents of jobs whose motions are of one size."""
-        if self.planar is not None and self.device == "cuda":
-            return exponents_on_gpu(self.planar, points, rows, starts, modes, n_returns, self.plan.phase, size)
-        if self.planar is not None:
-            return exponents_compiled(
-                self.planar, points, rows, starts, modes, n_returns, self.plan.phase, size, self.max_period
-            )
+        from nonsmooth.kernels.exponent import BATCHES, DISTANCE, RATE_SUMS
+
+        batch = n_returns // BATCHES
+        offsets, sums = np.tile(DISTANCE * size, (len(rows), 1)), np.zeros((len(rows), RATE_SUMS))
+        jobs = points, rows, starts, modes, batch // 4 + BATCHES * batch, batch
         if self.device == "cuda" and self.width == len(self.system.traced.u) + len(self.system.traced.m):
-            return series_exponents_on_gpu(self, points, rows, starts, modes, n_returns, size)
-        found = [
-            exponent_of(
-                self.system, self.engine, self.plan, points[i : i + 1], starts[j], int(modes[j]), n_returns, size
-            )
-            for j, i in enumerate(rows)
-        ]
-        largest, error = np.array(found).reshape(-1, 2).T
-        return largest, error
+            status = separate_on_gpu(self, *jobs, size, offsets, sums)
+        elif self.linear is not None:
+            status = exponents_compiled(self.linear, *jobs, self.plan.phase, size, offsets, sums)
+        else:
+            status = separate_one_by_one(self.system, self.engine, self.plan, *jobs, size, offsets, sums)
+        return rates(sums, status)
 
     def _run_one_by_one(
         self, points: FloatArray, rows: IntArray, starts: FloatArray, carried: bool, modes: IntArray, begin: float,
@@ -206,7 +204,7 @@ class Settler:
         tables = self.engine.prepare(points)
         attractors = Attractors(
             self.engine, tables, self.plan, self.transient, self.keep, self.max_period, self.tolerance,
-            system.scale_vector(), LONGER[:attempts],
+            system.scale_vector(), FIRST_LOOK if self.stop_early else 0, attempts,
         )  # fmt: skip
         out = Chain.empty(len(points), self.keep, len(traced.u), len(traced.indicators), len(traced.outputs))
         found = Settled.empty(len(rows), len(traced.u), self.width)
@@ -219,9 +217,9 @@ class Settler:
 
             if state is None or not carried:
                 state = fresh()
-            verdict, found.returns[j] = self._settle(attractors, int(i), state, out, fresh)
-            found.period_number[j], found.status[j] = verdict.period_number, verdict.status
-            found.residual[j], found.multiplier[j] = verdict.residual, verdict.multiplier
+            verdict = attractors.settle(int(i), state, out, fresh)
+            for name in ("period_number", "status", "residual", "multiplier", "returns"):
+                getattr(found, name)[j] = getattr(verdict, name)
             if not usable(verdict.status):
                 state = None
                 continue
@@ -235,23 +233,6 @@ class Settler:
             found.maximum[j], found.minimum[j] = cycle.maximum[i], cycle.minimum[i]
             found.last[j], found.mode[j] = place_of(state, self.width), state.counters[0]
         return found
-
-    def _settle(
-        self, attractors: Attractors, i: int, state: State, out: Chain, fresh: Callable[[], State]
-    ) -> tuple[Verdict, int]:
-        """Settle one job with looks before its transient ends: the verdict, and the returns run (without attempts)."""
-        used, todo = 0, FIRST_LOOK
-        while self.stop_early and used + todo < self.transient:
-            verdict = attractors.look(i, state, todo, out)
-            if verdict is None:
-                break
-            used += todo + self.keep
-            if verdict.status == codes.OK:
-                return verdict, used
-            todo = used if 2 * used + self.keep < self.transient else max(self.transient - used, 0)
-        rest = max(self.transient - used, 0)
-        verdict = replace(attractors, transient=rest).settle(i, state, out, fresh)
-        return verdict, used + rest + self.keep
 
 
 @lru_cache(maxsize=8)

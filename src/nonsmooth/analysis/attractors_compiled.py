@@ -1,81 +1,79 @@
-"""Jobs of systems of two states with the exact flow and a stroboscopic section, in one compiled call."""
+"""Jobs of linear systems with the exact flow and a stroboscopic section, in one compiled call."""
 
 from __future__ import annotations
 
-from dataclasses import fields
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.analysis.settled import Settled, usable
+from nonsmooth.analysis.settled import Settled
 from nonsmooth.flow.engine import Chain, FloatArray, IntArray
-from nonsmooth.flow.linear import PlanarEngine
+from nonsmooth.flow.linear import LinearEngine, Tables
 from nonsmooth.flow.loop import DIVERGENCE
-from nonsmooth.flow.poincare import result_status
+
+if TYPE_CHECKING:
+    from nonsmooth.kernels.settle import Rules
 
 __all__ = ["exponents_compiled", "load", "run_compiled"]
 
 
-def load(engine: PlanarEngine) -> Any:
-    """The compiled module of an engine's number of harmonics."""
+def load(engine: LinearEngine) -> Any:
+    """The compiled module of an engine's numbers of states and harmonics."""
     from nonsmooth.kernels.linear_module import settle_module
 
-    return settle_module(len(engine.form.multiples))
+    return settle_module(len(engine.scale), len(engine.form.multiples))
 
 
 def run_compiled(
-    engine: PlanarEngine, points: FloatArray, rows: IntArray, starts: FloatArray, modes: IntArray, begin: float,
-    phase: float, choice: tuple[Any, ...], tolerance: float, least: FloatArray,
+    engine: LinearEngine, points: FloatArray, rows: IntArray, starts: FloatArray, modes: IntArray, begin: float,
+    phase: float, carried: bool, extremes: bool, rules: Rules,
 ) -> Settled:  # fmt: skip
-    """Jobs settled and judged, as :meth:`nonsmooth.analysis.attractors.Settler.run` describes.
+    """Jobs settled and judged, as :meth:`nonsmooth.analysis.attractors.Settler.run` describes."""
+    from nonsmooth.kernels.settle import new_jobs
 
-    Parameters
-    ----------
-    choice : tuple of int
-        Transient, keep, max_period, first look (0: none), attempts, carried, extremes.
-    tolerance : float
-        What counts as a return.
-    least : array (2,)
-        The least size of a motion.
-    """
-    tables, traced = engine.prepare(points), engine.traced
-    _, keep, max_period, *_ = choice
-    sizes = len(traced.u), len(traced.indicators), tables.sizes[2]
-    out, probe = (Chain.empty(len(points), k, *sizes).record() for k in (keep, max_period))
-    norms = np.concatenate([[tolerance], least, np.zeros(2)])
-    plan, quiet = (np.array([-1, 1, -1, 1, 1, extremes], dtype=np.int64) for extremes in (1, 0))
-    found = Settled.empty(len(rows), 2)
+    tables, n = engine.prepare(points), len(engine.scale)
+    jobs, found = new_jobs(len(rows), n, rules.max_period), Settled.empty(len(rows), n)
     load(engine).settle_many(
-        rows, starts, np.full(len(rows), begin), modes, np.array(choice, dtype=np.int64), norms, tables.form,
-        engine.net, plan, quiet, phase, np.inf, DIVERGENCE * engine.scale, out, probe,
-        engine.given(tables, "sections")[1:], _work(max_period),
-        tuple(getattr(found, item.name) for item in fields(found)),
+        rows, starts, np.full(len(rows), begin), modes, int(carried), int(extremes), rules, jobs,
+        _flow(engine, tables, phase), _plan(True), _plan(False), _buffers(engine, tables, rules.keep),
+        _buffers(engine, tables, rules.max_period), _motion(n), _motion(n),
+        (np.zeros((n + 1, n)), np.zeros((2, n, n))),
+        (found.crossings, found.contacts, found.maximum, found.minimum, found.last, found.mode),
     )  # fmt: skip
-    failed = ~usable(found.status)
-    found.status[failed] = [result_status(code) for code in found.status[failed]]
-    found.residual[failed] = np.nan
-    found.multiplier[found.multiplier < 0.0] = np.nan
-    return found
+    return found.judged(jobs)
 
 
 def exponents_compiled(
-    engine: PlanarEngine, points: FloatArray, rows: IntArray, starts: FloatArray, modes: IntArray, n_returns: int,
-    phase: float, scale: FloatArray, max_period: int,
-) -> tuple[FloatArray, FloatArray]:  # fmt: skip
-    """Largest exponents of jobs and their standard errors (:meth:`nonsmooth.analysis.attractors.Settler.exponents`)."""
-    tables = engine.prepare(points)
-    largest, error = np.full(len(rows), np.nan), np.full(len(rows), np.nan)
-    out = Chain.empty(len(points), 1, 2, len(engine.traced.indicators), tables.sizes[2]).record()
-    quiet = np.array([-1, 1, -1, 1, 1, 0], dtype=np.int64)
-    load(engine).exponents_of(
-        rows, starts, modes, n_returns, scale, tables.form, engine.net, quiet, phase, np.inf,
-        DIVERGENCE * engine.scale, out, engine.given(tables, "sections")[1:], _work(max_period), largest, error,
+    engine: LinearEngine, points: FloatArray, rows: IntArray, starts: FloatArray, modes: IntArray, returns: int,
+    batch: int, phase: float, size: FloatArray, offsets: FloatArray, sums: FloatArray,
+) -> IntArray:  # fmt: skip
+    """Growth of neighbours of jobs, taken into their sums (:mod:`nonsmooth.kernels.exponent`); their statuses."""
+    tables, n, status = engine.prepare(points), len(engine.scale), np.zeros(len(rows), dtype=np.int64)
+    load(engine).separate_many(
+        rows, starts, modes, returns, batch, size, _flow(engine, tables, phase), _plan(False),
+        _buffers(engine, tables, 1), _motion(n), _motion(n), offsets, sums, status,
     )  # fmt: skip
-    return largest, error
+    return status
 
 
-def _work(max_period: int) -> tuple[Any, ...]:
-    """Two states in pieces (u, clock, counters), images of the return map, returns (and three sums)."""
-    one, other = ((np.zeros(2), np.zeros(3), np.zeros(4, dtype=np.int64)) for _ in range(2))
-    return *one, *other, np.zeros((3, 2)), np.zeros(max(max_period, 3))
+def _flow(engine: LinearEngine, tables: Tables, phase: float) -> Any:
+    from nonsmooth.kernels.records import Flow
 
+    none = np.zeros((0, len(engine.scale)))
+    form, own, work = engine.given(tables, "sections")
+    return Flow(form, engine.net, phase, np.inf, DIVERGENCE * engine.scale, own, work, none)
+
+
+def _plan(extremes: bool) -> IntArray:
+    return np.array([-1, 1, -1, 1, 1, extremes], dtype=np.int64)
+
+
+def _motion(n: int) -> Any:
+    from nonsmooth.kernels.records import Motion
+
+    return Motion(np.zeros(n), np.zeros(0), np.zeros(3), np.zeros(4, dtype=np.int64))
+
+
+def _buffers(engine: LinearEngine, tables: Tables, keep: int) -> Any:
+    sizes = len(engine.scale), len(engine.traced.indicators), tables.sizes[2]
+    return Chain.empty(len(tables.points), keep, *sizes).record()

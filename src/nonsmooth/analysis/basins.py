@@ -20,8 +20,7 @@ from nonsmooth.analysis.basins_measures import (
 from nonsmooth.analysis.basins_work import StartsWork, settled_from
 from nonsmooth.analysis.chart import described
 from nonsmooth.analysis.chart_work import CHUNK, STORED
-from nonsmooth.analysis.classify import longest_period
-from nonsmooth.analysis.settle import warn_if_small
+from nonsmooth.analysis.settle import longest_period, warn_if_small
 from nonsmooth.analysis.settled import usable
 from nonsmooth.campaign.run import run
 from nonsmooth.errors import shortened

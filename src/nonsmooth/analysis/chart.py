@@ -10,8 +10,7 @@ import numpy as np
 
 from nonsmooth.analysis.attractors import Settler
 from nonsmooth.analysis.chart_work import CHUNK, STORED, ChartWork
-from nonsmooth.analysis.classify import longest_period
-from nonsmooth.analysis.settle import warn_if_small
+from nonsmooth.analysis.settle import longest_period, warn_if_small
 from nonsmooth.analysis.sweep import swept_values
 from nonsmooth.campaign.run import run
 from nonsmooth.errors import shortened

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from nonsmooth.flow.devices import batch_size
-from nonsmooth.flow.engine import FloatArray, IntArray
+from nonsmooth.flow.engine import FloatArray, IntArray, SectionPlan
+from nonsmooth.flow.launches import States
 from nonsmooth.flow.linear import PlanarEngine
 from nonsmooth.flow.planar_cuda import PlanarOnGpu
 
@@ -51,9 +52,9 @@ def _batch(
     edges: IntArray,
 ) -> tuple[FloatArray, FloatArray, IntArray]:  # fmt: skip
     n = len(points)
-    gpu = PlanarOnGpu(engine, points, 0.0)
+    gpu = PlanarOnGpu(engine, points, SectionPlan())
     module, to_device = gpu.growth(), gpu.cuda.to_device
-    states = gpu.states(np.arange(n), np.tile(start, (n, 1)), np.full(n, mode), 0.0)
+    states = States.of(gpu.cuda, np.arange(n), np.tile(start, (n, 1)), np.zeros((n, 0)), mode, np.zeros((n, 3)))
     status = np.zeros(n, dtype=np.int64)
     jobs = np.arange(n)
     if wait > align:

@@ -1,7 +1,8 @@
 """Bring a trajectory to its attractor at one parameter value, and say what was reached.
 
-The state is run through the transient, its section points are judged (``classify``), and a point that is still
-settling is run on, or pushed off an unstable orbit on which a carried state may sit for ever.
+The state is run through the transient and its section points are judged (``kernels.judge``); a point that is still
+settling is run on, or perturbed on an unstable orbit on which a carried state may sit for ever (``kernels.settle``).
+Here this is done with any engine, one point after the other.
 """
 
 from __future__ import annotations
@@ -9,29 +10,31 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.analysis.classify import TOLERANCE, Verdict, judge
-from nonsmooth.analysis.settled import LEAST, least_sizes, size_of
+from nonsmooth.analysis.settled import LEAST, ROUNDED, least_sizes
+from nonsmooth.flow.arguments import whole_number
 from nonsmooth.flow.engine import Chain, Engine, FloatArray, SectionPlan, State
 from nonsmooth.flow.methods import RTOL
 from nonsmooth.flow.poincare import result_status
 from nonsmooth.kernels import codes
 
 if TYPE_CHECKING:
+    from nonsmooth.kernels.settle import Rules
     from nonsmooth.system.system import System
 
-__all__ = ["Attractors", "tolerance_of", "warn_if_small"]
+__all__ = ["ATTEMPTS", "Attractors", "Verdict", "longest_period", "rules_of", "tolerance_of", "warn_if_small"]
 
 RESTING = 5e-7  # in units of the scales: smaller values of a state are rounding beside the others
 NOTHING = 1e-15  # and beside none
-LONGER = (1, 2, 4)  # further transients for a point that is still settling, in units of the first
-KICK = 1e-3  # what pushes a state off an unstable orbit, in units of the motion's size
-NUDGE = 1e-6  # finite differences of the return map, in units of the motion's size
-ROUNDS = 8  # of a cycle, over which the contraction on a Poincare section is measured
-FAILED = (codes.DIVERGED, codes.CHATTER, codes.TOO_MANY_CROSSINGS, codes.NO_CONVERGENCE, codes.BEYOND_STOP)
+LONGEST = 16  # period number looked for where none is given and as many points are kept
+TOLERANCE = 1e-9  # of a return, in units of the motion's size
+DIFFERENCE = 1e-6  # finite differences of the return map, in units of the motion's size
+ATTEMPTS = 3  # further transients for a point that is still settling: of 1, 2 and 4 times the first
+GOOD = (codes.OK, codes.NOT_GUARANTEED)
 
 
 def warn_if_small(system: System, *sizes: FloatArray) -> None:
@@ -58,6 +61,19 @@ def warn_if_small(system: System, *sizes: FloatArray) -> None:
 
 
 @dataclass(frozen=True)
+class Verdict:
+    """Period number (0: none), the scaled return it rests on, the largest modulus of its multipliers, and the status.
+
+    ``multiplier`` is NaN where it was not looked at, or is unknown; ``returns`` counts the section returns run."""
+
+    period_number: int
+    residual: float
+    multiplier: float
+    status: int
+    returns: int
+
+
+@dataclass(frozen=True)
 class Attractors:
     """An engine with its tables for all points, the section, and how long to wait."""
 
@@ -69,110 +85,97 @@ class Attractors:
     max_period: int
     tolerance: float
     scale: FloatArray
-    longer: tuple[int, ...] = LONGER
+    first_look: int = 0  # returns after which a point is judged for the first time; 0: when the transient has ended
+    attempts: int = ATTEMPTS
 
     def over(self, tables: Any) -> Attractors:
         """The same over other tables of the engine."""
         return replace(self, tables=tables)
 
+    @cached_property
+    def rules(self) -> Rules:
+        return rules_of(
+            self.engine.name, self.transient, self.keep, self.max_period, self.tolerance, self.scale,
+            self.first_look, self.attempts,
+        )  # fmt: skip
+
     def settle(self, i: int, state: State, out: Chain, fresh: Callable[[], State]) -> Verdict:
         """Run point i on from ``state`` (left where the run ends) and judge it; ``fresh`` makes a start."""
-        state.settled = False  # a parameter has changed under it: what holds already is taken first
-        self._chain(i, state, self.transient, self.keep, out)
-        if out.status[i] == codes.BEYOND_STOP:  # a carried state that a moved stop has overtaken
-            other = fresh()
-            _replace(state, other)
-            self._chain(i, state, self.transient, self.keep, out)
-        if out.status[i] in FAILED:
-            return Verdict(0, np.nan, result_status(out.status[i]))
-        verdict = self._judge(i, state, out)
-        for factor in self.longer:
-            if verdict.status != codes.SLOW:
-                break
-            if verdict.unstable:
-                kicked = state.copy()
-                # where Runge-Kutta errors set the least size, a kick by that size would be a new motion
-                kicked.u += KICK * size_of(out.maximum[i], out.minimum[i], LEAST * self.scale)
-                kicked.settled = False
-                _replace(state, kicked)
-            self._chain(i, state, factor * max(self.transient, 1), self.keep, out)
-            if out.status[i] in FAILED:
-                return Verdict(0, np.nan, result_status(out.status[i]))
-            verdict = self._judge(i, state, out)
-        if out.status[i] == codes.NOT_GUARANTEED and verdict.status == codes.OK:
-            return replace(verdict, status=codes.NOT_GUARANTEED)
-        return verdict
+        from nonsmooth.kernels.settle import END, FRESH, PROBE, begin_job, new_jobs, next_run
 
-    def look(self, i: int, state: State, transient: int, out: Chain) -> Verdict | None:
-        """Judge point i after ``transient`` returns more, once; None where the run failed."""
-        state.settled = False
-        self._chain(i, state, transient, self.keep, out)
-        return None if out.status[i] in FAILED else self._judge(i, state, out)
+        jobs, rules = new_jobs(1, len(self.scale), self.max_period), self.rules
+        begin_job(jobs, 0, rules, 1)
+        measure = self._multiplier if self.plan.indicator < 0 else self._contraction
+        while jobs.wanted[0] != END:
+            mu = np.nan
+            if jobs.wanted[0] == PROBE:
+                mu = measure(i, int(jobs.period_number[0]), state, jobs.size[0], out)
+            else:
+                if jobs.wanted[0] == FRESH:
+                    _replace(state, fresh())
+                state.settled = bool(jobs.settled[0])
+                self._run(i, state, self.plan, int(jobs.transient[0]), self.keep, out)
+            code = int(out.status[i])
+            next_run(jobs, 0, rules, code, out.section[i], out.maximum[i], out.minimum[i], mu, state.u)
+        return Verdict(
+            int(jobs.period_number[0]), float(jobs.residual[0]), float(jobs.multiplier[0]),
+            result_status(int(jobs.status[0])), int(jobs.spent[0]),
+        )  # fmt: skip
 
-    def _chain(self, i: int, state: State, transient: int, keep: int, out: Chain) -> None:
-        self.engine.chain(self.tables, i, i + 1, state, None, self.plan, transient, keep, out)
-
-    def _probe(self, i: int, state: State, transient: int, keep: int, out: Chain) -> None:
-        plan = replace(self.plan, extremes=False, every=1)
+    def _run(self, i: int, state: State, plan: SectionPlan, transient: int, keep: int, out: Chain) -> None:
         self.engine.chain(self.tables, i, i + 1, state, None, plan, transient, keep, out)
 
-    def _size(self, i: int, out: Chain) -> FloatArray:
-        """Half the range of each state, and no less than a part of its scale: a motion that dies out comes to rest."""
-        return size_of(out.maximum[i], out.minimum[i], *least_sizes(self.engine.name, self.scale))
-
-    def _judge(self, i: int, state: State, out: Chain) -> Verdict:
-        size = self._size(i, out)
-        measure = self._multiplier if self.plan.indicator < 0 else self._contraction
-        return judge(
-            out.section[i], size, self.max_period, lambda p: measure(i, p, state, size, out), self.tolerance
-        )
+    def _beside(self, i: int, state: State, offset: FloatArray, transient: int, keep: int, out: Chain) -> Chain | None:
+        """What a run leaves in row i that begins beside a state; None where it failed."""
+        moved, plan = state.copy(), replace(self.plan, extremes=False, every=1)
+        moved.u += offset
+        moved.settled = moved.settled and not offset.any()
+        n, n_indicators, n_outputs = out.maximum.shape[1], out.indicator_max.shape[1], out.output_max.shape[1]
+        probe = Chain.empty(i + 1, keep, n, n_indicators, n_outputs)
+        self._run(i, moved, plan, transient, keep, probe)
+        return probe if probe.status[i] in GOOD else None
 
     def _multiplier(self, i: int, p: int, state: State, size: FloatArray, out: Chain) -> float:
         """Largest |multiplier| of the p-th return map of a stroboscopic section, by differences at the last point."""
-        n = len(size)
-        # at rest a Runge-Kutta pair errs by atol: a nudge must stand well above that for its growth to mean something
-        clear = min(1e3 * self.tolerance, 1e-4) if self.engine.name == "rkf45" else NUDGE
-        nudge = max(NUDGE, 1e2 * self.tolerance, clear) * size
-        probe = _rows_of(out, i, 1)
-        images = []
-        for j in range(-1, n):
-            moved = state.copy()
-            if j >= 0:
-                moved.u[j] += nudge[j]
-                moved.settled = False
-            self._probe(i, moved, p - 1, 1, probe)
-            if probe.status[i] in FAILED:
+        from nonsmooth.kernels.judge import multiplier
+
+        n, difference = len(size), self.rules.difference
+        images = np.zeros((n + 1, n))
+        for j in range(n + 1):
+            probe = self._beside(i, state, difference * size * (np.arange(n) == j - 1), p - 1, 1, out)
+            if probe is None:
                 return np.nan
-            images.append(probe.section[i, 0].copy())
-        matrix = np.array([(images[j + 1] - images[0]) / nudge[j] for j in range(n)]).T
-        scaled = matrix * size[None, :] / size[:, None]
-        return float(np.abs(np.linalg.eigvals(scaled)).max())
+            images[j] = probe.section[i, 0]
+        return float(multiplier(images, size, difference, np.zeros((2, n, n))))
 
     def _contraction(self, i: int, p: int, state: State, size: FloatArray, out: Chain) -> float:
-        """The factor by which a nudged state nears the cycle on a Poincare section per p returns.
+        """The factor by which a perturbed state nears the cycle on a Poincare section per p returns."""
+        from nonsmooth.kernels.judge import ROUNDS, contraction
 
-        A nudge moves the state off the surface, which may shift the count of returns by one; so the distance to the
-        whole cycle is measured, at all of its returns, over several rounds."""
-        cycle = out.section[i, -p:] / size
+        cycle, p = out, p * self.plan.every
         if self.plan.every > 1:
-            p *= self.plan.every
-            own = _rows_of(out, i, p)
-            self._probe(i, state.copy(), 0, p, own)
-            cycle = own.section[i] / size
-        keep = ROUNDS * p + 2
-        moved = state.copy()
-        moved.u += max(NUDGE, 1e2 * self.tolerance) * size
-        moved.settled = False
-        probe = _rows_of(out, i, keep)
-        self._probe(i, moved, 0, keep, probe)
-        if probe.status[i] in FAILED:
-            return np.nan
-        points = probe.section[i] / size
-        gap = np.abs(points[:, None, :] - cycle[None, :, :]).max(axis=2).min(axis=1)
-        first, last = gap[1 : p + 1].max(), gap[-p:].max()
-        if last <= self.tolerance:
-            return 0.5
-        return float((last / first) ** (1.0 / (ROUNDS - 1)))
+            own = self._beside(i, state, np.zeros(len(size)), 0, p, out)
+            if own is None:
+                return np.nan
+            cycle = own
+        run = self._beside(i, state, self.rules.difference * size, 0, ROUNDS * p + 2, out)
+        return np.nan if run is None else float(contraction(cycle.section[i], run.section[i], size, p, self.tolerance))
+
+
+def rules_of(
+    method: str, transient: int, keep: int, max_period: int, tolerance: float, scale: FloatArray, first_look: int = 0,
+    attempts: int = ATTEMPTS, beyond: int = 0,
+) -> Rules:  # fmt: skip
+    """The rules of judgement and of the cycle for a method; see :class:`nonsmooth.kernels.settle.Rules`."""
+    from nonsmooth.kernels.settle import Rules
+
+    # at rest a Runge-Kutta pair errs by atol: a difference must stand well above that for its growth to mean something
+    clear = min(1e3 * tolerance, 1e-4) if method == "rkf45" else DIFFERENCE
+    least, rounded = least_sizes(method, scale)
+    return Rules(
+        transient, keep, max_period, first_look, attempts, beyond, tolerance, max(DIFFERENCE, 1e2 * tolerance, clear),
+        least, rounded, LEAST * scale, ROUNDED,
+    )  # fmt: skip
 
 
 def tolerance_of(engine: Engine, rtol: float | None) -> float:
@@ -180,10 +183,23 @@ def tolerance_of(engine: Engine, rtol: float | None) -> float:
     return TOLERANCE if engine.name == "exact" else max(TOLERANCE, 10.0 * (RTOL if rtol is None else rtol))
 
 
-def _rows_of(out: Chain, i: int, keep: int) -> Chain:
-    """Buffers in which row i can be written."""
-    n, n_indicators, n_outputs = out.maximum.shape[1], out.indicator_max.shape[1], out.output_max.shape[1]
-    return Chain.empty(i + 1, keep, n, n_indicators, n_outputs)
+def longest_period(keep: int, max_period: object) -> int:
+    """``max_period`` as a whole number that ``keep`` section points can show; where None, up to 16.
+
+    Raises
+    ------
+    ValueError, TypeError
+        One that is not, or not a whole number from 1.
+    """
+    if max_period is None:
+        return min(LONGEST, keep - 1)
+    longest = whole_number(max_period, "max_period", 1)
+    if longest >= keep:
+        raise ValueError(
+            f"max_period = {longest}: {keep} kept section points show periods up to {keep - 1} only; raise keep above "
+            "max_period, or lower max_period"
+        )
+    return longest
 
 
 def _replace(state: State, other: State) -> None:

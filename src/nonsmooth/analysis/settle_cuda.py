@@ -1,179 +1,284 @@
-"""Jobs of the series methods brought to their attractors on a GPU, in rounds.
+"""Jobs brought to their attractors on a GPU, in rounds: each is one run of all jobs that want it.
 
-The rules are those of ``analysis.settle``, one job after the other; here every round is one run of all jobs that are
-still under way. The GPU marches, the processor judges the section points of a round in arrays (``classify_many``).
+What is wanted of a job next is decided there by the text of the processor (``kernels.settle``); looks come at the same
+returns for every job, so that all of them do the same thing at the same time, and those that are done are left out.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.analysis.classify import MARGIN
-from nonsmooth.analysis.classify_many import candidates, certain
-from nonsmooth.analysis.settle import KICK, NUDGE, ROUNDS
-from nonsmooth.analysis.settled import LEAST, Settled, size_of, usable
-from nonsmooth.flow.engine import FloatArray, IntArray
-from nonsmooth.flow.poincare import result_status
-from nonsmooth.flow.series_cuda import Buffers, SeriesOnGpu, States
+from nonsmooth.analysis.settle import Attractors
+from nonsmooth.analysis.settled import Settled, usable
+from nonsmooth.flow.devices import batch_size
+from nonsmooth.flow.engine import Chain, Engine, FloatArray, IntArray, SectionPlan
+from nonsmooth.flow.launches import States, batches
+from nonsmooth.flow.linear import PlanarEngine
+from nonsmooth.flow.planar_cuda import SLICE, PlanarOnGpu
+from nonsmooth.flow.series import SeriesEngine
+from nonsmooth.flow.series_cuda import PART, SeriesOnGpu
 from nonsmooth.kernels import codes
 
-__all__ = ["Settling"]
+if TYPE_CHECKING:
+    from nonsmooth.analysis.attractors import Settler
+    from nonsmooth.kernels.settle import Rules
+
+__all__ = ["separate_on_gpu", "settle_on_gpu", "sweep_on_gpu"]
 
 
-class Settling:
-    """J jobs on the GPU and what is known of them.
+class Rounds:
+    """J jobs on a GPU, as they are settled under some rules.
 
     Parameters
     ----------
-    gpu : SeriesOnGpu
+    gpu : PlanarOnGpu or SeriesOnGpu
     states : States
-        Where the jobs begin.
-    keep, max_period, tolerance
-        As in :class:`nonsmooth.analysis.settle.Attractors`.
-    scale : array (n,)
+        Where the jobs begin, and are left.
+    extremes : bool
+        Whether those over a whole cycle are wanted.
 
     Attributes
     ----------
-    found : Settled
-        ``period_number``, ``status``, ``residual`` and ``multiplier`` of the judged jobs; statuses are kernel codes.
-    kept : Buffers
-        The last ``keep`` section points of each job.
+    jobs : Jobs
+        What is known, on the GPU.
+    kept, single, cycle
+        The last ``keep`` section points of each job, one return behind them (where the rules say so), its cycle.
     """
 
-    def __init__(
-        self, gpu: SeriesOnGpu, states: States, keep: int, max_period: int, tolerance: float, scale: FloatArray
-    ) -> None:
-        n = len(states.rows)
-        self.gpu, self.states, self.keep, self.max_period, self.tolerance = gpu, states, keep, max_period, tolerance
-        self.least = LEAST * scale
-        self.begin = states.copy(gpu.cuda)
-        self.rows = states.rows.copy_to_host()
-        self.kept, self.found = gpu.buffers(n, keep), Settled.empty(n, gpu.n)
-        self.unstable, self.doubtful = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
-        self.size = np.zeros((n, gpu.n))
+    def __init__(self, gpu: Any, states: States, rules: Rules, extremes: bool = True) -> None:
+        from nonsmooth.kernels.settle import begin_job, new_jobs
 
-    def settle(self, jobs: IntArray, transient: IntArray, longer: tuple[int, ...]) -> None:
-        """Run jobs through ``transient`` (J,) returns and judge them; those still settling are run on."""
-        status = self.look(jobs, transient)
-        overtaken = jobs[status == codes.BEYOND_STOP]
-        if len(overtaken):
-            self.states.restore(self.begin, overtaken)
-            self.look(overtaken, transient)
-        for factor in longer:
-            slow = jobs[self.found.status[jobs] == codes.SLOW]
-            if not len(slow):
-                break
-            pushed = slow[self.unstable[slow]]
-            self.states.push(pushed, KICK * self.size[pushed])
-            settled = np.ones(len(self.rows), dtype=bool)
-            settled[pushed] = False
-            self._run(slow, factor * np.maximum(transient, 1), settled)
-        doubtful = jobs[self.doubtful[jobs] & (self.found.status[jobs] == codes.OK)]
-        self.found.status[doubtful] = codes.NOT_GUARANTEED
+        n, to_device = len(states.rows), gpu.cuda.to_device
+        self.gpu, self.states, self.rules, self.extremes = gpu, states, rules, extremes
+        self.given = tuple(to_device(part) if isinstance(part, np.ndarray) else part for part in rules)
+        first = new_jobs(1, gpu.n, rules.max_period)
+        begin_job(first, 0, rules, 0)
+        self.jobs = type(first)(*(to_device(np.repeat(part, n, axis=0)) for part in first))
+        self.kept, self.cycle = gpu.buffers(n, rules.keep), gpu.buffers(n, rules.max_period)
+        self.single = gpu.buffers(n, 1) if rules.beyond else None
+        self.others, self.arrived = states.room(gpu.cuda, gpu.n + 1), gpu.buffers((gpu.n + 1) * n, 1)
+        self.mu = gpu.cuda.device_array(n)
 
-    def look(self, jobs: IntArray, transient: IntArray) -> IntArray:
-        """Judge jobs after ``transient`` (J,) returns more; their codes."""
-        return self._run(jobs, transient, False)
+    def run(self) -> None:
+        """Settle all jobs."""
+        from nonsmooth.kernels.settle import END, PROBE
 
-    def _run(self, jobs: IntArray, transient: IntArray, settled: Any) -> IntArray:
-        found = self.found
-        ran = self.gpu.run(jobs, self.states, transient, self.keep, self.kept, settled)
-        code = self.kept.status.copy_to_host()
-        found.period_number[jobs], found.residual[jobs], found.multiplier[jobs] = 0, np.nan, np.nan
-        found.status[jobs], self.unstable[jobs] = code[jobs], False
-        self.doubtful[jobs] = code[jobs] == codes.NOT_GUARANTEED
-        if len(ran):
-            self._judge(ran)
-        status: IntArray = code[jobs]
-        return status
+        while True:
+            wanted = self.jobs.wanted.copy_to_host()
+            under_way = np.flatnonzero(wanted != END)
+            if not len(under_way):
+                return
+            self._run(under_way[wanted[under_way] != PROBE])
+            self._probe(under_way[wanted[under_way] == PROBE])
+            last = self.single or self.kept
+            self.gpu.launch(
+                self.gpu.module.decide, under_way, self.given, tuple(self.jobs), self.kept.status, last.status,
+                self.kept.section, last.maximum, last.minimum, self.mu, self.states.u,
+            )  # fmt: skip
 
-    def _judge(self, jobs: IntArray) -> None:
-        gpu, found = self.gpu, self.found
-        points = self.kept.sections.copy_to_host()[jobs][:, :, : gpu.n]
-        high, low = gpu.extremes(self.kept)
-        size = size_of(high[jobs, : gpu.n], low[jobs, : gpu.n], self.least)
-        period, status, residual, returns = candidates(points, size, self.max_period, self.tolerance)
-        self.size[jobs] = size
-        found.residual[jobs], found.status[jobs] = residual, status
-        there = np.flatnonzero(period > 0)
-        if not len(there):
+    def _run(self, jobs: IntArray) -> None:
+        transient, settled = self.jobs.transient.copy_to_host(), self.jobs.settled.copy_to_host()
+        for returns in np.unique(transient[jobs]):
+            self.gpu.run(
+                jobs[transient[jobs] == returns], self.states, int(returns), self.rules.keep, self.kept, settled,
+                extremes=self.single is None, one_more=self.single,
+            )  # fmt: skip
+
+    def _probe(self, jobs: IntArray) -> None:
+        """The cycle of each job from where it stands, and neighbours that show its multipliers."""
+        gpu, sizes = self.gpu, self.jobs.size
+        if not len(jobs):
             return
-        measure = self._multipliers if gpu.plan.indicator < 0 else self._contractions
-        mu = measure(jobs[there], period[there], size[there], points[there])
-        stands = certain(period[there], mu, residual[there], returns[there])
-        cyclic = jobs[there]
-        found.multiplier[cyclic] = mu
-        found.period_number[cyclic] = np.where(stands, period[there], 0)
-        found.status[cyclic] = np.where(stands, codes.OK, codes.SLOW)
-        self.unstable[cyclic] = ~stands & (mu > 1.0 + MARGIN)
+        period = self.jobs.period_number.copy_to_host()
+        self._beside(jobs, 0, -1, 0.0)
+        if gpu.plan.indicator >= 0:
+            gpu.run(jobs, self.others, 0, period, self.cycle, True)
+            self._contractions(jobs, period)
+            return
+        for state in range(gpu.n):
+            self._beside(jobs, state + 1, state, self.rules.difference)
+        gpu.run_beside(jobs, self.others, period, self.cycle, self.arrived, self.extremes)
+        gpu.launch(
+            gpu.module.measure, jobs, len(period), self.rules.difference, sizes, self.others.u, self.cycle.status,
+            self.arrived.status, self.mu,
+        )  # fmt: skip
 
-    @property
-    def _nudge(self) -> float:
-        return max(NUDGE, 1e2 * self.tolerance)
+    def _beside(self, jobs: IntArray, leg: int, state: int, factor: float) -> None:
+        self.gpu.launch(
+            self.gpu.module.beside, jobs, leg * len(self.states.rows), state, factor, self.jobs.size,
+            self.states.all(), self.others.all(),
+        )  # fmt: skip
 
-    def _probe(
-        self, jobs: IntArray, moved: FloatArray, transient: Any, keep: Any, settled: bool
-    ) -> tuple[Buffers, IntArray]:
-        """Runs of states beside those of the jobs: what they leave behind, and which came to their end."""
-        states = self.states.taken(self.gpu.cuda, jobs, moved)
-        out = self.gpu.buffers(len(jobs), int(np.max(keep)))
-        return out, self.gpu.run(np.arange(len(jobs)), states, transient, keep, out, settled)
+    def _contractions(self, jobs: IntArray, period: IntArray) -> None:
+        from nonsmooth.kernels.judge import ROUNDS
 
-    def _multipliers(self, jobs: IntArray, period: IntArray, size: FloatArray, points: FloatArray) -> FloatArray:
-        """As ``Attractors._multiplier``: the images of the state and of its neighbours, by differences."""
-        n, nudge = size.shape[1], self._nudge * size
-        images, failed = [], np.zeros(len(jobs), dtype=bool)
-        for j in range(-1, n):
-            moved = np.zeros_like(size)
-            if j >= 0:
-                moved[:, j] = nudge[:, j]
-            out, ran = self._probe(jobs, moved, period - 1, 1, j < 0)
-            failed |= ~np.isin(np.arange(len(jobs)), ran)
-            images.append(out.sections.copy_to_host()[:, 0, :n])
-        matrix = np.stack([(images[j + 1] - images[0]) / nudge[:, j, None] for j in range(n)], axis=2)
-        scaled = matrix * size[:, None, :] / size[:, :, None]
-        failed |= ~np.isfinite(scaled).all(axis=(1, 2))
-        mu = np.full(len(jobs), np.nan)
-        mu[~failed] = np.abs(np.linalg.eigvals(scaled[~failed])).max(axis=1)
-        return mu
+        gpu = self.gpu
+        self._beside(jobs, 0, -1, self.rules.difference)
+        for p in np.unique(period[jobs]):
+            some, run = jobs[period[jobs] == p], gpu.buffers(len(period), ROUNDS * int(p) + 2)
+            gpu.run(some, self.others, 0, ROUNDS * int(p) + 2, run, False)
+            gpu.launch(
+                gpu.module.contract, some, int(p), self.rules.tolerance, self.jobs.size, self.kept.section,
+                run.section, run.status, self.mu,
+            )  # fmt: skip
 
-    def _contractions(self, jobs: IntArray, period: IntArray, size: FloatArray, points: FloatArray) -> FloatArray:
-        """As ``Attractors._contraction``: the factor by which a nudged state nears the cycle per ``period`` returns."""
-        mu = np.full(len(jobs), np.nan)
-        for p in np.unique(period):
-            some = np.flatnonzero(period == p)
-            keep = ROUNDS * int(p) + 2
-            out, ran = self._probe(jobs[some], self._nudge * size[some], 0, keep, False)
-            if not len(ran):
-                continue
-            here = some[ran]
-            run = out.sections.copy_to_host()[ran][:, :, : self.gpu.n] / size[here, None, :]
-            cycle = points[here, -p:] / size[here, None, :]
-            gap = np.full(run.shape[:2], np.inf)
-            for k in range(int(p)):
-                np.minimum(gap, np.abs(run - cycle[:, k, None, :]).max(axis=2), out=gap)
-            first, last = gap[:, 1 : p + 1].max(axis=1), gap[:, -p:].max(axis=1)
-            with np.errstate(divide="ignore", invalid="ignore"):
-                measured = (last / first) ** (1.0 / (ROUNDS - 1))
-            mu[here] = np.where(last <= self.tolerance, 0.5, measured)
-        return mu
+    def found(self, width: int) -> Settled:
+        """What was found; counts and extremes over one whole cycle where there is one, else over the kept window, or as
+        many returns behind it."""
+        gpu, n, jobs = self.gpu, len(self.states.rows), type(self.jobs)(*(part.copy_to_host() for part in self.jobs))
+        found = Settled.empty(n, gpu.n, width)
+        cyclic, good = jobs.period_number > 0, usable(jobs.status)
+        returns = np.where(cyclic, jobs.period_number, self.rules.keep)
+        for name, to in (("crossings", found.crossings), ("contacts", found.contacts)):
+            one, other = (getattr(out, name).copy_to_host() for out in (self.cycle, self.kept))
+            to[good] = (np.where(cyclic, one, other) / returns)[good]
+        u, memory, clock, counters = (part.copy_to_host() for part in self.states.all())
+        place = np.concatenate([u, memory[:, : gpu.n_memory], clock[:, :1]], axis=1)[:, :width]
+        found.last[good], found.mode[good] = place[good], counters[good, 0]
+        if self.extremes:
+            other = good & ~cyclic
+            if self.single is not None:
+                gpu.run(np.flatnonzero(other), self.states, 0, self.rules.keep, self.kept, extremes=True)
+                code = self.kept.status.copy_to_host()
+                jobs.status[other] = np.where(code[other] == codes.OK, jobs.status[other], code[other])
+                other &= code == codes.OK
+            for out, which in ((self.cycle, good & cyclic), (self.kept, other)):
+                for name, to in (("maximum", found.maximum), ("minimum", found.minimum)):
+                    to[which] = getattr(out, name).copy_to_host()[which, : gpu.n]
+        return found.judged(jobs)
 
-    def cycles(self) -> Buffers:
-        """One run more over each whole cycle: its extremes and counts."""
-        out = self.gpu.buffers(len(self.rows), self.max_period)
-        jobs = np.flatnonzero(self.found.period_number > 0)
-        if len(jobs):
-            states = self.states.copy(self.gpu.cuda)
-            self.gpu.run(jobs, states, 0, np.maximum(self.found.period_number, 1), out, True)
-        return out
 
-    def finished(self) -> Settled:
-        """What was found, with statuses of results in place of the kernel's codes."""
-        found = self.found
-        failed = ~usable(found.status)
-        found.period_number[failed], found.residual[failed] = 0, np.nan
-        found.multiplier[failed] = np.nan
-        found.status[failed] = [result_status(code) for code in found.status[failed]]
-        return found
+def _on_gpu(engine: Engine, points: FloatArray, plan: SectionPlan) -> Any:
+    """Parameter points of an engine on the GPU."""
+    if isinstance(engine, PlanarEngine):
+        return PlanarOnGpu(engine, points, plan)
+    assert isinstance(engine, SeriesEngine)  # the door has seen to it
+    return SeriesOnGpu(engine, points, plan)
+
+
+def _batch(engine: Engine) -> int:
+    return batch_size() if isinstance(engine, PlanarEngine) else int(PART * batch_size())
+
+
+def _states_at(
+    gpu: Any, places: FloatArray, memory: FloatArray, rows: IntArray, modes: Any, begin: float
+) -> States:
+    """States at places (see ``attractors_trace``); what they do not say is as at a fresh start, at the phase ``begin``.
+    """
+    n, n_memory, period = gpu.n, gpu.n_memory, gpu.period[rows]
+    memory, clock = np.tile(memory, (len(rows), 1)), np.zeros((len(rows), 3))
+    if places.shape[1] >= n + n_memory:
+        memory = places[:, n : n + n_memory]
+    forced = period < np.inf
+    clock[forced, 0] = places[forced, -1] if places.shape[1] > n + n_memory else begin * period[forced]
+    clock[forced, 2] = period[forced]
+    return States.of(gpu.cuda, rows, places[:, :n], memory, modes, clock)
+
+
+def settle_on_gpu(
+    settler: Settler, points: FloatArray, rows: IntArray, starts: FloatArray, modes: IntArray, begin: float,
+    attempts: int,
+) -> Settled:  # fmt: skip
+    """Jobs settled and judged, as ``Settler.run`` describes."""
+    system, planar = settler.system, isinstance(settler.engine, PlanarEngine)
+    found = Settled.empty(len(rows), len(system.states), settler.width)
+    for some, own, own_rows in batches(points, rows, _batch(settler.engine)):
+        gpu = _on_gpu(settler.engine, own, settler.plan)
+        states = _states_at(gpu, starts[some], system.memory_vector(), own_rows, modes[some], begin)
+        rounds = Rounds(gpu, states, settler.rules(attempts, int(planar)), settler.extremes or not planar)
+        rounds.run()
+        part = rounds.found(settler.width)
+        for item in fields(found):
+            getattr(found, item.name)[some] = getattr(part, item.name)
+    return found
+
+
+def sweep_on_gpu(
+    points: FloatArray, start: FloatArray, memory: FloatArray, rules: Attractors, chain: Chain,
+    advance: Callable[[int], Any],
+) -> Settled:  # fmt: skip
+    """Every parameter point from one start: the rules of ``analysis.settle``, whose buffers ``chain`` is filled."""
+    parts = []
+    for some, own, rows in batches(points, np.arange(len(points)), _batch(rules.engine)):
+        gpu = _on_gpu(rules.engine, own, rules.plan)
+        states = _states_at(gpu, np.tile(start, (len(rows), 1)), memory, rows, 0, 0.0)
+        rounds = Rounds(gpu, states, rules.rules, extremes=False)
+        rounds.run()
+        _into(chain, some, rounds.kept, gpu)
+        parts.append(rounds.found(len(start)))
+        advance(len(rows))
+    return Settled.joined(parts)
+
+
+def _into(chain: Chain, some: slice, kept: Any, gpu: Any) -> None:
+    """The kept windows of a batch."""
+    n, n_i = gpu.n, chain.indicator_max.shape[1]
+    chain.section[some] = kept.section.copy_to_host()[:, :, :n]
+    for found, names in zip(
+        gpu.extremes(kept),
+        (("maximum", "indicator_max", "output_max"), ("minimum", "indicator_min", "output_min")), strict=True,
+    ):  # fmt: skip
+        for name, part in zip(names, (slice(0, n), slice(n, n + n_i), slice(n + n_i, None)), strict=True):
+            getattr(chain, name)[some] = found[:, part][:, : getattr(chain, name).shape[1]]
+    chain.crossings[some], chain.contacts[some] = kept.crossings.copy_to_host(), kept.contacts.copy_to_host()
+
+
+def separate_on_gpu(
+    settler: Settler, points: FloatArray, rows: IntArray, starts: FloatArray, modes: IntArray, returns: int, batch: int,
+    size: FloatArray, offsets: FloatArray, sums: FloatArray,
+) -> IntArray:  # fmt: skip
+    """Growth of neighbours of jobs, taken into their sums (:mod:`nonsmooth.kernels.exponent`); their statuses."""
+    plan, status = settler.plan, np.zeros(len(rows), dtype=np.int64)
+    separate = _separate_in_threads if isinstance(settler.engine, PlanarEngine) else _separate_in_rounds
+    for some, own, own_rows in batches(points, rows, _batch(settler.engine)):
+        gpu = _on_gpu(settler.engine, own, plan)
+        states = _states_at(gpu, starts[some], settler.system.memory_vector(), own_rows, modes[some],
+                            plan.phase if plan.indicator < 0 else 0.0)  # fmt: skip
+        on_gpu = [gpu.cuda.to_device(np.ascontiguousarray(part[some])) for part in (offsets, sums, status)]
+        separate(gpu, states, returns, batch, gpu.cuda.to_device(size), *on_gpu)
+        sums[some], status[some] = (part.copy_to_host() for part in on_gpu[1:])
+    return status
+
+
+def _separate_in_threads(
+    gpu: PlanarOnGpu, states: States, returns: int, batch: int, size: Any, offsets: Any, sums: Any, status: Any
+) -> None:
+    """Each thread follows its job and the neighbour over some returns."""
+    jobs = np.arange(len(states.rows))
+    for begin in range(0, returns, SLICE // 2):
+        gpu.launch(
+            gpu.module.neighbours, jobs, states.rows, *gpu.tables, gpu.net, states.u, states.clock, states.counters,
+            begin, min(begin + SLICE // 2, returns), batch, size, offsets, sums, gpu.plans[0], gpu.phase, gpu.limit,
+            status,
+        )  # fmt: skip
+        jobs = jobs[status.copy_to_host()[jobs] == codes.OK]
+        if not len(jobs):
+            return
+
+
+def _separate_in_rounds(
+    gpu: SeriesOnGpu, states: States, returns: int, batch: int, size: Any, offsets: Any, sums: Any, status: Any
+) -> None:
+    """Both are run to their next return, one after the other."""
+    jobs = every = np.arange(len(states.rows))
+    others, out = states.room(gpu.cuda, 1), gpu.buffers(len(jobs), 1)
+    for n in range(returns):
+        gpu.launch(gpu.module.beside, jobs, 0, -1, 1.0, offsets, states.all(), others.all())
+        first = None
+        for one, settled in ((states, n > 0), (others, False)):
+            jobs = gpu.run(jobs, one, 0, 1, out, settled)
+            elapsed = out.elapsed.copy_to_host()
+            first = elapsed if first is None else first
+            short = jobs[elapsed[jobs] < 0.5 * first[jobs]]  # just before the surface: that was no return
+            if len(short):
+                jobs = np.setdiff1d(jobs, np.setdiff1d(short, gpu.run(short, one, 0, 1, out, True)))
+        if not len(jobs):
+            break
+        gpu.launch(
+            gpu.module.separated, jobs, n, batch, gpu.cuda.to_device(first), states.u, others.u, size, offsets, sums
+        )
+    status.copy_to_device(np.where(np.isin(every, jobs), codes.OK, out.status.copy_to_host()))

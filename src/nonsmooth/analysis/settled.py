@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.flow.engine import FloatArray, IntArray
+from nonsmooth.flow.poincare import result_status
 from nonsmooth.kernels import codes
 
-__all__ = ["LEAST", "ROUNDED", "Settled", "least_sizes", "size_of", "usable"]
+if TYPE_CHECKING:
+    from nonsmooth.kernels.settle import Jobs
+
+__all__ = ["LEAST", "ROUNDED", "Settled", "least_sizes", "usable"]
 
 LEAST = 1e-3  # the least size of a motion, in units of the states' scales
 ROUNDED = 1e-4  # of a state's value: what is smaller cannot be told from rounding where returns are to be nil
@@ -23,16 +27,6 @@ USABLE = (codes.OK, codes.SLOW, codes.NOT_PERIODIC, codes.NOT_GUARANTEED)
 def usable(status: Any) -> NDArray[np.bool_]:
     """Where a run came to its end, so that its extremes and last point mean something."""
     return np.isin(status, USABLE)
-
-
-def size_of(
-    maximum: FloatArray, minimum: FloatArray, least: FloatArray, rounded: float = ROUNDED
-) -> FloatArray:
-    """Size of a motion in each state: half its range, no less than ``least``, nor than a part of a large value.
-
-    A pressure that rests at 1e5 Pa returns to 1e-11 Pa at best: rounding must not be taken for a motion."""
-    value = np.maximum(np.abs(maximum), np.abs(minimum))
-    return np.asarray(np.maximum(np.maximum(0.5 * (maximum - minimum), least), rounded * value))
 
 
 def least_sizes(method: str, scale: FloatArray) -> tuple[FloatArray, float]:
@@ -84,6 +78,15 @@ class Settled:
     def joined(cls, parts: Sequence[Settled]) -> Settled:
         """The jobs of all parts, one after the other."""
         return cls(*(np.concatenate([getattr(part, item.name) for part in parts]) for item in fields(cls)))
+
+    def judged(self, jobs: Jobs) -> Settled:
+        """The same with what was found out about the jobs; statuses of results in place of the kernel's codes."""
+        for name in ("period_number", "status", "residual", "multiplier"):
+            getattr(self, name)[:] = getattr(jobs, name)
+        self.returns[:] = jobs.spent
+        failed = ~usable(self.status)
+        self.status[failed] = [result_status(code) for code in self.status[failed]]
+        return self
 
     def __getitem__(self, which: Any) -> Settled:
         return Settled(*(getattr(self, item.name)[which] for item in fields(self)))

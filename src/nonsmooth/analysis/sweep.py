@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.analysis.classify import longest_period
 from nonsmooth.analysis.density import bin_edges, coarse_values, given_ranges
-from nonsmooth.analysis.settle import Attractors, tolerance_of, warn_if_small
+from nonsmooth.analysis.settle import Attractors, longest_period, tolerance_of, warn_if_small
 from nonsmooth.analysis.sweep_pieces import Report, Slot, ended, largest_of, pieces_of, run_on_gpu, run_pieces
 from nonsmooth.errors import shortened
 from nonsmooth.flow.arguments import check_options, check_system, float_array, whole_number
@@ -113,7 +112,7 @@ def sweep(
     -----
     With ``density`` memory does not depend on ``keep``: points are counted as soon as they have been judged.
     A period number p is granted only where the p-th return is below 1e-9 of the motion's size and contracts:
-    see :mod:`nonsmooth.analysis.classify`.
+    see :mod:`nonsmooth.kernels.judge`.
     """
     check_system(system, "sweep")
     check_options(system, expert, sweep)
@@ -181,7 +180,7 @@ def sweep(
             report.advance(1)
 
     if gpu:
-        run_on_gpu(engine, points, starts, memory, attractors, slots, progress, parameter)
+        run_on_gpu(points, starts, memory, attractors, slots, progress, parameter)
     else:
         run_pieces(march, pieces_of(directions, len(starts), numbers), threads, progress, parameter)
     largest = largest_of(starts, slots.values())

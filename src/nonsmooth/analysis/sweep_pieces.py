@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
-from nonsmooth.analysis.classify import Verdict
 from nonsmooth.analysis.density import CountedSlot, Counter
-from nonsmooth.analysis.settle import Attractors
+from nonsmooth.analysis.settle import Attractors, Verdict
 from nonsmooth.analysis.settled import usable
 from nonsmooth.campaign.threads import cores, over_items
 from nonsmooth.flow.engine import Chain, FloatArray
@@ -95,24 +93,16 @@ def run_pieces(
 
 
 def run_on_gpu(
-    engine: Any, points: FloatArray, starts: FloatArray, memory: FloatArray, rules: Attractors,
+    points: FloatArray, starts: FloatArray, memory: FloatArray, rules: Attractors,
     slots: Mapping[tuple[int, int], Slot], progress: bool, label: str,
 ) -> None:  # fmt: skip
     """All points from each start, on the GPU."""
-    from nonsmooth.analysis.series_cuda import sweep_series_on_gpu
-    from nonsmooth.analysis.sweep_cuda import sweep_on_gpu
-    from nonsmooth.flow.linear import PlanarEngine
+    from nonsmooth.analysis.settle_cuda import sweep_on_gpu
 
     with progress_bar(len(points) * len(starts), f"sweep over {label}", progress) as advance:
         for k, start in enumerate(starts):
             slot = slots[0, k]
-            if isinstance(engine, PlanarEngine):
-                found = sweep_on_gpu(
-                    engine, points, start, rules.plan.phase, rules.transient, rules.keep, rules.max_period,
-                    rules.tolerance, rules.scale, slot.chain, advance,
-                )  # fmt: skip
-            else:
-                found = sweep_series_on_gpu(points, start, memory, rules, slot.chain, advance)
+            found = sweep_on_gpu(points, start, memory, rules, slot.chain, advance)
             slot.period_number[:], slot.residual[:], slot.status[:] = found.period_number, found.residual, found.status
 
 

@@ -4,13 +4,46 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from nonsmooth.flow.engine import FloatArray, IntArray
 
-__all__ = ["batches", "launch"]
+__all__ = ["States", "batches", "launch"]
+
+
+@dataclass
+class States:
+    """Where N trajectories are, on the GPU: states, memory, clocks, modes, and the parameter row of each."""
+
+    u: Any  # (N, n)
+    memory: Any  # (N, n_memory), at least one column
+    clock: Any  # (N, 3)
+    counters: Any  # (N, 4)
+    rows: Any  # (N,)
+
+    @classmethod
+    def of(
+        cls, cuda: Any, rows: IntArray, u: FloatArray, memory: FloatArray, modes: Any, clock: FloatArray
+    ) -> States:
+        """Those of N trajectories with their clocks (see :class:`.engine.State`), which have no transition behind them.
+        """
+        counters, room = np.zeros((len(rows), 4), dtype=np.int64), np.zeros((len(rows), max(memory.shape[1], 1)))
+        counters[:, 0], counters[:, 1], room[:, : memory.shape[1]] = modes, -1, memory
+        parts = (np.array(u, dtype=float), room, np.array(clock, dtype=float), counters, np.asarray(rows))
+        return cls(*map(cuda.to_device, parts))
+
+    def room(self, cuda: Any, times: int) -> States:
+        """Room for so many states at the parameter rows of each of these."""
+        shapes = [(times * len(part), *part.shape[1:]) for part in self.all()]
+        rows = np.tile(self.rows.copy_to_host(), times)
+        arrays = (cuda.device_array(shape, part.dtype) for shape, part in zip(shapes, self.all(), strict=True))
+        return States(*[*arrays, cuda.to_device(rows)])
+
+    def all(self) -> tuple[Any, ...]:
+        return self.u, self.memory, self.clock, self.counters
 
 
 def batches(points: FloatArray, rows: IntArray, size: int) -> Iterator[tuple[slice, FloatArray, IntArray]]:

@@ -8,25 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.flow.engine import FloatArray, IntArray
-from nonsmooth.flow.launches import launch
+from nonsmooth.flow.engine import FloatArray, IntArray, SectionPlan
+from nonsmooth.flow.launches import States, launch
 from nonsmooth.flow.linear import PlanarEngine
 from nonsmooth.flow.loop import DIVERGENCE
 from nonsmooth.kernels import codes
 
-__all__ = ["SLICE", "Buffers", "PlanarOnGpu", "States"]
+__all__ = ["SLICE", "Buffers", "PlanarOnGpu"]
 
 SLICE = 256  # section returns of one launch, at most: below a second also on a small GPU
-
-
-@dataclass
-class States:
-    """Where N trajectories are, on the GPU: states, clocks, modes, and the parameter row of each."""
-
-    u: Any  # (N, 2)
-    clock: Any  # (N, 3)
-    counters: Any  # (N, 4)
-    rows: Any  # (N,)
 
 
 @dataclass
@@ -58,21 +48,24 @@ class PlanarOnGpu:
     ----------
     engine : PlanarEngine
     points : array (P, n_parameters)
-    phase : float
-        Phase of the forcing at which the section stands.
+    plan : SectionPlan
+        A stroboscopic section.
     """
 
-    def __init__(self, engine: PlanarEngine, points: FloatArray, phase: float) -> None:
+    n, n_memory = 2, 0
+
+    def __init__(self, engine: PlanarEngine, points: FloatArray, plan: SectionPlan) -> None:
         from nonsmooth.kernels.cuda_module import cuda_linear_module
         from nonsmooth.kernels.cuda_target import THREADS, cuda
 
         tables = engine.prepare(points)
         n_modes, n_indicators, n_outputs, n_rows = tables.sizes
         self.sizes = max(n_indicators, 1), max(n_outputs, 1)
+        self.void = [] if n_indicators else [self.n]  # a row of no indicator: no array is empty there
         shape = len(engine.form.multiples), n_modes, *self.sizes, max(len(engine.net.transitions), 1), n_rows
         self.module = cuda_linear_module(*shape)
         self.growth = partial(cuda_linear_module, *shape, "growth")
-        self.cuda, self.threads, self.phase = cuda, THREADS, float(phase)
+        self.cuda, self.threads, self.plan, self.phase = cuda, THREADS, plan, float(plan.phase)
         self.period: FloatArray = tables.period
         multiples = tables.form.multiples if len(tables.form.multiples) else np.ones(1, dtype=np.int64)
         given = cuda.to_device(_packed(tables.form)), cuda.to_device(multiples)
@@ -88,12 +81,6 @@ class PlanarOnGpu:
         """One thread for each job; waits for nothing."""
         launch(entry, self.threads, self.cuda.to_device(jobs), *arguments)
 
-    def states(self, rows: IntArray, u: FloatArray, modes: IntArray, phase: float) -> States:
-        """States at a phase of the forcing."""
-        clock, counters = np.zeros((len(rows), 3)), np.zeros((len(rows), 4), dtype=np.int64)
-        clock[:, 0], counters[:, 0] = phase * self.period[rows], modes
-        return States(*(self.cuda.to_device(part) for part in (u, clock, counters, rows)))
-
     def buffers(self, n: int, keep: int) -> Buffers:
         """Room for ``keep`` section points of each of n trajectories."""
         array, whole = self.cuda.device_array, np.int64
@@ -104,14 +91,23 @@ class PlanarOnGpu:
             array(n, whole),
         )  # fmt: skip
 
+    def extremes(self, out: Buffers) -> tuple[FloatArray, FloatArray]:
+        """Maxima and minima (N, rows) of states, indicators and outputs over the kept window."""
+        high = (out.maximum, out.indicator_max, out.output_max)
+        low = (out.minimum, out.indicator_min, out.output_min)
+        found = (np.concatenate([part.copy_to_host() for part in parts], axis=1) for parts in (high, low))
+        return tuple(np.delete(one, self.void, axis=1) for one in found)  # type: ignore[return-value]
+
     def run(
-        self, jobs: IntArray, states: States, transient: Any, keep: Any, out: Buffers, *, extremes: bool = False,
-        one_more: Buffers | None = None,
+        self, jobs: IntArray, states: States, transient: int, keep: Any, out: Buffers, settled: Any = False, *,
+        extremes: bool = False, one_more: Buffers | None = None,
     ) -> IntArray:  # fmt: skip
-        """March jobs by ``transient`` returns, then ``keep`` more into ``out`` (numbers, or one for each trajectory).
+        """March jobs by ``transient`` returns, then ``keep`` more into ``out`` (a number, or one for each trajectory).
 
         Parameters
         ----------
+        settled
+            Of no concern here: what holds where a run begins is always taken.
         one_more : Buffers, optional
             One return more, with extremes, goes in here.
 
@@ -120,30 +116,34 @@ class PlanarOnGpu:
         array
             The jobs that came to their end; the others have their code in ``out.status`` (or ``one_more.status``).
         """
-        todo = transient
-        while np.ndim(todo) == 0 and todo > SLICE and len(jobs):
+        while transient > SLICE and len(jobs):
             jobs = self._advance(jobs, states, SLICE - 1, 1, out)
-            todo -= SLICE
-        return self._advance(jobs, states, todo, keep, out, extremes, one_more) if len(jobs) else jobs
+            transient -= SLICE
+        if not len(jobs):
+            return jobs
+        if one_more is None:
+            return self._advance(jobs, states, transient, keep, out, extremes)
+        done = self._advance(jobs, states, transient, keep, out, extremes, one_more, True)
+        return done[one_more.status.copy_to_host()[done] == codes.OK]
 
-    def run_pairs(self, jobs: IntArray, states: States, transient: Any, out: Buffers) -> None:
-        """March the states j and J + j of each of J jobs by ``transient`` returns and one more, kept in ``out``."""
-        self._advance(jobs, states, transient, 1, out, False, out, len(states.u) // 2)
+    def run_beside(
+        self, jobs: IntArray, others: States, period: IntArray, whole: Buffers, arrived: Buffers, extremes: bool
+    ) -> None:
+        """March jobs j by period[j] returns into ``whole``, and their neighbours, which stand behind them in
+        ``others``; of these the last return goes into ``arrived``."""
+        self._advance(jobs, others, 0, period, whole, extremes, arrived, False, 3, len(period))
 
     def _advance(
-        self, jobs: IntArray, states: States, transient: Any, keep: Any, out: Buffers, extremes: bool = False,
-        other: Buffers | None = None, apart: int = 0,
+        self, jobs: IntArray, states: States, transient: int, keep: Any, out: Buffers, extremes: bool = False,
+        other: Buffers | None = None, after: bool = False, legs: int = 2, apart: int = 0,
     ) -> IntArray:  # fmt: skip
         counts = (self.cuda.to_device(np.atleast_1d(np.asarray(n, dtype=np.int64))) for n in (transient, keep))
         self.launch(
             self.module.advance, jobs, states.rows, *self.tables, self.net, states.u, states.clock, states.counters,
-            *counts, self.plans[extremes], self.plans[1], 1 if other is None else 2, apart, self.phase, self.limit,
-            out.all(), (out if other is None else other).all(),
+            *counts, self.plans[extremes], self.plans[after], 1 if other is None else legs, apart, self.phase,
+            self.limit, out.all(), (out if other is None else other).all(),
         )  # fmt: skip
-        done = jobs[out.status.copy_to_host()[jobs] == codes.OK]
-        if other is not None and not apart:
-            done = done[other.status.copy_to_host()[done] == codes.OK]
-        return done
+        return jobs[out.status.copy_to_host()[jobs] == codes.OK]
 
 
 def _not_empty(array: Any) -> Any:

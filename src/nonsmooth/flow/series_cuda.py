@@ -8,53 +8,16 @@ from typing import Any
 import numpy as np
 
 from nonsmooth.flow.engine import FloatArray, IntArray, SectionPlan
-from nonsmooth.flow.launches import launch
+from nonsmooth.flow.launches import States, launch
 from nonsmooth.flow.series import SeriesEngine
 from nonsmooth.flow.series_tables import Tables
 from nonsmooth.kernels import codes
 from nonsmooth.kernels.series_places import METHODS
 
-__all__ = ["PART", "STEPS", "Buffers", "SeriesOnGpu", "States", "module_of"]
+__all__ = ["PART", "STEPS", "Buffers", "SeriesOnGpu", "module_of"]
 
 STEPS = 1024  # of one launch, at most: below a second also on a small GPU
 PART = 0.75  # of ``devices.batch_size`` in one launch: what the registers hold by the compiler's choice (168 of each)
-
-
-@dataclass
-class States:
-    """Where N trajectories are, on the GPU: states, memory, clocks, modes, and the parameter row of each."""
-
-    u: Any  # (N, n)
-    memory: Any  # (N, n_memory), at least one column
-    clock: Any  # (N, 3)
-    counters: Any  # (N, 4)
-    rows: Any  # (N,)
-
-    def all(self) -> tuple[Any, ...]:
-        return self.u, self.memory, self.clock, self.counters
-
-    def taken(self, cuda: Any, which: IntArray, moved: FloatArray) -> States:
-        """New states beside some of these: ``moved`` is added to their u."""
-        parts = [part.copy_to_host()[which] for part in (*self.all(), self.rows)]
-        parts[0] = parts[0] + moved
-        return States(*map(cuda.to_device, parts))
-
-    def copy(self, cuda: Any) -> States:
-        return self.taken(cuda, np.arange(len(self.rows)), np.zeros((1, 1)))
-
-    def push(self, which: IntArray, moved: FloatArray) -> None:
-        """Add ``moved`` to some of the states."""
-        if len(which):
-            u = self.u.copy_to_host()
-            u[which] += moved
-            self.u.copy_to_device(u)
-
-    def restore(self, other: States, which: IntArray) -> None:
-        """Put some of them where they are in ``other``."""
-        for mine, its in zip(self.all(), other.all(), strict=True):
-            found = mine.copy_to_host()
-            found[which] = its.copy_to_host()[which]
-            mine.copy_to_device(found)
 
 
 @dataclass
@@ -63,8 +26,9 @@ class Buffers:
 
     whole: Any  # (numbers, N)
     real: Any
-    sections: Any  # (N, keep, n + 2): section points with time and mode
-    extremes: Any  # (N, 2, rows): maxima and minima of states, indicators, outputs
+    section: Any  # (N, keep, n + 2): section points with time and mode
+    maximum: Any  # (N, rows): of states, indicators, outputs
+    minimum: Any
     crossings: Any  # (N,)
     contacts: Any
     elapsed: Any
@@ -133,37 +97,33 @@ class SeriesOnGpu:
         """One thread for each job; waits for nothing."""
         launch(entry, self.threads, self.cuda.to_device(jobs), *arguments)
 
-    def states(self, rows: IntArray, u: FloatArray, memory: FloatArray, modes: IntArray, clock: FloatArray) -> States:
-        """States of N trajectories with their clocks (see :class:`engine.State`)."""
-        counters, room = np.zeros((len(rows), 4), dtype=np.int64), np.zeros((len(rows), max(self.n_memory, 1)))
-        counters[:, 0], counters[:, 1], room[:, : self.n_memory] = modes, -1, memory
-        parts = (np.array(u, dtype=float), room, np.array(clock, dtype=float), counters, np.asarray(rows))
-        return States(*map(self.cuda.to_device, parts))
-
     def buffers(self, n: int, keep: int) -> Buffers:
         """Room for ``keep`` section points of each of n trajectories."""
         array, whole, module = self.cuda.device_array, np.int64, self.module
         return Buffers(
             array((module.N_WHOLE, n), whole), array((module.N_REAL, n)), array((n, max(keep, 1), self.n + 2)),
-            array((n, 2, self.rows)), array(n, whole), array(n, whole), array(n), array(n, whole),
+            array((n, self.rows)), array((n, self.rows)), array(n, whole), array(n, whole), array(n), array(n, whole),
         )  # fmt: skip
 
-    def extremes(self, out: Buffers) -> FloatArray:
-        """Maxima and minima (2, N, rows) of states, indicators and outputs over the kept window."""
-        found: FloatArray = out.extremes.copy_to_host()
+    def extremes(self, out: Buffers) -> tuple[FloatArray, FloatArray]:
+        """Maxima and minima (N, rows) of states, indicators and outputs over the kept window."""
+        high, low = out.maximum.copy_to_host(), out.minimum.copy_to_host()
         for row, original in self.repeats.items():
-            found[:, :, row] = found[:, :, original]
-        return found.transpose(1, 0, 2)
+            high[:, row], low[:, row] = high[:, original], low[:, original]
+        return high, low
 
     def run(
-        self, jobs: IntArray, states: States, transient: Any, keep: Any, out: Buffers, settled: Any = False
-    ) -> IntArray:
+        self, jobs: IntArray, states: States, transient: Any, keep: Any, out: Buffers, settled: Any = False,
+        *, extremes: bool = True, one_more: None = None,
+    ) -> IntArray:  # fmt: skip
         """March jobs by ``transient`` returns, then ``keep`` more into ``out`` (numbers, or one for each trajectory).
 
         Parameters
         ----------
         settled : bool, or array of bool
             Whether transitions that hold at the beginning have been taken already.
+        extremes, one_more
+            Of no concern here: extremes are always there.
 
         Returns
         -------
@@ -181,3 +141,13 @@ class SeriesOnGpu:
             )  # fmt: skip
             under_way, fresh = under_way[out.status.copy_to_host()[under_way] == codes.PAUSED], 0
         return jobs[np.isin(out.status.copy_to_host()[jobs], (codes.OK, codes.NOT_GUARANTEED))]
+
+    def run_beside(
+        self, jobs: IntArray, others: States, period: IntArray, whole: Buffers, arrived: Buffers, extremes: bool
+    ) -> None:
+        """March jobs j by period[j] returns into ``whole``, and their neighbours, which stand behind them in
+        ``others``; of these the last return goes into ``arrived``. (Extremes are always there.)"""
+        self.run(jobs, others, 0, period, whole, True)
+        times = len(others.rows) // len(period)
+        neighbours = np.concatenate([jobs + leg * len(period) for leg in range(1, times)])
+        self.run(neighbours, others, np.tile(np.maximum(period, 1) - 1, times), 1, arrived, False)

@@ -10,7 +10,7 @@ from .codes import OK
 from .cuda_tables import tabled
 from .cuda_target import cuda, device, entry
 from .planar_settle import go
-from .records import Kept, Net
+from .records import Flow, Kept, Motion, Net
 
 
 @device
@@ -27,15 +27,16 @@ def row_of(buffers, row):
 
 @entry
 def advance(
-    jobs, rows, packed, multiples, built, net, u, clock, counters, transient, keep, plan, full, legs, apart, phase,
+    jobs, rows, packed, multiples, built, net, u, clock, counters, transient, keep, plan, after, legs, apart, phase,
     limit, out, other,
 ):  # fmt: skip
     """Thread k: march the state of job j = jobs[k] under parameter row rows[j] by transient[j] section returns, then
     keep[j] more into row j of ``out``. (One number for all jobs where these arrays are short.)
 
-    With two legs the tables serve twice: ``apart`` = 0, one more return with extremes (the plan ``full``), into row j
-    of ``other``; else the same for the state j + apart, into that row of ``other``. A state is left at its last
-    return; statuses stand in the buffers, and the second leg is left out where the first one failed."""
+    With more legs the tables serve again, under the plan ``after``: ``apart`` = 0, for one more return, into row j of
+    ``other``; else for as many returns of the states j + apart, j + 2 apart, ..., the last of each into that row of
+    ``other``. A state is left at its last return; statuses stand in the buffers, and legs are left out behind one that
+    failed."""
     k = cuda.grid(1)
     if k >= jobs.shape[0]:
         return
@@ -43,13 +44,14 @@ def advance(
     linear, scratch = tabled(packed, multiples, built, rows[j])
     n_transient = transient[min(j, transient.shape[0] - 1)]
     n_keep = keep[min(j, keep.shape[0] - 1)]
+    flow = Flow(linear, Net(*net), phase, 1e300, limit, scratch[0], scratch[1], u[0:0])
     for leg in range(legs):
         row = j + leg * apart
-        again = leg > 0 and apart == 0
+        if leg > 0:
+            n_transient, n_keep = n_transient + n_keep - 1 if apart > 0 else 0, 1
+        motion = Motion(u[row], u[row, 0:0], clock[row], counters[row])
         code = go(
-            0, u[row], clock[row], counters[row], linear, Net(*net), full if again else plan, phase, 1e300,
-            0 if again else n_transient, 1 if again else n_keep, limit, row_of(other if leg > 0 else out, row), scratch,
-            u[row : row + 1],
-        )  # fmt: skip
+            0, motion, flow, after if leg > 0 else plan, n_transient, n_keep, row_of(other if leg > 0 else out, row)
+        )
         if code != OK:
             break

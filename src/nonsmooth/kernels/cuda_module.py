@@ -20,8 +20,8 @@ __all__ = ["cuda_linear_module", "joined", "stamp"]
 STEPPER = ("linear_tables", "linear_polynomial", "linear_search", "linear_stepper", "linear_layout", "hybrid")
 OBSERVERS = {
     "sections": (
-        "linear_extremes", "sections", "planar_settle", "cuda_planar", "cuda_tables", "cuda_advance", "cuda_judge",
-        "cuda_neighbours",
+        "linear_extremes", "sections", "judge", "settle", "exponent", "planar_settle", "cuda_planar", "cuda_tables",
+        "cuda_advance", "cuda_settle", "cuda_neighbours",
     ),
     "growth": ("frame", "growth", "cuda_planar", "cuda_tables", "cuda_growth"),
 }  # fmt: skip

@@ -9,8 +9,8 @@ from numba import float64, int64
 from .cuda_planar import N_INDICATORS, N_OUTPUTS
 from .cuda_tables import tabled
 from .cuda_target import cuda, entry, local
-from .planar_settle import part
-from .records import Kept, Net
+from .planar_settle import follow_pair
+from .records import Flow, Kept, Motion, Net
 
 
 @local
@@ -36,19 +36,16 @@ def single():
 
 @entry
 def neighbours(
-    jobs, rows, packed, multiples, built, net, u, clock, counters, begin, end, batch, size, apart, sums, plan, phase,
+    jobs, rows, packed, multiples, built, net, u, clock, counters, begin, end, batch, size, offsets, sums, plan, phase,
     limit, status,
 ):  # fmt: skip
-    """Returns begin <= n < end of each job and its neighbour: see ``part``."""
+    """Returns begin <= n < end of each job and its neighbour: see ``follow_pair``."""
     k = cuda.grid(1)
     if k >= jobs.shape[0]:
         return
     j = jobs[k]
     linear, scratch = tabled(packed, multiples, built, rows[j])
-    moved = cuda.local.array(2, float64)
-    moved_clock = cuda.local.array(3, float64)
-    moved_counters = cuda.local.array(4, int64)
-    status[j] = part(
-        begin, end, batch, 0, size, u[j], clock[j], counters[j], moved, moved_clock, moved_counters, apart[j], sums[j],
-        linear, Net(*net), plan, phase, 1e300, limit, single(), scratch, u[j : j + 1],
-    )  # fmt: skip
+    motion = Motion(u[j], u[j, 0:0], clock[j], counters[j])
+    moved = Motion(cuda.local.array(2, float64), u[j, 0:0], cuda.local.array(3, float64), cuda.local.array(4, int64))
+    flow = Flow(linear, Net(*net), phase, 1e300, limit, scratch[0], scratch[1], u[0:0])
+    status[j] = follow_pair(begin, end, batch, 0, size, motion, moved, offsets[j], sums[j], flow, plan, single())

@@ -103,7 +103,7 @@ def may_pause(work):
 @entry
 def advance(
     jobs, rows, points, periods, exact_steps, norms, plan, settings, u, memory, clock, counters, settled, transient,
-    keep, fresh, pause, whole, real, sections, extremes, crossings, contacts, elapsed, status,
+    keep, fresh, pause, whole, real, section, maximum, minimum, crossings, contacts, elapsed, status,
 ):  # fmt: skip
     """Thread k: march the state of job j = jobs[k] at parameter point rows[j] by transient[j] section returns, then
     keep[j] more, whose points and extremes are kept (one number for all jobs where these arrays are short).
@@ -149,12 +149,12 @@ def advance(
         periods, own[:, :N_PARAMETERS], periods[i : i + 1], exact_steps[i : i + 1], LACKING, KINDS, norms[0], norms[1],
         settings[0], settings[1], ORDER, 1, CHECKED, CORNERS, NONLINEAR_ROWS, N_GUARDS, N_INDICATORS, N_OUTPUTS,
     )  # fmt: skip
-    section = Section(plan[0], plan[1], plan[2], plan[3], plan[4], 1, settings[2] if plan[0] < 0 else -1.0, settings[3])
+    at = Section(plan[0], plan[1], plan[2], plan[3], plan[4], 1, settings[2] if plan[0] < 0 else -1.0, settings[3])
     goal = Goal(
         transient[min(j, transient.shape[0] - 1)], keep[min(j, keep.shape[0] - 1)], 0.0, 0.0, norms[2], pause
     )
     motion = Motion(u[j], memory[j, :N_MEMORY], clock[j], counters[j])
-    points_kept, top, bottom = sections[j : j + 1], extremes[j : j + 1, 0], extremes[j : j + 1, 1]
+    points_kept, top, bottom = section[j : j + 1], maximum[j : j + 1], minimum[j : j + 1]
     seen = Kept(
         points_kept, top[:, :N_U], bottom[:, :N_U], top[:, N_U : N_U + N_INDICATORS],
         bottom[:, N_U : N_U + N_INDICATORS], top[:, N_U + N_INDICATORS :], bottom[:, N_U + N_INDICATORS :],
@@ -163,7 +163,7 @@ def advance(
         status[j : j + 1],
     )  # fmt: skip
     net = Net(TRANSITIONS, ROWS, ROW_START, MODE_START, MODE_LIST, AT)
-    code = march(0, form, net, section, goal, motion, seen, (), work)
+    code = march(0, form, net, at, goal, motion, seen, (), work)
     status[j] = code
     if code != PAUSED:
         leave(0, form, motion, work)

@@ -19,7 +19,7 @@ __all__ = ["cuda_series_module", "cuda_series_source"]
 
 PARTS = (
     "circular", "polynomial", "crossing", "rkf45", "taylor", "trust", "series_step", "watch", "series_stepper",
-    "hybrid", "sections", "cuda_series",
+    "hybrid", "sections", "judge", "settle", "exponent", "cuda_settle", "cuda_series",
 )  # fmt: skip
 
 
@@ -41,6 +41,8 @@ def cuda_series_source(model: str, sizes: Mapping[str, int], tables: Mapping[str
         line = f"{', '.join(names)} = {', '.join(str(int(sizes[name])) for name in names)}"
         text, found = re.subn(rf"^{', '.join(names)} = [\d, ]+$", line, text, flags=re.MULTILINE)
         assert found == 1, names
+    text, found = re.subn(r"^N_STATES = 2\b", f"N_STATES = {tables['LACKING'].shape[1]}", text, flags=re.MULTILINE)
+    assert found == 1
     for name, table in tables.items():
         line = f"{name} = np.array({table.tolist()!r}, dtype=np.{table.dtype}).reshape({table.shape})"
         text, found = re.subn(rf"^{name} = np\.array.*$", line, text, flags=re.MULTILINE)

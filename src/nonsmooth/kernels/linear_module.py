@@ -40,10 +40,10 @@ def linear_module(states: int, harmonics: int, observer: str = "sections") -> Mo
 
 
 @cache
-def settle_module(harmonics: int) -> ModuleType:
-    """The module with ``settle_many`` over the kernels of two states and that number of harmonics."""
-    below = linear_module(2, harmonics).__name__
+def settle_module(states: int, harmonics: int) -> ModuleType:
+    """The module with ``settle_many`` over the kernels of those numbers of states and harmonics."""
+    below = linear_module(states, harmonics).__name__
     text = (Path(__file__).parent / "planar_settle.py").read_text(encoding="utf-8")
-    text = re.sub(r"^from \.sections import", f"from {below} import", text, flags=re.MULTILINE)
+    text = re.sub(r"^from \.(?:sections|linear_tables) import", f"from {below} import", text, flags=re.MULTILINE)
     text = re.sub(r"^from \.(\w+) import", r"from nonsmooth.kernels.\1 import", text, flags=re.MULTILINE)
-    return load_module(text, f"planar_settle_{harmonics}")
+    return load_module(text, f"planar_settle_{states}_{harmonics}")

@@ -10,8 +10,9 @@ from typing import Any, NamedTuple
 from numba import types
 
 __all__ = [
-    "FORM", "GENERATED", "GOAL", "GROWTH", "KEPT", "LOG", "MOTION", "NET", "SECTION", "SERIES_WORK", "TABLES", "WORK",
-    "Form", "Generated", "Goal", "Growth", "Kept", "Log", "Motion", "Net", "Section", "SeriesWork",
+    "FLOW", "FORM", "GENERATED", "GOAL", "GROWTH", "KEPT", "LOG", "MOTION", "NET", "SECTION", "SERIES_WORK", "TABLES",
+    "WORK",
+    "Flow", "Form", "Generated", "Goal", "Growth", "Kept", "Log", "Motion", "Net", "Section", "SeriesWork",
     "Tables", "Work", "type_of",
 ]  # fmt: skip
 
@@ -241,6 +242,19 @@ class Growth(NamedTuple):
     scratch: Any  # (n,)
 
 
+class Flow(NamedTuple):
+    """What runs a linear system to a stroboscopic section."""
+
+    form: Any
+    net: Any
+    phase: Any  # of the section, in periods
+    t_max: Any
+    limit: Any  # (n,) sizes beyond which a state has diverged
+    tables: Any
+    work: Any
+    starts: Any  # (0, n): runs go on from a ``Motion``
+
+
 FORM = type_of(
     Form, _f4, _f3, _f4, _f4, _i1, _f1, _f1, _f3, _f2, _f3, _f3, _f4, _f3, _f4, _f4, _f4, _f3, _f4, _f4
 )  # fmt: skip
@@ -254,6 +268,7 @@ SERIES_WORK = type_of(
 )  # fmt: skip
 MOTION = type_of(Motion, _f1, _f1, _f1, _i1)
 SECTION = type_of(Section, *[_i] * 6, _f, _f)
+FLOW = type_of(Flow, FORM, NET, _f, _f, _f1, TABLES, WORK, _f2)
 GOAL = type_of(Goal, _i, _i, _f, _f, _f1, _i)
 KEPT = type_of(Kept, _f3, *[_f2] * 6, _i1, _i1, _f1, _f2, _i2, _i1)
 LOG = type_of(Log, _f1, _f2, _f2, _i1, _i1, _f1, _i1, _f2, _f2, _f2, _f1, _i1, _f2, _f1, _i)

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.analysis.classify import longest_period
-from nonsmooth.analysis.settle import Attractors, tolerance_of
+from nonsmooth.analysis.settle import Attractors, longest_period, tolerance_of
 from nonsmooth.analysis.settled import usable
 from nonsmooth.flow.engine import Chain, SectionPlan, State
 from nonsmooth.flow.failure import solve_error

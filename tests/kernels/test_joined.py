@@ -1,0 +1,50 @@
+"""Kernel files that are joined into one module share one space of names."""
+
+from __future__ import annotations
+
+import ast
+import re
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from nonsmooth.kernels import cuda_module, cuda_series_module, linear_module
+
+FOLDER = Path(cuda_module.__file__).parent
+TEXTS = {
+    **{name: (*linear_module.STEPPER, *parts) for name, parts in linear_module.OBSERVERS.items()},
+    **{f"cuda {name}": (*cuda_module.STEPPER, *parts) for name, parts in cuda_module.OBSERVERS.items()},
+    "cuda series": cuda_series_module.PARTS,
+}
+MARKERS = {"device", "inline", "kernel", "callback", "once", "sum_rows", "sum_columns"}  # another compiler's on a GPU
+ON_PURPOSE = MARKERS | {"build", "may_pause", "__all__"}  # replaced on a GPU
+SWAPPED = {"linear_stepper", "linear_extremes", "linear_touches", "generated"}  # for the stepper that is joined
+
+
+@cache
+def names(file: str) -> dict[str, str]:
+    """Where each name of a kernel file comes from."""
+    found: dict[str, str] = {}
+    for node in ast.parse((FOLDER / f"{file}.py").read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            found[node.name] = file
+        elif isinstance(node, ast.Assign):
+            targets = [one for target in node.targets for one in ast.walk(target) if isinstance(one, ast.Name)]
+            found |= {one.id: file for one in targets}
+        elif isinstance(node, ast.ImportFrom) and node.level and node.module:
+            found |= {one.asname or one.name: names(node.module).get(one.name, node.module) for one in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            found |= {one.asname or one.name: str(node.module) for one in node.names}
+    return found
+
+
+@pytest.mark.parametrize("text", TEXTS)
+def test_a_name_means_one_thing_in_a_joined_text(text: str) -> None:
+    origins: dict[str, set[str]] = {}
+    for file in TEXTS[text]:
+        for name, origin in names(file).items():
+            foreign = origin in SWAPPED and origin not in TEXTS[text]
+            if name not in ON_PURPOSE and not foreign and not re.fullmatch(r"_[if]\d?", name):
+                origins.setdefault(name, set()).add(origin)
+    assert {name: sorted(files) for name, files in origins.items() if len(files) > 1} == {}
