@@ -57,3 +57,47 @@ def test_ctrl_c_while_a_study_follows_a_branch(
     assert capsys.readouterr().err.splitlines()[-1] == "nonsmooth: interrupted"
     assert next(steps, None) is None  # it was a branch that was interrupted
     assert not [path for path in tmp_path.rglob("*") if path.suffix in (".nc", ".md", ".html", ".pdf", ".png")]
+
+
+LONG = """
+import os, signal, threading, time, warnings
+import nonsmooth as ns
+
+warnings.simplefilter("ignore")
+o = ns.models.discontinuous_support()
+valve, top = ns.models.relief_valve(), ns.Poincare("lift_velocity", rising=False)
+long = {
+    "a step of 1e-300": lambda: ns.simulate(o, periods=10, method="taylor", step=1e-300),
+    "a period of 1e12": lambda: ns.simulate(o.with_parameters(omega=1e-12), periods=1, samples=2),
+    "a long transient": lambda: ns.poincare(o, n=2, transient=10**8),
+    "by Runge-Kutta": lambda: ns.poincare(o, n=2, transient=10**8, method="rkf45"),
+    "on a surface": lambda: ns.poincare(valve, n=2, transient=10**8, start=[0.2, 0.0, 10.0], section=top),
+    "one value of a sweep": lambda: ns.sweep(o, "rho", [0.4], transient=2 * 10**7),
+    "a chart": lambda: ns.chart(o, {"rho": [0.3, 0.4], "omega": [3.0, 3.6]}, transient=2 * 10**7, stop_early=False),
+    "exponents": lambda: ns.lyapunov(o, periods=10**7),
+}
+ns.chart(o, {"rho": [0.3, 0.4], "omega": [3.0, 3.6]}, transient=50, progress=False)
+for name, call in long.items():
+    began = []
+    def interrupt():
+        began.append(time.perf_counter())
+        os.kill(os.getpid(), signal.SIGINT)
+    timer = threading.Timer(1.0, interrupt)
+    timer.start()
+    try:
+        call()
+        print(name, "came to its end")
+    except KeyboardInterrupt:
+        print(name, "took", time.perf_counter() - began[0])
+"""
+
+
+def test_every_verb_ends_soon_after_ctrl_c() -> None:
+    """Whatever the length of a transient, a period or a step: kernels pause. (2 s are promised on a quiet machine.)"""
+    done = subprocess.run([sys.executable, "-c", LONG], capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    assert len(lines) == 8
+    for line in lines:
+        assert " took " in line, line
+        assert float(line.rpartition(" ")[2]) < 10.0, line

@@ -10,6 +10,8 @@ from nonsmooth.analysis.settled import Settled
 from nonsmooth.flow.engine import Chain, FloatArray, IntArray
 from nonsmooth.flow.linear import LinearEngine, Tables
 from nonsmooth.flow.loop import DIVERGENCE
+from nonsmooth.kernels.run_places import PATIENCE
+from nonsmooth.kernels.stopping import flag
 
 if TYPE_CHECKING:
     from nonsmooth.kernels.settle import Rules
@@ -61,7 +63,7 @@ def _flow(engine: LinearEngine, tables: Tables, phase: float) -> Any:
 
     none = np.zeros((0, len(engine.scale)))
     form, own, work = engine.given(tables, "sections")
-    return Flow(form, engine.net, phase, np.inf, DIVERGENCE * engine.scale, own, work, none)
+    return Flow(form, engine.net, phase, np.inf, DIVERGENCE * engine.scale, own, work, none, PATIENCE, flag())
 
 
 def _plan(extremes: bool) -> IntArray:

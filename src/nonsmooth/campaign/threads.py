@@ -10,9 +10,11 @@ from itertools import islice
 from queue import SimpleQueue
 from typing import Any, TypeVar
 
+import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.campaign.work import Work
+from nonsmooth.kernels.stopping import obey
 
 __all__ = ["cores", "on_threads", "over_items"]
 
@@ -44,20 +46,18 @@ def over_items(
 ) -> None:
     """Compute every item and hand it to ``done(item, result)``, in the calling thread, in any order.
 
-    Ctrl-C (or an error) sets ``stop``, lets the items in hand end and starts no other. At most two items per thread
-    wait, so that memory does not grow with their number.
+    Ctrl-C (or an error) sets ``stop``, ends the items in hand at their next pause and starts no other. At most two
+    items per thread wait, so that memory does not grow with their number.
     """
     order = iter(items)
     workers = threads or cores()
-    if workers == 1:
-        for item in order:
-            done(item, compute(item))
-        return
     halt = threading.Event() if stop is None else stop
     # A queue, not the futures: Ctrl-C in the midst of a wait for futures can leave their locks in disorder.
     came: SimpleQueue[tuple[Any, Any, BaseException | None]] = SimpleQueue()
+    unwanted = np.zeros(1, dtype=np.int64)
 
     def run(item: T) -> None:
+        obey(unwanted)
         try:
             came.put((item, None if halt.is_set() else compute(item), None))
         except BaseException as error:
@@ -78,5 +78,6 @@ def over_items(
                     raise error
                 done(item, result)
         except BaseException:
+            unwanted[0] = 1
             halt.set()
             raise

@@ -10,6 +10,7 @@ import numpy as np
 from nonsmooth.flow.engine import Chain, FloatArray, Log, SectionPlan, State
 from nonsmooth.kernels import codes
 from nonsmooth.kernels.run_places import BEGUN, CROSSINGS, PATIENCE, TOUCHES
+from nonsmooth.kernels.stopping import flag
 
 if TYPE_CHECKING:
     from nonsmooth.system.traced import Traced
@@ -68,6 +69,7 @@ class LoopEngine:
         work.tally[BEGUN] = 0
         while first < last:  # Ctrl-C comes in between
             first = kernel(first, last, *rest)
+            _end_if_not_wanted()
         if carry:
             state.settled = True
             if state.clock[2] == 0.0 and tables.period[last - 1] < np.inf:
@@ -90,6 +92,7 @@ class LoopEngine:
         work.tally[BEGUN] = 0
         while code in (codes.LOG_FULL, codes.PAUSED):
             code = kernel(*rest, records.Log(*(*sampled, *crossings, *touches, spare)), own, work)
+            _end_if_not_wanted()
             if code == codes.LOG_FULL:
                 crossings = _longer(crossings, _crossings(2 * len(crossings[0]), n_u, n_m))
                 touches = _longer(touches, _touches(2 * len(touches[0]) + spare, n_u))
@@ -114,6 +117,11 @@ class LoopEngine:
 
         state.counters[1] = int(settled)
         return Motion(state.u, state.memory, state.clock, state.counters)
+
+
+def _end_if_not_wanted() -> None:
+    if flag()[0]:
+        raise KeyboardInterrupt
 
 
 def nowhere() -> Any:

@@ -44,7 +44,7 @@ def advance(
     linear, scratch = tabled(packed, multiples, built, rows[j])
     n_transient = transient[min(j, transient.shape[0] - 1)]
     n_keep = keep[min(j, keep.shape[0] - 1)]
-    flow = Flow(linear, Net(*net), phase, 1e300, limit, scratch[0], scratch[1], u[0:0])
+    flow = Flow(linear, Net(*net), phase, 1e300, limit, scratch[0], scratch[1], u[0:0], 1 << 62, jobs)
     for leg in range(legs):
         row = j + leg * apart
         if leg > 0:

@@ -47,5 +47,5 @@ def neighbours(
     linear, scratch = tabled(packed, multiples, built, rows[j])
     motion = Motion(u[j], u[j, 0:0], clock[j], counters[j])
     moved = Motion(cuda.local.array(2, float64), u[j, 0:0], cuda.local.array(3, float64), cuda.local.array(4, int64))
-    flow = Flow(linear, Net(*net), phase, 1e300, limit, scratch[0], scratch[1], u[0:0])
+    flow = Flow(linear, Net(*net), phase, 1e300, limit, scratch[0], scratch[1], u[0:0], 1 << 62, jobs)
     status[j] = follow_pair(begin, end, batch, 0, size, motion, moved, offsets[j], sums[j], flow, plan, single())

@@ -9,11 +9,12 @@ from math import nan
 from numba import types
 
 from .cache import device, kernel
-from .codes import OK
+from .codes import INTERRUPTED, OK
 from .exponent import separate
 from .judge import multiplier
 from .linear_tables import STATES
 from .records import FLOW, KEPT, MOTION, Goal, Section
+from .run_places import BEGUN
 from .sections import chain
 from .settle import END, FRESH, JOBS, PROBE, RULES, begin_job, next_run
 
@@ -22,7 +23,6 @@ _f1, _f2, _f3, _i1 = _f[::1], _f[:, ::1], _f[:, :, ::1], _i[::1]
 
 PROBES = types.Tuple((_f2, _f3))
 RESULTS = types.Tuple((_f1, _f1, _f2, _f2, _f2, _i1))
-FOR_EVER = 1 << 62  # steps without a pause
 
 
 @device
@@ -30,8 +30,11 @@ def go(i, motion, flow, plan, transient, keep, out):
     """Run parameter row i on from ``motion``, which is left where it ends. Returns the status."""
     motion.clock[2] = 0.0  # the time stands as it is: the kernel must not scale it to another period
     section = Section(plan[0], plan[1], plan[2], plan[3], plan[4], plan[5], flow.phase, flow.t_max)
-    goal = Goal(transient, keep, 0.0, 0.0, flow.limit, FOR_EVER)
-    chain(i, i + 1, flow.starts, flow.form, flow.net, section, goal, motion, out, flow.tables, flow.work)
+    goal = Goal(transient, keep, 0.0, 0.0, flow.limit, flow.patience)
+    while chain(i, i + 1, flow.starts, flow.form, flow.net, section, goal, motion, out, flow.tables, flow.work) == i:
+        if flow.stop[0] != 0:
+            flow.work.tally[BEGUN] = 0
+            return INTERRUPTED
     return out.status[i]
 
 
@@ -95,6 +98,8 @@ def settle_many(
     whole = plan if extremes != 0 else quiet
     good = False
     for j in range(rows.shape[0]):
+        if flow.stop[0] != 0:
+            break
         i = rows[j]
         if good and carried != 0:
             put(motion, i, motion.u, flow.phase, motion.counters[0], flow)

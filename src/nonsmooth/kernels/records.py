@@ -253,6 +253,8 @@ class Flow(NamedTuple):
     tables: Any
     work: Any
     starts: Any  # (0, n): runs go on from a ``Motion``
+    patience: Any  # steps between two looks at the flag
+    stop: Any  # (1,) not zero: the work is not wanted any more
 
 
 FORM = type_of(
@@ -268,7 +270,7 @@ SERIES_WORK = type_of(
 )  # fmt: skip
 MOTION = type_of(Motion, _f1, _f1, _f1, _i1)
 SECTION = type_of(Section, *[_i] * 6, _f, _f)
-FLOW = type_of(Flow, FORM, NET, _f, _f, _f1, TABLES, WORK, _f2)
+FLOW = type_of(Flow, FORM, NET, _f, _f, _f1, TABLES, WORK, _f2, _i, _i1)
 GOAL = type_of(Goal, _i, _i, _f, _f, _f1, _i)
 KEPT = type_of(Kept, _f3, *[_f2] * 6, _i1, _i1, _f1, _f2, _i2, _i1)
 LOG = type_of(Log, _f1, _f2, _f2, _i1, _i1, _f1, _i1, _f2, _f2, _f2, _f1, _i1, _f2, _f1, _i)
