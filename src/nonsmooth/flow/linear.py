@@ -1,6 +1,7 @@
 """The engine of the exact flow: linear modes with harmonic forcing, affine indicators and resets, any number of states.
 
-It only packs a system into the arrays of ``kernels.linear_module`` and unpacks what comes back.
+It only packs a system into the arrays of ``kernels.linear_module`` and unpacks what comes back. Memory travels there as
+states behind the others, that nothing but transitions changes.
 """
 
 from __future__ import annotations
@@ -27,17 +28,15 @@ LARGEST = 64e6  # bytes of the tables of all modes
 
 
 def is_linear(traced: Traced, form: LinearForm | None) -> bool:
-    """Whether the fast kernel covers the system: everything affine, no memory, no mode that lacks a state.
+    """Whether the fast kernel covers the system: fields, indicators, resets and what is written to memory all affine.
 
     It notes the modes of a start rule as bits of one integer: 62 modes at most."""
     return (
         form is not None
         and len(traced.mode_names) <= 62
-        and table_bytes(len(traced.u), len(form.multiples), len(traced.mode_names)) <= LARGEST
+        and table_bytes(len(traced.u) + len(traced.m), len(form.multiples), len(traced.mode_names)) <= LARGEST
         and form.affine_indicators
         and form.affine_resets
-        and not traced.memory_names
-        and not any(any(lacking) for lacking in traced.lacking)
     )
 
 
@@ -81,9 +80,16 @@ class LinearEngine:
     scale: FloatArray  # (n,)
     name: str = "exact"
     net: Any = field(init=False)  # ``kernels.records.Net``
+    limit: FloatArray = field(init=False)  # (n + memory,) sizes beyond which a run has diverged
 
     def __post_init__(self) -> None:
         self.net = pack_net(self.traced)
+        self.limit = np.append(DIVERGENCE * self.scale, np.full(len(self.traced.m), np.inf))
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether there is no memory and every mode has every state."""
+        return not self.net.lacking.any()
 
     def prepare(self, points: FloatArray) -> Tables:
         t = self.form.evaluate(points)
@@ -94,7 +100,7 @@ class LinearEngine:
         else:
             shape = (n_points, 0, n_modes)
             waves = np.zeros((*shape, n_h))
-            outputs = (np.zeros((*shape, len(self.scale))), np.zeros(shape), waves, waves)
+            outputs = (np.zeros((*shape, len(self.limit))), np.zeros(shape), waves, waves)
         multiples = np.array(self.form.multiples, dtype=np.int64)
         with np.errstate(divide="ignore"):
             period = np.where(t.omega > 0.0, 2.0 * np.pi / t.omega, np.inf)
@@ -107,7 +113,7 @@ class LinearEngine:
             t.ia, t.ib, t.ic, t.is_, *outputs, t.ra, t.rb, t.rc, t.rs,
         )  # fmt: skip
         if n_points > 1:  # threads may share them
-            compiled(linear_module(len(self.scale), n_h).chain)
+            compiled(linear_module(len(self.limit), n_h).chain)
         return Tables(points, form, period, (n_modes, n_i, outputs[0].shape[1], len(self.net[1])), n_h)
 
     def chain(
@@ -126,16 +132,24 @@ class LinearEngine:
             plan.indicator, plan.rising, plan.mode, int(plan.after), plan.every, int(plan.extremes),
             float(plan.phase), float(plan.t_max),
         )  # fmt: skip
+        n = len(self.scale)
+        u = np.append(state.u, state.memory)
+        begun = np.zeros((0, len(u))) if carry else np.hstack([starts, np.tile(state.memory, (len(starts), 1))])
+        wide = out if len(u) == n else out.widened(len(u))
         arguments = (
-            np.zeros((0, len(self.scale))) if starts is None else starts, tables.form, self._net(plan.indicator),
-            section, Goal(transient, keep, 0.0, 0.0, DIVERGENCE * self.scale, PATIENCE),
-            Motion(state.u, state.clock, state.counters),
-            out.record(), *tables.scratch(),
+            begun, tables.form, self._net(plan.indicator), section,
+            Goal(transient, keep, 0.0, 0.0, self.limit, PATIENCE), Motion(u, state.clock, state.counters),
+            wide.record(), *tables.scratch(),
         )  # fmt: skip
         tables.scratch()[1].tally[BEGUN] = 0
         at = first
         while at < last:  # Ctrl-C comes in between
             at = kernel(at, last, *arguments)
+        state.u[:], state.memory[:] = u[:n], u[n:]
+        if wide is not out:
+            out.section[first:last], out.maximum[first:last], out.minimum[first:last] = (
+                part[first:last, ..., :n] for part in (wide.section, wide.maximum, wide.minimum)
+            )
         if carry:
             state.settled = True
             if state.clock[2] == 0.0 and tables.period[first] < np.inf:
@@ -144,16 +158,16 @@ class LinearEngine:
     def record(self, tables: Tables, state: State, until: float, samples: FloatArray) -> Log:
         from nonsmooth.kernels import records
 
-        n = len(samples)
+        n, u = len(samples), np.append(state.u, state.memory)
         sampled = (
-            samples, np.full((n, len(self.scale)), np.nan), np.full(n, -1, dtype=np.int64), np.zeros(n, dtype=np.int64),
+            samples, np.full((n, len(u)), np.nan), np.full(n, -1, dtype=np.int64), np.zeros(n, dtype=np.int64),
         )  # fmt: skip
         size = 1024
         logs = self._logs(size)
         kernel = tables.module("record").record
         form, nowhere, work = tables.form, records.Section(-1, 0, -1, 0, 1, 0, 0.0, 0.0), tables.scratch("record")
-        goal = records.Goal(0, 0, float(until), 0.0, DIVERGENCE * self.scale, PATIENCE)
-        motion = records.Motion(state.u, state.clock, state.counters)
+        goal = records.Goal(0, 0, float(until), 0.0, self.limit, PATIENCE)
+        motion = records.Motion(u, state.clock, state.counters)
         state.counters[1] = int(state.settled)
         work[1].tally[:] = 0
         while True:
@@ -167,14 +181,28 @@ class LinearEngine:
             elif code != codes.PAUSED:
                 break
         state.settled = True
+        state.u[:], state.memory[:] = u[: len(state.u)], u[len(state.u) :]
         n_c, n_t = work[1].tally[[CROSSINGS, TOUCHES]]
-        times, transitions, before, after = (log[:n_c] for log in logs[:4])
-        touch_times, indicators, touch_u, clearances = (log[:n_t] for log in logs[4:])
-        _, sample_u, sample_mode, sample_segment = sampled
+        return self._log(sampled, [log[:n_c] for log in logs[:4]], [log[:n_t] for log in logs[4:]], int(code))
+
+    def _log(
+        self, sampled: tuple[np.ndarray, ...], crossings: list[np.ndarray], touches: list[np.ndarray], code: int
+    ) -> Log:
+        """The kernel's logs, states and memory apart; a state that a mode lacks is NaN."""
+        _, sample, mode, segment = sampled
+        times, transition, before, after = crossings
+        touch_times, indicators, touch_u, clearances = touches
+        n, lacking = len(self.scale), np.array(self.traced.lacking, dtype=bool)
+        memory, memory_after = sample[:, n:].copy(), after[:, n:].copy()
+        u, before, after, touch_u = (np.ascontiguousarray(part[:, :n]) for part in (sample, before, after, touch_u))
+        if lacking.any():
+            jumps = self.traced.transitions
+            u[lacking[mode] & (mode >= 0)[:, None]] = np.nan
+            before[lacking[[t.source for t in jumps]][transition]] = np.nan
+            after[lacking[[t.target for t in jumps]][transition]] = np.nan
         return Log(
-            sample_u, np.zeros((n, 0)), sample_mode, sample_segment,
-            times, transitions, before, after, np.zeros((n_c, 0)),
-            touch_times, indicators, touch_u, clearances, int(code),
+            u, memory, mode, segment, times, transition, before, after, memory_after,
+            touch_times, indicators, touch_u, clearances, code,
         )  # fmt: skip
 
     def grow(self, tables: Tables, i: int, state: State, count: int, unit: float, growth: Any) -> int:
@@ -184,7 +212,7 @@ class LinearEngine:
         from nonsmooth.kernels.records import Goal, Motion, Section
 
         kernel, work = tables.module("growth").grow, tables.scratch("growth")
-        goal = Goal(0, count, 0.0, float(unit), DIVERGENCE * self.scale, PATIENCE)
+        goal = Goal(0, count, 0.0, float(unit), self.limit, PATIENCE)
         state.counters[1] = 0
         work[1].tally[BEGUN] = 0
         code = codes.PAUSED
@@ -198,7 +226,7 @@ class LinearEngine:
 
     def _logs(self, size: int) -> list[np.ndarray]:
         """Room for crossings (time, transition, states before, after), and touches (time, indicator, states, gap)."""
-        n = len(self.scale)
+        n = len(self.limit)
         crossings = [np.zeros(size), np.zeros(size, dtype=np.int64), np.zeros((size, n)), np.zeros((size, n))]
         return [*crossings, np.zeros(size), np.zeros(size, dtype=np.int64), np.zeros((size, n)), np.zeros(size)]
 
@@ -219,7 +247,8 @@ def pack_net(traced: Traced) -> Any:
 
     integer = np.int64
     transitions = np.array(
-        [(t.target, t.reset is not None, t.contact) for t in traced.transitions], dtype=integer
+        [(t.target, 1 if t.reset is not None else 2 * bool(t.writes), t.contact) for t in traced.transitions],
+        dtype=integer,
     ).reshape(-1, 3)
     rows = [(r.indicator, r.sign, r.strict) for t in traced.transitions for r in t.rows]
     row_start = np.cumsum([0] + [len(t.rows) for t in traced.transitions], dtype=integer)
@@ -230,4 +259,5 @@ def pack_net(traced: Traced) -> Any:
     mode_list = np.array([j for one in leaving for j in one], dtype=integer)
     at = np.array([-1.0 if t.at is None else t.at for t in traced.transitions], dtype=float)
     both = np.array([*rows, (0, 1, 1), (0, -1, 1)], dtype=integer).reshape(-1, 3)
-    return Net(transitions, both, row_start, mode_start, mode_list, at)
+    lacking = np.array([[*own, *(True for _ in traced.m)] for own in traced.lacking], dtype=integer)
+    return Net(transitions, both, row_start, mode_start, mode_list, at, lacking)

@@ -24,7 +24,7 @@ from .linear_march import (
     wrap_phase,
 )
 from .linear_search import FUNCTIONAL, NODE, SIDE
-from .linear_tables import ONE, STATES, M, build
+from .linear_tables import ONE, STATES, M, build, hide_lacking
 from .run_places import (
     BEGUN,
     BURST,
@@ -43,6 +43,7 @@ from .run_places import (
 def begin(i, form, net, section, motion, tables, work):
     """Tables, state and mode where a run begins, by the start rule. Returns a status."""
     build(i, form, tables, work)
+    hide_lacking(net, tables, work)
     w, tally, memo = work.w, work.tally, work.memo
     for k in range(tally.shape[0]):
         tally[k] = 0
@@ -57,7 +58,7 @@ def begin(i, form, net, section, motion, tables, work):
     mode, code = motion.counters[0], OK
     mark_zeros(tables, work, mode)
     if motion.counters[1] == 0:
-        mode, code = settle(tables, net, work, mode)
+        mode, code = settle(i, form, tables, net, work, mode)
     if section.indicator >= 0:  # a start on the section is no return
         work.found[SIDE] = sign_after(tables, work, mode, section.indicator)
     tally[MODE] = mode

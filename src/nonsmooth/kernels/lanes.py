@@ -17,7 +17,7 @@ from llvmlite import ir
 from numba.core import cgutils, types
 from numba.extending import intrinsic
 
-__all__ = ["LANES", "plain", "sum_columns", "sum_rows"]
+__all__ = ["LANES", "dot", "plain", "spread", "sum_columns", "sum_rows"]
 
 LANES = 8
 WIDEST = 32  # lanes of one sum: what the vector registers hold
@@ -48,7 +48,21 @@ def _sum_columns(out: Any, table: Any, mode: Any, node: Any, w: Any, n: Any, m: 
         out[r] = total
 
 
-plain = SimpleNamespace(sum_rows=_sum_rows, sum_columns=_sum_columns)
+def _dot(total, row, at, w, n):  # type: ignore[no-untyped-def]
+    """total + sum_j row[at + j] w[j] for j < n."""
+    for j in range(n):
+        total += row[at + j] * w[j]
+    return total
+
+
+def _spread(total, row, at, w, about, n):  # type: ignore[no-untyped-def]
+    """total + sum_j row[at + j] |w[j] - about[2 + j]| for j < n."""
+    for j in range(n):
+        total += row[at + j] * abs(w[j] - about[2 + j])
+    return total
+
+
+plain = SimpleNamespace(sum_rows=_sum_rows, sum_columns=_sum_columns, dot=_dot, spread=_spread)
 
 
 class _Array:
@@ -73,6 +87,10 @@ class _Array:
 
     def load(self, vector: Any, *indices: Any) -> Any:
         return self.builder.load(self.builder.bitcast(self._at(*indices), vector.as_pointer()), align=8)
+
+    def get(self, vector: Any, *indices: Any) -> Any:
+        """A vector, or a number where ``vector`` is None."""
+        return self.number(*indices) if vector is None else self.load(vector, *indices)
 
     def store(self, value: Any, *indices: Any) -> None:
         self.builder.store(value, self.builder.bitcast(self._at(*indices), value.type.as_pointer()), align=8)
@@ -168,9 +186,96 @@ def _sum_columns_in_lanes(typing: Any, out: Any, table: Any, mode: Any, node: An
     return signature, generate
 
 
-def _choose(compiled: Any, loops: Callable[..., None]) -> Any:
+def _size(builder: Any, value: Any) -> Any:
+    """|value| of a number or a vector: without its sign's bit."""
+    bits, mask = ir.IntType(64), 2**63 - 1
+    if isinstance(value.type, ir.VectorType):
+        bits, mask = ir.VectorType(bits, value.type.count), [mask] * value.type.count
+    return builder.bitcast(builder.and_(builder.bitcast(value, bits), ir.Constant(bits, mask)), value.type)
+
+
+def _fold(builder: Any, total: Any, term: Callable[[Any, Any], Any], n: int) -> Any:
+    """``total`` and term(vector, j) for all j < n: in the widest vectors that fit, added up in halves at the end."""
+
+    def add(a: Any, b: Any) -> Any:
+        return builder.fadd(a, b, flags=_CONTRACT)
+
+    width, at, parts = WIDEST, 0, None
+    while width > 1:
+        vector = ir.VectorType(ir.DoubleType(), width)
+        count = (n - at) // width
+        if count:
+            parts = term(vector, at) if parts is None else add(parts, term(vector, at))
+            at += width
+        if count > LONGEST:
+            whole = ir.IntType(64)
+            place = cgutils.alloca_once_value(builder, parts)
+            ends = (ir.Constant(whole, k) for k in (at, at + (count - 1) * width, width))
+            with cgutils.for_range_slice(builder, *ends, intp=whole) as (j, _):
+                builder.store(add(builder.load(place), term(vector, j)), place)
+            parts = builder.load(place)
+            at += (count - 1) * width
+        elif count > 1:
+            for _ in range(count - 1):
+                parts = add(parts, term(vector, at))
+                at += width
+        if parts is not None:
+            lane, nothing = ir.IntType(32), ir.Constant(vector, ir.Undefined)
+            low, high = (
+                ir.Constant(ir.VectorType(lane, width // 2), list(range(begin, begin + width // 2)))
+                for begin in (0, width // 2)
+            )
+            parts = add(builder.shuffle_vector(parts, nothing, low), builder.shuffle_vector(parts, nothing, high))
+        width //= 2
+    if parts is not None:
+        total = add(total, builder.extract_element(parts, ir.Constant(ir.IntType(32), 0)))
+    for j in range(at, n):
+        total = add(total, term(None, j))
+    return total
+
+
+@intrinsic(prefer_literal=True)
+def _dot_in_lanes(typing: Any, total: Any, row: Any, at: Any, w: Any, n: Any) -> Any:
+    signature = types.float64(types.float64, row, types.int64, w, n)
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        total_, row_, at_, w_ = arguments[:4]
+        source, weights = _Array(context, builder, row, row_), _Array(context, builder, w, w_)
+
+        def term(vector: Any, j: Any) -> Any:
+            place = builder.add(at_, j if isinstance(j, ir.Value) else ir.Constant(at_.type, j))
+            return builder.fmul(source.get(vector, place), weights.get(vector, j), flags=_CONTRACT)
+
+        return _fold(builder, total_, term, n.literal_value)
+
+    return signature, generate
+
+
+@intrinsic(prefer_literal=True)
+def _spread_in_lanes(typing: Any, total: Any, row: Any, at: Any, w: Any, about: Any, n: Any) -> Any:
+    signature = types.float64(types.float64, row, types.int64, w, about, n)
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        total_, row_, at_, w_, about_ = arguments[:5]
+        source, weights = _Array(context, builder, row, row_), _Array(context, builder, w, w_)
+        middle = _Array(context, builder, about, about_)
+
+        def term(vector: Any, j: Any) -> Any:
+            j = j if isinstance(j, ir.Value) else ir.Constant(at_.type, j)
+            there = middle.get(vector, builder.add(j, ir.Constant(at_.type, 2)))
+            apart = builder.fsub(weights.get(vector, j), there)
+            return builder.fmul(source.get(vector, builder.add(at_, j)), _size(builder, apart), flags=_CONTRACT)
+
+        return _fold(builder, total_, term, n.literal_value)
+
+    return signature, generate
+
+
+def _choose(compiled: Any, loops: Callable[..., Any]) -> Any:
     return loops if numba.config.DISABLE_JIT else compiled
 
 
 sum_rows = _choose(_sum_rows_in_lanes, _sum_rows)
 sum_columns = _choose(_sum_columns_in_lanes, _sum_columns)
+dot = _choose(_dot_in_lanes, _dot)
+spread = _choose(_spread_in_lanes, _spread)

@@ -3,7 +3,7 @@
 A leg is one step of the mode, or its part up to the first crossing, section return or stop. ``w`` holds
 (u_1, ..., u_n, 1, cos k_1 w t, sin k_1 w t, ...), ``s`` is the time since the start of the forcing period.
 
-``transitions`` rows: target, has reset, is contact. ``rows`` rows: functional, sign, strict; the last two belong to
+``transitions`` rows: target, has a map (RESET: of the states, 2: of memory alone), is contact. ``rows`` rows: functional, sign, strict; the last two belong to
 the Poincare section (rising, falling). ``mode_start``/``mode_list``: outgoing transitions of a mode in declared order.
 """
 
@@ -11,6 +11,7 @@ from math import cos, fabs, isfinite, sin
 
 from .cache import device, inline
 from .codes import BEYOND_STOP, OK
+from .lanes import dot
 from .linear_search import (
     FUNCTIONAL,
     NEVER,
@@ -25,9 +26,10 @@ from .linear_search import (
     turn,
     value_of,
 )
-from .linear_tables import HARMONICS, NODES, ONE, STATES, WAVE, M
+from .linear_tables import HARMONICS, MANY, NODES, ONE, STATES, WAVE, M
 
 EPS = 2.3e-16
+RESET = 1
 
 
 @inline
@@ -130,8 +132,25 @@ def next_holding(tables, net, work, mode):
     return -1
 
 
+@inline
+def apply_map(i, t, form, work):
+    """The states behind transition t, into w."""
+    w, wn = work.w, work.wn
+    for r in range(STATES):
+        wn[r] = form.rb[i, t, r]
+        if STATES >= MANY:
+            wn[r] = dot(wn[r], form.ra[i, t, r], 0, w, STATES)
+        else:
+            for j in range(STATES):
+                wn[r] += form.ra[i, t, r, j] * w[j]
+        for h in range(HARMONICS):
+            wn[r] += form.rc[i, t, h, r] * w[WAVE + 2 * h] + form.rs[i, t, h, r] * w[WAVE + 1 + 2 * h]
+    for r in range(STATES):
+        w[r] = wn[r]
+
+
 @device
-def settle(tables, net, work, mode):
+def settle(i, form, tables, net, work, mode):
     """Start rule: transitions without a reset that already hold are taken, each mode at most once.
 
     Returns (mode, status): BEYOND_STOP where one with a reset holds."""
@@ -141,10 +160,12 @@ def settle(tables, net, work, mode):
         t = next_holding(tables, net, work, mode)
         if t < 0:
             return mode, OK
-        if net.transitions[t, 1] != 0:
+        if net.transitions[t, 1] == RESET:
             return mode, BEYOND_STOP
         if (visited >> net.transitions[t, 0]) & 1:
             return mode, OK
+        if net.transitions[t, 1] != 0:
+            apply_map(i, t, form, work)
         mode = net.transitions[t, 0]
         visited |= 1 << mode
     return mode, OK
@@ -155,20 +176,13 @@ def jump(i, t, fired, form, tables, net, work):
     """Take transition t (its functional ``fired`` has just crossed; -1: a time trigger). Returns the new mode.
 
     What has crossed is zero, also behind a reset that leaves it where it was. ``work.wp`` keeps w just before."""
-    w, wn, wp, zero = work.w, work.wn, work.wp, work.zero
+    w, wp, zero = work.w, work.wp, work.zero
     for j in range(M):
         wp[j] = w[j]
     mode = net.transitions[t, 0]
     if net.transitions[t, 1] != 0:
         off = fabs(value_of(tables, mode, fired, w)) if fired >= 0 else 0.0
-        for r in range(STATES):
-            wn[r] = form.rb[i, t, r]
-            for j in range(STATES):
-                wn[r] += form.ra[i, t, r, j] * w[j]
-            for h in range(HARMONICS):
-                wn[r] += form.rc[i, t, h, r] * w[WAVE + 2 * h] + form.rs[i, t, h, r] * w[WAVE + 1 + 2 * h]
-        for r in range(STATES):
-            w[r] = wn[r]
+        apply_map(i, t, form, work)
         if fired >= 0 and fabs(value_of(tables, mode, fired, w)) > 2.0 * off:
             fired = -1
     mark_zeros(tables, work, mode)

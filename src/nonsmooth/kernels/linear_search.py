@@ -15,7 +15,7 @@ then the condition's.
 from math import fabs
 
 from .cache import device, inline
-from .lanes import sum_columns, sum_rows
+from .lanes import dot, spread, sum_columns, sum_rows
 from .linear_polynomial import (
     NEVER,
     ONCE,
@@ -27,7 +27,7 @@ from .linear_polynomial import (
     next_upward,
     slope_at,
 )  # fmt: skip
-from .linear_tables import DEGREE, HARMONICS, NODES, ONE, STATES, WAVE, M
+from .linear_tables import DEGREE, HARMONICS, MANY, NODES, ONE, STATES, WAVE, M
 
 WIDTH = DEGREE + 1
 # Places in ``work.found``: the functional that crossed last; the node whose w stands in ``work.wn``, with the Taylor
@@ -43,6 +43,8 @@ def value_of(tables, mode, f, w):
     total = fun[mode, f, ONE]
     for j in range(WAVE, M):
         total += fun[mode, f, j] * w[j]
+    if STATES >= MANY:
+        return dot(total, fun[mode, f], 0, w, STATES)
     for j in range(STATES - 1, -1, -1):
         total += fun[mode, f, j] * w[j]
     return total
@@ -55,6 +57,8 @@ def slope_of(tables, mode, f, w):
     total = fun[mode, f, M + ONE]
     for j in range(WAVE, M):
         total += fun[mode, f, M + j] * w[j]
+    if STATES >= MANY:
+        return dot(total, fun[mode, f], M, w, STATES)
     for j in range(STATES - 1, -1, -1):
         total += fun[mode, f, M + j] * w[j]
     return total
@@ -65,6 +69,8 @@ def bound_at(tables, mode, f, w):
     """Bound on the fourth derivative of functional f on the step that starts at w."""
     fun, info = tables.fun, tables.info
     total = fun[mode, f, 2 * M + STATES]
+    if STATES >= MANY:
+        return spread(total, fun[mode, f], 2 * M, w, info[mode], STATES)
     for j in range(STATES - 1, -1, -1):
         total += fun[mode, f, 2 * M + j] * fabs(w[j] - info[mode, 2 + j])
     return total

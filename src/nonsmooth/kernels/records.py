@@ -63,12 +63,13 @@ class Tables(NamedTuple):
 class Net(NamedTuple):
     """The net of transitions of a linear system."""
 
-    transitions: Any  # (transitions, 3): target, has reset, is contact
+    transitions: Any  # (transitions, 3): target, has a map (1: of the states, 2: of memory alone), is contact
     rows: Any  # (rows + 2, 3): functional, sign, strict; the last two belong to the section (rising, falling)
     row_start: Any  # (transitions + 1,)
     mode_start: Any  # (modes + 1,)
     mode_list: Any  # outgoing transitions of each mode in declared order
     at: Any  # (transitions,) phase of a transition at a time, or -1
+    lacking: Any  # (modes, n) 1: memory, or a state that the mode does not have
 
 
 class Work(NamedTuple):
@@ -181,7 +182,7 @@ FORM = type_of(
     Form, _f4, _f3, _f4, _f4, _i1, _f1, _f1, _f3, _f2, _f3, _f3, _f4, _f3, _f4, _f4, _f4, _f3, _f4, _f4
 )  # fmt: skip
 TABLES = type_of(Tables, _f4, _f3, _f3, _f4, _f3, _f2)
-NET = type_of(Net, _i2, _i2, _i1, _i1, _i1, _f1)
+NET = type_of(Net, _i2, _i2, _i1, _i1, _i1, _f1, _i2)
 WORK = type_of(Work, *[_f1] * 8, _f2, _f2, _f1, _f1, _i1, _i1, _i1, _i1, _i1, _f1)
 MOTION = type_of(Motion, _f1, _f1, _i1)
 SECTION = type_of(Section, *[_i] * 6, _f, _f)
