@@ -24,6 +24,7 @@ import diagram
 import lyapunov
 import machine
 import oscillator
+import rigid_stops
 import valve
 import valve_scan
 
@@ -35,7 +36,7 @@ def main() -> int:
     options = parser.parse_args()
     effort = 0.1 if options.quick else 1.0
     text, verdicts = ["# Benchmarks", "", *(f"- {fact}" for fact in machine.facts() if fact), ""], []
-    for part in (oscillator, chain, valve, valve_scan, diagram, chart, chart_size, lyapunov, branch):
+    for part in (oscillator, chain, rigid_stops, valve, valve_scan, diagram, chart, chart_size, lyapunov, branch):
         lines, part_verdicts = part.run(effort)
         print("\n".join(lines), flush=True)
         text += lines

@@ -17,7 +17,7 @@ from llvmlite import ir
 from numba.core import cgutils, types
 from numba.extending import intrinsic
 
-__all__ = ["LANES", "dot", "plain", "spread", "sum_columns", "sum_rows"]
+__all__ = ["LANES", "dot", "plain", "sizes", "spread", "sum_columns", "sum_rows", "sum_some_rows"]
 
 LANES = 8
 WIDEST = 32  # lanes of one sum: what the vector registers hold
@@ -34,6 +34,15 @@ def _sum_rows(out: Any, row: Any, table: Any, mode: Any, f: Any, w: Any, one: An
             total += table[mode, f, j, k] * w[j]
         for j in range(one - 1, -1, -1):
             total += table[mode, f, j, k] * w[j]
+        out[row, k] = total
+
+
+def _sum_some_rows(out: Any, row: Any, table: Any, mode: Any, f: Any, w: Any, some: Any) -> None:
+    """The same where table[mode, f, j, :] is zero but for the some[0] values of j that stand behind that number."""
+    for k in range(LANES):
+        total = 0.0
+        for q in range(1, some[0] + 1):
+            total += table[mode, f, some[q], k] * w[some[q]]
         out[row, k] = total
 
 
@@ -62,7 +71,16 @@ def _spread(total, row, at, w, about, n):  # type: ignore[no-untyped-def]
     return total
 
 
-plain = SimpleNamespace(sum_rows=_sum_rows, sum_columns=_sum_columns, dot=_dot, spread=_spread)
+def _sizes(total, row, at, w, n):  # type: ignore[no-untyped-def]
+    """total + sum_j |row[at + j] w[j]| for j < n."""
+    for j in range(n):
+        total += abs(row[at + j] * w[j])
+    return total
+
+
+plain = SimpleNamespace(
+    sum_rows=_sum_rows, sum_some_rows=_sum_some_rows, sum_columns=_sum_columns, dot=_dot, sizes=_sizes, spread=_spread
+)
 
 
 class _Array:
@@ -143,6 +161,28 @@ def _sum_rows_in_lanes(
             one.literal_value, m.literal_value,
         )  # fmt: skip
         _Array(context, builder, out, out_).store(total, row_, 0)
+        return context.get_dummy_value()
+
+    return signature, generate
+
+
+@intrinsic
+def _sum_some_rows_in_lanes(typing: Any, out: Any, row: Any, table: Any, mode: Any, f: Any, w: Any, some: Any) -> Any:
+    whole = types.int64
+    signature = types.void(out, whole, table, whole, whole, w, some)
+    vector = ir.VectorType(ir.DoubleType(), LANES)
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        out_, row_, table_, mode_, f_, w_, some_ = arguments
+        source, weights = _Array(context, builder, table, table_), _Array(context, builder, w, w_)
+        places, index = _Array(context, builder, some, some_), ir.IntType(64)
+        place = cgutils.alloca_once_value(builder, ir.Constant(vector, [0.0] * LANES))
+        begin, end = ir.Constant(index, 1), builder.add(places.number(0), ir.Constant(index, 1))
+        with cgutils.for_range_slice(builder, begin, end, begin, intp=index) as (q, _):
+            j = places.number(q)
+            term = _scaled(builder, source.load(vector, mode_, f_, j, 0), weights.number(j))
+            builder.store(builder.fadd(builder.load(place), term, flags=_CONTRACT), place)
+        _Array(context, builder, out, out_).store(builder.load(place), row_, 0)
         return context.get_dummy_value()
 
     return signature, generate
@@ -234,8 +274,8 @@ def _fold(builder: Any, total: Any, term: Callable[[Any, Any], Any], n: int) -> 
     return total
 
 
-@intrinsic(prefer_literal=True)
-def _dot_in_lanes(typing: Any, total: Any, row: Any, at: Any, w: Any, n: Any) -> Any:
+def _products(total: Any, row: Any, w: Any, n: Any, whole: bool) -> Any:
+    """Signature and code of ``total`` and the products of two rows, or (not ``whole``) their sizes."""
     signature = types.float64(types.float64, row, types.int64, w, n)
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -244,11 +284,22 @@ def _dot_in_lanes(typing: Any, total: Any, row: Any, at: Any, w: Any, n: Any) ->
 
         def term(vector: Any, j: Any) -> Any:
             place = builder.add(at_, j if isinstance(j, ir.Value) else ir.Constant(at_.type, j))
-            return builder.fmul(source.get(vector, place), weights.get(vector, j), flags=_CONTRACT)
+            product = builder.fmul(source.get(vector, place), weights.get(vector, j), flags=_CONTRACT)
+            return product if whole else _size(builder, product)
 
         return _fold(builder, total_, term, n.literal_value)
 
     return signature, generate
+
+
+@intrinsic(prefer_literal=True)
+def _dot_in_lanes(typing: Any, total: Any, row: Any, at: Any, w: Any, n: Any) -> Any:
+    return _products(total, row, w, n, True)
+
+
+@intrinsic(prefer_literal=True)
+def _sizes_in_lanes(typing: Any, total: Any, row: Any, at: Any, w: Any, n: Any) -> Any:
+    return _products(total, row, w, n, False)
 
 
 @intrinsic(prefer_literal=True)
@@ -277,5 +328,7 @@ def _choose(compiled: Any, loops: Callable[..., Any]) -> Any:
 
 sum_rows = _choose(_sum_rows_in_lanes, _sum_rows)
 sum_columns = _choose(_sum_columns_in_lanes, _sum_columns)
+sum_some_rows = _choose(_sum_some_rows_in_lanes, _sum_some_rows)
 dot = _choose(_dot_in_lanes, _dot)
+sizes = _choose(_sizes_in_lanes, _sizes)
 spread = _choose(_spread_in_lanes, _spread)

@@ -11,7 +11,7 @@ from math import cos, fabs, isfinite, sin
 
 from .cache import device, inline
 from .codes import BEYOND_STOP, OK
-from .lanes import dot
+from .lanes import dot, sizes
 from .linear_search import (
     FUNCTIONAL,
     NEVER,
@@ -58,8 +58,11 @@ def wrap_phase(tables, work, mode, s):
 def rounding(tables, mode, f, at, w):
     """Below this the row fun[mode, f, at:] is zero within rounding at w."""
     total = 0.0
-    for j in range(M):
-        total += fabs(tables.fun[mode, f, at + j] * w[j])
+    if STATES >= MANY:
+        total = sizes(total, tables.fun[mode, f], at, w, M)
+    else:
+        for j in range(M):
+            total += fabs(tables.fun[mode, f, at + j] * w[j])
     return 16.0 * EPS * total
 
 

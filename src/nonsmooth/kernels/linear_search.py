@@ -15,7 +15,7 @@ then the condition's.
 from math import fabs
 
 from .cache import device, inline
-from .lanes import dot, spread, sum_columns, sum_rows
+from .lanes import dot, spread, sum_columns, sum_rows, sum_some_rows
 from .linear_polynomial import (
     NEVER,
     ONCE,
@@ -110,7 +110,10 @@ def place(tables, work, mode, node):
     if work.found[NODE] != node:
         at_node(tables, work, mode, node)
         for r in range(STATES):
-            compose(tables, mode, work.zero.shape[0] + r, work.wn, work.scr, r)
+            if STATES >= MANY:
+                sum_some_rows(work.scr, r, tables.tay, mode, work.zero.shape[0] + r, work.wn, tables.some[mode, r])
+            else:
+                compose(tables, mode, work.zero.shape[0] + r, work.wn, work.scr, r)
         work.found[NODE] = node
 
 

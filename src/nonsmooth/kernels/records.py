@@ -58,6 +58,7 @@ class Tables(NamedTuple):
     tay: Any
     field: Any
     info: Any
+    some: Any
 
 
 class Net(NamedTuple):
@@ -181,7 +182,7 @@ class Growth(NamedTuple):
 FORM = type_of(
     Form, _f4, _f3, _f4, _f4, _i1, _f1, _f1, _f3, _f2, _f3, _f3, _f4, _f3, _f4, _f4, _f4, _f3, _f4, _f4
 )  # fmt: skip
-TABLES = type_of(Tables, _f4, _f3, _f3, _f4, _f3, _f2)
+TABLES = type_of(Tables, _f4, _f3, _f3, _f4, _f3, _f2, _i[:, :, ::1])
 NET = type_of(Net, _i2, _i2, _i1, _i1, _i1, _f1, _i2)
 WORK = type_of(Work, *[_f1] * 8, _f2, _f2, _f1, _f1, _i1, _i1, _i1, _i1, _i1, _f1)
 MOTION = type_of(Motion, _f1, _f1, _i1)
