@@ -260,4 +260,10 @@ def pack_net(traced: Traced) -> Any:
     at = np.array([-1.0 if t.at is None else t.at for t in traced.transitions], dtype=float)
     both = np.array([*rows, (0, 1, 1), (0, -1, 1)], dtype=integer).reshape(-1, 3)
     lacking = np.array([[*own, *(True for _ in traced.m)] for own in traced.lacking], dtype=integer)
-    return Net(transitions, both, row_start, mode_start, mode_list, at, lacking)
+    lacking = lacking.reshape(len(traced.mode_names), -1)
+    changed = np.zeros((len(transitions), lacking.shape[1] + 1), dtype=integer)
+    for j, t in enumerate(traced.transitions):
+        moved = [i for i, e in enumerate(t.reset or ()) if e != traced.u[i]]
+        moved += [len(traced.u) + i for i, _ in t.writes]
+        changed[j, : len(moved) + 1] = [len(moved), *moved]
+    return Net(transitions, both, row_start, mode_start, mode_list, at, changed, lacking)

@@ -103,7 +103,7 @@ def arrays_of_thread(packed, multiples, i):
     tay = cuda.local.array((N_MODES, N_FUNCTIONALS, M, WIDTH), float64)
     field = cuda.local.array((N_MODES, 2, M), float64)
     info = cuda.local.array((N_MODES, 4), float64)
-    some = cuda.local.array((1, 1, 1), int64)
+    some = cuda.local.array((1, 1, 1, 1), int64)
     row = cuda.local.array((N_TERMS, M), float64)
     w = cuda.local.array(M, float64)
     w1 = cuda.local.array(M, float64)

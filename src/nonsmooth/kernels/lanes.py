@@ -215,8 +215,9 @@ def _sum_columns_in_lanes(typing: Any, out: Any, table: Any, mode: Any, node: An
             return _scaled(builder, source.load(vector, mode_, node_, j, begin), weights.number(j))
 
         parts = []
-        for begin in range(0, states, WIDEST):
-            vector = ir.VectorType(ir.DoubleType(), min(WIDEST, states - begin))
+        begins = list(range(0, max(states - LANES, 1), WIDEST))  # a few that are left go with the last
+        for begin, end in zip(begins, [*begins[1:], states], strict=True):
+            vector = ir.VectorType(ir.DoubleType(), end - begin)
             first = source.load(vector, mode_, node_, states, begin)
             parts.append((begin, _sum(builder, first, partial(column, vector, begin), states, m.literal_value)))
         for begin, total in parts:

@@ -136,19 +136,22 @@ def next_holding(tables, net, work, mode):
 
 
 @inline
-def apply_map(i, t, form, work):
+def apply_map(i, t, form, net, work):
     """The states behind transition t, into w."""
     w, wn = work.w, work.wn
-    for r in range(STATES):
-        wn[r] = form.rb[i, t, r]
+    for q in range(1, net.changed[t, 0] + 1):
+        r = net.changed[t, q]
+        total = form.rb[i, t, r]
         if STATES >= MANY:
-            wn[r] = dot(wn[r], form.ra[i, t, r], 0, w, STATES)
+            total = dot(total, form.ra[i, t, r], 0, w, STATES)
         else:
             for j in range(STATES):
-                wn[r] += form.ra[i, t, r, j] * w[j]
+                total += form.ra[i, t, r, j] * w[j]
         for h in range(HARMONICS):
-            wn[r] += form.rc[i, t, h, r] * w[WAVE + 2 * h] + form.rs[i, t, h, r] * w[WAVE + 1 + 2 * h]
-    for r in range(STATES):
+            total += form.rc[i, t, h, r] * w[WAVE + 2 * h] + form.rs[i, t, h, r] * w[WAVE + 1 + 2 * h]
+        wn[r] = total
+    for q in range(1, net.changed[t, 0] + 1):
+        r = net.changed[t, q]
         w[r] = wn[r]
 
 
@@ -168,7 +171,7 @@ def settle(i, form, tables, net, work, mode):
         if (visited >> net.transitions[t, 0]) & 1:
             return mode, OK
         if net.transitions[t, 1] != 0:
-            apply_map(i, t, form, work)
+            apply_map(i, t, form, net, work)
         mode = net.transitions[t, 0]
         visited |= 1 << mode
     return mode, OK
@@ -185,7 +188,7 @@ def jump(i, t, fired, form, tables, net, work):
     mode = net.transitions[t, 0]
     if net.transitions[t, 1] != 0:
         off = fabs(value_of(tables, mode, fired, w)) if fired >= 0 else 0.0
-        apply_map(i, t, form, work)
+        apply_map(i, t, form, net, work)
         if fired >= 0 and fabs(value_of(tables, mode, fired, w)) > 2.0 * off:
             fired = -1
     mark_zeros(tables, work, mode)

@@ -15,7 +15,8 @@ every inner loop has constant bounds. Arrays (M columns of w, functionals = indi
                                    at w is the sum over j of tay[mode, f, j, k] w[j]
     field[mode, n, M]              rows of u'
     info[mode, 2 + n]              step, node spacing, u_eq
-    some[mode, n, M + 1]           of many states: how many columns of a state's Taylor rows are not zero, and which
+    some[mode, functional, 2, M + 1]  of many states: how many columns of the Taylor rows are not zero, and which; and
+                                   of the states in value and slope
 """
 
 from math import cos, fabs, nan, sin, sqrt
@@ -272,18 +273,22 @@ def fill_functional(mode, f, tables, rates, row):
 
 
 @device
-def list_columns(mode, n_i, tables):
-    """Which columns of the states' Taylor rows are not zero: few where a state moves with few others."""
-    for r in range(STATES):
-        count = 0
-        for j in range(M):
-            moved = False
-            for k in range(DEGREE + 1):
-                moved = moved or tables.tay[mode, n_i + r, j, k] != 0.0
-            if moved:
-                count += 1
-                tables.some[mode, r, count] = j
-        tables.some[mode, r, 0] = count
+def list_columns(mode, f, tables):
+    """Which columns of a functional's Taylor rows are not zero, and which states of its value and slope: few where a
+    state moves with few others."""
+    every, few = 0, 0
+    for j in range(M):
+        moved = False
+        for k in range(DEGREE + 1):
+            moved = moved or tables.tay[mode, f, j, k] != 0.0
+        if moved:
+            every += 1
+            tables.some[mode, f, 0, every] = j
+        if j < STATES and (tables.fun[mode, f, j] != 0.0 or tables.fun[mode, f, M + j] != 0.0):
+            few += 1
+            tables.some[mode, f, 1, few] = j
+    tables.some[mode, f, 0, 0] = every
+    tables.some[mode, f, 1, 0] = few
 
 
 @device
@@ -318,8 +323,8 @@ def build(i, form, tables, work):
                     fun[mode, f, WAVE + 2 * h] = form.oc[i, o, mode, h]
                     fun[mode, f, WAVE + 1 + 2 * h] = form.os[i, o, mode, h]
             fill_functional(mode, f, tables, rates, work.row)
-        if STATES >= MANY:
-            list_columns(mode, n_i, tables)
+            if STATES >= MANY:
+                list_columns(mode, f, tables)
     for f in range(n_i):
         work.twin[f] = twin_of(f, n_i, fun)
     work.built[0] = i + 1

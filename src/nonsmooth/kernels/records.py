@@ -70,6 +70,7 @@ class Net(NamedTuple):
     mode_start: Any  # (modes + 1,)
     mode_list: Any  # outgoing transitions of each mode in declared order
     at: Any  # (transitions,) phase of a transition at a time, or -1
+    changed: Any  # (transitions, n + 1) how many states a transition changes, and which
     lacking: Any  # (modes, n) 1: memory, or a state that the mode does not have
 
 
@@ -182,8 +183,8 @@ class Growth(NamedTuple):
 FORM = type_of(
     Form, _f4, _f3, _f4, _f4, _i1, _f1, _f1, _f3, _f2, _f3, _f3, _f4, _f3, _f4, _f4, _f4, _f3, _f4, _f4
 )  # fmt: skip
-TABLES = type_of(Tables, _f4, _f3, _f3, _f4, _f3, _f2, _i[:, :, ::1])
-NET = type_of(Net, _i2, _i2, _i1, _i1, _i1, _f1, _i2)
+TABLES = type_of(Tables, _f4, _f3, _f3, _f4, _f3, _f2, _i[:, :, :, ::1])
+NET = type_of(Net, _i2, _i2, _i1, _i1, _i1, _f1, _i2, _i2)
 WORK = type_of(Work, *[_f1] * 8, _f2, _f2, _f1, _f1, _i1, _i1, _i1, _i1, _i1, _f1)
 MOTION = type_of(Motion, _f1, _f1, _i1)
 SECTION = type_of(Section, *[_i] * 6, _f, _f)
