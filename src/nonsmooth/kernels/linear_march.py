@@ -136,23 +136,33 @@ def next_holding(tables, net, work, mode):
 
 
 @inline
+def mapped(i, t, r, form, w):
+    """State r behind transition t."""
+    total = form.rb[i, t, r]
+    if STATES >= MANY:
+        total = dot(total, form.ra[i, t, r], 0, w, STATES)
+    else:
+        for j in range(STATES):
+            total += form.ra[i, t, r, j] * w[j]
+    for h in range(HARMONICS):
+        total += form.rc[i, t, h, r] * w[WAVE + 2 * h] + form.rs[i, t, h, r] * w[WAVE + 1 + 2 * h]
+    return total
+
+
+@inline
 def apply_map(i, t, form, net, work):
-    """The states behind transition t, into w."""
+    """The states behind transition t, into w; of many only those that it changes are looked at."""
     w, wn = work.w, work.wn
-    for q in range(1, net.changed[t, 0] + 1):
-        r = net.changed[t, q]
-        total = form.rb[i, t, r]
-        if STATES >= MANY:
-            total = dot(total, form.ra[i, t, r], 0, w, STATES)
-        else:
-            for j in range(STATES):
-                total += form.ra[i, t, r, j] * w[j]
-        for h in range(HARMONICS):
-            total += form.rc[i, t, h, r] * w[WAVE + 2 * h] + form.rs[i, t, h, r] * w[WAVE + 1 + 2 * h]
-        wn[r] = total
-    for q in range(1, net.changed[t, 0] + 1):
-        r = net.changed[t, q]
-        w[r] = wn[r]
+    if STATES >= MANY:
+        for q in range(1, net.changed[t, 0] + 1):
+            wn[net.changed[t, q]] = mapped(i, t, net.changed[t, q], form, w)
+        for q in range(1, net.changed[t, 0] + 1):
+            w[net.changed[t, q]] = wn[net.changed[t, q]]
+    else:
+        for r in range(STATES):
+            wn[r] = mapped(i, t, r, form, w)
+        for r in range(STATES):
+            w[r] = wn[r]
 
 
 @device
