@@ -84,7 +84,8 @@ class Peer:
             list(zip(variables, [*v, *forces(x, v, FORCE * hy.cos(OMEGA * hy.time))], strict=True)),
             np.zeros(2 * MASSES), tol=1e-14,
             t_events=[
-                hy.t_event(x[i] - PART * REACH[i], callback=rebound(i), direction=hy.event_direction.positive) for i in STOPS
+                hy.t_event(x[i] - PART * REACH[i], callback=rebound(i), direction=hy.event_direction.positive)
+                for i in STOPS
             ],
         )  # fmt: skip
         self.done = 0
@@ -182,8 +183,8 @@ def run(effort: float) -> tuple[list[str], list[tuple[str, str, str, bool]]]:
         "heyoka: scalar mode, tolerance 1e-14, landing every period. SciPy: `solve_ivp`, DOP853, rtol 1e-8. Both turn",
         "the velocity at terminal events.",
         "",
-        "| states | impacts per period | exact | exact, section points | heyoka | SciPy | heyoka / exact | with sections "
-        "| SciPy / exact | difference to heyoka | to SciPy | imbalance of energy |",
+        "| states | impacts per period | exact | exact, section points | heyoka | SciPy | heyoka / exact "
+        "| with sections | SciPy / exact | difference to heyoka | to SciPy | imbalance of energy |",
         "|---|---|---|---|---|---|---|---|---|---|---|---|",
         f"| {2 * MASSES} | {impacts / BALANCED:.1f} | {shown['exact']:.1f} | {shown['exact, points']:.1f} "
         f"| {shown['heyoka']:.1f} | {shown['SciPy']:.3g} | {over_heyoka:.1f} "

@@ -115,7 +115,8 @@ def test_a_start_takes_what_holds_and_writes_its_memory() -> None:
 
 
 def test_a_lacking_state_has_no_value_and_no_part_in_extremes() -> None:
-    """The block rides on the belt without a velocity of its own: its slip alone has speeds, and its largest is known."""
+    """The block rides on the belt without a velocity of its own: its slip alone has speeds."""
+
     def slip(t, u, p):
         return u.v, 0.5 - u.x + p.A * np.cos(p.w * t)
 
@@ -137,4 +138,4 @@ def test_a_lacking_state_has_no_value_and_no_part_in_extremes() -> None:
     engine.chain(engine.prepare(belt.parameter_vector()[None, :]), 0, 1, state, None, SectionPlan(), 0, 3, out)
     speed = np.hypot(0.5, 0.2)  # of the arc about the spring's equilibrium
     np.testing.assert_allclose([out.minimum[0, 1], out.maximum[0, 1]], [-speed, 0.2], rtol=0, atol=1e-13)
-    np.testing.assert_allclose(out.indicator_max[0, 1], 7.0 - 0.2, rtol=0, atol=1e-13)  # the indicator reads what stands there
+    np.testing.assert_allclose(out.indicator_max[0, 1], 7.0 - 0.2, rtol=0, atol=1e-13)

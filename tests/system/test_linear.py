@@ -206,7 +206,8 @@ def test_memory_is_a_state_that_only_transitions_change():
     np.testing.assert_array_equal(tables.A[0, 0], [[0, 1, 0], [-1, 0, a], [0, 0, 0]])
     np.testing.assert_array_equal(tables.ia[0, 0], [1, 0, -b])
     np.testing.assert_array_equal(tables.oa[0, 0, 0], [0, 1, 1])
-    np.testing.assert_array_equal(tables.ra[0], [[[1, 0, 0], [0, 0, 1], [0, 0, 1]], [[1, 0, 0], [0, 1, 0], [0, 1, 0.5]]])
+    maps = [[[1, 0, 0], [0, 0, 1], [0, 0, 1]], [[1, 0, 0], [0, 1, 0], [0, 1, 0.5]]]
+    np.testing.assert_array_equal(tables.ra[0], maps)
 
 
 def test_memory_times_a_state_is_not_affine():

@@ -3,8 +3,9 @@
 A leg is one step of the mode, or its part up to the first crossing, section return or stop. ``w`` holds
 (u_1, ..., u_n, 1, cos k_1 w t, sin k_1 w t, ...), ``s`` is the time since the start of the forcing period.
 
-``transitions`` rows: target, has a map (RESET: of the states, 2: of memory alone), is contact. ``rows`` rows: functional, sign, strict; the last two belong to
-the Poincare section (rising, falling). ``mode_start``/``mode_list``: outgoing transitions of a mode in declared order.
+``transitions`` rows: target, has a map (RESET: of the states, 2: of memory alone), is contact. ``rows`` rows:
+functional, sign, strict; the last two belong to the Poincare section (rising, falling). ``mode_start``/``mode_list``:
+outgoing transitions of a mode in declared order.
 """
 
 from math import cos, fabs, isfinite, sin

@@ -3,8 +3,8 @@ r"""Is every mode linear with constant coefficients and harmonic forcing, and if
     u' = A u + b + sum_h c_h cos(k_h omega t) + s_h sin(k_h omega t),    omega = 2 pi / period
 
 for each mode, with the same form for indicators, outputs and resets where they are affine in u. Memory counts as
-further states behind the others, at rest but for what transitions write. The decision is made by taking the expressions apart, once per system; the matrices of any number of parameter points then
-come from one generated NumPy function.
+further states behind the others, at rest but for what transitions write. The decision is made by taking the expressions
+apart, once per system; the matrices of any number of parameter points then come from one generated NumPy function.
 """
 
 from __future__ import annotations
