@@ -134,7 +134,9 @@ class LinearEngine:
         )  # fmt: skip
         n = len(self.scale)
         u = np.append(state.u, state.memory)
-        begun = np.zeros((0, len(u))) if carry else np.hstack([starts, np.tile(state.memory, (len(starts), 1))])
+        begun = np.zeros((0, len(u)))
+        if starts is not None:
+            begun = np.hstack([starts, np.tile(state.memory, (len(starts), 1))])
         wide = out if len(u) == n else out.widened(len(u))
         arguments = (
             begun, tables.form, self._net(plan.indicator), section,

@@ -57,21 +57,21 @@ def _sum_columns(out: Any, table: Any, mode: Any, node: Any, w: Any, n: Any, m: 
         out[r] = total
 
 
-def _dot(total, row, at, w, n):  # type: ignore[no-untyped-def]
+def _dot(total: Any, row: Any, at: Any, w: Any, n: Any) -> Any:
     """total + sum_j row[at + j] w[j] for j < n."""
     for j in range(n):
         total += row[at + j] * w[j]
     return total
 
 
-def _spread(total, row, at, w, about, n):  # type: ignore[no-untyped-def]
+def _spread(total: Any, row: Any, at: Any, w: Any, about: Any, n: Any) -> Any:
     """total + sum_j row[at + j] |w[j] - about[2 + j]| for j < n."""
     for j in range(n):
         total += row[at + j] * abs(w[j] - about[2 + j])
     return total
 
 
-def _sizes(total, row, at, w, n):  # type: ignore[no-untyped-def]
+def _sizes(total: Any, row: Any, at: Any, w: Any, n: Any) -> Any:
     """total + sum_j |row[at + j] w[j]| for j < n."""
     for j in range(n):
         total += abs(row[at + j] * w[j])
@@ -229,7 +229,8 @@ def _sum_columns_in_lanes(typing: Any, out: Any, table: Any, mode: Any, node: An
 
 def _size(builder: Any, value: Any) -> Any:
     """|value| of a number or a vector: without its sign's bit."""
-    bits, mask = ir.IntType(64), 2**63 - 1
+    bits: Any = ir.IntType(64)
+    mask: Any = 2**63 - 1
     if isinstance(value.type, ir.VectorType):
         bits, mask = ir.VectorType(bits, value.type.count), [mask] * value.type.count
     return builder.bitcast(builder.and_(builder.bitcast(value, bits), ir.Constant(bits, mask)), value.type)
