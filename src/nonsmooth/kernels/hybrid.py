@@ -99,7 +99,7 @@ def transit(i, t, short, form, net, section, goal, seen, tables, work):
     approach(mode, fired, seen, tables, work)
     jumps = 0
     while t >= 0:
-        if jumps > net.mode_start.shape[0]:
+        if jumps > net.mode_start.shape[0] + 1:  # modes + 3 of them at one instant, as by series
             code = CHATTER
             break
         mode = jump(i, t, fired if jumps == 0 else -1, form, tables, net, work)
