@@ -18,43 +18,44 @@ PYTEST_ARGS ?= -n auto --dist loadfile --no-loadscope-reorder
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 26
 
-reproduce: $(VENV)/.installed-run  ## reproduce Savi et al. (2007): figures, data and report in out/savi2007
+reproduce: $(VENV)/.compiled-run  ## reproduce Savi et al. (2007): figures, data and report in out/savi2007
 	$(BIN)/nonsmooth reproduce savi2007 --out $(OUT)
 
-reproduce-full: $(VENV)/.installed-run  ## the same with charts of a million points; an interrupted run goes on
+reproduce-full: $(VENV)/.compiled-zarr  ## the same with charts of a million points; an interrupted run goes on
 	$(BIN)/nonsmooth reproduce savi2007 --full --out $(OUT)
 
-test: $(VENV)/.installed-test  ## run the tests
+test: $(VENV)/.compiled-test  ## run the tests
 	$(BIN)/python -m pytest $(PYTEST_ARGS)
 
-slow: $(VENV)/.installed-test $(VENV)/.installed-cluster  ## run the long campaigns that `make test` leaves out
+slow: $(VENV)/.compiled-test $(VENV)/.installed-cluster  ## run the long campaigns that `make test` leaves out
 	$(BIN)/python -m pytest -m slow -s
 
-mutants: $(VENV)/.installed-test  ## small mistakes in the sources, one by one: each must fail a test
+mutants: $(VENV)/.compiled-test  ## small mistakes in the sources, one by one: each must fail a test
 	$(BIN)/python tests/mutants.py
 
-fuzz: $(VENV)/.installed-test  ## read 100 000 damaged recordings with every reader
+fuzz: $(VENV)/.compiled-test  ## read 100 000 damaged recordings with every reader
 	$(BIN)/python -m pytest -m slow tests/experiment/test_fuzz.py -s
 
-altered: $(VENV)/.installed-test  ## alter bytes of 400 saved files of each format: none loads with other content
+altered: $(VENV)/.compiled-test  ## alter bytes of 400 saved files of each format: none loads with other content
 	$(BIN)/python -m pytest -m slow tests/results/test_altered_bytes.py -s
 
-coverage: $(VENV)/.installed-run  ## identify 40 virtual rigs; writes docs/measured_coverage.md
+coverage: $(VENV)/.compiled-run  ## identify 40 virtual rigs; writes docs/measured_coverage.md
 	$(BIN)/python -m nonsmooth.identification.coverage --seeds 0-39 --out docs/measured_coverage.md
 
-coverage-awkward: $(VENV)/.installed-run  ## the same on rigs where much goes wrong; writes docs/measured_coverage_awkward.md
+coverage-awkward: $(VENV)/.compiled-run  ## the same on rigs where much goes wrong; writes docs/measured_coverage_awkward.md
 	$(BIN)/python -m nonsmooth.identification.coverage --awkward --seeds 0-39 --out docs/measured_coverage_awkward.md
 
-rig-against-model: $(VENV)/.installed-run  ## lay virtual rigs over the model; writes docs/measured_rig_against_model.md
+rig-against-model: $(VENV)/.compiled-run  ## lay virtual rigs over the model; writes docs/measured_rig_against_model.md
 	$(BIN)/python -m nonsmooth.identification.compare.rig_against_model --seeds 2 3 --out docs/measured_rig_against_model.md
 
-check: $(VENV)/.installed-dev  ## ruff, mypy, import-linter, codespell
+check: $(VENV)/.installed-dev  ## ruff, mypy, import-linter, codespell, the prose of docstrings
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/codespell README.md CHANGELOG.md CONTRIBUTING.md src tests docs benchmarks examples
+	$(BIN)/python tests/prose.py
 
-bench: $(VENV)/.installed-bench  ## compare with other programs on the same work; writes benchmarks/results.md
+bench: $(VENV)/.compiled-bench  ## compare with other programs on the same work; writes benchmarks/results.md
 	$(BIN)/python benchmarks/run.py
 
 gpu: $(VENV)/.installed-gpu  ## compare a GPU with the processor and time it; writes benchmarks/results_gpu.md
@@ -71,10 +72,13 @@ clean:  ## remove results, built documentation and caches
 	rm -rf out docs/_build .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis build dist
 	find src tests benchmarks examples -name __pycache__ -type d -prune -exec rm -rf {} +
 
-distclean: clean  ## remove .venv too
-	rm -rf $(VENV)
+distclean: clean  ## remove .venv too, and what was compiled ahead
+	rm -rf $(VENV) src/nonsmooth/kernels/ahead
 
-# One stamp per set of packages; a changed pyproject.toml installs again.
+# One stamp per set of packages; a changed pyproject.toml installs again. Kernels are compiled ahead by the Numba that is
+# installed here, not by the one that pip would fetch to build a wheel.
+export HATCH_BUILD_NO_HOOKS := true
+
 $(BIN)/python:
 	$(PYTHON) -m venv $(VENV)
 
@@ -82,6 +86,21 @@ $(VENV)/.installed-run: pyproject.toml | $(BIN)/python
 	$(PIP) --editable .
 	@touch $@
 
+# Groups of packages for work on this one, which need pip 25.1; all others are extras.
+$(VENV)/.pip: | $(BIN)/python
+	$(PIP) 'pip>=25.1'
+	@touch $@
+
+$(patsubst %,$(VENV)/.installed-%,test dev docs bench): $(VENV)/.installed-%: pyproject.toml | $(VENV)/.pip
+	$(PIP) --editable . --group $*
+	@touch $@
+
 $(VENV)/.installed-%: pyproject.toml | $(BIN)/python
 	$(PIP) --editable '.[$*]'
+	@touch $@
+
+.PRECIOUS: $(VENV)/.installed-%
+
+$(VENV)/.compiled-%: $(VENV)/.installed-%
+	$(BIN)/python -m nonsmooth.kernels.ahead --shapes 2,1
 	@touch $@

@@ -20,23 +20,22 @@ from nonsmooth.flow.sections import section_plan
 from nonsmooth.kernels import (
     crossing,
     polynomial,
-    series,
-    series_node,
     series_places,
     series_step,
     taylor,
     trust,
     watch,
 )
+from nonsmooth.kernels.series_module import series_module
 
-FILES = (crossing, polynomial, series, series_node, series_step, taylor, trust, watch)
+FILES = (crossing, polynomial, series_module("sections"), series_step, taylor, trust, watch)
 TRANSIENT, RETURNS, TOLERANCE = 40, 20, 1e-10
 START = [0.2, 0.0, 10.0]
 
 
-def counting(engine: Any) -> dict[str, int]:
-    """Make an engine march on counting numbers; operations and steps of its last run."""
-    found = {"operations": 0, "steps": 0}
+def counting(engine: Any) -> dict[str, Any]:
+    """Make an engine march on counting numbers; the working memory of its last run."""
+    found: dict[str, Any] = {}
     sources = {name: getattr(math, name) for name in ("fabs", "sqrt", "exp", "log")} | {"ln": math.log}
     for space in (*map(vars, FILES), engine.model.jet.__globals__):
         for name, plain in sources.items():
@@ -45,27 +44,18 @@ def counting(engine: Any) -> dict[str, int]:
 
     def convert(value: Any) -> Any:
         if isinstance(value, tuple):
-            return tuple(convert(one) for one in value)
+            parts = [convert(one) for one in value]
+            return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
         return counted(value) if isinstance(value, np.ndarray) and value.dtype.kind == "f" else value
 
-    def march(
-        tables: Any, i: int, choice: Any, control: Any, state: State, q: Any, scratch: Any, sections: Any,
-        extremes: Any, tally: Any, memo: Any, log: Any,
-    ) -> int:  # fmt: skip
-        model, u, clock = engine.model, convert(state.u), convert(state.clock)
-        given = (
-            *map(convert, (control, engine.norms, tables.steps[i], u, q, clock)), state.counters,
-            *map(convert, (scratch.arrays, sections, extremes)), tally, convert(memo), log,
-        )  # fmt: skip
-        Counted.done = 0
-        status: int = series.march(
-            model.field, model.jet, model.values, model.jump, engine.net, engine.lacking, engine.kinds, choice, *given
-        )
-        found["operations"], found["steps"] = Counted.done, int(tally[series_places.STEPS])
-        state.u[:], state.clock[:] = u.astype(float), clock.astype(float)
-        return status
+    plain_given, plain_motion = engine.given, engine._motion
 
-    engine._march = march
+    def given(tables: Any, observer: str) -> Any:
+        form, own, work = plain_given(tables, observer)
+        found["work"] = convert(work)._replace(tally=work.tally)
+        return convert(form), own, found["work"]
+
+    engine.given, engine._motion = given, lambda *arguments: convert(plain_motion(*arguments))
     return found
 
 
@@ -80,8 +70,9 @@ def main() -> None:
         found, totals = counting(engine), []
         for returns in (TRANSIENT, TRANSIENT + RETURNS):
             out, state = Chain.empty(1, 1, 3, 2, 0), State(np.array(START), np.zeros(0))
+            Counted.done = 0
             engine.chain(tables, 0, 1, state, None, plan, returns - 1, 1, out)
-            totals.append((found["operations"], found["steps"]))
+            totals.append((Counted.done, int(found["work"].tally[series_places.STEPS])))
         operations.append((totals[1][0] - totals[0][0]) / RETURNS)
         steps.append((totals[1][1] - totals[0][1]) / RETURNS)
     print(json.dumps({"per_return": float(np.mean(operations)), "steps_per_return": float(np.mean(steps))}))

@@ -22,6 +22,7 @@ import chart
 import chart_size
 import diagram
 import lyapunov
+import lyapunov_nonlinear
 import machine
 import oscillator
 import rigid_stops
@@ -36,7 +37,11 @@ def main() -> int:
     options = parser.parse_args()
     effort = 0.1 if options.quick else 1.0
     text, verdicts = ["# Benchmarks", "", *(f"- {fact}" for fact in machine.facts() if fact), ""], []
-    for part in (oscillator, chain, rigid_stops, valve, valve_scan, diagram, chart, chart_size, lyapunov, branch):
+    parts = (
+        oscillator, chain, rigid_stops, valve, valve_scan, diagram, chart, chart_size, lyapunov, lyapunov_nonlinear,
+        branch,
+    )  # fmt: skip
+    for part in parts:
         lines, part_verdicts = part.run(effort)
         print("\n".join(lines), flush=True)
         text += lines

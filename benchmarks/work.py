@@ -35,6 +35,7 @@ CASES = [Case(f"Fig. 11, 12: rho {rho}", rho, -0.0045, 3.69) for rho in (0.29, 0
     Case(f"Fig. 13: g {g}", 0.33, g, 11.15) for g in (-0.0012, 0.0009, 0.0014, 0.0018)
 ]
 
+LORENZ = {"s": 10.0, "r": 28.0, "b": 8 / 3}
 VALVE_INFLOWS = (0.5, 2.0, 5.0, 7.0, 8.0)
 
 

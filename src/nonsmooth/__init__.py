@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from nonsmooth.results.store import save as save
     from nonsmooth.system.mode import Band as Band
     from nonsmooth.system.mode import Mode as Mode
+    from nonsmooth.system.origin import system_of as system_of
     from nonsmooth.system.scalar import where as where
     from nonsmooth.system.system import System as System
     from nonsmooth.system.transition import Surface as Surface
@@ -61,6 +62,7 @@ _WHERE = {
     "Mode": "system.mode",
     "Band": "system.mode",
     "where": "system.scalar",
+    "system_of": "system.origin",
     "simulate": "flow.simulate",
     "sensitivity": "flow.sensitivity",
     "poincare": "flow.poincare",

@@ -28,13 +28,14 @@ COMPILE = """
 import json, sys
 import nonsmooth as ns
 from gpu_series_systems import filtered, two_wells
+from nonsmooth.flow.devices import engine_on
 from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.series_cuda import module_of
 from nonsmooth.kernels.cuda_ptx import ptx_of_module
 
 name, signature = json.load(sys.stdin)
 system = {"valve": ns.models.relief_valve, "two wells": two_wells, "filtered": filtered}[name]()
-engine = engine_for(system, "auto" if name == "filtered" else "taylor", None, None)
+engine = engine_on("cuda", engine_for(system, "auto" if name == "filtered" else "taylor", None, None), None)
 module = module_of(engine, engine.prepare(system.parameter_vector()[None, :]))
 text = ptx_of_module(module, "advance", signature)
 print(json.dumps([text.count(".visible .entry"), ".target sm_90" in text]))

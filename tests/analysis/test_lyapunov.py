@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from scipy.integrate import solve_ivp
 
 import nonsmooth as ns
 from nonsmooth.analysis.lyapunov import kaplan_yorke
@@ -135,13 +136,14 @@ def lorenz() -> ns.System:
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("pieces", [4096, 64])
-def test_lorenz(pieces: int, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("pieces", "options"), [(4096, {}), (64, {}), (64, {"order": 18})])
+def test_lorenz(pieces: int, options: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
     """Published: 0.9056, 0, -14.5723 (Sprott 2003); the sum -(sigma + 1 + b) is exact. Here within the stated error.
 
-    Also where the record has so few samples that a motion begun at one has forgotten it before the next."""
+    Also in units of time in which the lengths of a frame would underflow, and (with an order of the engine's own the
+    frame follows a record) with so few samples that a motion begun at one has forgotten it before the next."""
     monkeypatch.setattr("nonsmooth.analysis.lyapunov.UNITS", pieces)
-    found = spectrum(lorenz(), duration=4000, start=[1.0, 1.0, 20.0])
+    found = spectrum(lorenz(), duration=4000, start=[1.0, 1.0, 20.0], **options)
     assert found.equilibrium == 0 and "note" not in found.attrs
     error = found.standard_error.values
     assert error[0] < 5e-3 and error[1] < 2e-3
@@ -149,6 +151,41 @@ def test_lorenz(pieces: int, monkeypatch: pytest.MonkeyPatch) -> None:
     assert abs(float(found.exponents[1])) < 1e-3
     assert abs(float(found.exponents.sum()) + 10.0 + 1.0 + 8 / 3) < 1e-10
     assert abs(float(found.kaplan_yorke) - 2.062) < 2e-3  # Sprott: 2.062
+
+
+def test_a_frame_marched_with_its_motion_is_one_that_follows_a_record() -> None:
+    """Lorenz's system and a forced one, whose clock goes on from the transient, in periods and in pieces of none. The
+    record is a run of the series engine, which knows nothing of frames: it gives the true motion."""
+    duffing = ns.System(
+        states=["x", "v"], parameters={"c": 0.2}, period=4.0, scale={"x": 0.5, "v": 2.0},
+        modes={"all": lambda t, u, p: (u.v, u.x - u.x**3 - p.c * u.v + 0.3 * np.cos(np.pi * t / 2))},
+    )  # fmt: skip
+    for system, start, length in (
+        (lorenz(), [1.0, 1.0, 20.0], {"duration": 8.0}),
+        (duffing, [0.1, 0.2], {"periods": 5, "transient": 2}),
+        (duffing, [0.1, 0.2], {"duration": 17.0, "transient": 7.0}),
+    ):
+        marched = spectrum(system, start=start, rtol=1e-12, **length)
+        followed = spectrum(system, start=start, rtol=1e-12, order=18, **length)
+        assert np.abs(marched.exponents.values - followed.exponents.values).max() < 1e-8
+    assert abs(float(marched.exponents.sum()) + 0.2) < 1e-12
+    with pytest.raises(ns.SolveError, match="grew beyond"):
+        ns.lyapunov(duffing.with_parameters(c=-80.0), periods=4)
+
+
+def test_a_motion_that_needs_its_steps_checked_is_recorded() -> None:
+    """A kick once in a period, 3e-3 of it long: Taylor steps of their own choice pass over it (-1.04 then)."""
+    kicked = ns.System(
+        states=["x"], parameters={"w": 0.01}, period=1.0,
+        modes={"all": lambda t, u, p: (40.0 * np.exp(-((np.sin(np.pi * t) / p.w) ** 2)) - u.x - u.x**3,)},
+    )  # fmt: skip
+
+    def field(t: float, y: Any) -> list[float]:
+        return [40.0 * np.exp(-((np.sin(np.pi * t) / 0.01) ** 2)) - y[0] - y[0] ** 3, -1.0 - 3.0 * y[0] ** 2]
+
+    settled = solve_ivp(field, (0.5, 10.5), [0.3, 0.0], rtol=1e-9, max_step=2e-3).y[0, -1]
+    over_one = solve_ivp(field, (0.5, 1.5), [settled, 0.0], rtol=1e-9, max_step=2e-3).y[1, -1]
+    assert abs(float(spectrum(kicked, periods=8, transient=12).exponents[0]) - over_one) < 1e-5
 
 
 def at_origin(r: float) -> np.ndarray:

@@ -160,7 +160,7 @@ def test_other_rules_of_judgement_are_another_version(monkeypatch: pytest.Monkey
     """Labels are decided by analysis as much as by the kernels."""
     version, read = identity._kernel_version.__wrapped__, Path.read_bytes
     now = version()
-    for changed in ("analysis/classify.py", "flow/linear.py", "kernels/linear_march.py"):
+    for changed in ("analysis/classify.py", "flow/linear.py", "kernels/linear_stepper.py"):
         with monkeypatch.context() as patched:
             def edited(file: Path, end: str = changed) -> bytes:
                 return read(file) + (b"#" if file.as_posix().endswith(end) else b"")

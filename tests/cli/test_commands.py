@@ -114,15 +114,6 @@ def test_ctrl_c_ends_with_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pyte
     assert capsys.readouterr().err == "nonsmooth: interrupted\n"
 
 
-def test_a_fault_of_the_package_keeps_its_traceback(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fault() -> None:
-        raise ZeroDivisionError("not the user's")
-
-    monkeypatch.setattr(models, "names", fault)
-    with pytest.raises(ZeroDivisionError):
-        run("models")
-
-
 def test_show_says_what_a_chart_varies() -> None:
     from nonsmooth.analysis.chart import chart
     from nonsmooth.cli.show import summary

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-HEAVY = ("sympy", "numba", "xarray", "matplotlib", "scipy", "tqdm")
+HEAVY = ("sympy", "numba", "xarray", "matplotlib", "scipy", "tqdm", "numpy", "pandas")
 
 
 @pytest.mark.parametrize("module", ["nonsmooth.cli.main", "nonsmooth.plot"])

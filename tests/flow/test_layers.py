@@ -182,18 +182,21 @@ def test_systems_without_such_terms_run_as_they_stand() -> None:
 class Counting(SeriesEngine):
     """Counts the steps of its last run."""
 
-    steps = 0
     watchful = True
+    work: Any = None
+
+    @property
+    def steps(self) -> int:
+        return int(self.work.tally[at.STEPS])
 
     @property
     def layers(self) -> Any:
         found = layers(self.traced)
         return found if self.watchful else type(found)(self.traced, 0, False)
 
-    def _march(self, *arguments: Any) -> int:
-        status = super()._march(*arguments)
-        self.steps = int(arguments[9][at.STEPS])
-        return status
+    def _work(self) -> Any:
+        self.work = super()._work()
+        return self.work
 
 
 SMOOTH: dict[str, tuple[Callable[..., Any], list[float]]] = {

@@ -7,7 +7,6 @@ from nonsmooth.identification.finding import Estimate
 from nonsmooth.identification.lines import york
 from nonsmooth.identification.profiles import profile_likelihood, profile_of
 from nonsmooth.identification.uncertainty import (
-    bootstrap,
     correlated,
     correlation_times,
     coverage_factor,
@@ -58,12 +57,6 @@ def test_a_profile_that_does_not_rise_has_no_limit():
     value = np.linspace(0.1, 3, 59)
     profile = profile_of(value, np.minimum(40 * (value - 1) ** 2, np.where(value > 1, 2.0, np.inf)), 1.0)
     assert np.isnan(profile.high) and profile.low == pytest.approx(1 - np.sqrt(3.8415 / 40), abs=0.01)
-
-
-def test_bootstrap_of_a_mean():
-    x = np.random.default_rng(3).standard_normal(400)
-    found = bootstrap(lambda rows: x[rows].mean(), 400, draws=2000)
-    assert found.std() == pytest.approx(x.std() / 20, rel=0.1)
 
 
 def test_york_on_pearsons_data_with_yorks_weights():

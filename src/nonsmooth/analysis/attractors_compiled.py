@@ -9,7 +9,8 @@ import numpy as np
 
 from nonsmooth.analysis.settled import Settled, usable
 from nonsmooth.flow.engine import Chain, FloatArray, IntArray
-from nonsmooth.flow.linear import DIVERGENCE, PlanarEngine
+from nonsmooth.flow.linear import PlanarEngine
+from nonsmooth.flow.loop import DIVERGENCE
 from nonsmooth.flow.poincare import result_status
 
 __all__ = ["exponents_compiled", "load", "run_compiled"]
@@ -46,8 +47,9 @@ def run_compiled(
     found = Settled.empty(len(rows), 2)
     load(engine).settle_many(
         rows, starts, np.full(len(rows), begin), modes, np.array(choice, dtype=np.int64), norms, tables.form,
-        engine.net, plan, quiet, phase, np.inf, DIVERGENCE * engine.scale, out, probe, tables.scratch(),
-        _work(max_period), tuple(getattr(found, item.name) for item in fields(found)),
+        engine.net, plan, quiet, phase, np.inf, DIVERGENCE * engine.scale, out, probe,
+        engine.given(tables, "sections")[1:], _work(max_period),
+        tuple(getattr(found, item.name) for item in fields(found)),
     )  # fmt: skip
     failed = ~usable(found.status)
     found.status[failed] = [result_status(code) for code in found.status[failed]]
@@ -67,7 +69,7 @@ def exponents_compiled(
     quiet = np.array([-1, 1, -1, 1, 1, 0], dtype=np.int64)
     load(engine).exponents_of(
         rows, starts, modes, n_returns, scale, tables.form, engine.net, quiet, phase, np.inf,
-        DIVERGENCE * engine.scale, out, tables.scratch(), _work(max_period), largest, error,
+        DIVERGENCE * engine.scale, out, engine.given(tables, "sections")[1:], _work(max_period), largest, error,
     )  # fmt: skip
     return largest, error
 

@@ -34,7 +34,7 @@ class Trace:
 
 def period_of(tables: Any, row: int = 0) -> float:
     """Period of the forcing at one row of an engine's tables; infinite where there is none."""
-    return float((tables.period if hasattr(tables, "period") else tables.periods)[row])
+    return float(tables.period[row])
 
 
 def mode_at(system: System, phase: float) -> int:

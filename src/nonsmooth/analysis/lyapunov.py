@@ -86,7 +86,8 @@ def lyapunov(
     start, mode
         First state and mode, as in :func:`nonsmooth.simulate`.
     method, rtol, atol
-        Of the trajectory; see :func:`nonsmooth.flow.methods.engine_for`. Its derivatives are accurate to rounding.
+        Of the trajectory; see :func:`nonsmooth.flow.methods.engine_for`. Its derivatives are accurate to rounding where
+        the flow is exact, else to a tenth of ``rtol`` and at least 1e-11 in every step.
     device : {"cpu", "cuda"}
         ``"cuda"`` runs a sweep with ``direction=None`` on an NVIDIA GPU, one point per thread, for
         systems with the planar exact flow: see the guide "A chart on a GPU".

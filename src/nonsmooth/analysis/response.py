@@ -62,7 +62,7 @@ def frequency_response(
     A jump is a step between neighbouring values in which the amplitude changes by more than 0.5 % and more than five
     times as much as in the steps before and after it.
     """
-    from nonsmooth.results.provenance import ATTRIBUTE, read_provenance
+    from nonsmooth.results.provenance import attribute, read_provenance, with_short_record
     from nonsmooth.results.schema import response
 
     check_system(system, "frequency_response")
@@ -94,10 +94,7 @@ def frequency_response(
     }
     result = response(swept, amplitude=amplitude, jumps=jumps)
     record = read_provenance(swept) | {"verb": "frequency_response"}
-    import json
-
-    result.attrs[ATTRIBUTE] = json.dumps(record, ensure_ascii=False, allow_nan=False)
-    return result
+    return with_short_record(result.assign_attrs(attribute(record)))
 
 
 def jumps_in(amplitude: FloatArray) -> list[int]:

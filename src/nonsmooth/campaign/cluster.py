@@ -50,7 +50,7 @@ def connect(address: str) -> Any:
 
 
 def compute_chunk(work: Work, chunk: int, path: str | None, key: str) -> Mapping[str, NDArray[Any]] | None:
-    """What a worker does: one chunk, into the store where there is one."""
+    """Compute one chunk on a worker, into the store where there is one."""
     if path is None:
         return work.compute(chunk)
     store = ChunkStore(Path(path), key)

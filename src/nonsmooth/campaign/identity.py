@@ -1,4 +1,4 @@
-"""What makes a work the same work: model, parameters, options, the source of kernels and rules."""
+"""Identity of a work: model, parameters, options, the source of kernels and rules."""
 
 from __future__ import annotations
 

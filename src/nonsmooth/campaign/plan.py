@@ -1,16 +1,18 @@
-"""What a work would take, from a small sample of its chunks, spread over the whole from a random place on."""
+"""Estimate of what a work takes, from a small sample of its chunks, spread over the whole from a random place on."""
 
 from __future__ import annotations
 
 import sys
 import time
 from dataclasses import dataclass
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 
 from nonsmooth.campaign.threads import cores
 from nonsmooth.campaign.work import Work
+from nonsmooth.errors import not_installed
 
 __all__ = ["GOLDEN", "Plan", "duration", "plan"]
 
@@ -25,7 +27,7 @@ class Plan:
     """An estimate: core-seconds with their standard error, and bytes.
 
     ``process_bytes``: of this process as it is now, with all that is loaded (0: not known on this system);
-    ``stored_bytes``: of a store, compressed.
+    ``stored_bytes``: of a store, compressed; None where the package zarr is not installed.
     """
 
     places: int
@@ -34,7 +36,7 @@ class Plan:
     core_seconds: float
     error: float
     result_bytes: int
-    stored_bytes: int
+    stored_bytes: int | None
     process_bytes: int
 
     @property
@@ -58,7 +60,10 @@ class Plan:
             lines.append(f"cluster     {duration(self.seconds(workers))} on {workers} cores of this kind")
         process = f"{_size(self.memory_bytes)} for the process, " if self.process_bytes else ""
         lines.append(f"memory      {process}{_size(self.result_bytes)} of it for the result")
-        lines.append(f"store       {_size(self.stored_bytes)}, compressed")
+        if self.stored_bytes is None:
+            lines.append(f"store       not measured: it needs {not_installed('zarr', 'zarr')}")
+        else:
+            lines.append(f"store       {_size(self.stored_bytes)}, compressed")
         return "\n".join(lines)
 
 
@@ -96,7 +101,7 @@ def plan(work: Work, *, seconds: float = SECONDS, seed: int = 0, kept: int | Non
     together = [samples[chunk] for chunk in sorted(samples)]
     return Plan(
         places, n, len(per_place), places * float(np.mean(per_place)), error, places * width,
-        stored_bytes(work, together, kept or last - first), _resident(),
+        stored_bytes(work, together, kept or last - first) if find_spec("zarr") else None, _resident(),
     )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""What computes the chunks of a work: its type, which decides the last digits, and the clock that measures its work."""
+"""Type of the processor that computes chunks, which decides the last digits, and the clock that measures its work."""
 
 from __future__ import annotations
 
@@ -23,11 +23,14 @@ def clock(device: str) -> Callable[[], float]:
 
 @cache
 def cpu_type() -> str:
-    """The processor as the compiler sees it: its name and instruction sets decide the last digits."""
+    """The processor as the linear algebra sees it, and the level that kernels are made for: both decide last digits."""
     from llvmlite import binding
 
+    from nonsmooth.kernels.target import level
+
     features = binding.get_host_cpu_features().flatten()
-    return f"{platform.machine()} {binding.get_host_cpu_name()} {hashlib.sha256(features.encode()).hexdigest()[:8]}"
+    stamp = hashlib.sha256(features.encode()).hexdigest()[:8]
+    return " ".join(filter(None, [platform.machine(), binding.get_host_cpu_name(), stamp, level()]))
 
 
 @cache

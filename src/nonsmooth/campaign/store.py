@@ -36,6 +36,7 @@ from nonsmooth.campaign.processors import processor_type
 from nonsmooth.campaign.work import Work
 from nonsmooth.errors import DataFileError
 from nonsmooth.results.content import digest, seal, sealed
+from nonsmooth.results.store import needs_zarr
 from nonsmooth.results.whole import beside, told, write_whole
 
 __all__ = ["ChunkStore", "describe_store", "open_store", "stored_bytes"]
@@ -59,7 +60,7 @@ class ChunkStore:
         return {mark["chunk"] for mark in marks_of(self.path) if mark["key"] == self._key(mark["chunk"])}
 
     def has(self, chunk: int) -> bool:
-        """Whether a chunk is there, whole."""
+        """Return whether a chunk is there, whole."""
         mark = mark_in(self.path / "run" / f"{chunk:06d}.json")
         return mark is not None and mark["key"] == self._key(chunk)
 
@@ -119,7 +120,7 @@ class ChunkStore:
         return columns or {name: np.asarray(group[name][...]) for name in work.columns()}
 
     def _is_whole(self, work: Work, mark: Mapping[str, Any], columns: Any) -> bool:
-        """Whether a chunk's arrays are those that were written."""
+        """Return whether a chunk's arrays are those that were written."""
         first, last = work.bounds(mark["chunk"])
         try:
             found = _content({name: np.asarray(columns[name][first:last]) for name in work.columns()})
@@ -144,6 +145,8 @@ def open_store(path: str | os.PathLike[str], work: Work, *, any_cpu: bool = Fals
 
     Raises
     ------
+    ImportError
+        Where the package zarr is not installed.
     ValueError
         A name that does not end in .zarr.
     DataFileError
@@ -155,6 +158,7 @@ def open_store(path: str | os.PathLike[str], work: Work, *, any_cpu: bool = Fals
     target = Path(path)
     if target.suffix != ".zarr":
         raise ValueError(f"{target}: the name of a store must end in .zarr")
+    needs_zarr(target)
     wanted = described(work)
     key = hashlib.sha256(json.dumps(wanted, sort_keys=True).encode()).hexdigest()
     if not target.exists():
@@ -175,7 +179,7 @@ def open_store(path: str | os.PathLike[str], work: Work, *, any_cpu: bool = Fals
 
 
 def describe_store(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """What a store is of, and how far it is: ``verb``, ``system``, ``options``, ``chunks``, ``done``, ``seconds``.
+    """Describe a store's work and its progress: ``verb``, ``system``, ``options``, ``chunks``, ``done``, ``seconds``.
 
     ``content``: once all chunks are there, the hash of their hashes; else None.
 
@@ -184,9 +188,10 @@ def describe_store(path: str | os.PathLike[str]) -> dict[str, Any]:
     DataFileError
         Not a store of chunks, or its description was altered.
     """
+    target = Path(path)
+    needs_zarr(target)
     import zarr
 
-    target = Path(path)
     try:
         record: dict[str, Any] = dict(json.loads(str(zarr.open_group(target, mode="r").attrs[ATTRIBUTE])))
     except Exception as error:

@@ -1,4 +1,4 @@
-"""What the campaign room asks of a piece of work: chunks that depend on their own index only."""
+"""Interface of a piece of work for the campaign room: chunks that depend on their own index only."""
 
 from __future__ import annotations
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from nonsmooth.cli.keep import keep, kept_whatever_comes
 from nonsmooth.cli.tables import read_tables, with_folder
+from nonsmooth.errors import shortened
 from nonsmooth.system.names import check_keys, unknown
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ _KEYS = {
     "measured": ("session", "procedure", "run", "crank_force", "gap_offset", "referred"),
     "output": ("data", "figure", "picture", "x", "y"),
 }  # fmt: skip
+_TEXTS = ("model", "session", "procedure", *_KEYS["output"])
 _PICTURES = {
     "motion": {
         "phase_portrait": "comparison_phase_portrait", "time": "comparison_time", "section": "comparison_section",
@@ -40,6 +42,9 @@ def add(commands: Any) -> None:
         help="compare a measurement with a model",
         description="Lay a measurement of a session over a model, as the study file describes it: [system], "
         "[identified], [measured], [compare], [output]. Paths in the file are relative to the file.",
+        epilog="examples:\n"
+        "  nonsmooth compare compare.toml\n"
+        "  nonsmooth compare session/ --identified parameters.nc",
     )
     parser.add_argument(
         "study", type=Path, metavar="STUDY.toml",
@@ -130,7 +135,7 @@ def _run_study(
 def _offset(
     study: Mapping[str, Any], parameters: Any, session: Any, folder: Path, read: Callable[[Path], Any]
 ) -> Any:
-    """What the identified gap is more than the screw read; 0 where it was not identified, or not from contact."""
+    """Identified gap less the screw's reading; 0 where the gap was not identified, or not from contact."""
     from nonsmooth.identification.compare import gap_offset
 
     if "gap_at_rest" not in getattr(parameters, "extra", {}):
@@ -149,6 +154,9 @@ def _read(path: Path) -> dict[str, Any]:
     for name, table in document.items():
         keys = [*(key for key in allowed if key != "options"), "method", "rtol", "atol"]
         check_keys(table, keys if name == "compare" else _KEYS[name], f"{path}, table [{name}]", "a key")
+        for key in _TEXTS if name != "compare" else ():
+            if key in table and not isinstance(table[key], str):
+                raise ValueError(f"{path}, table [{name}]: {key} = {shortened(table[key])} must be a text")
     for name, needed in (("system", ("model",)), ("measured", ("session", "procedure"))):
         if missing := [key for key in needed if key not in document.get(name, {})]:
             raise ValueError(f"{path}: table [{name}] needs {', '.join(missing)}")

@@ -37,7 +37,7 @@ def keep(result: xr.Dataset, path: Path) -> Path:
 
 @contextmanager
 def kept_whatever_comes(result: xr.Dataset, saved: list[Path], name: Path) -> Iterator[None]:
-    """What is done with a result besides: where it fails, the message ends with where the result is.
+    """Make an error in further work on a result end with where the result is.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def keep_elsewhere(result: xr.Dataset, path: Path) -> str:
     """Save a result under a name of its own in the current folder, at home, or among temporary files; say where."""
     from nonsmooth.results.store import save
 
-    name = f"{path.stem}-{time.strftime('%Y%m%d-%H%M%S')}-{os.getpid()}{path.suffix}"
+    name = f"{path.stem}-{time.strftime('%Y%m%d-%H%M%S')}-{os.getpid()}.nc"
     for folder in (Path.cwd(), Path(os.path.expanduser("~")), Path(tempfile.gettempdir())):
         try:
             return f"the result is kept in {save(result, folder / name)}"

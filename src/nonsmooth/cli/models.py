@@ -12,9 +12,12 @@ __all__ = ["add"]
 def add(commands: Any) -> None:
     """Declare the sub-command."""
     parser = commands.add_parser(
-        "models", help="list the models that come ready", description="List the models that come ready."
+        "models", help="list the models that come ready", description="List the models that come ready.",
+        epilog="examples:\n"
+        "  nonsmooth models\n"
+        "  nonsmooth models discontinuous_support",
     )
-    parser.add_argument("name", nargs="?", help="show this model's equations and parameters")
+    parser.add_argument("name", nargs="?", metavar="MODEL", help="show this model's equations and parameters")
     parser.set_defaults(run=_run)
 
 
@@ -27,7 +30,12 @@ def _run(options: argparse.Namespace) -> int:
         return 0
     width = max(map(len, models.names()))
     for name in models.names():
-        summary = (getattr(models, name).__doc__ or "").strip().partition("\n")[0]
-        summary = re.sub(r":math:`([^`]*)`", r"\1", summary)
-        print(f"{name:{width}}  {summary}")
+        print(f"{name:{width}}  {_summary(getattr(models, name))}")
     return 0
+
+
+def _summary(model: Any) -> str:
+    """The first line of a model's documentation, without its verb and without formulas."""
+    line = (model.__doc__ or "").strip().partition("\n")[0]
+    line = re.sub(r"\s*:math:`[^`]*`", "", line).replace("``", "").removeprefix("Return the ")
+    return line[:1].upper() + line[1:]

@@ -18,6 +18,9 @@ def add(commands: Any) -> None:
         help="say what a chart would take",
         description="Run a small sample of a chart's points and print what the whole would take: time, memory, and "
         "the bytes of a store. Where this machine has a GPU, a sample is run on it too.",
+        epilog="examples:\n"
+        "  nonsmooth plan chart.toml\n"
+        "  nonsmooth plan chart.toml --workers 256 --seconds 20",
     )
     parser.add_argument("study", type=Path, metavar="STUDY.toml", help="a study file with a table [chart]")
     parser.add_argument("--workers", type=int, help="cores of a cluster to reckon with")

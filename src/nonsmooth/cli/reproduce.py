@@ -19,8 +19,11 @@ def add(commands: Any) -> None:
         help="reproduce a published study",
         description="Compute the figures, the data and the report of a published study. What its authors measured is "
         "measured on a virtual rig: synthetic, and labelled so.",
+        epilog="examples:\n"
+        "  nonsmooth reproduce savi2007\n"
+        "  nonsmooth reproduce savi2007 --quick --figure 11 --figure 13",
     )
-    parser.add_argument("study", help="the study, for example savi2007")
+    parser.add_argument("study", metavar="STUDY", help="the study, for example savi2007")
     parser.add_argument(
         "--figure", action="append", metavar="N",
         help="only this figure of the paper, by model and rig, or one by its name (fig11_rig, table1, eta, ...); "

@@ -17,6 +17,10 @@ def add(commands: Any) -> None:
         description="Write the recordings of a virtual rig (Savi et al. 2007, Fig. 3) into a session folder, with the "
         "notebook session.toml. What the rig really is goes to a file beside the folder. Everything is labelled "
         "synthetic.",
+        epilog="examples:\n"
+        "  nonsmooth rig --seed 3 --out session\n"
+        "  nonsmooth rig --figure 9 --out figure9\n"
+        "  nonsmooth rig --out decays --procedures springs impulse",
     )
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="draws the rig and its noise (default 0)")
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="the session folder, made if needed")

@@ -19,6 +19,10 @@ def add(commands: Any) -> None:
         help="run a study file",
         description="Run a study file: a system, one analysis of it, and where the result goes. "
         "Paths in the file are relative to the file.",
+        epilog="examples:\n"
+        "  nonsmooth run fig11.toml\n"
+        "  nonsmooth run chart.toml --store chart.zarr          # go on after an interruption\n"
+        "  nonsmooth run chart.toml --store chart.zarr --scheduler tcp://10.0.0.1:8786",
     )
     parser.add_argument("study", type=Path, metavar="STUDY.toml", help="the study file")
     parser.add_argument(

@@ -7,8 +7,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from nonsmooth.cli.terminal import one_line, printable
 
 if TYPE_CHECKING:
@@ -22,6 +20,10 @@ def add(commands: Any) -> None:
     parser = commands.add_parser(
         "show", help="show what a file holds",
         description="Show what a saved result (.nc, .zarr), a store of chunks or a recording (.csv, .cap, ...) holds.",
+        epilog="examples:\n"
+        "  nonsmooth show fig11.nc\n"
+        "  nonsmooth show fig11.nc --text            # with the equations of the system\n"
+        "  nonsmooth show springs.csv",
     )
     parser.add_argument("file", type=Path, help="a result saved by this package, or a recording")
     parser.add_argument("--text", action="store_true", help="show the whole text of the system too")
@@ -50,7 +52,7 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def progress_of(path: Path) -> str:
-    """How far a store of chunks is."""
+    """Progress of a store of chunks, in a few lines."""
     from nonsmooth.campaign.store import describe_store
 
     record = describe_store(path)
@@ -104,6 +106,8 @@ def _origin(record: Mapping[str, Any], result: xr.Dataset) -> list[str]:
 
 
 def _statuses(result: xr.Dataset) -> str:
+    import numpy as np
+
     from nonsmooth.results.statuses import STATUSES
 
     known = {status.code: status for status in STATUSES}

@@ -19,24 +19,21 @@ from typing import TYPE_CHECKING, Any
 
 from nonsmooth.cli.keep import keep, kept_whatever_comes
 from nonsmooth.cli.tables import read_tables, with_folder
+from nonsmooth.cli.verb_options import VERBS, options_of
 from nonsmooth.errors import shortened
 from nonsmooth.system.names import check_keys, unknown
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Study", "load_model", "named_model", "read_study"]
+__all__ = ["OUTPUT", "Study", "load_model", "named_model", "read_study"]
 
-VERBS = ("simulate", "sweep", "frequency_response", "poincare", "chart", "basins", "basin_fractions")
 _SYSTEM_KEYS = ("model", "parameters", "smoothed")
-_OUTPUT_KEYS = ("data", "figure", "store", "x", "y")
 _FORMATS = (".pdf", ".png", ".svg", ".eps", ".ps", ".pgf", ".jpg", ".jpeg", ".tif", ".tiff", ".webp")
-#: Arguments of verbs that belong to the command line, or that a file cannot hold.
-_NOT_IN_FILES = ("progress", "client", "store")
+#: Keys of the table [output], with the endings that a name may have.
+OUTPUT = {"data": (".nc", ".zarr"), "figure": _FORMATS, "store": (".zarr",), "x": (), "y": ()}
 #: Verbs whose work is cut into chunks.
 _IN_CHUNKS = ("chart", "basins", "basin_fractions")
-#: A verb that hands its further options on to another takes that one's keys too.
-_HANDS_ON_TO = {"frequency_response": "sweep"}
 _FIGURES = {
     "simulate": "phase_portrait", "sweep": "bifurcation", "frequency_response": "frequency_response",
     "poincare": "section", "chart": "chart", "basins": "basins", "basin_fractions": "basin_fractions",
@@ -86,7 +83,7 @@ class Study:
 
     @property
     def store(self) -> Path | None:
-        """Where ``[output]`` says that finished chunks are kept."""
+        """Folder for finished chunks, as ``[output]`` gives it."""
         return self.path.parent / self.output["store"] if "store" in self.output else None
 
     def write(self, result: xr.Dataset) -> list[Path]:
@@ -127,7 +124,7 @@ def read_study(path: Path) -> Study:
     if "system" not in document:
         raise ValueError(f'{where}: needs a table [system] with at least model = "..."')
     output = document.get("output", {})
-    check_keys(output, _OUTPUT_KEYS, f"{where}, table [output]", "a key")
+    check_keys(output, OUTPUT, f"{where}, table [output]", "a key")
     _check_output(output, path)
     system = _system(document["system"], path)
     options = _options(verbs[0], document[verbs[0]], where)
@@ -173,12 +170,14 @@ def load_model(text: str, folder: Path) -> Any:
 
 
 def _told(source: Path, call: Callable[[], Any]) -> Any:
-    """What a user's file does wrong, as one sentence with the line."""
+    """Turn an error of a user's file into one sentence with the line."""
     try:
         return call()
     except ValueError as error:  # the package's own sentences among them
         raise ValueError(f"{source}: {error}") from error
-    except (Exception, SystemExit) as error:
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
         frames = traceback.extract_tb(error.__traceback__)
         lines = [frame.lineno for frame in frames if Path(frame.filename).resolve() == source.resolve()]
         what: object = error
@@ -189,19 +188,21 @@ def _told(source: Path, call: Callable[[], Any]) -> Any:
 
 
 def _check_output(output: Mapping[str, Any], path: Path) -> None:
-    """What would fail after hours of computing is told before."""
-    from nonsmooth.results.store import check_place
+    """Refuse before the computation what would fail after it."""
+    from nonsmooth.results.store import check_place, needs_zarr
 
     place = f"{path}, table [output]"
     for name, value in output.items():
         if not isinstance(value, str):
             raise ValueError(f"{place}: {name} is {shortened(value)}; give a name in quotes")
-    for name, endings in (("data", (".nc", ".zarr")), ("figure", _FORMATS), ("store", (".zarr",))):
-        if name not in output:
+    for name, endings in OUTPUT.items():
+        if name not in output or not endings:
             continue
         target = path.parent / output[name]
         if target.suffix.lower() not in endings:
             raise ValueError(f"{place}: {name} = {output[name]!r} must end in {', '.join(endings)}")
+        if target.suffix.lower() == ".zarr":
+            needs_zarr(target)
         folder = next((one for one in target.parents if one.exists()), path.parent)
         if not (folder.is_dir() and os.access(folder, os.W_OK)):
             raise ValueError(f"{place}: {name} = {output[name]!r}: nothing may be written into {folder}")
@@ -221,7 +222,7 @@ def _figure(verb: str, options: Mapping[str, Any]) -> str:
 
 
 def _check_axes(output: Mapping[str, Any], figure: str, system: Any, place: str) -> None:
-    """What the figure's axes may be is known from the system."""
+    """Refuse axes that the figure of this system cannot have."""
     if "figure" not in output:
         return
     from nonsmooth import plot
@@ -256,22 +257,13 @@ def _system(table: Mapping[str, Any], path: Path) -> Any:
 
 
 def _options(verb: str, table: Mapping[str, Any], where: str) -> dict[str, Any]:
-    """The verb's own parameters are the allowed keys, so that a new option needs no change here."""
-    import nonsmooth
-
-    signature: dict[str, inspect.Parameter] = {}
-    for owner in (_HANDS_ON_TO.get(verb), verb):  # the verb's own defaults win
-        if owner is not None:
-            signature |= inspect.signature(getattr(nonsmooth, owner)).parameters
-    allowed = [
-        name for name, item in signature.items()
-        if name not in (*_NOT_IN_FILES, "system") and item.kind is not inspect.Parameter.VAR_KEYWORD
-    ]  # fmt: skip
+    """The keys of a verb's table, checked against the verb's own arguments and read."""
+    known = options_of(verb)
     place = f"{where}, table [{verb}]"
-    check_keys(table, allowed, place, "a key")
-    missing = [name for name in allowed if signature[name].default is inspect.Parameter.empty and name not in table]
+    check_keys(table, known, place, "a key")
+    missing = [name for name, option in known.items() if option.required and name not in table]
     if missing:
-        raise ValueError(f"{place}: needs {', '.join(missing)}; all keys: {', '.join(allowed)}")
+        raise ValueError(f"{place}: needs {', '.join(missing)}; all keys: {', '.join(known)}")
     readers = {"values": _values, "grid": _grid, "section": _section, "start": _start, "direction": _direction}
     return {name: readers[name](value, place) if name in readers else value for name, value in table.items()}
 

@@ -1,4 +1,4 @@
-"""Where the section of an autonomous orbit lies: in the middle of its longest visit, or across the flow."""
+"""Section of an autonomous orbit: in the middle of its longest visit, or across the flow."""
 
 from __future__ import annotations
 

@@ -218,7 +218,7 @@ class Curve:
 
 
 def passes_through(Y: FloatArray, a: FloatArray, b: FloatArray) -> bool:
-    """Whether the step from a to b goes through Y, as nearly as a chord follows a curve."""
+    """Return whether the step from a to b goes through Y, as nearly as a chord follows a curve."""
     step = b - a
     x = float(step @ (Y - a)) / float(step @ step)
     return 1e-9 < x <= 1.0 and float(np.abs(Y - a - x * step).max()) < 0.3 * float(np.abs(step).max())

@@ -76,7 +76,7 @@ def grow(
 
 
 def _bad(x: FloatArray, s: FloatArray, left: float, near: float, turn: float) -> NDArray[np.bool_]:
-    """Which gaps between neighbours want another point; none beyond the length that is left."""
+    """Gaps between neighbours that want another point; none beyond the length that is left."""
     chord = np.diff(x, axis=0)
     d = np.linalg.norm(chord, axis=1)
     wide: NDArray[np.bool_] = np.logical_not(d <= near)  # NaN is wide: the edge of what has an image

@@ -1,4 +1,4 @@
-"""Where a march begins: the curve through an orbit or a recorded point, its range, and its ending in words."""
+"""Beginning of a march: the curve through an orbit or a recorded point, its range, and its ending in words."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Asked:
     virtual: bool
 
     def limits(self, bounds: tuple[float, float], closed: Any = None) -> Limits:
-        """What bounds a march within ``bounds``."""
+        """Return the limits of a march within ``bounds``."""
         return Limits(*bounds, self.step, self.points, closed, self.virtual)
 
     @property
@@ -96,7 +96,7 @@ def curve_of(orbit: Orbit, name: str, width: float) -> tuple[Curve, FloatArray]:
 
 
 def sentence(found: March, bounds: tuple[float, float], name: str, asked: tuple[float, float]) -> str:
-    """How a march ended, in words; where the range was cut, that is the reason."""
+    """Return the end of a march in words; where the range was cut, that is the reason."""
     if found.ending == "range" and found.rows:
         value = float(found.rows[-1].point.X[-1])
         side = 0 if abs(value - bounds[0]) < abs(value - bounds[1]) else 1

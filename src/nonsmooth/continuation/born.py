@@ -1,4 +1,4 @@
-"""The cycles that are born at a Hopf point."""
+"""The cycles that emanate from a Hopf point."""
 
 from __future__ import annotations
 

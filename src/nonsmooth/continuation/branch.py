@@ -164,12 +164,12 @@ def _stepped(curve: Curve, point: Point, ds: float, before: Point | None) -> Poi
 
 
 def _shrunk(curve: Curve, point: Point) -> bool:
-    """Whether an autonomous orbit has all but shrunk to an equilibrium."""
+    """Return whether an autonomous orbit has all but shrunk to an equilibrium."""
     return swing(curve, point) < SMALL
 
 
 def _at_section(curve: Curve, point: Point) -> bool:
-    """Whether the visit that has become shortest begins or ends at the section of a forced orbit."""
+    """Return whether the visit that has become shortest begins or ends at the section of a forced orbit."""
     return curve.shooting.forced and int(point.path.tau.argmin()) in (0, curve.shooting.m)
 
 
@@ -181,7 +181,7 @@ def _apart(passed_by: list[Event], found: March, met: list[Event]) -> list[Event
 
 
 def _closed(begin: tuple[Curve, Point], curve: Curve, a: Point, b: Point) -> bool:
-    """Whether the branch has come back to its first point on the step from a to b."""
+    """Return whether the branch has come back to its first point on the step from a to b."""
     curve0, first = begin
     if curve0.shooting.signature != curve.shooting.signature or len(first.Y) != len(b.Y):
         return False

@@ -1,4 +1,4 @@
-"""Where a path leaves its signature: which signature comes next, and its first unknowns.
+"""Signatures that can follow where a path leaves its own, and their first unknowns.
 
 At the boundary itself one orbit satisfies the equations of both signatures: a visit of no length, or an impact of no
 speed, is put in or taken out. How the branch goes on from that common orbit stands in ``resuming``.
@@ -36,7 +36,7 @@ class Change:
 
 
 def changed(curve: Curve, point: Point, kind: str) -> list[Change]:
-    """What may come after the event ``kind`` at a located point; the likeliest first, none where nothing is known."""
+    """Return what may come after the event ``kind`` at a located point, likeliest first; none if nothing is known."""
     if kind == "touch":
         return _touched(curve, point)
     if kind == "short":
@@ -65,7 +65,7 @@ def _touched(curve: Curve, point: Point) -> list[Change]:
     place, k = path.touched
     traced = curve.shooting.system.traced
     jump = traced.transitions[k]
-    row = int(path.which[place, k] - curve.walk.transitions[k, 2])
+    row = int(path.which[place, k] - curve.walk.net.row_start[k])
     t = float(path.place[place, k])
     begin = float(point.solved.times[place])
     z = flow.legs(values, [visits[place].mode], [begin], [t - begin], states[place][None, :]).z[0]

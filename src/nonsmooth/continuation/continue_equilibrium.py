@@ -1,4 +1,4 @@
-"""``continue_equilibrium``: follow an equilibrium of an autonomous system, to where cycles are born."""
+"""``continue_equilibrium``: follow an equilibrium of an autonomous system to its Hopf points."""
 
 from __future__ import annotations
 
@@ -59,8 +59,8 @@ def continue_equilibrium(
     xarray.Dataset
         Over ``point``: the parameter, ``u(point, state)``, ``eigenvalues``, ``stable``, ``mode``; special points as in
         :func:`nonsmooth.special_points`: ``fold``, ``branch_point``, ``hopf`` (a row given to ``continue_orbit`` gives
-        the cycles born there), ``boundary_equilibrium``. Over ``end`` how the branch ends: ``ended`` and, in a
-        sentence, ``ended_because``.
+        the cycles that emanate from it), ``boundary_equilibrium``. Over ``end`` how the branch ends: ``ended`` and, in
+        a sentence, ``ended_because``.
 
     Raises
     ------

@@ -26,7 +26,7 @@ ENDS = {
     "no_convergence": "Newton's method did not converge, however small the step.",
     "grazing": "A contact begins or ends here: beyond this point the orbit has another signature.",
     "corner": "The orbit meets the corner of two boundaries: beyond this point it has another signature.",
-    "resonance": "Both multipliers meet on the real axis: beyond this point they are real, and no torus is born.",
+    "resonance": "Both multipliers meet on the real axis: beyond this point they are real, and there is no torus.",
     "interrupted": f"{INTERRUPTED}.",
 }
 #: The point of codimension two at which a curve meets a graze (another one, for a grazing curve).
@@ -49,7 +49,7 @@ class CurveMarch:
 
 
 def _violation(locus: Locus, place: Point) -> FloatArray:
-    """How far the path is from leaving its signature; on a grazing curve by another touch than its own."""
+    """Margin of the path to leaving its signature; on a grazing curve by another touch than its own."""
     path = place.path
     if locus.kind == "grazing":
         inner = path.inner.copy()
@@ -158,7 +158,7 @@ class _Edge:
 
 @dataclass
 class _Leaving:
-    """How far the path is from leaving its signature in one of the ways of ``VIOLATIONS``."""
+    """Margin of the path to leaving its signature in one of the ways of ``VIOLATIONS``."""
 
     locus: Locus
     way: int
@@ -169,7 +169,7 @@ class _Leaving:
 
 @dataclass
 class _Turning:
-    """How the parameters move, against how they did."""
+    """Test function of a turn: the parameters' direction against the earlier one."""
 
     before: Point
 

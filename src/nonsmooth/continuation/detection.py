@@ -1,4 +1,4 @@
-r"""What is looked for along a branch, and its exact location.
+r"""Test functions along a branch, and the exact location of their zeros.
 
 fold
     the parameter turns: the tangent's last component vanishes;

@@ -120,7 +120,7 @@ class _Edge:
 
 
 def _oscillates(rest: Rest) -> bool:
-    """Whether a pair +-i omega makes the sum of two eigenvalues vanish, and not two real ones."""
+    """Return whether a pair +-i omega makes the sum of two eigenvalues vanish, and not two real ones."""
     nearest = rest.eigenvalues[np.argmin(np.abs(rest.eigenvalues.real))]
     return bool(abs(nearest.imag) > 1e-9)
 

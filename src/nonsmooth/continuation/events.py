@@ -1,4 +1,4 @@
-"""What lies on one step of a branch: boundaries of the signature, special points, the edge of the range."""
+"""Events on one step of a branch: boundaries of the signature, special points, the edge of the range."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def at_edge(curve: Curve, a: Point, b: Point, edge: float) -> Point | None:
 
 
 def edge_before_fold(curve: Curve, point: Point, fold: Point, low: float, high: float) -> Point:
-    """Where the branch leaves the range before it turns; the fold itself where they are too near to tell apart."""
+    """Return where the branch leaves the range before it turns; the fold where they are too near to tell apart."""
     edge = low if float(fold.X[-1]) < low else high
     return at_edge(curve, point, fold, edge) or fold
 
@@ -108,7 +108,7 @@ def passed(
 
 
 def _at_an_end(point: Point) -> bool:
-    """Whether the largest margin stands where its visit begins or ends."""
+    """Return whether the largest margin stands where its visit begins or ends."""
     visit, k = point.path.touched
     times = point.solved.times
     ends = np.abs(times[visit : visit + 2] - point.path.place[visit, k])
@@ -183,7 +183,7 @@ def _has_pair(point: Point) -> bool:
 
 
 def _name(kind: str, curve: Curve, point: Point) -> str:
-    """What a crossing of branches is: the flip where a doubled orbit is born, a pitchfork where a symmetry breaks."""
+    """Name a crossing of branches: the flip of the orbit of half the period, a pitchfork where a symmetry breaks."""
     if kind == "fold" and swing(curve, point) < NOTHING:
         return "hopf"
     if kind != "branch":

@@ -101,7 +101,7 @@ def orbit_dataset(orbit: Orbit) -> xr.Dataset:
     import xarray as xr
 
     from nonsmooth.results.labels import labels_of
-    from nonsmooth.results.provenance import provenance
+    from nonsmooth.results.provenance import provenance, with_short_record
     from nonsmooth.results.schema import parameter_coords, state_coords
 
     labels = labels_of(orbit.system)
@@ -134,4 +134,4 @@ def orbit_dataset(orbit: Orbit) -> xr.Dataset:
         "component": ("component", np.array(names, dtype=str)), "column": ("column", np.array(names, dtype=str)),
         "indicator": ("indicator", np.array(list(orbit.clearance), dtype=str)),
     }  # fmt: skip
-    return xr.Dataset(variables, coords, attrs)
+    return with_short_record(xr.Dataset(variables, coords, attrs))

@@ -66,7 +66,7 @@ def find_orbit(
         Forcing periods to wait first (autonomous systems: rounds). 0 takes the start as it is, and an unstable orbit
         near it too.
     max_period : int
-        The longest period looked for.
+        The longest period searched.
     budget : float
         Seconds of processor time after which the search ends with an error (``budget``); compiling does not count.
     progress : bool
@@ -110,7 +110,7 @@ def find_orbit(
 def _guesses(
     system: System, state: State, period_number: int | None, transient: int, max_period: int, search: Search
 ) -> list[Guess]:
-    """Stretches of the motion that nearly close.
+    """Intervals of the motion that nearly close.
 
     Raises
     ------
@@ -229,7 +229,7 @@ def _scale(shooting: Shooting, size: FloatArray, period: float) -> FloatArray:
 
 
 def _is_near(orbit: Orbit, guess: Guess, gap: float, left: FloatArray) -> bool:
-    """Whether an orbit is the one that a motion settles on: as near as its gap says.
+    """Return whether an orbit is the one that a motion settles on: as near as its gap says.
 
     A slow motion closes better than it is near: by the multipliers, the orbit is (I - M)^-1 times the gap away.
     """

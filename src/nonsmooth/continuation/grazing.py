@@ -6,8 +6,8 @@ matrices of the contact put in at the touch, in the limit of a contact of no len
 .. math:: S = \lim R_z + \frac{(f^+ - R_z f^- - R_t) h_z}{h_t + h_z f^-}.
 
 Equal signs of det(I - M-) and det(I - M+): the orbit goes on (persistence). Unequal ones: both orbits lie on the same
-side and meet (a non-smooth fold). Unequal signs of det(I + M-) and det(I + M+): an orbit of twice the period is born
-at the graze. A rigid impact has f+ - R_z f- not zero at the touch and a multiplier without bound; the signs still
+side and meet (a non-smooth fold). Unequal signs of det(I + M-) and det(I + M+): an orbit of twice the period branches
+off at the graze. A rigid impact has f+ - R_z f- not zero at the touch and a multiplier without bound; the signs still
 decide.
 """
 
@@ -38,7 +38,7 @@ ASIDE = 1e-6  # of the period: the touch is looked at from this far before and b
 
 @dataclass
 class Graze:
-    """What happens at a graze; ``kind`` is ``"persistence"`` or ``"non_smooth_fold"``."""
+    """Outcome of a graze; ``kind`` is ``"persistence"`` or ``"non_smooth_fold"``."""
 
     kind: str
     bounded: bool

@@ -1,4 +1,4 @@
-"""Where a march leaves its signature: what is recorded there, and the curve on which it goes on."""
+"""End of a signature on a march: the record of it, and the curve on which the march goes on."""
 
 from __future__ import annotations
 
@@ -71,9 +71,10 @@ def _indicator(curve: Curve, point: Point, kind: str) -> int:
     """The indicator that an unexplained event is about (-1: not known)."""
     if kind == "touch":
         visit, k = point.path.touched
-        return int(curve.walk.rows[point.path.which[visit, k], 0])
+        return int(curve.walk.net.rows[point.path.which[visit, k], 0])
     if kind == "landed":
         k = int(point.path.landing[int(point.path.landed.argmax())])
-        rows = curve.walk.rows[curve.walk.transitions[k, 2] : curve.walk.transitions[k, 3], 0]
+        net = curve.walk.net
+        rows = net.rows[net.row_start[k] : net.row_start[k + 1], 0]
         return int(rows[0]) if len(rows) == 1 else -1
     return -1

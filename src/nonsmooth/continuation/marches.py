@@ -1,4 +1,4 @@
-"""What a march along a branch collects, how it ended, and what Ctrl-C does to it."""
+"""Points and special points that a march along a branch collects, its ending, and its answer to Ctrl-C."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ class March:
 
 @dataclass
 class Limits:
-    """What bounds a march."""
+    """Limits of a march."""
 
     low: float
     high: float

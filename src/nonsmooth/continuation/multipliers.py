@@ -42,7 +42,7 @@ def without_own(mu: ComplexArray, forced: bool) -> ComplexArray:
 
 
 def stable_by(mu: ComplexArray, forced: bool) -> bool:
-    """Whether all multipliers (but the orbit's own 1) lie inside the unit circle."""
+    """Return whether all multipliers (but the orbit's own 1) lie inside the unit circle."""
     others = without_own(mu, forced)
     return bool(not len(others) or np.abs(others).max() < 1.0 - EDGE)
 

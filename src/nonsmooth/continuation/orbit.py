@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from nonsmooth.continuation.multipliers import multipliers_of, stability, stable_by
 from nonsmooth.continuation.signature import Signature
+from nonsmooth.results.representation import cut, html_table
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -124,18 +125,26 @@ class Orbit:
         return xr.Dataset(variables, {"state": list(self.system.states)})
 
     def __repr__(self) -> str:
+        title, rows = self._shown()
+        return "\n".join([f"<{title}", *(f"  {head}: {text}" for head, text in rows)]) + ">"
+
+    def _repr_html_(self) -> str:
+        return html_table(*self._shown())
+
+    def _shown(self) -> tuple[str, list[tuple[str, str]]]:
+        """Title and rows of the representations."""
         name = f"period-{self.period_number}" if self.period_number else "autonomous"
         words = stability(self.floquet_multipliers, self.period_number > 0)
         if self.virtual:
             words = "virtual"
         numbers = ", ".join(f"{mu:.6g}" for mu in self.floquet_multipliers)
         state = ", ".join(f"{k} = {v:.9g}" for k, v in zip(self.system.states, self.u, strict=True))
-        return (
-            f"<Orbit of {self.system.name!r}: {name}, {words}, period {self.period:.9g}\n"
-            f"  section: {state} (mode {self.mode!r})\n"
-            f"  multipliers: {numbers}\n"
-            f"  signature: {self.signature.text(self.system.traced)}>"
-        )
+        signature, crossings = self.signature.text(self.system.traced), len(self.signature.crossings)
+        if (short := cut(signature)) != signature:
+            short += f" ({crossings} transitions)"
+        return f"Orbit of {self.system.name!r}: {name}, {words}, period {self.period:.9g}", [
+            ("section", f"{cut(state)} (mode {self.mode!r})"), ("multipliers", cut(numbers)), ("signature", short),
+        ]  # fmt: skip
 
     def to_dataset(self) -> xr.Dataset:
         """The orbit as a Dataset that can be saved; ``from_dataset`` reads it back."""

@@ -1,4 +1,4 @@
-"""The other branches through a special point: of twice the period, through a pitchfork, born at a Hopf point."""
+"""The other branches through a special point: of twice the period, through a pitchfork, from a Hopf point."""
 
 from __future__ import annotations
 
@@ -109,13 +109,13 @@ def straight_on(start: xr.Dataset, name: str | None, given: Any, asked: Asked) -
 
 
 def born(start: xr.Dataset, name: str | None, given: Any, asked: Asked) -> xr.Dataset:
-    """The cycles that are born at a Hopf point."""
+    """The cycles that emanate from a Hopf point."""
     from nonsmooth.continuation.born import first_cycle
 
     start = one_row(start, "continue_orbit")
     kind = str(start["kind"].values)
     if kind != "hopf":
-        raise ValueError(f"no cycle is born at a {kind}: that happens at a hopf point")
+        raise ValueError(f"no cycle emanates from a {kind}: that happens at a hopf point")
     system, own, value, mode, u, before = hopf_row(start)
     _check_parameter(name, own)
     low, high = limits(system, own, before if given is None else given, value)

@@ -26,7 +26,7 @@ VIOLATIONS = ("touch", "short", "slow", "own", "others", "landed")
 
 @dataclass
 class Path:
-    """What a walk along an orbit saw; see ``kernels.orbit_path`` for the arrays over (visit, transition)."""
+    """Extremes and margins along an orbit; see ``kernels.orbit_path`` for the arrays over (visit, transition)."""
 
     maximum: FloatArray  # (n_u,)
     minimum: FloatArray
@@ -59,7 +59,7 @@ class Walk:
     """Walks along orbits of one system with one signature."""
 
     def __init__(self, shooting: Shooting) -> None:
-        from nonsmooth.flow.series_tables import pack_net
+        from nonsmooth.flow.loop import pack_net
         from nonsmooth.kernels.pointers import addresses
         from nonsmooth.system.generate import compile_model
 
@@ -67,14 +67,14 @@ class Walk:
         traced: Traced = system.traced
         self.model = compile_model(traced)
         self.functions = addresses(self.model.jet)
-        self.first, self.outgoing, self.transitions, self.rows, at = pack_net(traced)
-        n_t = len(self.transitions)
+        self.net = pack_net(traced)
+        n_t = len(traced.transitions)
         n, m = len(traced.u), shooting.m + 1
         visits = shooting.signature.visits
         self.modes = shooting.modes
         self.fired = np.array([v.transition for v in visits], dtype=np.int64)
         self.fired_row = np.array(
-            [-1 if v.row < 0 else int(self.transitions[v.transition, 2]) + v.row for v in visits], dtype=np.int64
+            [-1 if v.row < 0 else int(self.net.row_start[v.transition]) + v.row for v in visits], dtype=np.int64
         )
         self.lacking = np.array(traced.lacking, dtype=np.int64).reshape(len(traced.mode_names), n)
         self.weight = system.scale_vector() * 1e-3
@@ -85,8 +85,8 @@ class Walk:
         )  # fmt: skip
         self.shape = (m, n_t)
         self.n = n
-        conditions = np.array([a < 0 for a in at], dtype=bool)
-        armed = [[self.transitions[k, 0] == mode for k in range(n_t)] for mode in self.modes]
+        conditions = self.net.at < 0
+        armed = [[traced.transitions[k].source == mode for k in range(n_t)] for mode in self.modes]
         self.armed = np.array(armed, dtype=bool).reshape(m, n_t)
         self.armed &= conditions[None, :]
         self.elsewhere = self.armed.copy()  # transitions that could fire at the end of a visit but do not
@@ -107,7 +107,7 @@ class Walk:
             if self.at_once[i - 1]:
                 self.crossed[i] = self.crossed[i - 1]
             elif self.fired_row[i - 1] >= 0:
-                self.crossed[i, self.rows[self.fired_row[i - 1], 0]] = True
+                self.crossed[i, self.net.rows[self.fired_row[i - 1], 0]] = True
         for i in range(m):  # of conditions that hold together the first is taken
             if self.at_once[i]:
                 self.elsewhere[i, self.fired[i] :] = False
@@ -126,10 +126,9 @@ class Walk:
         which, slope = np.empty((m, n_t), dtype=np.int64), np.empty((m, 2))
         tau = np.where(self.at_once, 0.0, solved.times[1:] - solved.times[:-1])
         status = follow(
-            self.functions, ORDER, RTOL, self.weight, self.lacking, self.first, self.outgoing, self.transitions,
-            self.rows, solved.values, self.modes, solved.times[:-1], tau, np.ascontiguousarray(states), self.fired,
-            self.fired_row, *self.scratch, extremes, inner, place, which, begin, begin_row, size,
-            end, slope,
+            self.functions, ORDER, RTOL, self.weight, self.lacking, self.net, solved.values, self.modes,
+            solved.times[:-1], tau, np.ascontiguousarray(states), self.fired, self.fired_row, *self.scratch, extremes,
+            inner, place, which, begin, begin_row, size, end, slope,
         )  # fmt: skip
         if status:
             return None
@@ -143,7 +142,7 @@ class Walk:
             others = rest[np.arange(m - 1), other]
         else:
             other, others = np.zeros(m - 1, dtype=np.int64), np.full(m - 1, -np.inf)
-        held = self._held(begin, begin_row, size) if len(self.rows) else np.full((m, 1), -np.inf)
+        held = self._held(begin, begin_row, size) if len(self.net.rows) > 2 else np.full((m, 1), -np.inf)
         landing = held.argmax(axis=1)
         extremes[~np.isfinite(extremes)] = np.nan  # states that no visit has
         return Path(
@@ -158,8 +157,8 @@ class Walk:
         Beside a boundary that has just been crossed only what is solved for tells which side is meant."""
         crossed = self.crossed.copy()
         for i in np.flatnonzero(self.shooting.divided):  # the exit lies in the surface of the entry
-            crossed[i, self.rows[self.fired_row[i], 0]] = True
-        near = np.where(np.take_along_axis(crossed, self.rows[row, 0], axis=1), SOLVED, ROUNDING)
+            crossed[i, self.net.rows[self.fired_row[i], 0]] = True
+        near = np.where(np.take_along_axis(crossed, self.net.rows[row, 0], axis=1), SOLVED, ROUNDING)
         zero = np.abs(begin) <= near * size
         held = np.where(self.armed & ~zero, begin, -np.inf)
         held[0] = -np.inf  # the section is passed, nothing has led there
@@ -172,7 +171,7 @@ class Walk:
         """Per indicator the least distance left to a transition that did not happen; NaN where none came near."""
         found = np.full(indicators, np.nan)
         for visit, k in np.argwhere(np.isfinite(path.inner)):
-            i = int(self.rows[path.which[visit, k], 0])
+            i = int(self.net.rows[path.which[visit, k], 0])
             distance = -path.inner[visit, k]
             if not found[i] <= distance:
                 found[i] = distance

@@ -1,6 +1,6 @@
 """Orbits, branches and rows of special points read back from their Datasets, and refused where they are damaged.
 
-An index that points nowhere would end in a traceback, a negative one in another orbit without a word; so the signatures
+An index that points nowhere would end in a traceback, a negative one silently in another orbit; so the signatures
 are checked against the system, and the unknowns against the signatures.
 """
 
@@ -35,7 +35,7 @@ _POINT = ("layout", "unknowns", "tangent", "mode", "section", "maximum", "minimu
 
 @contextmanager
 def _undamaged(what: str) -> Iterator[None]:
-    """What is missing or does not fit together, as one sentence."""
+    """Turn what is missing or does not fit together into one sentence."""
     try:
         yield
     except (AttributeError, IndexError, KeyError, TypeError, ValueError) as error:
@@ -48,13 +48,13 @@ def _undamaged(what: str) -> Iterator[None]:
 def recorded(dataset: xr.Dataset, what: str) -> tuple[dict[str, Any], System]:
     """The record of how a result was made, and its system at the parameters of the record."""
     from nonsmooth.results.provenance import read_provenance
-    from nonsmooth.system.system import System
+    from nonsmooth.system.origin import recorded_system
 
     if not hasattr(dataset, "data_vars"):
         raise TypeError(f"this {what} is read from its Dataset, not from {type(dataset).__name__}")
     source = read_provenance(dataset)
     with _undamaged(what):
-        system = System.from_text(source["system"]["text"]).with_parameters(source["system"]["parameters"])
+        system = recorded_system(source)
     return source, system
 
 

@@ -67,7 +67,7 @@ class BranchRecord:
 
 
 def point_record(curve: Curve, point: Point, virtual: bool = False) -> PointRecord:
-    """What is kept of a solved point."""
+    """Record of a solved point."""
     shooting, path = curve.shooting, point.path
     n_u = len(shooting.system.states)
     return PointRecord(
@@ -79,7 +79,7 @@ def point_record(curve: Curve, point: Point, virtual: bool = False) -> PointReco
 
 
 def special_record(special: Special) -> SpecialRecord:
-    """What is kept of a special point."""
+    """Record of a special point."""
     record = SpecialRecord(special.kind, special.row, special.indicator)
     g = special.graze
     if g is not None:

@@ -1,4 +1,4 @@
-"""How a branch goes on behind a change of signature.
+"""Continuation of a branch behind a change of signature.
 
 From the common orbit of both signatures it goes along the null vector of the new equations, on the side where the path
 is admissible.

@@ -121,7 +121,7 @@ def search_within(budget: float, label: str, enabled: bool) -> Iterator[Search]:
 
 
 def _joined(logs: list[Log]) -> Log:
-    """Logs of stretches that follow each other, as one."""
+    """Join the logs of segments that follow each other."""
     if len(logs) == 1:
         return logs[0]
     before = np.cumsum([0, *(len(log.crossing_time) for log in logs[:-1])])

@@ -30,7 +30,7 @@ NEAR = 0.2  # of the motion's size: a return farther off than this is no candida
 
 @dataclass
 class Guess:
-    """A stretch of motion that nearly closes, read as an orbit; ``gap`` tells how far off it closes (scaled)."""
+    """An interval of motion that nearly closes, read as an orbit; ``gap`` tells how far off it closes (scaled)."""
 
     period_number: int  # 0: autonomous
     period: float

@@ -35,7 +35,7 @@ LONGEST = 1e6
 REST = 1e-7  # of its scale: a motion smaller than this has come to rest
 AT_ONCE = 1e-12  # of a unit of time: what happens within it happens at the start
 ELSEWHERE = (
-    "Give start=, a state away from it, or follow the equilibrium with continue_equilibrium to where a cycle is born"
+    "Give start=, a state away from it, or follow the equilibrium with continue_equilibrium to where a cycle emanates"
 )
 
 
@@ -61,7 +61,7 @@ def autonomous_guesses(
         log, instants = run(duration)
         rounds = len(_passages(log, instants, system)[0])
         if not rounds and _at_rest(log, system):
-            _refuse_equilibrium(system, state, "the motion comes to rest:", AT_REST, stable=True)
+            _refuse_equilibrium(system, state, "the motion tends to an equilibrium:", AT_REST, stable=True)
         if rounds < FEW and duration < LONGEST:
             duration *= 4.0
         elif rounds > MANY:
@@ -69,7 +69,7 @@ def autonomous_guesses(
         else:
             break
     if rounds < 2:  # a motion that drifts passes once
-        _refuse_equilibrium(system, state, "the motion comes to rest:", AT_REST)
+        _refuse_equilibrium(system, state, "the motion tends to an equilibrium:", AT_REST)
         raise SolveError(
             f"the motion does not come back: over {duration:.3g} units of time the state that moves most passed the "
             "middle of its range at most once. There is no cycle here; give another start",
@@ -81,8 +81,9 @@ def autonomous_guesses(
         run(transient * one)
     log, instants = run(max((2 * (given or min(most, 8)) + 3), FEW) * one)
     if _at_rest(log, system):
-        _refuse_equilibrium(system, state, "the motion comes to rest:", AT_REST)
-        raise SolveError(f"the motion comes to rest: there is no cycle here. {ELSEWHERE}", status="equilibrium")
+        _refuse_equilibrium(system, state, "the motion tends to an equilibrium:", AT_REST)
+        said = f"the motion tends to an equilibrium: there is no cycle here. {ELSEWHERE}"
+        raise SolveError(said, status="equilibrium")
     found = _by_transitions(system, log, most, given) if len(log.crossing_time) > 1 else []
     return found or _by_level(system, log, instants, most, given)
 
@@ -118,7 +119,7 @@ def _passages(log: Log, instants: FloatArray, system: System) -> tuple[FloatArra
 
 
 def _at_rest(log: Log, system: System) -> bool:
-    """Whether the motion is as good as still, or shrinks steadily towards it."""
+    """Return whether the motion is as good as still, or shrinks steadily towards it."""
     _, _, half = _swing(log, system)
     return bool((half <= REST * system.scale_vector()).all())
 

@@ -1,4 +1,4 @@
-r"""Multiple shooting: one leg per visit of a mode, one Newton system for the whole orbit.
+r"""Multiple shooting: one segment per visit of a mode, one Newton system for the whole orbit.
 
 The unknowns are the state at the section, the instant of every transition and the state after it (an autonomous
 orbit: the period too), and the active parameters:

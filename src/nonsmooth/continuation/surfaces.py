@@ -80,7 +80,7 @@ def divide(
 
 
 def _coincide(a: FloatArray, h: float, b: FloatArray, g: float, z: FloatArray) -> bool:
-    """Whether two indicators with gradients a, b and values h, g near z are one, but for a positive factor."""
+    """Return whether two indicators with gradients a, b and values h, g near z are one, but for a positive factor."""
     size = float(np.sqrt((a @ a) * (b @ b)))
     if size == 0.0 or float(a @ b) < (1.0 - SAME) * size:
         return False

@@ -1,4 +1,4 @@
-"""Where branches cross: the other directions at a branch point, and orbits of twice the period at a flip."""
+"""Branch switching: the other directions at a branch point, and orbits of twice the period at a flip."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def branch_point(curve: Curve, Y: FloatArray, *, tolerance: float = 1e-11, most:
 
 
 def is_doubled(curve: Curve, point: Point) -> bool:
-    """Whether an orbit is a shorter one gone round twice: where a doubled branch meets the flip it comes from."""
+    """Return whether an orbit is a shorter one gone round twice, as where a doubled branch meets its flip."""
     shooting = curve.shooting
     visits, m = shooting.signature.visits, shooting.m
     if m % 2 or (shooting.forced and shooting.period_number % 2):
@@ -109,7 +109,7 @@ def is_doubled(curve: Curve, point: Point) -> bool:
 
 
 def breaks_symmetry(curve: Curve, point: Point) -> bool:
-    """Whether an orbit at a branch point is its own mirror image under the system's declared symmetry."""
+    """Return whether an orbit at a branch point is its own mirror image under the system's declared symmetry."""
     symmetry = curve.shooting.system.symmetry
     if symmetry is None:
         return False

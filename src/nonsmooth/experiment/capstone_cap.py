@@ -1,6 +1,6 @@
-"""PASCO Capstone experiments (``.cap``): a ZIP archive with ``main.xml`` and one member per stretch of data.
+"""PASCO Capstone experiments (``.cap``): a ZIP archive with ``main.xml`` and one member per block of data.
 
-``DataSource`` is a measurement, ``DataSet`` one run of it, ``DataSegmentElement`` a stretch. A member is a row of
+``DataSource`` is a measurement, ``DataSet`` one run of it, ``DataSegmentElement`` a block. A member is a row of
 12-byte records, a valid flag (u32) and a value (f64), little-endian; the members are longer than what was measured, so
 trailing records have the flag 0, and the number of valid ones equals ``DataCacheDataSize``. A flag of 2 begins text
 that a user typed into a table; it is no measurement and is left out with a remark. ``BaseUnit`` is a unit, or the
@@ -57,7 +57,7 @@ def read(data: bytes, source: Source, options: Options) -> Reading:
 
 
 def _groups(experiment: Experiment, reading: Reading) -> Iterator[list[Segment]]:
-    """The stretches of one measurement in one run, together."""
+    """The blocks of one measurement in one run, together."""
     groups: dict[int, list[Segment]] = {}
     for segment in experiment.segments:
         if segment.deleted:

@@ -32,7 +32,7 @@ _PORT = re.compile(r"(?P<measurement>.+), Ch (?P<port>[^,]+)", re.DOTALL)
 
 
 def looks_like_capstone(data: bytes, options: Options) -> bool:
-    """Whether the first line holds a ``Time`` column with a run's name, and another column of that run."""
+    """Return whether the first line holds a ``Time`` column with a run's name, and another column of that run."""
     source = Source("", len(data), "", "")
     begin = data[: 1 << 20]
     end = begin.find(b"\n") + 1 or len(begin)

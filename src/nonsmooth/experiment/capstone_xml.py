@@ -22,7 +22,7 @@ _UNIT_WORDS = ("UnitSymbol", "SymbolName", "Symbol", "ShortName", "UnitName", "N
 
 @dataclass
 class Segment:
-    """One stretch of one run: the members with its values and, where the clock is not even, its times."""
+    """One block of one run: the members with its values and, where the clock is not even, its times."""
 
     measurement: str
     channel: str
@@ -40,7 +40,7 @@ class Segment:
 
 @dataclass
 class Experiment:
-    """What ``main.xml`` says; ``units`` are those that its own tables name by a number."""
+    """Contents of ``main.xml``; ``units`` are those that its own tables name by a number."""
 
     header: dict[str, str] = field(default_factory=dict)
     sensors: list[dict[str, str]] = field(default_factory=list)
@@ -138,7 +138,7 @@ class _Handler:
         self._open.pop()
         if name == "DataSegmentElement" and self._segment is not None:
             if len(self.found.segments) >= 4 * MAX_COLUMNS:
-                raise self._error(f"holds more than {4 * MAX_COLUMNS} stretches of data")
+                raise self._error(f"holds more than {4 * MAX_COLUMNS} blocks of data")
             if self._segment.values:
                 self.found.segments.append(self._segment)
             elif len(self.found.empty) < MAX_COLUMNS:

@@ -1,4 +1,4 @@
-"""How much a file may ask for. A recording comes from elsewhere; what it claims is checked against what it weighs."""
+"""Limits on what a file may claim. A recording comes from elsewhere; claims are checked against its size."""
 
 from __future__ import annotations
 

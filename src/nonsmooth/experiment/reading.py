@@ -1,4 +1,4 @@
-"""What every reader hands over: traces (one channel of one run), remarks, and the file they came from.
+"""Result of every reader: traces (one channel of one run), remarks, and the file they came from.
 
 A reader is a function ``read(data: bytes, source: Source, options: Options) -> Reading``. It takes the whole file as
 bytes, touches no disk, raises only ``DataFileError``, and leaves rates, grouping and labels to ``assemble``.
@@ -80,7 +80,7 @@ class Trace:
     attrs: Mapping[str, str] = field(default_factory=dict)
 
     def place(self, index: int) -> str:
-        """Where sample ``index`` stands in the file."""
+        """Place of sample ``index`` in the file, in words."""
         if self.lines is not None:
             return f"line {self.lines[index]}"
         return f"{self.origin}, sample {index + 1}"
@@ -98,7 +98,7 @@ class Reading:
 
 
 def is_axis_name(name: str, axis: str) -> bool:
-    """Whether a column of this name is the axis: its own name, or any word for time when the axis is time."""
+    """Return whether a column of this name is the axis: its own name, or any word for time when the axis is time."""
     word = name.strip().casefold()
     if word == axis.casefold():
         return True

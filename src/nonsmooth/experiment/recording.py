@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.results.provenance import ATTRIBUTE
+from nonsmooth.results.provenance import ATTRIBUTE, COORDINATE
+from nonsmooth.results.representation import cut, html_table
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -27,7 +28,7 @@ class RecordingWarning(UserWarning):
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """What was recorded, by run and sensor, with units, rates and where each channel came from.
+    """Recorded signals by run and sensor, with units, rates and where each channel came from.
 
     Read one with :func:`nonsmooth.load_recording`, or build one with :meth:`from_runs`.
 
@@ -151,6 +152,8 @@ class Recording:
         """
         import xarray as xr
 
+        from nonsmooth.results.provenance import with_short_record
+
         variables: dict[str, Any] = {}
         coords: dict[str, Any] = {}
         for i, (run, sensor, ds) in enumerate(self._sensors(), 1):
@@ -163,18 +166,22 @@ class Recording:
                 variables[f"channel_{i}_{k}"] = (dim, array.values, {**array.attrs, **here, "channel": str(name)})
         runs = {run: dict(self.tree[run].attrs) for run in self.runs}
         attrs = {**self.tree.attrs, "run_attributes": json.dumps(runs, ensure_ascii=False)}
-        return xr.Dataset(variables, coords, attrs)
+        return with_short_record(xr.Dataset(variables, coords, attrs))
 
     @classmethod
     def from_dataset(cls, dataset: xr.Dataset) -> Recording:
         """The recording that :meth:`to_dataset` made the Dataset from; ValueError for any other Dataset."""
         import xarray as xr
 
+        from nonsmooth.results.provenance import read_provenance
+
         if "run_attributes" not in dataset.attrs or ATTRIBUTE not in dataset.attrs:
             raise ValueError("this Dataset was not made by Recording.to_dataset")
         run_attrs = json.loads(dataset.attrs["run_attributes"])
         runs: dict[str, dict[str, xr.Dataset]] = {run: {} for run in run_attrs}
         for axis_name, axis in dataset.coords.items():
+            if axis_name == COORDINATE:
+                continue
             own = dict(axis.attrs)
             run, sensor, dim = own.pop("run"), own.pop("sensor"), own.pop("axis")
             attrs = {key.removeprefix("sensor_"): own.pop(key) for key in list(own) if key.startswith("sensor_")}
@@ -185,27 +192,41 @@ class Recording:
                     kept = {key: value for key, value in array.attrs.items() if key not in ("run", "sensor", "channel")}
                     data[array.attrs["channel"]] = (dim, array.values, kept)
             runs[run][sensor] = xr.Dataset(data, {dim: (dim, axis.values, own)}, attrs)
-        record = json.loads(dataset.attrs[ATTRIBUTE])
+        record = read_provenance(dataset)
         return cls.from_runs(
             runs, synthetic=record["synthetic"], source=record["source"], warnings=tuple(record["warnings"]),
             run_attrs=run_attrs,
         )  # fmt: skip
 
     def __repr__(self) -> str:
-        name = self.source.get("file") or "in memory"
-        lines = [f"Recording of {name} ({self.source.get('format')}{', synthetic' if self.synthetic else ''})"]
-        rows = list(self._sensors())
-        for run, _, ds in rows[:20]:
-            (axis,) = ds.dims
-            rate = float(ds.attrs.get("rate", np.nan))
-            clock = f" at {rate:.6g} Hz" if np.isfinite(rate) else ""
-            shown = ", ".join(f"{c} [{a.attrs['units'] or '?'}]" for c, a in ds.data_vars.items())
-            lines.append(f"  {run}: {ds.sizes[axis]} samples{clock}: {shown}")
+        rows = self._rows()
+        lines = [
+            f"  {run}: {n} samples{f' at {clock}' if clock else ''}: {cut(names)}" for run, n, clock, names in rows[:20]
+        ]
         if len(rows) > 20:
             lines.append(f"  and {len(rows) - 20} more sensors")
         if self.warnings:
             lines.append(f"  {len(self.warnings)} warnings: see .warnings")
-        return "\n".join(lines)
+        return "\n".join([self._title(), *lines])
+
+    def _repr_html_(self) -> str:
+        header = ("run", "samples", "rate", "channels")
+        return html_table(self._title(), self._rows(), header=header, details=self.warnings, of="warnings")
+
+    def _title(self) -> str:
+        name = self.source.get("file") or "in memory"
+        return f"Recording of {name} ({self.source.get('format')}{', synthetic' if self.synthetic else ''})"
+
+    def _rows(self) -> list[tuple[str, str, str, str]]:
+        """Run, number of samples, rate and channels of each sensor."""
+        rows = []
+        for run, _, ds in self._sensors():
+            (axis,) = ds.dims
+            rate = float(ds.attrs.get("rate", np.nan))
+            clock = f"{rate:.6g} Hz" if np.isfinite(rate) else ""
+            names = ", ".join(f"{c} [{a.attrs['units'] or '?'}]" for c, a in ds.data_vars.items())
+            rows.append((run, str(ds.sizes[axis]), clock, names))
+        return rows
 
     def _sensors(self) -> Iterator[tuple[str, str, xr.Dataset]]:
         for run, node in self.tree.children.items():

@@ -1,4 +1,4 @@
-"""What a user should know about a recording, collected while it is read; equal remarks on channels become one."""
+"""Remarks on a recording, collected while it is read; equal remarks on channels become one."""
 
 from __future__ import annotations
 

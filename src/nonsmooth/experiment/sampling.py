@@ -1,4 +1,4 @@
-"""What a time axis says of its sampling: the rate, gaps, a change of rate, times printed with too few digits."""
+"""Sampling read off a time axis: the rate, gaps, a change of rate, times printed with too few digits."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def examine(time: NDArray[np.float64]) -> Sampling:
 
 
 def missing_runs(values: NDArray[np.float64]) -> tuple[int, int, int]:
-    """How many values are not finite, and the first index and length of the longest run of them."""
+    """Number of values that are not finite, and the first index and length of the longest run of them."""
     bad = ~np.isfinite(values)
     total = int(np.count_nonzero(bad))
     if total == 0:

@@ -104,7 +104,7 @@ class Cells:
     lines: NDArray[np.int64]
 
     def blanks(self, column: int) -> tuple[int, int]:
-        """How many rows after a column's last value are blank, and how many before it."""
+        """Number of blank rows after a column's last value, and before it."""
         held = self.rows[column]
         if len(held) == 0:
             return len(self.lines), 0

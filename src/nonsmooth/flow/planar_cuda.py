@@ -10,7 +10,8 @@ import numpy as np
 
 from nonsmooth.flow.engine import FloatArray, IntArray
 from nonsmooth.flow.launches import launch
-from nonsmooth.flow.linear import DIVERGENCE, PlanarEngine
+from nonsmooth.flow.linear import PlanarEngine
+from nonsmooth.flow.loop import DIVERGENCE
 from nonsmooth.kernels import codes
 
 __all__ = ["SLICE", "Buffers", "PlanarOnGpu", "States"]
@@ -154,7 +155,7 @@ def _not_empty(array: Any) -> Any:
 def _packed(form: Any) -> FloatArray:
     """All numbers of a parameter point as one column, in the order in which a thread unpacks them."""
     n_points = len(form.A)
-    parts = [form.omega, form.period, *form[:4], *form[7:]]
+    parts = [form.omega, form.period, *form[:4], *form[7:-1]]
     columns = []
     for part in parts:
         shape = [n_points, *(max(n, 1) for n in part.shape[1:])]

@@ -36,25 +36,70 @@ FloatArray = NDArray[np.float64]
 class Jump:
     """A transition at (t, z): the state after it and all first derivatives.
 
-    ``row`` is the row of the condition whose indicator is zero (-1: at a given phase), ``indicator`` that indicator.
+    ``R``, ``fields``, ``S`` and ``instant`` count the active parameters behind the n numbers of z: N in all. ``row`` is
+    the row of the condition whose indicator is zero (-1: at a given phase), ``indicator`` that indicator.
     """
 
     z_after: FloatArray  # (n,)
-    R_z: FloatArray  # (n, n)
-    R_t: FloatArray  # (n,)
-    R_p: FloatArray  # (n, n_active)
+    R: FloatArray  # (N, N) derivative of the map
+    fields: FloatArray  # (3, N) f-, f+, and the map's derivative in time
     h: float
     h_z: FloatArray  # (n,)
     h_t: float
     h_p: FloatArray  # (n_active,)
-    f_before: FloatArray  # (n,)
-    f_after: FloatArray  # (n,)
-    saltation: FloatArray  # (n, n)
-    parameter_column: FloatArray  # (n, n_active)
-    t_z: FloatArray  # (n,) derivatives of the instant
-    t_p: FloatArray  # (n_active,)
+    S: FloatArray  # (N, N)
+    instant: FloatArray  # (N,) derivatives of the instant
     row: int
     indicator: int
+
+    @property
+    def n(self) -> int:
+        return len(self.z_after)
+
+    @property
+    def R_z(self) -> FloatArray:
+        """(n, n)"""
+        return self.R[: self.n, : self.n]
+
+    @property
+    def R_t(self) -> FloatArray:
+        """(n,)"""
+        return self.fields[2, : self.n]
+
+    @property
+    def R_p(self) -> FloatArray:
+        """(n, n_active)"""
+        return self.R[: self.n, self.n :]
+
+    @property
+    def f_before(self) -> FloatArray:
+        """(n,)"""
+        return self.fields[0, : self.n]
+
+    @property
+    def f_after(self) -> FloatArray:
+        """(n,)"""
+        return self.fields[1, : self.n]
+
+    @property
+    def saltation(self) -> FloatArray:
+        """(n, n)"""
+        return self.S[: self.n, : self.n]
+
+    @property
+    def parameter_column(self) -> FloatArray:
+        """(n, n_active)"""
+        return self.S[: self.n, self.n :]
+
+    @property
+    def t_z(self) -> FloatArray:
+        """(n,) derivative of the instant"""
+        return self.instant[: self.n]
+
+    @property
+    def t_p(self) -> FloatArray:
+        """(n_active,)"""
+        return self.instant[self.n :]
 
     @property
     def rate(self) -> float:
@@ -96,10 +141,9 @@ def chained(jumps: list[Jump]) -> Jump:
 
 
 def _then(a: Jump, b: Jump) -> Jump:
-    r_z = b.R_z @ a.R_z
-    r_t, r_p = b.R_z @ a.R_t + b.R_t, b.R_z @ a.R_p + b.R_p
-    slip = r_z @ a.f_before + r_t - b.f_after
-    return Jump(
-        b.z_after, r_z, r_t, r_p, a.h, a.h_z, a.h_t, a.h_p, a.f_before, b.f_after,
-        r_z + np.outer(slip, a.t_z), r_p + np.outer(slip, a.t_p), a.t_z, a.t_p, a.row, a.indicator,
-    )  # fmt: skip
+    from nonsmooth.kernels.legs import Crossing, follow
+
+    both = Crossing(a.S.copy(), b.R, np.empty_like(a.S), b.fields, a.instant)
+    follow(both)
+    fields = np.array([a.fields[0], b.fields[1], b.R @ a.fields[2] + b.fields[2]])
+    return Jump(b.z_after, b.R @ a.R, fields, a.h, a.h_z, a.h_t, a.h_p, both.step, a.instant, a.row, a.indicator)

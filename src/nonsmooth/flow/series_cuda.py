@@ -12,15 +12,11 @@ from nonsmooth.flow.launches import launch
 from nonsmooth.flow.series import SeriesEngine
 from nonsmooth.flow.series_tables import Tables
 from nonsmooth.kernels import codes
-from nonsmooth.kernels import series_places as place
 
 __all__ = ["PART", "STEPS", "Buffers", "SeriesOnGpu", "States", "module_of"]
 
 STEPS = 1024  # of one launch, at most: below a second also on a small GPU
 PART = 0.75  # of ``devices.batch_size`` in one launch: what the registers hold by the compiler's choice (168 of each)
-CONSTANTS = (
-    "METHOD", "ORDER", "CHECKED", "CORNERS", "NONLINEAR_ROWS", "N_GUARDS", "N_PARAMETERS", "N_INDICATORS", "N_OUTPUTS",
-)  # fmt: skip
 
 
 @dataclass
@@ -82,15 +78,17 @@ def module_of(engine: SeriesEngine, tables: Tables) -> Any:
     from nonsmooth.kernels.cuda_series_module import cuda_series_module, cuda_series_source
     from nonsmooth.system.generate import model_source
 
-    first, outgoing, transitions, rows, at = engine.net
-    choice = engine.choice(tables)
-    sizes = {name: int(choice[getattr(place, name)]) for name in CONSTANTS} | {
-        "N_MEMORY": len(engine.traced.m), "N_SCRATCH_ROWS": engine.model.n_scratch,
+    net, form = engine.net, engine.generated(tables)
+    sizes = {
+        "METHOD": form.method, "ORDER": form.order, "CHECKED": form.checked, "CORNERS": form.corners,
+        "NONLINEAR_ROWS": form.nonlinear_rows, "N_GUARDS": form.guards, "N_PARAMETERS": len(engine.traced.p),
+        "N_INDICATORS": form.indicators, "N_OUTPUTS": form.outputs, "N_MEMORY": len(engine.traced.m),
+        "N_SCRATCH_ROWS": engine.model.n_scratch,
     }  # fmt: skip
     arrays = {
-        "FIRST": first, "OUTGOING": _filled(outgoing, (1,)), "TRANSITIONS": _filled(transitions, (1, 6)),
-        "ROWS": _filled(rows, (1, 3)), "AT": at if len(at) else np.full(1, -1.0), "LACKING": engine.lacking,
-        "KINDS": engine.kinds,
+        "TRANSITIONS": _filled(net.transitions, (1, 3)), "ROWS": net.rows, "ROW_START": net.row_start,
+        "MODE_START": net.mode_start, "MODE_LIST": _filled(net.mode_list, (1,)),
+        "AT": net.at if len(net.at) else np.full(1, -1.0), "LACKING": engine.lacking, "KINDS": engine.kinds,
     }  # fmt: skip
     return cuda_series_module(cuda_series_source(model_source(engine.layers.model), sizes, arrays))
 
@@ -118,16 +116,16 @@ class SeriesOnGpu:
         self.n, self.n_memory = len(traced.u), len(traced.m)
         self.rows = self.n + len(traced.indicators) + len(traced.outputs)
         self.module, self.cuda, self.threads, self.plan = module_of(engine, tables), cuda, THREADS, plan
-        self.period: FloatArray = tables.periods
+        self.period: FloatArray = tables.period
         self.repeats = engine.repeats
         columns = points.T if points.shape[1] else np.zeros((1, len(points)))
         phase = plan.phase if plan.indicator < 0 else 0.0
         step = 0.0 if engine.step is None else engine.step
         self.tables = (
-            *map(cuda.to_device, (np.ascontiguousarray(columns), tables.periods, tables.steps)),
+            *map(cuda.to_device, (np.ascontiguousarray(columns), tables.period, tables.steps)),
             tuple(map(cuda.to_device, engine.norms)),
             cuda.to_device(np.array([plan.indicator, plan.rising, plan.mode, plan.after, plan.every], dtype=np.int64)),
-            cuda.to_device(np.array([engine.rtol, step, phase, plan.t_max])),
+            cuda.to_device(np.array([engine.rtol, step, phase, min(plan.t_max, 1e300)])),
         )
 
     def launch(self, entry: Any, jobs: IntArray, *arguments: Any) -> None:

@@ -14,7 +14,7 @@ from nonsmooth.flow.engine import FloatArray
 if TYPE_CHECKING:
     from nonsmooth.system.traced import Traced
 
-__all__ = ["Scratch", "Tables", "exact_steps", "pack_net", "periods"]
+__all__ = ["Tables", "exact_steps", "periods", "work_of"]
 
 
 @dataclass(frozen=True)
@@ -22,56 +22,30 @@ class Tables:
     """What ``prepare`` finds for P points; read only, shared by threads."""
 
     points: FloatArray  # (P, n_parameters)
-    periods: FloatArray  # (P,), inf where autonomous
+    period: FloatArray  # (P,), inf where autonomous
     steps: FloatArray  # (P, n_modes): length of an exact step
     nonlinear_rows: bool  # indicators whose series must be watched on an exact step
 
 
-@dataclass(frozen=True)
-class Scratch:
-    """Working memory of one running kernel, in the order in which ``kernels.series.march`` takes it apart."""
+def work_of(
+    n: int, n_indicators: int, rows: int, n_modes: int, n_rows: int, n_q: int, order: int, n_scratch: int
+) -> Any:
+    """Working memory of one running kernel (``kernels.records.SeriesWork``)."""
+    from nonsmooth.kernels.block import one_block
+    from nonsmooth.kernels.polynomial import stack_size
+    from nonsmooth.kernels.records import SeriesWork
+    from nonsmooth.kernels.series_places import N_SERIES_MEMO, N_SERIES_TALLY
 
-    arrays: tuple[Any, ...]
-
-    @classmethod
-    def of(
-        cls, n: int, n_indicators: int, rows: int, n_modes: int, n_rows: int, n_q: int, order: int, n_scratch: int
-    ) -> Scratch:
-        from nonsmooth.kernels.block import one_block
-        from nonsmooth.kernels.polynomial import stack_size
-
-        width = max(order, 6) + 1
-        vector, integers = np.zeros, lambda size: np.zeros(size, dtype=np.int64)
-        return cls(one_block(
-            np.zeros((rows, width)), np.zeros((n_scratch, width)), np.zeros((rows, width)), np.zeros((rows, width)),
-            tuple(vector(n) for _ in range(8)), vector(width), vector(width), vector(width), vector(rows - n),
-            vector(n), vector(n_q), vector(n_indicators), vector(n_indicators), integers(n_indicators),
-            integers(n_indicators), integers(n_rows), vector(n_modes), integers(n_modes),
-            vector(stack_size(width)), integers(2), vector(n), vector(n), vector(n_modes), vector(rows - n),
-        ))  # fmt: skip
-
-
-def pack_net(traced: Traced) -> tuple[Any, ...]:
-    """(first, outgoing, transitions, rows, at): see ``kernels.crossing``."""
-    integer = np.int64
-    leaving = [
-        [j for j, t in enumerate(traced.transitions) if t.source == mode] for mode in range(len(traced.mode_names))
-    ]
-    first = np.cumsum([0] + [len(one) for one in leaving], dtype=integer)
-    outgoing = np.array([j for one in leaving for j in one], dtype=integer)
-    ends = np.cumsum([0] + [len(t.rows) for t in traced.transitions])
-    transitions = np.array(
-        [
-            (t.source, t.target, ends[j], ends[j + 1], t.contact, t.reset is not None)
-            for j, t in enumerate(traced.transitions)
-        ],
-        dtype=integer,
-    ).reshape(-1, 6)
-    rows = np.array(
-        [(r.indicator, r.sign, r.strict) for t in traced.transitions for r in t.rows], dtype=integer
-    ).reshape(-1, 3)
-    at = np.array([-1.0 if t.at is None else t.at for t in traced.transitions], dtype=float)
-    return first, outgoing, transitions, rows, at
+    width = max(order, 6) + 1
+    vector, integers = np.zeros, lambda size: np.zeros(size, dtype=np.int64)
+    jets = [np.zeros((size, width)) for size in (rows, n_scratch, rows, rows)]
+    return SeriesWork(*one_block(
+        *(vector(n) for _ in range(5)), vector(n_q), vector(n_q), *jets, tuple(vector(n) for _ in range(8)),
+        vector(width), vector(width), vector(width), vector(rows - n), vector(rows - n), vector(n_indicators),
+        vector(n_indicators), integers(n_indicators), integers(n_indicators), integers(n_rows), vector(n_modes),
+        vector(n_modes), integers(n_modes), vector(stack_size(width)), integers(2), vector(n),
+        integers(N_SERIES_TALLY), vector(N_SERIES_MEMO),
+    ))  # fmt: skip
 
 
 @lru_cache(maxsize=64)

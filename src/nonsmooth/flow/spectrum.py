@@ -2,9 +2,9 @@ r"""How small changes grow along a trajectory: frames carried through legs and t
 
 The sums of the logarithms of what is divided out, over the elapsed time, are finite-time Lyapunov exponents. Their sum
 is :math:`\frac1t \log|\det\Phi(t)|`, which must equal
-:math:`\frac1t(\int \operatorname{div} f\,dt + \sum \log|\det S|)`. Two ways lead there: linear systems with an exact
-flow are marched with their frame in one kernel; every other trajectory is recorded by its engine piece by piece, and
-the frame follows it with Taylor legs.
+:math:`\frac1t(\int \operatorname{div} f\,dt + \sum \log|\det S|)`. Linear systems with an exact flow are marched with
+their frame in one kernel, and so is a motion of Taylor series without transitions. Every other trajectory is recorded
+by its engine piece by piece, and the frame follows it.
 
 References
 ----------
@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from nonsmooth.flow.engine import Engine, FloatArray, Log, State
 from nonsmooth.flow.linear import LinearEngine
+from nonsmooth.flow.series import SeriesEngine, order_for
 from nonsmooth.flow.variational import VariationalFlow
 from nonsmooth.kernels import codes
 
@@ -34,6 +35,8 @@ __all__ = ["Frame", "Growth", "frame_for"]
 CHUNK = 250  # units of time recorded at once
 APART = 1e3  # times the engine's tolerance: what a piece may end away from the record
 DENSEST = 4096  # samples per unit of time
+FINER = 0.1  # of the engine's tolerance: a step of the frame
+FINEST = 1e-11  # and no coarser than this
 
 
 @dataclass
@@ -84,22 +87,30 @@ class _LinearFrame:
         return Growth(record.growth, float(sums[0]), float(sums[1]), float(sums[3]), status)
 
 
-class _RecordedFrame:
-    """The engine records a stretch of the trajectory; the frame follows piece by piece."""
+class _SeriesFrame:
+    """Taylor series for the frame, along pieces of a trajectory that the engine records.
+
+    Where nothing can happen to the motion nothing is recorded: state and frame are marched as one."""
 
     def __init__(
         self, engine: Engine, tables: Any, flow: VariationalFlow, values: FloatArray, period: float | None, timed: bool
     ) -> None:
+        from nonsmooth.kernels.spectrum import Pace
+
         self.engine, self.tables, self.flow, self.values = engine, tables, flow, values
         self.period, self.timed = period, timed
         self.density = 1
-        self.active = np.zeros(flow.n, dtype=bool)
-        self.Q = np.zeros((flow.n, 0))
-        traced = flow.traced
-        self._transitions = np.array(
-            [(t.source, t.target, len(t.rows)) for t in traced.transitions], dtype=np.int64
-        ).reshape(-1, 3)
-        self._lacking = np.array(traced.lacking, dtype=bool).reshape(len(traced.mode_names), -1)
+        n, n_u = flow.n, flow.n_u
+        self.active = np.zeros(n, dtype=bool)
+        self.Q = np.zeros((n, 0))
+        self._lacking = np.array(flow.traced.lacking, dtype=bool).reshape(len(flow.traced.mode_names), -1)
+        self.rtol = float(getattr(engine, "rtol", 1e-9))
+        self.smooth = _smooth(engine, flow.traced)
+        weight, limit = flow.scale[:n_u], np.full(n_u, np.inf)
+        if isinstance(engine, SeriesEngine):
+            weight, _, limit = engine.norms
+        tolerance = max(min(FINER * self.rtol, FINEST), 1e-16)
+        self.pace = Pace(order_for(tolerance), float(np.log(tolerance)), weight, np.zeros(0), limit)
 
     def advance(self, state: State, count: int, unit: float) -> Growth:
         total = Growth(np.zeros((count, self.flow.n)), 0.0, 0.0, 1.0, codes.OK)
@@ -111,7 +122,7 @@ class _RecordedFrame:
         return total
 
     def _chunk(self, state: State, count: int, unit: float, total: Growth, done: int) -> None:
-        """Record and follow ``count`` units, into the rows of ``total`` from ``done`` on.
+        """Follow ``count`` units, into the rows of ``total`` from ``done`` on.
 
         A piece is marched from its recorded beginning, so in chaos it parts from the record; the frame would then go on
         along another motion. Where a piece ends too far away the stretch is done again with more samples."""
@@ -120,60 +131,79 @@ class _RecordedFrame:
         if self.period is None and not self.timed:
             state.clock[0] = 0.0
         at_start, Q, active = state.copy(), self.Q.copy(), self.active
-        limit = APART * float(getattr(self.engine, "rtol", 1e-9))
         while True:
-            log, apart, growth, sums, status = self._follow(state, count, unit)
-            if log.status not in (codes.OK, codes.NOT_GUARANTEED) or apart <= limit or self.density >= DENSEST:
+            status, growth, sums = (self._march if self.smooth else self._follow)(state, count, unit)
+            if growth is None or sums[4] <= APART * self.rtol or self.density >= DENSEST:
                 break
             self.density *= 4
             state.u[:], state.memory[:], state.clock[:] = at_start.u, at_start.memory, at_start.clock
             state.counters[:], state.settled = at_start.counters, at_start.settled
             self.Q, self.active = Q.copy(), active
-        if log.status not in (codes.OK, codes.NOT_GUARANTEED):
-            total.status = log.status
-            return
-        total.logarithms[done : done + count, : growth.shape[1]] += growth
-        total.divergence += sums[0]
-        total.determinants += sums[1]
-        total.nearest = min(total.nearest, sums[2])
-        if status != codes.OK or log.status != codes.OK:
-            total.status = status if status != codes.OK else log.status
+        if status != codes.OK:
+            total.status = status
+        if growth is not None:
+            total.logarithms[done : done + count, : growth.shape[1]] += growth
+            total.divergence += float(sums[0])
+            total.determinants += float(sums[1])
+            total.nearest = min(total.nearest, float(sums[3]))
 
-    def _follow(
-        self, state: State, count: int, unit: float
-    ) -> tuple[Log, float, FloatArray, tuple[float, float, float], int]:
-        """One attempt: (record, distance from it, logarithms, (divergence, determinants, nearest), status)."""
-        from nonsmooth.kernels.spectrum import grow
+    def _march(self, state: State, count: int, unit: float) -> tuple[int, FloatArray, FloatArray]:
+        """The motion itself with its frame, by the tolerance of the frame."""
+        from nonsmooth.kernels.spectrum import Pieces
 
-        density, n, flow = self.density, self.flow.n, self.flow
+        mode, begun = int(state.counters[0]), float(state.clock[0])
+        self._widen({mode}, set())
+        pieces = Pieces(
+            np.full(count, mode), begun + unit * np.arange(count), np.full(count, unit),
+            np.concatenate([state.u, state.memory])[None, :], np.arange(count), np.zeros(count + 1, dtype=np.int64),
+            np.zeros(0, dtype=np.int64), np.zeros((0, self.flow.n)),
+        )  # fmt: skip
+        found = self._grow(pieces, count)
+        state.u[:], state.settled = self.flow.scratch().u, True
+        state.clock[0] += 0.0 if unit == self.period else count * unit
+        if self.period is not None and unit == self.period:
+            state.clock[1] += count
+        elif self.period is not None:
+            state.clock[1], state.clock[0] = divmod(state.clock[0], self.period)
+        return found
+
+    def _follow(self, state: State, count: int, unit: float) -> tuple[int, FloatArray | None, FloatArray]:
+        """Record, and follow the record: (status, logarithms, sums of ``kernels.records.Growth``)."""
+        density, traced = self.density, self.flow.traced
         steps = np.arange(count * density + 1, dtype=np.float64)
         instants: FloatArray = float(state.clock[0]) + unit * (steps / density)
         log = self.engine.record(self.tables, state, float(instants[-1]), instants[:-1])
         if log.status not in (codes.OK, codes.NOT_GUARANTEED):
-            return log, 0.0, np.zeros((count, 0)), (0.0, 0.0, 1.0), codes.OK
-        self._widen(log)
-        columns = self.Q.shape[1]
-        growth, rates = np.zeros((count, columns)), np.ones(2 + 3 * n)
-        divergence, determinant = np.zeros(count), np.zeros(count)
-        rates[1] = 0.0
+            return log.status, None, np.zeros(5)
+        visited = {*log.sample_mode.tolist(), *(traced.transitions[k].target for k in log.crossing_transition)}
+        written = {i for k in set(log.crossing_transition.tolist()) for i, _ in traced.transitions[k].writes}
+        self._widen(visited, written)
+        status, growth, sums = self._grow(_pieces(traced, log, instants, density), count)
+        return status if status != codes.OK else log.status, growth, sums
+
+    def _grow(self, pieces: Any, count: int) -> tuple[int, FloatArray, FloatArray]:
+        """Carry the frame along the pieces."""
+        from nonsmooth.kernels.records import Growth as Record
+        from nonsmooth.kernels.spectrum import grow
+
+        flow, n, columns = self.flow, self.flow.n, self.Q.shape[1]
+        sums, square = np.array([0.0, 0.0, 0.0, 1.0, 0.0]), np.zeros((n, n))
+        record = Record(
+            flow.scale, self.Q, np.zeros((count, columns)), np.ones(columns), sums, square, square.copy(),
+            square.copy(), np.zeros((3, n)), np.zeros(n), np.zeros(n),
+        )  # fmt: skip
+        sizes = np.concatenate([np.zeros(len(flow.model.entries)), np.repeat(flow.scale[: flow.n_u], columns)])
         status = grow(
-            flow.functions, flow.model.entries, flow.model.kinds, self._transitions,
-            *_pieces(flow.traced, log, instants, density), self.values, flow.scale, self.Q, np.zeros((n, columns)),
-            np.zeros((n, n)), np.zeros((n, n)), growth, divergence, determinant, np.zeros(flow.n_out), rates,
+            flow.equations, pieces, self.pace._replace(sizes=sizes), self.values, record, np.zeros(flow.n_out),
             flow.scratch(),
         )  # fmt: skip
-        sums = float(divergence.sum()), float(determinant.sum()), float(rates[0])
-        return log, float(rates[1]), growth, sums, int(status)
+        return int(status), record.growth, sums
 
-    def _widen(self, log: Log) -> None:
+    def _widen(self, visited: set[int], written: set[int]) -> None:
         """Directions for the states of the modes now visited, and for the memory now written."""
-        traced, n_u = self.flow.traced, self.flow.n_u
-        visited = {*log.sample_mode.tolist(), *(traced.transitions[k].target for k in log.crossing_transition)}
         now = self.active.copy()
-        now[:n_u] |= ~self._lacking[sorted(visited)].all(axis=0)
-        for k in set(log.crossing_transition.tolist()):
-            for i, _ in traced.transitions[k].writes:
-                now[n_u + i] = True
+        now[: self.flow.n_u] |= ~self._lacking[sorted(visited)].all(axis=0)
+        now[[self.flow.n_u + i for i in written]] = True
         new = np.flatnonzero(now & ~self.active)
         if len(new):
             both = np.hstack([self.Q, np.eye(self.flow.n)[:, new]])
@@ -181,10 +211,12 @@ class _RecordedFrame:
             self.active = now
 
 
-def _pieces(traced: Traced, log: Log, instants: FloatArray, density: int) -> tuple[Any, ...]:
-    """Smooth pieces between samples and crossings: modes, t0, tau, z0, unit, first_jump, jumps, before.
+def _pieces(traced: Traced, log: Log, instants: FloatArray, density: int) -> Any:
+    """Smooth pieces between samples and crossings (``kernels.spectrum.Pieces``).
 
     A sample at the instant of a crossing is left out; transitions at one instant (a chain) form a group."""
+    from nonsmooth.kernels.spectrum import Pieces
+
     times, first = np.unique(log.crossing_time, return_index=True)
     ends = np.append(first, len(log.crossing_time))[1:]
     kept = ~np.isin(instants[:-1], times)
@@ -203,12 +235,19 @@ def _pieces(traced: Traced, log: Log, instants: FloatArray, density: int) -> tup
     count = np.zeros(len(t0), dtype=np.int64)
     count[following >= 0] = ends - first
     unit = np.clip(np.searchsorted(instants, t0, side="right") - 1, 0, len(instants) - 2)
-    return (
+    return Pieces(
         np.concatenate([log.sample_mode[kept], target[ends - 1]])[order].astype(np.int64), t0,
         np.diff(np.append(t0, instants[-1])), np.nan_to_num(np.vstack([sampled, after[ends - 1]])[order]),
         (unit // density).astype(np.int64), np.concatenate([[0], np.cumsum(count)]).astype(np.int64),
         log.crossing_transition.astype(np.int64), np.nan_to_num(at_end),
     )  # fmt: skip
+
+
+def _smooth(engine: Engine, traced: Traced) -> bool:
+    """Whether the motion is one Taylor series after the other, of steps that the engine chooses and need not check."""
+    if not isinstance(engine, SeriesEngine) or engine.name != "taylor" or traced.transitions:
+        return False
+    return engine.step is None and engine.order is None and not engine.layers.checked
 
 
 def frame_for(system: System, engine: Engine, tables: Any, i: int) -> Frame:
@@ -218,5 +257,5 @@ def frame_for(system: System, engine: Engine, tables: Any, i: int) -> Frame:
     flow = VariationalFlow.of(system)
     points = tables.points[i : i + 1]
     period = system.period_at(points[0])
-    return _RecordedFrame(engine, engine.prepare(points), flow, np.ascontiguousarray(points[0]), period,
-                          system.depends_on_time)  # fmt: skip
+    return _SeriesFrame(engine, engine.prepare(points), flow, np.ascontiguousarray(points[0]), period,
+                        system.depends_on_time)  # fmt: skip

@@ -65,6 +65,7 @@ class VariationalFlow:
     """
 
     def __init__(self, traced: Traced, active: tuple[str, ...], scale: FloatArray) -> None:
+        from nonsmooth.kernels.legs import Equations
         from nonsmooth.kernels.pointers import addresses
         from nonsmooth.system.variations import variational_model
 
@@ -74,14 +75,15 @@ class VariationalFlow:
         self.n_u, self.n = len(traced.u), len(traced.u) + len(traced.m)
         self.n_active, self.n_p = len(active), len(traced.p)
         self.scale = np.concatenate([scale, np.ones(len(traced.m))])
-        self.functions = addresses(self.model.jet, self.model.field, self.model.switch)
+        self.equations = Equations(
+            addresses(self.model.jet, self.model.field, self.model.switch), self.model.entries, self.model.kinds,
+            np.array([(t.source, t.target, len(t.rows)) for t in traced.transitions], dtype=np.int64).reshape(-1, 3),
+        )  # fmt: skip
         self._local = threading.local()
         self._touches: dict[tuple[int, int], Any] = {}
         rows = max([0, *(len(jump.rows) for jump in traced.transitions)])
         n, a = self.n, self.n_active
         self.n_out = n + n * n + n + n * a + rows * (2 + n + a)
-        self._n_result = 3 * n + n * n + n * a + a
-        self._jumps = [(t.source, t.target, len(t.rows), t.at is not None) for t in traced.transitions]
         self._no_timing = np.zeros(a)
 
     @classmethod
@@ -114,7 +116,7 @@ class VariationalFlow:
             Beginning (forced systems: within the orbit, not a large absolute time) and duration, of either sign.
         z0 : array (m, n)
         """
-        from nonsmooth.kernels.legs import march_legs
+        from nonsmooth.kernels.legs import Ends, march_legs
 
         modes = np.ascontiguousarray(modes, dtype=np.int64)
         m, n = len(modes), self.n
@@ -122,10 +124,9 @@ class VariationalFlow:
             np.empty((m, n)), np.empty((m, n, n)), np.empty((m, n, self.n_active)), np.empty((m, n)),
             np.empty((m, n)), np.empty(m), np.empty(m, dtype=np.int64),
         )  # fmt: skip
+        ends = Ends(out.z, out.Phi, out.P, out.f_begin, out.f_end, out.divergence, out.status)
         march_legs(
-            self.functions, self.model.entries, self.model.kinds, modes, _floats(t0), _floats(tau),
-            _floats(z0), _floats(values), out.z, out.Phi, out.P, out.f_begin, out.f_end, out.divergence, out.status,
-            self.scratch(),
+            self.equations, modes, _floats(t0), _floats(tau), _floats(z0), _floats(values), ends, self.scratch()
         )  # fmt: skip
         return out
 
@@ -135,7 +136,7 @@ class VariationalFlow:
         ``row`` is the row of the (first) condition that is zero there, -1: the nearest to it. For a transition at a
         given phase t must be the time since the orbit's beginning: dt/dp = (t / T) dT/dp.
         """
-        from nonsmooth.kernels.legs import cross
+        from nonsmooth.kernels.legs import Crossing, cross
 
         if not isinstance(k, int | np.integer):
             jumps: list[Jump] = []
@@ -144,31 +145,20 @@ class VariationalFlow:
             return chained(jumps)
 
         n, a = self.n, self.n_active
-        source, target, n_rows, timed = self._jumps[k]
-        values = _floats(values)
-        timing = self._no_timing
-        if timed and a:
+        values, timing = _floats(values), self._no_timing
+        if a and self.traced.transitions[k].at is not None:
             period, gradient = self.period(values)
             timing = (t / period) * gradient
-        out, result = np.empty(self.n_out), np.empty(self._n_result)
-        row = cross(
-            self.functions, k, source, target, n_rows, row, t, _floats(z), values, timing, self.scale, out, result,
-            self.scratch(),
-        )  # fmt: skip
-        after_r = n + n * n + n + n * a
-        at = after_r + row * (2 + n + a)
-        if row >= 0:
-            h, h_z, h_t, h_p = out[at], out[at + 1 : at + 1 + n], out[at + 1 + n], out[at + 2 + n : at + 2 + n + a]
-        else:
-            h, h_z, h_t, h_p = 0.0, np.zeros(n), 0.0, np.zeros(a)
-        s, p = 2 * n, 2 * n + n * n
-        t_z = p + n * a
+        square = n + a, n + a
+        out, seen = np.empty(self.n_out), Crossing(
+            np.empty(square), np.empty(square), np.empty(square), np.empty((3, n + a)), np.empty(n + a)
+        )
+        row = cross(self.equations, k, row, t, _floats(z), values, timing, self.scale, seen, out, self.scratch())
+        at = n + n * n + n + n * a + row * (2 + n + a)
+        h = out[at : at + 2 + n + a] if row >= 0 else np.zeros(2 + n + a)
         return Jump(
-            out[:n], out[n : n + n * n].reshape(n, n), out[n + n * n : 2 * n + n * n],
-            out[2 * n + n * n : after_r].reshape(n, a), float(h), h_z, float(h_t), h_p,
-            result[:n], result[n:s], result[s:p].reshape(n, n), result[p:t_z].reshape(n, a),
-            result[t_z : t_z + n], result[t_z + n : t_z + n + a],
-            row, self.traced.transitions[k].rows[row].indicator if row >= 0 else -1,
+            out[:n], seen.reset, seen.fields, float(h[0]), h[1 : 1 + n], float(h[1 + n]), h[2 + n :], seen.step,
+            seen.t_z, row, self.traced.transitions[k].rows[row].indicator if row >= 0 else -1,
         )  # fmt: skip
 
     def indicator(self, values: Any, i: int, mode: int, t: float, z: Any) -> Touch:
@@ -202,20 +192,21 @@ class VariationalFlow:
         assert period is not None
         return sp.lambdify(p, [period, *(period.diff(p[i]) for i in self.places)], modules="math")
 
-    def scratch(self) -> tuple[FloatArray, ...]:
+    def scratch(self) -> Any:
         """The thread's scratch memory."""
-        found: tuple[FloatArray, ...] | None = getattr(self._local, "work", None)
+        found = getattr(self._local, "work", None)
         if found is None:
             from nonsmooth.kernels.block import one_block
-            from nonsmooth.kernels.legs import ORDER
+            from nonsmooth.kernels.lanes import FOUR
+            from nonsmooth.kernels.legs import ORDER, Steps
 
             columns, width = self.n + self.n_active, ORDER + 1
-            found = self._local.work = one_block(
-                np.zeros((self.n_u + len(self.model.entries), width)), np.zeros((self.model.n_scratch, width)),
-                np.zeros((self.n_u, columns, width)), np.zeros((self.n_u, columns)), np.zeros((self.n_u, columns)),
-                np.zeros((self.n_u, columns)), np.zeros(width), np.zeros(self.n_u),
-                np.zeros(self.n_p + len(self.traced.m)),
-            )  # fmt: skip
+            rows, changes = 2 * self.n_u + len(self.model.entries), np.zeros((self.n_u, columns))
+            found = self._local.work = Steps(*one_block(
+                np.zeros((rows, width)), np.zeros((width, columns, -(-columns // FOUR) * FOUR)),
+                np.zeros((self.model.n_scratch, width)), changes, changes, changes,
+                np.zeros(width), np.zeros(self.n_u), np.zeros(self.n_p + len(self.traced.m)),
+            ))  # fmt: skip
         return found
 
 
@@ -223,6 +214,6 @@ def _floats(x: Any) -> FloatArray:
     return np.ascontiguousarray(x, dtype=np.float64)
 
 
-@lru_cache(maxsize=128)
+@lru_cache(maxsize=32)  # as many as of what it is made of
 def _flow(traced: Traced, names: tuple[str, ...], scale: tuple[float, ...]) -> VariationalFlow:
     return VariationalFlow(traced, names, np.array(scale))

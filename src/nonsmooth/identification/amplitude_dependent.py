@@ -171,7 +171,7 @@ def amplitude_dependent(
 def _data(
     fit: ResponseFit, grid: FloatArray, f: FloatArray, f_error: FloatArray, zeta: FloatArray, zeta_error: FloatArray
 ) -> xr.Dataset:
-    """What the pictures need."""
+    """Data of the pictures."""
     import xarray as xr
 
     point = {"frequency": fit.omega / (2 * np.pi), "response": np.abs(fit.measured), "modal_amplitude": fit.amplitude}
@@ -214,7 +214,7 @@ def _others(fit: ResponseFit) -> dict[str, Estimate]:
 
 
 def _notes(fit: ResponseFit) -> list[str]:
-    """What a reader should know."""
+    """Notes for a reader."""
     slope = fit.slopes()
     unstable = int(np.count_nonzero(slope < 0))
     said = [

@@ -181,7 +181,7 @@ class _Chain:
         return Observation((name,), np.array([quantity.value]), np.array([[quantity.uncertainty**2]]), "weighed")
 
     def beside(self, what: str, find: Callable[[], Finding | list[Finding]]) -> Finding | None:
-        """A finding that no parameter rests on: where it cannot be had, say why and go on."""
+        """Make a finding that no parameter rests on; on failure, record a note and continue."""
         try:
             found = find()
         except (ValueError, SolveError) as error:
@@ -204,7 +204,7 @@ class _Chain:
         warnings.warn(sentence, RecordingWarning, stacklevel=5)
 
     def doubts(self, adjusted: Adjusted, contacts: ContactFit | None) -> None:
-        """What cannot be, what disagrees, and procedures of which most runs could not be used."""
+        """Anomalies: impossible values, disagreements, and procedures of which most runs could not be used."""
         self.unused(contacts)
         sentences = [disagreement(adjusted), *impossible(adjusted)]
         if contacts is not None and contacts.poor:

@@ -42,8 +42,8 @@ class Consistent(NamedTuple):
     mean, covariance : array (p,), (p, p)
         Weighted mean of those used, and its covariance by the stated uncertainties.
     scatter : array (p, p)
-        Covariance of a single one of those used, by how they differ: what the mean is worth where they disagree, since
-        a fault that several share does not average out.
+        Covariance of a single one of those used, by how they differ: the uncertainty of the mean where they disagree,
+        since a fault that several share does not average out.
     """
 
     used: NDArray[np.bool_]

@@ -1,8 +1,8 @@
-r"""What multiple shooting says of the support: gap and contact parameters, and how much of them one contact tells.
+r"""Findings of multiple shooting on the support: gap and contact parameters, and how much of them one contact tells.
 
 :math:`c_s/k_s` is half a millisecond and a contact eight samples: no sample shows it, but the speed that a contact
-takes, some 3 %, shows in the free motion after it. The profile over one contact says what that is worth; what many
-contacts fitted together are worth is more, by the root of their number and by what they tell of gap and drive.
+takes, some 3 %, shows in the free motion after it. The profile over one contact gives the uncertainty of that;
+many contacts fitted together have a smaller one, by the root of their number and by what they tell of gap and drive.
 """
 
 from __future__ import annotations

@@ -96,7 +96,7 @@ def drive_mean(truth: Mapping[str, float], crank: float) -> float:
 
 
 def _moved(truth: Mapping[str, float], crank: float) -> float:
-    """How far the mean position under the drive lies from rest (m), towards the support."""
+    """Distance of the mean position under the drive from rest (m), towards the support."""
     return truth["motor_side"] * drive_mean(truth, crank) / 2
 
 

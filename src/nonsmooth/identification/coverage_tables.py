@@ -83,7 +83,7 @@ class _Counted:
 
 
 def misses(results: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Where the limits are not met, one sentence each; empty: all are."""
+    """Sentences on the limits that are not met; empty where all are."""
     found = []
     for name, limit in ASKED.items():
         counted = _Counted(name, _rows(name, results))

@@ -34,7 +34,7 @@ class Check(NamedTuple):
 
     @property
     def agrees(self) -> bool:
-        """Whether chance explains the difference."""
+        """Return whether chance explains the difference."""
         return birge_ratio(self.off**2, 1)[1]
 
 
@@ -107,7 +107,7 @@ def cross_checks(
 
 
 def sentences(checks: Sequence[Check]) -> tuple[list[str], list[str]]:
-    """What agrees, in one sentence, and one sentence for each pair that does not."""
+    """Agreements in one sentence, and one sentence for each pair that disagrees."""
     good = [f"{check.name} ({abs(check.off):.1f})" for check in checks if check.agrees]
     agree = [f"in agreement, with the difference in its uncertainties: {'; '.join(good)}"] if good else []
     return agree, [

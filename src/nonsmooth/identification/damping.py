@@ -19,6 +19,7 @@ from nonsmooth.experiment.session import Quantity
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.free_decay import DecayFit
 from nonsmooth.identification.gap import grazing_amplitude
+from nonsmooth.identification.nonlinear_fit import nonlinear_fit
 from nonsmooth.identification.steady import Steady
 
 __all__ = ["amplitude_fit", "viscous_bias"]
@@ -126,24 +127,18 @@ def _fit(
     omega: FloatArray, crank: FloatArray, amplitude: FloatArray, spread: FloatArray, natural: float,
     start: tuple[float, float], *, friction: bool,
 ) -> dict[str, tuple[float, float]]:  # fmt: skip
-    """Values of b and f, each with its standard error."""
-    from lmfit import Minimizer, Parameters
+    """Values of b and f, each with its standard error; f is 0 where the fit is without friction."""
 
-    parameters = Parameters()
-    parameters.add("b", value=start[0], min=1e-6)
-    parameters.add("f", value=start[1] if friction else 0.0, vary=friction)
+    def residual(p: FloatArray) -> FloatArray:
+        return (_predicted(omega, crank, natural, p[0], p[1] if friction else 0.0) - amplitude) / spread
 
-    def residual(p: Any) -> FloatArray:
-        return (_predicted(omega, crank, natural, p["b"].value, p["f"].value) - amplitude) / spread
-
-    fitted = Minimizer(residual, parameters, scale_covar=True).minimize()
-    if not fitted.success:
+    names = ("b", "f") if friction else ("b",)
+    fitted = nonlinear_fit(residual, start[: len(names)], (1e-6, -np.inf)[: len(names)])
+    if fitted is None:
         raise SolveError("the fit of the amplitudes did not settle; look at them over frequency")
-    found = fitted.params
-    return {
-        name: (float(row.value), float(row.stderr if row.stderr is not None else np.inf))
-        for name, row in found.items()
-    }  # fmt: skip
+    values, covariance = fitted
+    rows = zip(names, values.tolist(), np.sqrt(np.diag(covariance)).tolist(), strict=True)
+    return {"f": (0.0, 0.0)} | {name: (value, error) for name, value, error in rows}
 
 
 def _data(

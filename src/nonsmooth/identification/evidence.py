@@ -1,4 +1,4 @@
-"""What ``identify`` looks at: the runs of each procedure as plain arrays in SI units, and the notebook's apparatus."""
+"""Input of ``identify``: the runs of each procedure as plain arrays in SI units, and the notebook's apparatus."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What one procedure found: a value, its standard uncertainty, how, and from which samples."""
+"""Outcome of one procedure: a value, its standard uncertainty, how, and from which samples."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.identification.uncertainty import factor_interval, interval
+from nonsmooth.results.representation import cut, html_table
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -132,10 +133,18 @@ class Finding:
         return self.estimate.interval(level)
 
     def __str__(self) -> str:
-        lines = [f"{self.name} = {self.estimate}", f"  {self.method}"]
-        used = f"{self.samples_used} samples" + (f" of {len(self.runs)} runs" if self.runs else "")
-        lines.append(f"  from {used}")
+        lines = [f"{self.name} = {self.estimate}", f"  {self.method}", f"  from {self._used()}"]
         lines += [f"  besides: {name} = {other}" for name, other in self.others.items()]
         return "\n".join(lines + [f"  note: {note}" for note in self.notes])
 
-    __repr__ = __str__
+    def __repr__(self) -> str:
+        notes = f"; {len(self.notes)} notes: see .notes" if self.notes else ""
+        return f"<Finding {self.name} = {self.estimate}: {cut(self.method, 80)}; from {self._used()}{notes}>"
+
+    def _repr_html_(self) -> str:
+        rows = [("method", self.method), ("from", self._used())]
+        rows += [(f"besides: {name}", str(other)) for name, other in self.others.items()]
+        return html_table(f"{self.name} = {self.estimate}", rows, details=self.notes, of="notes")
+
+    def _used(self) -> str:
+        return f"{self.samples_used} samples" + (f" of {len(self.runs)} runs" if self.runs else "")

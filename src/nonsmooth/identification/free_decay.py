@@ -12,7 +12,7 @@ single decay therefore tells the two apart by its shape, several of different he
 
 The fit is in the time domain over all runs together, from each first turning point to where the car has become slow:
 there the friction law is in doubt (a car that creeps, a belt that gives), and the fit should not hang on it. How far
-the estimate moves when half of that speed is let in is added to the uncertainty: it is what the law is worth.
+the estimate moves when half of that speed is let in is added to the uncertainty: it is that of the law.
 
 References: J.P. Den Hartog, Trans. ASME 53 (1931) 107; B.F. Feeny and J.W. Liang, J. Sound Vib. 195 (1996) 149.
 """

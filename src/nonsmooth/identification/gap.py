@@ -56,7 +56,7 @@ class MeanShift(NamedTuple):
         return self._of(self.row(crank_length) + np.array([1.0, 0.0, 0.0]))
 
     def row(self, crank_length: float) -> FloatArray:
-        """How the shift goes with (rest, alpha, beta)."""
+        """Derivatives of the shift in (rest, alpha, beta)."""
         further = 3 * crank_length**2 / (16 * self.string_length**2) if self.string_length else 0.0
         return np.array([0.0, crank_length**2 * (1 + further), crank_length])
 

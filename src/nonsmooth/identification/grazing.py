@@ -142,7 +142,7 @@ def grazing_gap(runs: Sequence[Run], decay: DecayFit, *, resolution: float, kapp
 
 
 def _touching(seen: Steady, resolution: float) -> tuple[NDArray[np.bool_], float]:
-    """Which runs touch, and how far a mean must leave the place of the free runs' for that.
+    """Runs that touch, and the distance of a mean from that of the free runs that tells so.
 
     All runs from the first with contact on have left it: a single mean that strays among free runs is no contact.
     """
@@ -184,7 +184,7 @@ def _bracket(seen: Steady, contact: NDArray[np.bool_]) -> tuple[int, int]:
 
 
 def _unseen(limit: float, amplitude: float, stiff: float) -> float:
-    """How far beyond the gap a motion goes whose mean moves by ``limit``; ``stiff`` is k_s/(2k)."""
+    """Penetration of a motion whose mean moves by ``limit``; ``stiff`` is k_s/(2k)."""
     return float((1.5 * np.pi * limit / stiff * np.sqrt(amplitude / 2)) ** (2 / 3))
 
 
@@ -224,7 +224,7 @@ def _by_push(
 def _height(
     seen: Steady, free: NDArray[np.bool_], last: int, model: Callable[[FloatArray], FloatArray]
 ) -> Callable[[FloatArray], FloatArray]:
-    """How far above its mean the free motion goes, over frequency.
+    """Height of the free motion above its mean, over frequency.
 
     The crank's length and the balance of friction are known to a few parts in a thousand: the model is scaled to the
     free runs that are nearest to the graze. A second harmonic, by string and ripple, hardly changes among them.

@@ -30,7 +30,6 @@ from numpy.typing import NDArray
 from nonsmooth.experiment.session import Quantity
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.steady import Steady
-from nonsmooth.identification.uncertainty import bootstrap
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -148,7 +147,8 @@ def _scatter(part: Steady, seed: int) -> FloatArray:
             return np.full(6, np.nan)
         return np.append(row, row[0] * row[1])
 
-    drawn = bootstrap(again, len(part), draws=_DRAWS, seed=seed)
+    rng = np.random.default_rng(seed)
+    drawn = np.array([again(rng.integers(0, len(part), size=len(part))) for _ in range(_DRAWS)])
     return np.asarray(np.nanstd(drawn, axis=0, ddof=1))
 
 

@@ -73,7 +73,7 @@ def _step(h, d, phi, turning, x, v, sign, touching, oscillator, drive, contact):
 
 @njit(cache=True)
 def _beyond(x, v, sign, touching, contact):
-    """Whether a state lies beyond its mode: the velocity has turned, contact has begun, or it has ended."""
+    """Return whether a state lies beyond its mode: the velocity has turned, contact has begun, or it has ended."""
     if sign * v < 0:
         return True
     if touching:

@@ -9,7 +9,7 @@ swing with it, so that their difference, the gap *referred to the car's mean pos
 A piece in which the car turns at the support itself, a graze, is left out: its motion has no derivative in the
 parameters there (the push grows as the power 3/2 of a depth of micrometres), and the fit would stop at it wherever its
 minimum lies. How far the estimate moves with every other turn of the crank alone is added to its uncertainty: it is
-what a motor that wanders is worth.
+the uncertainty that a wandering motor causes.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ class ContactFit:
 
     @property
     def poor(self) -> bool:
-        """Whether the motion is another than the model's: chi^2, or half of its pieces as outliers."""
+        """Return whether the motion is another than the model's: chi^2, or half of its pieces as outliers."""
         return bool(self.fit.reduced > _LARGE or np.mean(~self.fit.used) > 0.5)
 
     @property
@@ -142,7 +142,7 @@ def shoot_contacts(
 
 
 def _poor(fit: ShootingFit) -> bool:
-    """Whether a fit leaves more than it should: chi^2, or a fifth of its pieces as outliers."""
+    """Return whether a fit leaves more than it should: chi^2, or a fifth of its pieces as outliers."""
     return fit.reduced > _LARGE or float(np.mean(~fit.used)) > _LEFT_OUT
 
 
@@ -209,7 +209,7 @@ class _Joint:
         return replace(found, covariance=found.covariance + np.outer(reason.step, reason.step)), pieces, short
 
     def by_turns(self, fit: ShootingFit, kept: list[Piece]) -> FloatArray:
-        """How far the parameters move when the crank's angle is known from every other turn only, to first order.
+        """Shift of the parameters, to first order, when the crank's angle is known from every other turn only.
 
         Between passages of the photogate a motor that wanders is not where a straight line has it. How far it is off
         nobody sees, but how far a line over two turns is off.
@@ -259,7 +259,7 @@ class _Joint:
 
 
 def _grazes(piece: Piece, motion: FloatArray, gap: float, margin: float, lingers: float = np.inf) -> bool:
-    """Whether the car turns within a margin of the gap, or dry friction all but holds it on the way for so long.
+    """Return whether the car turns within a margin of the gap, or dry friction all but holds it on the way for so long.
 
     A start that changes by a micrometre then decides whether the car touches, or turns: there the sum of squares has
     a corner.

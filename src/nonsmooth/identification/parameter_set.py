@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.identification.finding import Estimate, Finding
+from nonsmooth.results.representation import cut, html_table, text_table
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -158,7 +158,7 @@ class ParameterSet(Mapping[str, float]):
         """All numbers and texts as a Dataset that ``nonsmooth.save`` takes; the findings' pictures stay behind."""
         import xarray as xr
 
-        from nonsmooth.results.provenance import ATTRIBUTE, package_version
+        from nonsmooth.results.provenance import attribute, package_version, with_short_record
 
         names = [*self.estimates, *self.extra]
         rows = [*self.estimates.values(), *self.extra.values()]
@@ -168,7 +168,7 @@ class ParameterSet(Mapping[str, float]):
             "n_parameters": len(self.estimates), "identifiability": dict(self.identifiability),
             "units": [row.unit for row in rows], "findings": [_as_record(finding) for finding in self.findings],
         }  # fmt: skip
-        return xr.Dataset(
+        return with_short_record(xr.Dataset(
             {
                 "value": ("parameter", [row.value for row in rows]),
                 "uncertainty": ("parameter", [row.uncertainty for row in rows]),
@@ -177,8 +177,8 @@ class ParameterSet(Mapping[str, float]):
                 "covariance": (("parameter", "other"), self._covariance.copy()),
             },
             {"parameter": names, "other": names},
-            {ATTRIBUTE: json.dumps(record, ensure_ascii=False), "synthetic": "yes" if self.synthetic else "no"},
-        )
+            attribute(record) | {"synthetic": "yes" if self.synthetic else "no"},
+        ))  # fmt: skip
 
     @classmethod
     def from_dataset(cls, dataset: xr.Dataset) -> ParameterSet:
@@ -189,9 +189,9 @@ class ParameterSet(Mapping[str, float]):
         ValueError
             If the Dataset was not made so.
         """
-        from nonsmooth.results.provenance import ATTRIBUTE
+        from nonsmooth.results.provenance import ATTRIBUTE, read_provenance
 
-        record = json.loads(dataset.attrs.get(ATTRIBUTE, "{}"))
+        record = read_provenance(dataset) if ATTRIBUTE in dataset.attrs else {}
         if record.get("verb") != "identify":
             raise ValueError("this Dataset was not made by ParameterSet.to_dataset")
         columns = [dataset[name].values for name in ("value", "uncertainty", "half_width", "logarithmic")]
@@ -210,12 +210,70 @@ class ParameterSet(Mapping[str, float]):
             anomalies=record.get("anomalies", ()), synthetic=record["synthetic"],
         )  # fmt: skip
 
-    def __repr__(self) -> str:
-        lines = [f"ParameterSet{' (synthetic recordings)' if self.synthetic else ''}"]
+    def to_dataframe(self, level: float = 0.95) -> Any:  # a pandas.DataFrame
+        """Return a table with a row for each parameter, then for each quantity in ``extra``.
+
+        Parameters
+        ----------
+        level : float
+            Probability of the interval from ``low`` to ``high``.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns ``value``, ``uncertainty`` (standard), ``low``, ``high``, ``unit``, ``parameter_of_the_model`` and
+            ``identifiability`` (the sentence, "" where there is none); the index holds the names.
+
+        Examples
+        --------
+        >>> import nonsmooth as ns
+        >>> from nonsmooth.identification.finding import Estimate
+        >>> ns.ParameterSet({"k": Estimate(8.5, 0.1, "N/m")}, [[0.01]]).to_dataframe().loc["k", "unit"]
+        'N/m'
+        """
+        import xarray as xr
+
+        rows = {**self.estimates, **self.extra}
+        low, high = zip(*(row.interval(level) for row in rows.values()), strict=True) if rows else ((), ())
+        columns: dict[str, Any] = {
+            "value": [row.value for row in rows.values()],
+            "uncertainty": [row.uncertainty for row in rows.values()],
+            "low": list(low), "high": list(high),
+            "unit": np.array([row.unit for row in rows.values()], dtype=object),
+            "parameter_of_the_model": [name in self.estimates for name in rows],
+            "identifiability": np.array([self.identifiability.get(name, "") for name in rows], dtype=object),
+        }  # fmt: skip
+        names = np.array(list(rows), dtype=object)
+        return xr.Dataset({key: ("name", values) for key, values in columns.items()}, {"name": names}).to_dataframe()
+
+    def __str__(self) -> str:
+        lines = [self._title()]
         lines += [f"  {name} = {estimate}" for name, estimate in self.estimates.items()]
         lines += [f"  ({name} = {estimate})" for name, estimate in self.extra.items()]
         lines += [f"  {note}" for note in self.notes]
         return "\n".join(lines + [f"  ANOMALY: {sentence}" for sentence in self.anomalies])
+
+    def __repr__(self) -> str:
+        rows = [(name, f"= {estimate}") for name, estimate in self.estimates.items()]
+        rows += [(f"({name}", f"= {estimate})") for name, estimate in self.extra.items()]
+        lines = [text_table(self._title(), rows, whole=False)]
+        lines += [f"  ANOMALY: {cut(sentence)}" for sentence in self.anomalies]
+        counts = {"findings": len(self.findings), "notes": len(self.notes)}
+        if any(counts.values()):
+            lines.append(f"  {', '.join(f'{n} {word}' for word, n in counts.items() if n)}: see .findings, .notes")
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        rows = [
+            (name, str(row), self.identifiability.get(name, ""))
+            for name, row in {**self.estimates, **{f"({name})": row for name, row in self.extra.items()}}.items()
+        ]
+        anomalies = [("ANOMALY", sentence, "") for sentence in self.anomalies]
+        header = ("", "value", "rests on")
+        return html_table(self._title(), anomalies + rows, header=header, details=self.notes, of="notes")
+
+    def _title(self) -> str:
+        return f"ParameterSet{' (synthetic recordings)' if self.synthetic else ''}"
 
 
 def _as_record(finding: Finding) -> dict[str, Any]:
@@ -230,7 +288,11 @@ def _as_record(finding: Finding) -> dict[str, Any]:
 
 
 def _from_record(item: Mapping[str, Any]) -> Finding:
+    def estimate(row: Sequence[Any]) -> Estimate:
+        value, uncertainty, unit, half_width, logarithmic = row
+        return Estimate(float(value), float(uncertainty), unit, float(half_width), logarithmic)  # "inf" is a text there
+
     return Finding(
-        item["name"], Estimate(*item["estimate"]), item["method"], item["samples_used"], tuple(item["runs"]),
-        tuple(item["notes"]), {name: Estimate(*row) for name, row in item["others"].items()}, plot=item["plot"],
+        item["name"], estimate(item["estimate"]), item["method"], item["samples_used"], tuple(item["runs"]),
+        tuple(item["notes"]), {name: estimate(row) for name, row in item["others"].items()}, plot=item["plot"],
     )  # fmt: skip

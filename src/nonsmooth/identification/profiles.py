@@ -109,7 +109,7 @@ def profile_of(values: Any, rise: Any, best: float, *, level: float = 0.95) -> P
 
 
 def _crossed(values: FloatArray, rise: FloatArray, bound: float) -> float:
-    """Where the rise of chi^2, from the best value on, passes the bound; NaN where it does not."""
+    """Value at which the rise of chi^2 from the best value passes the bound; NaN where it does not."""
     over = np.flatnonzero(rise > bound)
     if len(over) == 0 or over[0] == 0:
         return float("nan")

@@ -22,13 +22,13 @@ from nonsmooth.experiment.session import Quantity
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.free_decay import DecayFit
 from nonsmooth.identification.gap import grazing_amplitude
+from nonsmooth.identification.nonlinear_fit import nonlinear_fit
 from nonsmooth.identification.steady import Steady
 
 __all__ = ["crank_mark", "receptance", "receptance_fit"]
 
 FloatArray = NDArray[np.float64]
 LEAST = 8  # runs
-_NAMES = ("b", "omega_0", "f", "scale", "mark")
 
 
 def receptance(
@@ -106,28 +106,20 @@ def receptance_fit(seen: Steady, decay: DecayFit, mass: Quantity) -> Finding:
 
 def _fit(seen: Steady, decay: DecayFit) -> tuple[FloatArray, FloatArray]:
     """Values and covariance of b, omega_0, f, scale and mark."""
-    from lmfit import Minimizer, Parameters
-
     # the balance of friction leaves out its third harmonic; transients leave some tenths of a percent
     spread = np.hypot(seen.error, 1e-3 * seen.amplitude)
-    parameters = Parameters()
-    parameters.add("b", value=float(decay.values[1]), min=1e-6)
-    parameters.add("omega_0", value=float(decay.values[0]), min=1e-6)
-    parameters.add("f", value=float(max(decay.values[2], 1e-4)), min=-0.1)
-    parameters.add("scale", value=1.0, min=0.1)
-    parameters.add("mark", value=crank_mark(seen, decay))
+    natural, b, f = (float(value) for value in decay.values[:3])
+    start = (b, natural, max(f, 1e-4), 1.0, crank_mark(seen, decay))
 
-    def residual(p: Any) -> FloatArray:
-        b, natural, f, scale, mark = (p[name].value for name in _NAMES)
+    def residual(p: FloatArray) -> FloatArray:
+        b, natural, f, scale, mark = p
         left = (seen.response - receptance(seen.omega, seen.crank, natural, b, f, scale, mark)) / spread
         return np.concatenate([left.real, left.imag])
 
-    fitted = Minimizer(residual, parameters, scale_covar=True).minimize()
-    if not fitted.success or fitted.covar is None:
+    fitted = nonlinear_fit(residual, start, (1e-6, 1e-6, -0.1, 0.1, -np.inf))
+    if fitted is None or not np.isfinite(fitted[1]).all():
         raise SolveError("the fit of the complex response did not settle; look at the runs' amplitudes over frequency")
-    order = [list(fitted.var_names).index(name) for name in _NAMES]
-    values = np.array([float(fitted.params[name].value) for name in _NAMES])
-    return values, np.asarray(fitted.covar)[np.ix_(order, order)]
+    return fitted
 
 
 def crank_mark(seen: Steady, decay: DecayFit) -> float:

@@ -125,7 +125,7 @@ class Referred:
 
 
 def places(evidence: Evidence, decay: DecayFit | None, seen: Steady, *, held: float | None = None) -> MeanShift:
-    """Where the car rests and swings, in the sensor's count, from taps, steady runs and the string.
+    """Places about which the car rests and swings, in the sensor's count, from taps, steady runs and the string.
 
     Parameters
     ----------

@@ -51,7 +51,7 @@ class ResponseFit:
 
     @property
     def sizes(self) -> tuple[int, int]:
-        """Where the shifts begin, and how many unknowns there are."""
+        """Index of the first shift, and the number of unknowns."""
         K, n = len(self.knots), len(self.names)
         first = 2 * K + (0 if self.mass is not None else 1 if self.forced else n) + 2 * self.residual
         return first, first + 2 * n * self.shifts
@@ -213,7 +213,7 @@ class ResponseFit:
         return p
 
     def _alike(self, left: FloatArray) -> float:
-        """How many neighbouring points of a curve say as much as one."""
+        """Number of neighbouring points of a curve that say as much as one."""
         blocks = left.reshape(-1, len(self.curve))
         total = cross = 0.0
         for row in blocks:
@@ -248,7 +248,7 @@ class ResponseFit:
 
 
 def _all_or_none(curves: Sequence[Any], name: str) -> bool:
-    """Whether all curves have it."""
+    """Return whether all curves have it."""
     having = [c.name for c in curves if getattr(c, name) is not None]
     if having and len(having) < len(curves):
         lacking = [c.name for c in curves if c.name not in having]

@@ -34,7 +34,7 @@ _ROUNDS = 10  # of weights from residuals and residuals from weights
 
 @dataclass(frozen=True, eq=False)
 class ShootingFit:
-    """What `shoot` found.
+    """Result of `shoot`.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What ``identify`` says in words: how well the procedures agree, what each parameter rests on, what a model takes."""
+"""Statements of ``identify``: agreement of the procedures, what each parameter rests on, what a model takes."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ HARMONICS = 3
 
 @dataclass(frozen=True, eq=False)
 class Steady:
-    r"""What a steady run shows, one entry per run.
+    r"""Amplitudes and phases of steady runs, one entry per run.
 
     Attributes
     ----------

@@ -8,14 +8,14 @@ References: JCGM 100:2008 (GUM), 4.3.7 for limits without a distribution, 5.2.2 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
-    "bootstrap", "correlated", "correlation_times", "coverage_factor", "factor_interval", "interval", "uniform",
+    "correlated", "correlation_times", "coverage_factor", "factor_interval", "interval", "uniform",
 ]  # fmt: skip
 
 FloatArray = NDArray[np.float64]
@@ -35,7 +35,7 @@ def uniform(half_width: float) -> float:
 
 
 def coverage_factor(level: float = 0.95) -> float:
-    """How many standard uncertainties hold a normal quantity with this probability: 1.96 for 0.95."""
+    """Number of standard uncertainties that hold a normal quantity with this probability: 1.96 for 0.95."""
     from scipy.special import ndtri
 
     if not 0 < level < 1:
@@ -94,7 +94,7 @@ def factor_interval(value: float, relative: float, level: float = 0.95) -> tuple
 
 
 def correlation_times(residuals: Any, *, longest: int | None = None) -> float:
-    r"""How many samples share one independent error: :math:`\tau = 1 + 2 \sum \rho_k`, at least 1.
+    r"""Number of samples that share one independent error: :math:`\tau = 1 + 2 \sum \rho_k`, at least 1.
 
     The sum stops at the first lag that is not positive (Geyer's initial sequence, Statist. Sci. 7 (1992) 473).
     """
@@ -129,7 +129,7 @@ def correlated(jacobian: Any, residuals: Any, pieces: Sequence[int] | None = Non
     residuals : array (n,)
         Weighted residuals, in the order of time.
     pieces : sequence of int, optional
-        Lengths of independent records that follow one another; no correlation is looked for across them.
+        Lengths of independent records that follow one another; no correlation is assumed across them.
 
     Returns
     -------
@@ -165,30 +165,3 @@ def correlated(jacobian: Any, residuals: Any, pieces: Sequence[int] | None = Non
     found = sandwich * np.outer(raise_by, raise_by)
     result: FloatArray = found / np.outer(scale, scale)
     return result
-
-
-def bootstrap(
-    estimate: Callable[[NDArray[np.intp]], Any], n: int, *, draws: int = 200, block: int = 1, seed: int = 0
-) -> FloatArray:
-    """Estimates from records drawn again with replacement, (draws, p): their scatter is the type-A uncertainty.
-
-    Parameters
-    ----------
-    estimate : callable
-        The estimate from an array of indices into the data (runs, cycles, samples).
-    n : int
-        How many there are.
-    draws : int
-    block : int
-        Length of blocks that are kept together: longer than the errors are correlated.
-    seed : int
-    """
-    if not 1 <= block <= n:
-        raise ValueError(f"block = {block!r} must lie between 1 and n = {n}")
-    rng = np.random.default_rng(seed)
-    found = []
-    for _ in range(draws):
-        begins = rng.integers(0, n - block + 1, size=-(-n // block))
-        rows = (begins[:, None] + np.arange(block)).ravel()[:n]
-        found.append(np.atleast_1d(np.asarray(estimate(rows), dtype=np.float64)))
-    return np.array(found)

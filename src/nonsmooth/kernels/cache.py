@@ -3,12 +3,13 @@
 Numba's own disk cache looks only at the file a function stands in, so an edit in another kernel file would
 run stale code, and it cannot write beside a read-only install. Here one file per compiled function lives in
 ``cache_folder()``; its name is a hash of the source and of what it imports, the options, the signature, the versions
-and the CPU, so nothing is ever stale, entries never change, and several processes need no lock. An entry is code: it
-begins with a hash of its content, and one that another user may write is not read (``folder``).
+and the level of the architecture (``target``), so nothing is ever stale, entries never change, and several processes
+need no lock. An entry is code: it begins with a hash of its content, and one that another user may write is not read
+(``folder``). What no model changes has come with the package where it could be made ahead (``ahead``).
 
-Everything that leans on private parts of Numba (a dispatcher's ``_cache`` and ``_compile_for_args``,
-``CompileResult._reduce``) stands in this file; ``tests/kernels/test_cache.py`` covers it. Checked with Numba 0.62 and
-0.68, calls that compile with 0.68.
+What leans on private parts of Numba (a dispatcher's ``_cache`` and ``_compile_for_args``, ``CompileResult._reduce``)
+stands in this file and in ``target``; ``tests/kernels/test_cache.py`` covers it. Checked with Numba 0.62 and 0.68,
+calls that compile with 0.68.
 """
 
 from __future__ import annotations
@@ -27,17 +28,22 @@ from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
+from weakref import WeakValueDictionary
 
 import llvmlite
 import numba
 from numba.core.caching import _Cache
 from numba.core.compiler import CompileResult
 from numba.core.compiler_lock import global_compiler_lock
+from numba.core.registry import cpu_target
 
 from nonsmooth.kernels import before_compiling
 from nonsmooth.kernels.folder import cache_folder, make_private, mark_used, prune, read_private, write_atomically
+from nonsmooth.kernels.target import Function, made_ahead
 
-__all__ = ["cache_statistics", "callback", "compiled", "device", "inline", "kernel", "load_module"]
+__all__ = [
+    "cache_statistics", "callback", "compiled", "device", "inline", "kernel", "load_module", "once", "reached",
+]  # fmt: skip
 
 # Kernels allocate nothing (scratch is an argument), so they need no reference counts: "_nrt" off saves a third.
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}, "_nrt": False}
@@ -45,8 +51,10 @@ _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {
 _INNER: dict[str, Any] = {**_OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 _DIGEST = hashlib.sha256().digest_size
 _GENERATED = "nonsmooth_generated_"
-_MACHINERY = {"cache", "folder"}
+_MACHINERY = {"ahead", "cache", "folder", "target"}
 _lock = threading.Lock()
+_passing: WeakValueDictionary[str, ModuleType] = WeakValueDictionary()  # modules of models, while somebody has them
+_most_passing = 16
 
 
 # --------------------------------------------------------------------------------------------------------------
@@ -79,15 +87,23 @@ def _imported(text: str) -> Iterator[str]:
 
 @cache
 def _source_stamp(text: str) -> str:
-    """Hash of a source text and of every kernel file and generated module that it imports, through any number of files.
+    """Hash of a source text and of all that it reaches."""
+    digest = hashlib.sha256(text.encode())
+    for name, found in sorted(reached(text).items()):
+        digest.update(f"\0{name}\0{found}".encode())
+    return digest.hexdigest()
+
+
+def reached(text: str) -> dict[str, str]:
+    """Name -> text of every kernel file and generated module that a source imports, through any number of files.
 
     The files of the cache itself are left out: what they decide about a function's code stands in its key."""
     sources = _kernel_sources()
-    reached: dict[str, str] = {}
+    texts: dict[str, str] = {}
     pending = [text]
     while pending:
         for name in _imported(pending.pop()):
-            if name in reached or name in _MACHINERY:
+            if name in texts or name in _MACHINERY:
                 continue
             if name.startswith(_GENERATED):
                 found = Path(str(sys.modules[name].__file__)).read_text(encoding="utf-8")
@@ -95,12 +111,9 @@ def _source_stamp(text: str) -> str:
                 found = sources[name]
             else:
                 continue  # not a module: a function of the package, say
-            reached[name] = found
+            texts[name] = found
             pending.append(found)
-    digest = hashlib.sha256(text.encode())
-    for name in sorted(reached):
-        digest.update(f"\0{name}\0{reached[name]}".encode())
-    return digest.hexdigest()
+    return texts
 
 
 @cache
@@ -109,7 +122,7 @@ def _file_stamp(path: str) -> str:
 
 
 class _ContentCache(_Cache):
-    """Numba's cache protocol over one immutable file per function, signature, source, version and CPU."""
+    """Numba's cache protocol over one immutable file per function, signature, source, version and level."""
 
     def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
         self._name = function.__qualname__
@@ -129,22 +142,24 @@ class _ContentCache(_Cache):
     def cache_path(self) -> str:
         return str(cache_folder() / "compiled")
 
-    def _path(self, signature: Any, codegen: Any) -> Path:
+    def entry(self, signature: Any, codegen: Any) -> str:
+        """Name of the file that holds the function's code."""
         key = repr((self._origin, str(signature), codegen.magic_tuple()))
-        return Path(self.cache_path) / f"{self._name}-{hashlib.sha256(key.encode()).hexdigest()[:32]}.nbc"
+        return f"{self._name}-{hashlib.sha256(key.encode()).hexdigest()[:32]}.nbc"
 
     def load_overload(self, sig: Any, target_context: Any) -> CompileResult | None:
-        target_context.refresh()
-        path = self._path(sig, target_context.codegen())
-        stored = read_private(path)
-        digest, entry = stored[:_DIGEST], stored[_DIGEST:]
-        if not entry or hashlib.sha256(entry).digest() != digest:  # none yet, or a damaged one: compiled anew
+        cpu_target.target_context.refresh()  # of Numba's own: what all engines share is not to live in this one
+        name = self.entry(sig, target_context.codegen())
+        payload = _checked(made_ahead(name))
+        if not payload:
+            path = Path(self.cache_path) / name
+            payload = _checked(read_private(path))
+            mark_used(path)
+        if not payload:  # none yet, or a damaged one: compiled anew
             for call in tuple(before_compiling):
                 call(self._name)
             return None
-        payload = pickle.loads(entry)
-        mark_used(path)
-        return CompileResult._rebuild(target_context, *payload)
+        return CompileResult._rebuild(target_context, *pickle.loads(payload))
 
     def save_overload(self, sig: Any, data: CompileResult) -> None:
         if data.library.has_dynamic_globals or any(not part.can_cache for part in data.lifted):
@@ -152,10 +167,10 @@ class _ContentCache(_Cache):
                 f"kernel {self._name!r} cannot be cached: it refers to a large global array, a function pointer or "
                 "a Python object; pass it as an argument"
             )
-        path = self._path(sig, data.codegen)
+        path = Path(self.cache_path) / self.entry(sig, data.codegen)
         with contextlib.suppress(OSError):  # a full disk costs a compile in the next process, not this run
-            entry = numba.core.serialize.dumps(data._reduce())
-            write_atomically(path, hashlib.sha256(entry).digest() + entry)
+            payload = numba.core.serialize.dumps(data._replace(type_annotation="")._reduce())
+            write_atomically(path, hashlib.sha256(payload).digest() + payload)
             prune(path.parent)
 
     def enable(self) -> None:
@@ -166,6 +181,12 @@ class _ContentCache(_Cache):
 
     def flush(self) -> None:
         """Entries never become stale."""
+
+
+def _checked(stored: bytes) -> bytes:
+    """An entry without its hash; empty where there is none or it is damaged."""
+    payload = stored[_DIGEST:]
+    return payload if hashlib.sha256(payload).digest() == stored[:_DIGEST] else b""
 
 
 # --------------------------------------------------------------------------------------------------------------
@@ -206,6 +227,7 @@ def kernel(signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any
                 return plain_template(arguments, named)
 
             dispatcher.compile_now = lambda: _compile_once(dispatcher, signature)
+            dispatcher.entry = lambda: dispatcher._cache.entry(signature, dispatcher.targetctx.codegen())
             dispatcher._compile_for_args = compile_for_arguments
             dispatcher.get_call_template = get_call_template
         return dispatcher
@@ -220,6 +242,7 @@ def callback(signature: Any, **options: Any) -> Callable[[Callable[..., Any]], A
         dispatcher = _cached(function, options)
         if dispatcher is not function:
             _compile_once(dispatcher, signature)
+            dispatcher.never_inlined()
         return dispatcher
 
     return decorate
@@ -233,10 +256,14 @@ def compiled(function: Any) -> Any:
 
 
 def _cached(function: Callable[..., Any], options: dict[str, Any]) -> Any:
-    dispatcher = numba.njit(**{**_OPTIONS, **options})(function)
+    dispatcher = _jitted(function, {**_OPTIONS, **options})
     if dispatcher is not function:
         dispatcher._cache = _ContentCache(function, options)
     return dispatcher
+
+
+def _jitted(function: Callable[..., Any], options: dict[str, Any]) -> Any:
+    return function if numba.config.DISABLE_JIT else Function(function, options)
 
 
 def _compile_once(dispatcher: Any, signature: Any) -> None:
@@ -265,7 +292,7 @@ def device(function: Callable[..., Any]) -> Any:
 
     It has no signature and no cache entry of its own, and costs nothing when its callers are loaded from disk.
     """
-    return numba.njit(**_INNER)(function)
+    return _jitted(function, _INNER)
 
 
 def inline(function: Callable[..., Any]) -> Any:
@@ -274,10 +301,18 @@ def inline(function: Callable[..., Any]) -> Any:
     An array argument is seven machine words and a reference count; a call that passes ten arrays costs more than
     the dozen multiplications behind it. Every call site grows the caller and its compile time, so use it sparingly.
     """
-    return numba.njit(**_INNER, forceinline=True)(function)
+    return _jitted(function, {**_INNER, "forceinline": True})
 
 
-def load_module(source: str, stem: str) -> ModuleType:
+def once(function: Callable[..., Any]) -> Any:
+    """Like :func:`inline`, but part of its caller before anything is compiled: for parts of a long function.
+
+    A function that is compiled by itself is optimised there and once more in each caller on the way up, with all that
+    stands below it: a loop of six levels took 60 s, and takes 10 as one function."""
+    return _jitted(function, {**_INNER, "inline": "always"})
+
+
+def load_module(source: str, stem: str, *, lasting: bool = True) -> ModuleType:
     """Write a generated module under a name that is a hash of its content, and import it.
 
     Parameters
@@ -286,17 +321,20 @@ def load_module(source: str, stem: str) -> ModuleType:
         Text of the module. Its functions are decorated with :func:`kernel` or :func:`callback`.
     stem
         Beginning of the file's name: an identifier.
+    lasting
+        False: its machine code ends with the last reference to its functions. Then all of them are :func:`callback`.
 
     Returns
     -------
     module
-        The same object for the same text, however often it is asked for in this process.
+        The same object for the same text, however often it is asked for while it lives.
     """
     name = f"{stem}_{hashlib.sha256(source.encode()).hexdigest()[:20]}"
     with _lock:
         full_name = f"{_GENERATED}{name}"
-        if full_name in sys.modules:
-            return sys.modules[full_name]
+        there = sys.modules.get(full_name) or _passing.get(full_name)
+        if there is not None:
+            return there
         path = cache_folder() / "generated" / f"{name}.py"
         data = source.encode()
         if read_private(path) != data:
@@ -313,7 +351,21 @@ def load_module(source: str, stem: str) -> ModuleType:
         except BaseException:
             del sys.modules[full_name]
             raise
+        if not lasting:
+            vars(module)["_itself"] = module  # it lives as long as its functions
+            _passing[full_name] = module
+            del sys.modules[full_name]
+    if not lasting:
+        _collect_models()
     return module
+
+
+def _collect_models() -> None:
+    """Code of models hangs in cycles, and Python looks for these by the number of objects, however large they are."""
+    global _most_passing
+    if len(_passing) > _most_passing:
+        gc.collect()
+        _most_passing = len(_passing) + 16
 
 
 def cache_statistics(module: ModuleType) -> Iterator[tuple[str, int, int]]:

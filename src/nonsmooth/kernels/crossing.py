@@ -1,8 +1,6 @@
 """The first transition inside one step, and how conditions are judged just after a jump.
 
-``net`` describes the system in integers: (first, outgoing) lists the transitions of each mode in declared order;
-``transitions`` rows are source, target, first row, last row + 1, contact, reset; ``rows`` are indicator, sign, strict;
-``at`` holds the phase of time-triggered transitions.
+``net`` is ``records.Net``; its last two rows are a section's and not looked at here.
 
 A transition fires where the least of its rows rises through zero. The sign of an indicator is remembered from step to
 step (``side``: -1, 1, or 0 where nothing was established), so that no change falls between two steps.
@@ -13,7 +11,7 @@ from math import fabs, sqrt
 from .cache import device, inline
 from .polynomial import NONE, UP, bounds, dense, first_crossing, load, row_bounds, shift, strip
 
-__all__ = ["NOISE", "earliest", "holding", "holds", "section_crossing", "sides_at", "snap"]
+__all__ = ["NOISE", "earliest", "rows_hold", "section_crossing", "sides_at", "snap"]
 
 NOISE = 3.6e-15  # 16 roundings: an indicator this small against its own scale is zero
 
@@ -43,25 +41,14 @@ def snap(C, m, n, n_indicators, h, scale, measured, side):
         side[i] = sign
 
 
-@device
-def holds(k, net, side):
+@inline
+def rows_hold(k, net, side):
     """Whether all rows of transition k hold by the signs ``side``."""
-    transitions, rows = net[2], net[3]
-    for r in range(transitions[k, 2], transitions[k, 3]):
-        s = rows[r, 1] * side[rows[r, 0]]
-        if s < 0 or (s == 0 and rows[r, 2] == 1):
+    for r in range(net.row_start[k], net.row_start[k + 1]):
+        s = net.rows[r, 1] * side[net.rows[r, 0]]
+        if s < 0 or (s == 0 and net.rows[r, 2] == 1):
             return False
-    return transitions[k, 3] > transitions[k, 2]
-
-
-@device
-def holding(mode, net, side):
-    """The first transition out of ``mode`` whose rows all hold by the after-limit signs, or -1."""
-    first, outgoing = net[0], net[1]
-    for j in range(first[mode], first[mode + 1]):
-        if holds(outgoing[j], net, side):
-            return outgoing[j]
-    return -1
+    return net.row_start[k + 1] > net.row_start[k]
 
 
 @inline
@@ -144,11 +131,11 @@ def earliest(mode, C, m, n, powers, net, side, side_next, scale, tail, slack, a,
     A transition is out of the question as soon as one of its rows is certainly <= 0 throughout. Where two fire
     together, the one declared first is taken.
     """
-    first, outgoing, transitions, rows, _ = net
+    rows = net.rows
     best, which, hit = NONE, -1, -1
-    for j in range(first[mode], first[mode + 1]):
-        k = outgoing[j]
-        lo, hi = transitions[k, 2], transitions[k, 3]
+    for j in range(net.mode_start[mode], net.mode_start[mode + 1]):
+        k = net.mode_list[j]
+        lo, hi = net.row_start[k], net.row_start[k + 1]
         dead, opened, row = False, 0, lo
         for r in range(lo, hi):
             i, sign = rows[r, 0], rows[r, 1]

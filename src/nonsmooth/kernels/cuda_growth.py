@@ -37,7 +37,7 @@ def frames(
     for n in range(count):
         for c in range(STATES):
             logarithms[n, c] = 0.0
-    motion = Motion(u[j], clock[j], counters[j])
+    motion = Motion(u[j], u[j, 0:0], clock[j], counters[j])
     motion.counters[1] = 0
     seen = Growth(scale, Q[j], logarithms, lengths, sums[j], step, reset, matrix, fields, t_z, turned)
     goal = Goal(0, count, 0.0, units[rows[j]], limit, 1 << 62)

@@ -17,7 +17,7 @@ from nonsmooth.kernels.cache import load_module
 
 __all__ = ["cuda_linear_module", "joined", "stamp"]
 
-STEPPER = ("linear_tables", "linear_polynomial", "linear_search", "linear_march", "linear_layout", "hybrid")
+STEPPER = ("linear_tables", "linear_polynomial", "linear_search", "linear_stepper", "linear_layout", "hybrid")
 OBSERVERS = {
     "sections": (
         "linear_extremes", "sections", "planar_settle", "cuda_planar", "cuda_tables", "cuda_advance", "cuda_judge",
@@ -49,10 +49,12 @@ def joined(parts: Sequence[str], before: str = "") -> str:
     the markers are those of the GPU."""
     folder = Path(__file__).parent
     text = "\n".join([before, *((folder / f"{part}.py").read_text(encoding="utf-8") for part in parts)])
-    own = "|".join(parts)
+    own = "|".join({*parts, "linear_stepper", "linear_extremes", "linear_touches", "generated"})
     text = re.sub(
         rf"^from (?:\.|nonsmooth\.kernels\.)(?:{own}) import (\([^)]*\).*|[^(\n]*)$", "", text, flags=re.MULTILINE
     )
+    # a model's functions are there by name
+    text = re.sub(r"^ +(field|jet|values|jump) = \1_of\(form\)$", "", text, flags=re.MULTILINE)
     text = re.sub(r"^from \. import", "from nonsmooth.kernels import", text, flags=re.MULTILINE)
     text = re.sub(r"^from \.(\w+) import", r"from nonsmooth.kernels.\1 import", text, flags=re.MULTILINE)
     return re.sub(r"from nonsmooth\.kernels\.(?:cache|lanes) import", "from nonsmooth.kernels.cuda_target import", text)

@@ -118,14 +118,17 @@ def arrays_of_thread(packed, multiples, i):
     rates = cuda.local.array(N_HARMONICS, float64)
     zero = cuda.local.array(N_INDICATORS, int64)
     found = cuda.local.array(4, int64)
+    visited = cuda.local.array(N_MODES, int64)
     twin = cuda.local.array(N_INDICATORS, int64)
     built = cuda.local.array(1, int64)
     tally = cuda.local.array(N_TALLY, int64)
     memo = cuda.local.array(N_MEMO, float64)
     built[0] = 0
     tally[0] = 0
-    form = Form(A, b, c, s, multiples, omega, period, ia, ib, ic, is_, oa, ob, oc, os_, ra, rb, rc, rs)
+    lacking = cuda.local.array((1, 1), int64)
+    lacking[0, 0] = 0
+    form = Form(A, b, c, s, multiples, omega, period, ia, ib, ic, is_, oa, ob, oc, os_, ra, rb, rc, rs, lacking)
     work = Work(
-        w, w1, wn, wp, wq, end, there, before, row, scr, points, rates, zero, found, twin, built, tally, memo,
+        w, w1, wn, wp, wq, end, there, before, row, scr, points, rates, zero, found, visited, twin, built, tally, memo,
     )  # fmt: skip
     return form, (Tables(prop, rot, fun, tay, field, info, some), work)

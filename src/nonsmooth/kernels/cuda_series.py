@@ -12,20 +12,22 @@ neighbouring threads then read neighbouring numbers.
 import numpy as np
 from numba import float64, int64
 
-from . import series_places as place
 from .codes import PAUSED
-from .cuda_target import cuda, entry, local
+from .cuda_target import cuda, entry, local, once
+from .hybrid import leave, march
 from .polynomial import stack_size
-from .series import march
-from .series_places import N_CHOICE, N_CONTROL, N_TALLY
+from .records import Generated, Goal, Kept, Motion, Net, Section, SeriesWork
+from .run_places import BEGUN
+from .series_places import N_SERIES_MEMO, N_SERIES_TALLY, OPEN_STEP, READY, ZERO_ROW
 
 # Set for each system and method.
 METHOD, ORDER, CHECKED, CORNERS, NONLINEAR_ROWS, N_GUARDS = 0, 16, 0, 0, 0, 0
 N_PARAMETERS, N_MEMORY, N_INDICATORS, N_OUTPUTS, N_SCRATCH_ROWS = 1, 0, 1, 0, 1
-FIRST = np.array([0, 1])
-OUTGOING = np.array([0])
-TRANSITIONS = np.array([[0, 0, 0, 1, 0, 0]])
+TRANSITIONS = np.array([[0, 0, 0]])
 ROWS = np.array([[0, 1, 0]])
+ROW_START = np.array([0, 1])
+MODE_START = np.array([0, 1])
+MODE_LIST = np.array([0])
 AT = np.array([-1.0])
 LACKING = np.array([[0]])
 KINDS = np.array([1])
@@ -41,14 +43,13 @@ N_SIDES = max(N_INDICATORS, 1)
 N_VALUES = max(ALL_ROWS - N_U, 1)
 WIDTH = max(ORDER, 6) + 1
 STACK = stack_size(WIDTH)
-N_MEMO = place.N_MEMO + N_U
-N_WHOLE = N_TALLY + N_SIDES  # numbers kept between launches
-N_REAL = N_MEMO + 2 * N_SIDES + 2 * N_MODES
+N_WHOLE = N_SERIES_TALLY + N_SIDES  # numbers kept between launches
+N_REAL = N_SERIES_MEMO + 2 * N_SIDES + 2 * N_MODES + N_U
 
 
 @local
 def arrays_of_thread():
-    """Scratch memory of a thread, as ``march`` takes it."""
+    """Working memory of a thread, as ``march`` takes it."""
     C = cuda.local.array((ALL_ROWS, WIDTH), float64)
     W = cuda.local.array((N_SCRATCH_ROWS, WIDTH), float64)
     J0 = cuda.local.array((ALL_ROWS, WIDTH), float64)
@@ -65,7 +66,6 @@ def arrays_of_thread():
     a = cuda.local.array(WIDTH, float64)
     d = cuda.local.array(WIDTH, float64)
     vals = cuda.local.array(N_VALUES, float64)
-    u_new = cuda.local.array(N_U, float64)
     q_new = cuda.local.array(N_Q, float64)
     scale = cuda.local.array(N_SIDES, float64)
     measured = cuda.local.array(N_SIDES, float64)
@@ -73,26 +73,31 @@ def arrays_of_thread():
     side_next = cuda.local.array(N_SIDES, int64)
     rise = cuda.local.array(N_ROWS, int64)
     usual = cuda.local.array(N_MODES, float64)
+    dwell = cuda.local.array(N_MODES, float64)
     visited = cuda.local.array(N_MODES, int64)
     stack = cuda.local.array(STACK, float64)
     found = cuda.local.array(2, int64)
-    u_dense = cuda.local.array(N_U, float64)
-    u_before = cuda.local.array(N_U, float64)
-    dwell = cuda.local.array(N_MODES, float64)
+    rest = cuda.local.array(N_U, float64)
+    w = cuda.local.array(N_U, float64)
+    end = cuda.local.array(N_U, float64)
+    before = cuda.local.array(N_U, float64)
+    wp = cuda.local.array(N_U, float64)
+    dense_ = cuda.local.array(N_U, float64)
+    q = cuda.local.array(N_Q, float64)
     near = cuda.local.array(N_VALUES, float64)
-    K = (K0, K1, K2, K3, K4, K5, K6, K7)
-    return (
-        C, W, J0, J1, K, powers, a, d, vals, u_new, q_new, scale, measured, side, side_next, rise, usual, visited,
-        stack, found, u_dense, u_before, dwell, near,
+    tally = cuda.local.array(N_SERIES_TALLY, int64)
+    memo = cuda.local.array(N_SERIES_MEMO, float64)
+    return SeriesWork(
+        w, end, before, wp, dense_, q, q_new, C, W, J0, J1, (K0, K1, K2, K3, K4, K5, K6, K7), powers, a, d, vals, near,
+        scale, measured, side, side_next, rise, usual, dwell, visited, stack, found, rest, tally, memo,
     )  # fmt: skip
 
 
-@local
-def no_log():
-    """The logs of a run that records nothing."""
-    times = cuda.local.array(1, float64)
-    samples = cuda.local.array((1, 1), float64)
-    return times, samples, samples, samples
+@once
+def may_pause(work):
+    """In place of the CPU's: only between two steps, so that no polynomial is kept between launches."""
+    tally = work.tally
+    return tally[READY] == 0 and tally[ZERO_ROW] < 0 and tally[OPEN_STEP] == 0
 
 
 @entry
@@ -111,85 +116,73 @@ def advance(
     j = jobs[k]
     i = rows[j]
     work = arrays_of_thread()
-    choice = cuda.local.array(N_CHOICE, int64)
-    control = cuda.local.array(N_CONTROL, float64)
-    tally = cuda.local.array(N_TALLY, int64)
-    memo = cuda.local.array(N_MEMO, float64)
-    state = cuda.local.array(N_U, float64)
-    q = cuda.local.array(N_Q, float64)
-    time = cuda.local.array(3, float64)
-    window = cuda.local.array((2, SEEN_ROWS), float64)
-    for n in range(N_CHOICE):
-        choice[n] = 0
-    choice[place.METHOD], choice[place.ORDER], choice[place.LOCATE], choice[place.CHECKED] = METHOD, ORDER, 1, CHECKED
-    choice[place.CORNERS], choice[place.NONLINEAR_ROWS], choice[place.N_GUARDS] = CORNERS, NONLINEAR_ROWS, N_GUARDS
-    choice[place.N_PARAMETERS], choice[place.N_INDICATORS] = N_PARAMETERS, N_INDICATORS
-    choice[place.N_OUTPUTS] = N_OUTPUTS
-    choice[place.SECTION], choice[place.RISING], choice[place.SECTION_MODE] = plan[0], plan[1], plan[2]
-    choice[place.AFTER], choice[place.EVERY], choice[place.PAUSE] = plan[3], plan[4], pause
-    choice[place.TRANSIENT] = transient[min(j, transient.shape[0] - 1)]
-    choice[place.KEEP] = keep[min(j, keep.shape[0] - 1)]
-    control[place.RTOL], control[place.STEP], control[place.PERIOD] = settings[0], settings[1], periods[i]
-    control[place.PHASE] = settings[2] * periods[i] if plan[0] < 0 else -1.0
-    control[place.T_MAX], control[place.UNTIL] = settings[3], -1.0
-    for n in range(N_U):
-        state[n] = u[j, n]
+    tally, memo = work.tally, work.memo
+    own = cuda.local.array((1, N_Q), float64)
     for n in range(N_PARAMETERS):
-        q[n] = points[n, i]
-    for n in range(N_MEMORY):
-        q[N_PARAMETERS + n] = memory[j, n]
-    for n in range(3):
-        time[n] = clock[j, n]
-    scale, measured, side, usual, dwell = work[11], work[12], work[13], work[16], work[22]
+        own[0, n] = points[n, i]
     if fresh == 1:
-        for n in range(N_TALLY):
-            tally[n] = 0
-        for n in range(N_MEMO):
-            memo[n] = 0.0
-        tally[place.SETTLED] = settled[j]
+        tally[BEGUN] = 0
+        counters[j, 1] = settled[j]
     else:
-        choice[place.PAUSE] += whole[place.STEPS, j]
-        for n in range(N_TALLY):
+        for n in range(N_SERIES_TALLY):
             tally[n] = whole[n, j]
-        for n in range(N_MEMO):
+        for n in range(N_SERIES_MEMO):
             memo[n] = real[n, j]
+        first = N_SERIES_MEMO
         for n in range(N_SIDES):
-            side[n] = whole[N_TALLY + n, j]
-            scale[n] = real[N_MEMO + n, j]
-            measured[n] = real[N_MEMO + N_SIDES + n, j]
+            work.side[n] = whole[N_SERIES_TALLY + n, j]
+            work.scale[n] = real[first + n, j]
+            work.measured[n] = real[first + N_SIDES + n, j]
+        first += 2 * N_SIDES
         for n in range(N_MODES):
-            usual[n] = real[N_MEMO + 2 * N_SIDES + n, j]
-            dwell[n] = real[N_MEMO + 2 * N_SIDES + N_MODES + n, j]
-        for n in range(SEEN_ROWS):
-            window[0, n] = extremes[j, 0, n]
-            window[1, n] = extremes[j, 1, n]
-    code = march(
-        field, jet, values, jump,  # noqa: F821 - of the model, whose text stands before this one
-        (FIRST, OUTGOING, TRANSITIONS, ROWS, AT), LACKING, KINDS, choice, control, norms,
-        exact_steps[i], state, q, time, counters[j], work, sections[j], window, tally, memo, no_log(),
+            work.usual[n] = real[first + n, j]
+            work.dwell[n] = real[first + N_MODES + n, j]
+        first += 2 * N_MODES
+        for n in range(N_U):
+            work.rest[n] = real[first + n, j]
+            work.w[n] = u[j, n]
+        for n in range(N_PARAMETERS):
+            work.q[n] = own[0, n]
+        for n in range(N_MEMORY):
+            work.q[N_PARAMETERS + n] = memory[j, n]
+    form = Generated(
+        periods, own[:, :N_PARAMETERS], periods[i : i + 1], exact_steps[i : i + 1], LACKING, KINDS, norms[0], norms[1],
+        settings[0], settings[1], METHOD, ORDER, 1, CHECKED, CORNERS, NONLINEAR_ROWS, N_GUARDS, N_INDICATORS, N_OUTPUTS,
     )  # fmt: skip
-    for n in range(N_U):
-        u[j, n] = state[n]
-    for n in range(N_MEMORY):
-        memory[j, n] = q[N_PARAMETERS + n]
-    for n in range(3):
-        clock[j, n] = time[n]
-    for n in range(SEEN_ROWS):
-        extremes[j, 0, n] = window[0, n]
-        extremes[j, 1, n] = window[1, n]
-    if code == PAUSED:
-        for n in range(N_TALLY):
-            whole[n, j] = tally[n]
-        for n in range(N_MEMO):
-            real[n, j] = memo[n]
-        for n in range(N_SIDES):
-            whole[N_TALLY + n, j] = side[n]
-            real[N_MEMO + n, j] = scale[n]
-            real[N_MEMO + N_SIDES + n, j] = measured[n]
-        for n in range(N_MODES):
-            real[N_MEMO + 2 * N_SIDES + n, j] = usual[n]
-            real[N_MEMO + 2 * N_SIDES + N_MODES + n, j] = dwell[n]
-    crossings[j] = tally[place.KEPT_CROSSINGS]
-    contacts[j] = tally[place.KEPT_CONTACTS]
-    elapsed[j] = memo[place.ELAPSED]
+    section = Section(plan[0], plan[1], plan[2], plan[3], plan[4], 1, settings[2] if plan[0] < 0 else -1.0, settings[3])
+    goal = Goal(
+        transient[min(j, transient.shape[0] - 1)], keep[min(j, keep.shape[0] - 1)], 0.0, 0.0, norms[2], pause
+    )
+    motion = Motion(u[j], memory[j, :N_MEMORY], clock[j], counters[j])
+    points_kept, top, bottom = sections[j : j + 1], extremes[j : j + 1, 0], extremes[j : j + 1, 1]
+    seen = Kept(
+        points_kept, top[:, :N_U], bottom[:, :N_U], top[:, N_U : N_U + N_INDICATORS],
+        bottom[:, N_U : N_U + N_INDICATORS], top[:, N_U + N_INDICATORS :], bottom[:, N_U + N_INDICATORS :],
+        crossings[j : j + 1], contacts[j : j + 1], elapsed[j : j + 1], points_kept[:, :, N_U],
+        points_kept[:, :, N_U + 1],
+        status[j : j + 1],
+    )  # fmt: skip
+    net = Net(TRANSITIONS, ROWS, ROW_START, MODE_START, MODE_LIST, AT)
+    code = march(0, form, net, section, goal, motion, seen, (), work)
     status[j] = code
+    if code != PAUSED:
+        leave(0, form, motion, work)
+        return
+    for n in range(N_U):
+        u[j, n] = work.w[n]
+        real[N_REAL - N_U + n, j] = work.rest[n]
+    for n in range(N_MEMORY):
+        memory[j, n] = work.q[N_PARAMETERS + n]
+    for n in range(N_SERIES_TALLY):
+        whole[n, j] = tally[n]
+    for n in range(N_SERIES_MEMO):
+        real[n, j] = memo[n]
+    first = N_SERIES_MEMO
+    for n in range(N_SIDES):
+        whole[N_SERIES_TALLY + n, j] = work.side[n]
+        real[first + n, j] = work.scale[n]
+        real[first + N_SIDES + n, j] = work.measured[n]
+    first += 2 * N_SIDES
+    for n in range(N_MODES):
+        real[first + n, j] = work.usual[n]
+        real[first + N_MODES + n, j] = work.dwell[n]

@@ -18,8 +18,8 @@ from nonsmooth.kernels.cuda_module import joined, stamp
 __all__ = ["cuda_series_module", "cuda_series_source"]
 
 PARTS = (
-    "circular", "polynomial", "crossing", "rkf45", "taylor", "trust", "watch", "series_step", "series_node", "series",
-    "cuda_series",
+    "circular", "polynomial", "crossing", "rkf45", "taylor", "trust", "watch", "series_step", "series_stepper",
+    "hybrid", "sections", "cuda_series",
 )  # fmt: skip
 
 

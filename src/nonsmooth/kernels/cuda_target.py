@@ -18,7 +18,7 @@ from numba import config, cuda
 from nonsmooth.kernels.lanes import plain
 
 __all__ = [
-    "REGISTERS", "THREADS", "callback", "cuda", "device", "dot", "entry", "inline", "kernel", "local", "sizes",
+    "REGISTERS", "THREADS", "callback", "cuda", "device", "dot", "entry", "inline", "kernel", "local", "once", "sizes",
     "spread", "sum_columns", "sum_rows", "sum_some_rows",
 ]  # fmt: skip
 
@@ -34,7 +34,7 @@ def device(function: Callable[..., Any]) -> Any:
     return function if _SIMULATED else cuda.jit(device=True, forceinline=True)(function)
 
 
-inline = device
+inline = once = device
 sum_rows, sum_columns = device(plain.sum_rows), device(plain.sum_columns)
 dot, sizes, spread = device(plain.dot), device(plain.sizes), device(plain.spread)
 sum_some_rows = device(plain.sum_some_rows)

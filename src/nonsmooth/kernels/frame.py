@@ -8,7 +8,7 @@ from math import fabs, inf, log, sqrt
 
 from .cache import inline
 
-__all__ = ["log_determinant", "orthonormal", "put_away", "saltation"]
+__all__ = ["log_determinant", "multiply", "saltation", "straighten"]
 
 SINGULAR = 1e-13  # a pivot below this part of its row's size is that of a matrix without full rank
 
@@ -64,6 +64,31 @@ def put_away(lengths, columns, growth):
     for c in range(columns):
         growth[c] += log(lengths[c]) if lengths[c] > 0.0 else -inf
         lengths[c] = 1.0
+
+
+@inline
+def straighten(Q, n, columns, lengths, singular, ended, growth):
+    """Make the frame orthonormal; its lengths go to ``growth`` where the unit of time has ended, or before they
+    overflow."""
+    orthonormal(Q, n, columns, lengths, singular)
+    away = ended
+    for c in range(columns):
+        away = away or not (1e-100 < lengths[c] < 1e100)
+    if away:
+        put_away(lengths, columns, growth)
+
+
+@inline
+def multiply(X, Q, n, columns, scratch):
+    """Q = X Q, for X in units of the scales."""
+    for c in range(columns):
+        for r in range(n):
+            total = X[r, 0] * Q[0, c]
+            for j in range(1, n):
+                total += X[r, j] * Q[j, c]
+            scratch[r] = total
+        for r in range(n):
+            Q[r, c] = scratch[r]
 
 
 @inline

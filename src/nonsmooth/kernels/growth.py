@@ -8,19 +8,20 @@ from math import fabs, inf, sqrt
 
 from numba import types
 
-from .cache import inline, kernel
+from .cache import inline, kernel, once
 from .codes import OK, PAUSED
-from .frame import log_determinant, orthonormal, put_away, saltation
+from .frame import log_determinant, multiply, saltation, straighten
 from .hybrid import leave, march
 from .linear_search import slope_of
+from .linear_stepper import STEPPER
 from .linear_tables import DEGREE, HARMONICS, NODES, STATES, WAVE, M
-from .records import FORM, GOAL, GROWTH, MOTION, NET, SECTION, TABLES, WORK
-from .run_places import DONE, JUMPS, MODE, PERIODS, RETURNS, TIME, WAITED
+from .records import GOAL, GROWTH, MOTION, NET, SECTION
+from .run_places import DONE, JUMPS, MODE, NO_END, PERIODS, RETURNS, TIME, WAITED
 
 OPEN_RUN, CLOSED = 0, 2
 
 
-@inline
+@once
 def open_window(i, form, section, seen, tables, work):
     """Units of time count from here (``RETURNS`` of them; where in the period the run began: ``WAITED``), and periods
     with them."""
@@ -30,56 +31,42 @@ def open_window(i, form, section, seen, tables, work):
         seen.lengths[c] = 1.0
 
 
-@inline
+@once
 def reached(goal, work):
     """Whether the run is over."""
     return work.tally[RETURNS] >= goal.keep
 
 
-@inline
+@once
 def room(seen, work):
     """Nothing is logged."""
     return OK
 
 
-@inline
-def remaining(goal, work):
-    """Time to the end of the unit."""
-    return (work.tally[RETURNS] + 1) * goal.unit - work.memo[DONE]
+@once
+def remaining(section, goal, work):
+    """Time to the end of the unit (rounding may have passed it)."""
+    return max((work.tally[RETURNS] + 1) * goal.unit - work.memo[DONE], 0.0)
 
 
-@inline
-def may_stride(i, form, net, section):
+@once
+def may_stride(i, form, net, section, seen):
     """Every step is followed."""
     return False
 
 
-@inline
+@once
 def hurry(i, form, net, section, goal, seen, tables, work, patience):
     """Every step is followed."""
     return False, False, patience
 
 
-@inline
-def times(X, seen):
-    """frame = X frame, for X in units of the scales."""
-    Q, scratch = seen.frame, seen.scratch
-    for c in range(STATES):
-        for r in range(STATES):
-            total = X[r, 0] * Q[0, c]
-            for j in range(1, STATES):
-                total += X[r, j] * Q[j, c]
-            scratch[r] = total
-        for r in range(STATES):
-            Q[r, c] = scratch[r]
-
-
-@inline
-def observe(i, step, full, triggered, form, net, section, goal, seen, tables, work):
+@once
+def observe(i, step, stop, triggered, form, net, section, goal, seen, tables, work):
     """Carry the frame over the leg: X = exp(A tau), from the nearest node and the Taylor rows of the states."""
     prop, tay, X, scale = tables.prop, tables.tay, seen.step, seen.scale
     mode, n_i = work.tally[MODE], work.zero.shape[0]
-    spacing = tables.info[mode, 1]
+    spacing, full = tables.info[mode, 1], step == tables.info[mode, 0]
     node = NODES if full else min(int(step / spacing + 0.5), NODES)
     local = step - node * spacing
     for r in range(STATES):
@@ -97,11 +84,11 @@ def observe(i, step, full, triggered, form, net, section, goal, seen, tables, wo
         seen.sums[0] += tables.field[mode, r, r] * step
         for c in range(STATES):
             X[r, c] *= scale[c] / scale[r]
-    times(X, seen)
+    multiply(X, seen.frame, STATES, STATES, seen.scratch)
     return OPEN_RUN
 
 
-@inline
+@once
 def mark(i, wrapped, ended, crossed, step, form, goal, seen, work):
     """The time at the end of a leg, on the clock of the forcing: sums of steps would drift away from it."""
     tally, memo, T = work.tally, work.memo, form.period[i]
@@ -110,21 +97,10 @@ def mark(i, wrapped, ended, crossed, step, form, goal, seen, work):
         tally[JUMPS] = 0
         memo[DONE] = tally[RETURNS] * goal.unit
     else:
-        memo[DONE] = memo[PERIODS] * T + memo[TIME] - memo[WAITED] if T < 1e300 else memo[DONE] + step
+        memo[DONE] = memo[PERIODS] * T + memo[TIME] - memo[WAITED] if T < NO_END else memo[DONE] + step
     if not crossed:
-        settle_frame(tally[RETURNS] - 1 if ended else tally[RETURNS], ended, False, seen)
-
-
-@inline
-def settle_frame(unit, ended, singular, seen):
-    """Make the frame orthonormal; its lengths go to the unit's logarithms at its end, or before they overflow."""
-    lengths = seen.lengths
-    orthonormal(seen.frame, STATES, STATES, lengths, singular)
-    away = ended
-    for c in range(STATES):
-        away = away or not (1e-100 < lengths[c] < 1e100)
-    if away:
-        put_away(lengths, STATES, seen.growth[unit])
+        unit = tally[RETURNS] - 1 if ended else tally[RETURNS]
+        straighten(seen.frame, STATES, STATES, seen.lengths, False, ended, seen.growth[unit])
 
 
 @inline
@@ -137,7 +113,7 @@ def slope_along(field, mode, w, out):
         out[r] = total
 
 
-@inline
+@once
 def approach(mode, fired, seen, tables, work):
     """Derivative of the instant of a crossing in the state, and how steeply the surface is met."""
     t_z, S, f = seen.t_z, seen.step, seen.fields
@@ -158,7 +134,7 @@ def approach(mode, fired, seen, tables, work):
             seen.sums[3] = min(seen.sums[3], fabs(rate) / sqrt(across * speed))
 
 
-@inline
+@once
 def cross(i, t, mode, jumps, form, net, goal, seen, tables, work):
     """Saltation of a transition, from the mode in which it was taken to ``mode``."""
     before, f, R = work.wp, seen.fields, seen.reset
@@ -178,7 +154,7 @@ def cross(i, t, mode, jumps, form, net, goal, seen, tables, work):
     saltation(R, f[2], f[0], f[1], seen.t_z, STATES, seen.step, seen.matrix)
 
 
-@inline
+@once
 def depart(jumps, seen, work):
     """The transitions of one instant act on the frame."""
     S, scale = seen.step, seen.scale
@@ -188,17 +164,17 @@ def depart(jumps, seen, work):
     size = log_determinant(S, STATES, seen.matrix)
     seen.sums[1] += size
     seen.sums[2] += jumps
-    times(S, seen)
-    settle_frame(work.tally[RETURNS], False, size == -inf, seen)
+    multiply(S, seen.frame, STATES, STATES, seen.scratch)
+    straighten(seen.frame, STATES, STATES, seen.lengths, size == -inf, False, seen.growth[work.tally[RETURNS]])
 
 
-@inline
+@once
 def arrive(i, code, source, t, sense, state, form, section, goal, seen, tables, work):
     """No section is looked for."""
     return code
 
 
-@kernel(types.int64(types.int64, FORM, NET, SECTION, GOAL, MOTION, GROWTH, TABLES, WORK))
+@kernel(types.int64(types.int64, STEPPER[0], NET, SECTION, GOAL, MOTION, GROWTH, STEPPER[1], STEPPER[2]))
 def grow(i, form, net, section, goal, motion, seen, tables, work):
     """Point i for ``goal.keep`` units of time with the frame. Returns a status: PAUSED asks to be called again."""
     code = march(i, form, net, section, goal, motion, seen, tables, work)

@@ -1,38 +1,28 @@
 """The hybrid loop: one trajectory through legs and transitions, over a stepper and an observer.
 
-The *stepper* (``linear_march`` and what it stands on) knows the flow: it prepares the tables of a point, marches a leg
-to its first crossing, lands there, takes transitions and says which conditions hold just after. The *observer*
-(``sections``, ``record`` or ``growth``, joined behind this file) says how far to go and looks at each leg and each
-transition. Everything else is here: start rule, triggers, transitions of one instant in declared order, guards of
-chatter, the clock.
+The *stepper* knows the flow: ``linear_stepper`` (linear modes with harmonic forcing, any number of states) or
+``series_stepper`` (generated Taylor series, Runge-Kutta-Fehlberg). It prepares a point, marches a leg to its first
+crossing, lands there, takes transitions and says which conditions hold just after. The *observer* (``sections``,
+``record`` or ``growth``) says how far to go and looks at each leg and each transition. Their functions stand in the
+text that is joined with this file. Everything else is here: start rule, transitions of one instant in declared order,
+guards of chatter, the clock.
 
-All that a run knows beside its state stands in ``work.tally`` and ``work.memo``: it may pause and go on.
+All that a run knows beside its arrays stands in ``work.tally`` and ``work.memo``: it may pause and go on.
 """
 
-from .cache import inline
-from .codes import CHATTER, DIVERGED, OK, PAUSED, TOO_MANY_CROSSINGS
-from .linear_march import (
-    bounded,
-    jump,
-    leg,
-    mark_zeros,
-    next_holding,
-    set_phase,
-    settle,
-    sign_after,
-    trigger,
-    wrap_phase,
-)
-from .linear_search import FUNCTIONAL, NODE, SIDE
-from .linear_tables import ONE, STATES, M, build, hide_lacking
+from .cache import inline, once
+from .codes import BEYOND_STOP, CHATTER, DIVERGED, NOT_GUARANTEED, OK, PAUSED, TOO_MANY_CROSSINGS
 from .run_places import (
     BEGUN,
     BURST,
     BURST_LENGTH,
+    FIRED,
     JUMPS,
     MODE,
     MOST_CROSSINGS,
+    NO_END,
     PERIODS,
+    RESET,
     SHORT,
     SINCE,
     TIME,
@@ -40,73 +30,96 @@ from .run_places import (
 
 
 @inline
+def next_holding(mode, tables, net, work):
+    """The first outgoing transition (in declared order) whose rows all hold just after the present instant, or -1."""
+    for k in range(net.mode_start[mode], net.mode_start[mode + 1]):
+        if holds(net.mode_list[k], mode, tables, net, work):
+            return net.mode_list[k]
+    return -1
+
+
+@once
+def settle(i, form, net, tables, work):
+    """Start rule: transitions without a reset that hold already are taken, each mode at most once.
+
+    Returns a status: BEYOND_STOP where one with a reset holds."""
+    tally, visited = work.tally, work.visited
+    for k in range(visited.shape[0]):
+        visited[k] = 0
+    visited[tally[MODE]] = 1
+    for _ in range(visited.shape[0]):
+        mode, t = tally[MODE], -1
+        for k in range(net.mode_start[mode], net.mode_start[mode + 1]):
+            one = net.mode_list[k]
+            if holds(one, mode, tables, net, work):
+                if net.transitions[one, 1] == RESET:
+                    return BEYOND_STOP
+                if visited[net.transitions[one, 0]] == 0:
+                    t = one
+                    break
+        if t < 0:
+            break
+        tally[MODE] = take(i, t, -1, form, tables, net, work)
+        visited[tally[MODE]] = 1
+    return OK
+
+
+@once
 def begin(i, form, net, section, motion, tables, work):
-    """Tables, state and mode where a run begins, by the start rule. Returns a status."""
-    build(i, form, tables, work)
-    hide_lacking(net, tables, work)
-    w, tally, memo = work.w, work.tally, work.memo
+    """State and mode where a run begins, by the start rule. Returns a status."""
+    tally, memo = work.tally, work.memo
     for k in range(tally.shape[0]):
         tally[k] = 0
     for k in range(memo.shape[0]):
         memo[k] = 0.0
-    tally[BEGUN] = 1
-    memo[TIME], memo[PERIODS], memo[SINCE] = motion.clock[0], motion.clock[1], 1e300
-    for j in range(STATES):
-        w[j] = motion.u[j]
-    w[ONE] = 1.0
-    set_phase(work, memo[TIME])
-    mode, code = motion.counters[0], OK
-    mark_zeros(tables, work, mode)
-    if motion.counters[1] == 0:
-        mode, code = settle(i, form, tables, net, work, mode)
+    tally[BEGUN], tally[MODE] = 1, motion.counters[0]
+    memo[TIME], memo[PERIODS], memo[SINCE] = motion.clock[0], motion.clock[1], NO_END
+    prepare(i, form, motion, tables, work)
+    look(i, form, tables, work, tally[MODE])
+    code = OK
+    if motion.counters[1] != 1:
+        code = settle(i, form, net, tables, work)
     if section.indicator >= 0:  # a start on the section is no return
-        work.found[SIDE] = sign_after(tables, work, mode, section.indicator)
-    tally[MODE] = mode
+        start_on_section(form, section, tables, work)
     return code
 
 
-@inline
-def land(i, step, crossed, full, form, tables, work):
-    """End a leg: state, clock and phase of the forcing. Returns (a period has ended, closely behind a crossing)."""
-    w, w1, end, memo, zero = work.w, work.w1, work.end, work.memo, work.zero
-    mode, T = work.tally[MODE], form.period[i]
-    short = memo[SINCE] + step < SHORT * tables.info[mode, 0]
-    memo[SINCE] = 0.0 if crossed else memo[SINCE] + step
-    for j in range(M):
-        w[j] = w1[j] if full else end[j]
-    s = memo[TIME] + step
+@once
+def land(i, step, stop, t, full, form, net, tables, work):
+    """End a leg: clock and state; ``stop`` is the time at which it ends exactly, or -1.
+
+    Returns (transition, a period has ended, closely behind a crossing)."""
+    memo, T = work.memo, form.period[i]
+    since = memo[SINCE] + step
+    short = since < SHORT * time_scale(i, since, form, tables, work)
+    s = stop if stop >= 0.0 else memo[TIME] + step
     wrapped = s >= T
     if wrapped:
         s -= T
         memo[PERIODS] += 1.0
-        wrap_phase(tables, work, mode, s)
     memo[TIME] = s
-    for f in range(zero.shape[0]):
-        zero[f] = 0
-    return wrapped, short
+    t = arrive_at(t, since, full, wrapped, form, net, tables, work)
+    memo[SINCE] = 0.0 if t >= 0 else since
+    return t, wrapped, short
 
 
-@inline
+@once
 def transit(i, t, short, form, net, section, goal, seen, tables, work):
     """Transition t and those that hold just after it, at the same instant. Returns (status, section direction)."""
-    found, tally = work.found, work.tally
-    mode, code, sense = tally[MODE], OK, 0
-    source, fired = mode, found[FUNCTIONAL]
-    if section.indicator >= 0 and fired == section.indicator:
-        for k in range(net.row_start[t], net.row_start[t + 1]):
-            if net.rows[k, 0] == fired:
-                sense = net.rows[k, 1]
+    tally = work.tally
+    mode, code = tally[MODE], OK
+    source, fired, first = mode, tally[FIRED], t
     approach(mode, fired, seen, tables, work)
     jumps = 0
     while t >= 0:
-        if jumps > net.mode_start.shape[0] + 1:  # modes + 3 of them at one instant, as by series
+        if jumps > net.mode_start.shape[0] + 1:  # as many as modes, and three
             code = CHATTER
             break
-        mode = jump(i, t, fired if jumps == 0 else -1, form, tables, net, work)
+        mode = take(i, t, fired if jumps == 0 else -1, form, tables, net, work)
         cross(i, t, mode, jumps, form, net, goal, seen, tables, work)
         tally[MODE] = mode
         jumps += 1
-        t = next_holding(tables, net, work, mode)
+        t = next_holding(mode, tables, net, work)
     depart(jumps, seen, work)
     tally[JUMPS] += jumps
     tally[BURST] = tally[BURST] + 1 if short else 0
@@ -114,73 +127,72 @@ def transit(i, t, short, form, net, section, goal, seen, tables, work):
         code = CHATTER
     elif tally[JUMPS] > MOST_CROSSINGS:
         code = TOO_MANY_CROSSINGS
-    # a section that lies on the surface just crossed
-    if sense != 0 and section.rising * sense >= 0:
+    sense = 0  # where the section lies on the surface just crossed
+    if section.indicator >= 0 and fired >= 0:
         if section.mode < 0 or section.mode == (mode if section.after != 0 else source):
-            return code, sense
-    return code, 0
+            sense = met(first, fired, form, net, section, work)
+    return code, sense
 
 
-@inline
+@once
 def march(i, form, net, section, goal, motion, seen, tables, work):
     """Point i until its goal is reached. Returns a status: PAUSED and LOG_FULL ask to be called again.
 
     ``work`` then holds where it stands; ``leave`` writes that to the motion."""
-    w, tally, memo, found = work.w, work.tally, work.memo, work.found
+    w, tally, memo = work.w, work.tally, work.memo
     code = OK
     if tally[BEGUN] == 0:
         code = begin(i, form, net, section, motion, tables, work)
         open_window(i, form, section, seen, tables, work)
-    T = form.period[i]
     patience = goal.patience
-    strides = may_stride(i, form, net, section)
+    strides = may_stride(i, form, net, section, seen)
     while code == OK and not reached(goal, work):
         patience -= 1
-        code = PAUSED if patience < 0 else room(seen, work)
+        code = PAUSED if patience < 0 and may_pause(work) else room(seen, work)
         if code != OK:
             break
-        mode = tally[MODE]
         ready, clear = False, False
         if strides:
             ready, clear, patience = hurry(i, form, net, section, goal, seen, tables, work, patience)
-        wait, timed = 1e300, -1
+        stop, timed = NO_END, -1
         if not strides:
-            wait, timed = trigger(net, mode, memo[TIME], T)
-        rest = remaining(goal, work)
-        if clear:
-            step, t, full, sense = tables.info[mode, 0], -1, True, 0
-            found[NODE] = -1
-        else:
-            step, t, full, sense = leg(tables, net, work, section, mode, min(wait, rest), ready)
-        if t < 0 and sense == 0 and timed >= 0 and step >= wait:
+            stop, timed = next_stop(i, form, net, section, goal, work)
+        wait, rest = stop - memo[TIME], remaining(section, goal, work)
+        step, t, full, sense = leg(i, form, net, section, goal, tables, work, min(wait, rest), ready, clear)
+        if not step >= 0.0:
+            code = DIVERGED
+            break
+        stopped = t < 0 and sense == 0 and step >= wait
+        if stopped and timed >= 0:
             t = timed
-            found[FUNCTIONAL] = -1
-        state = observe(i, step, full, t >= 0 and t == timed, form, net, section, goal, seen, tables, work)
+        state = observe(i, step, stop if stopped else -1.0, t >= 0 and t == timed, form, net, section, goal, seen,
+                        tables, work)  # fmt: skip
         if state == CLOSED:
             break
-        wrapped, short = land(i, step, t >= 0, full, form, tables, work)
-        mark(i, wrapped, step >= rest and t < 0, t >= 0, step, form, goal, seen, work)
+        source = tally[MODE]
+        ended = step >= rest and t < 0
+        t, wrapped, short = land(i, step, stop if stopped else -1.0, t, full, form, net, tables, work)
+        mark(i, wrapped, ended, t >= 0, step, form, goal, seen, work)
         if section.indicator >= 0:
-            for j in range(STATES):
+            for j in range(w.shape[0]):
                 work.before[j] = w[j]
         if t >= 0:
             code, sense = transit(i, t, short, form, net, section, goal, seen, tables, work)
         elif sense != 0:
-            work.zero[section.indicator] = 1
-        if not bounded(w, goal.limit):
+            touch_section(section, work)
+        if not bounded(work, goal.limit):
             code = DIVERGED
-        code = arrive(i, code, mode, t, sense, state, form, section, goal, seen, tables, work)
-    return code
+        code = arrive(i, code, source, t, sense, state, form, section, goal, seen, tables, work)
+    return NOT_GUARANTEED if code == OK and doubtful(work) else code
 
 
-@inline
+@once
 def leave(i, form, motion, work):
     """Write where a run stands to the motion."""
     T = form.period[i]
-    for j in range(STATES):
-        motion.u[j] = work.w[j]
+    put_state(motion, work)
     motion.clock[0] = work.memo[TIME]
     motion.clock[1] = work.memo[PERIODS]
-    motion.clock[2] = T if T < 1e300 else 0.0
+    motion.clock[2] = T if T < NO_END else 0.0
     motion.counters[0] = work.tally[MODE]
     work.tally[BEGUN] = 0

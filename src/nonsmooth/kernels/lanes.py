@@ -15,11 +15,15 @@ from typing import Any
 import numba
 from llvmlite import ir
 from numba.core import cgutils, types
-from numba.extending import intrinsic
+from numba.extending import intrinsic, models, register_model
 
-__all__ = ["LANES", "dot", "plain", "sizes", "spread", "sum_columns", "sum_rows", "sum_some_rows"]
+__all__ = [
+    "FOUR", "LANES", "dot", "load", "plain", "plus", "sizes", "spread", "store", "sum_columns", "sum_rows",
+    "sum_some_rows", "times",
+]  # fmt: skip
 
 LANES = 8
+FOUR = 4  # numbers of a vector that is a value in a kernel
 WIDEST = 32  # lanes of one sum: what the vector registers hold
 LONGEST = 24  # sums of more terms are loops
 FEW = 2  # so many columns' entries go one by one: joining them costs more than it gains
@@ -55,6 +59,26 @@ def _sum_columns(out: Any, table: Any, mode: Any, node: Any, w: Any, n: Any, m: 
         for j in range(n - 1, -1, -1):
             total += table[mode, node, j, r] * w[j]
         out[r] = total
+
+
+def _load(D: Any, place: Any) -> Any:
+    """Four numbers of an array from a place in its memory on."""
+    return D.reshape(-1)[place : place + FOUR].copy()
+
+
+def _store(D: Any, place: Any, x: Any) -> None:
+    """Four numbers to an array."""
+    D.reshape(-1)[place : place + FOUR] = x
+
+
+def _times(a: Any, x: Any) -> Any:
+    """A number times four."""
+    return a * x
+
+
+def _plus(y: Any, a: Any, x: Any) -> Any:
+    """y + a x."""
+    return y + a * x
 
 
 def _dot(total: Any, row: Any, at: Any, w: Any, n: Any) -> Any:
@@ -324,6 +348,60 @@ def _spread_in_lanes(typing: Any, total: Any, row: Any, at: Any, w: Any, about: 
     return signature, generate
 
 
+class _Four(types.Type):
+    """Four numbers in a vector register."""
+
+    def __init__(self) -> None:
+        super().__init__(name="Four")
+
+
+_four, _vector = _Four(), ir.VectorType(ir.DoubleType(), FOUR)
+
+
+@register_model(_Four)
+class _FourModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, kind: Any) -> None:
+        super().__init__(manager, kind, _vector)
+
+
+def _at(context: Any, builder: Any, kind: Any, array: Any, place: Any) -> Any:
+    data = context.make_array(kind)(context, builder, array).data
+    return builder.bitcast(builder.gep(data, [place]), _vector.as_pointer())
+
+
+@intrinsic
+def _load_four(typing: Any, D: Any, place: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.load(_at(context, builder, D, *arguments), align=8)
+
+    return _four(D, types.int64), generate
+
+
+@intrinsic
+def _store_four(typing: Any, D: Any, place: Any, x: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        builder.store(arguments[2], _at(context, builder, D, *arguments[:2]), align=8)
+        return context.get_dummy_value()
+
+    return types.void(D, types.int64, x), generate
+
+
+@intrinsic
+def _times_four(typing: Any, a: Any, x: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return _scaled(builder, arguments[1], arguments[0])
+
+    return _four(types.float64, x), generate
+
+
+@intrinsic
+def _plus_four(typing: Any, y: Any, a: Any, x: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.fadd(arguments[0], _scaled(builder, arguments[2], arguments[1]), flags=_CONTRACT)
+
+    return _four(y, types.float64, x), generate
+
+
 def _choose(compiled: Any, loops: Callable[..., Any]) -> Any:
     return loops if numba.config.DISABLE_JIT else compiled
 
@@ -334,3 +412,5 @@ sum_some_rows = _choose(_sum_some_rows_in_lanes, _sum_some_rows)
 dot = _choose(_dot_in_lanes, _dot)
 sizes = _choose(_sizes_in_lanes, _sizes)
 spread = _choose(_spread_in_lanes, _spread)
+load, store = _choose(_load_four, _load), _choose(_store_four, _store)
+times, plus = _choose(_times_four, _times), _choose(_plus_four, _plus)

@@ -4,10 +4,11 @@ A step that certainly does not leave the extremes so far costs a dozen multiplic
 is halved down to two node spacings, where the polynomial's critical points decide.
 """
 
-from .cache import device, inline
+from .cache import device, inline, once
 from .linear_polynomial import NEVER, THIRD, classify, critical_points, horner
 from .linear_search import bound_at, compose, slope_of, to_node, value_of
-from .linear_tables import NODES, ONE, STATES
+from .linear_tables import MEMORY, NODES, ONE, OWN, STATES
+from .run_places import MODE
 
 
 @device
@@ -72,24 +73,15 @@ def extremes_of(f, kept, n_i):
     return kept.o_max, kept.o_min, f - n_i - STATES
 
 
-@inline
-def forget(i, kept):
-    """Begin the extremes of point i."""
-    for k in range(kept.maximum.shape[1]):
-        kept.maximum[i, k], kept.minimum[i, k] = -1e300, 1e300
-    for k in range(kept.i_max.shape[1]):
-        kept.i_max[i, k], kept.i_min[i, k] = -1e300, 1e300
-    for k in range(kept.o_max.shape[1]):
-        kept.o_max[i, k], kept.o_min[i, k] = -1e300, 1e300
-
-
-@inline
-def widen(i, a, b, tables, work, mode, kept):
+@once
+def widen(i, a, b, form, tables, work, kept):
     """Extend the extremes of point i by the piece [a, b] of a leg."""
-    n_i = work.zero.shape[0]
+    n_i, mode = work.zero.shape[0], work.tally[MODE]
     for f in range(tables.fun.shape[1]):
         if f < n_i and work.twin[f] >= 0:
             continue  # a state but for a constant: see ``finish``
+        if MEMORY > 0 and n_i + OWN <= f < n_i + STATES:
+            continue
         hi, lo, k = extremes_of(f, kept, n_i)
         below, above = exceeds(tables, mode, f, work.w, work.w1, lo[i, k], hi[i, k])
         if above:
@@ -98,8 +90,8 @@ def widen(i, a, b, tables, work, mode, kept):
             lo[i, k] = -locate_maximum(tables, work, mode, f, -1.0, a, b, -lo[i, k])
 
 
-@inline
-def finish(i, tables, work, kept):
+@once
+def finish(i, form, tables, work, kept):
     """Extremes of the indicators that are a state but for a constant."""
     for f in range(work.zero.shape[0]):
         if work.twin[f] >= 0:
@@ -107,11 +99,13 @@ def finish(i, tables, work, kept):
             kept.i_min[i, f] = kept.minimum[i, work.twin[f]] + tables.fun[0, f, ONE]
 
 
-@device
-def include(i, tables, work, mode, kept):
+@once
+def include(i, mode, form, tables, work, kept):
     """Extend the extremes of point i by the present instant."""
     n_i = work.zero.shape[0]
     for f in range(tables.fun.shape[1]):
+        if MEMORY > 0 and n_i + OWN <= f < n_i + STATES:
+            continue
         hi, lo, k = extremes_of(f, kept, n_i)
         value = value_of(tables, mode, f, work.w)
         hi[i, k] = max(hi[i, k], value)

@@ -26,6 +26,8 @@ from .lanes import dot
 
 STATES = 2
 HARMONICS = 1
+MEMORY = 0  # of the states: the last of them, which only transitions change
+OWN = STATES - MEMORY
 ONE = STATES  # the place of the constant in w
 WAVE = STATES + 1  # and of the first harmonic
 M = WAVE + 2 * HARMONICS
@@ -292,6 +294,19 @@ def list_columns(mode, f, tables):
 
 
 @device
+def hide_lacking(form, tables, work):
+    """No value for a state that a mode lacks, and for memory: NaN takes no part in extremes."""
+    n_i = work.zero.shape[0]
+    for mode in range(form.lacking.shape[0]):
+        for j in range(form.lacking.shape[1]):
+            if form.lacking[mode, j] != 0:
+                tables.fun[mode, n_i + j, ONE] = nan
+                for f in range(n_i):
+                    if work.twin[f] == j:
+                        work.twin[f] = -1
+
+
+@device
 def build(i, form, tables, work):
     """Fill the tables for parameter point ``i``, where they do not stand there already."""
     if work.built[0] == i + 1:
@@ -327,6 +342,7 @@ def build(i, form, tables, work):
                 list_columns(mode, f, tables)
     for f in range(n_i):
         work.twin[f] = twin_of(f, n_i, fun)
+    hide_lacking(form, tables, work)
     work.built[0] = i + 1
 
 
@@ -341,16 +357,3 @@ def twin_of(f, n_i, fun):
         if same:
             twin = k
     return twin
-
-
-@device
-def hide_lacking(net, tables, work):
-    """No value for a state that a mode lacks, and for memory: NaN takes no part in extremes."""
-    n_i = work.zero.shape[0]
-    for mode in range(net.lacking.shape[0]):
-        for j in range(STATES):
-            if net.lacking[mode, j] != 0:
-                tables.fun[mode, n_i + j, ONE] = nan
-                for f in range(n_i):
-                    if work.twin[f] == j:
-                        work.twin[f] = -1

@@ -14,6 +14,7 @@ from numba import types
 from .cache import device, inline, kernel
 from .codes import DIVERGED, NO_CONVERGENCE, OK
 from .pointers import function_at
+from .records import NET
 from .taylor import dense_states, step_length
 
 __all__ = ["follow"]
@@ -39,12 +40,13 @@ def value_and_slope(C, m, row, x):
 
 
 @device
-def margin(C, m, n, transitions, rows, k, x, skipped):
+def margin(C, m, n, net, k, x, skipped):
     """(least signed indicator of transition k, its slope, its row) at the local time x; row ``skipped`` is left out.
 
     Of rows that are equal to rounding the one that rises last counts: it is the one that would fire."""
     least, slope, which = inf, 0.0, -1
-    for r in range(transitions[k, 2], transitions[k, 3]):
+    rows = net.rows
+    for r in range(net.row_start[k], net.row_start[k + 1]):
         if r == skipped:
             continue
         v, s = value_and_slope(C, m, n + rows[r, 0], x)
@@ -81,12 +83,12 @@ def extremum(C, m, row, a, b, sign):
 
 @kernel(
     types.int64(
-        _i1, _i, _f, _f1, _i2, _i1, _i1, _i2, _i2, _f1, _i1, _f1, _f1, _f2, _i1, _i1,
+        _i1, _i, _f, _f1, _i2, NET, _f1, _i1, _f1, _f1, _f2, _i1, _i1,
         _f2, _f2, _f1, _f1, _f1, _f2, _f2, _f2, _i2, _f2, _i2, _f2, _f2, _f2,
     )
 )  # fmt: skip
 def follow(
-    functions, order, rtol, weight, lacking, first, outgoing, transitions, rows, values, modes, t0, tau, z, fired,
+    functions, order, rtol, weight, lacking, net, values, modes, t0, tau, z, fired,
     fired_row, C, W, u, q, scale, extremes, inner, place, which, begin, begin_row, begin_size, end, slope,
 ):  # fmt: skip
     """Follow all visits of an orbit.
@@ -95,8 +97,8 @@ def follow(
     ----------
     functions
         Address of the model's jet (``pointers.addresses``).
-    first, outgoing, transitions, rows
-        The net of transitions (``crossing``).
+    net
+        The net of transitions.
     modes, t0, tau, z : (m,), (m,), (m,), (m, n + n_memory)
         The visits; those of no or negative length are passed over.
     fired, fired_row : (m,)
@@ -112,7 +114,7 @@ def follow(
     slope : (m, 2), written
         Time derivative of the signed indicator that is zero at the end, just before it, and its value.
     """
-    jet = jet_at(functions[0])
+    jet, rows = jet_at(functions[0]), net.rows
     n, n_p = weight.shape[0], values.shape[0]
     log_rtol = ln(rtol)
     for i in range(n_p):
@@ -125,7 +127,7 @@ def follow(
             u[i] = z[leg, i]
         for i in range(n, z.shape[1]):
             q[n_p + i - n] = z[leg, i]
-        for k in range(transitions.shape[0]):
+        for k in range(net.at.shape[0]):
             inner[leg, k], place[leg, k], which[leg, k], end[leg, k] = -inf, 0.0, -1, -inf
             begin[leg, k], begin_row[leg, k], begin_size[leg, k] = -inf, -1, 0.0
         slope[leg, 0], slope[leg, 1] = 0.0, 0.0
@@ -158,28 +160,28 @@ def follow(
                     extremes[0, i], extremes[1, i] = max(extremes[0, i], v), min(extremes[1, i], v)
                     a, before = b, s
             # Margins of the transitions out of this mode
-            for j in range(first[mode], first[mode + 1]):
-                k = outgoing[j]
-                if transitions[k, 3] == transitions[k, 2]:
+            for j in range(net.mode_start[mode], net.mode_start[mode + 1]):
+                k = net.mode_list[j]
+                if net.row_start[k + 1] == net.row_start[k]:
                     continue  # at a time, not by a condition
                 a = 0.0
-                begun, rising, row = margin(C, order, n, transitions, rows, k, 0.0, -1)
+                begun, rising, row = margin(C, order, n, net, k, 0.0, -1)
                 if steps == 1:
                     begin[leg, k], begin_row[leg, k] = begun, row
                     begin_size[leg, k] = size_of(C, order, n + rows[row, 0], reach)
                 for part in range(1, PARTS + 1):
                     b = h if part == PARTS else part * width
-                    _, s, _ = margin(C, order, n, transitions, rows, k, b, -1)
+                    _, s, _ = margin(C, order, n, net, k, b, -1)
                     if rising > 0.0 and s <= 0.0:
                         lo, hi = a, b
                         for _ in range(BISECTIONS):
                             c = 0.5 * (lo + hi)
-                            _, sc, _ = margin(C, order, n, transitions, rows, k, c, -1)
+                            _, sc, _ = margin(C, order, n, net, k, c, -1)
                             if sc > 0.0:
                                 lo = c
                             else:
                                 hi = c
-                        v, _, row = margin(C, order, n, transitions, rows, k, lo, -1)
+                        v, _, row = margin(C, order, n, net, k, lo, -1)
                         size = size_of(C, order, n + rows[row, 0], h)
                         # A visit may begin where the indicator and its slope are zero: rounding is no maximum.
                         begins = steps == 1 and a == 0.0 and max(fabs(v), fabs(begun)) <= ROUNDING * size
@@ -188,12 +190,12 @@ def follow(
                     a, rising = b, s
             left -= h
             if left <= 0.0:
-                for j in range(first[mode], first[mode + 1]):
-                    k = outgoing[j]
-                    if transitions[k, 3] == transitions[k, 2]:
+                for j in range(net.mode_start[mode], net.mode_start[mode + 1]):
+                    k = net.mode_list[j]
+                    if net.row_start[k + 1] == net.row_start[k]:
                         continue
                     skipped = fired_row[leg] if fired[leg] == k else -1
-                    v, _, _ = margin(C, order, n, transitions, rows, k, h, skipped)
+                    v, _, _ = margin(C, order, n, net, k, h, skipped)
                     end[leg, k] = v
                 if fired_row[leg] >= 0:
                     r = fired_row[leg]

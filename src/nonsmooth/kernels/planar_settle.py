@@ -45,7 +45,7 @@ def go(i, u, clock, counters, linear, net, plan, phase, t_max, transient, keep, 
     clock[2] = 0.0  # the time stands as it is: the kernel must not scale it to another period
     section = Section(plan[0], plan[1], plan[2], plan[3], plan[4], plan[5], phase, t_max)
     goal = Goal(transient, keep, 0.0, 0.0, limit, FOR_EVER)
-    motion = Motion(u, clock, counters)
+    motion = Motion(u, rest[0, 0:0], clock, counters)
     chain(i, i + 1, rest[0:0], linear, net, section, goal, motion, out, scratch[0], scratch[1])
     return out[12][i]
 

@@ -10,8 +10,9 @@ from typing import Any, NamedTuple
 from numba import types
 
 __all__ = [
-    "FORM", "GOAL", "GROWTH", "KEPT", "LOG", "MOTION", "NET", "SECTION", "TABLES", "WORK",
-    "Form", "Goal", "Growth", "Kept", "Log", "Motion", "Net", "Section", "Tables", "Work", "type_of",
+    "FORM", "GENERATED", "GOAL", "GROWTH", "KEPT", "LOG", "MOTION", "NET", "SECTION", "SERIES_WORK", "TABLES", "WORK",
+    "Form", "Generated", "Goal", "Growth", "Kept", "Log", "Motion", "Net", "Section", "SeriesWork",
+    "Tables", "Work", "type_of",
 ]  # fmt: skip
 
 _i, _f = types.int64, types.float64
@@ -47,6 +48,7 @@ class Form(NamedTuple):
     rb: Any  # (P, transitions, n)
     rc: Any  # (P, transitions, harmonics, n)
     rs: Any
+    lacking: Any  # (modes, n) 1: memory, or a state that the mode does not have
 
 
 class Tables(NamedTuple):
@@ -64,14 +66,13 @@ class Tables(NamedTuple):
 class Net(NamedTuple):
     """The net of transitions of a linear system."""
 
-    transitions: Any  # (transitions, 3): target, has a map (1: of the states, 2: of memory alone), is contact
+    transitions: Any  # (transitions, 3): target, what it changes (0, or see ``run_places.RESET``), is contact
     rows: Any  # (rows + 2, 3): functional, sign, strict; the last two belong to the section (rising, falling)
     row_start: Any  # (transitions + 1,)
     mode_start: Any  # (modes + 1,)
     mode_list: Any  # outgoing transitions of each mode in declared order
     at: Any  # (transitions,) phase of a transition at a time, or -1
     changed: Any  # (transitions, n + 1) how many states a transition changes, and which
-    lacking: Any  # (modes, n) 1: memory, or a state that the mode does not have
 
 
 class Work(NamedTuple):
@@ -91,16 +92,77 @@ class Work(NamedTuple):
     rates: Any  # (harmonics,)
     zero: Any  # (indicators,) 1: zero just now, 2: with its slope
     found: Any  # (4,) see ``linear_search``
+    visited: Any  # (modes,) by the start rule
     twin: Any  # (indicators,) the state that an indicator is but for a constant, or -1
     built: Any  # (1,) the point for which the tables stand there already, plus one
     tally: Any  # counts of the run, at the places of ``run_places``
     memo: Any  # and times
 
 
+class Generated(NamedTuple):
+    """A system by its generated functions at P parameter points, and the method by which it is marched."""
+
+    functions: Any  # addresses of field, jet, values and jump (see ``generated``)
+    points: Any  # (P, parameters)
+    period: Any  # (P,), inf where nothing depends on time
+    exact_steps: Any  # (P, modes) lengths of exact steps
+    lacking: Any  # (modes, n) 1: a state that the mode has not
+    kinds: Any  # (rows,) of the jets: 1 a polynomial, 0 an output with a corner, -1 - s: it repeats state s
+    weight: Any  # (n,) atol / rtol
+    absolute: Any  # (n,) atol
+    rtol: Any
+    step: Any  # a fixed one, or 0
+    method: Any  # ``series_places``
+    order: Any
+    locate: Any  # 0: transitions are judged at the ends of steps
+    checked: Any  # 1: polynomials are held against the equations
+    corners: Any  # 1: some output has corners
+    nonlinear_rows: Any  # 1: some indicator is not affine, so that an exact step must be watched
+    guards: Any  # rows behind the outputs where a polynomial may miss something
+    indicators: Any
+    outputs: Any
+
+
+class SeriesWork(NamedTuple):
+    """Working memory of one running trajectory of the series stepper."""
+
+    w: Any  # (n,) where the present leg begins
+    end: Any  # at its end
+    before: Any  # just before a transition
+    wp: Any
+    dense: Any
+    q: Any  # parameters, then memory
+    q_new: Any
+    C: Any  # (rows, order + 1) polynomials of the step
+    W: Any  # scratch of the jets
+    J0: Any  # jets at its two ends
+    J1: Any
+    K: Any  # eight vectors: the stages of a Runge-Kutta step
+    powers: Any
+    a: Any  # one polynomial
+    d: Any
+    vals: Any
+    near: Any
+    scale: Any  # (indicators,) size so far
+    measured: Any  # (indicators,) of one that is zero: its rounding
+    side: Any  # (indicators,) sign at the beginning of the step
+    side_next: Any  # and at its end
+    rise: Any  # (rows,) sign of the slope at the end of the step before
+    usual: Any  # (modes,) length of the last step
+    dwell: Any  # (modes,) time spent there the last time
+    visited: Any  # (modes,) by the start rule
+    stack: Any
+    found: Any
+    rest: Any  # (n,) about which it has stayed
+    tally: Any
+    memo: Any
+
+
 class Motion(NamedTuple):
     """A trajectory's place: left at its end by every kernel."""
 
     u: Any  # (n,)
+    memory: Any  # (n_memory,)
     clock: Any  # (3,) time since the period began, periods done, the period in which that time was measured
     counters: Any  # (4,) mode, and for others what they count
 
@@ -152,16 +214,19 @@ class Log(NamedTuple):
 
     samples: Any  # instants asked for
     sample_u: Any
+    sample_memory: Any
     sample_mode: Any
     sample_segment: Any
     crossing_time: Any
     crossing_transition: Any
     u_before: Any
     u_after: Any
+    memory_after: Any
     touch_time: Any
     touch_indicator: Any
     touch_u: Any
     touch_gap: Any
+    spare: Any  # touches that one leg may add
 
 
 class Growth(NamedTuple):
@@ -181,14 +246,19 @@ class Growth(NamedTuple):
 
 
 FORM = type_of(
-    Form, _f4, _f3, _f4, _f4, _i1, _f1, _f1, _f3, _f2, _f3, _f3, _f4, _f3, _f4, _f4, _f4, _f3, _f4, _f4
+    Form, _f4, _f3, _f4, _f4, _i1, _f1, _f1, _f3, _f2, _f3, _f3, _f4, _f3, _f4, _f4, _f4, _f3, _f4, _f4, _i2
 )  # fmt: skip
 TABLES = type_of(Tables, _f4, _f3, _f3, _f4, _f3, _f2, _i[:, :, :, ::1])
-NET = type_of(Net, _i2, _i2, _i1, _i1, _i1, _f1, _i2, _i2)
-WORK = type_of(Work, *[_f1] * 8, _f2, _f2, _f1, _f1, _i1, _i1, _i1, _i1, _i1, _f1)
-MOTION = type_of(Motion, _f1, _f1, _i1)
+NET = type_of(Net, _i2, _i2, _i1, _i1, _i1, _f1, _i2)
+WORK = type_of(Work, *[_f1] * 8, _f2, _f2, _f1, _f1, *[_i1] * 6, _f1)
+GENERATED = type_of(Generated, _i1, _f2, _f1, _f2, _i2, _i1, _f1, _f1, _f, _f, *[_i] * 9)
+SERIES_WORK = type_of(
+    SeriesWork, *[_f1] * 7, *[_f2] * 4, types.UniTuple(_f1, 8), *[_f1] * 7, *[_i1] * 3, _f1, _f1, _i1, _f1, _i1, _f1,
+    _i1, _f1,
+)  # fmt: skip
+MOTION = type_of(Motion, _f1, _f1, _f1, _i1)
 SECTION = type_of(Section, *[_i] * 6, _f, _f)
 GOAL = type_of(Goal, _i, _i, _f, _f, _f1, _i)
 KEPT = type_of(Kept, _f3, *[_f2] * 6, _i1, _i1, _f1, _f2, _i2, _i1)
-LOG = type_of(Log, _f1, _f2, _i1, _i1, _f1, _i1, _f2, _f2, _f1, _i1, _f2, _f1)
+LOG = type_of(Log, _f1, _f2, _f2, _i1, _i1, _f1, _i1, _f2, _f2, _f2, _f1, _i1, _f2, _f1, _i)
 GROWTH = type_of(Growth, _f1, _f2, _f2, _f1, _f1, _f2, _f2, _f2, _f2, _f1, _f1)

@@ -8,9 +8,9 @@ of degree 5 whose error h^6 / 46080 is below the step's own.
 
 from math import fabs, inf, sqrt
 
-from .cache import device, inline
+from .cache import device, inline, once
 
-__all__ = ["first_step", "hermite", "quiet", "stages", "transit"]
+__all__ = ["first_step", "hermite", "quiet", "stages", "time_to_transition"]
 
 
 @inline
@@ -106,14 +106,14 @@ def _certain(J0, J1, row, sign, h, error):
     return 0
 
 
-@inline
-def quiet(mode, J0, J1, n, h, net, side, side_next, scale, slack, section, section_mode):
+@once
+def quiet(mode, n, h, slack, net, section, work):
     """Whether nothing can happen on the step, seen from the jets at its two ends alone (most steps)."""
-    first, outgoing, transitions, rows, _ = net
-    for j in range(first[mode], first[mode + 1]):
-        k = outgoing[j]
+    rows, J0, J1, side, side_next, scale = net.rows, work.J0, work.J1, work.side, work.side_next, work.scale
+    for j in range(net.mode_start[mode], net.mode_start[mode + 1]):
+        k = net.mode_list[j]
         dead, opened = False, False
-        for r in range(transitions[k, 2], transitions[k, 3]):
+        for r in range(net.row_start[k], net.row_start[k + 1]):
             i, sign = rows[r, 0], rows[r, 1]
             certain = _certain(J0, J1, n + i, float(sign), h, slack * scale[i])
             if certain < 0:
@@ -126,11 +126,12 @@ def quiet(mode, J0, J1, n, h, net, side, side_next, scale, slack, section, secti
                 opened = True
         if opened and not dead:
             return False
-    if section >= 0 and (section_mode < 0 or section_mode == mode):
-        low = _certain(J0, J1, n + section, 1.0, h, 0.0)
-        if low == 0 or low * side[section] < 0:
+    s = section.indicator
+    if s >= 0 and (section.mode < 0 or section.mode == mode):
+        low = _certain(J0, J1, n + s, 1.0, h, 0.0)
+        if low == 0 or low * side[s] < 0:
             return False
-        side_next[section] = low
+        side_next[s] = low
     return True
 
 
@@ -152,16 +153,16 @@ def first_step(J, u, n, absolute, rtol):
 
 
 @inline
-def transit(mode, J, n, net, h):
+def time_to_transition(mode, J, n, net, h):
     """Estimated time to the next transition, from the parabolas of its rows (inf: none within h).
 
     A step is not planned far beyond it: the bands of a smoothed system are crossed in one step each."""
-    first, outgoing, transitions, rows, _ = net
+    rows = net.rows
     best = inf
-    for j in range(first[mode], first[mode + 1]):
-        k = outgoing[j]
-        last = 0.0 if transitions[k, 3] > transitions[k, 2] else inf
-        for r in range(transitions[k, 2], transitions[k, 3]):
+    for j in range(net.mode_start[mode], net.mode_start[mode + 1]):
+        k = net.mode_list[j]
+        last = 0.0 if net.row_start[k + 1] > net.row_start[k] else inf
+        for r in range(net.row_start[k], net.row_start[k + 1]):
             row, sign = n + rows[r, 0], rows[r, 1]
             g, s, c = sign * J[row, 0], sign * J[row, 1], sign * J[row, 2]
             if g > 0.0:

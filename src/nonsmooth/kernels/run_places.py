@@ -1,18 +1,21 @@
-"""Places in ``work.tally`` and ``work.memo``: all that a run of the exact flow knows beside its state, so that it can
-pause and go on."""
+"""Places in ``work.tally`` and ``work.memo``: what a run knows beside its arrays, to pause and go on."""
 
 # counts
 BEGUN, MODE, JUMPS, BURST = 0, 1, 2, 3  # transitions within one return, period or unit; and closely behind each other
 RETURNS, PASSES, TRIES = 4, 5, 6  # of the section; steps since the last pass
 SAMPLES, CROSSINGS, TOUCHES = 7, 8, 9  # logged
-N_TALLY = 10
+FIRED = 10  # the functional (indicator) that has crossed, or -1
+N_TALLY = 11
 
 # times
 TIME, PERIODS, SINCE, WAITED, DONE = 0, 1, 2, 3, 4  # in the period, since a crossing, since a pass, since the start
 N_MEMO = 5
 
 MOST_CROSSINGS = 1000  # within one section return, period or unit of time
-MOST_STEPS = 2_000_000  # on the way to a surface that may never be met again
-BURST_LENGTH = 50  # crossings in a row at intervals below SHORT of the mode's step end a run as chatter
+MOST_STEPS = 2_000_000  # on the way to the next return
+BURST_LENGTH = 50  # crossings in a row at intervals below SHORT of the stepper's time scale end a run as chatter
 SHORT = 1e-11
 PATIENCE = 1_000_000  # steps of a run between two looks whether somebody wants to stop it
+NO_END = 1e300  # a time that is never reached
+
+RESET = 1  # of ``Net.transitions``: the states change (2: memory alone)

@@ -4,22 +4,30 @@ Of ``transient`` + ``keep`` returns the last ones are kept. The window reaches f
 start) to the last kept one; its end is where a carried state goes on.
 """
 
+from math import fabs, inf
+
 from numba import types
 
-from .cache import inline, kernel
-from .codes import NO_CONVERGENCE, OK, PAUSED
+from .cache import inline, kernel, once
+from .codes import NO_CONVERGENCE, NOT_GUARANTEED, OK, PAUSED
 from .hybrid import leave, march
-from .linear_extremes import finish, forget, include, widen
-from .linear_march import sign_after, stride
-from .linear_search import SIDE, dense, value_of
-from .linear_tables import STATES
-from .records import FORM, GOAL, KEPT, MOTION, NET, SECTION, TABLES, WORK
-from .run_places import BEGUN, JUMPS, MODE, MOST_STEPS, PASSES, PERIODS, RETURNS, SINCE, TIME, TRIES, WAITED
+from .linear_extremes import finish, include, widen
+from .linear_stepper import (
+    STEPPER,
+    at_rest,
+    n_states,
+    note_side,
+    state_at,
+    steps_at_a_stride,
+    stride,
+)
+from .records import GOAL, KEPT, MOTION, NET, SECTION
+from .run_places import BEGUN, JUMPS, MODE, MOST_STEPS, NO_END, PASSES, PERIODS, RETURNS, SINCE, TIME, TRIES, WAITED
 
 OPEN_RUN, LATE, CLOSED = 0, 1, 2
 
 
-@inline
+@once
 def stroboscopic_hit(s, s1, target, period):
     """Time after s at which the section phase is met within (s, s1], or -1; judged on the clock: none counts twice."""
     if s < target and target <= s1:
@@ -29,7 +37,18 @@ def stroboscopic_hit(s, s1, target, period):
     return -1.0
 
 
-@inline
+@once
+def forget(i, kept):
+    """Begin the extremes of point i."""
+    for k in range(kept.maximum.shape[1]):
+        kept.maximum[i, k], kept.minimum[i, k] = -inf, inf
+    for k in range(kept.i_max.shape[1]):
+        kept.i_max[i, k], kept.i_min[i, k] = -inf, inf
+    for k in range(kept.o_max.shape[1]):
+        kept.o_max[i, k], kept.o_min[i, k] = -inf, inf
+
+
+@once
 def open_window(i, form, section, seen, tables, work):
     """Begin the counts of point i."""
     forget(i, seen)
@@ -38,34 +57,46 @@ def open_window(i, form, section, seen, tables, work):
     seen.elapsed[i] = 0.0
 
 
-@inline
+@once
 def reached(goal, work):
     """Whether the run is over."""
     return work.tally[RETURNS] >= goal.transient + goal.keep
 
 
-@inline
+@once
 def room(seen, work):
     """Nothing is logged."""
     return OK
 
 
-@inline
-def remaining(goal, work):
-    """No time ends a run."""
-    return 1e300
+@once
+def remaining(section, goal, work):
+    """Time for which a return to a surface is waited still."""
+    return section.t_max - work.memo[WAITED] if section.indicator >= 0 else NO_END
 
 
-@inline
-def may_stride(i, form, net, section):
-    """Whether whole steps may be made at a stride: nothing but a crossing can end one."""
-    strides = section.indicator < 0 and form.period[i] < 1e300
-    for k in range(net.at.shape[0]):
-        strides = strides and net.at[k] < 0.0
-    return strides
+@once
+def may_stride(i, form, net, section, seen):
+    """Whether whole steps may be made at a stride."""
+    return steps_at_a_stride(i, form, net, section)
 
 
-@inline
+@once
+def watched(section, goal, work):
+    """Whether extremes on the leg are wanted."""
+    return section.extremes != 0 and work.tally[RETURNS] >= goal.transient
+
+
+@once
+def next_is_edge(section, goal, work):
+    """Whether the next pass of the section opens or closes the kept window."""
+    if (work.tally[PASSES] + 1) % section.every != 0:
+        return False
+    returns = work.tally[RETURNS] + 1
+    return returns == goal.transient or returns == goal.transient + goal.keep
+
+
+@once
 def hurry(i, form, net, section, goal, seen, tables, work, patience):
     """Whole steps without crossings, where extremes need not be seen. Returns (w1 stands at the end of the step that is
     next, that step is clear, patience left)."""
@@ -91,16 +122,16 @@ def hurry(i, form, net, section, goal, seen, tables, work, patience):
 
 
 @inline
-def keep_point(i, k, u, mode, time, seen):
+def keep_point(i, k, u, mode, time, seen, work):
     """The k-th kept point of the section."""
-    for j in range(STATES):
+    for j in range(n_states(work)):
         seen.section[i, k, j] = u[j]
     seen.section_mode[i, k] = mode
     seen.section_time[i, k] = time
 
 
-@inline
-def observe(i, step, full, triggered, form, net, section, goal, seen, tables, work):
+@once
+def observe(i, step, stop, triggered, form, net, section, goal, seen, tables, work):
     """Returns at a phase of the forcing on the leg, and extremes of its part in the kept window.
 
     CLOSED: the last return, where the run ends. LATE: a transition at the section's own phase comes first; a run that
@@ -111,17 +142,18 @@ def observe(i, step, full, triggered, form, net, section, goal, seen, tables, wo
     a, b, state = 0.0, step, OPEN_RUN
     if section.indicator < 0:
         target = section.phase * T
-        r = stroboscopic_hit(s, s + step, target, T)
+        after = stop if stop >= 0.0 else s + step
+        r = stroboscopic_hit(s, after, target, T)
         if r >= step and triggered:
             state = LATE
         elif r >= 0.0:
             r = min(r, step)
             tally[RETURNS] += 1
-            tally[JUMPS] = 0
+            tally[JUMPS], tally[TRIES] = 0, 0
             if is_open:
-                dense(tables, work, tally[MODE], r, work.wp)
-                turn = memo[PERIODS] if s < target and target <= s + step else memo[PERIODS] + 1.0
-                keep_point(i, tally[RETURNS] - goal.transient - 1, work.wp, tally[MODE], turn * T + target, seen)
+                state_at(r, form, tables, work, work.wp)
+                turn = memo[PERIODS] if s < target and target <= after else memo[PERIODS] + 1.0
+                keep_point(i, tally[RETURNS] - goal.transient - 1, work.wp, tally[MODE], turn * T + target, seen, work)
                 if reached(goal, work):
                     state, b = CLOSED, r
                     memo[PERIODS] = turn
@@ -129,42 +161,42 @@ def observe(i, step, full, triggered, form, net, section, goal, seen, tables, wo
                 is_open, a = True, r
     if is_open:
         if section.extremes != 0:
-            widen(i, a, b, tables, work, tally[MODE], seen)
+            widen(i, a, b, form, tables, work, seen)
         seen.elapsed[i] += b - a
     if state == CLOSED:
         memo[TIME] = section.phase * T
-        for j in range(STATES):
+        for j in range(n_states(work)):
             work.w[j] = seen.section[i, goal.keep - 1, j]
     return state
 
 
-@inline
+@once
 def mark(i, wrapped, ended, crossed, step, form, goal, seen, work):
     """Count a leg."""
     work.memo[WAITED] += step
     work.tally[TRIES] += 1
 
 
-@inline
+@once
 def approach(mode, fired, seen, tables, work):
     """Nothing is asked of a crossing before it is made."""
 
 
-@inline
+@once
 def cross(i, t, mode, jumps, form, net, goal, seen, tables, work):
     """Count a transition in the kept window."""
     if work.tally[RETURNS] >= goal.transient:
         seen.crossings[i] += 1
         seen.contacts[i] += net.transitions[t, 2]
-        include(i, tables, work, mode, seen)
+        include(i, mode, form, tables, work, seen)
 
 
-@inline
+@once
 def depart(jumps, seen, work):
     """Nothing is asked of a crossing after it was made."""
 
 
-@inline
+@once
 def arrive(i, code, source, t, sense, state, form, section, goal, seen, tables, work):
     """Returns at the end of a leg: on a surface, or behind a transition at the section's phase. Gives the status."""
     tally, memo, T = work.tally, work.memo, form.period[i]
@@ -178,10 +210,10 @@ def arrive(i, code, source, t, sense, state, form, section, goal, seen, tables, 
             tally[RETURNS] += 1
             if tally[RETURNS] > goal.transient:
                 after = section.after != 0 or t < 0
-                time = (memo[PERIODS] * T if T < 1e300 else 0.0) + memo[TIME]
+                time = (memo[PERIODS] * T if T < NO_END else 0.0) + memo[TIME]
                 keep_point(
                     i, tally[RETURNS] - goal.transient - 1, work.w if after else work.before, mode if after else source,
-                    time, seen,
+                    time, seen, work,
                 )  # fmt: skip
     if state == LATE and code == OK:
         memo[TIME] = section.phase * T
@@ -189,24 +221,20 @@ def arrive(i, code, source, t, sense, state, form, section, goal, seen, tables, 
         tally[JUMPS] = 0
         if tally[RETURNS] > goal.transient:
             keep_point(
-                i, tally[RETURNS] - goal.transient - 1, work.w, mode, memo[PERIODS] * T + memo[TIME], seen
+                i, tally[RETURNS] - goal.transient - 1, work.w, mode, memo[PERIODS] * T + memo[TIME], seen, work
             )  # fmt: skip
     if section.indicator >= 0:
-        if t >= 0:
-            work.found[SIDE] = sign_after(tables, work, mode, section.indicator)
-        elif sense != 0:
-            work.found[SIDE] = sense
-        else:
-            value = value_of(tables, mode, section.indicator, work.w)
-            if value != 0.0:
-                work.found[SIDE] = 1 if value > 0.0 else -1
-        if (memo[WAITED] > section.t_max or tally[TRIES] > MOST_STEPS) and code == OK:
+        note_side(t, sense, section, tables, work)
+        waited = memo[WAITED] >= section.t_max * (1.0 - 1e-12)
+        if code == OK and (waited or memo[WAITED] > 1e100 or at_rest(form, section, tables, work)):
             code = NO_CONVERGENCE
+    if code == OK and tally[TRIES] > MOST_STEPS:
+        code = NO_CONVERGENCE
     return code
 
 
 @kernel(types.int64(
-    types.int64, types.int64, types.float64[:, ::1], FORM, NET, SECTION, GOAL, MOTION, KEPT, TABLES, WORK
+    types.int64, types.int64, types.float64[:, ::1], STEPPER[0], NET, SECTION, GOAL, MOTION, KEPT, *STEPPER[1:]
 ))  # fmt: skip
 def chain(first, last, starts, form, net, section, goal, motion, seen, tables, work):
     """Run points first <= i < last into ``seen``; returns the point that has paused, or ``last``.
@@ -216,21 +244,25 @@ def chain(first, last, starts, form, net, section, goal, motion, seen, tables, w
     for i in range(first, last):
         T = form.period[i]
         if work.tally[BEGUN] == 0:
-            motion.counters[1] = 0
             if starts.shape[0] > 0:
-                for j in range(STATES):
+                for j in range(motion.u.shape[0]):
                     motion.u[j] = starts[i, j]
-                motion.counters[0] = 0
+                for j in range(motion.memory.shape[0]):
+                    motion.memory[j] = 0.0
+                motion.counters[0], motion.counters[1] = 0, 0
                 motion.clock[0], motion.clock[1], motion.clock[2] = 0.0, 0.0, 0.0
             elif motion.clock[2] > 0.0:
                 motion.clock[0] = motion.clock[0] / motion.clock[2] * T
-                motion.clock[2] = T if T < 1e300 else 0.0
+                if fabs(motion.clock[0] - section.phase * T) <= 1e-12 * T:  # else rounding would count it once more
+                    motion.clock[0] = section.phase * T
+                motion.clock[2] = T if T < NO_END else 0.0
         code = march(i, form, net, section, goal, motion, seen, tables, work)
         if code == PAUSED:
             return i
         work.tally[BEGUN] = 0
-        finish(i, tables, work, seen)
+        motion.counters[1] = 0
+        finish(i, form, tables, work, seen)
         seen.status[i] = code
-        if code == OK:
+        if code == OK or code == NOT_GUARANTEED:
             leave(i, form, motion, work)
     return last

@@ -1,37 +1,16 @@
-"""Parts of the hybrid loop: where a step ends, how long it is, and how a crossing on it is placed."""
+"""Parts of a step of the series methods: how long it is, and how a crossing on it is placed."""
 
 from math import fabs
 
 from . import series_places as place
-from .cache import device, inline
-from .crossing import holds
+from .cache import device, once
+from .crossing import rows_hold
+from .generated import values_of
 from .rkf45 import first_step
+from .run_places import MODE
 from .taylor import dense_states, step_length
 
-__all__ = ["at_end", "failed", "judged_at_end", "next_stop", "planned_length", "polished", "triggered"]
-
-
-@inline
-def next_stop(mode, t, base, period, phase, until, net):
-    """The next time at which a step must end."""
-    stop = period if until < 0.0 else min(period, until - base)
-    if t < phase < stop:
-        stop = phase
-    transitions, at = net[2], net[4]
-    for k in range(at.shape[0]):
-        if at[k] >= 0.0 and transitions[k, 0] == mode and t < at[k] * period < stop:
-            stop = at[k] * period
-    return stop
-
-
-@device
-def triggered(mode, t, period, net):
-    """The time-triggered transition out of ``mode`` at the time t of the period, or -1."""
-    transitions, at = net[2], net[4]
-    for k in range(at.shape[0]):
-        if at[k] >= 0.0 and transitions[k, 0] == mode and at[k] * period == t:
-            return k
-    return -1
+__all__ = ["at_end", "judged_at_end", "planned_length", "polished"]
 
 
 @device
@@ -48,30 +27,25 @@ def converged(C, m, n, n_indicators, h, scale):
     return 0.0
 
 
-@inline
-def failed(u, n, largest):
-    """Whether the state has left every bound."""
-    for i in range(n):
-        if not (fabs(u[i]) <= largest[i]):
-            return True
-    return False
-
-
 @device
-def polished(values, mode, t, q, C, m, n, row, h, tau, u_dense, vals):
+def polished(form, work, row, t, h, tau):
     """A zero of the interpolated indicator ``row``, moved to the zero of the indicator of the dense state.
 
-    Where Newton's method does not get there the interpolated one stands, which has the error of the step."""
+    ``t`` and ``h`` are begin and length of the step. Where Newton's method does not get there the interpolated one
+    stands, which has the error of the step."""
+    C, n = work.C, work.w.shape[0]
+    values = values_of(form)
+    m = 5 if form.method == place.RKF45 else form.order
     at = tau
     for _ in range(12):
-        dense_states(C, m, n, at, u_dense)
-        values(mode, t + at, u_dense, q, vals)
+        dense_states(C, m, n, at, work.dense)
+        values(work.tally[MODE], t + at, work.dense, work.q, work.vals)
         slope = 0.0
         for k in range(m, 0, -1):
             slope = slope * at + k * C[n + row, k]
         if slope == 0.0:
             break
-        move = vals[row] / slope
+        move = work.vals[row] / slope
         if not (fabs(at - move - tau) <= 1e-3 * h and 0.0 <= at - move <= h):
             break
         at -= move
@@ -80,16 +54,17 @@ def polished(values, mode, t, q, C, m, n, row, h, tau, u_dense, vals):
     return tau
 
 
-@device
-def judged_at_end(mode, X, n, n_indicators, net, side, side_before):
+@once
+def judged_at_end(mode, X, n, n_indicators, net, work):
     """Without location: the transition whose rows hold at the end of the step and did not at its beginning, or -1."""
-    first, outgoing = net[0], net[1]
+    side, side_before = work.side, work.side_next
     for i in range(n_indicators):
         side_before[i] = side[i]
         side[i] = 1 if X[n + i, 0] > 0.0 else -1
-    for j in range(first[mode], first[mode + 1]):
-        if holds(outgoing[j], net, side) and not holds(outgoing[j], net, side_before):
-            return outgoing[j]
+    for j in range(net.mode_start[mode], net.mode_start[mode + 1]):
+        k = net.mode_list[j]
+        if rows_hold(k, net, side) and not rows_hold(k, net, side_before):
+            return k
     return -1
 
 
@@ -103,16 +78,16 @@ def at_end(C, m, row, h):
     return v, slope
 
 
-@inline
-def planned_length(mode, method, J, u, n, n_indicators, order, fixed, usual, exact_steps, watch_rows, norms, scale,
-                   log_rtol, rtol):  # fmt: skip
+@once
+def planned_length(i, mode, form, J, log_rtol, work):
     """The length of the next step, before stops and crossings in sight shorten it."""
-    if fixed > 0.0:
-        return fixed
-    if method == place.RKF45:
-        return usual[mode] if usual[mode] > 0.0 else first_step(J, u, n, norms[1], rtol)
-    if method == place.TAYLOR:
-        return step_length(J, order, n, n_indicators, u, norms[0], scale, log_rtol)
-    if watch_rows == 1:
-        return converged(J, order, n, n_indicators, exact_steps[mode], scale)
-    return exact_steps[mode]
+    n = work.w.shape[0]
+    if form.step > 0.0:
+        return form.step
+    if form.method == place.RKF45:
+        return work.usual[mode] if work.usual[mode] > 0.0 else first_step(J, work.w, n, form.absolute, form.rtol)
+    if form.method == place.TAYLOR:
+        return step_length(J, form.order, n, form.indicators, work.w, form.weight, work.scale, log_rtol)
+    if form.nonlinear_rows == 1:
+        return converged(J, form.order, n, form.indicators, form.exact_steps[i, mode], work.scale)
+    return form.exact_steps[i, mode]

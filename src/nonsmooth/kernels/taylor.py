@@ -9,7 +9,7 @@ from math import exp, fabs, inf, log
 
 from .cache import device, inline
 
-__all__ = ["dense_states", "end_states", "fill_powers", "step_length"]
+__all__ = ["copied", "dense_states", "end_states", "fill_powers", "step_length"]
 
 
 @inline
@@ -56,6 +56,17 @@ def step_over_gaps(C, order, n, n_indicators, u, weight, scale, log_rtol):
             if size > 0.0:
                 growth = max(growth, exp(log(size) / k))
     return exp(log_rtol / order) / growth if growth > 0.0 else inf
+
+
+@inline
+def copied(source, target):
+    """target = source, element by element: so written that the compiler does not prepare it for many."""
+    j = 0
+    while True:
+        target[j] = source[j]
+        j += 1
+        if j >= target.shape[0]:
+            break
 
 
 @inline

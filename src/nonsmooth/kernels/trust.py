@@ -10,9 +10,11 @@ from math import fabs, inf
 
 import numpy as np
 
-from .cache import device
+from .cache import device, once
 from .crossing import NOISE
+from .generated import field_of, values_of
 from .polynomial import NONE, first_crossing, load, row_bounds, shift, strip
+from .run_places import MODE, TIME
 
 __all__ = ["trusted"]
 
@@ -22,14 +24,12 @@ MOST = 4000  # such fractions in a row: more than there are powers of two
 POINTS = 64  # zeros, and extremes, of one guard on one step
 
 
-@device
-def trusted(
-    field, values, mode, t, u, q, C, m, h, part, n_indicators, first_guard, n_guards, powers, weight, scale, rtol,
-    a, d, stack, found, K, vals, vals_near,
-):  # fmt: skip
-    """The largest length tried, at most ``part`` of the step h, on which the polynomials C agree with the equations.
-
-    K are eight vectors of scratch."""
+@once
+def trusted(form, work, h, part):
+    """The largest length tried, at most ``part`` of the step h, on which the polynomials agree with the equations."""
+    C, m, a, d, stack, found = work.C, form.order, work.a, work.d, work.stack, work.found
+    first_guard = C.shape[0] - form.guards
+    powers, n_guards = work.powers, form.guards
     far = part
     for row in range(first_guard, first_guard + n_guards):
         _, low, high = row_bounds(C, row, 1.0, m, powers)
@@ -42,7 +42,7 @@ def trusted(
                 degree = slopes(C, row, m, powers, a)
             cursor = 0.0
             for _ in range(POINTS):
-                degree_left = remaining(a, degree, cursor, d)
+                degree_left = remainder_of(a, degree, cursor, d)
                 if degree_left < 0:
                     break
                 x = first_crossing(d, degree_left, EITHER, EITHER, 0.0, stack, found)
@@ -51,16 +51,11 @@ def trusted(
                 cursor += x * (1.0 - cursor)
                 if cursor * h >= far:
                     break
-                if misfits(
-                    field, values, mode, t, u, q, C, m, cursor * h, far, n_indicators, weight, scale, rtol, K, vals,
-                    vals_near,
-                ):  # fmt: skip
+                if misfits(form, work, cursor * h, far):
                     far = SHORTER * cursor * h
                     break
     for _ in range(MOST):
-        if not misfits(
-            field, values, mode, t, u, q, C, m, far, far, n_indicators, weight, scale, rtol, K, vals, vals_near
-        ):
+        if not misfits(form, work, far, far):
             return far
         far *= SHORTER
     return 0.0
@@ -77,7 +72,7 @@ def slopes(C, row, m, powers, a):
 
 
 @device
-def remaining(a, m, cursor, d):
+def remainder_of(a, m, cursor, d):
     """a on what remains of the unit interval behind a zero at ``cursor``, divided by its leading powers; the degree."""
     if cursor >= 1.0:
         return -1
@@ -91,15 +86,18 @@ def remaining(a, m, cursor, d):
 
 
 @device
-def misfits(
-    field, values, mode, t, u, q, C, m, tau, length, n_indicators, weight, scale, rtol, K, vals, vals_near
-):  # fmt: skip
+def misfits(form, work, tau, length):
     """Whether field or indicators at the local time tau differ from the polynomials by more than the tolerance.
 
     A difference of the slopes counts as if it lasted for ``length``. One that is not larger than what rounding of the
     state and the time does to the equations does not count."""
-    n = u.shape[0]
-    at, slope, f, f_near, noise = K[0], K[1], K[2], K[3], K[4]
+    mode, t, u, q, n, C, m = work.tally[MODE], work.memo[TIME], work.w, work.q, work.w.shape[0], work.C, form.order
+    n_indicators, weight, rtol, scale, vals, vals_near = (
+        form.indicators, form.weight, form.rtol, work.scale, work.vals, work.near,
+    )  # fmt: skip
+    at, slope, f, f_near, noise = work.K[0], work.K[1], work.K[2], work.K[3], work.K[4]
+    field = field_of(form)
+    values = values_of(form)
     for i in range(n):
         v, s = C[i, m], 0.0
         for k in range(m - 1, -1, -1):

@@ -1,76 +1,104 @@
-"""What is observed while a step's polynomials are at hand: extremes, touches and samples."""
+"""What is observed while a step's polynomials are at hand: extremes and touches."""
 
-from math import inf
-
-from .cache import device, inline
+from . import series_places as place
+from .cache import inline, once
 from .crossing import NOISE
+from .generated import values_of
 from .polynomial import DOWN, NONE, dense, first_crossing, largest, load, row_bounds, shift, strip
+from .run_places import DONE, MODE, TOUCHES
 from .taylor import dense_states
 
-__all__ = ["extend", "extend_at_node", "extend_corners", "forget", "sample", "touches", "write_sample"]
-
-
-@device
-def forget(extremes):
-    """Begin a new window: extremes[0] are the maxima of all rows, extremes[1] the minima."""
-    for i in range(extremes.shape[1]):
-        extremes[0, i] = -inf
-        extremes[1, i] = inf
-
-
-@device
-def extend_at_node(values, rows, lacking, mode, n, extremes):
-    """Take in the values of all rows at one instant (column 0 of ``values``)."""
-    for i in range(rows):
-        if i < n and lacking[mode, i] == 1:
-            continue
-        v = values[i, 0]
-        if v > extremes[0, i]:
-            extremes[0, i] = v
-        if v < extremes[1, i]:
-            extremes[1, i] = v
+__all__ = ["finish", "include", "log_touches", "widen"]
 
 
 @inline
-def extend(C, m, rows, powers, lacking, mode, n, kinds, extremes, a, stack):
-    """Take in the true extremes of all rows over the step; rows that cannot exceed the old ones cost a bound.
+def extremes_of(row, n, n_i, kept):
+    """Maxima and minima in which those of a row of the jets are kept, and its column there."""
+    if row < n:
+        return kept.maximum, kept.minimum, row
+    if row < n + n_i:
+        return kept.i_max, kept.i_min, row - n
+    return kept.o_max, kept.o_min, row - n - n_i
 
-    ``kinds``: 1 a row with a polynomial, 0 an output with a corner, -1 a row that repeats a state."""
-    for i in range(rows):
-        if kinds[i] != 1 or (i < n and lacking[mode, i] == 1):
+
+@once
+def widen(i, a, b, form, tables, work, kept):
+    """Extend the extremes of point i by a step, when it is over; rows that cannot exceed the old ones cost a bound."""
+    if work.tally[place.OPEN_STEP] == 1 or not (b > a):
+        return
+    C, n, n_i, mode, poly = work.C, work.w.shape[0], form.indicators, work.tally[MODE], work.a
+    m = 5 if form.method == place.RKF45 else form.order
+    for row in range(form.kinds.shape[0]):
+        if form.kinds[row] != 1 or (row < n and form.lacking[mode, row] == 1):
             continue
-        _, low, high = row_bounds(C, i, 1.0, m, powers)
-        if high > extremes[0, i]:
-            extremes[0, i] = largest(a, load(C, i, 1.0, m, powers, a), extremes[0, i], stack)
-        if low < extremes[1, i]:
-            extremes[1, i] = -largest(a, load(C, i, -1.0, m, powers, a), -extremes[1, i], stack)
+        top, bottom, k = extremes_of(row, n, n_i, kept)
+        _, low, high = row_bounds(C, row, 1.0, m, work.powers)
+        if high > top[i, k]:
+            top[i, k] = largest(poly, load(C, row, 1.0, m, work.powers, poly), top[i, k], work.stack)
+        if low < bottom[i, k]:
+            bottom[i, k] = -largest(poly, load(C, row, -1.0, m, work.powers, poly), -bottom[i, k], work.stack)
+    if form.corners == 1:
+        widen_corners(i, m, form, work, kept)
 
 
-@device
-def extend_corners(values, mode, t, h, C, m, n, q, kinds, extremes, u, out):
+@once
+def widen_corners(i, m, form, work, kept):
     """Outputs with a corner have no polynomial: sampled four times on the step."""
+    n, h = work.w.shape[0], work.memo[place.PART]
+    values = values_of(form)
     for j in range(1, 5):
-        dense_states(C, m, n, 0.25 * j * h, u)
-        values(mode, t + 0.25 * j * h, u, q, out)
-        for row in range(n, kinds.shape[0]):
-            if kinds[row] == 0:
-                extremes[0, row] = max(extremes[0, row], out[row - n])
-                extremes[1, row] = min(extremes[1, row], out[row - n])
+        dense_states(work.C, m, n, 0.25 * j * h, work.dense)
+        values(work.tally[MODE], work.memo[place.BASE] + 0.25 * j * h, work.dense, work.q, work.vals)
+        for row in range(n, form.kinds.shape[0]):
+            if form.kinds[row] == 0:
+                top, bottom, k = extremes_of(row, n, form.indicators, kept)
+                top[i, k] = max(top[i, k], work.vals[row - n])
+                bottom[i, k] = min(bottom[i, k], work.vals[row - n])
 
 
-@device
-def touches(mode, t, h, C, m, n, powers, net, scale, rise, a, d, stack, found, u, log, count):
-    """Log every local maximum <= 0 of an armed row: time, indicator, clearance, states. Returns the new count.
+@once
+def include(i, mode, form, tables, work, kept):
+    """Extend the extremes of point i by the present instant, just after a transition."""
+    n = work.w.shape[0]
+    jets = work.J0 if form.method == place.RKF45 else work.C
+    for row in range(form.kinds.shape[0]):
+        if row < n and form.lacking[mode, row] == 1:
+            continue
+        top, bottom, k = extremes_of(row, n, form.indicators, kept)
+        value = jets[row, 0]
+        if value > top[i, k]:
+            top[i, k] = value
+        if value < bottom[i, k]:
+            bottom[i, k] = value
 
-    ``rise`` is the sign of each row's slope at the end of the previous step (0: just after a jump)."""
-    first, outgoing, transitions, rows, _ = net
-    begin = first[mode]
-    for j in range(begin, first[mode + 1]):
-        for r in range(transitions[outgoing[j], 2], transitions[outgoing[j], 3]):
+
+@once
+def finish(i, form, tables, work, kept):
+    """Extremes of the rows that repeat a state."""
+    n = work.w.shape[0]
+    for row in range(n, form.kinds.shape[0]):
+        if form.kinds[row] < 0:
+            top, bottom, k = extremes_of(row, n, form.indicators, kept)
+            top[i, k] = kept.maximum[i, -1 - form.kinds[row]]
+            bottom[i, k] = kept.minimum[i, -1 - form.kinds[row]]
+
+
+@once
+def log_touches(step, form, net, log, tables, work):
+    """Log every local maximum <= 0 of an armed row on the step.
+
+    ``work.rise`` is the sign of each row's slope at the end of the step before (0: just after a jump)."""
+    C, n, powers, rows, rise = work.C, work.w.shape[0], work.powers, net.rows, work.rise
+    a, d, stack, found, u, scale = work.a, work.d, work.stack, work.found, work.dense, work.scale
+    m = 5 if form.method == place.RKF45 else form.order
+    mode, t, h, count = work.tally[MODE], work.memo[DONE], work.memo[place.PART], work.tally[TOUCHES]
+    begin = net.mode_start[mode]
+    for j in range(begin, net.mode_start[mode + 1]):
+        for r in range(net.row_start[net.mode_list[j]], net.row_start[net.mode_list[j] + 1]):
             i, sign = rows[r, 0], rows[r, 1]
             known = False  # the same row may stand in several transitions
             for jj in range(begin, j):
-                for rr in range(transitions[outgoing[jj], 2], transitions[outgoing[jj], 3]):
+                for rr in range(net.row_start[net.mode_list[jj]], net.row_start[net.mode_list[jj] + 1]):
                     known = known or (rows[rr, 0] == i and rows[rr, 1] == sign)
             if known:
                 continue
@@ -97,37 +125,15 @@ def touches(mode, t, h, C, m, n, powers, net, scale, rise, a, d, stack, found, u
                     break
                 cursor, begun = cursor + x * (1.0 - cursor), True
                 v = dense(a, mr, cursor)
-                if v <= NOISE * scale[i] and count < log.shape[0]:
+                if v <= NOISE * scale[i] and count < log.touch_time.shape[0]:
                     dense_states(C, m, n, cursor * h, u)
-                    log[count, 0], log[count, 1], log[count, 2] = t + cursor * h, i, max(-v, 0.0)
+                    log.touch_time[count], log.touch_indicator[count] = t + cursor * h, i
+                    log.touch_gap[count] = max(-v, 0.0)
                     for k in range(n):
-                        log[count, 3 + k] = u[k]
+                        log.touch_u[count, k] = u[k]
                     count += 1
                 if cursor >= 1.0:
                     break
-    return count
+    work.tally[TOUCHES] = count
 
 
-@device
-def sample(times, written, base, t, h, C, m, n, q, n_parameters, mode, segment, u, out):
-    """Write the samples on the step [t, t + h): states, memory, mode, segment. Returns how many there are now."""
-    while written < times.shape[0]:
-        tau = (times[written] - base) - t
-        if tau >= h * (1.0 - 4e-16):  # the end belongs to what follows: a sample at a crossing is the limit after it
-            break
-        dense_states(C, m, n, max(tau, 0.0), u)
-        write_sample(out, written, u, n, q, n_parameters, mode, segment)
-        written += 1
-    return written
-
-
-@device
-def write_sample(out, row, u, n, q, n_parameters, mode, segment):
-    """One row of samples: states, memory, mode, segment."""
-    for i in range(n):
-        out[row, i] = u[i]
-    memory = q.shape[0] - n_parameters
-    for i in range(memory):
-        out[row, n + i] = q[n_parameters + i]
-    out[row, n + memory] = mode
-    out[row, n + memory + 1] = segment

@@ -33,8 +33,9 @@ def _rebound(t: Any, u: Any, p: Any) -> Any:
 
 
 def impact_oscillator(**parameters: float) -> System:
-    r"""Return the impact oscillator :math:`\ddot x + c \dot x + k x = A \cos \omega t`, :math:`\dot x^+ = -e \dot x^-`
-    at :math:`x = d`.
+    r"""Return the impact oscillator: a forced mass on a spring that hits a rigid stop.
+
+    :math:`\ddot x + c \dot x + k x = A \cos \omega t`, and :math:`\dot x^+ = -e \dot x^-` at :math:`x = d`.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What all pictures of a comparison share: who is who, and what is synthetic."""
+"""Names, colours and marks that all pictures of a comparison share, and what is synthetic."""
 
 from __future__ import annotations
 

@@ -72,7 +72,7 @@ def _dots(ax: Axes, points: list[Any], marker: str, face: str, words: str) -> No
 
 
 def _nearest(run: xr.Dataset) -> tuple[int, float] | None:
-    """Which touch leaves the least distance, and how much; None where the orbit comes near no other transition."""
+    """Touch that leaves the least distance, and this distance; None where the orbit comes near no other transition."""
     clearance = run["touch_clearance"].values
     if not np.isfinite(clearance).any():
         return None

@@ -1,4 +1,4 @@
-r"""Which mode rules where: the regions of a system in the plane of two states, sharp or smoothed.
+r"""Regions of modes: those of a system in the plane of two states, sharp or smoothed.
 
 With the signed indicators :math:`g_r` of the condition under which the first mode is left, the margin is
 :math:`\mu = \min_r g_r`. A sharp system is in :math:`G_-` where :math:`\mu < 0` and in :math:`G_+` where
@@ -39,7 +39,7 @@ def regions(
     y: str | None = None,
     t: float = 0.0,
 ) -> Axes:
-    """Draw the regions of a system's first mode (G-), of the mode it changes to (G+), and what parts them.
+    """Draw the regions of a system's first mode (G-), of the mode it changes to (G+), and the borders between them.
 
     Parameters
     ----------

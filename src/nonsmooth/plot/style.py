@@ -1,4 +1,4 @@
-"""How every figure looks: journal column widths, small fonts, colours that colour-blind readers can tell apart.
+"""The look of every figure: journal column widths, small fonts, colours that colour-blind readers can tell apart.
 
 A plot function given no axes draws on its own, in this style. Given axes, it leaves the caller's style alone, but for
 what it adds itself: a legend has no frame and letters in proportion to the axes' labels, unless the caller's own
@@ -11,6 +11,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -39,44 +40,30 @@ COLORS = {
 
 _DOT = 7.0  # of a point cloud in a legend, in points; the mark "." is half of it wide
 
-_RC: Any = {
-    "figure.figsize": (COLUMN, COLUMN * 0.72),
-    "figure.dpi": 150,
-    "figure.constrained_layout.use": True,
-    "savefig.dpi": 600,
-    "font.family": "serif",
-    "font.serif": ["STIX Two Text", "Times New Roman", "STIXGeneral"],
-    "mathtext.fontset": "stix",
-    "font.size": 8,
-    "axes.labelsize": 8,
-    "axes.titlesize": 8,
-    "axes.linewidth": 0.6,
-    "axes.formatter.use_mathtext": True,
-    "axes.formatter.limits": (-2, 4),
-    "axes.formatter.useoffset": False,
-    "xtick.labelsize": 7,
-    "ytick.labelsize": 7,
-    "xtick.direction": "in",
-    "ytick.direction": "in",
-    "xtick.top": True,
-    "ytick.right": True,
-    "xtick.major.width": 0.6,
-    "ytick.major.width": 0.6,
-    "legend.fontsize": 7,
-    "legend.frameon": False,
-    "lines.linewidth": 0.8,
-    "lines.markersize": 3,
-    "pdf.fonttype": 42,  # TrueType: text stays text, as journals ask
-    "svg.fonttype": "none",
-}
+@cache
+def _settings() -> Any:
+    """The settings of ``journal.mplstyle``."""
+    import matplotlib as mpl
+
+    return mpl.rc_params_from_file(Path(__file__).with_name("journal.mplstyle"), use_default_template=False)
 
 
 @contextmanager
 def journal() -> Iterator[None]:
-    """The package's style, for the figures made inside the ``with`` block."""
+    """The package's style, for the figures made inside the ``with`` block.
+
+    ``plt.style.use("nonsmooth.plot.journal")`` sets it for all figures that follow.
+
+    Examples
+    --------
+    >>> import matplotlib.pyplot as plt
+    >>> import nonsmooth as ns
+    >>> with ns.plot.journal():
+    ...     figure, ax = plt.subplots()
+    """
     import matplotlib as mpl
 
-    with mpl.rc_context(_RC):
+    with mpl.rc_context(_settings()):
         yield
 
 
@@ -108,7 +95,7 @@ def _own_legend(ax: Axes) -> Iterator[None]:
     """Legends in the package's style on a caller's axes; what the caller has set stays."""
     import matplotlib as mpl
 
-    wanted: Any = {"legend.frameon": _RC["legend.frameon"], "legend.fontsize": small(ax)}
+    wanted: Any = {"legend.frameon": _settings()["legend.frameon"], "legend.fontsize": small(ax)}
     now: Any = mpl.rcParams
     plain: Any = mpl.rcParamsDefault
     free: Any = {key: value for key, value in wanted.items() if now[key] == plain[key]}
@@ -118,7 +105,8 @@ def _own_legend(ax: Axes) -> Iterator[None]:
 
 def small(ax: Axes) -> float:
     """Size of letters within axes: 7/8 of their labels', as in legends; 7 pt in the package's style."""
-    return float(_RC["legend.fontsize"] / _RC["axes.labelsize"] * ax.xaxis.label.get_fontsize())
+    settings = _settings()
+    return float(settings["legend.fontsize"] / settings["axes.labelsize"] * ax.xaxis.label.get_fontsize())
 
 
 def halo(width: float = 2.0) -> list[Any]:

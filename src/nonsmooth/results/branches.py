@@ -10,6 +10,7 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from nonsmooth.results.labels import Labels
+from nonsmooth.results.provenance import with_short_record
 from nonsmooth.results.schema import floats, parameter_coords, quantity_attributes, state_coords, strings, varied
 from nonsmooth.results.statuses import flag_attributes, status_attributes
 
@@ -39,7 +40,7 @@ _MARKS: dict[str, tuple[str, tuple[str, ...], str]] = {
     "indicator": ("special_indicator", (), "indicator that is touched"),
     "grazing": ("special_grazing", (), "what happens at the graze (Feigin)"),
     "bounded": ("special_bounded", (), "multipliers stay bounded at the graze"),
-    "doubled": ("special_doubled", (), "an orbit of twice the period is born at the graze"),
+    "doubled": ("special_doubled", (), "an orbit of twice the period branches off at the graze"),
     "contact": ("special_contact_multipliers", ("multiplier",), "multipliers with the contact, in the limit"),
     "determinants": (
         "special_determinant", ("matrix",), "det(I - M-), det(I - M+), det(I + M-), det(I + M+) at the graze",
@@ -86,7 +87,8 @@ def branch(
     variables["period_number"] = ((), np.int64(period_number), {"long_name": "forcing periods (0: autonomous)"})
     coords = _coords(d, {parameter: values})
     coords["indicator"] = ("indicator", strings(d.indicators), {"long_name": "indicator"})
-    return xr.Dataset(variables | _ends(endings, ended, sentences), coords, dict(attrs))
+    variables |= _ends(endings, ended, sentences)
+    return with_short_record(xr.Dataset(variables, coords, dict(attrs)))
 
 
 def curve(
@@ -115,7 +117,7 @@ def curve(
     variables["special_kind"] = ("special", strings(name for name, _ in special), {"long_name": "codimension two"})
     variables["special_point"] = _places(special)
     variables |= _ends(list(endings), ended, [endings[word] for word in ended])
-    return xr.Dataset(variables, _coords(d, parameters), dict(attrs))
+    return with_short_record(xr.Dataset(variables, _coords(d, parameters), dict(attrs)))
 
 
 def equilibria(
@@ -142,7 +144,7 @@ def equilibria(
         "special_value": _special_value(d, parameter, floats(values), [place for _, place in special]),
         **_ends(list(endings), ended, [endings[word] for word in ended]),
     }
-    return xr.Dataset(variables, _coords(d, {parameter: values}), dict(attrs))
+    return with_short_record(xr.Dataset(variables, _coords(d, {parameter: values}), dict(attrs)))
 
 
 def _places(special: Sequence[tuple[str, int]]) -> tuple[Any, ...]:
@@ -155,7 +157,7 @@ def _special_value(d: Labels, parameter: str, along: NDArray[np.float64], places
 
 
 def _ends(endings: Sequence[str], ended: Sequence[str], sentences: Sequence[str]) -> dict[str, Any]:
-    """How both ends came about: one of ``endings``, and a sentence."""
+    """Endings of both ends: one of ``endings``, and a sentence."""
     codes = np.array([endings.index(word) for word in ended], dtype=np.int8)
     return {
         "ended": ("end", codes, {"long_name": "how it ends", **flag_attributes(endings)}),

@@ -84,7 +84,7 @@ def trailer(data: bytes | memoryview) -> bytes:
 
 
 def bytes_as_written(path: Path) -> bool:
-    """Whether a file's bytes are those before its :func:`trailer`; True where it has none."""
+    """Return whether a file's bytes are those before its :func:`trailer`; True where it has none."""
     found, left = hashlib.sha256(), path.stat().st_size - _TRAILER_LENGTH
     if left < 0:
         return True
@@ -106,7 +106,7 @@ def seal(record: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def sealed(record: Any) -> bool:
-    """Whether a record is as :func:`seal` made it."""
+    """Return whether a record is as :func:`seal` made it."""
     if not isinstance(record, dict) or "sha256" not in record:
         return False
     return bool(digest({name: value for name, value in record.items() if name != "sha256"}) == record["sha256"])

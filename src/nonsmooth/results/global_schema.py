@@ -16,6 +16,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from nonsmooth.results.labels import Labels
+from nonsmooth.results.provenance import with_short_record
 from nonsmooth.results.schema import (
     floats,
     parameter_coords,
@@ -89,7 +90,7 @@ def chart(
     for name, values in grid.items():
         coords |= varied(labels, name, values)
     coords |= state_coords(labels)
-    result = xr.Dataset(variables, coords | start_coords(starts), dict(attrs))
+    result = with_short_record(xr.Dataset(variables, coords | start_coords(starts), dict(attrs)))
     return result.squeeze("start") if one_start else result
 
 
@@ -123,11 +124,11 @@ def basins(
         coords[name] = ((), float(value), quantity_attributes(name, labels.states[name]))
     coords["distance"] = ("distance", uncertain[0], {"long_name": "distance in grid steps"})
     coords["attractor"] = ("attractor", np.arange(len(attractors)), {"long_name": "attractor"})
-    return xr.Dataset(variables, coords, dict(attrs))
+    return with_short_record(xr.Dataset(variables, coords, dict(attrs)))
 
 
 def attractor_variables(labels: Labels, attractors: Sequence[Any]) -> dict[str, Any]:
-    """What is known of each attractor; their section points one after the other over ``section_point``."""
+    """Properties of each attractor; their section points one after the other over ``section_point``."""
     n = len(labels.states)
     rows = {name: [getattr(item, name) for item in attractors] for name in ("maximum", "minimum", "points")}
     points = [item[:SHOWN] for item in rows["points"]]
@@ -193,4 +194,4 @@ def basin_fractions(
     coords: dict[str, Any] = parameter_coords(labels, without=parameter) | state_coords(labels)
     coords |= varied(labels, parameter, values)
     coords["attractor"] = ("attractor", np.arange(np.shape(arrays["fraction"])[1]), {"long_name": "attractor"})
-    return xr.Dataset(variables, coords, dict(attrs))
+    return with_short_record(xr.Dataset(variables, coords, dict(attrs)))

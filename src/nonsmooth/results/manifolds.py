@@ -10,6 +10,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from nonsmooth.results.labels import Labels
+from nonsmooth.results.provenance import with_short_record
 from nonsmooth.results.schema import parameter_coords, state_coords
 from nonsmooth.results.statuses import flag_attributes
 
@@ -59,4 +60,5 @@ def manifolds(
         ("return", "state"), np.asarray(orbit_section, float), {"long_name": "points of the orbit"},
     )  # fmt: skip
     variables["size"] = ("state", np.asarray(scale, float), {"long_name": "what a scaled state of 1 is"})
-    return xr.Dataset(variables, {**state_coords(labels), **parameter_coords(labels)}, dict(attrs))
+    coords = state_coords(labels) | parameter_coords(labels)
+    return with_short_record(xr.Dataset(variables, coords, dict(attrs)))

@@ -56,7 +56,7 @@ def say(text: str, enabled: bool = True) -> None:
 
 
 def is_watched() -> bool:
-    """Whether stderr is a terminal, or this process a notebook's."""
+    """Return whether stderr is a terminal, or this process a notebook's."""
     try:
         return _in_notebook() or bool(sys.stderr.isatty())
     except (AttributeError, ValueError):  # no stderr (pythonw), or a closed one

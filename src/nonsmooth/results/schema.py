@@ -34,6 +34,7 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from nonsmooth.results.labels import Labels, Quantity
+from nonsmooth.results.provenance import with_short_record
 from nonsmooth.results.statuses import flag_attributes, status_attributes
 
 __all__ = [
@@ -125,7 +126,7 @@ def trajectory(
         **state_coords(d),
         **parameter_coords(d),
     }
-    return xr.Dataset(variables, coords, dict(attrs))
+    return with_short_record(xr.Dataset(variables, coords, dict(attrs)))
 
 
 def sweep(
@@ -172,7 +173,7 @@ def sweep(
         variables["bin_edge"] = (("state", "edge"), floats(edges), {"long_name": "edges of the bins, per state"})
     if "clearance" in arrays:
         coords["indicator"] = ("indicator", strings(d.indicators), {"long_name": "indicator"})
-    result = xr.Dataset(variables, coords, dict(attrs))
+    result = with_short_record(xr.Dataset(variables, coords, dict(attrs)))
     order = (parameter, "direction", "start", ...)
     return result.transpose(*order).squeeze(list(squeeze))
 
@@ -226,7 +227,7 @@ def section_points(
         "status": ("start", np.asarray(status, np.int8), status_attributes()),
     }
     coords = {**start_coords(starts), **state_coords(d), **parameter_coords(d)}
-    return xr.Dataset(variables, coords, dict(attrs)).squeeze(list(squeeze))
+    return with_short_record(xr.Dataset(variables, coords, dict(attrs))).squeeze(list(squeeze))
 
 
 @lru_cache(maxsize=64)

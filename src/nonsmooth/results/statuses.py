@@ -1,4 +1,4 @@
-"""What a status code of the kernels means: its name in results, what happened, and what to do about it."""
+"""Meanings of the kernels' status codes: name in results, what happened, and what to do about it."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Status:
 
     @property
     def sentence(self) -> str:
-        """What happened and what to do, in one line."""
+        """Sentence on what happened and what to do."""
         return f"{self.happened} {self.remedy}".strip()
 
 
@@ -63,8 +63,8 @@ STATUSES: tuple[Status, ...] = (
     ),
     Status(
         codes.NO_CONVERGENCE, "no_convergence",
-        "The trajectory did not return to the section (it may have come to rest), it began beyond a stop, or an "
-        "equation did not converge.",
+        "The trajectory did not return to the section (it may have reached an equilibrium), it began beyond a stop, or "
+        "an equation did not converge.",
         "Check that the start lies on the admissible side of every stop, and that the motion meets the section's "
         "surface in the direction asked for; otherwise lower `rtol`.",
     ),

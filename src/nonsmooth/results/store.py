@@ -13,20 +13,21 @@ import os
 import warnings
 from collections.abc import Hashable, Iterator, Mapping
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from nonsmooth.errors import DataFileError
+from nonsmooth.errors import DataFileError, not_installed
 from nonsmooth.results import claims
 from nonsmooth.results.content import bytes_as_written, content, digest, stamp, trailer, unstamp
 from nonsmooth.results.memory import room_for
 from nonsmooth.results.provenance import ATTRIBUTE
 from nonsmooth.results.whole import beside, replace, told
 
-__all__ = ["check_place", "load", "save"]
+__all__ = ["check_place", "load", "needs_zarr", "save"]
 
 _EXPECTED = "expected a result written by nonsmooth.save (.nc or .zarr)"
 _ALTERED = (
@@ -47,6 +48,8 @@ def save(result: xr.Dataset, path: str | os.PathLike[str]) -> Path:
 
     Raises
     ------
+    ImportError
+        If the path ends in ``.zarr`` and the package zarr is not installed.
     TypeError
         If ``result`` is not a Dataset, or holds something that files do not give back as it is.
     ValueError
@@ -152,10 +155,18 @@ def check_place(target: Path) -> None:
         )
 
 
+def needs_zarr(path: Path) -> None:
+    """Refuse a Zarr store where the package zarr is not installed: ImportError that names the extra."""
+    if find_spec("zarr") is None:
+        raise ImportError(f"{path}: a Zarr store needs {not_installed('zarr', 'zarr')}")
+
+
 def _suffix(path: Path) -> str:
     if path.suffix not in (".nc", ".zarr"):
         given = path.suffix or "no ending"
         raise ValueError(f"{path}: the name must end in .nc (NetCDF) or .zarr (Zarr), got {given!r}")
+    if path.suffix == ".zarr":
+        needs_zarr(path)
     return path.suffix
 
 
@@ -164,7 +175,7 @@ def _is_zarr(path: Path) -> bool:
 
 
 def _is_result(path: Path) -> bool:
-    """Whether a Zarr store holds a result that :func:`save` has written."""
+    """Return whether a Zarr store holds a result that :func:`save` has written."""
     for name in (".zattrs", "zarr.json"):
         try:
             attributes = json.loads((path / name).read_text(encoding="utf-8"))
@@ -229,7 +240,7 @@ def _variables(result: xr.Dataset) -> Iterator[tuple[str, bool, xr.Variable]]:
 
 
 def _encode(result: xr.Dataset) -> xr.Dataset:
-    """What both formats can hold. Encodings left by an earlier read are dropped."""
+    """Return a Dataset that both formats can hold. Encodings left by an earlier read are dropped."""
     encoded = result.drop_encoding()
     for name, variable in list(encoded.variables.items()):
         if variable.dtype.kind == "c":

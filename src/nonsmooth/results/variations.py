@@ -10,6 +10,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from nonsmooth.results.labels import Labels
+from nonsmooth.results.provenance import with_short_record
 from nonsmooth.results.schema import floats, parameter_coords, varied
 from nonsmooth.results.statuses import EQUILIBRIA, flag_attributes, status_attributes
 
@@ -50,7 +51,7 @@ def derivatives_of_run(
         "parameter": ("parameter", np.array(list(parameters), dtype=str)),
         **parameter_coords(d),
     }
-    return xr.Dataset(variables, coords, dict(attrs))
+    return with_short_record(xr.Dataset(variables, coords, dict(attrs)))
 
 
 def spectrum(
@@ -83,5 +84,6 @@ def spectrum(
         **parameter_coords(d, without=parameter or ""),
     }
     if parameter is None:
-        return xr.Dataset(variables, coords, dict(attrs)).isel(point=0)
-    return xr.Dataset(variables, coords | varied(d, parameter, () if values is None else values), dict(attrs))
+        return with_short_record(xr.Dataset(variables, coords, dict(attrs))).isel(point=0)
+    coords |= varied(d, parameter, () if values is None else values)
+    return with_short_record(xr.Dataset(variables, coords, dict(attrs)))

@@ -91,7 +91,7 @@ def told(path: Path, remedy: str) -> Iterator[None]:
 
 
 def _stale(folder: Path, target: Path) -> bool:
-    """Whether the process that made a folder has ended."""
+    """Return whether the process that made a folder has ended."""
     try:
         whose = json.loads((folder / _WRITER).read_text(encoding="utf-8"))
         if whose["target"] != target.name:

@@ -1,1 +1,1 @@
-"""What a piecewise-smooth system is: states, parameters, modes, indicators, transitions, and their equations."""
+"""Piecewise-smooth systems: states, parameters, modes, indicators, transitions, and their equations."""

@@ -47,7 +47,7 @@ class Description:
 
     @property
     def symbol_names(self) -> dict[sp.Symbol, str]:
-        """How the symbols are written in text: ``t``, ``u.x``, ``p.k`` (memory is read as ``p.`` too)."""
+        """Names of the symbols in text: ``t``, ``u.x``, ``p.k`` (memory is read as ``p.`` too)."""
         t = self.traced
         names = {t.t: "t"}
         names |= {s: f"u.{name}" for s, name in zip(t.u, t.state_names, strict=True)}

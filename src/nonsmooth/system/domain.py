@@ -1,4 +1,4 @@
-"""Which values of the parameters the equations allow: no division by zero, no root of a negative number.
+"""Values of the parameters that the equations allow: no division by zero, no root of a negative number.
 
 Parts of the expressions that depend on parameters alone are collected once. A single parameter in a
 denominator, by far the most common, is then a look-up; others are evaluated.

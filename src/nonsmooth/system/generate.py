@@ -19,8 +19,9 @@ from nonsmooth.system.jet import jet_code
 from nonsmooth.system.printing import Printer, assignments
 from nonsmooth.system.traced import Traced
 
-__all__ = ["SIGNATURES", "CompiledModel", "compile_model", "model_source"]
+__all__ = ["MOST_MODELS", "SIGNATURES", "CompiledModel", "compile_model", "model_source"]
 
+MOST_MODELS = 32  # whose code is kept though nobody uses it: a third of a MB each
 # mode, [order,] t, u, q and what is written; q holds the parameters, then the memory.
 SIGNATURES = {
     "field": "void(i8, f8, f8[::1], f8[::1], f8[::1])",
@@ -69,7 +70,7 @@ class CompiledModel:
     content_hash: str
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=MOST_MODELS)
 def compile_model(traced: Traced) -> CompiledModel:
     """Generate, compile (or load from the cache) and return the functions of a traced system.
 
@@ -81,7 +82,7 @@ def compile_model(traced: Traced) -> CompiledModel:
     from nonsmooth.kernels.cache import load_module
 
     source = model_source(traced)
-    module = load_module(source, "model")
+    module = load_module(source, "model", lasting=False)
     return CompiledModel(
         field=module.field,
         jet=module.jet,
@@ -169,7 +170,7 @@ def _values(traced: Traced, mode: int) -> tuple[list[str], set[str]]:
 
 
 def _jump(traced: Traced, index: int) -> tuple[list[str], set[str]]:
-    """What a transition changes; the rest has been copied before."""
+    """Code for what a transition changes; the rest has been copied before."""
     transition = traced.transitions[index]
     reset = traced.u if transition.reset is None else transition.reset
     targets = [(f"u_new[{i}]", e) for i, e in enumerate(reset) if e != traced.u[i]]

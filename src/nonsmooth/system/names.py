@@ -1,4 +1,4 @@
-"""Which names may be used, and helpful answers to those that may not, in calls too.
+"""Names that may be used, and helpful answers to those that may not, in calls too.
 
 A parameter's name becomes a dim of a result and a state's name a coordinate, so that the names the
 results use themselves are reserved.
@@ -28,7 +28,7 @@ RESERVED = frozenset(
         # variables of results
         "section", "maximum", "minimum", "amplitude", "residual", "period", "period_number", "crossings_per_period",
         "contacts_per_period", "clearance", "signature", "stable", "label", "kind", "transition",
-        "floquet_multipliers", "start_state", "state_unit", "state_symbol",
+        "floquet_multipliers", "start_state", "state_unit", "state_symbol", "provenance",
         # arguments of the user's functions
         "u", "t", "p",
     ]

@@ -52,7 +52,7 @@ def finite_number(value: Any, what: str) -> float:
 
 
 def _scalar(value: Any) -> bool:
-    """Whether something with ``__float__`` is one number (0-d arrays are; longer arrays and strings are not)."""
+    """Return whether something with ``__float__`` is one number (0-d arrays are; longer arrays and strings are not)."""
     return getattr(value, "ndim", 0) == 0 and not isinstance(value, (str, bytes, complex))
 
 

@@ -56,7 +56,7 @@ _RELATION_TYPES = (sympy.Gt, sympy.Ge, sympy.Lt, sympy.Le, sympy.Eq, sympy.Ne)
 
 
 def is_corner(expression: Basic) -> bool:
-    """Whether the outermost operation has a corner or a jump, hence no Taylor series everywhere."""
+    """Return whether the outermost operation has a corner or a jump, hence no Taylor series everywhere."""
     return isinstance(expression, _CORNERS)
 
 

@@ -1,4 +1,4 @@
-"""A system for the eye: a short table, and LaTeX."""
+"""A system as a table, in text and in HTML, and as LaTeX."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import sympy as sp
 
+from nonsmooth.results.representation import html_table, text_table
 from nonsmooth.system.expressions import write_expression
 from nonsmooth.system.parameter import latex_name
 
@@ -13,7 +14,7 @@ if TYPE_CHECKING:
     from nonsmooth.system.system import System
     from nonsmooth.system.traced import Row, Traced, TracedTransition
 
-__all__ = ["latex", "table"]
+__all__ = ["latex", "page", "table"]
 
 
 def _plain(traced: Traced) -> dict[sp.Symbol, str]:
@@ -51,8 +52,18 @@ def _jump(jump: TracedTransition, traced: Traced, names: dict[sp.Symbol, str]) -
     return text
 
 
-def table(system: System) -> str:
-    """Return the table shown by ``repr``."""
+def table(system: System, *, whole: bool = True) -> str:
+    """Return the equations as a table; short enough for a terminal where it need not be ``whole``."""
+    return text_table(f"System {system.name!r}", _rows(system), whole=whole, more="print(system) shows")
+
+
+def page(system: System) -> str:
+    """Return the same table as HTML."""
+    return html_table(f"System {system.name!r}", _rows(system))
+
+
+def _rows(system: System) -> list[tuple[str, str]]:
+    """Headings and texts: states, parameters, equations by mode, indicators, transitions, period."""
     traced = system.traced
     names = _plain(traced)
     lines: list[tuple[str, str]] = []
@@ -88,8 +99,7 @@ def table(system: System) -> str:
     lines.append(("period", _period(system, names)))
     if system.is_smoothed:
         lines.append(("smoothing", f"eta = {system.eta}"))
-    width = max(len(head) for head, _ in lines)
-    return "\n".join([f"System {system.name!r}", *(f"  {head:<{width}}  {text}".rstrip() for head, text in lines)])
+    return lines
 
 
 def _period(system: System, names: dict[sp.Symbol, str]) -> str:

@@ -207,7 +207,7 @@ class _Builder:
             self.jump(pair.inner, bands[r][0], (self.beyond(row, 1, -1), *least[r]), bands[r][1])
 
     def _repeats(self, pair: _Pair, r: int) -> bool:
-        """Whether an earlier row is the same function of the state."""
+        """Return whether an earlier row is the same function of the state."""
         row = pair.rows[r]
         return any(sp.expand(self.margin(row) - self.margin(earlier)) == 0 for earlier in pair.rows[:r])
 

@@ -205,7 +205,7 @@ class System:
 
     @property
     def is_smoothed(self) -> bool:
-        """Whether the switches are smoothed."""
+        """Return whether the switches are smoothed."""
         return self._variant.kind != SHARP
 
     @property
@@ -219,12 +219,12 @@ class System:
 
     @property
     def depends_on_time(self) -> bool:
-        """Whether the time occurs in the equations, or transitions happen at phases of a period."""
+        """Return whether the time occurs in the equations, or transitions happen at phases of a period."""
         return self.traced.period is not None or self._description.explicit_time
 
     @property
     def explicit_time(self) -> bool:
-        """Whether the equations depend on time without a known period: only runs over a ``duration`` are possible."""
+        """Return whether the equations depend on time without a known period: runs then need a ``duration``."""
         return self._description.explicit_time
 
     # Numbers
@@ -354,7 +354,17 @@ class System:
     def __repr__(self) -> str:
         from nonsmooth.system.show import table
 
+        return table(self, whole=False)
+
+    def __str__(self) -> str:
+        from nonsmooth.system.show import table
+
         return table(self)
+
+    def _repr_html_(self) -> str:
+        from nonsmooth.system.show import page
+
+        return page(self)
 
     def to_latex(self) -> str:
         """Return the equations as LaTeX (an ``align*`` environment)."""

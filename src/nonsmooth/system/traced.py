@@ -1,4 +1,4 @@
-"""What remains of a user's system once its functions have been called with symbols.
+"""Expressions of a user's system, from calling its functions with symbols.
 
 Everything below the system room reads this record and nothing else: the linearity test, the
 derivatives, the code generator, the smoothed switch and the text form.

@@ -183,7 +183,7 @@ _ROLES = {"Scalar": ("t", "time"), "States": ("u", "states"), "Parameters": ("p"
 
 
 def _order(function: Callable[..., Any], arguments: Sequence[Any]) -> str:
-    """How a function is called, where its own arguments do not look like it: a sentence, or what to add to one."""
+    """Sentence on how a function is called, where its own arguments do not look like it."""
     try:
         signature = inspect.signature(function)
     except (TypeError, ValueError):  # a function of C

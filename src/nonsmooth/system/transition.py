@@ -58,7 +58,7 @@ class Transition:
 
     @property
     def label(self) -> str:
-        """How errors and logs call it: ``free -> contact``."""
+        """Name in errors and logs: ``free -> contact``."""
         return f"{self.source} -> {self.target}"
 
 
@@ -88,5 +88,5 @@ class Surface:
 
     @property
     def label(self) -> str:
-        """How errors call it."""
+        """Name in errors."""
         return f"surface {self.indicator} ({self.below} | {self.above})"

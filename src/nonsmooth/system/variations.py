@@ -19,7 +19,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from nonsmooth.system.generate import SIGNATURES
+from nonsmooth.system.generate import MOST_MODELS, SIGNATURES
 from nonsmooth.system.jet import jet_code
 from nonsmooth.system.printing import Printer, assignments
 from nonsmooth.system.traced import Traced, TracedTransition
@@ -27,6 +27,8 @@ from nonsmooth.system.traced import Traced, TracedTransition
 __all__ = ["VariationalModel", "touch_function", "variational_model"]
 
 ZERO, CONSTANT, VARYING = 0, 1, 2
+FOUR = 4  # columns in a vector (``kernels.lanes``)
+_JET = SIGNATURES["jet"][:-1] + ", f8[:,:,::1])"
 _SWITCH = "void(i8, f8, f8[::1], f8[::1], f8[::1])"
 
 
@@ -58,7 +60,7 @@ class VariationalModel:
     n_scratch: int
 
 
-@lru_cache(maxsize=128)
+@lru_cache(maxsize=MOST_MODELS)
 def variational_model(traced: Traced, active: tuple[int, ...]) -> VariationalModel:
     """Generate and compile (or load from the cache) for some active parameters, given by index."""
     from nonsmooth.kernels.cache import load_module
@@ -81,18 +83,53 @@ def variational_model(traced: Traced, active: tuple[int, ...]) -> VariationalMod
     functions = set().union(*(jet.functions for jet in jets), *(used for _, used in [*fields, *switches]))
     parts = [
         "from nonsmooth.kernels.cache import callback",
+        "from nonsmooth.kernels.lanes import load, plus, store, times",
         f"from math import {', '.join(sorted(functions))}" if functions else "",
-        _function("jet", SIGNATURES["jet"], "mode, order, t, u, q, C, W", traced, [jet.lines for jet in jets]),
+        _function("jet", _JET, "mode, order, t, u, q, C, W, D", traced, [
+            [*jet.lines, *_small_changes(entries, kind, n, len(wanted))] for jet, kind in zip(jets, kinds, strict=True)
+        ]),
         _function("field", SIGNATURES["field"], "mode, t, u, q, du", traced, [lines for lines, _ in fields]),
         _function("switch", _SWITCH, "transition, t, u, q, out", traced, [lines for lines, _ in switches]),
     ]
-    module = load_module("\n".join(part for part in parts if part) + "\n", "variations")
+    module = load_module("\n".join(part for part in parts if part) + "\n", "variations", lasting=False)
     return VariationalModel(
         module.jet, module.field, module.switch,
         np.array(entries, dtype=np.int64).reshape(-1, 2),
         np.array(kinds, dtype=np.int64).reshape(len(kinds), len(entries)),
         max([1, *(jet.n_scratch for jet in jets)]),
     )  # fmt: skip
+
+
+def _small_changes(entries: list[tuple[int, int]], kinds: list[int], n: int, columns: int) -> list[str]:
+    """Lines that go on with the series D[k, number, column] of small changes, from D[0] and the entries' series in C:
+    X_(k+1) = sum_j A_j X_(k-j) / (k + 1), four columns at once."""
+    width = -(-columns // FOUR) * FOUR
+
+    def load(m: int, k: str = "k") -> str:
+        place = f"{m * width} + b" if k == "0" else f"{columns * width}*{k} + {m * width} + b"
+        return f"load(D, {place})"
+
+    rows: dict[int, list[str]] = {i: [] for i in range(n)}  # terms of each row: factor, vector
+    sums, used = [], set()
+    for e, ((i, m), kind) in enumerate(zip(entries, kinds, strict=True)):
+        if kind == VARYING and m < n:
+            sums.append((e, i, m))
+        elif kind != ZERO:
+            rows[i].append(f"C[{n + e}, k], {load(m, '0')}" if m >= n else f"C[{n + e}, 0], y{m}")
+            used |= {m} if m < n else set()
+    body = [f"y{m} = {load(m)}" for m in sorted(used)]
+    if sums:
+        body += [f"w{e} = times(0.0, {load(m, '0')})" for e, _, m in sums]
+        body += ["for j in range(k + 1):", *(f"    x{m} = {load(m, 'j')}" for m in sorted({m for _, _, m in sums}))]
+        body += [f"    w{e} = plus(w{e}, C[{n + e}, k - j], x{m})" for e, _, m in sums]
+    for i, terms in rows.items():
+        own = [f"w{e}" for e, row, _ in sums if row == i]
+        first = own[0] if own else f"times({terms.pop(0)})" if terms else f"times(0.0, {load(i, '0')})"
+        body.append(f"v{i} = {first}")
+        body += [f"v{i} = plus(v{i}, 1.0, {more})" for more in own[1:]]
+        body += [f"v{i} = plus(v{i}, {term})" for term in terms]
+        body.append(f"store(D, {columns * width}*(k + 1) + {i * width} + b, times(1.0/(k + 1), v{i}))")
+    return ["for k in range(order):", f"    for b in range(0, {width}, {FOUR}):", *(f"        {line}" for line in body)]
 
 
 def _derivative(e: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
@@ -167,4 +204,5 @@ def _function(name: str, signature: str, arguments: str, traced: Traced, branche
         lines.append(f"{'el' if i else ''}if {selector} == {i}:")
         lines += [f"    {line}" for line in branch or ["pass"]]
     body = "".join(f"    {line}\n" for line in lines or ["pass"])
-    return f'\n\n@callback("{signature}")\ndef {name}({arguments}):\n{body}'.rstrip("\n")
+    decorator = f'@callback("{signature}", no_cpython_wrapper=True, no_cfunc_wrapper=True)'  # only kernels call it
+    return f"\n\n{decorator}\ndef {name}({arguments}):\n{body}".rstrip("\n")

@@ -119,6 +119,22 @@ def test_order_of_interpolation(with_a: bool, order_x: int, order_v: int) -> Non
     assert (orders[:, 2] > order_x - 0.6).all()
 
 
+@pytest.mark.parametrize("with_a", [False, True])
+def test_between_two_samples_stands_the_polynomial_of_scipy(with_a: bool) -> None:
+    """On an uneven clock."""
+    from scipy.interpolate import BPoly
+
+    rng = np.random.default_rng(4)
+    t = np.cumsum(rng.uniform(0.01, 0.03, 300))
+    x, v, a = rng.standard_normal((3, 300))
+    polynomial = BPoly.from_derivatives(t, np.column_stack([x, v, a] if with_a else [x, v]))
+    points = stroboscopic(t, x, v, exact_phase(40.0, 0.1, t[-1] - 0.1), 0.37, a=a if with_a else None)
+    at = points["time"].values
+    assert len(at) > 20
+    np.testing.assert_allclose(points["section"].sel(state="x"), polynomial(at), atol=1e-12)
+    np.testing.assert_allclose(points["section"].sel(state="v"), polynomial(at, 1), atol=1e-9)
+
+
 def test_errors_of_section_points_of_a_smoothed_record() -> None:
     z_x, z_v, z_t = [], [], []
     for seed in range(12):

@@ -109,7 +109,7 @@ def test_errors_of_a_balls_restitution_are_as_stated() -> None:
 
 def test_doors() -> None:
     t, place, q, _, _ = tossed(1, 0.0)
-    with pytest.raises(ValueError, match="no stretch of at least 4 samples falls freely"):
+    with pytest.raises(ValueError, match="no interval of at least 4 samples falls freely"):
         flights(t, np.ones(len(t)))
     with pytest.raises(ValueError, match="unit quaternions"):
         corner_heights(place, 2 * q, cube())

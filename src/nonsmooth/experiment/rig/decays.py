@@ -25,7 +25,7 @@ def impulse(
     rig: VirtualRig, *, velocities: tuple[float, ...] = (0.5, -0.5, 0.35, -0.35, 0.2, -0.2, 0.1, -0.1),
     duration: float = 20.0,
 ) -> Recording:  # fmt: skip
-    """Tap the resting car, no support, and let it come to rest: about these velocities (m/s), one run each."""
+    """Tap the resting car, no support, and let it stop: about these velocities (m/s), one run each."""
     system = rig.system().with_parameters(rig.parameters(crank_length=0.0, g=NO_SUPPORT))
     runs = []
     for i, velocity in enumerate(velocities):
@@ -37,7 +37,7 @@ def impulse(
 
 
 def _stuck(rig: VirtualRig, run: int) -> dict[str, float]:
-    """Where friction that holds keeps the car before a tap: the first is made where the sensor was zeroed."""
+    """Place at which friction holds the car before a tap: the first is made where the sensor was zeroed."""
     if not rig.holding:
         return {}
     held = rig.truth["friction"] / (2 * rig.truth["k"])

@@ -60,7 +60,7 @@ def write_session(
 
 
 def truth_path(folder: Path, truth: str | os.PathLike[str] | None = None) -> Path:
-    """Where the truth of the rig goes that was recorded into ``folder``: ``truth``, or a file beside the folder."""
+    """Path of the file with the truth of the rig recorded into ``folder``: ``truth``, or a file beside the folder."""
     return folder.with_name(f"{folder.name}.truth.toml") if truth is None else Path(truth)
 
 
@@ -71,7 +71,7 @@ _ROTARY = {
 
 
 def _apparatus(rig: VirtualRig) -> list[str]:
-    """What an experimenter knows: makers' data, and what was weighed and measured with a ruler."""
+    """Apparatus as an experimenter knows it: makers' data, and what was weighed and measured with a ruler."""
     rng = rig.generator("springs", 9999)
     spread = 1.0 if rig.noise else 0.0
     weighed = round(rig.truth["m"] + spread * 1e-3 * rng.standard_normal(), 4)

@@ -1,4 +1,4 @@
-r"""What the rig's sensors make of a motion: counts, a jittered clock, a gain error, noise, steps and limits.
+r"""Signals that the rig's sensors make of a motion: counts, a jittered clock, a gain error, noise, steps and limits.
 
 Rotary sensor (PASCO CI-6538): 1440 counts per turn of its wheel, at most 30 turns per second. Force sensor
 (PS-2104): +-50 N, 1 %, steps of 0.03 N. Photogate at the crank: one time per turn, to 0.1 ms. Source: Savi et al.

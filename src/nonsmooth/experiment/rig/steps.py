@@ -1,4 +1,4 @@
-"""Which settings an experimenter would choose: frequency steps, the hunt for the graze, records with contact.
+"""Settings that an experimenter would choose: frequency steps, the hunt for the graze, records with contact.
 
 The steps are taken relative to what is roughly known by then: the natural frequency from a tap, the frequency at
 which the car first touches from listening.

@@ -1,4 +1,4 @@
-"""What a virtual rig really is: drawn from its seed, around the published parameters."""
+"""True parameters of a virtual rig, drawn from its seed around the published ones."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def drawn(seed: int) -> dict[str, float]:
 
 
 def awkward(seed: int) -> dict[str, float]:
-    """What a careless experimenter's rig has besides: see :meth:`VirtualRig.awkward`."""
+    """Additional faults of a careless experimenter's rig: see :meth:`VirtualRig.awkward`."""
     rng = np.random.default_rng([seed, 3])
     truth = drawn(seed)
     held = truth["friction"] / (2 * truth["k"])

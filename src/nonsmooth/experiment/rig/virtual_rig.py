@@ -116,7 +116,7 @@ class VirtualRig:
 
     @property
     def wanders(self) -> bool:
-        """Whether the motor's frequency wanders."""
+        """Return whether the motor's frequency wanders."""
         return self.truth["motor_wander"] > 0
 
     def wander(self, procedure: str, run: int, omega: float) -> Wander:
@@ -156,7 +156,7 @@ class VirtualRig:
     def channels(
         self, rng: np.random.Generator, run: str, time: Any, x: Any, v: Any, *, pulled: Any = None, crossed: Any = None
     ) -> dict[str, xr.Dataset]:
-        """What the sensors record of a motion; a force sensor that is ``pulled``, a photogate that was ``crossed``."""
+        """Channels that the sensors record of a motion; a force sensor is ``pulled``, a photogate was ``crossed``."""
         found = {"Angle": sensors.angle(self, run, time, x, v)}
         if pulled is not None:
             reading = sensors.force(self, rng, run, time, pulled)

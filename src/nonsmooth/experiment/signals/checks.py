@@ -1,4 +1,4 @@
-"""What a signal must be before anything is computed from it; each refusal says run, channel and what to do.
+"""Checks of a signal before anything is computed from it; each refusal says run, channel and what to do.
 
 Functions that take plain arrays know no names; those of a DataArray are read from its attributes, which
 :func:`take` completes with the run.

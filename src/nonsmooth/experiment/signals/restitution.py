@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 
 
 def flights(time: ArrayLike, height: Any, *, threshold: float = 6.0, least: int = 4) -> xr.Dataset:
-    """Stretches of a record in which the height of a body's centre falls freely.
+    """Intervals of a record in which the height of a body's centre falls freely.
 
     In flight the second differences of the height are gravity plus noise. Where a tenth of the record or more is
     flight, their lower tail is: of those between half and one and a half of their 10 % quantile, the densest half gives
@@ -67,7 +67,7 @@ def flights(time: ArrayLike, height: Any, *, threshold: float = 6.0, least: int 
     rows = [(a, b - 1) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= least]
     if not rows or fall >= 0:
         raise ValueError(
-            f"{whose(height)}: no stretch of at least {least} samples falls freely; give the height of the centre of "
+            f"{whose(height)}: no interval of at least {least} samples falls freely; give the height of the centre of "
             "mass, upwards, at a rate that shows its flights"
         )
     acceleration, error, noise = _common_fall(t, z, rows)
@@ -203,7 +203,7 @@ class _Side:
 
 
 def _meeting(d: Floats, length: float) -> float:
-    """Where the difference of two parabolas vanishes within (0, length); the middle if it does not."""
+    """Zero of the difference of two parabolas within (0, length); the middle if there is none."""
     roots = np.roots(d[::-1])
     real = np.real(roots[np.abs(np.imag(roots)) < 1e-9])
     inside = real[(real >= 0.0) & (real <= length)]

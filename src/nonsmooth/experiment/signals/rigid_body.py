@@ -108,7 +108,7 @@ def corner_restitution(
             f"{t.shape}, {place.shape}, {np.shape(orientation)} and {points.shape}"
         )
     if not (np.isfinite(t).all() and np.isfinite(place).all() and np.isfinite(np.asarray(orientation)).all()):
-        raise ValueError(f"{whose(position)}: values are missing; take the stretches of the record that are whole")
+        raise ValueError(f"{whose(position)}: values are missing; take the intervals of the record that are whole")
     turns, fall = _turns(orientation), float(flights["acceleration"])
     sample = float(np.median(np.diff(t)))
     longest = 4.5 * sample if longest is None else longest
@@ -165,7 +165,7 @@ def corner_restitution(
 
 
 def _nearest_zero(t: Floats, y: Floats) -> float:
-    """Where y vanishes, between two of its samples; where it does not, the sample nearest to zero."""
+    """Zero of y between two of its samples; where there is none, the sample nearest to zero."""
     k = np.flatnonzero(np.sign(y[:-1]) != np.sign(y[1:]))
     if len(k) == 0:
         return float(t[int(np.argmin(np.abs(y)))])

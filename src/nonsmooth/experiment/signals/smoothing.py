@@ -126,7 +126,7 @@ class _Intervals:
         self.begin, self.end = begin, end
 
     def hold(self, times: Floats) -> NDArray[np.bool_]:
-        """Which times lie inside one of them."""
+        """Mask of the times that lie inside one of them."""
         k = np.searchsorted(self.begin, times, side="right") - 1
         return (k >= 0) & (times < np.append(self.end, -np.inf)[k])
 
@@ -289,7 +289,7 @@ class _Nodes:
 
 
 class _Edges:
-    """What a slow motion says through an encoder: the instants at which the count changes.
+    """Instants at which the count of an encoder changes, which is all that it says of a slow motion.
 
     While a count stays for ``n`` samples their errors are one and the same, and together they say as much as one
     sample: ``stay`` is n, by which the variance of each grows. In exchange the change by one count between two

@@ -76,7 +76,7 @@ class SteadyResponse:
 
     @property
     def statement(self) -> str:
-        """What the record says of damping, in words."""
+        """Statement on what the record tells of damping."""
         seen = (
             f"{self.name}: the envelope changes at {-self.rate:+.2g} ± {self.rate_error:.2g} 1/s over "
             f"{self.length:.3g} s"

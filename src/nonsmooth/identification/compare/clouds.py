@@ -209,7 +209,7 @@ def _same_width(x: FloatArray, y: FloatArray) -> None:
 
 
 def _stretch(cloud: FloatArray) -> FloatArray:
-    """The last stretch of a long cloud: thinning would part successive points."""
+    """The last points of a long cloud: thinning would separate successive points."""
     return cloud[-MOST:]
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -281,7 +280,14 @@ def _dataset(
     import xarray as xr
 
     from nonsmooth.results.labels import labels_of
-    from nonsmooth.results.provenance import ATTRIBUTE, options_as_data, provenance, read_provenance
+    from nonsmooth.results.provenance import (
+        ATTRIBUTE,
+        attribute,
+        options_as_data,
+        provenance,
+        read_provenance,
+        with_short_record,
+    )
 
     if hasattr(theory, "data_vars"):
         record = read_provenance(theory) | {"verb": "compare", "options": options_as_data(given), "seed": seed}
@@ -290,7 +296,7 @@ def _dataset(
         system = nominal(theory, parameters, settings)
         labels = labels_of(system)
         method = str(given.get("method", "auto"))
-        record = json.loads(provenance(labels, "compare", given, method=method, seed=seed)[ATTRIBUTE])
+        record = read_provenance(xr.Dataset(attrs=provenance(labels, "compare", given, method=method, seed=seed)))
         states = {name: quantity.unit for name, quantity in labels.states.items()}
         for name, quantity in labels.parameters.items():
             if name not in variables:
@@ -307,5 +313,4 @@ def _dataset(
     coords |= {key: variables.pop(key) for key in sorted(named)}
     data = {key: (dims, np.asarray(values), attrs) for key, (dims, values, attrs) in variables.items()}
     attrs = {"comparison": kind, "synthetic": synthetic, "title": str(measured.attrs.get("title", ""))}
-    attrs[ATTRIBUTE] = json.dumps(record, ensure_ascii=False, allow_nan=False)
-    return xr.Dataset(data, coords, attrs)
+    return with_short_record(xr.Dataset(data, coords, attrs | attribute(record)))

@@ -19,14 +19,14 @@ Rule = Callable[[Mapping[str, float]], float]
 
 
 class Setting(NamedTuple):
-    """What was set in a run: a value, or a rule by which it follows from the other parameters; standard uncertainty."""
+    """Setting of a run: a value, or a rule by which it follows from the other parameters; standard uncertainty."""
 
     value: float | Rule
     uncertainty: float = 0.0
 
     @property
     def follows(self) -> bool:
-        """Whether it is a rule."""
+        """Return whether it is a rule."""
         return callable(self.value)
 
     def at(self, values: Mapping[str, float]) -> float:

@@ -1,4 +1,4 @@
-r"""Where a motion doubles its period, read off a record in which the parameter rises slowly.
+r"""Flips (period doublings) read off a record in which the parameter rises slowly.
 
 A rise is late: near the flip the amplitude A by which successive section points part, :math:`\pm A`, settles ever more
 slowly, and it is seen to vanish (or to appear) only some way beyond. How far depends on the rate and on the noise, so
@@ -101,7 +101,7 @@ def _followed(at: FloatArray, points: FloatArray, numbers: NDArray[np.int64], wo
 
 
 def _reach(numbers: NDArray[np.int64], cut: int, number: int) -> int:
-    """How far back from the cut the record keeps this number, strays apart."""
+    """Length, back from the cut, over which the record keeps this period number, strays apart."""
     stray = 0
     for i in range(cut, -1, -1):
         stray = 0 if numbers[i] == number else stray + 1

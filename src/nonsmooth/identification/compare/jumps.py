@@ -115,7 +115,7 @@ def match_jumps(measured: Jumps, theory: Jumps, drawn: Sequence[Jumps], unit: st
 
 
 def _pairs(seen: list[Jump], expected: list[Jump]) -> dict[int, int]:
-    """Which predicted jump belongs to which measured one."""
+    """Pairs of predicted and measured jumps."""
     every = (range(len(seen)), range(len(expected)))
     groups: list[tuple[list[int], list[int]]] = [(list(every[0]), list(every[1]))]
     # Jumps as an experimenter read them off do not say whether the amplitude rose.

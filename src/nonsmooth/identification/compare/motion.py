@@ -173,7 +173,7 @@ def _periods(number: int, predicted: Prediction) -> dict[str, Any]:
 def _begun_with_the_measurement(
     motions: Motions | None, folded: FloatArray | None, number: int, predicted: Prediction, grid: int
 ) -> Prediction:
-    """Where neither motion has a period, the predicted one shown begins at the first measured state that is shown."""
+    """Begin the predicted motion at the first measured state that is shown, where neither has a period."""
     if motions is None or folded is None or number or predicted.period_number:
         return predicted
     whole = folded[np.isfinite(folded).all(axis=(1, 2))][-SHOWN:]

@@ -44,7 +44,7 @@ def measured_period(
     noise : array (states,)
         Standard error of a point in each state; positive.
     max_period : int
-        The longest looked for; at least four returns of it must be there.
+        The longest searched; at least four returns of it must be there.
     bound : float
         Largest scaled return that counts.
     drifting : bool
@@ -96,7 +96,7 @@ def period_numbers(
 
 
 def flips(values: ArrayLike, numbers: ArrayLike, *, last: int = 4) -> dict[str, float]:
-    """Where the period number doubles: ``{"1-2": value, "2-4": value, ...}`` up to period ``last``.
+    """Values at which the period number doubles: ``{"1-2": value, "2-4": value, ...}`` up to period ``last``.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def flips(values: ArrayLike, numbers: ArrayLike, *, last: int = 4) -> dict[str, 
     Notes
     -----
     Between the two numbers there may be values where none is found (the motion is slow near a flip, and passes through
-    it with a delay when the parameter moves); the value given is the one that parts the two numbers with the fewest
+    it with a delay when the parameter moves); the value given is the one that separates the two numbers with the fewest
     points on the wrong side.
     """
     order = np.argsort(np.asarray(values, dtype=float), kind="stable")

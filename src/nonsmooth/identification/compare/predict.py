@@ -1,4 +1,4 @@
-"""What the theory predicts for one setting: the attractors that starts lead to, their orbits and section clouds."""
+"""Prediction of the theory for one setting: the attractors that starts lead to, their orbits and section clouds."""
 
 from __future__ import annotations
 

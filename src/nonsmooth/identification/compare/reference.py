@@ -1,4 +1,4 @@
-r"""Where the car swings about, and the gap counted from there.
+r"""Mean position of the car, and the gap counted from there.
 
 Three places are told apart. The rig's position counts from where the *sensor was zeroed*; the car *rests* where its
 springs balance, and a car with dry friction stops, and is zeroed, anywhere within :math:`F_C/2k` of it; under the drive
@@ -30,7 +30,7 @@ _TELLING = ("impulse", "response", "contact", "grazing", "section", "rise")
 
 
 class GapOffset(NamedTuple):
-    """What the gap at rest is more than the screw reads (m), its standard uncertainty, and what it goes with.
+    """Gap at rest less the screw's reading (m), its standard uncertainty, and what it is correlated with.
 
     ``rest`` is the place of rest in the count of the session that was identified from: another session with the same
     taps has the same, and its errors cancel. ``held`` is F_C/2k: as far as dry friction may hold a car off its rest.
@@ -44,7 +44,7 @@ class GapOffset(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class GapReference:
-    r"""What the screw's reading and the sensor's count are to be referred to.
+    r"""Reference of the screw's reading and of the sensor's count.
 
     Attributes
     ----------
@@ -162,7 +162,7 @@ def _offset(given: float | Sequence[float] | GapOffset) -> GapOffset:
 
 
 def gap_offset(parameters: Any, session: Session) -> GapOffset:
-    """What the identified gap at rest is more than the screw read, and its standard uncertainty.
+    """Return the identified gap at rest less the screw's reading, with its standard uncertainty.
 
     Parameters
     ----------

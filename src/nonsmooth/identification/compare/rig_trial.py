@@ -90,7 +90,7 @@ class RigTrial:
 
     @cached_property
     def reading(self) -> GapOffset:
-        """What the gap is more than the screw reads, with its uncertainty."""
+        """Gap less the screw's reading, with its uncertainty."""
         return gap_offset(self.identified, self.session) if self.offset is None else self.offset
 
     @property
@@ -108,7 +108,7 @@ class RigTrial:
         return self._sessions[key]
 
     def measured(self, session: Session, procedure: str, runs: str | Sequence[str] | None = None) -> Any:
-        """What ``compare`` takes; see :func:`session_measurement`."""
+        """Arguments of ``compare``; see :func:`session_measurement`."""
         with _quiet():
             return session_measurement(session, procedure, runs, k=self.identified["k"], gap_offset=self.reading)
 
@@ -213,7 +213,7 @@ class RigTrial:
         return rows
 
     def _coexisting(self, settings: Mapping[str, Any]) -> dict[int, int]:
-        """How many of seeded starts lead the model to each period number."""
+        """Number of seeded starts that lead the model to each period number."""
         from nonsmooth.analysis.sweep import sweep
         from nonsmooth.identification.compare.draws import nominal, read_settings
 

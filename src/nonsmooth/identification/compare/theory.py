@@ -34,7 +34,7 @@ class Prediction:
     sections : list of array (n, states)
         Section points, one cloud for each phase asked for.
     orbit : array (periods * grid, states), optional
-        Over ``period_number`` forcing periods, or a stretch of a motion without one; from phase 0.
+        Over ``period_number`` forcing periods, or an interval of a motion without one; from phase 0.
     coexisting : array of int
         Period numbers of all motions found.
     attractor : Attractor, optional
@@ -76,7 +76,7 @@ def predict(
 
 
 def from_result(result: xr.Dataset, states: list[str], phases: list[float], grid: int, max_period: int) -> Prediction:
-    """What a result of ``simulate``, ``poincare`` or ``sweep`` at one setting holds.
+    """Theory read from a result of ``simulate``, ``poincare`` or ``sweep`` at one setting.
 
     Raises
     ------

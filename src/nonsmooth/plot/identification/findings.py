@@ -1,4 +1,4 @@
-"""What every picture of an identification reads: the data of a finding, and whether it is synthetic."""
+"""Input of every picture of an identification: the data of a finding, and whether it is synthetic."""
 
 from __future__ import annotations
 

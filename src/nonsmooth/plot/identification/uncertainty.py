@@ -1,4 +1,4 @@
-"""How well a parameter is known: the profile of its likelihood, and the coverage of intervals over many rigs."""
+"""Uncertainty of a parameter: the profile of its likelihood, and the coverage of intervals over many rigs."""
 
 from __future__ import annotations
 

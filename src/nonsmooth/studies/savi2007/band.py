@@ -96,7 +96,7 @@ def _grazing(settings: Settings) -> xr.Dataset:
 
 
 def _first_meeting(eta: float) -> float:
-    """Where the steady motion without contact, started exactly, meets something within a period: from 5.1 to 5.3."""
+    """Frequency, from 5.1 to 5.3, at which the steady motion without contact first meets something within a period."""
     model = EXACT.system(**FIGURE_9)
     options = {"method": "rkf45", "rtol": FINE} if eta else EXACT.options
     low, high = 5.1, 5.3  # contact at the first, none at the second

@@ -83,7 +83,7 @@ class Bench:
 
 
 def _pass_on(text: str, heard: Callable[[str], None]) -> None:
-    """What is for a person's eye: the times, without the notes on single recordings."""
+    """Print what a person reads: the times, without the notes on single recordings."""
     for line in text.splitlines():
         if line.endswith(_TIMED):
             heard(f"virtual rig: {line}")
@@ -122,7 +122,7 @@ _GROUPS = (("fig10_rig",), ("fig09_rig",), ("fig13_rig", "fig14_rig"), ("fig11_r
 
 @dataclass(frozen=True)
 class _Job:
-    """What the processes share."""
+    """Data that the processes share."""
 
     settings: Settings
     figures: Mapping[str, Figure]

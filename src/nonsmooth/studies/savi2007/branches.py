@@ -33,7 +33,7 @@ _SAME = 1e-8  # of the value of a flip
 
 @dataclass(frozen=True)
 class Beginning:
-    """Where the branches of a figure begin: a stable period-1 orbit at ``at``; ``longest``: the last period number."""
+    """Beginning of a figure's branches: a stable period-1 orbit at ``at``; ``longest``: the last period number."""
 
     parameters: Mapping[str, float]
     parameter: str
@@ -89,7 +89,7 @@ def _flips(branch: xr.Dataset, parameter: str) -> list[xr.Dataset]:
 
 
 def at_ends(branch: xr.Dataset) -> np.ndarray:
-    """Whether each special point of a branch is an end of it, and so belongs to the branch that it leaves."""
+    """Return whether each special point of a branch is an end of it, and so belongs to the branch that it leaves."""
     last = branch.sizes["point"] - 1
     return np.isin(branch["special_point"].values, [0, last])
 

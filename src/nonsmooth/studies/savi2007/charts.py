@@ -99,7 +99,7 @@ def curves(plane: Plane) -> list[xr.Dataset]:
 
 
 def _on(curve: xr.Dataset, row: xr.Dataset, parameter: str) -> bool:
-    """Whether a special point lies on a curve that is known: of its kind and period, and through its two values."""
+    """Return whether a special point lies on a known curve: of its kind and period, and through its two values."""
     if str(curve["kind"].values) != str(row["kind"].values):
         return False
     if int(curve["period_number"]) != int(row["period_number"]):

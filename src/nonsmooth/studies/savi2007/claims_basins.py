@@ -1,4 +1,4 @@
-"""What coexists with the motions that the paper names at g = 0.0014 m (Fig. 14) and omega = 9.55 rad/s (Fig. 18)."""
+"""Attractors beside the motions that the paper names, at g = 0.0014 m (Fig. 14) and omega = 9.55 rad/s (Fig. 18)."""
 
 from __future__ import annotations
 

@@ -75,7 +75,7 @@ def _chaos_from(swept: xr.Dataset) -> Interval | None:
 
 
 def _hysteresis(swept: xr.Dataset) -> str:
-    """Where the periodic motions of the two directions differ."""
+    """Ranges in which the periodic motions of the two directions differ."""
     up, down = swept.sel(direction="up"), swept.sel(direction="down")
     periodic = (up["period_number"] > 0) & (down["period_number"] > 0)
     top = [one["section"].sel(state="v").max("iterate") for one in (up, down)]
@@ -148,7 +148,7 @@ def _span(values: np.ndarray, regime: np.ndarray, n: int) -> str:
 
 
 def _coexisting(many: xr.Dataset, swept: xr.Dataset) -> str:
-    """Where several starts reach more than one regime."""
+    """Ranges in which several starts reach more than one regime."""
     parameter = str(swept["maximum"].dims[0])
     values = many[parameter].values
     several = [len({n for n in periods_reached(many, value) if n != UNSETTLED}) > 1 for value in values]
@@ -279,7 +279,7 @@ def _abrupt(data: Data) -> Row:
 
 
 def _lasting(data: Data) -> str:
-    """How long chaos lasts just above grazing."""
+    """Duration of chaos just above grazing."""
     short, long = (data["fig17"][f"exact_{word}"] for word in ("short", "long"))
     omega = float(short["omega"][0])
     left = [periods_reached(survey, omega).get(APERIODIC, 0) for survey in (short, long)]

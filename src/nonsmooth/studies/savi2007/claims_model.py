@@ -100,7 +100,7 @@ def m3(data: Data) -> list[Row]:
 
 
 def m4(data: Data) -> list[Row]:
-    """What eta does: order 2 away from grazing, and a shift of grazing."""
+    """Effect of eta: order 2 away from grazing, and a shift of grazing."""
     errors, grazing = data["eta"]["error"], data["eta"]["grazing"]
     at = errors["error"].sel(eta=ETA, method="nearest")
     order = order_in_eta(errors, "paper")

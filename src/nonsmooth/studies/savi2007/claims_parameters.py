@@ -38,7 +38,7 @@ def _closed(claim: str, says: str, printed: Printed, model: float, cell: Cell, w
 
 
 def _back(printed: Printed, found: Known, note: str = "") -> Cell:
-    """What the rig gives back of a number that it was given, or that follows from such."""
+    """Identified value of a number that the rig was given, or that follows from such."""
     return printed_cell(printed, found, note, put_in=True)
 
 
@@ -177,7 +177,7 @@ def p5(data: Data) -> list[Row]:
 
 
 def _line(data: Data, key: str) -> tuple[float, Cell]:
-    """What a calibration leaves of its range, and the rig's words."""
+    """Largest residual of a calibration relative to its range, and the rig's words."""
     import numpy as np
 
     picture, found = data["fig08"][key], found_in(data["fig08"][key])

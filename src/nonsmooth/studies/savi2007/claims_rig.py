@@ -1,4 +1,4 @@
-"""What the virtual rig says to the claims F11 to F18 and C1: one cell for each row of the model, in the same order."""
+"""Verdicts of the virtual rig on the claims F11 to F18 and C1: a cell for each row of the model, in the same order."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def f11(data: Data) -> list[Cell]:
 
 
 def _flip(data: Data, rise: xr.Dataset, n: int) -> Cell:
-    """Where period n doubles, beside the printed end of its range; where the records show it, beside the model's."""
+    """Flip of period n beside the printed end of its range; where the records show it, beside the model's."""
     name, printed = f"{n}-{2 * n}", NUMBERS[f"period {n} from"]
     kinds = ("measured_flip", "measured_flip_error", "theory_flip")
     value, error, theory = (flip_of(rise, name, kind) for kind in kinds)

@@ -1,4 +1,4 @@
-"""What the virtual rig says to the claims F9 and F10: one cell for each row of the model, in the same order."""
+"""Verdicts of the virtual rig on the claims F9 and F10: one cell for each row of the model, in the same order."""
 
 from __future__ import annotations
 

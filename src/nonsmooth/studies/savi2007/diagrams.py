@@ -151,7 +151,7 @@ def shared_legend(canvas: Canvas, columns: int = 5) -> None:
 
 
 def how(data: Mapping[str, xr.Dataset]) -> str:
-    """How the sweeps were made, for a caption."""
+    """Settings of the sweeps, for a caption."""
     words = []
     for flow in FLOWS:
         swept, many = data[flow.key], data[f"{flow.key}_starts"]

@@ -45,7 +45,7 @@ class Number:
 
 @dataclass(frozen=True)
 class Found:
-    """What one procedure found: its number, what came with it, and what there is to say."""
+    """Outcome of one procedure: its number, what came with it, and what there is to say."""
 
     name: str
     number: Number
@@ -80,7 +80,7 @@ def kept(finding: Finding) -> xr.Dataset:
 
 
 def found_in(data: xr.Dataset) -> Found:
-    """What :func:`kept` put into the dataset."""
+    """Read back what :func:`kept` put into the dataset."""
     record = read_provenance(data)
     others = {name: Number(*row) for name, row in record["others"].items()}
     return Found(

@@ -35,7 +35,7 @@ def finish(name: str, data: Mapping[str, xr.Dataset], seconds: float, settings: 
 
 
 def finished(name: str, settings: Settings) -> Made | None:
-    """What :func:`finish` wrote with the same sources and settings; None where that is not there, or damaged.
+    """Read what :func:`finish` wrote with the same sources and settings; None where that is not there, or damaged.
 
     Raises
     ------
@@ -59,7 +59,7 @@ def finished(name: str, settings: Settings) -> Made | None:
 
 
 def just_made(name: str, settings: Settings) -> Made:
-    """What another process of this run has finished, even if the sources have been changed meanwhile.
+    """Read what another process of this run has finished, even if the sources have been changed meanwhile.
 
     Raises
     ------
@@ -84,7 +84,7 @@ def _loaded(folder: Path, name: str, keys: Sequence[str], seconds: float) -> Mad
 
 
 def _made_by(settings: Settings) -> dict[str, str | bool]:
-    """What a figure depends on: the sources of this package, and how much work was asked for."""
+    """Identity of a figure: the sources of this package, and how much work was asked for."""
     return {"sources": _sources(), "quick": settings.quick, "full": settings.full}
 
 

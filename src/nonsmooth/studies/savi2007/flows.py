@@ -44,7 +44,7 @@ FLOWS = (EXACT, SMOOTHED)
 
 @dataclass(frozen=True)
 class Settings:
-    """How much work: ``quick`` for a first look, ``full`` for the finest. ``laboratory``: where the figures of the rig
+    """Amount of work: ``quick`` for a first look, ``full`` for the finest. ``laboratory``: where the figures of the rig
     are measured; ``folder``: where finished figures and stores of chunks are kept.
     """
 

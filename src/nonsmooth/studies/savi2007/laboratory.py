@@ -101,7 +101,7 @@ class Laboratory:
         return write_session(self.rig, self.folder / name, made, self.folder / TRUTH, title=title)
 
     def sensors(self) -> xr.Dataset:
-        """What the files of the session say of the sensors: rate, steps, ranges used."""
+        """Sensors as the files of the session describe them: rate, steps, ranges used."""
         import numpy as np
         import xarray as xr
 
@@ -142,7 +142,7 @@ class Laboratory:
     def measured(
         self, session: Session, procedure: str, runs: str | Sequence[str] | None = None
     ) -> tuple[xr.Dataset, dict[str, Any]]:
-        """What ``compare`` takes: a measurement, and the settings of the model that belong to it."""
+        """Arguments of ``compare``: a measurement, and the settings of the model that belong to it."""
         from nonsmooth.identification.compare import session_measurement
 
         offset = self._gap_offset
@@ -150,7 +150,7 @@ class Laboratory:
             return session_measurement(session, procedure, runs, k=self.identified["k"], gap_offset=offset)
 
     def once(self, name: str, measure: Callable[[], _Measured]) -> _Measured:
-        """What ``measure`` gives, measured when first asked for."""
+        """Result of ``measure``, measured when first asked for."""
         if name not in self._kept:
             self._kept[name] = measure()
         made: _Measured = self._kept[name]
@@ -171,7 +171,7 @@ class Laboratory:
 
     @cached_property
     def _gap_offset(self) -> GapOffset:
-        """What the gap is more than the screw's reading, from the records with contact, and its uncertainty."""
+        """Gap less the screw's reading, from the records with contact, and its uncertainty."""
         from nonsmooth.identification.compare import gap_offset
 
         with self._noted():

@@ -70,7 +70,7 @@ def regimes(swept: xr.Dataset, direction: str | None = None) -> tuple[NDArray[np
 
 
 def changes(swept: xr.Dataset, first: int, second: int, direction: str | None = None) -> list[Interval]:
-    """Where regime ``first`` borders on ``second`` (in either order), with nothing but unsettled points between."""
+    """Borders between the regimes ``first`` and ``second`` (in either order), with only unsettled points between."""
     values, regime = regimes(swept, direction)
     at = np.flatnonzero(regime != UNSETTLED)
     return [
@@ -127,7 +127,7 @@ def measured_periods(runs: xr.Dataset, direction: str | None = None) -> tuple[ND
 
 
 def periods_reached(survey: xr.Dataset, value: float) -> dict[int, int]:
-    """How many starts of a ``survey`` (a sweep from several starts) end in each regime at one parameter value."""
+    """Number of starts of a ``survey`` (a sweep from several starts) that end in each regime at one parameter value."""
     one = survey.sel({str(survey["maximum"].dims[0]): value}, method="nearest")
     ok = [by_name(word).code for word in ("ok", "not_periodic", "not_guaranteed")]
     regime = np.where(np.isin(one["status"].values, ok), one["period_number"].values, UNSETTLED)
@@ -137,7 +137,7 @@ def periods_reached(survey: xr.Dataset, value: float) -> dict[int, int]:
 def separation_rate(twins: xr.Dataset, scale: tuple[float, float] = (1e-3, 1e-2)) -> tuple[float, float]:
     """Mean growth of ln(distance) per period between each start and its twin, with its standard error.
 
-    The first half of the starts and the second are pairs. A mean over a finite stretch, not a Lyapunov exponent: it
+    The first half of the starts and the second are pairs. A mean over a finite time, not a Lyapunov exponent: it
     leaves out the first return, in which the distance turns into the growing direction.
     """
     points = twins["section"].transpose("start", "iterate", "state").values / np.asarray(scale)

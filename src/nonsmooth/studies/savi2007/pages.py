@@ -62,7 +62,7 @@ class Contents:
 
 @dataclass(frozen=True)
 class Tally:
-    """How many statements have each verdict, by side."""
+    """Number of statements with each verdict, by side."""
 
     counts: Mapping[str, Mapping[Verdict, int]]
 

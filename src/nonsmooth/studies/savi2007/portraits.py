@@ -99,7 +99,7 @@ def setting(symbol: str, value: float, unit: str) -> str:
 
 
 def describe(data: Mapping[str, xr.Dataset], shown: Mapping[float, int]) -> str:
-    """What the starts reached at each value, by the exact flow."""
+    """Regimes that the starts reached at each value, by the exact flow."""
     survey = data["exact"]
     name = _parameter(survey)
     unit = str(survey[name].attrs["units"])

@@ -97,7 +97,7 @@ def _blocks(
 
 
 def _counts(rows: Sequence[Row]) -> dict[str, dict[Verdict, int]]:
-    """How many statements have each verdict: from the model, from the rig; both sum to all of them."""
+    """Number of statements with each verdict, from the model and from the rig; both sum to all of them."""
     return {
         _MODEL: Counter(row.verdict for row in rows),
         _RIG: Counter(row.rig_verdict for row in rows),

@@ -87,7 +87,7 @@ def _draw_13(data: Mapping[str, xr.Dataset]) -> Canvas:
 
 
 def transient_points(compared: xr.Dataset, runs: xr.Dataset) -> np.ndarray:
-    """Which section points belong to records that have no period where others at the same setting have one."""
+    """Mask of the section points of records that have no period where others at the same setting have one."""
     periodic = runs["period_number"].values > 0
     settled = set(runs["setting"].values[periodic])
     over = np.array([setting in settled for setting in runs["setting"].values]) & ~periodic

@@ -148,7 +148,7 @@ def chosen(data: Mapping[str, xr.Dataset], value: float, wanted: int) -> xr.Data
 
 
 def said(data: Mapping[str, xr.Dataset], shown: Mapping[float, int], unit: str) -> str:
-    """What the rig did at each value, and what the model has there."""
+    """Motions of the rig at each value, beside those of the model."""
     words = []
     for value in shown:
         rig = " and ".join(_name(n) for n in measured_periods_at(data, value))

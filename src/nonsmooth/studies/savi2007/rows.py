@@ -21,7 +21,7 @@ Data: TypeAlias = "Mapping[str, Mapping[str, xr.Dataset]]"
 
 @dataclass(frozen=True)
 class Cell:
-    """What the virtual rig says to a statement, and how that stands to the paper; without a verdict it is not asked.
+    """Outcome of the virtual rig for a statement, and its relation to the paper; without a verdict it is not asked.
 
     ``why`` is added to the row's own; ``beside``: the number, where one was printed.
     """
@@ -62,7 +62,7 @@ class Row:
 
     @property
     def differs(self) -> bool:
-        """Whether the model or the rig gives something else than the paper says."""
+        """Return whether the model or the rig gives something else than the paper says."""
         return Verdict.DIFFERS in (self.verdict, self.rig_verdict)
 
     @property

@@ -28,7 +28,7 @@ PARAMETERS = "table1"
 
 @dataclass(frozen=True)
 class Reproduction:
-    """What a run of :func:`reproduce` made: the folder, the figures, the rows of the report, and the time each took."""
+    """Output of :func:`reproduce`: the folder, the figures, the rows of the report, and the time each took."""
 
     out: Path
     figures: tuple[Figure, ...]

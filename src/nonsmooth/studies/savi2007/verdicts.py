@@ -83,7 +83,7 @@ def agreed(met: bool) -> Verdict:
 
 
 def judge(printed: float, found: Judged | None, resolution: float = 0.0) -> Verdict:
-    """The verdict on a printed number by ``RULE``; what was looked for and not found differs."""
+    """The verdict on a printed number by ``RULE``; a number that was searched and not found differs."""
     if found is None:
         return Verdict.DIFFERS
     distance, tolerance = abs(found.value - printed), max(resolution, 0.01 * CLOSE * abs(printed))

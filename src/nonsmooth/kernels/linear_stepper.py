@@ -1,17 +1,12 @@
-"""One leg of a trajectory and what happens at its end: jumps, after-limits, start rules.
+"""The stepper of the exact flow: legs of linear modes with harmonic forcing, landing, jumps and after-limits.
 
-A leg is one step of the mode, or its part up to the first crossing, section return or stop. ``w`` holds
-(u_1, ..., u_n, 1, cos k_1 w t, sin k_1 w t, ...), ``s`` is the time since the start of the forcing period.
-
-``transitions`` rows: target, has a map (RESET: of the states, 2: of memory alone), is contact. ``rows`` rows:
-functional, sign, strict; the last two belong to the Poincare section (rising, falling). ``mode_start``/``mode_list``:
-outgoing transitions of a mode in declared order.
+A leg is one step of the mode, or its part up to the first crossing, section return or stop. ``work.w`` holds
+(u_1, ..., u_n, 1, cos k_1 w t, sin k_1 w t, ...); times count from the start of the forcing period.
 """
 
 from math import cos, fabs, isfinite, sin
 
-from .cache import device, inline
-from .codes import BEYOND_STOP, OK
+from .cache import device, inline, once
 from .lanes import dot, sizes
 from .linear_search import (
     FUNCTIONAL,
@@ -27,10 +22,12 @@ from .linear_search import (
     turn,
     value_of,
 )
-from .linear_tables import HARMONICS, MANY, NODES, ONE, STATES, WAVE, M
+from .linear_tables import HARMONICS, MANY, MEMORY, NODES, ONE, OWN, STATES, WAVE, M, build
+from .records import FORM, TABLES, WORK
+from .run_places import FIRED, MODE, NO_END, TIME
 
 EPS = 2.3e-16
-RESET = 1
+STEPPER = FORM, TABLES, WORK  # the types of this stepper's records: model, tables, work
 
 
 @inline
@@ -118,22 +115,43 @@ def sign_after(tables, work, mode, f):
 
 
 @inline
-def next_holding(tables, net, work, mode):
-    """The first outgoing transition (in declared order) whose rows all hold just after w, or -1."""
+def holds(t, mode, tables, net, work):
+    """Whether all rows of transition t hold just after the present instant."""
     rows = net.rows
-    for k in range(net.mode_start[mode], net.mode_start[mode + 1]):
-        t = net.mode_list[k]
-        lo = net.row_start[t]
-        hi = net.row_start[t + 1]
-        holds = lo < hi
-        for r in range(lo, hi):
-            sign = sign_after(tables, work, mode, rows[r, 0]) * rows[r, 1]
-            if sign < 0 or (sign == 0 and rows[r, 2] != 0):
-                holds = False
-                break
-        if holds:
-            return t
-    return -1
+    lo = net.row_start[t]
+    hi = net.row_start[t + 1]
+    holds = lo < hi
+    for r in range(lo, hi):
+        sign = sign_after(tables, work, mode, rows[r, 0]) * rows[r, 1]
+        if sign < 0 or (sign == 0 and rows[r, 2] != 0):
+            holds = False
+            break
+    return holds
+
+
+@once
+def prepare(i, form, motion, tables, work):
+    """Tables of point i, and where the motion is."""
+    build(i, form, tables, work)
+    w = work.w
+    for j in range(OWN):
+        w[j] = motion.u[j]
+    for j in range(MEMORY):
+        w[OWN + j] = motion.memory[j]
+    w[ONE] = 1.0
+    set_phase(work, motion.clock[0])
+
+
+@inline
+def look(i, form, tables, work, mode):
+    """What holds just after the present instant is judged from here on."""
+    mark_zeros(tables, work, mode)
+
+
+@once
+def start_on_section(form, section, tables, work):
+    """The sign of the section's functional where a run begins."""
+    work.found[SIDE] = sign_after(tables, work, work.tally[MODE], section.indicator)
 
 
 @inline
@@ -166,30 +184,8 @@ def apply_map(i, t, form, net, work):
             w[r] = wn[r]
 
 
-@device
-def settle(i, form, tables, net, work, mode):
-    """Start rule: transitions without a reset that already hold are taken, each mode at most once.
-
-    Returns (mode, status): BEYOND_STOP where one with a reset holds."""
-    visited = 1 << mode
-    for _ in range(64):
-        mark_zeros(tables, work, mode)
-        t = next_holding(tables, net, work, mode)
-        if t < 0:
-            return mode, OK
-        if net.transitions[t, 1] == RESET:
-            return mode, BEYOND_STOP
-        if (visited >> net.transitions[t, 0]) & 1:
-            return mode, OK
-        if net.transitions[t, 1] != 0:
-            apply_map(i, t, form, net, work)
-        mode = net.transitions[t, 0]
-        visited |= 1 << mode
-    return mode, OK
-
-
 @inline
-def jump(i, t, fired, form, tables, net, work):
+def take(i, t, fired, form, tables, net, work):
     """Take transition t (its functional ``fired`` has just crossed; -1: a time trigger). Returns the new mode.
 
     What has crossed is zero, also behind a reset that leaves it where it was. ``work.wp`` keeps w just before."""
@@ -208,24 +204,25 @@ def jump(i, t, fired, form, tables, net, work):
     return mode
 
 
-@inline
-def trigger(net, mode, s, period):
-    """Time to the next time-triggered transition of the mode, and that transition (-1: none)."""
-    wait = 1e300
+@once
+def next_stop(i, form, net, section, goal, work):
+    """Time of the next time-triggered transition of the mode, and that transition (-1: none)."""
+    period, s, mode = form.period[i], work.memo[TIME], work.tally[MODE]
+    stop = NO_END
     which = -1
     for k in range(net.mode_start[mode], net.mode_start[mode + 1]):
         t = net.mode_list[k]
         if net.at[t] >= 0.0:
-            r = net.at[t] * period - s
-            if r <= 0.0:
+            r = net.at[t] * period
+            if r <= s:
                 r += period
-            if r < wait:
-                wait = r
+            if r < stop:
+                stop = r
                 which = t
-    return wait, which
+    return stop, which
 
 
-@inline
+@once
 def clear_step(tables, net, work, mode):
     """Whether no transition can fire on the whole step from w to w1: each has a row that certainly stays <= 0."""
     w, w1, zero, rows = work.w, work.w1, work.zero, net.rows
@@ -253,7 +250,7 @@ def clear_step(tables, net, work, mode):
     return clear
 
 
-@inline
+@once
 def stride(tables, net, work, mode, s, whole, target, period, returns, most, patience):
     """Whole steps without crossings, past section phases, as long as ``returns`` < ``most``; ``patience`` of them.
 
@@ -289,19 +286,31 @@ def stride(tables, net, work, mode, s, whole, target, period, returns, most, pat
     return s, whole, returns, clear, patience
 
 
-@inline
-def leg(tables, net, work, section, mode, r_max, ready):
+@once
+def steps_at_a_stride(i, form, net, section):
+    """Whether whole steps may be made at a stride: nothing but a crossing can end one."""
+    strides = section.indicator < 0 and form.period[i] < NO_END
+    for k in range(net.at.shape[0]):
+        strides = strides and net.at[k] < 0.0
+    return strides
+
+
+@once
+def leg(i, form, net, section, goal, tables, work, r_max, ready, clear):
     """March one step of the mode, or less: to r_max, or to the first crossing or section return.
 
-    w1 stands at the end of the whole step (``ready``: it does so already), ``end`` at the leg's end where that is
-    shorter (the third number returned tells). Returns (time marched, transition or -1, whole step or not, section
-    direction or 0).
+    w1 stands at the end of the whole step (``ready``: it does so already; ``clear``: and nothing happens on it),
+    ``end`` at the leg's end where that is shorter (the third number returned tells). Returns (time marched, transition
+    or -1, whole step or not, section direction or 0).
     """
     w, w1, end, there, found, rows = work.w, work.w1, work.end, work.there, work.found, net.rows
-    if not ready:
-        to_node(tables, mode, NODES, w, w1)
+    mode = work.tally[MODE]
     found[NODE] = -1
     step = tables.info[mode, 0]
+    if clear:
+        return step, -1, True, 0
+    if not ready:
+        to_node(tables, mode, NODES, w, w1)
     best = min(step, r_max)
     fired = -1
     crossed = 0
@@ -331,17 +340,118 @@ def leg(tables, net, work, section, mode, r_max, ready):
             functional = found[FUNCTIONAL]
             for j in range(M):
                 end[j] = there[j]
-    found[FUNCTIONAL] = functional
+    work.tally[FIRED] = functional
     whole = fired < 0 and crossed == 0 and r_max >= step
     if not whole and functional < 0:
         dense(tables, work, mode, best, end)
     return best, fired, whole, crossed
 
 
-@inline
-def bounded(w, limit):
+@once
+def time_scale(i, since, form, tables, work):
+    """The time beside which crossings are close to each other."""
+    return tables.info[work.tally[MODE], 0]
+
+
+@once
+def arrive_at(t, since, full, wrapped, form, net, tables, work):
+    """State and phase at the end of a leg. Returns its transition."""
+    w, w1, end, zero = work.w, work.w1, work.end, work.zero
+    for j in range(M):
+        w[j] = w1[j] if full else end[j]
+    if wrapped:
+        wrap_phase(tables, work, work.tally[MODE], work.memo[TIME])
+    for f in range(zero.shape[0]):
+        zero[f] = 0
+    return t
+
+
+@once
+def met(t, fired, form, net, section, work):
+    """Direction in which transition t, whose functional ``fired`` has crossed, meets the section; 0: it does not."""
+    sense = 0
+    if fired == section.indicator:
+        for k in range(net.row_start[t], net.row_start[t + 1]):
+            if net.rows[k, 0] == fired:
+                sense = net.rows[k, 1]
+    return sense if section.rising * sense >= 0 else 0
+
+
+@once
+def touch_section(section, work):
+    """The section's indicator is zero just now."""
+    work.zero[section.indicator] = 1
+
+
+@once
+def note_side(t, sense, section, tables, work):
+    """The sign of the section's functional where the next leg begins."""
+    mode = work.tally[MODE]
+    if t >= 0:
+        work.found[SIDE] = sign_after(tables, work, mode, section.indicator)
+    elif sense != 0:
+        work.found[SIDE] = sense
+    else:
+        value = value_of(tables, mode, section.indicator, work.w)
+        if value != 0.0:
+            work.found[SIDE] = 1 if value > 0.0 else -1
+
+
+@once
+def at_rest(form, section, tables, work):
+    """Rest is not looked for: a return is waited for as long as is said."""
+    return False
+
+
+@once
+def state_at(tau, form, tables, work, out):
+    """The state at any instant of the leg."""
+    dense(tables, work, work.tally[MODE], tau, out)
+
+
+@once
+def n_states(work):
+    """Number of states, without memory."""
+    return OWN
+
+
+@once
+def n_memory(form, work):
+    """Number of values in memory: the last of the kernel's states."""
+    return MEMORY
+
+
+@once
+def memory_at(k, form, work):
+    """The k-th of them."""
+    return work.w[OWN + k]
+
+
+@once
+def put_state(motion, work):
+    """Write the state to the motion."""
+    for j in range(OWN):
+        motion.u[j] = work.w[j]
+    for j in range(MEMORY):
+        motion.memory[j] = work.w[OWN + j]
+
+
+@once
+def bounded(work, limit):
     """Finite and below the limits of divergence."""
     within = True
-    for r in range(STATES):
-        within = within and isfinite(w[r]) and fabs(w[r]) < limit[r]
+    for r in range(OWN):
+        within = within and isfinite(work.w[r]) and fabs(work.w[r]) < limit[r]
     return within
+
+
+@once
+def may_pause(work):
+    """All that is known stands in the arrays."""
+    return True
+
+
+@once
+def doubtful(work):
+    """Crossings are found with certainty."""
+    return False

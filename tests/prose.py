@@ -1,0 +1,101 @@
+"""Check of the project's prose, run by ``make check``: how docstrings begin, and which words they and the pages use.
+
+A docstring begins with what it returns or does, not with a question word. The words below were this project's own for
+things that the field has a term for; the term stands beside each. Code (between backticks) is left alone.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+#: NOT CHECKED YET: rooms of the package that are being rebuilt, and the pages (README.md and docs). To be emptied.
+NOT_COVERED_YET = ("kernels", "flow", "analysis", "docs")
+QUESTIONS = ("What", "Where", "How", "Which", "Whether")
+#: Pattern of a word to replace, and the term for it.
+TERMS = {
+    r"legs?": "segment",
+    r"stretch(es)?": "segment; a part of a record is an interval",
+    r"leaps?|leapt": "transition",
+    r"settlers?": "attractor mapper",
+    r"(comes?|came|coming) to rest": "reaches a steady state; of a body: stops",
+    r"what parts|parts (the|these|two)|goes where": "separates; the basin boundary",
+    r"nudg\w+|kicks?|kicked": "perturb, perturbation",
+    r"can(not)? be had": "does not exist; was not found",
+    r"looked for": "searched",
+    r"landed|lands": "locate, converge",
+    r"born": "appears, emanates",
+    r"(is|are|was|were) worth": "accuracy, uncertainty",
+    r"at the door": "before any computation",
+    r"without a word": "silently; say what is counted or refused",
+    r"tally|memo": "counters, accumulators",
+    r"(?<!-)nets?": "transition table",
+    r"guards?": "condition of a transition, indicator",
+}
+#: Places in which such a word is the right one, by file name: public keywords, ordinary English, other fields' terms.
+ALLOWED: dict[str, tuple[str, ...]] = {
+    "pages.py": ("tally",),  # a class of the report's style sheet
+    "style.py": ("tally",),
+    "maps.md": ("kicked",),  # the kicked rotor
+    "what_each_procedure_needs.md": ("come to rest",),  # of a car
+}
+
+
+def words(text: str) -> str:
+    """The text without code, formulas and links."""
+    text = re.sub(r"^(```|~~~).*?^\1", " ", text, flags=re.S | re.M)
+    text = re.sub(r":\w+:`[^`]*`|``.*?``|`[^`]*`|\$[^$]*\$|\]\([^)]*\)", " code ", text, flags=re.S)
+    return re.sub(r"\s+", " ", text)
+
+
+def beginning(docstring: str) -> str | None:
+    """The complaint about how a docstring begins."""
+    first = (docstring.split() or [""])[0].rstrip(",:.")
+    return f"begins with {first!r}: name the result, or use an imperative" if first in QUESTIONS else None
+
+
+def terms(text: str, allowed: tuple[str, ...] = ()) -> Iterator[str]:
+    """The complaints about words."""
+    plain = words(text)
+    for pattern, term in TERMS.items():
+        for found in re.finditer(rf"\b({pattern})\b", plain, re.IGNORECASE):
+            if found[0].lower() not in allowed:
+                around = plain[max(found.start() - 30, 0) : found.end() + 30]
+                yield f"{found[0]!r} (... {around} ...): {term}"
+
+
+def of_source(path: Path) -> Iterator[str]:
+    """The complaints about a Python file: its docstrings, and the sentences in its strings."""
+    allowed = ALLOWED.get(path.name, ())
+    documented = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, documented) and (text := ast.get_docstring(node)):
+            place = f"{path.relative_to(ROOT)}:{getattr(node, 'lineno', 1)}"
+            if complaint := beginning(text):
+                yield f"{place}: the docstring {complaint}"
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and " " in node.value.strip():
+            for complaint in terms(node.value, allowed):
+                yield f"{path.relative_to(ROOT)}:{node.lineno}: {complaint}"
+
+
+def complaints() -> Iterator[str]:
+    """All complaints, one a line."""
+    sources = ROOT / "src" / "nonsmooth"
+    for path in sorted(sources.rglob("*.py")):
+        if path.relative_to(sources).parts[0] not in NOT_COVERED_YET:
+            yield from of_source(path)
+    pages = [] if "docs" in NOT_COVERED_YET else [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+    for path in pages:
+        if "_build" not in path.parts and path.name != "decisions.md":  # a log, left as it was written
+            for complaint in terms(path.read_text(encoding="utf-8"), ALLOWED.get(path.name, ())):
+                yield f"{path.relative_to(ROOT)}: {complaint}"
+
+
+if __name__ == "__main__":
+    found = list(complaints())
+    print("\n".join([*found, f"prose: {len(found)} complaints; not covered yet: {', '.join(NOT_COVERED_YET)}"]))
+    sys.exit(bool(found))
