@@ -25,6 +25,7 @@ import lyapunov
 import lyapunov_nonlinear
 import machine
 import oscillator
+import rigid_stops
 import valve
 import valve_scan
 
@@ -36,7 +37,10 @@ def main() -> int:
     options = parser.parse_args()
     effort = 0.1 if options.quick else 1.0
     text, verdicts = ["# Benchmarks", "", *(f"- {fact}" for fact in machine.facts() if fact), ""], []
-    parts = (oscillator, chain, valve, valve_scan, diagram, chart, chart_size, lyapunov, lyapunov_nonlinear, branch)
+    parts = (
+        oscillator, chain, rigid_stops, valve, valve_scan, diagram, chart, chart_size, lyapunov, lyapunov_nonlinear,
+        branch,
+    )  # fmt: skip
     for part in parts:
         lines, part_verdicts = part.run(effort)
         print("\n".join(lines), flush=True)

@@ -121,6 +121,72 @@ def test_energy_of_two_masses_and_a_rigid_stop_is_lost_in_impacts_alone() -> Non
     assert energy(run["u"].values[-1]) == pytest.approx(begun - lost[-1], abs=1e-13)
 
 
+def row_of_masses(masses: int, stops: list[int], part: float, e: float, c: float, w: float) -> ns.System:
+    """Driven at its first mass; some masses strike rigid stops at a part of what they would reach without them."""
+    names = [f"{letter}{i}" for letter in "xv" for i in range(masses)]
+    reach = np.abs(np.linalg.inv(stiffness(masses) - (w**2 - 1j * w * c) * np.eye(masses))[0])
+
+    def motion(t, u, p):
+        x, v = list(u)[:masses], list(u)[masses:]
+        force = [-2 * x[i] - p.c * v[i] for i in range(masses)]
+        for i in range(masses - 1):
+            force[i] += x[i + 1]
+            force[i + 1] += x[i]
+        force[0] += np.cos(p.w * t)
+        return (*v, *force)
+
+    def rebound(i):
+        return lambda t, u, p: [-p.e * a if k == masses + i else a for k, a in enumerate(list(u))]
+
+    return ns.System(
+        states=names, parameters={"w": w, "c": c, "e": e}, modes={"free": motion},
+        indicators={f"over{i}": lambda t, u, p, i=i: list(u)[i] - part * float(reach[i]) for i in stops},
+        transitions=[ns.Transition("free", "free", when=f"over{i} > 0", reset=rebound(i)) for i in stops],
+    )  # fmt: skip
+
+
+def stiffness(masses: int) -> np.ndarray:
+    return 2 * np.eye(masses) - np.eye(masses, k=1) - np.eye(masses, k=-1)
+
+
+@pytest.mark.parametrize("masses", [5, pytest.param(50, marks=pytest.mark.slow)])
+def test_a_row_of_masses_with_rigid_stops(masses: int) -> None:
+    """Energy: the force's work goes into dampers and impacts. Flights are matrix exponentials between the stops."""
+    e, c, w, part = 0.8, 0.05, 0.6, 0.4
+    stops = list(range(4 if masses > 5 else 2, masses, 5 if masses > 5 else 2))
+    system, K, periods = row_of_masses(masses, stops, part, e, c, w), stiffness(masses), 15
+    first = ns.simulate(system, periods=periods, samples=2, method="exact")
+    hits, before, after = (first[name].values for name in ("crossing_time", "u_before", "u_after"))
+    assert len(hits) > 2 * periods and len(set(first["crossing_transition"].values)) >= min(len(stops), 5)
+
+    ends = np.unique([*np.linspace(0.0, periods * 2 * np.pi / w, 15 * periods + 1), *hits])
+    nodes, weights = np.polynomial.legendre.leggauss(10)
+    instants = (0.5 * (ends[1:] + ends[:-1])[:, None] + 0.5 * np.diff(ends)[:, None] * nodes).ravel()
+    weights = (0.5 * np.diff(ends)[:, None] * weights).ravel()
+    run = ns.simulate(system, periods=periods, samples=instants, method="exact")
+    u = run["u"].values[np.isin(run["time"].values, instants)]
+    v = u[:, masses:]
+    work = np.cos(w * instants) * v[:, 0]
+    lost = 0.5 * (1 - e**2) * sum(
+        before[k, masses + stops[t]] ** 2 for k, t in enumerate(first["crossing_transition"].values)
+    )
+    end = first["u"].values[-1]
+    energy = 0.5 * end[masses:] @ end[masses:] + 0.5 * end[:masses] @ K @ end[:masses]
+    balance = energy + lost - weights @ (work - c * (v**2).sum(axis=1))
+    assert abs(balance) < 1e-12 * float(weights @ np.abs(work))
+
+    A = np.block([[np.zeros((masses, masses)), np.eye(masses)], [-K, -c * np.eye(masses)]])
+    flow = LinearFlow(A, None, {1: (np.eye(2 * masses)[masses], np.zeros(2 * masses))}, w)
+    gaps = part * np.abs(np.linalg.inv(K - (w**2 - 1j * w * c) * np.eye(masses))[0])[stops]
+    t0, u0 = 0.0, np.zeros(2 * masses)
+    for k, time in enumerate(hits[:40]):
+        assert np.abs(flow.at(t0, u0, time) - before[k]).max() < 1e-12
+        if time > t0:
+            _, dense = flow.along(t0, u0, time, 100)
+            assert (dense[1:-1, stops] < gaps + 1e-13).all()
+        t0, u0 = time, after[k]
+
+
 @pytest.mark.slow
 def test_random_systems_run_as_by_their_series() -> None:
     """120 driven systems of 1 to 6 states with hysteresis between two modes, and kicks: as by series at 1e-13."""

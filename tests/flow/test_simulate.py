@@ -356,3 +356,21 @@ def test_a_motion_as_small_as_the_tolerance_is_warned_of() -> None:
     np.testing.assert_allclose(run.u.sel(state="x"), exact, atol=1e-16)
     with pytest.warns(UserWarning, match="below a hundred times atol"):
         ns.sweep(system(), "F", [1e-9, 2e-9], transient=2, keep=4, max_period=3, method="rkf45", progress=False)
+
+
+@pytest.mark.parametrize("method", ["exact", "taylor"])
+def test_five_transitions_of_one_instant_are_taken_by_every_method(method: str) -> None:
+    """Thrown 0.9 beyond the surface, the state is set back by 0.25 until it is before it again: four times."""
+    system = ns.System(
+        states=["x", "v"], parameters={"A": 0.0, "w": 1.0},
+        modes={"first": lambda t, u, p: (1.0, p.A * np.cos(p.w * t)), "then": lambda t, u, p: (1.0, -u.v)},
+        indicators={"beyond": lambda t, u, p: u.x},
+        transitions=[
+            ns.Transition("first", "then", when="beyond > 0", reset=lambda t, u, p: (u.x + 0.9, u.v)),
+            ns.Transition("then", "then", when="beyond > 0", reset=lambda t, u, p: (u.x - 0.25, u.v)),
+        ],
+    )  # fmt: skip
+    run = ns.simulate(system, duration=0.55, start={"x": -0.5}, method=method)
+    np.testing.assert_allclose(run.crossing_time, 0.5, atol=1e-12)
+    assert run.crossing_transition.values.tolist() == [0, 1, 1, 1, 1]
+    np.testing.assert_allclose(run.u.values[-1, 0], -0.1 + 0.05, atol=1e-12)

@@ -1,5 +1,7 @@
 """The linear form against matrices written by hand, and against the expressions themselves."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import sympy as sp
@@ -185,18 +187,31 @@ def test_cancelling_terms_are_multiplied_out():
         make((Y, sp.exp(-T)), period=PERIOD),
         make((Y, 1 / (2 + sp.cos(W * T))), period=PERIOD),
         make((Y, -X), (Y, X * Y)),
-        make((Y, -X + MEMORY), memory=(MEMORY,)),
+        make((Y, -X * MEMORY), memory=(MEMORY,)),
     ],
     ids=["cubic", "parametric forcing", "pendulum", "ramp", "no period", "two frequencies", "irrational",
-         "decaying", "not harmonic", "second mode", "memory"],
+         "decaying", "not harmonic", "second mode", "memory times a state"],
 )  # fmt: skip
 def test_not_linear(traced):
     assert linear_form(traced) is None
 
 
-def test_memory_outside_the_fields():
-    form = linear_form(make((Y, -X), indicators=[X - MEMORY], resets=[(X, MEMORY)], memory=(MEMORY,)))
-    assert form is not None
+def test_memory_is_a_state_that_only_transitions_change():
+    traced = make((Y, A * MEMORY - X), indicators=[X - B * MEMORY], outputs=[[MEMORY + Y]], resets=[(X, MEMORY)],
+                  memory=(MEMORY,))  # fmt: skip
+    jump = traced.transitions[0]
+    form = linear_form(replace(traced, transitions=(jump, replace(jump, reset=None, writes=((0, MEMORY / 2 + Y),)))))
+    assert form.affine_indicators and form.affine_outputs and form.affine_resets
+    (a, b, _), tables = POINTS[0], form.evaluate(POINTS)
+    np.testing.assert_array_equal(tables.A[0, 0], [[0, 1, 0], [-1, 0, a], [0, 0, 0]])
+    np.testing.assert_array_equal(tables.ia[0, 0], [1, 0, -b])
+    np.testing.assert_array_equal(tables.oa[0, 0, 0], [0, 1, 1])
+    maps = [[[1, 0, 0], [0, 0, 1], [0, 0, 1]], [[1, 0, 0], [0, 1, 0], [0, 1, 0.5]]]
+    np.testing.assert_array_equal(tables.ra[0], maps)
+
+
+def test_memory_times_a_state_is_not_affine():
+    form = linear_form(make((Y, -X), indicators=[X * MEMORY], resets=[(X, Y * MEMORY)], memory=(MEMORY,)))
     assert not form.affine_indicators and not form.affine_resets
 
 

@@ -6,7 +6,7 @@ raises for numerical trouble; it writes a status code (``kernels.codes``).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -101,6 +101,14 @@ class Chain:
             np.full((points, n_outputs), nan), np.full((points, n_outputs), nan),
             np.zeros(points, zero), np.zeros(points, zero), np.zeros(points),
             np.full((points, keep), nan), np.zeros((points, keep), zero), np.zeros(points, zero),
+        )  # fmt: skip
+
+    def widened(self, n: int) -> Chain:
+        """The same buffers but for those of the states, which have n columns."""
+        points, keep = self.section.shape[:2]
+        return replace(
+            self, section=np.full((points, keep, n), np.nan), maximum=np.full((points, n), np.nan),
+            minimum=np.full((points, n), np.nan),
         )  # fmt: skip
 
     def record(self) -> Any:

@@ -1,6 +1,7 @@
 """The engine of the exact flow: linear modes with harmonic forcing, affine indicators and resets, any number of states.
 
-It only packs a system into the arrays of ``kernels.linear_module`` and unpacks what comes back.
+It only packs a system into the arrays of ``kernels.linear_module`` and unpacks what comes back. Memory travels there as
+states behind the others, that nothing but transitions changes.
 """
 
 from __future__ import annotations
@@ -27,17 +28,15 @@ LARGEST = 64e6  # bytes of the tables of all modes
 
 
 def is_linear(traced: Traced, form: LinearForm | None) -> bool:
-    """Whether the fast kernel covers the system: everything affine, no memory, no mode that lacks a state.
+    """Whether the fast kernel covers the system: fields, indicators, resets and what is written to memory all affine.
 
     It notes the modes of a start rule as bits of one integer: 62 modes at most."""
     return (
         form is not None
         and len(traced.mode_names) <= 62
-        and table_bytes(len(traced.u), len(form.multiples), len(traced.mode_names)) <= LARGEST
+        and table_bytes(len(traced.u) + len(traced.m), len(form.multiples), len(traced.mode_names)) <= LARGEST
         and form.affine_indicators
         and form.affine_resets
-        and not traced.memory_names
-        and not any(any(lacking) for lacking in traced.lacking)
     )
 
 
@@ -72,6 +71,11 @@ class LinearEngine(LoopEngine):
     def __post_init__(self) -> None:
         self.net = pack_net(self.traced)
 
+    @property
+    def is_plain(self) -> bool:
+        """Whether there is no memory and every mode has every state."""
+        return not self.traced.m and not self.lacking.any()
+
     def prepare(self, points: FloatArray) -> Tables:
         t = self.form.evaluate(points)
         n_points, n_modes = t.b.shape[:2]
@@ -81,16 +85,17 @@ class LinearEngine(LoopEngine):
         else:
             shape = (n_points, 0, n_modes)
             waves = np.zeros((*shape, n_h))
-            outputs = (np.zeros((*shape, len(self.scale))), np.zeros(shape), waves, waves)
+            outputs = (np.zeros((*shape, t.A.shape[-1])), np.zeros(shape), waves, waves)
         multiples = np.array(self.form.multiples, dtype=np.int64)
         with np.errstate(divide="ignore"):
             period = np.where(t.omega > 0.0, 2.0 * np.pi / t.omega, np.inf)
         from nonsmooth.kernels.cache import compiled
         from nonsmooth.kernels.records import Form
 
+        lacking = np.hstack([self.lacking, np.ones((n_modes, len(self.traced.m)), dtype=np.int64)])
         form = Form(
             t.A, t.b, t.c, t.s, multiples, t.omega, period,
-            t.ia, t.ib, t.ic, t.is_, *outputs, t.ra, t.rb, t.rc, t.rs,
+            t.ia, t.ib, t.ic, t.is_, *outputs, t.ra, t.rb, t.rc, t.rs, lacking,
         )  # fmt: skip
         tables = Tables(points, form, period, (n_modes, n_i, outputs[0].shape[1], len(self.net.rows)), n_h)
         if n_points > 1:  # threads may share them
@@ -100,7 +105,8 @@ class LinearEngine(LoopEngine):
     def module(self, tables: Tables, observer: str) -> ModuleType:
         from nonsmooth.kernels.linear_module import linear_module
 
-        return linear_module(len(self.scale), tables.harmonics, observer)
+        memory = len(self.traced.m)
+        return linear_module(len(self.scale) + memory, tables.harmonics, observer, memory)
 
     def given(self, tables: Tables, observer: str) -> tuple[Any, Any, Any]:
         """The present thread's tables and work; the kernel keeps the tables of the last point in them."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
@@ -44,6 +45,11 @@ class LoopEngine:
         """How many touches one leg may add to a log, at most."""
         raise NotImplementedError
 
+    @cached_property
+    def lacking(self) -> Any:
+        """(modes, n) 1 where a mode has not that state."""
+        return np.array(self.traced.lacking, dtype=np.int64).reshape(len(self.traced.mode_names), -1)
+
     def chain(
         self, tables: Any, first: int, last: int, state: State, starts: FloatArray | None,
         plan: SectionPlan, transient: int, keep: int, out: Chain,
@@ -76,7 +82,7 @@ class LoopEngine:
                 state.clock[:] = clock  # failed at the first point: nothing was written
 
     def record(self, tables: Any, state: State, until: float, samples: FloatArray) -> Log:
-        """See :class:`nonsmooth.flow.engine.Engine`."""
+        """See :class:`nonsmooth.flow.engine.Engine`. A state that a mode lacks is NaN."""
         from nonsmooth.kernels import records
 
         n, n_u, n_m = len(samples), len(self.scale), len(self.traced.m)
@@ -101,6 +107,12 @@ class LoopEngine:
         times, transitions, before, after, memory = (part[:n_c].copy() for part in crossings)
         touch_times, indicators, touch_u, clearances = (part[:n_t].copy() for part in touches)
         _, sample_u, sample_memory, sample_mode, sample_segment = sampled
+        lacking = self.lacking == 1
+        if lacking.any():
+            jumps = self.traced.transitions
+            sample_u[lacking[sample_mode] & (sample_mode >= 0)[:, None]] = np.nan
+            before[lacking[[t.source for t in jumps]][transitions]] = np.nan
+            after[lacking[[t.target for t in jumps]][transitions]] = np.nan
         return Log(
             sample_u, sample_memory, sample_mode, sample_segment, times, transitions, before, after, memory,
             touch_times, indicators, touch_u, clearances, int(code),
@@ -163,7 +175,8 @@ def pack_net(traced: Traced) -> Any:
 
     integer = np.int64
     transitions = np.array(
-        [(t.target, t.reset is not None, t.contact) for t in traced.transitions], dtype=integer
+        [(t.target, 1 if t.reset is not None else 2 * bool(t.writes), t.contact) for t in traced.transitions],
+        dtype=integer,
     ).reshape(-1, 3)
     rows = [(r.indicator, r.sign, r.strict) for t in traced.transitions for r in t.rows]
     row_start = np.cumsum([0] + [len(t.rows) for t in traced.transitions], dtype=integer)
@@ -174,4 +187,9 @@ def pack_net(traced: Traced) -> Any:
     mode_list = np.array([j for one in leaving for j in one], dtype=integer)
     at = np.array([-1.0 if t.at is None else t.at for t in traced.transitions], dtype=float)
     both = np.array([*rows, (0, 1, 1), (0, -1, 1)], dtype=integer).reshape(-1, 3)
-    return Net(transitions, both, row_start, mode_start, mode_list, at)
+    changed = np.zeros((len(transitions), len(traced.u) + len(traced.m) + 1), dtype=integer)
+    for j, t in enumerate(traced.transitions):
+        moved = [i for i, e in enumerate(t.reset or ()) if e != traced.u[i]]
+        moved += [len(traced.u) + i for i, _ in t.writes]
+        changed[j, : len(moved) + 1] = [len(moved), *moved]
+    return Net(transitions, both, row_start, mode_start, mode_list, at, changed)

@@ -84,7 +84,7 @@ def engine_for(
         if form is None:
             raise ValueError(
                 f"{system.name!r} has no exact flow: some mode is not linear with constant coefficients and harmonic "
-                'forcing (or reads memory); use method="taylor" or "rkf45"'
+                'forcing; use method="taylor" or "rkf45"'
             )
         if rtol is not None or atol is not None or step is not None:
             raise ValueError('method="exact" has no tolerance and no step; leave rtol, atol and step out')
@@ -94,7 +94,8 @@ def engine_for(
         from nonsmooth.flow.linear import LinearEngine, PlanarEngine, is_linear
 
         if is_linear(equations, form) and not expert:
-            kind = PlanarEngine if len(equations.u) == 2 else LinearEngine
+            plain = not equations.m and not any(map(any, equations.lacking))
+            kind = PlanarEngine if plain and len(equations.u) == 2 else LinearEngine
             return kind(equations, form, system.scale_vector())
         name = "exact"
     elif method == "exact":

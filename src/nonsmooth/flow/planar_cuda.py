@@ -155,7 +155,7 @@ def _not_empty(array: Any) -> Any:
 def _packed(form: Any) -> FloatArray:
     """All numbers of a parameter point as one column, in the order in which a thread unpacks them."""
     n_points = len(form.A)
-    parts = [form.omega, form.period, *form[:4], *form[7:]]
+    parts = [form.omega, form.period, *form[:4], *form[7:-1]]
     columns = []
     for part in parts:
         shape = [n_points, *(max(n, 1) for n in part.shape[1:])]

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.flow.engine import FloatArray, Log, State
+from nonsmooth.flow.engine import FloatArray
 from nonsmooth.flow.layers import Layers, layers
 from nonsmooth.flow.loop import DIVERGENCE, LoopEngine, pack_net
 from nonsmooth.flow.series_tables import Tables, exact_steps, periods, work_of
@@ -85,10 +85,6 @@ class SeriesEngine(LoopEngine):
         self.net = pack_net(self.traced)
 
     @cached_property
-    def lacking(self) -> Any:
-        return np.array(self.traced.lacking, dtype=np.int64).reshape(len(self.traced.mode_names), -1)
-
-    @cached_property
     def repeats(self) -> dict[int, int]:
         """Rows (indicators, outputs) that are a state and nothing else: row -> state. Their extremes are its."""
         traced = self.traced
@@ -155,16 +151,6 @@ class SeriesEngine(LoopEngine):
 
     def touches_of_a_leg(self) -> int:
         return (len(self.net.rows) + 1) * (self.series_order + 1)
-
-    def record(self, tables: Tables, state: State, until: float, samples: FloatArray) -> Log:
-        """See :class:`nonsmooth.flow.engine.Engine`. A state that a mode lacks is NaN."""
-        log, traced = super().record(tables, state, until, samples), self.traced
-        if self.lacking.any():
-            lacking = self.lacking == 1
-            log.sample_u[lacking[log.sample_mode] & (log.sample_mode >= 0)[:, None]] = np.nan
-            log.u_before[lacking[[t.source for t in traced.transitions]][log.crossing_transition]] = np.nan
-            log.u_after[lacking[[t.target for t in traced.transitions]][log.crossing_transition]] = np.nan
-        return log
 
     def generated(self, tables: Tables) -> Any:
         """What stands for system and method in the kernels (``kernels.records.Generated``)."""

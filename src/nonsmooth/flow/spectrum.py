@@ -252,7 +252,7 @@ def _smooth(engine: Engine, traced: Traced) -> bool:
 
 def frame_for(system: System, engine: Engine, tables: Any, i: int) -> Frame:
     """A frame for row ``i`` of an engine's tables."""
-    if isinstance(engine, LinearEngine):
+    if isinstance(engine, LinearEngine) and engine.is_plain:
         return _LinearFrame(engine, tables, i, system.scale_vector())
     flow = VariationalFlow.of(system)
     points = tables.points[i : i + 1]

@@ -103,6 +103,7 @@ def arrays_of_thread(packed, multiples, i):
     tay = cuda.local.array((N_MODES, N_FUNCTIONALS, M, WIDTH), float64)
     field = cuda.local.array((N_MODES, 2, M), float64)
     info = cuda.local.array((N_MODES, 4), float64)
+    some = cuda.local.array((1, 1, 1, 1), int64)
     row = cuda.local.array((N_TERMS, M), float64)
     w = cuda.local.array(M, float64)
     w1 = cuda.local.array(M, float64)
@@ -124,8 +125,10 @@ def arrays_of_thread(packed, multiples, i):
     memo = cuda.local.array(N_MEMO, float64)
     built[0] = 0
     tally[0] = 0
-    form = Form(A, b, c, s, multiples, omega, period, ia, ib, ic, is_, oa, ob, oc, os_, ra, rb, rc, rs)
+    lacking = cuda.local.array((1, 1), int64)
+    lacking[0, 0] = 0
+    form = Form(A, b, c, s, multiples, omega, period, ia, ib, ic, is_, oa, ob, oc, os_, ra, rb, rc, rs, lacking)
     work = Work(
         w, w1, wn, wp, wq, end, there, before, row, scr, points, rates, zero, found, visited, twin, built, tally, memo,
     )  # fmt: skip
-    return form, (Tables(prop, rot, fun, tay, field, info), work)
+    return form, (Tables(prop, rot, fun, tay, field, info, some), work)

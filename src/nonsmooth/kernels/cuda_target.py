@@ -18,8 +18,8 @@ from numba import config, cuda
 from nonsmooth.kernels.lanes import plain
 
 __all__ = [
-    "REGISTERS", "THREADS", "callback", "cuda", "device", "entry", "inline", "kernel", "local", "once", "sum_columns",
-    "sum_rows",
+    "REGISTERS", "THREADS", "callback", "cuda", "device", "dot", "entry", "inline", "kernel", "local", "once", "sizes",
+    "spread", "sum_columns", "sum_rows", "sum_some_rows",
 ]  # fmt: skip
 
 THREADS = 64  # in a block: few, because a trajectory fills a thread's registers
@@ -36,6 +36,8 @@ def device(function: Callable[..., Any]) -> Any:
 
 inline = once = device
 sum_rows, sum_columns = device(plain.sum_rows), device(plain.sum_columns)
+dot, sizes, spread = device(plain.dot), device(plain.sizes), device(plain.spread)
+sum_some_rows = device(plain.sum_some_rows)
 
 
 def local(function: Callable[..., Any]) -> Any:

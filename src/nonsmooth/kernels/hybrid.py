@@ -22,6 +22,7 @@ from .run_places import (
     MOST_CROSSINGS,
     NO_END,
     PERIODS,
+    RESET,
     SHORT,
     SINCE,
     TIME,
@@ -51,7 +52,7 @@ def settle(i, form, net, tables, work):
         for k in range(net.mode_start[mode], net.mode_start[mode + 1]):
             one = net.mode_list[k]
             if holds(one, mode, tables, net, work):
-                if net.transitions[one, 1] != 0:
+                if net.transitions[one, 1] == RESET:
                     return BEYOND_STOP
                 if visited[net.transitions[one, 0]] == 0:
                     t = one
@@ -111,7 +112,7 @@ def transit(i, t, short, form, net, section, goal, seen, tables, work):
     approach(mode, fired, seen, tables, work)
     jumps = 0
     while t >= 0:
-        if jumps > net.mode_start.shape[0]:
+        if jumps > net.mode_start.shape[0] + 1:  # as many as modes, and three
             code = CHATTER
             break
         mode = take(i, t, fired if jumps == 0 else -1, form, tables, net, work)

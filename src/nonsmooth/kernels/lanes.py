@@ -17,7 +17,10 @@ from llvmlite import ir
 from numba.core import cgutils, types
 from numba.extending import intrinsic, models, register_model
 
-__all__ = ["FOUR", "LANES", "load", "plain", "plus", "store", "sum_columns", "sum_rows", "times"]
+__all__ = [
+    "FOUR", "LANES", "dot", "load", "plain", "plus", "sizes", "spread", "store", "sum_columns", "sum_rows",
+    "sum_some_rows", "times",
+]  # fmt: skip
 
 LANES = 8
 FOUR = 4  # numbers of a vector that is a value in a kernel
@@ -35,6 +38,15 @@ def _sum_rows(out: Any, row: Any, table: Any, mode: Any, f: Any, w: Any, one: An
             total += table[mode, f, j, k] * w[j]
         for j in range(one - 1, -1, -1):
             total += table[mode, f, j, k] * w[j]
+        out[row, k] = total
+
+
+def _sum_some_rows(out: Any, row: Any, table: Any, mode: Any, f: Any, w: Any, some: Any) -> None:
+    """The same where table[mode, f, j, :] is zero but for the some[0] values of j that stand behind that number."""
+    for k in range(LANES):
+        total = 0.0
+        for q in range(1, some[0] + 1):
+            total += table[mode, f, some[q], k] * w[some[q]]
         out[row, k] = total
 
 
@@ -69,7 +81,30 @@ def _plus(y: Any, a: Any, x: Any) -> Any:
     return y + a * x
 
 
-plain = SimpleNamespace(sum_rows=_sum_rows, sum_columns=_sum_columns)
+def _dot(total: Any, row: Any, at: Any, w: Any, n: Any) -> Any:
+    """total + sum_j row[at + j] w[j] for j < n."""
+    for j in range(n):
+        total += row[at + j] * w[j]
+    return total
+
+
+def _spread(total: Any, row: Any, at: Any, w: Any, about: Any, n: Any) -> Any:
+    """total + sum_j row[at + j] |w[j] - about[2 + j]| for j < n."""
+    for j in range(n):
+        total += row[at + j] * abs(w[j] - about[2 + j])
+    return total
+
+
+def _sizes(total: Any, row: Any, at: Any, w: Any, n: Any) -> Any:
+    """total + sum_j |row[at + j] w[j]| for j < n."""
+    for j in range(n):
+        total += abs(row[at + j] * w[j])
+    return total
+
+
+plain = SimpleNamespace(
+    sum_rows=_sum_rows, sum_some_rows=_sum_some_rows, sum_columns=_sum_columns, dot=_dot, sizes=_sizes, spread=_spread
+)
 
 
 class _Array:
@@ -94,6 +129,10 @@ class _Array:
 
     def load(self, vector: Any, *indices: Any) -> Any:
         return self.builder.load(self.builder.bitcast(self._at(*indices), vector.as_pointer()), align=8)
+
+    def get(self, vector: Any, *indices: Any) -> Any:
+        """A vector, or a number where ``vector`` is None."""
+        return self.number(*indices) if vector is None else self.load(vector, *indices)
 
     def store(self, value: Any, *indices: Any) -> None:
         self.builder.store(value, self.builder.bitcast(self._at(*indices), value.type.as_pointer()), align=8)
@@ -151,6 +190,28 @@ def _sum_rows_in_lanes(
     return signature, generate
 
 
+@intrinsic
+def _sum_some_rows_in_lanes(typing: Any, out: Any, row: Any, table: Any, mode: Any, f: Any, w: Any, some: Any) -> Any:
+    whole = types.int64
+    signature = types.void(out, whole, table, whole, whole, w, some)
+    vector = ir.VectorType(ir.DoubleType(), LANES)
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        out_, row_, table_, mode_, f_, w_, some_ = arguments
+        source, weights = _Array(context, builder, table, table_), _Array(context, builder, w, w_)
+        places, index = _Array(context, builder, some, some_), ir.IntType(64)
+        place = cgutils.alloca_once_value(builder, ir.Constant(vector, [0.0] * LANES))
+        begin, end = ir.Constant(index, 1), builder.add(places.number(0), ir.Constant(index, 1))
+        with cgutils.for_range_slice(builder, begin, end, begin, intp=index) as (q, _):
+            j = places.number(q)
+            term = _scaled(builder, source.load(vector, mode_, f_, j, 0), weights.number(j))
+            builder.store(builder.fadd(builder.load(place), term, flags=_CONTRACT), place)
+        _Array(context, builder, out, out_).store(builder.load(place), row_, 0)
+        return context.get_dummy_value()
+
+    return signature, generate
+
+
 @intrinsic(prefer_literal=True)
 def _sum_columns_in_lanes(typing: Any, out: Any, table: Any, mode: Any, node: Any, w: Any, n: Any, m: Any) -> Any:
     whole = types.int64
@@ -178,13 +239,111 @@ def _sum_columns_in_lanes(typing: Any, out: Any, table: Any, mode: Any, node: An
             return _scaled(builder, source.load(vector, mode_, node_, j, begin), weights.number(j))
 
         parts = []
-        for begin in range(0, states, WIDEST):
-            vector = ir.VectorType(ir.DoubleType(), min(WIDEST, states - begin))
+        begins = list(range(0, max(states - LANES, 1), WIDEST))  # a few that are left go with the last
+        for begin, end in zip(begins, [*begins[1:], states], strict=True):
+            vector = ir.VectorType(ir.DoubleType(), end - begin)
             first = source.load(vector, mode_, node_, states, begin)
             parts.append((begin, _sum(builder, first, partial(column, vector, begin), states, m.literal_value)))
         for begin, total in parts:
             target.store(total, begin)
         return context.get_dummy_value()
+
+    return signature, generate
+
+
+def _size(builder: Any, value: Any) -> Any:
+    """|value| of a number or a vector: without its sign's bit."""
+    bits: Any = ir.IntType(64)
+    mask: Any = 2**63 - 1
+    if isinstance(value.type, ir.VectorType):
+        bits, mask = ir.VectorType(bits, value.type.count), [mask] * value.type.count
+    return builder.bitcast(builder.and_(builder.bitcast(value, bits), ir.Constant(bits, mask)), value.type)
+
+
+def _fold(builder: Any, total: Any, term: Callable[[Any, Any], Any], n: int) -> Any:
+    """``total`` and term(vector, j) for all j < n: in the widest vectors that fit, added up in halves at the end."""
+
+    def add(a: Any, b: Any) -> Any:
+        return builder.fadd(a, b, flags=_CONTRACT)
+
+    width, at, parts = WIDEST, 0, None
+    while width > 1:
+        vector = ir.VectorType(ir.DoubleType(), width)
+        count = (n - at) // width
+        if count:
+            parts = term(vector, at) if parts is None else add(parts, term(vector, at))
+            at += width
+        if count > LONGEST:
+            whole = ir.IntType(64)
+            place = cgutils.alloca_once_value(builder, parts)
+            ends = (ir.Constant(whole, k) for k in (at, at + (count - 1) * width, width))
+            with cgutils.for_range_slice(builder, *ends, intp=whole) as (j, _):
+                builder.store(add(builder.load(place), term(vector, j)), place)
+            parts = builder.load(place)
+            at += (count - 1) * width
+        elif count > 1:
+            for _ in range(count - 1):
+                parts = add(parts, term(vector, at))
+                at += width
+        if parts is not None:
+            lane, nothing = ir.IntType(32), ir.Constant(vector, ir.Undefined)
+            low, high = (
+                ir.Constant(ir.VectorType(lane, width // 2), list(range(begin, begin + width // 2)))
+                for begin in (0, width // 2)
+            )
+            parts = add(builder.shuffle_vector(parts, nothing, low), builder.shuffle_vector(parts, nothing, high))
+        width //= 2
+    if parts is not None:
+        total = add(total, builder.extract_element(parts, ir.Constant(ir.IntType(32), 0)))
+    for j in range(at, n):
+        total = add(total, term(None, j))
+    return total
+
+
+def _products(total: Any, row: Any, w: Any, n: Any, whole: bool) -> Any:
+    """Signature and code of ``total`` and the products of two rows, or (not ``whole``) their sizes."""
+    signature = types.float64(types.float64, row, types.int64, w, n)
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        total_, row_, at_, w_ = arguments[:4]
+        source, weights = _Array(context, builder, row, row_), _Array(context, builder, w, w_)
+
+        def term(vector: Any, j: Any) -> Any:
+            place = builder.add(at_, j if isinstance(j, ir.Value) else ir.Constant(at_.type, j))
+            product = builder.fmul(source.get(vector, place), weights.get(vector, j), flags=_CONTRACT)
+            return product if whole else _size(builder, product)
+
+        return _fold(builder, total_, term, n.literal_value)
+
+    return signature, generate
+
+
+@intrinsic(prefer_literal=True)
+def _dot_in_lanes(typing: Any, total: Any, row: Any, at: Any, w: Any, n: Any) -> Any:
+    return _products(total, row, w, n, True)
+
+
+@intrinsic(prefer_literal=True)
+def _sizes_in_lanes(typing: Any, total: Any, row: Any, at: Any, w: Any, n: Any) -> Any:
+    return _products(total, row, w, n, False)
+
+
+@intrinsic(prefer_literal=True)
+def _spread_in_lanes(typing: Any, total: Any, row: Any, at: Any, w: Any, about: Any, n: Any) -> Any:
+    signature = types.float64(types.float64, row, types.int64, w, about, n)
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        total_, row_, at_, w_, about_ = arguments[:5]
+        source, weights = _Array(context, builder, row, row_), _Array(context, builder, w, w_)
+        middle = _Array(context, builder, about, about_)
+
+        def term(vector: Any, j: Any) -> Any:
+            j = j if isinstance(j, ir.Value) else ir.Constant(at_.type, j)
+            there = middle.get(vector, builder.add(j, ir.Constant(at_.type, 2)))
+            apart = builder.fsub(weights.get(vector, j), there)
+            return builder.fmul(source.get(vector, builder.add(at_, j)), _size(builder, apart), flags=_CONTRACT)
+
+        return _fold(builder, total_, term, n.literal_value)
 
     return signature, generate
 
@@ -243,11 +402,15 @@ def _plus_four(typing: Any, y: Any, a: Any, x: Any) -> Any:
     return _four(y, types.float64, x), generate
 
 
-def _choose(compiled: Any, loops: Callable[..., None]) -> Any:
+def _choose(compiled: Any, loops: Callable[..., Any]) -> Any:
     return loops if numba.config.DISABLE_JIT else compiled
 
 
 sum_rows = _choose(_sum_rows_in_lanes, _sum_rows)
 sum_columns = _choose(_sum_columns_in_lanes, _sum_columns)
+sum_some_rows = _choose(_sum_some_rows_in_lanes, _sum_some_rows)
+dot = _choose(_dot_in_lanes, _dot)
+sizes = _choose(_sizes_in_lanes, _sizes)
+spread = _choose(_spread_in_lanes, _spread)
 load, store = _choose(_load_four, _load), _choose(_store_four, _store)
 times, plus = _choose(_times_four, _times), _choose(_plus_four, _plus)

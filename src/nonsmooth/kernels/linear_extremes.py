@@ -7,7 +7,7 @@ is halved down to two node spacings, where the polynomial's critical points deci
 from .cache import device, inline, once
 from .linear_polynomial import NEVER, THIRD, classify, critical_points, horner
 from .linear_search import bound_at, compose, slope_of, to_node, value_of
-from .linear_tables import NODES, ONE, STATES
+from .linear_tables import MEMORY, NODES, ONE, OWN, STATES
 from .run_places import MODE
 
 
@@ -80,6 +80,8 @@ def widen(i, a, b, form, tables, work, kept):
     for f in range(tables.fun.shape[1]):
         if f < n_i and work.twin[f] >= 0:
             continue  # a state but for a constant: see ``finish``
+        if MEMORY > 0 and n_i + OWN <= f < n_i + STATES:
+            continue
         hi, lo, k = extremes_of(f, kept, n_i)
         below, above = exceeds(tables, mode, f, work.w, work.w1, lo[i, k], hi[i, k])
         if above:
@@ -102,6 +104,8 @@ def include(i, mode, form, tables, work, kept):
     """Extend the extremes of point i by the present instant."""
     n_i = work.zero.shape[0]
     for f in range(tables.fun.shape[1]):
+        if MEMORY > 0 and n_i + OWN <= f < n_i + STATES:
+            continue
         hi, lo, k = extremes_of(f, kept, n_i)
         value = value_of(tables, mode, f, work.w)
         hi[i, k] = max(hi[i, k], value)

@@ -4,7 +4,7 @@ import numpy as np
 
 from .block import one_block
 from .linear_search import WIDTH
-from .linear_tables import DEGREE, HARMONICS, NODES, STATES, TERMS, M
+from .linear_tables import DEGREE, HARMONICS, MANY, NODES, STATES, TERMS, M
 from .records import Tables, Work
 from .run_places import N_MEMO, N_TALLY
 
@@ -18,7 +18,8 @@ def scratch(n_modes, n_indicators, n_outputs, n_rows):
         np.zeros((n_modes, NODES + 1, M, STATES)), np.zeros((n_modes, NODES + 1, 2 * HARMONICS + 1)),
         np.zeros((n_modes, n_f, 2 * (M + STATES + 1))), np.zeros((n_modes, n_f, M, DEGREE + 1)),
         np.zeros((n_modes, STATES, M)), np.zeros((n_modes, 2 + STATES)),
+        np.zeros((n_modes, n_f, 2, M + 1) if STATES >= MANY else (1, 1, 1, 1), dtype=np.int64),
         *vectors, np.zeros((max(TERMS, STATES) + 1, M)), np.zeros((n_rows + STATES + 1, WIDTH)), np.zeros(4),
         np.zeros(HARMONICS), *integers, np.zeros(N_MEMO),
     )  # fmt: skip
-    return Tables(*block[:6]), Work(*block[6:])
+    return Tables(*block[:7]), Work(*block[7:])

@@ -15,7 +15,7 @@ then the condition's.
 from math import fabs
 
 from .cache import device, inline
-from .lanes import sum_columns, sum_rows
+from .lanes import dot, spread, sum_columns, sum_rows, sum_some_rows
 from .linear_polynomial import (
     NEVER,
     ONCE,
@@ -27,13 +27,27 @@ from .linear_polynomial import (
     next_upward,
     slope_at,
 )  # fmt: skip
-from .linear_tables import DEGREE, HARMONICS, NODES, ONE, STATES, WAVE, M
+from .linear_tables import DEGREE, HARMONICS, MANY, NODES, ONE, STATES, WAVE, M
 
 WIDTH = DEGREE + 1
+FEW = 8  # states of a condition that are summed one by one
 # Places in ``work.found``: the functional that crossed last; the node whose w stands in ``work.wn``, with the Taylor
 # coefficients of the states in the first rows of ``work.scr`` (-2 - node: without them, -1: none); whether all
 # conditions are positive at a piece's end; the sign of the section's functional where the leg begins.
 FUNCTIONAL, NODE, HELD, SIDE = 0, 1, 2, 3
+
+
+@inline
+def sum_few(total, tables, mode, f, at, w):
+    """``total`` and the states' part of a functional's value (at = 0) or slope (M): one by one where they are few."""
+    fun, some = tables.fun, tables.some
+    count = some[mode, f, 1, 0]
+    if count > FEW:
+        return dot(total, fun[mode, f], at, w, STATES)
+    for q in range(1, count + 1):
+        j = some[mode, f, 1, q]
+        total += fun[mode, f, at + j] * w[j]
+    return total
 
 
 @inline
@@ -43,6 +57,8 @@ def value_of(tables, mode, f, w):
     total = fun[mode, f, ONE]
     for j in range(WAVE, M):
         total += fun[mode, f, j] * w[j]
+    if STATES >= MANY:
+        return sum_few(total, tables, mode, f, 0, w)
     for j in range(STATES - 1, -1, -1):
         total += fun[mode, f, j] * w[j]
     return total
@@ -55,6 +71,8 @@ def slope_of(tables, mode, f, w):
     total = fun[mode, f, M + ONE]
     for j in range(WAVE, M):
         total += fun[mode, f, M + j] * w[j]
+    if STATES >= MANY:
+        return sum_few(total, tables, mode, f, M, w)
     for j in range(STATES - 1, -1, -1):
         total += fun[mode, f, M + j] * w[j]
     return total
@@ -65,6 +83,8 @@ def bound_at(tables, mode, f, w):
     """Bound on the fourth derivative of functional f on the step that starts at w."""
     fun, info = tables.fun, tables.info
     total = fun[mode, f, 2 * M + STATES]
+    if STATES >= MANY:
+        return spread(total, fun[mode, f], 2 * M, w, info[mode], STATES)
     for j in range(STATES - 1, -1, -1):
         total += fun[mode, f, 2 * M + j] * fabs(w[j] - info[mode, 2 + j])
     return total
@@ -86,7 +106,10 @@ def to_node(tables, mode, node, w, out):
 @inline
 def compose(tables, mode, f, wn, scr, row):
     """Taylor coefficients of functional f at a node where w is ``wn``, into a row of scr."""
-    sum_rows(scr, row, tables.tay, mode, f, wn, STATES, M)
+    if STATES >= MANY:
+        sum_some_rows(scr, row, tables.tay, mode, f, wn, tables.some[mode, f, 0])
+    else:
+        sum_rows(scr, row, tables.tay, mode, f, wn, STATES, M)
 
 
 @inline

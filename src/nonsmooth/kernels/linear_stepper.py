@@ -7,6 +7,7 @@ A leg is one step of the mode, or its part up to the first crossing, section ret
 from math import cos, fabs, isfinite, sin
 
 from .cache import device, inline, once
+from .lanes import dot, sizes
 from .linear_search import (
     FUNCTIONAL,
     NEVER,
@@ -21,7 +22,7 @@ from .linear_search import (
     turn,
     value_of,
 )
-from .linear_tables import HARMONICS, NODES, ONE, STATES, WAVE, M, build
+from .linear_tables import HARMONICS, MANY, MEMORY, NODES, ONE, OWN, STATES, WAVE, M, build
 from .records import FORM, TABLES, WORK
 from .run_places import FIRED, MODE, NO_END, TIME
 
@@ -55,8 +56,11 @@ def wrap_phase(tables, work, mode, s):
 def rounding(tables, mode, f, at, w):
     """Below this the row fun[mode, f, at:] is zero within rounding at w."""
     total = 0.0
-    for j in range(M):
-        total += fabs(tables.fun[mode, f, at + j] * w[j])
+    if STATES >= MANY:
+        total = sizes(total, tables.fun[mode, f], at, w, M)
+    else:
+        for j in range(M):
+            total += fabs(tables.fun[mode, f, at + j] * w[j])
     return 16.0 * EPS * total
 
 
@@ -130,8 +134,10 @@ def prepare(i, form, motion, tables, work):
     """Tables of point i, and where the motion is."""
     build(i, form, tables, work)
     w = work.w
-    for j in range(STATES):
+    for j in range(OWN):
         w[j] = motion.u[j]
+    for j in range(MEMORY):
+        w[OWN + j] = motion.memory[j]
     w[ONE] = 1.0
     set_phase(work, motion.clock[0])
 
@@ -149,24 +155,47 @@ def start_on_section(form, section, tables, work):
 
 
 @inline
+def mapped(i, t, r, form, w):
+    """State r behind transition t."""
+    total = form.rb[i, t, r]
+    if STATES >= MANY:
+        total = dot(total, form.ra[i, t, r], 0, w, STATES)
+    else:
+        for j in range(STATES):
+            total += form.ra[i, t, r, j] * w[j]
+    for h in range(HARMONICS):
+        total += form.rc[i, t, h, r] * w[WAVE + 2 * h] + form.rs[i, t, h, r] * w[WAVE + 1 + 2 * h]
+    return total
+
+
+@inline
+def apply_map(i, t, form, net, work):
+    """The states behind transition t, into w; of many only those that it changes are looked at."""
+    w, wn = work.w, work.wn
+    if STATES >= MANY:
+        for q in range(1, net.changed[t, 0] + 1):
+            wn[net.changed[t, q]] = mapped(i, t, net.changed[t, q], form, w)
+        for q in range(1, net.changed[t, 0] + 1):
+            w[net.changed[t, q]] = wn[net.changed[t, q]]
+    else:
+        for r in range(STATES):
+            wn[r] = mapped(i, t, r, form, w)
+        for r in range(STATES):
+            w[r] = wn[r]
+
+
+@inline
 def take(i, t, fired, form, tables, net, work):
     """Take transition t (its functional ``fired`` has just crossed; -1: a time trigger). Returns the new mode.
 
     What has crossed is zero, also behind a reset that leaves it where it was. ``work.wp`` keeps w just before."""
-    w, wn, wp, zero = work.w, work.wn, work.wp, work.zero
+    w, wp, zero = work.w, work.wp, work.zero
     for j in range(M):
         wp[j] = w[j]
     mode = net.transitions[t, 0]
     if net.transitions[t, 1] != 0:
         off = fabs(value_of(tables, mode, fired, w)) if fired >= 0 else 0.0
-        for r in range(STATES):
-            wn[r] = form.rb[i, t, r]
-            for j in range(STATES):
-                wn[r] += form.ra[i, t, r, j] * w[j]
-            for h in range(HARMONICS):
-                wn[r] += form.rc[i, t, h, r] * w[WAVE + 2 * h] + form.rs[i, t, h, r] * w[WAVE + 1 + 2 * h]
-        for r in range(STATES):
-            w[r] = wn[r]
+        apply_map(i, t, form, net, work)
         if fired >= 0 and fabs(value_of(tables, mode, fired, w)) > 2.0 * off:
             fired = -1
     mark_zeros(tables, work, mode)
@@ -382,34 +411,36 @@ def state_at(tau, form, tables, work, out):
 
 @once
 def n_states(work):
-    """Number of states."""
-    return STATES
+    """Number of states, without memory."""
+    return OWN
 
 
 @once
 def n_memory(form, work):
-    """A linear system of this stepper has no memory beside its states."""
-    return 0
+    """Number of values in memory: the last of the kernel's states."""
+    return MEMORY
 
 
 @once
 def memory_at(k, form, work):
-    """There is none."""
-    return 0.0
+    """The k-th of them."""
+    return work.w[OWN + k]
 
 
 @once
 def put_state(motion, work):
     """Write the state to the motion."""
-    for j in range(STATES):
+    for j in range(OWN):
         motion.u[j] = work.w[j]
+    for j in range(MEMORY):
+        motion.memory[j] = work.w[OWN + j]
 
 
 @once
 def bounded(work, limit):
     """Finite and below the limits of divergence."""
     within = True
-    for r in range(STATES):
+    for r in range(OWN):
         within = within and isfinite(work.w[r]) and fabs(work.w[r]) < limit[r]
     return within
 

@@ -15,14 +15,19 @@ every inner loop has constant bounds. Arrays (M columns of w, functionals = indi
                                    at w is the sum over j of tay[mode, f, j, k] w[j]
     field[mode, n, M]              rows of u'
     info[mode, 2 + n]              step, node spacing, u_eq
+    some[mode, functional, 2, M + 1]  of many states: how many columns of the Taylor rows are not zero, and which; and
+                                   of the states in value and slope
 """
 
-from math import cos, fabs, sin, sqrt
+from math import cos, fabs, nan, sin, sqrt
 
 from .cache import device, inline
+from .lanes import dot
 
 STATES = 2
 HARMONICS = 1
+MEMORY = 0  # of the states: the last of them, which only transitions change
+OWN = STATES - MEMORY
 ONE = STATES  # the place of the constant in w
 WAVE = STATES + 1  # and of the first harmonic
 M = WAVE + 2 * HARMONICS
@@ -32,6 +37,7 @@ GROUP = 8  # nodes up to here, and its multiples, by their own series
 FEWER_TERMS = 18  # enough within the first GROUP nodes
 DEGREE = 7  # of the Taylor polynomials: within 3/4 of a node spacing the remainder is below 1e-16 of the amplitude
 STEP_ANGLE = 1.5707963267948966  # 2 pi / 4: longer is faster, but the polynomials of degree 7 would not reach
+MANY = 8  # states from which on sums over them go in vectors (``lanes``)
 FREE_STEP = 1.0  # a mode without a time scale of its own moves on polynomials: any step is exact
 
 
@@ -82,9 +88,13 @@ def find_equilibrium(A, b, row, info):
     """The solution of A u + b = 0 into info[2:], by elimination in ``row``; the origin where A is singular."""
     for r in range(STATES):
         info[2 + r] = 0.0
+        moved = b[r] != 0.0
         for j in range(STATES):
             row[r, j] = A[r, j]
+            moved = moved or A[r, j] != 0.0
         row[r, STATES] = -b[r]
+        if not moved:  # memory, or a state that the mode lacks
+            row[r, r] = 1.0
     for k in range(STATES):
         best = k
         size = 0.0
@@ -113,11 +123,20 @@ def find_equilibrium(A, b, row, info):
 @inline
 def times_generator(row, k, field, mode, rates, scale):
     """row[k + 1] = scale * row[k] M, for the generator M of the mode."""
-    for j in range(M):
-        total = row[k, 0] * field[mode, 0, j]
-        for r in range(1, STATES):
-            total += row[k, r] * field[mode, r, j]
-        row[k + 1, j] = scale * total
+    if STATES >= MANY:
+        for j in range(M):
+            row[k + 1, j] = 0.0
+        for r in range(STATES):
+            factor = scale * row[k, r]
+            if factor != 0.0:
+                for j in range(M):
+                    row[k + 1, j] += factor * field[mode, r, j]
+    else:
+        for j in range(M):
+            total = row[k, 0] * field[mode, 0, j]
+            for r in range(1, STATES):
+                total += row[k, r] * field[mode, r, j]
+            row[k + 1, j] = scale * total
     for h in range(HARMONICS):
         rate = scale * rates[h]
         row[k + 1, WAVE + 2 * h] += rate * row[k, WAVE + 1 + 2 * h]
@@ -202,6 +221,8 @@ def fill_propagators(mode, field, rates, spacing, prop, rot, row):
 @inline
 def column(row, k, prop, mode, node, j):
     """Entry j of row[k] exp(M tau) at a node, without what the harmonics of row[k] add."""
+    if STATES >= MANY:
+        return dot(0.0, row[k], 0, prop[mode, node, j], STATES)
     total = row[k, 0] * prop[mode, node, j, 0]
     for r in range(1, STATES):
         total += row[k, r] * prop[mode, node, j, r]
@@ -254,6 +275,38 @@ def fill_functional(mode, f, tables, rates, row):
 
 
 @device
+def list_columns(mode, f, tables):
+    """Which columns of a functional's Taylor rows are not zero, and which states of its value and slope: few where a
+    state moves with few others."""
+    every, few = 0, 0
+    for j in range(M):
+        moved = False
+        for k in range(DEGREE + 1):
+            moved = moved or tables.tay[mode, f, j, k] != 0.0
+        if moved:
+            every += 1
+            tables.some[mode, f, 0, every] = j
+        if j < STATES and (tables.fun[mode, f, j] != 0.0 or tables.fun[mode, f, M + j] != 0.0):
+            few += 1
+            tables.some[mode, f, 1, few] = j
+    tables.some[mode, f, 0, 0] = every
+    tables.some[mode, f, 1, 0] = few
+
+
+@device
+def hide_lacking(form, tables, work):
+    """No value for a state that a mode lacks, and for memory: NaN takes no part in extremes."""
+    n_i = work.zero.shape[0]
+    for mode in range(form.lacking.shape[0]):
+        for j in range(form.lacking.shape[1]):
+            if form.lacking[mode, j] != 0:
+                tables.fun[mode, n_i + j, ONE] = nan
+                for f in range(n_i):
+                    if work.twin[f] == j:
+                        work.twin[f] = -1
+
+
+@device
 def build(i, form, tables, work):
     """Fill the tables for parameter point ``i``, where they do not stand there already."""
     if work.built[0] == i + 1:
@@ -285,8 +338,11 @@ def build(i, form, tables, work):
                     fun[mode, f, WAVE + 2 * h] = form.oc[i, o, mode, h]
                     fun[mode, f, WAVE + 1 + 2 * h] = form.os[i, o, mode, h]
             fill_functional(mode, f, tables, rates, work.row)
+            if STATES >= MANY:
+                list_columns(mode, f, tables)
     for f in range(n_i):
         work.twin[f] = twin_of(f, n_i, fun)
+    hide_lacking(form, tables, work)
     work.built[0] = i + 1
 
 

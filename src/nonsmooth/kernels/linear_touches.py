@@ -3,7 +3,7 @@
 from .cache import once
 from .linear_polynomial import critical_points, curvature_at, horner
 from .linear_search import compose, to_node
-from .linear_tables import NODES, STATES
+from .linear_tables import NODES, OWN
 from .run_places import DONE, MODE, TOUCHES
 
 
@@ -33,7 +33,7 @@ def log_touches(step, form, net, seen, tables, work):
                     seen.touch_time[n] = base + tau
                     seen.touch_indicator[n] = f
                     seen.touch_gap[n] = -value
-                    for s in range(STATES):
+                    for s in range(OWN):
                         compose(tables, mode, work.zero.shape[0] + s, wn, scr, 1)
                         seen.touch_u[n, s] = horner(scr, 1, local)
                     n += 1

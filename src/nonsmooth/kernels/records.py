@@ -49,6 +49,7 @@ class Form(NamedTuple):
     rb: Any  # (P, transitions, n)
     rc: Any  # (P, transitions, harmonics, n)
     rs: Any
+    lacking: Any  # (modes, n) 1: memory, or a state that the mode does not have
 
 
 class Tables(NamedTuple):
@@ -60,17 +61,19 @@ class Tables(NamedTuple):
     tay: Any
     field: Any
     info: Any
+    some: Any
 
 
 class Net(NamedTuple):
     """The net of transitions of a linear system."""
 
-    transitions: Any  # (transitions, 3): target, has reset, is contact
+    transitions: Any  # (transitions, 3): target, what it changes (0, or see ``run_places.RESET``), is contact
     rows: Any  # (rows + 2, 3): functional, sign, strict; the last two belong to the section (rising, falling)
     row_start: Any  # (transitions + 1,)
     mode_start: Any  # (modes + 1,)
     mode_list: Any  # outgoing transitions of each mode in declared order
     at: Any  # (transitions,) phase of a transition at a time, or -1
+    changed: Any  # (transitions, n + 1) how many states a transition changes, and which
 
 
 class Work(NamedTuple):
@@ -258,10 +261,10 @@ class Flow(NamedTuple):
 
 
 FORM = type_of(
-    Form, _f4, _f3, _f4, _f4, _i1, _f1, _f1, _f3, _f2, _f3, _f3, _f4, _f3, _f4, _f4, _f4, _f3, _f4, _f4
+    Form, _f4, _f3, _f4, _f4, _i1, _f1, _f1, _f3, _f2, _f3, _f3, _f4, _f3, _f4, _f4, _f4, _f3, _f4, _f4, _i2
 )  # fmt: skip
-TABLES = type_of(Tables, _f4, _f3, _f3, _f4, _f3, _f2)
-NET = type_of(Net, _i2, _i2, _i1, _i1, _i1, _f1)
+TABLES = type_of(Tables, _f4, _f3, _f3, _f4, _f3, _f2, _i[:, :, :, ::1])
+NET = type_of(Net, _i2, _i2, _i1, _i1, _i1, _f1, _i2)
 WORK = type_of(Work, *[_f1] * 8, _f2, _f2, _f1, _f1, *[_i1] * 6, _f1)
 GENERATED = type_of(Generated, _i1, _f2, _f1, _f2, _i2, _i1, _f1, _f1, _f, _f, *[_i] * 8)
 SERIES_WORK = type_of(

@@ -17,3 +17,5 @@ BURST_LENGTH = 50  # crossings in a row at intervals below SHORT of the stepper'
 SHORT = 1e-11
 PATIENCE = 1_000_000  # steps of a run between two looks whether somebody wants to stop it
 NO_END = 1e300  # a time that is never reached
+
+RESET = 1  # of ``Net.transitions``: the states change (2: memory alone)

@@ -2,9 +2,9 @@ r"""Is every mode linear with constant coefficients and harmonic forcing, and if
 
     u' = A u + b + sum_h c_h cos(k_h omega t) + s_h sin(k_h omega t),    omega = 2 pi / period
 
-for each mode, with the same form for indicators, outputs and resets where they are affine in u. The decision
-is made by taking the expressions apart, once per system; the matrices of any number of parameter points then
-come from one generated NumPy function.
+for each mode, with the same form for indicators, outputs and resets where they are affine in u. Memory counts as
+further states behind the others, at rest but for what transitions write. The decision is made by taking the expressions
+apart, once per system; the matrices of any number of parameter points then come from one generated NumPy function.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from sympy import Expr, Symbol
 
 from nonsmooth.system.printing import Printer, assignments
-from nonsmooth.system.traced import Traced
+from nonsmooth.system.traced import Traced, TracedTransition
 
 __all__ = ["LinearForm", "LinearTables", "linear_form"]
 
@@ -30,7 +30,8 @@ Terms = dict[Hashable, Expr]  # "1", "t", ("u", i), ("cos", k) or ("sin", k) -> 
 
 @dataclass(frozen=True)
 class LinearTables:
-    """Matrices for P parameter points, M modes, n states, H harmonics, I indicators, O outputs, T transitions.
+    """Matrices for P parameter points, M modes, n states with the memory behind them, H harmonics, I indicators, O
+    outputs, T transitions.
 
     Names: ``?b`` the constant part, ``?c`` and ``?s`` the cosines' and sines' coefficients. Where the form says
     that indicators, outputs or resets are not affine, their arrays are zero (identity for ``ra``).
@@ -99,15 +100,15 @@ class LinearForm:
 
 @lru_cache(maxsize=256)
 def linear_form(traced: Traced) -> LinearForm | None:
-    """Return the linear form, or None where some mode has none or its field reads the memory."""
+    """Return the linear form, or None where some mode has none."""
     taking = _TakingApart(traced)
     fields = [taking.all_or_none(vector) for vector in traced.fields]
     if any(vector is None for vector in fields):
         return None
     indicators = taking.all_or_none(traced.indicators)
     outputs = [taking.all_or_none(row) for row in traced.outputs]
-    resets = [None if t.reset is None else taking.all_or_none(t.reset) for t in traced.transitions]
-    affine_resets = all(r is not None or t.reset is None for r, t in zip(resets, traced.transitions, strict=True))
+    resets = [taking.all_or_none(_map_of(t, traced)) for t in traced.transitions]
+    affine_resets = all(r is not None for r in resets)
 
     code = _TablesCode(traced, taking.base)
     for mode, vector in enumerate(fields):
@@ -126,6 +127,13 @@ def linear_form(traced: Traced) -> LinearForm | None:
     )
 
 
+def _map_of(transition: TracedTransition, traced: Traced) -> tuple[Expr, ...]:
+    """States and memory behind a transition."""
+    written = dict(transition.writes)
+    states = traced.u if transition.reset is None else transition.reset
+    return (*states, *(written.get(i, symbol) for i, symbol in enumerate(traced.m)))
+
+
 class _NotAffineError(Exception):
     """The expression has no such form."""
 
@@ -134,9 +142,9 @@ class _TakingApart:
     """Writes expressions as a sum of coefficients times 1, u_i, cos(k omega t), sin(k omega t)."""
 
     def __init__(self, traced: Traced) -> None:
-        self.t, self.u, self.memory = traced.t, traced.u, set(traced.m)
+        self.t, self.u = traced.t, (*traced.u, *traced.m)
         self.base: Expr | None = None if traced.period is None else 2 * sympy.pi / traced.period
-        self.variables: set[Symbol] = {traced.t, *traced.u}
+        self.variables: set[Symbol] = {traced.t, *self.u}
 
     def all_or_none(self, expressions: tuple[Expr, ...]) -> list[Terms] | None:
         try:
@@ -149,8 +157,6 @@ class _TakingApart:
 
     def terms(self, expression: Expr) -> Terms:
         """Raise where there is no such form; products are multiplied out only if need be."""
-        if expression.free_symbols & self.memory:
-            raise _NotAffineError
         try:
             terms = self._terms(expression)
         except _NotAffineError:
@@ -285,7 +291,7 @@ class _TablesCode:
 
     def _shapes(self, h: int) -> dict[str, tuple[int, ...]]:
         t = self.traced
-        n, m, i, o, r = len(t.u), len(t.fields), len(t.indicators), len(t.outputs), len(t.transitions)
+        n, m, i, o, r = len(t.u) + len(t.m), len(t.fields), len(t.indicators), len(t.outputs), len(t.transitions)
         return {
             "omega": (), "A": (m, n, n), "b": (m, n), "c": (m, h, n), "s": (m, h, n),
             "ia": (i, n), "ib": (i,), "ic": (i, h), "is_": (i, h),

@@ -1,0 +1,141 @@
+"""Memory, and modes that lack a state, by the exact flow: closed forms, and the series of the same flow beside it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from random_systems import Template, draw, growing
+
+import nonsmooth as ns
+from nonsmooth.flow.engine import Chain, SectionPlan, State
+from nonsmooth.flow.linear import LinearEngine, PlanarEngine
+from nonsmooth.flow.methods import engine_for
+from nonsmooth.flow.series import SeriesEngine
+
+
+def yielding() -> Template:
+    """A mass strikes a wall that gives way by a part of the speed of each impact, and pulls towards where it stands."""
+    ranges = {
+        "k": (0.5, 2.0), "c": (0.05, 0.4), "F": (0.5, 2.0), "w": (0.6, 1.8), "e": (0.5, 0.9), "d": (0.02, 0.1),
+        "a": (-0.3, 0.3), "r": (0.3, 0.9), "low": (-0.8, -0.4),
+    }  # fmt: skip
+
+    def motion(t, u, p):
+        return u.v, p.F * np.cos(p.w * t) - p.k * u.x - p.c * u.v + p.a * p.wall
+
+    system = ns.System(
+        name="yielding wall", states=["x", "v"], memory={"wall": 0.3},
+        parameters={name: 0.5 * (low + high) for name, (low, high) in ranges.items()},
+        modes={"near": motion, "far": motion},
+        indicators={"reach": lambda t, u, p: u.x - p.wall, "back": lambda t, u, p: u.x - p.low},
+        transitions=[
+            ns.Transition("near", "near", when="reach > 0", reset=lambda t, u, p: (u.x, -p.e * u.v),
+                          write={"wall": lambda t, u, p: p.wall + p.d * u.v}),
+            ns.Transition("near", "far", when="back < 0", write={"wall": lambda t, u, p: p.r * p.wall}),
+            ns.Transition("far", "near", when="back > 0"),
+        ],
+        outputs={"room": lambda t, u, p: p.wall - u.x},
+    )  # fmt: skip
+    return Template(system, (), ranges, (-0.3, 0.2), (12.0, 20.0))
+
+
+def engines(system: ns.System) -> tuple[LinearEngine, SeriesEngine]:
+    ours = engine_for(system)
+    assert isinstance(ours, LinearEngine) and not isinstance(ours, PlanarEngine)
+    return ours, SeriesEngine(system.traced, system.scale_vector(), "exact")
+
+
+@pytest.mark.parametrize("template", [yielding, growing])
+def test_runs_and_sweeps_as_by_the_series_of_the_same_flow(template) -> None:
+    """Random draws: transitions, limits, samples, memory; section points, extremes and counts of a sweep."""
+    seen = 0
+    for seed in range(12):
+        system, start, duration = draw(template(), np.random.default_rng(seed))
+        samples, logs, chains, ends = np.linspace(0.0, duration, 50), [], [], []
+        for engine in engines(system):
+            tables = engine.prepare(system.parameter_vector()[None, :])
+            state = State(start.copy(), system.memory_vector())
+            logs.append(engine.record(tables, state, duration, samples))
+            ends.append(np.concatenate([state.u, state.memory, state.clock[:1]]))
+            out = Chain.empty(1, 3, len(start), len(system.indicators), len(system.outputs))
+            engine.chain(tables, 0, 1, state, None, SectionPlan(), 2, 3, out)
+            chains.append((out, np.concatenate([state.u, state.memory])))
+        ours, theirs = logs
+        assert ours.status == theirs.status == 0
+        assert ours.crossing_transition.tolist() == theirs.crossing_transition.tolist()
+        assert ours.sample_mode.tolist() == theirs.sample_mode.tolist()
+        for name in ("crossing_time", "u_before", "u_after", "memory_after", "sample_u", "sample_memory"):
+            np.testing.assert_allclose(getattr(ours, name), getattr(theirs, name), rtol=0, atol=1e-10, err_msg=name)
+        np.testing.assert_allclose(*ends, rtol=0, atol=1e-10)
+        (a, end), (b, their_end) = chains
+        assert (a.status, a.crossings, a.contacts) == (b.status, b.crossings, b.contacts)
+        np.testing.assert_allclose(end, their_end, rtol=0, atol=1e-10)
+        for name in ("section", "maximum", "minimum", "indicator_max", "indicator_min", "output_max", "output_min",
+                     "elapsed", "section_time", "section_mode"):  # fmt: skip
+            np.testing.assert_allclose(getattr(a, name), getattr(b, name), rtol=0, atol=1e-10, err_msg=name)
+        seen += len(ours.crossing_time)
+    assert seen > 20
+
+
+def test_a_ball_on_a_floor_that_sinks() -> None:
+    """Free falls between a floor that each impact lowers by a tenth of its speed: flights and speeds by hand."""
+    e, d = 0.6, 0.1
+    ball = ns.System(
+        states=["x", "v"], parameters={"e": e, "d": d, "A": 0.0, "w": 1.0}, memory={"floor": 0.0},
+        modes={"flight": lambda t, u, p: (u.v, -1.0 + p.A * np.cos(p.w * t))},
+        indicators={"above": lambda t, u, p: u.x - p.floor},
+        transitions=[ns.Transition("flight", "flight", when="above < 0", reset=lambda t, u, p: (u.x, -p.e * u.v),
+                                   write={"floor": lambda t, u, p: p.floor + p.d * u.v})],
+    )  # fmt: skip
+    assert isinstance(engine_for(ball), LinearEngine)
+    run = ns.simulate(ball, duration=5.0, start={"x": 0.5}, samples=11)
+    t, x, v, floor, fall = 0.0, 0.5, 0.0, 0.0, []
+    while True:
+        hit = v + np.sqrt(v**2 + 2 * (x - floor))  # x + v s - s^2 / 2 = floor
+        t += hit
+        if t > 5.0:
+            break
+        x, v, floor = floor, e * (hit - v), floor - d * (hit - v)
+        fall.append((t, x, v, floor))
+    assert len(fall) >= 3
+    np.testing.assert_allclose(run.crossing_time, [row[0] for row in fall], rtol=0, atol=1e-13)
+    np.testing.assert_allclose(run.u_after, [row[1:3] for row in fall], rtol=0, atol=1e-13)
+    assert run["floor"].values[0] == 0.0
+    np.testing.assert_allclose(run["floor"].values[-1], floor, rtol=0, atol=1e-13)
+
+
+def test_a_start_takes_what_holds_and_writes_its_memory() -> None:
+    """Beyond the far threshold at the start: that transition is taken at t = 0 and writes."""
+    system = yielding().system
+    engine = engine_for(system)
+    state = State(np.array([-1.0, 0.0]), system.memory_vector())
+    log = engine.record(engine.prepare(system.parameter_vector()[None, :]), state, 1e-6, np.array([0.0]))
+    assert log.sample_mode[0] == 1 and len(log.crossing_time) == 0
+    assert log.sample_memory[0, 0] == state.memory[0] == 0.3 * system.values["r"]
+
+
+def test_a_lacking_state_has_no_value_and_no_part_in_extremes() -> None:
+    """The block rides on the belt without a velocity of its own: its slip alone has speeds."""
+
+    def slip(t, u, p):
+        return u.v, 0.5 - u.x + p.A * np.cos(p.w * t)
+
+    belt = ns.System(
+        states=["x", "v"], parameters={"A": 0.0, "w": 1.0, "v_b": 0.2},
+        modes={"stick": ns.Mode(lambda t, u, p: (p.v_b,), states=["x"]), "slip": slip},
+        indicators={"strain": lambda t, u, p: u.x - 1.0, "catch": lambda t, u, p: u.v - p.v_b},
+        transitions=[ns.Transition("stick", "slip", when="strain > 0", reset=lambda t, u, p: (u.x, p.v_b)),
+                     ns.Transition("slip", "stick", when="catch > 0", reset=lambda t, u, p: (u.x,))],
+    )  # fmt: skip
+    engine = engine_for(belt)
+    assert isinstance(engine, LinearEngine) and not isinstance(engine, PlanarEngine)
+    run = ns.simulate(belt, duration=20.0, start={"v": 7.0}, samples=400)
+    stuck = run["mode"].values == 0
+    assert stuck.any() and np.isnan(run.u.sel(state="v").values[stuck]).all()
+    assert np.isfinite(run.u.sel(state="v").values[~stuck]).all()
+    state = State(np.array([0.0, 7.0]), np.zeros(0))  # a speed that the first mode does not have
+    out = Chain.empty(1, 3, 2, 2, 0)
+    engine.chain(engine.prepare(belt.parameter_vector()[None, :]), 0, 1, state, None, SectionPlan(), 0, 3, out)
+    speed = np.hypot(0.5, 0.2)  # of the arc about the spring's equilibrium
+    np.testing.assert_allclose([out.minimum[0, 1], out.maximum[0, 1]], [-speed, 0.2], rtol=0, atol=1e-13)
+    np.testing.assert_allclose(out.indicator_max[0, 1], 7.0 - 0.2, rtol=0, atol=1e-13)
