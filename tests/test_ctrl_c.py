@@ -19,7 +19,7 @@ SOURCES = Path(nonsmooth.__file__).parent
 CATCHES = {
     "continuation/marches.py: march_until",  # unless_interrupted raises it with what was found
     "campaign/threads.py: run",  # a worker hands it to the thread that waits, which raises it
-    "cli/main.py: main",  # the exit code 130
+    "cli/main.py: _answer",  # the exit code 130
 }
 
 
