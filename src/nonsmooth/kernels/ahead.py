@@ -58,7 +58,8 @@ def tasks(shapes: Sequence[str] = SHAPES) -> list[_Task]:
             for states, harmonics in (map(int, shape.split(",")) for shape in shapes):
                 choices: dict[str, Any] = {"states": [states], "harmonics": [harmonics]}
                 choices |= {one: getattr(file, f"{one.upper()}S", []) for one in ("observer", "method")}
-                given = product(*(choices[parameter] for parameter in signature(getattr(file, name)).parameters))
+                names = signature(getattr(file, name)).parameters
+                given = product(*(choices.get(one, [names[one].default]) for one in names))
                 found += [(file.__name__, name, arguments) for arguments in given]
     return list(dict.fromkeys(found))
 
