@@ -11,8 +11,10 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
+import nonsmooth as ns
 from nonsmooth.kernels import before_compiling
 from nonsmooth.results import progress as module
 from nonsmooth.results.progress import progress, say
@@ -122,3 +124,24 @@ def test_a_terminal_that_does_not_know_its_size_shows_a_bar() -> None:
     code = "from nonsmooth.results.progress import progress\nwith progress(10, 'work') as advance: input()"
     words, _ = first_words(code, {})
     assert "work" in words and "0/10" in words
+
+
+def test_a_function_hears_the_fraction_done_and_may_cancel() -> None:
+    heard: list[float] = []
+    osc = ns.models.discontinuous_support()
+    found = ns.sweep(osc, "rho", np.linspace(0.3, 0.5, 5), transient=20, keep=20, progress=heard.append)
+    assert heard[0] == 0.0
+    assert heard[-1] == 1.0
+    assert heard == sorted(heard)
+    assert len(heard) > 3
+    again = ns.sweep(osc, "rho", np.linspace(0.3, 0.5, 5), transient=20, keep=20, progress=False)
+    assert (found["section"] == again["section"]).all()
+    seen: list[float] = []
+    with pytest.raises(KeyboardInterrupt, match="cancelled"):
+        ns.chart(
+            osc, {"rho": [0.3, 0.4], "omega": [3.0, 3.6]}, transient=20,
+            progress=lambda done: seen.append(done) or len(seen) < 2,
+        )  # fmt: skip
+    assert len(seen) == 2
+    with pytest.raises(TypeError, match=r"progress = 'yes': True, False, or a function"):
+        ns.sweep(osc, "rho", [0.3], progress="yes")

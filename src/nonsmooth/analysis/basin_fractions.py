@@ -24,6 +24,7 @@ from nonsmooth.flow.devices import BATCH, workers_of
 from nonsmooth.flow.sections import Poincare, Stroboscopic
 from nonsmooth.flow.starts import random_starts, start_states
 from nonsmooth.results.memory import room_for
+from nonsmooth.results.progress import Progress
 from nonsmooth.system.names import by_name
 
 if TYPE_CHECKING:
@@ -56,7 +57,7 @@ def basin_fractions(
     store: Any = None,
     client: Any = None,
     any_cpu: bool = False,
-    progress: bool = True,
+    progress: Progress = True,
     **expert: Any,
 ) -> xr.Dataset:
     """Attractors over a parameter, and the share of random starts that each attracts: the multistability diagram.

@@ -30,6 +30,7 @@ from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.kernels import codes
 from nonsmooth.results.memory import room_for
+from nonsmooth.results.progress import Progress
 from nonsmooth.system.names import by_name
 
 if TYPE_CHECKING:
@@ -59,7 +60,7 @@ def basins(
     store: Any = None,
     client: Any = None,
     any_cpu: bool = False,
-    progress: bool = True,
+    progress: Progress = True,
     **expert: Any,
 ) -> xr.Dataset:
     """Attractors and their basins on a plane of starts.
@@ -92,8 +93,9 @@ def basins(
         Computes the chunks on its workers.
     any_cpu : bool
         Go on with a store that was begun on another type of processor, or of GPU with ``device="cuda"``.
-    progress : bool
-        A bar, on a terminal and in a notebook; nothing elsewhere.
+    progress : bool, or function
+        A bar, on a terminal and in a notebook; nothing elsewhere. A function hears the fraction done, and cancels the
+        work by returning False (:func:`nonsmooth.results.progress.progress`).
 
     Returns
     -------

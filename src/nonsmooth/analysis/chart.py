@@ -21,6 +21,7 @@ from nonsmooth.flow.linear import PlanarEngine
 from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.flow.starts import is_one_start, plain_start, start_states
+from nonsmooth.results.progress import Progress
 from nonsmooth.system.names import by_name
 
 if TYPE_CHECKING:
@@ -57,7 +58,7 @@ def chart(
     store: Any = None,
     client: Any = None,
     any_cpu: bool = False,
-    progress: bool = True,
+    progress: Progress = True,
     **expert: Any,
 ) -> xr.Dataset:
     """Period numbers, contacts and extremes over a plane of two parameters.
@@ -102,8 +103,9 @@ def chart(
         Computes the chunks on its workers.
     any_cpu : bool
         Go on with a store that was begun on another type of processor, or of GPU with ``device="cuda"``.
-    progress : bool
-        A bar, on a terminal and in a notebook; nothing elsewhere.
+    progress : bool, or function
+        A bar, on a terminal and in a notebook; nothing elsewhere. A function hears the fraction done, and cancels the
+        work by returning False (:func:`nonsmooth.results.progress.progress`).
 
     Returns
     -------

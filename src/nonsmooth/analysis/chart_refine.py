@@ -25,6 +25,7 @@ from nonsmooth.campaign.work import check_room
 from nonsmooth.flow.arguments import real_number
 from nonsmooth.flow.engine import IntArray
 from nonsmooth.kernels import codes
+from nonsmooth.results.progress import Progress
 
 __all__ = ["labels_of_points", "refined"]
 
@@ -48,7 +49,7 @@ def labels_of_points(arrays: Mapping[str, NDArray[Any]]) -> IntArray:
 
 
 def refined(
-    work: ChartWork, part: bool | float, *, threads: int | None = None, progress: bool = True, label: str = ""
+    work: ChartWork, part: bool | float, *, threads: int | None = None, progress: Progress = True, label: str = ""
 ) -> dict[str, NDArray[Any]]:
     """Columns over the plane, with ``confidence`` and ``computed``.
 
@@ -91,7 +92,7 @@ def confidence_of(
 class _Refinement:
     """The plane as far as it is known."""
 
-    def __init__(self, work: ChartWork, share: float, threads: int | None, progress: bool, label: str) -> None:
+    def __init__(self, work: ChartWork, share: float, threads: int | None, progress: Progress, label: str) -> None:
         self.work, self.threads, self.progress, self.text = work, threads, progress, label
         self.shape = (len(next(iter(work.grid.values()))), len(list(work.grid.values())[1]))
         size = self.shape[0] * self.shape[1]

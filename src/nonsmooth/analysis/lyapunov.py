@@ -36,6 +36,7 @@ from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.poincare import result_status
 from nonsmooth.flow.starts import first_state, is_one_start, plain_start
 from nonsmooth.kernels import codes
+from nonsmooth.results.progress import Progress
 from nonsmooth.results.progress import progress as progress_bar
 from nonsmooth.results.statuses import EQUILIBRIA
 from nonsmooth.system.names import by_name
@@ -66,7 +67,7 @@ def lyapunov(
     rtol: float | None = None,
     atol: Any = None,
     device: str = "cpu",
-    progress: bool = True,
+    progress: Progress = True,
     **expert: Any,
 ) -> xr.Dataset:
     r"""Lyapunov exponents, all of them, at one parameter point or along a sweep.
@@ -91,8 +92,9 @@ def lyapunov(
     device : {"cpu", "cuda"}
         ``"cuda"`` runs a sweep with ``direction=None`` on an NVIDIA GPU, one point per thread, for
         systems with the planar exact flow: see the guide "A chart on a GPU".
-    progress : bool
-        A bar, on a terminal and in a notebook; nothing elsewhere.
+    progress : bool, or function
+        A bar, on a terminal and in a notebook; nothing elsewhere. A function hears the fraction done, and cancels the
+        work by returning False (:func:`nonsmooth.results.progress.progress`).
 
     Returns
     -------
@@ -172,7 +174,7 @@ def lyapunov(
         order = order[::-1]
     found: list[Spectrum | None] = [None] * len(points)
     state: State | None = None
-    with progress_bar(len(points), "lyapunov", progress and numbers is not None) as advance:
+    with progress_bar(len(points), "lyapunov", progress if numbers is not None else False) as advance:
         for i in order:
             carried = state is not None and direction is not None
             if state is None or direction is None:

@@ -9,6 +9,7 @@ import numpy as np
 from nonsmooth.analysis.sweep import sweep
 from nonsmooth.flow.arguments import check_system
 from nonsmooth.flow.engine import FloatArray
+from nonsmooth.results.progress import Progress
 from nonsmooth.system.names import by_name
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ def frequency_response(
     *,
     parameter: str = "omega",
     direction: str | None = "both",
-    progress: bool = True,
+    progress: Progress = True,
     **options: Any,
 ) -> xr.Dataset:
     r"""Amplitude over the forcing frequency (or another parameter), carried along up and down.
@@ -45,8 +46,9 @@ def frequency_response(
         ``"omega"`` where not given.
     direction : {"up", "down", "both", None}
         See :func:`nonsmooth.sweep`.
-    progress : bool
-        A bar, on a terminal and in a notebook; nothing elsewhere.
+    progress : bool, or function
+        A bar, on a terminal and in a notebook; nothing elsewhere. A function hears the fraction done, and cancels the
+        work by returning False (:func:`nonsmooth.results.progress.progress`).
     **options
         All other options of :func:`nonsmooth.sweep`.
 

@@ -19,6 +19,7 @@ from nonsmooth.flow.methods import engine_for, warn_if_coarse
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.flow.starts import is_one_start, plain_start, start_states
 from nonsmooth.results.memory import room_for
+from nonsmooth.results.progress import Progress
 from nonsmooth.system.names import by_name
 
 if TYPE_CHECKING:
@@ -52,7 +53,7 @@ def sweep(
     atol: Any = None,
     threads: int | None = None,
     device: str = "cpu",
-    progress: bool = True,
+    progress: Progress = True,
     **expert: Any,
 ) -> xr.Dataset:
     """Long-time behaviour over a parameter: section points, extremes, period numbers.
@@ -88,8 +89,9 @@ def sweep(
     device : {"cpu", "cuda"}
         ``"cuda"`` runs the points on an NVIDIA GPU, one per thread, with ``direction=None`` and without
         ``density``: by the exact flow or by ``method="taylor"``. See the guide "A chart on a GPU".
-    progress : bool
-        A bar, on a terminal and in a notebook; nothing elsewhere.
+    progress : bool, or function
+        A bar, on a terminal and in a notebook; nothing elsewhere. A function hears the fraction done, and cancels the
+        work by returning False (:func:`nonsmooth.results.progress.progress`).
 
     Returns
     -------

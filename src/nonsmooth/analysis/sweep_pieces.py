@@ -13,6 +13,7 @@ from nonsmooth.analysis.settled import usable
 from nonsmooth.campaign.threads import cores, over_items
 from nonsmooth.flow.engine import Chain, FloatArray
 from nonsmooth.kernels import codes
+from nonsmooth.results.progress import Progress
 from nonsmooth.results.progress import progress as progress_bar
 
 __all__ = ["Report", "Slot", "ended", "largest_of", "pieces_of", "run_on_gpu", "run_pieces"]
@@ -81,7 +82,7 @@ def run_pieces(
     march: Callable[..., None],
     pieces: Sequence[tuple[tuple[int, int], list[int]]],
     threads: int | None,
-    progress: bool,
+    progress: Progress,
     label: str,
 ) -> None:
     """All pieces on a pool of threads (the kernels release the lock); Ctrl-C stops them after their present point."""
@@ -94,7 +95,7 @@ def run_pieces(
 
 def run_on_gpu(
     points: FloatArray, starts: FloatArray, memory: FloatArray, rules: Attractors,
-    slots: Mapping[tuple[int, int], Slot], progress: bool, label: str,
+    slots: Mapping[tuple[int, int], Slot], progress: Progress, label: str,
 ) -> None:  # fmt: skip
     """All points from each start, on the GPU."""
     from nonsmooth.analysis.settle_cuda import sweep_on_gpu

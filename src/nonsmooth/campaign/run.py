@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 from nonsmooth.campaign.processors import clock
 from nonsmooth.campaign.threads import on_threads
 from nonsmooth.campaign.work import Work, check_room, empty_columns
+from nonsmooth.results.progress import Progress
 from nonsmooth.results.progress import progress as progress_bar
 
 __all__ = ["run"]
 
 
 def run(
-    work: Work, *, threads: int | None = None, progress: bool = True, label: str = "", store: Any = None,
+    work: Work, *, threads: int | None = None, progress: Progress = True, label: str = "", store: Any = None,
     client: Any = None, any_cpu: bool = False,
 ) -> dict[str, NDArray[Any]]:  # fmt: skip
     """Compute every chunk of ``work`` that is not in the store yet, and return its columns over all places.
@@ -25,8 +26,9 @@ def run(
     ----------
     threads : int, optional
         Threads of this process; one per core where not given. The result does not depend on it.
-    progress : bool
-        A bar, on a terminal and in a notebook; nothing elsewhere.
+    progress : bool, or function
+        A bar, on a terminal and in a notebook; nothing elsewhere. A function hears the fraction done, and cancels the
+        work by returning False (:func:`nonsmooth.results.progress.progress`).
     store : path, optional
         A Zarr store (see :mod:`nonsmooth.campaign.store`).
     client : dask.distributed.Client, optional

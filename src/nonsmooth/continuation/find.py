@@ -22,6 +22,7 @@ from nonsmooth.flow.failure import solve_error
 from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.starts import first_state, plain_start
 from nonsmooth.kernels import codes
+from nonsmooth.results.progress import Progress
 from nonsmooth.system.names import by_name
 
 if TYPE_CHECKING:
@@ -49,7 +50,7 @@ def find_orbit(
     transient: int = 500,
     max_period: int = 32,
     budget: float = 60.0,
-    progress: bool = True,
+    progress: Progress = True,
 ) -> Orbit:
     """Find a periodic orbit from a simulation: period, signature and phases are read off it, Newton does the rest.
 
@@ -69,7 +70,7 @@ def find_orbit(
         The longest period searched.
     budget : float
         Seconds of processor time after which the search ends with an error (``budget``); compiling does not count.
-    progress : bool
+    progress : bool, or function
         A bar of the budget, on a terminal and in a notebook; nothing elsewhere.
 
     Returns

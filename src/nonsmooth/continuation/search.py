@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.engine import Log, State
 from nonsmooth.kernels import before_compiling, codes
+from nonsmooth.results.progress import Progress
 from nonsmooth.results.progress import progress as progress_bar
 
 if TYPE_CHECKING:
@@ -109,7 +110,7 @@ class Search:
 
 
 @contextmanager
-def search_within(budget: float, label: str, enabled: bool) -> Iterator[Search]:
+def search_within(budget: float, label: str, enabled: Progress) -> Iterator[Search]:
     """A search for a ``with`` block; the bar shows how much of the budget is spent."""
     with progress_bar(max(1, int(budget)), f"{label}, seconds of its budget", enabled) as advance:
         search = Search(budget, advance)

@@ -13,24 +13,38 @@ from typing import Any
 
 from nonsmooth.kernels import before_compiling
 
-__all__ = ["is_watched", "progress", "say"]
+__all__ = ["Progress", "is_watched", "progress", "say"]
+
+#: True: a bar where somebody watches; a function of the fraction done, which may return False to cancel.
+Progress = bool | Callable[[float], object]
 
 AGAIN = 10.0  # seconds until compiling is mentioned again
 _mentioned = -AGAIN
 
 
 @contextmanager
-def progress(total: int, label: str, enabled: bool = True, done: int = 0) -> Iterator[Callable[..., None]]:
+def progress(total: int, label: str, enabled: Progress = True, done: int = 0) -> Iterator[Callable[..., None]]:
     """A bar of ``total`` steps; yields ``advance(n=1)``, which any thread may call.
+
+    Where ``enabled`` is a function, it hears the fraction done, 0 to 1, in place of the bar; the work is cancelled
+    where it returns False, and then ends as by Ctrl-C.
 
     ``done`` steps were made before: they fill the bar, and do not count in the estimate of what remains. No bar is
     drawn, and nothing is imported, when ``enabled`` is False, when there is nothing to do or when nobody watches
     (:func:`is_watched`). The bar is wiped when the block ends, by an exception too.
     """
+    if not isinstance(enabled, bool) and not callable(enabled):
+        raise TypeError(
+            f"progress = {enabled!r}: True, False, or a function that takes the fraction done (0 to 1) and may return "
+            "False to cancel"
+        )
+    lock = threading.Lock()
+    if callable(enabled) and total > 0:
+        yield _Told(enabled, total, done, lock)
+        return
     if not enabled or total <= 0 or not is_watched():
         yield _count_nothing
         return
-    lock = threading.Lock()
     # A bar that is redrawn by its own steps needs no thread that looks after it.
     kind = type("Bar", (_tqdm(),), {"monitor_interval": 0})
     with kind(
@@ -47,9 +61,23 @@ def progress(total: int, label: str, enabled: bool = True, done: int = 0) -> Ite
         yield advance
 
 
-def say(text: str, enabled: bool = True) -> None:
+class _Told:
+    """Tells a function how far the work is."""
+
+    def __init__(self, hear: Callable[[float], object], total: int, done: int, lock: threading.Lock) -> None:
+        self.hear, self.total, self.done, self.lock = hear, total, done, lock
+        self(0)
+
+    def __call__(self, n: int = 1) -> None:
+        with self.lock:
+            self.done += n
+            if self.hear(min(self.done / self.total, 1.0)) is False:
+                raise KeyboardInterrupt("cancelled by the function given as progress")
+
+
+def say(text: str, enabled: Progress = True) -> None:
     """A line on stderr, above the bars, where somebody watches; an unwritable stderr is passed over."""
-    if enabled and is_watched():
+    if enabled is True and is_watched():
         with suppress(OSError, ValueError):
             _tqdm().write(text, file=sys.stderr)
             sys.stderr.flush()
