@@ -19,7 +19,7 @@ STOPS = tuple(range(4, MASSES, 5))
 K, C, FORCE, OMEGA, E = 1.0, 0.05, 1.0, 0.6, 0.8
 PART = 0.4  # gaps, over what the masses would move without stops: the motion is then periodic
 PERIOD = 2 * np.pi / OMEGA
-PERIODS = 20_000
+PERIODS = 50_000
 COMPARED = 5  # periods after which the states are compared
 BALANCED = 40  # periods of the balance of energy
 RTOL, ATOL = 1e-8, 1e-8
@@ -163,17 +163,17 @@ def run(effort: float) -> tuple[list[str], list[tuple[str, str, str, bool]]]:
     difference = float(np.abs(peer.run(COMPARED) - near).max())
     apart = float(np.abs(scipy.run(COMPARED) - near).max())
     balance, impacts = imbalance(ours, BALANCED)
-    chunks = {"heyoka": periods // 10, "SciPy": 2}
+    chunks = {"heyoka": periods // 25, "SciPy": 2}
     times = per_unit(
         interleaved({
             "exact": lambda: ns.sweep(
                 ours, "gaps", [PART], transient=periods, keep=2, method="exact", progress=False
             ),
-            "exact, points": lambda: ns.poincare(ours, n=periods // 2, method="exact"),
+            "exact, points": lambda: ns.poincare(ours, n=periods // 5, method="exact"),
             "heyoka": lambda: peer.run(chunks["heyoka"]),
             "SciPy": lambda: scipy.run(chunks["SciPy"]),
         }),
-        {"exact": periods + 2, "exact, points": periods // 2, **chunks},
+        {"exact": periods + 2, "exact, points": periods // 5, **chunks},
     )  # fmt: skip
     shown = {name: median(values) for name, values in times.items()}
     over_heyoka, over_scipy = ratio(times, "heyoka", "exact"), ratio(times, "SciPy", "exact")
