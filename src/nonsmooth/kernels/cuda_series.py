@@ -162,7 +162,7 @@ def advance(
         points_kept[:, :, N_U + 1],
         status[j : j + 1],
     )  # fmt: skip
-    net = Net(TRANSITIONS, ROWS, ROW_START, MODE_START, MODE_LIST, AT)
+    net = Net(TRANSITIONS, ROWS, ROW_START, MODE_START, MODE_LIST, AT, TRANSITIONS)  # series ask nothing of the last
     code = march(0, form, net, at, goal, motion, seen, (), work)
     status[j] = code
     if code != PAUSED:
