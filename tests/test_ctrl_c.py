@@ -68,26 +68,31 @@ import nonsmooth as ns
 warnings.simplefilter("ignore")
 o = ns.models.discontinuous_support()
 valve, top = ns.models.relief_valve(), ns.Poincare("lift_velocity", rising=False)
-long = {
-    "a step of 1e-300": lambda: ns.simulate(o, periods=10, method="taylor", step=1e-300),
-    "a period of 1e12": lambda: ns.simulate(o.with_parameters(omega=1e-12), periods=1, samples=2),
-    "a long transient": lambda: ns.poincare(o, n=2, transient=10**8),
-    "by Runge-Kutta": lambda: ns.poincare(o, n=2, transient=10**8, method="rkf45"),
-    "on a surface": lambda: ns.poincare(valve, n=2, transient=10**8, start=[0.2, 0.0, 10.0], section=top),
-    "one value of a sweep": lambda: ns.sweep(o, "rho", [0.4], transient=2 * 10**7),
-    "a chart": lambda: ns.chart(o, {"rho": [0.3, 0.4], "omega": [3.0, 3.6]}, transient=2 * 10**7, stop_early=False),
-    "exponents": lambda: ns.lyapunov(o, periods=10**7),
+two = {"rho": [0.3, 0.4], "omega": [3.0, 3.6]}
+cases = {  # each short, to compile what it needs, then long
+    "a step of 1e-300": lambda long: ns.simulate(o, duration=0.1, method="taylor", step=1e-300 if long else 0.01),
+    "a period of 1e12": lambda long: ns.simulate(
+        o.with_parameters(omega=1e-12 if long else 1.0), periods=1, samples=2, method="exact"
+    ),
+    "a long transient": lambda long: ns.poincare(o, n=2, transient=10**8 if long else 1),
+    "by Runge-Kutta": lambda long: ns.poincare(o, n=2, transient=10**8 if long else 1, method="rkf45"),
+    "on a surface": lambda long: ns.poincare(
+        valve, n=2, transient=10**8 if long else 1, start=[0.2, 0.0, 10.0], section=top
+    ),
+    "one value of a sweep": lambda long: ns.sweep(o, "rho", [0.4], transient=2 * 10**7 if long else 1),
+    "a chart": lambda long: ns.chart(o, two, transient=2 * 10**7 if long else 1, stop_early=False),
+    "exponents": lambda long: ns.lyapunov(o, periods=10**7 if long else 100),
 }
-ns.chart(o, {"rho": [0.3, 0.4], "omega": [3.0, 3.6]}, transient=50, progress=False)
-for name, call in long.items():
+for name, call in cases.items():
+    call(False)
     began = []
     def interrupt():
         began.append(time.perf_counter())
         os.kill(os.getpid(), signal.SIGINT)
-    timer = threading.Timer(1.0, interrupt)
+    timer = threading.Timer(0.5, interrupt)
     timer.start()
     try:
-        call()
+        call(True)
         print(name, "came to its end")
     except KeyboardInterrupt:
         print(name, "took", time.perf_counter() - began[0])
