@@ -47,10 +47,11 @@ def over_items(
     """Compute every item and hand it to ``done(item, result)``, in the calling thread, in any order.
 
     Ctrl-C (or an error) sets ``stop``, ends the items in hand at their next pause and starts no other. At most two
-    items per thread wait, so that memory does not grow with their number.
+    items per thread wait (one by one where there is one thread), so that memory does not grow with their number.
     """
     order = iter(items)
     workers = threads or cores()
+    in_hand = 2 * workers if workers > 1 else 1
     halt = threading.Event() if stop is None else stop
     # A queue, not the futures: Ctrl-C in the midst of a wait for futures can leave their locks in disorder.
     came: SimpleQueue[tuple[Any, Any, BaseException | None]] = SimpleQueue()
@@ -67,7 +68,7 @@ def over_items(
         waiting = 0
         try:
             while True:
-                for item in islice(order, 2 * workers - waiting):
+                for item in islice(order, in_hand - waiting):
                     pool.submit(run, item)
                     waiting += 1
                 if not waiting:
