@@ -2,7 +2,7 @@
 
 Nothing depends on it. Where it fails, or `HATCH_BUILD_NO_HOOKS=true` leaves it out, the wheel has the sources alone and
 kernels are compiled when they are first called. `NONSMOOTH_LEVELS` names the levels of the architecture to be made (by
-default the highest that this processor has): "x86-64-v3 x86-64-v4" for a wheel that is to travel.
+default that of this processor).
 """
 
 import os

@@ -29,7 +29,7 @@ _V2 = "cx16 popcnt sahf sse3 sse4.1 sse4.2 ssse3"
 _V3 = f"{_V2} avx avx2 bmi bmi2 f16c fma lzcnt movbe xsave"
 #: Machine -> level -> what a processor must have for it, as LLVM calls it; the highest level first.
 LEVELS: dict[str, dict[str, str]] = {
-    "x86_64": {"x86-64-v4": f"{_V3} avx512f avx512bw avx512cd avx512dq avx512vl", "x86-64-v3": _V3},
+    "x86_64": {"x86-64-v3": _V3},  # v4 is slower: docs/decisions.md
     "aarch64": {"generic": "neon"},
 }
 _SAME = {"amd64": "x86_64", "arm64": "aarch64"}
