@@ -198,3 +198,15 @@ def test_how_long_a_return_is_waited_for(swing: ns.System) -> None:
     assert section_plan(support, section)[1].t_max == pytest.approx(1000 * 2 * np.pi / 4.0, rel=1e-15)
     assert section_plan(swing, ns.Poincare("speed"))[1].t_max == 1e6
     assert section_plan(swing, ns.Poincare("speed", t_max=3.0))[1].t_max == 3.0
+
+
+@pytest.mark.parametrize("method", ["exact", "taylor"])
+def test_every_start_begins_with_the_initial_memory(method: str) -> None:
+    """A point that only a kick of the memory's size moves, once a period: by arithmetic."""
+    system = ns.System(
+        states=["x"], parameters={"v": 0.0}, memory={"m": 0.3}, period=1.0,
+        modes={"all": lambda t, u, p: (p.v,)},
+        transitions=[ns.Transition("all", "all", at=0.5, reset=lambda t, u, p: (u.x + p.m,))],
+    )  # fmt: skip
+    found = ns.poincare(system, n=2, start=[[0.0], [1.0]], method=method)
+    assert np.allclose(found["section"].values.reshape(2, 2), [[0.3, 0.6], [1.3, 1.6]], atol=1e-12)

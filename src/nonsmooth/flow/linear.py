@@ -28,12 +28,9 @@ LARGEST = 64e6  # bytes of the tables of all modes
 
 
 def is_linear(traced: Traced, form: LinearForm | None) -> bool:
-    """Whether the fast kernel covers the system: fields, indicators, resets and what is written to memory all affine.
-
-    It notes the modes of a start rule as bits of one integer: 62 modes at most."""
+    """The fast kernel covers the system: fields, indicators, resets and what is written to memory are all affine."""
     return (
         form is not None
-        and len(traced.mode_names) <= 62
         and table_bytes(len(traced.u) + len(traced.m), len(form.multiples), len(traced.mode_names)) <= LARGEST
         and form.affine_indicators
         and form.affine_resets

@@ -67,7 +67,7 @@ class LoopEngine:
         )  # fmt: skip
         model, own, work = self.given(tables, "sections")
         rest = (
-            np.zeros((0, len(self.scale))) if carry else np.ascontiguousarray(starts), model,
+            np.zeros((0, 0)) if starts is None else _with_memory(starts, state.memory), model,
             with_section(self.net, plan.indicator), section, self._goal(transient, keep, 0.0, 0.0),
             self._motion(state, carry and state.settled), out.record(), own, work,
         )  # fmt: skip
@@ -129,6 +129,11 @@ class LoopEngine:
 
         state.counters[1] = int(settled)
         return Motion(state.u, state.memory, state.clock, state.counters)
+
+
+def _with_memory(starts: FloatArray, memory: FloatArray) -> FloatArray:
+    """States and memory side by side: every start begins with the memory that is given."""
+    return np.ascontiguousarray(np.hstack([starts, np.tile(memory, (len(starts), 1))]), dtype=float)
 
 
 def _end_if_not_wanted() -> None:

@@ -23,7 +23,7 @@ OBSERVERS = {
         "linear_extremes", "sections", "judge", "settle", "exponent", "planar_settle", "cuda_planar", "cuda_tables",
         "cuda_advance", "cuda_settle", "cuda_neighbours",
     ),
-    "growth": ("frame", "growth", "cuda_planar", "cuda_tables", "cuda_growth"),
+    "growth": ("frame", "every_step", "growth", "cuda_planar", "cuda_tables", "cuda_growth"),
 }  # fmt: skip
 
 

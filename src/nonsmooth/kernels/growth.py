@@ -50,18 +50,6 @@ def remaining(section, goal, work):
 
 
 @once
-def may_stride(i, form, net, section, seen):
-    """Every step is followed."""
-    return False
-
-
-@once
-def hurry(i, form, net, section, goal, seen, tables, work, patience):
-    """Every step is followed."""
-    return False, False, patience
-
-
-@once
 def observe(i, step, stop, triggered, form, net, section, goal, seen, tables, work):
     """Carry the frame over the leg: X = exp(A tau), from the nearest node and the Taylor rows of the states."""
     prop, tay, X, scale = tables.prop, tables.tay, seen.step, seen.scale
@@ -166,12 +154,6 @@ def depart(jumps, seen, work):
     seen.sums[2] += jumps
     multiply(S, seen.frame, STATES, STATES, seen.scratch)
     straighten(seen.frame, STATES, STATES, seen.lengths, size == -inf, False, seen.growth[work.tally[RETURNS]])
-
-
-@once
-def arrive(i, code, source, t, sense, state, form, section, goal, seen, tables, work):
-    """No section is looked for."""
-    return code
 
 
 @kernel(types.int64(types.int64, STEPPER[0], NET, SECTION, GOAL, MOTION, GROWTH, STEPPER[1], STEPPER[2]))

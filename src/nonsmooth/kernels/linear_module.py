@@ -16,7 +16,10 @@ from nonsmooth.kernels.cache import load_module
 __all__ = ["joined", "linear_module", "settle_module"]
 
 STEPPER = ("linear_tables", "linear_polynomial", "linear_search", "linear_stepper", "linear_layout", "hybrid")
-OBSERVERS = {"sections": ("linear_extremes", "sections"), "record": ("linear_touches", "record"), "growth": ("growth",)}
+OBSERVERS = {
+    "sections": ("linear_extremes", "sections"), "record": ("linear_touches", "every_step", "record"),
+    "growth": ("every_step", "growth"),
+}  # fmt: skip
 
 
 def joined(parts: tuple[str, ...], states: int = 2, harmonics: int = 1, memory: int = 0) -> str:

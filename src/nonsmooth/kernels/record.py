@@ -47,18 +47,6 @@ def remaining(section, goal, work):
 
 
 @once
-def may_stride(i, form, net, section, seen):
-    """Every step is seen."""
-    return False
-
-
-@once
-def hurry(i, form, net, section, goal, seen, tables, work, patience):
-    """Every step is seen."""
-    return False, False, patience
-
-
-@once
 def watched(section, goal, work):
     """Every step is seen."""
     return True
@@ -125,12 +113,6 @@ def cross(i, t, mode, jumps, form, net, goal, seen, tables, work):
 @once
 def depart(jumps, seen, work):
     """Nothing is asked of a crossing after it was made."""
-
-
-@once
-def arrive(i, code, source, t, sense, state, form, section, goal, seen, tables, work):
-    """No section is looked for."""
-    return code
 
 
 @kernel(types.int64(STEPPER[0], NET, SECTION, GOAL, MOTION, LOG, STEPPER[1], STEPPER[2]))

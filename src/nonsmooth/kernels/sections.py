@@ -240,7 +240,8 @@ def chain(first, last, starts, form, net, section, goal, motion, seen, tables, w
     """Run points first <= i < last into ``seen``; returns the point that has paused, or ``last``.
 
     Without ``starts`` each point goes on from where the last good one ended, at equal phase of the forcing; else it
-    begins at its own row of them, in the first mode. A point that fails leaves the motion where it was."""
+    begins at its own row of them (states, memory), in the first mode. A point that fails leaves the motion where it
+    was."""
     for i in range(first, last):
         T = form.period[i]
         if work.tally[BEGUN] == 0:
@@ -248,7 +249,7 @@ def chain(first, last, starts, form, net, section, goal, motion, seen, tables, w
                 for j in range(motion.u.shape[0]):
                     motion.u[j] = starts[i, j]
                 for j in range(motion.memory.shape[0]):
-                    motion.memory[j] = 0.0
+                    motion.memory[j] = starts[i, motion.u.shape[0] + j]
                 motion.counters[0], motion.counters[1] = 0, 0
                 motion.clock[0], motion.clock[1], motion.clock[2] = 0.0, 0.0, 0.0
             elif motion.clock[2] > 0.0:

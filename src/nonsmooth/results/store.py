@@ -82,8 +82,13 @@ def save(result: xr.Dataset, path: str | os.PathLike[str]) -> Path:
                     file.write(written)
                     file.write(trailer(written))
             else:
+                # Made in memory: where a disk is full, zarr's threads go on and make anew the folder that was cleared.
                 # Every chunk is written, empty or not, so that `load` can tell a missing one from zeros.
-                encoded.to_zarr(fresh, zarr_format=2, consolidated=True, write_empty_chunks=True)
+                chunks: dict[str, Any] = {}
+                encoded.to_zarr(chunks, zarr_format=2, consolidated=True, write_empty_chunks=True)
+                for name, chunk in chunks.items():
+                    (fresh / name).parent.mkdir(parents=True, exist_ok=True)
+                    (fresh / name).write_bytes(chunk.to_bytes())
             _compare(target, fresh, held)
             replace(target, fresh)
     except DataFileError as error:
