@@ -9,20 +9,14 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from nonsmooth.kernels.forking import watch_forks
+from nonsmooth.kernels.compile.forking import watch_forks
 from nonsmooth.results import progress as _progress  # noqa: F401  it says when kernels are compiled
 
 if TYPE_CHECKING:
     from nonsmooth import models as models
     from nonsmooth import plot as plot
-    from nonsmooth.analysis.basin_fractions import basin_fractions as basin_fractions
-    from nonsmooth.analysis.basins import basins as basins
-    from nonsmooth.analysis.chart import chart as chart
-    from nonsmooth.analysis.correlation_dimension import correlation_dimension as correlation_dimension
-    from nonsmooth.analysis.lyapunov import lyapunov as lyapunov
-    from nonsmooth.analysis.response import frequency_response as frequency_response
-    from nonsmooth.analysis.sweep import sweep as sweep
-    from nonsmooth.analysis.zero_one_test import zero_one_test as zero_one_test
+    from nonsmooth.attractors.basin_fractions import basin_fractions as basin_fractions
+    from nonsmooth.attractors.basins import basins as basins
     from nonsmooth.continuation.continue_curve import continue_curve as continue_curve
     from nonsmooth.continuation.continue_equilibrium import continue_equilibrium as continue_equilibrium
     from nonsmooth.continuation.continue_orbit import continue_orbit as continue_orbit
@@ -30,6 +24,12 @@ if TYPE_CHECKING:
     from nonsmooth.continuation.manifolds import manifolds as manifolds
     from nonsmooth.continuation.orbit import Orbit as Orbit
     from nonsmooth.continuation.special import special_points as special_points
+    from nonsmooth.diagrams.chart import chart as chart
+    from nonsmooth.diagrams.correlation_dimension import correlation_dimension as correlation_dimension
+    from nonsmooth.diagrams.lyapunov import lyapunov as lyapunov
+    from nonsmooth.diagrams.response import frequency_response as frequency_response
+    from nonsmooth.diagrams.sweep import sweep as sweep
+    from nonsmooth.diagrams.zero_one_test import zero_one_test as zero_one_test
     from nonsmooth.errors import DataFileError as DataFileError
     from nonsmooth.errors import Interrupted as Interrupted
     from nonsmooth.errors import SolveError as SolveError
@@ -69,14 +69,14 @@ _WHERE = {
     "Stroboscopic": "flow.sections",
     "Poincare": "flow.sections",
     "random_starts": "flow.starts",
-    "sweep": "analysis.sweep",
-    "frequency_response": "analysis.response",
-    "lyapunov": "analysis.lyapunov",
-    "correlation_dimension": "analysis.correlation_dimension",
-    "zero_one_test": "analysis.zero_one_test",
-    "basins": "analysis.basins",
-    "basin_fractions": "analysis.basin_fractions",
-    "chart": "analysis.chart",
+    "sweep": "diagrams.sweep",
+    "frequency_response": "diagrams.response",
+    "lyapunov": "diagrams.lyapunov",
+    "correlation_dimension": "diagrams.correlation_dimension",
+    "zero_one_test": "diagrams.zero_one_test",
+    "basins": "attractors.basins",
+    "basin_fractions": "attractors.basin_fractions",
+    "chart": "diagrams.chart",
     "find_orbit": "continuation.find",
     "Orbit": "continuation.orbit",
     "continue_orbit": "continuation.continue_orbit",

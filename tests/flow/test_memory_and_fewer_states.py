@@ -7,10 +7,10 @@ import pytest
 from random_systems import Template, draw, growing
 
 import nonsmooth as ns
-from nonsmooth.flow.engine import Chain, SectionPlan, State
-from nonsmooth.flow.linear import LinearEngine, PlanarEngine
-from nonsmooth.flow.methods import engine_for
-from nonsmooth.flow.series import SeriesEngine
+from nonsmooth.flow.engines.engine import Chain, SectionPlan, State
+from nonsmooth.flow.engines.linear import LinearEngine, PlanarEngine
+from nonsmooth.flow.engines.methods import engine_for
+from nonsmooth.flow.engines.series import SeriesEngine
 
 
 def yielding() -> Template:

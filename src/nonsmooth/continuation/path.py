@@ -59,8 +59,8 @@ class Walk:
     """Walks along orbits of one system with one signature."""
 
     def __init__(self, shooting: Shooting) -> None:
-        from nonsmooth.flow.loop import pack_net
-        from nonsmooth.kernels.pointers import addresses
+        from nonsmooth.flow.engines.loop import pack_net
+        from nonsmooth.kernels.compile.pointers import addresses
         from nonsmooth.system.generate import compile_model
 
         self.shooting, system = shooting, shooting.system
@@ -117,7 +117,7 @@ class Walk:
         """Walk along the visits of a solved orbit; ``states`` (m + 1, n_z) begin them.
 
         None where the states grow without bound."""
-        from nonsmooth.kernels.orbit_path import follow
+        from nonsmooth.kernels.tangent.orbit_path import follow
 
         m, n_t = self.shape
         extremes = np.empty((2, self.n))
