@@ -287,10 +287,7 @@ def make_step(i, form, net, section, wanted, work, r_max):
         if form.locate == 1:
             work.found[0] = 0
             forget_signs(n_i, work.side_next)
-            x, pending, hit = earliest(
-                mode, work.C, degree, n, work.powers, net, work.side, work.side_next, work.scale, tail, slack, work.a,
-                work.d, work.stack, work.found,
-            )  # fmt: skip
+            x, pending, hit = earliest(mode, degree, n, net, tail, slack, work)
             if work.found[0] == 1 and fixed <= 0.0 and halvings < place.HALVINGS:
                 h *= 0.5  # a graze nearer than the polynomial is sure of
                 tally[place.LANDING] = 0
