@@ -92,8 +92,9 @@ def vanishing(tables, mode, f, w):
 def mark_zeros(tables, work, mode):
     """Of each indicator, how many of its value, slope and further derivatives vanish within rounding at w.
 
-    Two where a stick ends, three where a contact lifts off: what is rounding there must not decide. At a crossing w carries the rounding of the step that led there: it decides where an indicator has no constant
-    part, such as that of a stop at x = 0."""
+    Two where a stick ends, three where a contact lifts off: what is rounding there must not decide. At a crossing w
+    carries the rounding of the step that led there: it decides where an indicator has no constant part, such as that of
+    a stop at x = 0."""
     w, zero = work.w, work.zero
     step = 0.0
     for k in range(tables.info.shape[0]):
