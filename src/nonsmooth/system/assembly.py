@@ -38,7 +38,7 @@ from nonsmooth.system.transition import Transition
 __all__ = ["assembled"]
 
 MOST = 256  # modes
-SMALL = 1e-9  # of the states' scale: what a rate or a gap that is held at zero may be off where a run begins
+SMALL = 1e-6  # of the states' scale: what a rate or a gap that is held at zero may be off where a run begins
 CREEP = 1e-7  # of the same: the speed of approach below which impacts are not followed
 Condition = tuple[sp.Expr, int, str]  # an expression, its sign, a name for it
 Pattern = tuple[int, ...]  # the phase of each element
@@ -247,6 +247,12 @@ class _Assembler:
                 after[i] += d * impulse
         return [sp.expand(sp.cancel(state)) for state in after]
 
+    def back_on(self, part: _Part, states: Sequence[sp.Expr]) -> list[sp.Expr]:
+        """States moved onto the surface of a contact, the shortest way."""
+        slopes = [sp.diff(part.where, symbol) for symbol in self.u]
+        length = sp.Add(*[slope**2 for slope in slopes])
+        return [sp.expand(sp.cancel(x - part.where * s / length)) for x, s in zip(states, slopes, strict=True)]
+
     def leaving(self, k: int, mode: str, pattern: Pattern) -> list[tuple[str, list[Condition], list[sp.Expr] | None]]:
         """Transitions of one element out of its phase: the phase behind, the condition, the states behind."""
         part = self.parts[k]
@@ -290,7 +296,7 @@ class _Assembler:
         if e.phases[pattern[k]] == "rest":
             off = sp.Float(SMALL * self.size(part.where))
             beyond = [(part.where + off, -1, f"{name}_beyond")]
-            same = self.projected(part, w, sp.Integer(0), (), mode)
+            same = self.back_on(part, self.projected(part, w, sp.Integer(0), (), mode))
             return [
                 ("open", [(pull[0], 1, pull[1])], None), ("open", [(part.where - off, 1, f"{name}_off")], None),
                 ("open", beyond, same),

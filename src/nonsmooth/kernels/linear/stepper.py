@@ -134,6 +134,15 @@ def holds(t, mode, tables, net, work):
 
 
 @once
+def lies_beyond(t, form, net, work):
+    """Whether no indicator of transition t is zero at the present instant."""
+    beyond = True
+    for r in range(net.row_start[t], net.row_start[t + 1]):
+        beyond = beyond and work.zero[net.rows[r, 0]] == 0
+    return beyond
+
+
+@once
 def prepare(i, form, motion, tables, work):
     """Tables of point i, and where the motion is."""
     build(i, form, tables, work)

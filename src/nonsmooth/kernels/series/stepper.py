@@ -102,6 +102,16 @@ def holds(t, mode, tables, net, work):
 
 
 @once
+def lies_beyond(t, form, net, work):
+    """Whether no indicator of transition t is zero at the present instant."""
+    J = work.J0 if METHOD == place.RKF45 else work.C
+    beyond = True
+    for r in range(net.row_start[t], net.row_start[t + 1]):
+        beyond = beyond and J[work.w.shape[0] + net.rows[r, 0], 0] != 0.0
+    return beyond
+
+
+@once
 def take(i, t, fired, form, tables, net, work):
     """Take transition t (its indicator ``fired`` has just crossed; -1: none). Returns the new mode.
 
