@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from nonsmooth.results.store import load as load
     from nonsmooth.results.store import save as save
     from nonsmooth.system import elements as elements
+    from nonsmooth.system.mechanical import mechanical as mechanical
     from nonsmooth.system.mode import Band as Band
     from nonsmooth.system.mode import Mode as Mode
     from nonsmooth.system.origin import system_of as system_of
@@ -61,6 +62,7 @@ _WHERE = {
     "Transition": "system.transition",
     "Surface": "system.transition",
     "Mode": "system.mode",
+    "mechanical": "system.mechanical",
     "Band": "system.mode",
     "where": "system.scalar",
     "system_of": "system.origin",
