@@ -5,11 +5,38 @@ Parameters are given by name: ``discontinuous_support(omega=3.69, g=-0.0045)``.
 
 from typing import Any
 
+from nonsmooth.models.bilinear_oscillator import bilinear_oscillator
+from nonsmooth.models.chua_circuit import chua_circuit
 from nonsmooth.models.discontinuous_support import discontinuous_support
+from nonsmooth.models.double_impact_oscillator import double_impact_oscillator
+from nonsmooth.models.drifting_impact_oscillator import drifting_impact_oscillator
+from nonsmooth.models.gear_pair import gear_pair
+from nonsmooth.models.impact_damper import impact_damper
+from nonsmooth.models.impact_duffing import impact_duffing
+from nonsmooth.models.impact_friction_oscillator import impact_friction_oscillator
 from nonsmooth.models.impact_oscillator import impact_oscillator
+from nonsmooth.models.parabolic_track import parabolic_track
 from nonsmooth.models.relief_valve import relief_valve
+from nonsmooth.models.rubbing_rotor import rubbing_rotor
+from nonsmooth.models.stribeck_oscillator import stribeck_oscillator
 
-__all__ = ["discontinuous_support", "impact_oscillator", "names", "relief_valve"]
+__all__ = [
+    "bilinear_oscillator",
+    "chua_circuit",
+    "discontinuous_support",
+    "double_impact_oscillator",
+    "drifting_impact_oscillator",
+    "gear_pair",
+    "impact_damper",
+    "impact_duffing",
+    "impact_friction_oscillator",
+    "impact_oscillator",
+    "names",
+    "parabolic_track",
+    "relief_valve",
+    "rubbing_rotor",
+    "stribeck_oscillator",
+]
 
 
 def __getattr__(name: str) -> Any:

@@ -138,13 +138,13 @@ class _Assembler:
         if isinstance(e, ElasticStop):
             if phase == "open":
                 return sp.Integer(0)
-            return -self.of(part, "stiffness") * part.where - self.of(part, "damping") * self.rate(part, mode)
+            return -self.of(part, "stiffness") * part.where + self.damped(part, mode)
         if isinstance(e, Backlash):
             if phase == "free":
                 return sp.Integer(0)
             side = 1 if phase == "above" else -1
             pressed = part.where - side * self.of(part, "half_width")
-            return -self.of(part, "stiffness") * pressed - self.of(part, "damping") * self.rate(part, mode)
+            return -self.of(part, "stiffness") * pressed + self.damped(part, mode)
         if isinstance(e, PreloadedSpring):
             side = 1 if phase == "above" else -1
             return -side * self.of(part, "preload") - self.of(part, "stiffness") * part.where
@@ -152,6 +152,11 @@ class _Assembler:
             return None
         side = 1 if phase == "forward" else -1
         return -side * self.friction(part, side * part.where) * self.normal(part, mode, pattern)
+
+    def damped(self, part: _Part, mode: str) -> sp.Expr:
+        """The damper's force of an elastic contact; without one no speed is asked for, and states need not have one."""
+        damping = self.of(part, "damping")
+        return sp.Integer(0) if damping == 0 else -damping * self.rate(part, mode)
 
     def friction(self, part: _Part, speed: sp.Expr) -> sp.Expr:
         """The kinetic law at a magnitude of the speed."""
