@@ -3,7 +3,7 @@ r"""A symmetrically bilinear oscillator on a shaken base: Wiercigroch & Sin, J. 
 A mass on soft springs meets stiffer ones on both sides, each behind the gap g. Known in closed form: the motion
 between the stiffer springs grazes them at A omega^2 = g sqrt((1 - omega^2)^2 + (2 zeta omega)^2), and free motion
 without damping that leaves them with the speed v has the period
-4 arcsin(g / a) + (4 / s) (pi / 2 + arctan(g / (s v))), a^2 = g^2 + v^2, s^2 = 1 + beta.
+4 arcsin(g / a) + (4 / s) arctan(s v / g), a^2 = g^2 + v^2, s^2 = 1 + beta.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 r"""Chua's circuit, piecewise linear: Matsumoto, Chua & Komuro, IEEE Trans. Circuits Syst. 32 (1985) 797-818.
 
-Published for the double scroll (alpha 9, beta 100/7, slopes -1/7 and 2/7): Lyapunov exponents 0.23, 0 and -1.78. Known in
-closed form: the outer equilibria are at x = +-(b - a) / b = +-1.5 and lose stability at
-(1 + alpha b) (alpha b - alpha + beta) = alpha beta b.
+Published for the double scroll (alpha 9, beta 100/7, slopes -1/7 and 2/7): Lyapunov exponents 0.23, 0 and -1.78 per unit
+of the circuit's time, which is 1 / 0.7 of the dimensionless one, and the dimension 2.13. Known in closed form: the outer
+equilibria are at x = +-(b - a) / b = +-1.5 and lose stability at (1 + alpha b) (alpha b - alpha + beta) = alpha beta b.
 """
 
 from __future__ import annotations

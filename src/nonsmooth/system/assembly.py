@@ -259,7 +259,7 @@ class _Assembler:
     def projected(self, k: int, factor: sp.Expr, held: Sequence[int], mode: str) -> list[sp.Expr]:
         """States behind an impulse of the element that takes its rate to -factor times it.
 
-        Contacts that rest and friction that sticks bear their part of it."""
+        What is held bears its part of it."""
         wanted = sp.Matrix([-(1 + factor) * self.rate(self.parts[k], mode), *([0] * len(held))])
         impulses = self.effects([k, *held], mode).LUsolve(wanted)
         after = list(self.u)
@@ -357,25 +357,27 @@ class _Assembler:
                 ("forward", [(v - off, 1, f"{name}_speed_above")], None), ("back", [(v + off, -1, f"{name}_speed_below")], None),
                 ("back", [(above[0], 1, above[1])], None), ("forward", [(below[0], -1, below[1])], None),
             ]  # fmt: skip
-        held = self._bearing(k, pattern, mode)
+        held = [j for j in self.held(pattern) if sp.simplify(self.across(self.rate(self.parts[j], mode), part)) != 0]
         still = self.projected(k, sp.Integer(0), held, mode)
         sign = -1 if phase == "forward" else 1
         stopped: Condition = (v, sign, f"{name}_speed")
+        off = -sign * sp.Float(CREEP * self.size(v))
+        slow, turned = ((v + off, one * sign, f"{name}_turned_{phase}") for one in (-1, 1))
         within = [(above[0], -1, above[1]), (below[0], 1, below[1])]
         other, torn = ("back", (above[0], 1, above[1])) if phase == "forward" else ("forward", (below[0], -1, below[1]))
-        return [("stick", [stopped, *within], still), (other, [stopped, torn], None)]
+        # An impact turns the speed round at once, and no finite force can stop it then.
+        return [("stick", [stopped, slow, *within], still), (other, [stopped, torn], None), (other, [turned], None)]
 
     def _bearing(self, k: int, pattern: Pattern, mode: str) -> list[int]:
-        """Of what rests or sticks the elements that take part in an impulse of element k.
+        """Of the contacts that rest those that take part in an impulse of element k.
 
-        Contacts that it would pull open part instead."""
+        Those that it would pull open part instead; friction is finite and lets go of what it held."""
 
         def bears(j: int) -> bool:
             part = self.parts[j]
-            change = self.across(self.rate(part, mode), self.parts[k])
-            if sp.simplify(change) == 0:
+            if isinstance(part.element, Coulomb):
                 return False
-            return isinstance(part.element, Coulomb) or float(change.subs(self.values)) < 0
+            return float(self.across(self.rate(part, mode), self.parts[k]).subs(self.values)) < 0
 
         return [j for j in self.held(pattern) if j != k and bears(j)]
 
