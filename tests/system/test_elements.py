@@ -131,6 +131,41 @@ def test_impacts_between_masses_keep_the_momentum() -> None:
     assert after[3] - after[2] == pytest.approx(0.25 * (before[2] - before[3]), rel=1e-14)
 
 
+def test_what_friction_holds_is_driven_away_by_an_impact() -> None:
+    """A finite force bears no impulse: the struck mass leaves with (1 + e) / 2 and the momentum is kept."""
+    pair = ns.mechanical(
+        np.eye(2), np.zeros((2, 2)), np.zeros((2, 2)), coordinates=["a", "b"],
+        elements={
+            "bumper": Stop(at={"b": 1, "a": -1}, side=-1, restitution=0.25), "rub": Coulomb(at="b", friction=0.1),
+        },
+    )  # fmt: skip
+    run = ns.simulate(pair, duration=1.5, start={"a": 0.0, "b": 1.0, "v_a": 1.0})
+    assert run["u_after"].values[0] == pytest.approx([1.0, 1.0, 0.375, 0.625], abs=1e-14)
+    assert run["u"].values[-1] == pytest.approx([1.1875, 1.3, 0.375, 0.575], abs=1e-13)
+
+
+def test_a_mass_that_rubs_rebounds() -> None:
+    """The impact turns the speed round and with it the friction: v - f t before, f t - e (v - f) after."""
+    puck = ns.mechanical(
+        1.0, 0.0, 0.0, elements=[Coulomb(at="q", friction=0.1), Stop(at="q", position=0.95, restitution=0.5)]
+    )
+    run = ns.simulate(puck, duration=3.0, start={"v_q": 1.0})
+    assert run["crossing_time"].values[0] == pytest.approx(1.0, abs=1e-13)
+    assert run["u"].values[-1] == pytest.approx([0.95 - 0.45 * 2 + 0.05 * 4, -0.25], abs=1e-13)
+
+
+def test_an_elastic_contact_without_a_damper_acts_on_any_state() -> None:
+    """x' = -x + F with F = -3 (x - 1) above 1: decay with the rate 4 down to x = 1, then with the rate 1."""
+    diode = ns.System(
+        states=["x"], parameters={}, modes={"all": lambda t, u, p: (-u.x,)},
+        elements=[Backlash(displacement=lambda t, u, p: u.x, on={"x": 1.0}, half_width=1.0, stiffness=3.0)],
+    )  # fmt: skip
+    run = ns.simulate(diode, duration=2.0, start={"x": 2.0})
+    turn = np.log((2 - 0.75) / (1 - 0.75)) / 4  # x = 3/4 + (2 - 3/4) exp(-4 t)
+    assert run["crossing_time"].values[-1] == pytest.approx(turn, rel=1e-13)
+    assert float(run["u"][-1, 0]) == pytest.approx(np.exp(-(2.0 - turn)), rel=1e-12)
+
+
 def test_a_block_rests_on_two_feet_and_tips_over_one() -> None:
     """Forces of two contacts at once: statics of a bar on two supports under a load that moves out.
 
