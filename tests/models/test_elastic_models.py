@@ -37,11 +37,12 @@ def test_free_motion_of_the_bilinear_oscillator_has_the_period_of_its_pieces(v: 
 
 def bilinear(t: float, u: np.ndarray) -> list[float]:
     x, v = u
-    return [v, 0.7**2 * np.cos(0.7 * t) - 0.1 * v - x - 10 * (x - np.clip(x, -1, 1))]
+    return [v, 2 * 0.7**2 * np.cos(0.7 * t) - 0.1 * v - x - 10 * (x - np.clip(x, -1, 1))]
 
 
 def test_the_forced_bilinear_oscillator_and_its_multipliers_against_scipy() -> None:
     orbit = ns.find_orbit(ns.models.bilinear_oscillator())
+    assert orbit.maximum[0] > 1 and orbit.minimum[0] < -1
     assert march({"all": bilinear}, {}, "all", orbit.u, orbit.period)[1] == pytest.approx(orbit.u, abs=1e-9)
     expected = multipliers(bilinear, orbit.u, orbit.period)
     assert np.sort_complex(orbit.floquet_multipliers) == pytest.approx(expected, abs=1e-5)

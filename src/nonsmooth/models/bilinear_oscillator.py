@@ -46,7 +46,7 @@ def bilinear_oscillator(**parameters: float) -> System:
     ----------
     **parameters : float
         ``zeta`` 0.05 (damping ratio), ``beta`` 10 (stiffness of the outer springs over that of the inner ones),
-        ``g`` 1 (gap), ``A`` 1 (amplitude of the base), ``omega`` 0.7; dimensionless, round values in place of a rig's.
+        ``g`` 1 (gap), ``A`` 2 (amplitude of the base), ``omega`` 0.7; dimensionless, round values in place of a rig's.
 
     Returns
     -------
@@ -71,7 +71,7 @@ def bilinear_oscillator(**parameters: float) -> System:
     system = mechanical(
         1.0, _damping, 1.0, name="bilinear oscillator", coordinates="x", base=_base,
         parameters={
-            "zeta": (0.05, "", r"\zeta"), "beta": (10.0, "", r"\beta"), "g": 1.0, "A": 1.0,
+            "zeta": (0.05, "", r"\zeta"), "beta": (10.0, "", r"\beta"), "g": 1.0, "A": 2.0,
             "omega": (0.7, "", r"\omega"),
         },
         elements={"springs": Backlash(at="x", half_width="g", stiffness="beta")},

@@ -47,7 +47,7 @@ def parabolic_track(**parameters: float) -> System:
     Parameters
     ----------
     **parameters : float
-        ``zeta`` 0.02, ``A`` 0.1 (amplitude of the track's horizontal motion), ``omega`` 0.8, ``d`` 0.2 (the stop), ``e`` 0.6;
+        ``zeta`` 0.02, ``A`` 0.2 (amplitude of the track's horizontal motion), ``omega`` 0.8, ``d`` 0.2 (the stop), ``e`` 0.6;
         dimensionless.
 
     Returns
@@ -72,7 +72,7 @@ def parabolic_track(**parameters: float) -> System:
     system = System(
         name="parabolic track", states=["x", "v"], modes={"cart": _cart},
         parameters={
-            "zeta": (0.02, "", r"\zeta"), "A": 0.1, "omega": (0.8, "", r"\omega"), "d": 0.2, "e": 0.6,
+            "zeta": (0.02, "", r"\zeta"), "A": 0.2, "omega": (0.8, "", r"\omega"), "d": 0.2, "e": 0.6,
         },
         elements={"stop": Stop(gap=_gap, on={"v": _stop}, restitution="e")},
     )  # fmt: skip
