@@ -47,6 +47,8 @@ if TYPE_CHECKING:
     from nonsmooth.identification.parameter_set import ParameterSet as ParameterSet
     from nonsmooth.results.store import load as load
     from nonsmooth.results.store import save as save
+    from nonsmooth.system.maps import Branch as Branch
+    from nonsmooth.system.maps import Map as Map
     from nonsmooth.system.mode import Band as Band
     from nonsmooth.system.mode import Mode as Mode
     from nonsmooth.system.origin import system_of as system_of
@@ -59,6 +61,8 @@ _WHERE = {
     "System": "system.system",
     "Transition": "system.transition",
     "Surface": "system.transition",
+    "Map": "system.maps",
+    "Branch": "system.maps",
     "Mode": "system.mode",
     "Band": "system.mode",
     "where": "system.scalar",

@@ -142,7 +142,8 @@ def _jump(
     before, after, order = modes[item.source], modes[item.target], list(indicators)
     rows: tuple[Row, ...] = ()
     if item.when is not None:
-        rows = tuple(Row(order.index(key), sign) for key, sign in read_condition(item.when, order, label))
+        conditions = read_condition(item.when, order, label)
+        rows = tuple(Row(order.index(key), sign, strict) for key, sign, strict in conditions)
     hidden = {symbols.u[state]: state for state in symbols.u if state not in before}
     for row in rows:
         for symbol in expressions[row.indicator].free_symbols & hidden.keys():

@@ -87,7 +87,7 @@ def _content(d: Description) -> dict[str, Any]:
             continue
         entry: dict[str, Any] = {"source": t.mode_names[jump.source], "target": t.mode_names[jump.target]}
         if jump.at is None:
-            entry["when"] = condition_text([(t.indicator_names[row.indicator], row.sign) for row in jump.rows])
+            entry["when"] = condition_text([(t.indicator_names[row.indicator], row.sign, row.strict) for row in jump.rows])
         else:
             entry["at"] = float(jump.at)
         if jump.reset is not None:

@@ -19,8 +19,8 @@ __all__ = ["Row", "Traced", "TracedTransition"]
 class Row:
     """One sign condition: ``sign * indicator > 0`` (``>= 0`` where not strict).
 
-    A non-strict row only occurs in derived systems (the smoothed switch), where it settles a tie:
-    the region of an indicator that vanishes identically.
+    A non-strict row settles a tie in derived systems (the smoothed switch, the regions of a map): it also holds where
+    the indicator vanishes identically.
     """
 
     indicator: int
