@@ -10,11 +10,11 @@ import numpy as np
 
 from nonsmooth.flow.engine import Chain, FloatArray, Log, SectionPlan, State
 from nonsmooth.kernels import codes
-from nonsmooth.kernels.run_places import BEGUN, CROSSINGS, PATIENCE, TOUCHES
+from nonsmooth.kernels.run_places import BEGUN, CROSSINGS, PATIENCE, RESET, TOUCHES
 from nonsmooth.kernels.stopping import flag
 
 if TYPE_CHECKING:
-    from nonsmooth.system.traced import Traced
+    from nonsmooth.system.traced import Traced, TracedTransition
 
 __all__ = ["DIVERGENCE", "LoopEngine", "pack_net"]
 
@@ -174,15 +174,21 @@ def with_section(net: Any, indicator: int) -> Any:
     return net._replace(rows=rows)
 
 
+def _change(traced: Traced, jump: TracedTransition) -> int:
+    """What a transition changes: RESET the state, 2 other numbers only, so that it is taken where it holds at a start."""
+    if not traced.keeps(jump):
+        return RESET
+    return 0 if jump.reset is None and not jump.writes else 2
+
+
 def pack_net(traced: Traced) -> Any:
     """The net of transitions (``kernels.records.Net``), with two more rows for a section."""
     from nonsmooth.kernels.records import Net
 
     integer = np.int64
     transitions = np.array(
-        [(t.target, 1 if t.reset is not None else 2 * bool(t.writes), t.contact) for t in traced.transitions],
-        dtype=integer,
-    ).reshape(-1, 3)
+        [(t.target, _change(traced, t), t.contact) for t in traced.transitions], dtype=integer,
+    ).reshape(-1, 3)  # fmt: skip
     rows = [(r.indicator, r.sign, r.strict) for t in traced.transitions for r in t.rows]
     row_start = np.cumsum([0] + [len(t.rows) for t in traced.transitions], dtype=integer)
     leaving = [

@@ -74,3 +74,10 @@ class Traced:
     transitions: tuple[TracedTransition, ...]
     outputs: tuple[tuple[Expr, ...], ...]
     period: Expr | None
+
+    def keeps(self, jump: TracedTransition) -> bool:
+        """Whether a transition leaves every state of its source as it is; states that its source lacks may begin."""
+        if jump.reset is None:
+            return True
+        both = zip(jump.reset, self.u, self.lacking[jump.source], self.lacking[jump.target], strict=True)
+        return all(before or (new == old and not after) for new, old, before, after in both)
