@@ -24,6 +24,7 @@ from nonsmooth.flow.engine import Chain, Engine, FloatArray, IntArray, SectionPl
 from nonsmooth.flow.linear import LinearEngine
 from nonsmooth.flow.methods import engine_for
 from nonsmooth.results.memory import room_for
+from nonsmooth.system.phases import varying_phases
 
 if TYPE_CHECKING:
     from nonsmooth.kernels.settle import Rules
@@ -79,7 +80,8 @@ class Settler:
     @property
     def linear(self) -> LinearEngine | None:
         """The engine whose jobs run in one compiled call; None where they run one by one."""
-        return self.engine if isinstance(self.engine, LinearEngine) and self.plan.indicator < 0 else None
+        alike = isinstance(self.engine, LinearEngine) and self.plan.indicator < 0 and self.engine.phases is None
+        return self.engine if alike else None
 
     def load(self) -> None:
         """Compile or load the kernel now, before threads ask for it."""
@@ -119,10 +121,12 @@ class Settler:
         """
         rows = np.ascontiguousarray(rows, dtype=np.int64)
         starts = np.ascontiguousarray(starts, dtype=float)
-        if modes is None:
-            modes = np.full(len(rows), mode_at(self.system, begin))
-        modes = np.array(modes, dtype=np.int64)
         points = np.ascontiguousarray(points, dtype=float)
+        if modes is None:
+            one = varying_phases(self.system.traced) is None
+            modes = np.array([mode_at(self.system, begin, values) for values in points[: 1 if one else None]])
+            modes = np.full(len(rows), modes[0]) if one else modes[rows]
+        modes = np.array(modes, dtype=np.int64)
         if self.device == "cuda":
             assert not carried  # refused at the door
             return settle_on_gpu(self, points, rows, starts, modes, begin, attempts)

@@ -89,7 +89,7 @@ def _content(d: Description) -> dict[str, Any]:
         if jump.at is None:
             entry["when"] = condition_text([(t.indicator_names[row.indicator], row.sign, row.strict) for row in jump.rows])
         else:
-            entry["at"] = float(jump.at)
+            entry["at"] = float(jump.at) if isinstance(jump.at, int | float) else text(jump.at)
         if jump.reset is not None:
             own = t.lacking[jump.target]
             entry["reset"] = {s: text(e) for s, e, gone in zip(t.state_names, jump.reset, own, strict=True) if not gone}
@@ -218,7 +218,7 @@ class _Reader:
             entry["source"],
             entry["target"],
             when=entry.get("when"),
-            at=entry.get("at"),
+            at=self.function(entry["at"]) if isinstance(entry.get("at"), str) else entry.get("at"),
             reset=self.vector(entry["reset"]) if "reset" in entry else None,
             write={k: self.function(e) for k, e in entry["write"].items()} if "write" in entry else None,
         )

@@ -33,7 +33,7 @@ class TracedTransition:
     """An allowed jump from mode ``source`` to mode ``target``.
 
     It fires at the instant all ``rows`` hold (``rows``), or at the forcing phase ``at`` (in periods,
-    0..1); one of the two is empty. ``reset`` has one expression per state, or is None (identity).
+    0..1: a number, or an expression of the parameters); one of the two is empty. ``reset`` has one expression per state, or is None (identity).
     ``writes`` are (memory index, expression) pairs, evaluated with the state just before the jump.
     ``contact`` marks the transitions counted as contacts: those with a reset, and those that leave the
     first mode.
@@ -42,7 +42,7 @@ class TracedTransition:
     source: int
     target: int
     rows: tuple[Row, ...]
-    at: float | None = None
+    at: float | Expr | None = None
     reset: tuple[Expr, ...] | None = None
     writes: tuple[tuple[int, Expr], ...] = ()
     contact: bool = False
@@ -74,6 +74,15 @@ class Traced:
     transitions: tuple[TracedTransition, ...]
     outputs: tuple[tuple[Expr, ...], ...]
     period: Expr | None
+
+    def phase_text(self, jump: TracedTransition) -> str:
+        """The phase of a transition as it was written."""
+        if isinstance(jump.at, int | float):
+            return f"{jump.at:g}"
+        from nonsmooth.system.expressions import write_expression
+
+        assert jump.at is not None
+        return write_expression(jump.at, dict(zip(self.p, self.parameter_names, strict=True)))
 
     def keeps(self, jump: TracedTransition) -> bool:
         """Whether a transition leaves every state of its source as it is; states that its source lacks may begin."""
