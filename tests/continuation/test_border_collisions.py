@@ -32,6 +32,7 @@ def test_a_fixed_point_goes_through_the_border():
     assert table.touched.values.tolist() == ["border_x"]
     assert table.mu.values == pytest.approx([0.0], abs=1e-13)
     x, mu = branch.section.values[:, 0], branch.mu.values
+    assert mu[[0, -1]] == pytest.approx([-0.5, 0.5])
     assert x == pytest.approx(np.where(mu < 0, mu / (1 - 0.5), mu / (1 + 0.8)), abs=1e-12)
     off = np.abs(mu) > 1e-12
     multipliers = branch.floquet_multipliers.values.real.ravel()[off]

@@ -28,7 +28,7 @@ def stable_periods(lam: float, mu: float) -> set[int]:
 
 
 def test_period_adding_below_a_quarter():
-    """Chin, Ott, Nusse, Grebogi 1994: for lambda < 1/4 period m + 1 follows on m as mu falls, and both exist between."""
+    """Chin, Ott, Nusse, Grebogi 1994: for lambda < 1/4 period m + 1 follows on m as mu falls; both exist between."""
     lam = 0.2
     mu = np.geomspace(0.3, 1e-4, 60)
     found = ns.sweep(models.square_root_map(lam=lam), "mu", mu, direction="both", transient=2000, keep=24)

@@ -103,5 +103,5 @@ def test_a_region_that_opens_at_other_values_ends_the_run():
     pieces = ["low < 0 and high < 0", "low > 0 and high < 0", "low > 0 and high > 0"]
     system = one_state(*[(same, when) for when in pieces], low=low, high=high)
     found = ns.sweep(system, "a", [1.0, -1.0], start={"x": 0.5}, direction=None)
-    meanings = found.status.attrs["flag_meanings"].split()
-    assert [meanings[list(found.status.attrs["flag_values"]).index(one)] for one in found.status.values] == ["ok", "diverged"]
+    meanings = dict(zip(found.status.attrs["flag_values"], found.status.attrs["flag_meanings"].split(), strict=True))
+    assert [meanings[one] for one in found.status.values] == ["ok", "diverged"]

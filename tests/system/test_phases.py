@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 import nonsmooth as ns
+from nonsmooth.flow.engine import Chain, SectionPlan, State
+from nonsmooth.flow.methods import engine_for
 
 
 def heater(duty: float = 0.3, **more: float) -> ns.System:
@@ -32,6 +36,15 @@ def test_a_sweep_over_the_phase(method: str):
     expected = [steady(duty) for duty in DUTIES]
     assert found.period_number.values.tolist() == [1] * 4
     assert found.section.values[:, -1, 0] == pytest.approx(expected, rel=1e-9)
+
+
+def test_points_of_one_call_have_their_own_phases():
+    system = heater()
+    engine = engine_for(system)
+    tables = engine.prepare(system.parameter_points({"duty": DUTIES}))
+    out, state = Chain.empty(4, 1, 1, 0, 0), State(np.zeros(1), np.zeros(0))
+    engine.chain(tables, 0, 4, state, np.zeros((4, 1)), SectionPlan(), 40, 1, out)
+    assert out.section.ravel() == pytest.approx([steady(duty) for duty in DUTIES], rel=1e-12)
 
 
 def test_a_chart_over_phase_and_period():
@@ -77,11 +90,13 @@ def test_a_phase_outside_the_period_is_refused(duty: float):
 
 
 def test_a_phase_depends_on_parameters_alone():
-    def system(at: object) -> ns.System:
+    def system(at: Any) -> ns.System:
+        kick = ns.Transition(
+            "one", "one", at=at, reset=lambda t, u, p: (u.x + 1,), write={"kept": lambda t, u, p: u.x}
+        )
         return ns.System(
             states=["x"], parameters={"a": 0.5}, modes={"one": lambda t, u, p: (-u.x,)}, period=1.0,
-            memory={"kept": ""},
-            transitions=[ns.Transition("one", "one", at=at, reset=lambda t, u, p: (u.x + 1,), write={"kept": lambda t, u, p: u.x})],  # type: ignore[arg-type]
+            memory={"kept": ""}, transitions=[kick],
         )  # fmt: skip
 
     assert system(lambda p: 0.25).transitions[0].at == 0.25

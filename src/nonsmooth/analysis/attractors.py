@@ -80,8 +80,9 @@ class Settler:
     @property
     def linear(self) -> LinearEngine | None:
         """The engine whose jobs run in one compiled call; None where they run one by one."""
-        alike = isinstance(self.engine, LinearEngine) and self.plan.indicator < 0 and self.engine.phases is None
-        return self.engine if alike else None
+        if not isinstance(self.engine, LinearEngine) or self.engine.phases is not None:
+            return None
+        return self.engine if self.plan.indicator < 0 else None
 
     def load(self) -> None:
         """Compile or load the kernel now, before threads ask for it."""

@@ -102,7 +102,8 @@ class LoopEngine:
 
         n, n_u, n_m = len(samples), len(self.scale), len(self.traced.m)
         model, own, work = self.given(tables, "record")
-        rest = model, self.net_of(tables, 0), nowhere(), self._goal(0, 0, until, 0.0), self._motion(state, state.settled)
+        net, goal = self.net_of(tables, 0), self._goal(0, 0, until, 0.0)
+        rest = model, net, nowhere(), goal, self._motion(state, state.settled)
         sampled = (
             np.ascontiguousarray(samples, dtype=float), np.full((n, n_u), np.nan), np.full((n, n_m), np.nan),
             np.full(n, -1, dtype=np.int64), np.zeros(n, dtype=np.int64),
@@ -190,7 +191,9 @@ def with_section(net: Any, indicator: int) -> Any:
 
 
 def _change(traced: Traced, jump: TracedTransition) -> int:
-    """What a transition changes: RESET the state, 2 other numbers only, so that it is taken where it holds at a start."""
+    """Place 1 of ``Net.transitions``: RESET, or 2 for one that also happens where it holds at a start already.
+
+    It writes memory, or begins states that its source lacks."""
     if not traced.keeps(jump):
         return RESET
     return 0 if jump.reset is None and not jump.writes else 2

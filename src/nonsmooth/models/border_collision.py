@@ -1,11 +1,11 @@
 r"""The normal form of border collision: two linear maps that agree on the border x = 0.
 
 The fixed point of the side with trace :math:`\tau` and determinant :math:`\delta` is
-:math:`x = \mu / (1 - \tau + \delta)`, :math:`y = -\delta x`; it exists where x lies on its side, and its multipliers are
-the roots of :math:`z^2 - \tau z + \delta`. With both determinants zero x follows the skew tent map with the slopes
+:math:`x = \mu / (1 - \tau + \delta)`, :math:`y = -\delta x`; it exists where x lies on its side, and its multipliers
+are the roots of :math:`z^2 - \tau z + \delta`. With both determinants zero x follows the skew tent map with the slopes
 a = tau_l and b = tau_r. For 0 < a < 1 and mu > 0 the orbit with one point to the right among n exists for
-:math:`b < -(1 + a + \dots + a^{n-2}) / a^{n-2}` and is stable for :math:`a^{n-1} b > -1`: as mu passes through 0 a stable
-fixed point becomes one of period 2, of period 3, or chaos.
+:math:`b < -(1 + a + \dots + a^{n-2}) / a^{n-2}` and is stable for :math:`a^{n-1} b > -1`: as mu passes through 0 a
+stable fixed point becomes an orbit of period 2, of period 3, or chaos.
 """
 
 from __future__ import annotations

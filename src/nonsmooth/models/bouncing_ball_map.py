@@ -1,9 +1,9 @@
 r"""A ball on a vibrating table, bounces so high that the table's own displacement does not matter.
 
 The orbit that bounces once in n periods of the table, :math:`v = 2 \pi n`,
-:math:`\cos\theta = -2 \pi n (1 - \alpha) / \gamma`, is born in a fold at :math:`\gamma = 2 \pi n (1 - \alpha)` and loses
-stability in a flip at :math:`\gamma = 2 \sqrt{\pi^2 n^2 (1 - \alpha)^2 + (1 + \alpha)^2}`: for n = 1 at 3.141593 and
-4.344 with :math:`\alpha = 0.5`, at 1.256637 and 3.813 with 0.8. Its determinant is :math:`\alpha`.
+:math:`\cos\theta = -2 \pi n (1 - \alpha) / \gamma`, is born in a fold at :math:`\gamma = 2 \pi n (1 - \alpha)` and
+loses stability in a flip at :math:`\gamma = 2 \sqrt{\pi^2 n^2 (1 - \alpha)^2 + (1 + \alpha)^2}`: for n = 1 at
+3.141593 and 4.344 with :math:`\alpha = 0.5`, at 1.256637 and 3.813 with 0.8. Its determinant is :math:`\alpha`.
 """
 
 from __future__ import annotations
@@ -40,12 +40,12 @@ def bouncing_ball_map(**parameters: float) -> Map:
     -------
     Map
         One branch; the states are the table's phase at an impact and the ball's velocity behind it, in units of
-        :math:`g / (2 \omega)`. Give a start such as ``{"theta": 4.0, "v": 6.3}``: it decides whether the ball bounces at all.
+        :math:`g / (2 \omega)`. Give a start such as ``{"theta": 4.0, "v": 6.3}``: it decides which orbit is reached.
 
     References
     ----------
-    P.J. Holmes, J. Sound Vib. 84 (1982) 173-189; J. Guckenheimer, P. Holmes, *Nonlinear Oscillations, Dynamical Systems,
-    and Bifurcations of Vector Fields*, Springer 1983, sec. 2.4.
+    P.J. Holmes, J. Sound Vib. 84 (1982) 173-189; J. Guckenheimer, P. Holmes, *Nonlinear Oscillations, Dynamical
+    Systems, and Bifurcations of Vector Fields*, Springer 1983, sec. 2.4.
     """
     from nonsmooth.system.maps import Branch, Map
 

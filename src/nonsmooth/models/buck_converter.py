@@ -1,8 +1,8 @@
 r"""A DC-DC buck converter under voltage-mode control: the classic example of chaos in power electronics.
 
-A switch feeds an LC filter with a load. It is closed while a sawtooth lies above the amplified error of the output voltage,
-and the sawtooth falls back at the end of every period. Published: for rising input voltage the period-1 cycle loses
-stability in a period doubling near 24.5 V and period 4 follows near 31 V.
+A switch feeds an LC filter with a load. It is closed while a sawtooth lies above the amplified error of the output
+voltage, and the sawtooth falls back at the end of every period. Published: for rising input voltage the period-1 cycle
+loses stability in a period doubling near 24.5 V, and period 4 follows near 31 V.
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ def buck_converter(**parameters: float) -> System:
     Parameters
     ----------
     **parameters : float
-        ``V_in`` 24 V, ``R`` 22 ohm, ``L`` 20 mH, ``C`` 47 uF, ``T`` 400 us, ``V_ref`` 11.3 V, ``gain`` 8.4, ``V_low`` 3.8 V,
-        ``V_high`` 8.2 V.
+        ``V_in`` 24 V, ``R`` 22 ohm, ``L`` 20 mH, ``C`` 47 uF, ``T`` 400 us, ``V_ref`` 11.3 V, ``gain`` 8.4,
+        ``V_low`` 3.8 V, ``V_high`` 8.2 V.
 
     Returns
     -------

@@ -1,7 +1,7 @@
 r"""Nordmark's square-root map: an impact oscillator near the amplitude at which it grazes its stop.
 
-Between impacts the return map is linear; an impact of low speed adds a square root, whose slope is infinite at the border
-x = 0. With :math:`s = \sqrt{x}` the period-m orbit with one point beyond the border solves
+Between impacts the return map is linear; an impact of low speed adds a square root, whose slope is infinite at the
+border x = 0. With :math:`s = \sqrt{x}` the period-m orbit with one point beyond the border solves
 
 .. math:: (1 - \lambda^m) s^2 + \lambda^{m-1} s = \mu \frac{1 - \lambda^m}{1 - \lambda}
 

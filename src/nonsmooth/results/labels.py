@@ -35,8 +35,13 @@ class Labels:
     outputs: Mapping[str, Quantity] = field(default_factory=dict)
     memory: Mapping[str, Quantity] = field(default_factory=dict)
     time_unit: str = "s"
-    turn: str = "forcing period"  # between two returns to a section at a phase; of a map an iterate
+    is_map: bool = False  # the time counts iterates
     text: str = ""
+
+    @property
+    def turn(self) -> str:
+        """Word for the time between two returns to a section at a phase."""
+        return "iterate" if self.is_map else "forcing period"
 
     @property
     def transition_labels(self) -> tuple[str, ...]:
@@ -62,6 +67,6 @@ def labels_of(system: Any) -> Labels:
         memory={name: Quantity(unit or "1") for name, unit in system.memory.items()},
         # A system whose states have no units is written in a scaled time; that of a map counts iterates.
         time_unit="s" if any(quantity.unit != "1" for quantity in states.values()) and not system.is_map else "1",
-        turn="iterate" if system.is_map else "forcing period",
+        is_map=system.is_map,
         text=system.to_text(),
     )

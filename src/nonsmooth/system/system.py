@@ -229,7 +229,7 @@ class System:
 
     @property
     def is_map(self) -> bool:
-        """Return whether the states change by transitions alone, as those of a `Map` do: the time counts its iterates."""
+        """Return whether the states change by transitions alone and the period is 1, as those of a `Map` do."""
         fields = self.traced.fields
         return self.traced.period == 1 and all(entry == 0 for field in fields for entry in field)
 

@@ -87,7 +87,8 @@ def _content(d: Description) -> dict[str, Any]:
             continue
         entry: dict[str, Any] = {"source": t.mode_names[jump.source], "target": t.mode_names[jump.target]}
         if jump.at is None:
-            entry["when"] = condition_text([(t.indicator_names[row.indicator], row.sign, row.strict) for row in jump.rows])
+            rows = [(t.indicator_names[row.indicator], row.sign, row.strict) for row in jump.rows]
+            entry["when"] = condition_text(rows)
         else:
             entry["at"] = float(jump.at) if isinstance(jump.at, int | float) else text(jump.at)
         if jump.reset is not None:

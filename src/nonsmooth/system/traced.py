@@ -32,11 +32,10 @@ class Row:
 class TracedTransition:
     """An allowed jump from mode ``source`` to mode ``target``.
 
-    It fires at the instant all ``rows`` hold (``rows``), or at the forcing phase ``at`` (in periods,
-    0..1: a number, or an expression of the parameters); one of the two is empty. ``reset`` has one expression per state, or is None (identity).
-    ``writes`` are (memory index, expression) pairs, evaluated with the state just before the jump.
-    ``contact`` marks the transitions counted as contacts: those with a reset, and those that leave the
-    first mode.
+    It fires at the instant all ``rows`` hold (``rows``), or at the forcing phase ``at`` (in periods, 0..1: a number,
+    or an expression of the parameters); one of the two is empty. ``reset`` has one expression per state, or is None
+    (identity). ``writes`` are (memory index, expression) pairs, evaluated with the state just before the jump.
+    ``contact`` marks the transitions counted as contacts: those with a reset, and those that leave the first mode.
     """
 
     source: int

@@ -21,7 +21,7 @@ class Transition:
         Names of modes; equal for an impact that stays in its mode.
     when : str, optional
         Signs of indicators joined by ``and``: ``"penetration > 0 and separation < 0"``. The transition fires
-        at the instant the condition *becomes* true.
+        at the instant the condition *becomes* true. ``>= 0`` also holds where an indicator is and stays zero.
     at : float or callable, optional
         Instead of ``when``: a phase of the forcing, in periods (0 <= at < 1), or a function of the parameters that
         returns it: ``at=lambda p: p.duty``.
