@@ -1,7 +1,7 @@
-r"""A ball on a vibrating table, bounces so high that the table's own displacement does not matter.
+r"""A ball on a vibrating table that bounces so high that the displacement of the table does not matter.
 
 The orbit that bounces once in n periods of the table, :math:`v = 2 \pi n`,
-:math:`\cos\theta = -2 \pi n (1 - \alpha) / \gamma`, is born in a fold at :math:`\gamma = 2 \pi n (1 - \alpha)` and
+:math:`\cos\theta = -2 \pi n (1 - \alpha) / \gamma`, appears in a fold at :math:`\gamma = 2 \pi n (1 - \alpha)` and
 loses stability in a flip at :math:`\gamma = 2 \sqrt{\pi^2 n^2 (1 - \alpha)^2 + (1 + \alpha)^2}`: for n = 1 at
 3.141593 and 4.344 with :math:`\alpha = 0.5`, at 1.256637 and 3.813 with 0.8. Its determinant is :math:`\alpha`.
 """

@@ -81,7 +81,7 @@ class Map(System):
     -----
     An iterate is a period: ``transient``, ``keep`` and ``period_number`` count iterates, and so does the time. The
     first section point is the image of the start. Whether regions cover the states once is shown by the signs of their
-    indicators, else looked for at the given values of the parameters. At other values the first of two regions is
+    indicators, else searched at the given values of the parameters. At other values the first of two regions is
     taken, and a point that no region holds ends the run with the status ``diverged``.
     """
 

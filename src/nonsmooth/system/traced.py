@@ -84,7 +84,7 @@ class Traced:
         return write_expression(jump.at, dict(zip(self.p, self.parameter_names, strict=True)))
 
     def keeps(self, jump: TracedTransition) -> bool:
-        """Whether a transition leaves every state of its source as it is; states that its source lacks may begin."""
+        """Return whether a transition leaves every state of its source as it is; states that it lacks may begin."""
         if jump.reset is None:
             return True
         both = zip(jump.reset, self.u, self.lacking[jump.source], self.lacking[jump.target], strict=True)
