@@ -26,7 +26,7 @@ SCRIPT = Path(__file__).with_name("gpu_script.py")
 
 COMPILE = """
 import json, sys
-from nonsmooth.kernels.cuda_ptx import ptx_of
+from nonsmooth.kernels.cuda.ptx import ptx_of
 
 found = {}
 for name, signature in json.load(sys.stdin).items():

@@ -12,7 +12,7 @@ import pytest
 import nonsmooth
 
 KERNEL = """
-from nonsmooth.kernels.cache import kernel
+from nonsmooth.kernels.compile.cache import kernel
 
 
 @kernel("float64(float64)")
@@ -24,17 +24,23 @@ def twice(a):
 BEGIN = """
 import json, sys
 from pathlib import Path
-from nonsmooth.kernels import cache, target
+from nonsmooth.kernels.compile import cache, target
 target.AHEAD = Path(sys.argv[1])
 {}
 import one
 """
-CALL = BEGIN + """
+CALL = (
+    BEGIN
+    + """
 print(json.dumps([one.twice(21.0), *list(cache.cache_statistics(one))[0][1:]]))
 """
-NAMED = BEGIN + """
+)
+NAMED = (
+    BEGIN
+    + """
 print(json.dumps([cache.compiled(one.twice).entry(), target.level()]))
 """
+)
 LOADED, COMPILED = [42.0, 1, 0], [42.0, 0, 1]
 
 
@@ -98,12 +104,12 @@ def test_one_of_another_level_is_not_used(tmp_path, made):
 @pytest.mark.parametrize("has", ["", "avx avx512f"])
 def test_the_level_is_one_that_the_processor_has(tmp_path, has):
     """Code for a level is asked for only where every feature of it is there."""
-    from nonsmooth.kernels.target import LEVELS
+    from nonsmooth.kernels.compile.target import LEVELS
 
     v3 = LEVELS["x86_64"]["x86-64-v3"]
     script = """
 import json, platform, sys
-from nonsmooth.kernels import target
+from nonsmooth.kernels.compile import target
 platform.machine = lambda: "x86_64"
 target.get_host_cpu_features = lambda: sys.argv[1]
 print(json.dumps(target.level()))
@@ -137,7 +143,7 @@ def decorated(path):
 
 
 def test_every_kernel_of_the_package_is_compiled_ahead():
-    from nonsmooth.kernels import ahead
+    from nonsmooth.kernels.compile import ahead
 
     written = {name for path in Path(nonsmooth.__file__).parent.rglob("*.py") for name in decorated(path)}
     modules = {ahead._module(task) for task in ahead.tasks()}
@@ -148,8 +154,8 @@ def test_every_kernel_of_the_package_is_compiled_ahead():
 
 
 def test_what_is_compiled_ahead_is_what_a_later_process_looks_for(tmp_path):
-    from nonsmooth.kernels.ahead import compile_ahead
-    from nonsmooth.kernels.target import level
+    from nonsmooth.kernels.compile.ahead import compile_ahead
+    from nonsmooth.kernels.compile.target import level
 
     if not level():
         pytest.skip("this processor has none of the levels")
@@ -158,8 +164,11 @@ def test_what_is_compiled_ahead_is_what_a_later_process_looks_for(tmp_path):
     stale.write_bytes(b"of an older source")
     assert compile_ahead(tmp_path / "ahead", level(), [("nonsmooth.kernels.histogram", "", ())]) == 1
     assert not stale.exists()
-    script = BEGIN.replace("import one", "from nonsmooth.kernels import histogram") + """
+    script = (
+        BEGIN.replace("import one", "from nonsmooth.kernels import histogram")
+        + """
 histogram.count.compile_now()
 print(json.dumps([list(found) for found in cache.cache_statistics(histogram)]))
 """
+    )
     assert run(tmp_path, script) == [["count", 1, 0]]

@@ -12,7 +12,7 @@ import json, sys
 import numpy as np
 import nonsmooth as ns
 from nonsmooth.flow.variational import VariationalFlow
-from nonsmooth.kernels.cache import cache_statistics
+from nonsmooth.kernels.compile.cache import cache_statistics
 
 system = ns.models.discontinuous_support()
 flow = VariationalFlow.of(system, ("rho",))

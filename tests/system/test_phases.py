@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.flow.engine import Chain, SectionPlan, State
-from nonsmooth.flow.methods import engine_for
+from nonsmooth.flow.engines.engine import Chain, SectionPlan, State
+from nonsmooth.flow.engines.methods import engine_for
 
 
 def heater(duty: float = 0.3, **more: float) -> ns.System:
