@@ -51,6 +51,7 @@ def test_an_orbit_born_at_the_border_begins_there():
     """b < -1 and a b > -1: the orbit of period 2, x = mu (1 + b) / (1 - a b) and mu (1 + a) / (1 - a b)."""
     branch = branch_of(skew(0.5, -1.5, mu=0.1), start={"x": 0.1})
     assert int(branch.period_number) == 2
+    assert branch.period_number.attrs["long_name"].startswith("iterates")
     assert float(branch.mu.min()) == pytest.approx(0.0, abs=1e-13)
     mu, x = branch.mu.values[1:], branch.section.values[1:, 0]
     points = np.abs(x / mu - np.array([[-0.5 / 1.75], [1.5 / 1.75]])).min(axis=0)

@@ -115,6 +115,16 @@ def test_from_period_1_to(a: float, b: float, period: int):
     assert found.period_number.values.tolist() == [1, period]
 
 
+def test_charts_and_basins_of_the_normal_form():
+    """a = 0.5: behind the collision period 1 for b = -0.8, 2 for -1.5, 3 for none of these; every start gets there."""
+    chart = ns.chart(normal_form(0.5, -0.8), {"mu": [-0.1, 0.1], "tau_r": [-1.5, -0.8]})
+    assert chart.period_number.values.tolist() == [[1, 1], [2, 1]]
+    grid = {"x": np.linspace(-1.0, 1.0, 5), "y": np.linspace(-1.0, 1.0, 4)}
+    basins = ns.basins(normal_form(0.5, -1.5), grid)
+    assert (basins.label.values == 0).all()
+    assert basins.period_number.values.tolist() == [2]
+
+
 def test_the_exponent_of_chaos_behind_a_collision():
     """b = -2.5 and a = b / (1 - b^2): the third image of the border is the fixed point, three intervals are mapped
     onto one another, and the density is uniform on each."""

@@ -44,6 +44,15 @@ def test_iterates_are_those_of_a_loop():
     assert np.allclose(found.section.values[:12, 0], expected[:12], rtol=0, atol=1e-13)
 
 
+def test_results_count_iterates():
+    """No seconds on the axis, though the state has a unit."""
+    growth = ns.Map(states={"mass": "kg"}, parameters={"r": 0.5}, branches=[ns.Branch(lambda u, p: (p.r * u.mass,))])
+    run = ns.simulate(growth, periods=2, start={"mass": 1.0})
+    assert (run.time.attrs["units"], run.time.attrs["symbol"]) == ("1", "n")
+    assert ns.poincare(growth, n=3, start={"mass": 1.0}).time.values.tolist() == [1.0, 2.0, 3.0]
+    assert ns.find_orbit(growth).period_number == 1
+
+
 def test_a_point_on_a_border_belongs_to_the_branch_listed_first():
     found = ns.poincare(tent(), n=1, start={"x": 0.3})
     assert found.section.values[0, 0] == 1.7 * 0.3  # the second would give 0.41

@@ -54,6 +54,11 @@ def test_a_chart_over_phase_and_period():
     assert chart.maximum.values[..., 0] == pytest.approx(np.array(top), rel=1e-9)
 
 
+def test_a_gpu_knows_one_phase_for_all_points():
+    with pytest.raises(ValueError, match="`at` depends on the parameters"):
+        ns.chart(heater(), {"duty": [0.2, 0.3], "span": [1.0, 2.0]}, device="cuda")
+
+
 def test_an_orbit_and_its_branch_in_the_phase():
     orbit = ns.find_orbit(heater(0.3))
     assert orbit.u == pytest.approx([steady(0.3)], rel=1e-12)

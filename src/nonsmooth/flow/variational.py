@@ -184,9 +184,12 @@ class VariationalFlow:
         at = self.traced.transitions[k].at
         if isinstance(at, int | float):
             return float(at), self._no_timing
-        varying = varying_phases(self.traced)
-        assert varying is not None
-        return float(varying(values)[k]), phase_slopes(self.traced, self.places)(values)[k]
+        found, slopes = self._phases
+        return float(found(values)[k]), slopes(values)[k]
+
+    @cached_property
+    def _phases(self) -> Any:
+        return varying_phases(self.traced), phase_slopes(self.traced, self.places)
 
     def period(self, values: Any) -> tuple[float, FloatArray]:
         """Forcing period T and dT/dp (n_active,); infinite and zeros where there is none."""
