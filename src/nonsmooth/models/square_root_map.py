@@ -33,7 +33,7 @@ def _impact(u: Any, p: Any) -> Any:
 
 
 def square_root_map(**parameters: float) -> Map:
-    r"""Return Nordmark's square-root map, the normal form of grazing with one strongly contracting direction.
+    r"""Return the square-root map of Nordmark: the normal form of a grazing impact in one dimension.
 
     :math:`x \to \lambda x + \mu` for :math:`x \le 0`, :math:`\lambda x + \mu - \sqrt x` for :math:`x > 0`
 
