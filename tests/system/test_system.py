@@ -139,7 +139,7 @@ def jump(*arguments, **options):
     [
         (jump("free", "contakt", when="overlap > 0"), "`contakt` is not a mode .*nearest: contact"),
         (jump("free", "contact", when="overlapp > 0"), "`overlapp` is not an indicator .*nearest: overlap"),
-        (jump("free", "contact", when="overlap >= 0"), "the grammar is: <indicator> > 0"),
+        (jump("free", "contact", when="overlap == 0"), "the grammar is: <indicator> > 0"),
         (jump("free", "contact", when="overlap > 0 or back < 0"), "the grammar is"),
         (jump("free", "contact", when="overlap > 1"), "the grammar is"),
         (jump("free", "contact", when="u.x > 0"), "the grammar is"),

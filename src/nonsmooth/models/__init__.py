@@ -5,11 +5,18 @@ Parameters are given by name: ``discontinuous_support(omega=3.69, g=-0.0045)``.
 
 from typing import Any
 
+from nonsmooth.models.border_collision import border_collision
+from nonsmooth.models.bouncing_ball_map import bouncing_ball_map
+from nonsmooth.models.buck_converter import buck_converter
 from nonsmooth.models.discontinuous_support import discontinuous_support
 from nonsmooth.models.impact_oscillator import impact_oscillator
 from nonsmooth.models.relief_valve import relief_valve
+from nonsmooth.models.square_root_map import square_root_map
 
-__all__ = ["discontinuous_support", "impact_oscillator", "names", "relief_valve"]
+__all__ = [
+    "border_collision", "bouncing_ball_map", "buck_converter", "discontinuous_support", "impact_oscillator", "names",
+    "relief_valve", "square_root_map",
+]  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:

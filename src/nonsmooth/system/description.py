@@ -218,16 +218,16 @@ def _with_period(
 
 def _check_phases(traced: Traced) -> None:
     """Of two transitions from one mode at one phase only the first would ever be taken."""
-    met: dict[tuple[int, float], str] = {}
+    met: dict[tuple[int, Any], str] = {}
     for jump in traced.transitions:
         if jump.at is None:
             continue
-        place = (jump.source, float(jump.at))
+        place = (jump.source, jump.at)
         if place in met:
             raise SystemDefinitionError(
                 f"transitions {met[place]} and {jump.label} both leave mode {traced.mode_names[jump.source]!r} at "
-                f"phase {float(jump.at):g}: only the first would be taken. Put what both do into one reset, or give "
-                "them different phases"
+                f"phase {traced.phase_text(jump)}: only the first would be taken. Put what both do into one reset, or "
+                "give them different phases"
             )
         met[place] = jump.label
 

@@ -144,7 +144,8 @@ def _jump(
     before, after, order = modes[item.source], modes[item.target], list(indicators)
     rows: tuple[Row, ...] = ()
     if item.when is not None:
-        rows = tuple(Row(order.index(key), sign) for key, sign in read_condition(item.when, order, label))
+        conditions = read_condition(item.when, order, label)
+        rows = tuple(Row(order.index(key), sign, strict) for key, sign, strict in conditions)
     hidden = {symbols.u[state]: state for state in symbols.u if state not in before}
     for row in rows:
         for symbol in expressions[row.indicator].free_symbols & hidden.keys():
@@ -171,7 +172,21 @@ def _jump(
         value = call_scalar(function, (time, u, p), f"what {label} writes to {key!r}")
         writes.append((list(symbols.m).index(key), value))
     contact = source == 0 or reset is not None
-    return TracedTransition(source, target, rows, item.at, reset, tuple(writes), contact, item.label)
+    at = _phase(item.at, label, symbols) if callable(item.at) else item.at
+    return TracedTransition(source, target, rows, at, reset, tuple(writes), contact, item.label)
+
+
+def _phase(given: Callable[..., Any], label: str, symbols: Symbols) -> float | sp.Expr:
+    """The phase of a transition as an expression of the parameters; a number where it depends on none."""
+    phase = call_scalar(given, (symbols.parameters(),), f"`at` of {label}")
+    if not phase.free_symbols:
+        number = float(phase)
+        if not 0 <= number < 1:
+            raise SystemDefinitionError(f"{label}: `at` is a phase in forcing periods, 0 <= at < 1; not {number!r}")
+        return number
+    if not phase.free_symbols <= set(symbols.p.values()):
+        raise SystemDefinitionError(f"{label}: `at` may depend on the parameters only, not on {as_written(phase)}")
+    return phase
 
 
 def _trace_output(

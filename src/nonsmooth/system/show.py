@@ -34,7 +34,7 @@ def _row(row: Row, traced: Traced) -> str:
 def _jump(jump: TracedTransition, traced: Traced, names: dict[sp.Symbol, str]) -> str:
     text = jump.label
     if jump.at is not None:
-        text += f"  at phase {jump.at:g}"
+        text += f"  at phase {traced.phase_text(jump)}"
     else:
         text += "  when " + " and ".join(_row(row, traced) for row in jump.rows)
     if jump.reset is not None:
@@ -136,7 +136,7 @@ def latex(system: System) -> str:
     for jump in traced.transitions:
         arrow = rf"{word(traced.mode_names[jump.source])} &\to {word(traced.mode_names[jump.target])}"
         if jump.at is not None:
-            condition = rf"t / T = {jump.at:g}"
+            condition = "t / T = " + (f"{jump.at:g}" if isinstance(jump.at, int | float) else write(jump.at))
         else:
             signs = (
                 (">" if r.sign > 0 else "<") if r.strict else (r"\ge" if r.sign > 0 else r"\le") for r in jump.rows

@@ -87,9 +87,10 @@ def _content(d: Description) -> dict[str, Any]:
             continue
         entry: dict[str, Any] = {"source": t.mode_names[jump.source], "target": t.mode_names[jump.target]}
         if jump.at is None:
-            entry["when"] = condition_text([(t.indicator_names[row.indicator], row.sign) for row in jump.rows])
+            rows = [(t.indicator_names[row.indicator], row.sign, row.strict) for row in jump.rows]
+            entry["when"] = condition_text(rows)
         else:
-            entry["at"] = float(jump.at)
+            entry["at"] = float(jump.at) if isinstance(jump.at, int | float) else text(jump.at)
         if jump.reset is not None:
             own = t.lacking[jump.target]
             entry["reset"] = {s: text(e) for s, e, gone in zip(t.state_names, jump.reset, own, strict=True) if not gone}
@@ -218,7 +219,7 @@ class _Reader:
             entry["source"],
             entry["target"],
             when=entry.get("when"),
-            at=entry.get("at"),
+            at=self.function(entry["at"]) if isinstance(entry.get("at"), str) else entry.get("at"),
             reset=self.vector(entry["reset"]) if "reset" in entry else None,
             write={k: self.function(e) for k, e in entry["write"].items()} if "write" in entry else None,
         )

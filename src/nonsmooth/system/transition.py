@@ -21,9 +21,10 @@ class Transition:
         Names of modes; equal for an impact that stays in its mode.
     when : str, optional
         Signs of indicators joined by ``and``: ``"penetration > 0 and separation < 0"``. The transition fires
-        at the instant the condition *becomes* true.
-    at : float, optional
-        Instead of ``when``: a phase of the forcing, in periods (0 <= at < 1).
+        at the instant the condition *becomes* true. ``>= 0`` also holds where an indicator is and stays zero.
+    at : float or callable, optional
+        Instead of ``when``: a phase of the forcing, in periods (0 <= at < 1), or a function of the parameters that
+        returns it: ``at=lambda p: p.duty``.
     reset : callable, optional
         ``reset(t, u, p)`` returns the new state (in the order of the target mode's states).
     write : mapping of str to callable, optional
@@ -33,7 +34,7 @@ class Transition:
     source: str
     target: str
     when: str | None = None
-    at: float | None = None
+    at: float | Callable[..., Any] | None = None
     reset: Callable[..., Any] | None = None
     write: Mapping[str, Callable[..., Any]] | None = field(default=None)
 
@@ -43,9 +44,10 @@ class Transition:
                 f"{self.label}: give either `when` (a condition) or `at` (a phase of the forcing), not "
                 + ("neither" if self.when is None else "both")
             )
-        if self.at is not None and not (isinstance(self.at, (int, float)) and 0 <= self.at < 1):
+        if not (self.at is None or callable(self.at) or (isinstance(self.at, (int, float)) and 0 <= self.at < 1)):
             raise SystemDefinitionError(
-                f"{self.label}: `at` is a phase in forcing periods, 0 <= at < 1; not {self.at!r}"
+                f"{self.label}: `at` is a phase in forcing periods, 0 <= at < 1, or a function of the parameters; not "
+                f"{self.at!r}"
             )
         if self.reset is not None and not callable(self.reset):
             raise SystemDefinitionError(f"{self.label}: `reset` must be a function reset(t, u, p), not {self.reset!r}")
