@@ -25,7 +25,7 @@ class Variant:
         self.memory: dict[str, tuple[float, str]] = dict(description.memory)
         extra: tuple[Any, ...] = ()
         if kind == SHARP:
-            self.traced: Traced = description.traced
+            self.traced: Traced = description.with_sliding(description.traced)
         else:
             from nonsmooth.system.smoothing import smooth
 
