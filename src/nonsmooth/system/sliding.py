@@ -106,16 +106,23 @@ class _Builder:
 
     def rate(self, pair: _Pair, mode: int) -> sp.Expr:
         """Lie derivative of the pair's indicator in a mode."""
-        h = self.traced_indicator(pair)
+        h = self.indicators[pair.indicator]
         flow = sum(h.diff(u) * f for u, f in zip(self.traced.u, self.fields[mode], strict=True))
         return sp.expand(h.diff(self.traced.t) + flow)
 
-    def traced_indicator(self, pair: _Pair) -> sp.Expr:
-        return self.indicators[pair.indicator]
+    def at_surface(self, pair: _Pair, expression: sp.Expr) -> sp.Expr:
+        """The expression without a state that the surface determines: a field may have no value far beyond it."""
+        h = self.indicators[pair.indicator]
+        slopes = {u: sp.expand(h.diff(u)) for u in self.traced.u}
+        usable = [u for u, slope in slopes.items() if slope != 0 and not slope.free_symbols & self.moving]
+        if not usable:
+            return expression
+        u = min(usable, key=lambda u: len(slopes[u].free_symbols))
+        return sp.expand(expression.subs(u, sp.expand(u - h / slopes[u])))
 
     def size(self, pair: _Pair) -> sp.Expr:
         """Typical size of the indicator, from the states' scales."""
-        h, at = self.traced_indicator(pair), dict(zip(self.traced.u, self.scale, strict=True))
+        h, at = self.indicators[pair.indicator], dict(zip(self.traced.u, self.scale, strict=True))
         at |= {self.traced.t: sp.Integer(0)}
         size = sum(sp.Abs(h.diff(u).subs(at)) * s for u, s in zip(self.traced.u, self.scale, strict=True))
         usable = size != 0 and size.is_finite is not False and not size.free_symbols & self.moving
@@ -134,7 +141,7 @@ class _Builder:
         e = tuple(sp.Integer(0) if entry == 0 else self.ratio(entry, length) for entry in d)
         if any(entry.free_symbols & self.moving for entry in e):
             return None
-        h = self.traced_indicator(pair)
+        h = self.indicators[pair.indicator]
         return e, sp.expand(sum(h.diff(u) * x for u, x in zip(self.traced.u, e, strict=True))), length
 
     # Modes
@@ -165,7 +172,7 @@ class _Builder:
         """The convex combination that stays on the surface: vector field, outputs."""
         first, second = self.fields[pair.below], self.fields[pair.above]
         ends = [(row[pair.below], row[pair.above]) for row in self.outputs]
-        off = self.kappa * self.traced_indicator(pair)
+        off = self.kappa * self.indicators[pair.indicator]
         found = self.direction(pair)
         if found is None:
             a, b = (below + off) / (below - above), below / (below - above)
@@ -217,13 +224,13 @@ class _Builder:
     def add_transitions(self, pair: _Pair) -> None:
         """Add the transitions between below, above and sliding."""
         h, name = pair.indicator, self.indicator_names[pair.indicator]
-        size, value = self.size(pair), BEYOND * self.traced_indicator(pair)
+        size, value = self.size(pair), BEYOND * self.indicators[pair.indicator]
         beyond = {
             1: Row(self.indicator(value - size, f"{name} beyond"), 1),
             -1: Row(self.indicator(value + size, f"{name} behind"), -1),
         }
-        rates = {-1: self.rate(pair, pair.below), 1: self.rate(pair, pair.above)}
         mode = {-1: pair.below, 1: pair.above}
+        rates = {s: self.at_surface(pair, self.rate(pair, mode[s])) for s in mode}
         rate = {s: self.indicator(rates[s], f"{name} rate in {self.modes[mode[s]]}") for s in mode}
         leave = dict(rate)
         if pair.static is not None:
