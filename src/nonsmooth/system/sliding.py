@@ -16,25 +16,38 @@ Sliding ends where L_+ h rises or L_- h falls through zero, never by the quotien
 vanish together; a return to the surface therefore also needs the rate of h in its own mode, whose sign is known there.
 A state beyond the surface (a start, a reset) changes sides without sliding.
 
+Where L_- h - L_+ h vanishes in sliding (a two-fold) both fields turn away at once and motion is not unique: it goes to
+and fro between two modes at one instant, and the run ends as chatter.
+
 Two surfaces that both pairs of modes share give sliding along both: the same construction, with sliding modes in the
 places of the two modes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import sympy as sp
+from numpy.typing import NDArray
 
-from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.errors import SystemDefinitionError, shortened
 from nonsmooth.system.equations import TracedSurface
+from nonsmooth.system.scalar import as_written
 from nonsmooth.system.traced import Row, Traced, TracedTransition
 
-__all__ = ["slide"]
+__all__ = ["NOT_UNIQUE", "repelled", "slide"]
 
+if TYPE_CHECKING:
+    from nonsmooth.system.system import System
+
+FloatArray = NDArray[np.float64]
 BEYOND = 10**9  # a state farther from the surface than the indicator's scale over this is not on it
+NOT_UNIQUE = "_not_unique"  # ends the name of the mode in which motion has no unique way on
+ON_SURFACE = 1e-12  # of the indicator's size: a start so near lies on the surface
 SEEDS = 3  # random points at which the orders of two surfaces are compared
 
 Field = tuple[sp.Expr, ...]
@@ -84,6 +97,37 @@ def slide(traced: Traced, surfaces: Sequence[TracedSurface], scale: Mapping[str,
         indicator_names=tuple(build.indicator_names), indicators=tuple(build.indicators),
         transitions=tuple(build.jumps), outputs=tuple(tuple(row) for row in build.outputs),
     )  # fmt: skip
+
+
+@lru_cache(maxsize=256)
+def _both_rates(traced: Traced, surface: TracedSurface, scale: tuple[float, ...]) -> Callable[..., Any]:
+    """Function of t, u, m, p: the indicator, its size, its rates below and above."""
+    build = _Builder(traced, dict(zip(traced.state_names, scale, strict=True)))
+    pair = _Pair(surface.indicator, surface.below, surface.above, surface.mode)
+    rates = (build.rate(pair, mode) for mode in (pair.below, pair.above))
+    found = [traced.indicators[pair.indicator], build.size(pair), *rates]
+    return sp.lambdify([traced.t, list(traced.u), list(traced.m), list(traced.p)], found, modules="numpy")
+
+
+def repelled(system: System, states: FloatArray) -> tuple[str, int] | None:
+    """Return the surface on which a start lies where both fields point away from it, and which start; else None.
+
+    Parameters
+    ----------
+    system : System
+    states : array (S, n)
+        Starts at t = 0.
+    """
+    traced, scale = system.declared, tuple(system.scale.values())
+    for surface in system.surfaces:
+        both = _both_rates(traced, surface, scale)
+        with np.errstate(all="ignore"):
+            h, size, below, above = both(0.0, list(states.T), system.memory_vector(), system.parameter_vector())
+            found = (np.abs(h) <= ON_SURFACE * size) & (np.asarray(below) < 0) & (np.asarray(above) > 0)
+        found = np.broadcast_to(found, len(states))
+        if found.any():
+            return traced.indicator_names[surface.indicator], int(np.argmax(found))
+    return None
 
 
 class _Builder:
@@ -154,7 +198,7 @@ class _Builder:
         cell = self.cells[pair.below] | self.cells[pair.above]
         field, shown = self._filippov(pair, below, above)
         if pair.field is not None:
-            field = pair.field
+            field = self._given(pair, pair.field)
         if cell in self.cells:  # two surfaces that were met in the other order
             known = self.cells.index(cell)
             if _agree(field, self.fields[known]):
@@ -185,6 +229,22 @@ class _Builder:
         )
         shown = [x if x == y else sp.expand(x - self.ratio(y - x, length) * below / slope) for x, y in ends]
         return field, shown
+
+    def _given(self, pair: _Pair, given: Field) -> Field:
+        """The field that was given for the surface, with the same decay beside it."""
+        h = self.indicators[pair.indicator]
+        slopes = [h.diff(u) for u in self.traced.u]
+        rate = sp.expand(h.diff(self.traced.t) + sum(s * f for s, f in zip(slopes, given, strict=True)))
+        remainder = sp.simplify(self.at_surface(pair, rate))
+        if remainder != 0 and sp.fraction(sp.cancel(rate / h))[1].free_symbols & self.moving:
+            raise SystemDefinitionError(
+                f"{self.traced.name!r}: the field given for {pair.mode!r} leaves the surface "
+                f"{self.indicator_names[pair.indicator]!r}: along it the indicator has the rate "
+                f"{shortened(as_written(remainder))}, which must vanish on the surface"
+            )
+        norm = sum(s * s for s in slopes)
+        off = self.kappa * h
+        return tuple(f if s == 0 else f - off * s / norm for f, s in zip(given, slopes, strict=True))
 
     def meetings(self, pairs: Sequence[_Pair]) -> Iterator[_Pair]:
         """Surfaces between two sliding modes: where both sides of one surface slide along another."""
@@ -252,6 +312,26 @@ class _Builder:
             # Behind the end of sliding the rate in its own mode vanishes, and its sign is known.
             self.jump(source, slid, Row(h, s), Row(leave[s], -s), Row(rate[-s], s))
             self.jump(slid, target, Row(leave[s], s))
+        attraction = sp.expand(rates[-1] - rates[1])
+        if slid is not None and attraction.free_symbols & self.moving:
+            least = self.size(pair) * self.kappa / BEYOND
+            gone = Row(self.indicator(attraction - least, f"{name} attraction between {self._names(mode)}"), -1)
+            self.jump(slid, self.undetermined(slid), gone)
+            self.jump(self.undetermined(slid), slid, gone)
+
+    def _names(self, mode: Mapping[int, int]) -> str:
+        return f"{self.modes[mode[-1]]} and {self.modes[mode[1]]}"
+
+    def undetermined(self, slid: int) -> int:
+        """The mode that says that motion is not unique behind the end of a sliding mode."""
+        name = self.modes[slid] + NOT_UNIQUE
+        if name not in self.modes:
+            self.modes.append(name)
+            self.fields.append(self.fields[slid])
+            self.lacking.append(self.lacking[slid])
+            for row in self.outputs:
+                row.append(row[slid])
+        return self.modes.index(name)
 
     def inherit(self, between: Mapping[tuple[int, int], int | None], pairs: Sequence[_Pair]) -> None:
         """Keep the transitions of the declared system and give the sliding modes those of the modes that meet there."""
