@@ -1,0 +1,99 @@
+"""Motion along surfaces: where a run begins, how perturbations pass, ramps, and where there is no unique way on."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+
+
+@pytest.mark.parametrize(
+    ("start", "mode"),
+    [
+        ((0.0, 2.0), "forward"), ((3.0, 2.0), "forward"), ((-3.0, 0.5), "forward"), ((3.0, 0.31), "forward"),
+        ((0.0, -2.0), "backward"), ((-3.0, 0.2), "backward"), ((3.0, -0.5), "backward"),
+        ((1.0, 0.3), "stick"), ((0.6, 0.3), "forward"), ((1.4, 0.3), "backward"),
+    ],
+)  # fmt: skip
+def test_a_start_goes_to_its_side(start: tuple[float, float], mode: str) -> None:
+    """Beside the surface by its indicator alone, on it by the forces: |cos 0 - x| < 0.3 sticks."""
+    system = ns.models.dry_friction_oscillator(v_b=0.3)
+    run = ns.simulate(system, start=start, duration=1e-6, samples=2)
+    assert system.modes[int(run.mode.values[0])] == mode
+
+
+def derivatives(system: ns.System, duration: float, start: np.ndarray, step: float = 1e-6) -> np.ndarray:
+    columns = []
+    for i in range(len(start)):
+        ends = []
+        for sign in (1, -1):
+            moved = start.copy()
+            moved[i] += sign * step
+            ends.append(ns.simulate(system, duration=duration, start=moved, samples=2).u.values[-1])
+        columns.append((ends[0] - ends[1]) / (2 * step))
+    return np.array(columns).T
+
+
+def through(system: ns.System, duration: float, start: Any) -> list[str]:
+    run = ns.simulate(system, duration=duration, start=start, samples=2)
+    return [system.modes[system.transitions[i].target] for i in run.crossing_transition.values]
+
+
+@pytest.mark.parametrize(("duration", "last", "rank"), [(1.9, "stick", 1), (6.5, "backward", 1)])
+def test_derivatives_into_and_out_of_a_stick(duration: float, last: str, rank: int) -> None:
+    """With static friction: the field jumps where the stick ends."""
+    system = ns.models.dry_friction_oscillator(omega=0.4, f_s=0.4, zeta=0.05, v_b=0.1)
+    start = np.array([0.2, 1.2])
+    assert through(system, duration, start)[-1] == last
+    found = ns.sensitivity(system, duration=duration, start=start).states.values
+    assert found == pytest.approx(derivatives(system, duration, start), abs=1e-6)
+    assert np.linalg.matrix_rank(found, tol=1e-9) == rank
+
+
+def test_derivatives_of_the_relay() -> None:
+    """Into sliding and out of it, several times."""
+    system = ns.models.relay_feedback()
+    start = np.array([0.1, -0.4, 0.3])
+    path = through(system, 4.0, start)
+    assert path.count("sliding") >= 2
+    found = ns.sensitivity(system, duration=4.0, start=start).states.values
+    expected = derivatives(system, 4.0, start)
+    assert found == pytest.approx(expected, abs=1e-6 * np.abs(expected).max())
+    assert np.linalg.matrix_rank(found, tol=1e-9 * np.abs(found).max()) < 3
+
+
+def test_a_belt_that_speeds_up() -> None:
+    """A ramp of the belt's speed: while the mass sticks, dv/dt is that of the belt and the friction carries it."""
+    system = ns.models.stick_slip_belt()
+    run = ns.simulate(system, duration=1.0, start={"x": 0.0, "v": 0.2}, ramps={"v_b": (0.2, 0.6)}, samples=11)
+    t = run.time.values
+    assert run.u.values[:, 1] == pytest.approx(0.2 + 0.4 * t, abs=1e-13)
+    assert run.u.values[:, 0] == pytest.approx(0.2 * t + 0.2 * t**2, abs=1e-12)
+    assert run.friction.values == pytest.approx(0.4 + 0.2 * t + 0.2 * t**2, abs=1e-12)
+
+
+def test_a_start_on_a_repelling_surface_is_refused() -> None:
+    system = ns.System(
+        states=["x", "v"], parameters={"F": 0.3},
+        modes={"low": lambda t, u, p: (u.v, -u.x - p.F), "high": lambda t, u, p: (u.v, -u.x + p.F)},
+        indicators={"h": lambda t, u, p: u.v}, transitions=[ns.Surface("h", below="low", above="high")],
+    )  # fmt: skip
+    with pytest.raises(ValueError, match=r"'v': 0.0.* lies on the surface 'h' where both vector fields lead away"):
+        ns.simulate(system, duration=1.0)
+    assert len(ns.simulate(system, duration=1.0, start={"x": 1.0}).crossing_time) <= 1  # crossing is no question
+
+
+def test_sliding_into_a_two_fold_ends_with_a_sentence() -> None:
+    """In the time scaled by y - x the sliding flow is x' = y, y' = -3 y - 2 x: a node that takes in all of x < 0 < y."""
+    system = ns.System(
+        states=["x", "y", "z"], parameters={},
+        modes={"below": lambda t, u, p: (0, 2, u.y), "above": lambda t, u, p: (1, -3, u.x)},
+        indicators={"h": lambda t, u, p: u.z}, transitions=[ns.Surface("h", below="below", above="above")],
+    )  # fmt: skip
+    with pytest.raises(ns.SolveError, match="Sliding in mode 'h_sliding' .* two-fold.* not unique") as caught:
+        ns.simulate(system, duration=5.0, start=[-0.5, 0.5, 0.0])
+    assert caught.value.status == "chatter"
+    assert np.abs(list(caught.value.state.values())).max() < 1e-8
