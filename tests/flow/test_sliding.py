@@ -42,15 +42,15 @@ def through(system: ns.System, duration: float, start: Any) -> list[str]:
     return [system.modes[system.transitions[i].target] for i in run.crossing_transition.values]
 
 
-@pytest.mark.parametrize(("duration", "last", "rank"), [(1.9, "stick", 1), (6.5, "backward", 1)])
-def test_derivatives_into_and_out_of_a_stick(duration: float, last: str, rank: int) -> None:
+@pytest.mark.parametrize(("duration", "last"), [(8.0, "stick"), (12.0, "forward"), (16.0, "stick"), (20.0, "backward")])
+def test_derivatives_into_and_out_of_a_stick(duration: float, last: str) -> None:
     """With static friction: the field jumps where the stick ends."""
     system = ns.models.dry_friction_oscillator(omega=0.4, f_s=0.4, zeta=0.05, v_b=0.1)
     start = np.array([0.2, 1.2])
     assert through(system, duration, start)[-1] == last
-    found = ns.sensitivity(system, duration=duration, start=start).states.values
+    found = ns.sensitivity(system, duration=duration, start=start).Phi.values
     assert found == pytest.approx(derivatives(system, duration, start), abs=1e-6)
-    assert np.linalg.matrix_rank(found, tol=1e-9) == rank
+    assert np.linalg.matrix_rank(found, tol=1e-9) == 1
 
 
 def test_derivatives_of_the_relay() -> None:
@@ -59,10 +59,10 @@ def test_derivatives_of_the_relay() -> None:
     start = np.array([0.1, -0.4, 0.3])
     path = through(system, 4.0, start)
     assert path.count("sliding") >= 2
-    found = ns.sensitivity(system, duration=4.0, start=start).states.values
-    expected = derivatives(system, 4.0, start)
+    found = ns.sensitivity(system, duration=4.0, start=start).Phi.values
+    expected = derivatives(system, 4.0, start, step=1e-7)
     assert found == pytest.approx(expected, abs=1e-6 * np.abs(expected).max())
-    assert np.linalg.matrix_rank(found, tol=1e-9 * np.abs(found).max()) < 3
+    assert np.linalg.matrix_rank(found, tol=1e-9 * np.abs(found).max()) == 2
 
 
 def test_a_belt_that_speeds_up() -> None:

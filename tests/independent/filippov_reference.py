@@ -68,3 +68,49 @@ def integrate(system: Filippov, u: Any, duration: float, mode: str) -> tuple[lis
         else:
             mode = BELOW if first < 0 else SLIDING
         changes.append((t, mode))
+
+
+@dataclass
+class Contacts:
+    """Masses x'' = force(t, x, v) + friction, friction of at most ``limit`` against belts of constant speed."""
+
+    force: Callable[[float, Any, Any], Any]
+    limit: Any
+    belt: Any
+
+
+def rub(system: Contacts, u: Any, duration: float) -> tuple[list[tuple[float, tuple[int, ...]]], Any]:
+    """Changes of the signs of relative velocities (0: sticks), and the last state; starts off every belt."""
+    n = len(system.limit)
+    t, u = 0.0, np.array(u, float)
+    signs = [int(np.sign(v - b)) for v, b in zip(u[n:], system.belt, strict=True)]
+    changes: list[tuple[float, tuple[int, ...]]] = []
+
+    def field(t: float, u: Any) -> Any:
+        force = system.force(t, u[:n], u[n:])
+        return np.array([*u[n:], *(0.0 if s == 0 else f - s * F for s, f, F in zip(signs, force, system.limit, strict=True))])
+
+    while True:
+        events = []
+        for i, s in enumerate(signs):
+            if s:
+                events.append((i, lambda t, u, i=i, s=s: s * (u[n + i] - system.belt[i])))
+            else:
+                events.append((i, lambda t, u, i=i: system.limit[i] - abs(system.force(t, u[:n], u[n:])[i])))
+        for _, event in events:
+            event.terminal, event.direction = True, -1
+        run = solve_ivp(
+            field, (t, duration), u, method="DOP853", rtol=1e-13, atol=1e-14, events=[e for _, e in events], max_step=0.05
+        )
+        assert run.status >= 0, run.message
+        t, u = float(run.t[-1]), run.y[:, -1]
+        if run.status == 0:
+            return changes, u
+        i = next(i for (i, _), times in zip(events, run.t_events, strict=True) if len(times))
+        force = system.force(t, u[:n], u[n:])[i]
+        if signs[i]:
+            u[n + i] = system.belt[i]
+            signs[i] = 0 if abs(force) < system.limit[i] else int(np.sign(force))
+        else:
+            signs[i] = int(np.sign(force))
+        changes.append((t, tuple(signs)))
