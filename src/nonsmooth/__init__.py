@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from nonsmooth.identification.parameter_set import ParameterSet as ParameterSet
     from nonsmooth.results.store import load as load
     from nonsmooth.results.store import save as save
+    from nonsmooth.system import elements as elements
     from nonsmooth.system.mode import Band as Band
     from nonsmooth.system.mode import Mode as Mode
     from nonsmooth.system.origin import system_of as system_of
@@ -96,7 +97,7 @@ _WHERE = {
     "DataFileError": "errors",
     "Interrupted": "errors",
 }
-_ROOMS = ("models", "plot")
+_ROOMS = {"elements": "system.elements", "models": "models", "plot": "plot"}
 
 __all__ = sorted([*_WHERE, *_ROOMS, "__version__"])
 
@@ -110,7 +111,7 @@ def __getattr__(name: str) -> Any:
 
         return package_version()
     if name in _ROOMS:
-        return import_module(f"nonsmooth.{name}")
+        return import_module(f"nonsmooth.{_ROOMS[name]}")
     if name in _WHERE:
         value = getattr(import_module(f"nonsmooth.{_WHERE[name]}"), name)
         globals()[name] = value
@@ -125,7 +126,7 @@ def _not_there(name: str) -> str:
         return text
     from nonsmooth.system.names import nearest
 
-    elsewhere = [f"ns.{room}.{name}" for room in _ROOMS if name in import_module(f"nonsmooth.{room}").__all__]
+    elsewhere = [f"ns.{room}.{name}" for room, where in _ROOMS.items() if name in import_module(f"nonsmooth.{where}").__all__]
     near = elsewhere or [f"ns.{one}" for one in nearest(name, __all__)]
     return text + (f"; nearest: {', '.join(near)}" if near else "") + "; dir(nonsmooth) lists all"
 

@@ -36,9 +36,9 @@ def run_compiled(
     tables, n = engine.prepare(points), len(engine.scale)
     jobs, found = new_jobs(len(rows), n, rules.max_period), Settled.empty(len(rows), n)
     load(engine).settle_many(
-        rows, starts, np.full(len(rows), begin), modes, int(carried), int(extremes), rules, jobs,
-        _flow(engine, tables, phase), _plan(True), _plan(False), _buffers(engine, tables, rules.keep),
-        _buffers(engine, tables, rules.max_period), _motion(n), _motion(n),
+        (rows, starts, np.full(len(rows), begin), modes), int(carried), int(extremes), rules, jobs,
+        _flow(engine, tables, phase), (_plan(True), _plan(False)),
+        tuple(_buffers(engine, tables, keep) for keep in (rules.keep, rules.max_period)), (_motion(n), _motion(n)),
         (np.zeros((n + 1, n)), np.zeros((2, n, n))),
         (found.crossings, found.contacts, found.maximum, found.minimum, found.last, found.mode),
     )  # fmt: skip
@@ -52,8 +52,8 @@ def exponents_compiled(
     """Growth of neighbours of jobs, taken into their sums (``kernels.judging.exponent``); their statuses."""
     tables, n, status = engine.prepare(points), len(engine.scale), np.zeros(len(rows), dtype=np.int64)
     load(engine).separate_many(
-        rows, starts, modes, returns, batch, size, _flow(engine, tables, phase), _plan(False),
-        _buffers(engine, tables, 1), _motion(n), _motion(n), offsets, sums, status,
+        (rows, starts, np.full(len(rows), phase), modes), returns, batch, size, _flow(engine, tables, phase),
+        _plan(False), _buffers(engine, tables, 1), (_motion(n), _motion(n)), offsets, sums, status,
     )  # fmt: skip
     return status
 

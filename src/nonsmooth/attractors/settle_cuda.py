@@ -248,8 +248,8 @@ def _separate_in_threads(
     jobs = np.arange(len(states.rows))
     for begin in range(0, returns, SLICE // 2):
         gpu.launch(
-            gpu.module.neighbours, jobs, states.rows, *gpu.tables, gpu.net, states.u, states.clock, states.counters,
-            begin, min(begin + SLICE // 2, returns), batch, size, offsets, sums, gpu.plans[0], gpu.phase, gpu.limit,
+            gpu.module.neighbours, jobs, states.rows, gpu.tables, gpu.net, states.place(),
+            (begin, min(begin + SLICE // 2, returns), batch), size, (offsets, sums), gpu.plans[0], gpu.phase, gpu.limit,
             status,
         )  # fmt: skip
         jobs = jobs[status.copy_to_host()[jobs] == codes.OK]

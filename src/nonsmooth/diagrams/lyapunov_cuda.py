@@ -69,8 +69,8 @@ def _batch(
         while count > 0 and len(jobs):
             some = min(count, module.UNITS)
             gpu.launch(
-                module.frames, jobs, states.rows, *gpu.tables, gpu.net, states.u, states.clock, states.counters,
-                some, gpu.periods, gpu.limit, lengths, frame, growth, sums, on_device,
+                module.frames, jobs, states.rows, gpu.tables, gpu.net, states.place(), some, gpu.periods, gpu.limit,
+                lengths, (frame, growth, sums, on_device),
             )  # fmt: skip
             status[:] = on_device.copy_to_host()
             jobs = jobs[status[jobs] == 0]

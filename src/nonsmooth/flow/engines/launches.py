@@ -42,6 +42,10 @@ class States:
     def all(self) -> tuple[Any, ...]:
         return self.u, self.memory, self.clock, self.counters
 
+    def place(self) -> tuple[Any, ...]:
+        """Without memory, as the linear kernels take it."""
+        return self.u, self.clock, self.counters
+
 
 def batches(points: FloatArray, rows: IntArray, size: int) -> Iterator[tuple[slice, FloatArray, IntArray]]:
     """Jobs in batches: which, the parameter points that they need, and their rows among these."""

@@ -71,7 +71,7 @@ class PlanarOnGpu:
         given = cuda.to_device(_packed(tables.form)), cuda.to_device(multiples)
         of_point = sum(part.size for part in self.module.scratch(n_modes, *self.sizes, n_rows)[0])
         self.tables = *given, cuda.device_array((of_point, len(points)))
-        self.launch(self.module.tabulate, np.arange(len(points)), *self.tables)
+        self.launch(self.module.tabulate, np.arange(len(points)), self.tables)
         self.net = tuple(cuda.to_device(_not_empty(part)) for part in engine.net)
         self.limit = cuda.to_device(DIVERGENCE * engine.scale)
         self.plans = [cuda.to_device(np.array([-1, 1, -1, 1, 1, extremes], dtype=np.int64)) for extremes in (0, 1)]
@@ -137,11 +137,11 @@ class PlanarOnGpu:
         self, jobs: IntArray, states: States, transient: int, keep: Any, out: Buffers, extremes: bool = False,
         other: Buffers | None = None, after: bool = False, legs: int = 2, apart: int = 0,
     ) -> IntArray:  # fmt: skip
-        counts = (self.cuda.to_device(np.atleast_1d(np.asarray(n, dtype=np.int64))) for n in (transient, keep))
+        counts = tuple(self.cuda.to_device(np.atleast_1d(np.asarray(n, dtype=np.int64))) for n in (transient, keep))
         self.launch(
-            self.module.advance, jobs, states.rows, *self.tables, self.net, states.u, states.clock, states.counters,
-            *counts, self.plans[extremes], self.plans[after], 1 if other is None else legs, apart, self.phase,
-            self.limit, out.all(), (out if other is None else other).all(),
+            self.module.advance, jobs, states.rows, self.tables, self.net, states.place(), counts,
+            (self.plans[extremes], self.plans[after]), (1 if other is None else legs, apart), self.phase, self.limit,
+            out.all(), (out if other is None else other).all(),
         )  # fmt: skip
         return jobs[out.status.copy_to_host()[jobs] == codes.OK]
 

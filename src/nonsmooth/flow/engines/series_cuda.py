@@ -87,7 +87,7 @@ class SeriesOnGpu:
         phase = plan.phase if plan.indicator < 0 else 0.0
         step = 0.0 if engine.step is None else engine.step
         self.tables = (
-            *map(cuda.to_device, (np.ascontiguousarray(columns), tables.period, tables.steps)),
+            tuple(map(cuda.to_device, (np.ascontiguousarray(columns), tables.period, tables.steps))),
             tuple(map(cuda.to_device, engine.norms)),
             cuda.to_device(np.array([plan.indicator, plan.rising, plan.mode, plan.after, plan.every], dtype=np.int64)),
             cuda.to_device(np.array([engine.rtol, step, phase, min(plan.t_max, 1e300)])),
@@ -136,8 +136,8 @@ class SeriesOnGpu:
         under_way, fresh = jobs, 1
         while len(under_way):
             self.launch(
-                self.module.advance, under_way, states.rows, *self.tables, *states.all(), begun, *counts, fresh, STEPS,
-                *out.all(),
+                self.module.advance, under_way, states.rows, *self.tables, states.all(), (begun, *counts),
+                (fresh, STEPS), out.all(),
             )  # fmt: skip
             under_way, fresh = under_way[out.status.copy_to_host()[under_way] == codes.PAUSED], 0
         return jobs[np.isin(out.status.copy_to_host()[jobs], (codes.OK, codes.NOT_GUARANTEED))]

@@ -26,22 +26,23 @@ def row_of(buffers, row):
 
 
 @entry
-def advance(
-    jobs, rows, packed, multiples, built, net, u, clock, counters, transient, keep, plan, after, legs, apart, phase,
-    limit, out, other,
-):  # fmt: skip
+def advance(jobs, rows, point, net, place, counts, plans, way, phase, limit, out, other):
     """Thread k: march the state of job j = jobs[k] under parameter row rows[j] by transient[j] section returns, then
     keep[j] more into row j of ``out``. (One number for all jobs where these arrays are short.)
 
-    With more legs the tables serve again, under the plan ``after``: ``apart`` = 0, for one more return, into row j of
-    ``other``; else for as many returns of the states j + apart, j + 2 apart, ..., the last of each into that row of
-    ``other``. A state is left at its last return; statuses stand in the buffers, and legs are left out behind one that
-    failed."""
+    ``place``: states, clocks, counters of all; ``counts``: transient, keep; ``plans``: plan, after; ``way``: legs and
+    apart. With more legs the tables serve again, under the plan ``after``: ``apart`` = 0, for one more return, into row
+    j of ``other``; else for as many returns of the states j + apart, j + 2 apart, ..., the last of each into that row
+    of ``other``. A state is left at its last return; statuses stand in the buffers, and legs are left out behind one
+    that failed."""
     k = cuda.grid(1)
     if k >= jobs.shape[0]:
         return
     j = jobs[k]
-    linear, scratch = tabled(packed, multiples, built, rows[j])
+    u, clock, counters = place
+    transient, keep = counts
+    legs, apart = way
+    linear, scratch = tabled(point, rows[j])
     n_transient = transient[min(j, transient.shape[0] - 1)]
     n_keep = keep[min(j, keep.shape[0] - 1)]
     flow = Flow(linear, Net(*net), phase, 1e300, limit, scratch[0], scratch[1], u[0:0], 1 << 62, jobs)
@@ -50,8 +51,7 @@ def advance(
         if leg > 0:
             n_transient, n_keep = n_transient + n_keep - 1 if apart > 0 else 0, 1
         motion = Motion(u[row], u[row, 0:0], clock[row], counters[row])
-        code = go(
-            0, motion, flow, after if leg > 0 else plan, n_transient, n_keep, row_of(other if leg > 0 else out, row)
-        )
+        plan, into = (plans[1], other) if leg > 0 else (plans[0], out)
+        code = go(0, motion, flow, plan, n_transient, n_keep, row_of(into, row))
         if code != OK:
             break

@@ -17,15 +17,17 @@ UNITS = 128  # of time in one launch of ``frames``, at most
 
 
 @entry
-def frames(
-    jobs, rows, packed, multiples, built, net, u, clock, counters, count, units, limit, scale, Q, growth, sums, status
-):  # fmt: skip
-    """``count`` units of time of each job with its frame: see ``growth``. ``growth[j]`` gains the logarithms."""
+def frames(jobs, rows, point, net, place, count, units, limit, scale, found):
+    """``count`` units of time of each job with its frame: see ``growth``.
+
+    ``found``: frames, logarithms (which gain), sums, statuses of all jobs; ``place``: states, clocks, counters."""
     k = cuda.grid(1)
     if k >= jobs.shape[0]:
         return
     j = jobs[k]
-    form, scratch = tabled(packed, multiples, built, rows[j])
+    u, clock, counters = place
+    Q, growth, sums, status = found
+    form, scratch = tabled(point, rows[j])
     logarithms = cuda.local.array((UNITS, STATES), float64)
     lengths = cuda.local.array(STATES, float64)
     step = cuda.local.array((STATES, STATES), float64)

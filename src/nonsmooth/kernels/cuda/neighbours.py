@@ -35,16 +35,16 @@ def single():
 
 
 @entry
-def neighbours(
-    jobs, rows, packed, multiples, built, net, u, clock, counters, begin, end, batch, size, offsets, sums, plan, phase,
-    limit, status,
-):  # fmt: skip
-    """Returns begin <= n < end of each job and its neighbour: see ``follow_pair``."""
+def neighbours(jobs, rows, point, net, place, span, size, pair, plan, phase, limit, status):
+    """Returns begin <= n < end of each job and its neighbour (``span``: begin, end, batch): see ``follow_pair``."""
     k = cuda.grid(1)
     if k >= jobs.shape[0]:
         return
     j = jobs[k]
-    linear, scratch = tabled(packed, multiples, built, rows[j])
+    u, clock, counters = place
+    begin, end, batch = span
+    offsets, sums = pair
+    linear, scratch = tabled(point, rows[j])
     motion = Motion(u[j], u[j, 0:0], clock[j], counters[j])
     moved = Motion(cuda.local.array(2, float64), u[j, 0:0], cuda.local.array(3, float64), cuda.local.array(4, int64))
     flow = Flow(linear, Net(*net), phase, 1e300, limit, scratch[0], scratch[1], u[0:0], 1 << 62, jobs)

@@ -101,20 +101,24 @@ def may_pause(work):
 
 
 @entry
-def advance(
-    jobs, rows, points, periods, exact_steps, norms, plan, settings, u, memory, clock, counters, settled, transient,
-    keep, fresh, pause, whole, real, section, maximum, minimum, crossings, contacts, elapsed, status,
-):  # fmt: skip
+def advance(jobs, rows, point, norms, plan, settings, place, counts, way, out):
     """Thread k: march the state of job j = jobs[k] at parameter point rows[j] by transient[j] section returns, then
     keep[j] more, whose points and extremes are kept (one number for all jobs where these arrays are short).
 
-    ``fresh`` = 1 begins a run, 0 goes on with one whose status is PAUSED. ``plan``: indicator, rising, mode, after,
+    ``way``: fresh, pause; fresh = 1 begins a run, 0 goes on with one whose status is PAUSED. ``point``: parameters,
+    periods, exact steps of all; ``place``: states, memory, clocks, counters; ``counts``: settled, transient, keep;
+    ``out``: what is kept between launches, then as in ``Kept``. ``plan``: indicator, rising, mode, after,
     every; ``settings``: rtol, fixed step, phase of the section, longest wait for a return."""
     k = cuda.grid(1)
     if k >= jobs.shape[0]:
         return
     j = jobs[k]
     i = rows[j]
+    points, periods, exact_steps = point
+    u, memory, clock, counters = place
+    settled, transient, keep = counts
+    fresh, pause = way
+    whole, real, section, maximum, minimum, crossings, contacts, elapsed, status = out
     work = arrays_of_thread()
     tally, memo = work.tally, work.memo
     own = cuda.local.array((1, N_Q), float64)

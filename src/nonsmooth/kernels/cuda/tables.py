@@ -43,12 +43,13 @@ def move_tables(tables, built, i, into):
 
 
 @entry
-def tabulate(jobs, packed, multiples, built):
+def tabulate(jobs, point):
     """Build the tables of the parameter points ``jobs``."""
     k = cuda.grid(1)
     if k >= jobs.shape[0]:
         return
     i = jobs[k]
+    packed, multiples, built = point
     form, scratch = arrays_of_thread(packed, multiples, i)
     fill(0, form, scratch[0], scratch[1])
     move_tables(scratch[0], built, i, True)
@@ -70,8 +71,9 @@ build = stand  # what the joined text's other functions find under this name
 
 
 @local
-def tabled(packed, multiples, built, i):
+def tabled(point, i):
     """Parameter row i and scratch memory with its tables in it, as ``chain`` takes them: (form, (tables, work))."""
+    packed, multiples, built = point
     form, scratch = arrays_of_thread(packed, multiples, i)
     move_tables(scratch[0], built, i, False)
     return form, scratch

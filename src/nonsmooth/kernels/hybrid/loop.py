@@ -48,9 +48,9 @@ def next_holding(mode, tables, net, work):
 
 @once
 def settle(i, form, net, tables, work):
-    """Start rule: transitions without a reset that hold already are taken, each mode at most once.
+    """Start rule: transitions that hold already are taken, each mode at most once; so is an impact that begins there.
 
-    Returns a status: BEYOND_STOP where one with a reset holds."""
+    Returns a status: BEYOND_STOP where one with a reset holds and the start does not lie on its surface."""
     tally, visited = work.tally, work.visited
     for k in range(visited.shape[0]):
         visited[k] = 0
@@ -60,9 +60,10 @@ def settle(i, form, net, tables, work):
         for k in range(net.mode_start[mode], net.mode_start[mode + 1]):
             one = net.mode_list[k]
             if holds(one, mode, tables, net, work):
-                if net.transitions[one, 1] == RESET:
+                impact = net.transitions[one, 1] == RESET
+                if impact and lies_beyond(one, form, net, work):
                     return BEYOND_STOP
-                if visited[net.transitions[one, 0]] == 0:
+                if visited[net.transitions[one, 0]] == 0 or (impact and net.transitions[one, 0] == mode):
                     t = one
                     break
         if t < 0:

@@ -91,7 +91,7 @@ class Work(NamedTuple):
     scr: Any  # (rows + n + 1, 8) Taylor polynomials
     points: Any  # (4,) critical points
     rates: Any  # (harmonics,)
-    zero: Any  # (indicators,) 1: zero just now, 2: with its slope
+    zero: Any  # (indicators,) how many of value, slope and further derivatives are zero just now
     found: Any  # (4,) see ``linear.search``
     visited: Any  # (modes,) by the start rule
     twin: Any  # (indicators,) the state that an indicator is but for a constant, or -1

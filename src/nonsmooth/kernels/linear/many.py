@@ -21,6 +21,10 @@ from nonsmooth.kernels.linear.tables import STATES
 _i, _f = types.int64, types.float64
 _f1, _f2, _f3, _i1 = _f[::1], _f[:, ::1], _f[:, :, ::1], _i[::1]
 
+BEGIN = types.Tuple((_i1, _f2, _f1, _i1))
+PLANS = types.UniTuple(_i1, 2)
+KEPTS = types.UniTuple(KEPT, 2)
+MOTIONS = types.UniTuple(MOTION, 2)
 PROBES = types.Tuple((_f2, _f3))
 RESULTS = types.Tuple((_f1, _f1, _f2, _f2, _f2, _i1))
 
@@ -82,18 +86,18 @@ def probe(i, p, size, rules, motion, moved, flow, plan, quiet, cycle, work):
     return multiplier(images, size, rules.difference, matrices)
 
 
-@kernel(types.void(
-    _i1, _f2, _f1, _i1, _i, _i, RULES, JOBS, FLOW, _i1, _i1, KEPT, KEPT, MOTION, MOTION, PROBES, RESULTS
-))  # fmt: skip
-def settle_many(
-    rows, starts, phases, modes, carried, extremes, rules, jobs, flow, plan, quiet, kept, cycle, motion, moved, work,
-    results,
-):  # fmt: skip
-    """Job j: parameter row rows[j], from starts[j] at phases[j] of the forcing in the mode modes[j].
+@kernel(types.void(BEGIN, _i, _i, RULES, JOBS, FLOW, PLANS, KEPTS, MOTIONS, PROBES, RESULTS))
+def settle_many(begin, carried, extremes, rules, jobs, flow, plans, keeps, motions, work, results):
+    """Job j: parameter row rows[j], from starts[j] at phases[j] of the forcing in the mode modes[j] (``begin``).
 
     With ``carried`` = 1 a job goes on from where the one before it ended (from its own start where that failed).
-    ``quiet`` is ``plan`` without extremes. ``results``: crossings and contacts per return, maxima, minima (over one
-    whole cycle where there is one, else over as many returns as are kept), last section point, mode there."""
+    ``plans``: with and without extremes; ``keeps``: room for the kept returns and for one cycle; ``motions``: of the
+    job and of its neighbours. ``results``: crossings and contacts per return, maxima, minima (over one whole cycle
+    where there is one, else over as many returns as are kept), last section point, mode there."""
+    rows, starts, phases, modes = begin
+    plan, quiet = plans
+    kept, cycle = keeps
+    motion, moved = motions
     crossings, contacts, maximum, minimum, last, mode = results
     whole = plan if extremes != 0 else quiet
     good = False
@@ -155,11 +159,13 @@ def follow_pair(begin, end, batch, i, size, motion, moved, offset, sums, flow, q
     return OK
 
 
-@kernel(types.void(_i1, _f2, _i1, _i, _i, _f1, FLOW, _i1, KEPT, MOTION, MOTION, _f2, _f2, _i1))
-def separate_many(rows, starts, modes, returns, batch, size, flow, quiet, out, motion, moved, offsets, sums, status):
+@kernel(types.void(BEGIN, _i, _i, _f1, FLOW, _i1, KEPT, MOTIONS, _f2, _f2, _i1))
+def separate_many(begin, returns, batch, size, flow, quiet, out, motions, offsets, sums, status):
     """Growth of the distance of two neighbours over ``returns`` section returns, taken into sums[j], for each job.
 
-    Job j begins on the section at starts[j] in the mode modes[j], its neighbour beside it by offsets[j]."""
+    Job j begins at starts[j] at phases[j] in the mode modes[j], its neighbour beside it by offsets[j]."""
+    rows, starts, phases, modes = begin
+    motion, moved = motions
     for j in range(rows.shape[0]):
-        put(motion, rows[j], starts[j], flow.phase, modes[j], flow)
+        put(motion, rows[j], starts[j], phases[j], modes[j], flow)
         status[j] = follow_pair(0, returns, batch, rows[j], size, motion, moved, offsets[j], sums[j], flow, quiet, out)

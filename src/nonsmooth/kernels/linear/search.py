@@ -172,9 +172,8 @@ def refine(tables, work, mode, f, sign, zero, guess):
         at_node(tables, work, mode, node)
         compose(tables, mode, f, work.wn, scr, STATES)
         if node == 0 and zero != 0:
-            scr[STATES, 0] = 0.0
-            if zero == 2:
-                scr[STATES, 1] = 0.0
+            for k in range(zero):
+                scr[STATES, k] = 0.0
         local = tau - node * spacing
         converged = False
         slope = 1.0
@@ -216,9 +215,8 @@ def finest(tables, work, mode, rows, lo, hi, node, up):
             for k in range(WIDTH):
                 scr[row, k] = -scr[row, k]
         if node == 0 and rows[r, 0] < zero.shape[0] and zero[rows[r, 0]] != 0:
-            scr[row, 0] = 0.0
-            if zero[rows[r, 0]] == 2:
-                scr[row, 1] = 0.0
+            for k in range(zero[rows[r, 0]]):
+                scr[row, k] = 0.0
     tau = 0.0
     current = -1
     if up:
@@ -295,7 +293,7 @@ def search(tables, work, mode, rows, lo, hi, held, r_max):
                 s1 = sign * slope_of(tables, mode, f, wq)
             if node == 0 and f < zero.shape[0] and zero[f] != 0:
                 g0 = 0.0
-                if zero[f] == 2:
+                if zero[f] >= 2:
                     s0 = 0.0
             kind = classify(g0, s0, g1, s1, h, bound_at(tables, mode, f, w))
             if kind == NEVER:

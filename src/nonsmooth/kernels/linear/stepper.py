@@ -70,26 +70,11 @@ def flat(tables, mode, f, w):
     return fabs(slope_of(tables, mode, f, w)) <= rounding(tables, mode, f, M, w)
 
 
-@inline
-def mark_zeros(tables, work, mode):
-    """Which indicators are zero within rounding at w (1), or zero with a slope that is (2): where a stick ends.
-
-    At a crossing w carries the rounding of the step that led there: it decides where an indicator has no constant
-    part, such as that of a stop at x = 0."""
-    w, zero = work.w, work.zero
-    step = 0.0
-    for k in range(tables.info.shape[0]):
-        step = max(step, tables.info[k, 0])
-    for f in range(zero.shape[0]):
-        noise = rounding(tables, mode, f, 0, w) + 0.25 * step * rounding(tables, mode, f, M, w)
-        zero[f] = 1 if fabs(value_of(tables, mode, f, w)) <= noise else 0
-        if zero[f] != 0 and flat(tables, mode, f, w):
-            zero[f] = 2
-
-
 @device
-def sign_of_derivatives(tables, mode, f, w):
-    """Sign of the first derivative of functional f, from the second to the fourth, that is not zero."""
+def vanishing(tables, mode, f, w):
+    """(k, sign): the first derivative of functional f from the second on that is not zero within rounding at w.
+
+    Of those up to the fourth; (5, 0) where they vanish all."""
     tay = tables.tay
     for k in range(2, 5):
         total = tay[mode, f, ONE, k]
@@ -99,8 +84,26 @@ def sign_of_derivatives(tables, mode, f, w):
                 total += tay[mode, f, j, k] * w[j]
                 size += fabs(tay[mode, f, j, k] * w[j])
         if fabs(total) > 64.0 * EPS * size:
-            return 1 if total > 0.0 else -1
-    return 0
+            return k, 1 if total > 0.0 else -1
+    return 5, 0
+
+
+@inline
+def mark_zeros(tables, work, mode):
+    """Of each indicator, how many of its value, slope and further derivatives vanish within rounding at w.
+
+    Two where a stick ends, three where a contact lifts off: what is rounding there must not decide. At a crossing w
+    carries the rounding of the step that led there: it decides where an indicator has no constant part, such as that of
+    a stop at x = 0."""
+    w, zero = work.w, work.zero
+    step = 0.0
+    for k in range(tables.info.shape[0]):
+        step = max(step, tables.info[k, 0])
+    for f in range(zero.shape[0]):
+        noise = rounding(tables, mode, f, 0, w) + 0.25 * step * rounding(tables, mode, f, M, w)
+        zero[f] = 1 if fabs(value_of(tables, mode, f, w)) <= noise else 0
+        if zero[f] != 0 and flat(tables, mode, f, w):
+            zero[f], _ = vanishing(tables, mode, f, w)
 
 
 @inline
@@ -111,7 +114,8 @@ def sign_after(tables, work, mode, f):
         return 1 if value_of(tables, mode, f, w) > 0.0 else -1
     if not flat(tables, mode, f, w):
         return 1 if slope_of(tables, mode, f, w) > 0.0 else -1
-    return sign_of_derivatives(tables, mode, f, w)
+    _, sign = vanishing(tables, mode, f, w)
+    return sign
 
 
 @inline
@@ -127,6 +131,15 @@ def holds(t, mode, tables, net, work):
             holds = False
             break
     return holds
+
+
+@once
+def lies_beyond(t, form, net, work):
+    """Whether no indicator of transition t is zero at the present instant."""
+    beyond = True
+    for r in range(net.row_start[t], net.row_start[t + 1]):
+        beyond = beyond and work.zero[net.rows[r, 0]] == 0
+    return beyond
 
 
 @once
@@ -200,7 +213,9 @@ def take(i, t, fired, form, tables, net, work):
             fired = -1
     mark_zeros(tables, work, mode)
     if fired >= 0:
-        zero[fired] = 2 if flat(tables, mode, fired, w) else 1
+        zero[fired] = 1
+        if flat(tables, mode, fired, w):
+            zero[fired], _ = vanishing(tables, mode, fired, w)
     return mode
 
 
@@ -239,7 +254,7 @@ def clear_step(tables, net, work, mode):
             g1 = sign * value_of(tables, mode, f, w1)
             s0 = sign * slope_of(tables, mode, f, w)
             s1 = sign * slope_of(tables, mode, f, w1)
-            if zero[f] == 2:
+            if zero[f] >= 2:
                 s0 = 0.0
             if classify(g0, s0, g1, s1, tables.info[mode, 0], bound_at(tables, mode, f, w)) == NEVER:
                 blocked = True

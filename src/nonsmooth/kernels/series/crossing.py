@@ -59,8 +59,9 @@ def _error(C, row, m, powers, tail, slack, scale):
 
 
 @device
-def _others_hold(r0, lo, hi, x, C, m, n, powers, rows, scale, a, d):
+def _others_hold(r0, lo, hi, x, m, n, rows, work):
     """Whether the other rows hold where row r0 crosses; one that vanishes there is judged by what it does next."""
+    C, powers, scale, a, d = work.C, work.powers, work.scale, work.a, work.d
     i0 = rows[r0, 0]
     m0 = load(C, n + i0, float(rows[r0, 1]), m, powers, a)
     shift(a, m0, x, 1.0, d)
@@ -91,8 +92,9 @@ def _others_hold(r0, lo, hi, x, C, m, n, powers, rows, scale, a, d):
 
 
 @device
-def _fires(lo, hi, C, m, n, powers, rows, side, side_next, scale, tail, slack, a, d, stack, found):
+def _fires(lo, hi, m, n, rows, tail, slack, work):
     """Where the conjunction of rows lo..hi-1 first becomes true on the step, and the row that makes it so."""
+    C, powers, scale, a, found = work.C, work.powers, work.scale, work.a, work.found
     cursor, begun = 0.0, False
     for _ in range(64):
         best, best_row = NONE, lo
@@ -100,7 +102,7 @@ def _fires(lo, hi, C, m, n, powers, rows, side, side_next, scale, tail, slack, a
             i, sign = rows[r, 0], rows[r, 1]
             mr = load(C, n + i, float(sign), m, powers, a)
             error = _error(C, n + i, m, powers, tail, slack, scale[i])
-            before = 0 if begun else sign * side[i]
+            before = 0 if begun else sign * work.side[i]
             if begun:
                 shift(a, mr, cursor, 1.0 - cursor, a)
                 if fabs(a[0]) <= NOISE * scale[i]:
@@ -108,16 +110,16 @@ def _fires(lo, hi, C, m, n, powers, rows, side, side_next, scale, tail, slack, a
             mr = strip(a, mr)
             if mr < 0:
                 continue
-            x = first_crossing(a, mr, UP, before, error, stack, found)
-            side_next[i] = sign * found[1]
+            x = first_crossing(a, mr, UP, before, error, work.stack, found)
+            work.side_next[i] = sign * found[1]
             if x != NONE and cursor + x * (1.0 - cursor) < best:
                 best, best_row = cursor + x * (1.0 - cursor), r
         if best == NONE:
             return NONE, -1
-        if hi - lo == 1 or _others_hold(best_row, lo, hi, best, C, m, n, powers, rows, scale, a, d):
+        if hi - lo == 1 or _others_hold(best_row, lo, hi, best, m, n, rows, work):
             return best, best_row
         if best >= 1.0:
-            side_next[rows[best_row, 0]] = rows[best_row, 1]
+            work.side_next[rows[best_row, 0]] = rows[best_row, 1]
             return NONE, -1
         cursor, begun = best, True
     found[0] = 1  # too many crossings on one step: it is halved, or said to be not guaranteed
@@ -125,13 +127,13 @@ def _fires(lo, hi, C, m, n, powers, rows, side, side_next, scale, tail, slack, a
 
 
 @inline
-def earliest(mode, C, m, n, powers, net, side, side_next, scale, tail, slack, a, d, stack, found):
+def earliest(mode, m, n, net, tail, slack, work):
     """(x, transition, row): the first transition out of ``mode`` on the step, at the fraction x of it; x = NONE: none.
 
-    A transition is out of the question as soon as one of its rows is certainly <= 0 throughout. Where two fire
-    together, the one declared first is taken.
+    The step's polynomials of degree m stand in ``work.C``, in its rows from n on. A transition is out of the question
+    as soon as one of its rows is certainly <= 0 throughout. Where two fire together, the one declared first is taken.
     """
-    rows = net.rows
+    C, powers, a, rows = work.C, work.powers, work.a, net.rows
     best, which, hit = NONE, -1, -1
     for j in range(net.mode_start[mode], net.mode_start[mode + 1]):
         k = net.mode_list[j]
@@ -140,7 +142,7 @@ def earliest(mode, C, m, n, powers, net, side, side_next, scale, tail, slack, a,
         for r in range(lo, hi):
             i, sign = rows[r, 0], rows[r, 1]
             a0, low, high = row_bounds(C, n + i, float(sign), m, powers)
-            error = _error(C, n + i, m, powers, tail, slack, scale[i])
+            error = _error(C, n + i, m, powers, tail, slack, work.scale[i])
             if a0 == 0.0:  # after a jump: decided by the coefficients that follow
                 mr = strip(a, load(C, n + i, float(sign), m, powers, a))
                 if mr < 0:
@@ -150,18 +152,18 @@ def earliest(mode, C, m, n, powers, net, side, side_next, scale, tail, slack, a,
                     continue
                 low, high = bounds(a, mr)
             if high + error <= 0.0:
-                side_next[i] = -sign
+                work.side_next[i] = -sign
                 dead = True
                 break
-            if low - error > 0.0 and sign * side[i] >= 0:
-                side_next[i] = sign
+            if low - error > 0.0 and sign * work.side[i] >= 0:
+                work.side_next[i] = sign
             else:
                 opened, row = opened + 1, r
         if dead or opened == 0:
             continue
         if opened == 1:  # the others hold throughout: it fires at the first rise of this one
             lo, hi = row, row + 1
-        x, r = _fires(lo, hi, C, m, n, powers, rows, side, side_next, scale, tail, slack, a, d, stack, found)
+        x, r = _fires(lo, hi, m, n, rows, tail, slack, work)
         if x < best * (1.0 - 1e-14):
             best, which, hit = x, k, r
     return best, which, hit

@@ -102,6 +102,16 @@ def holds(t, mode, tables, net, work):
 
 
 @once
+def lies_beyond(t, form, net, work):
+    """Whether no indicator of transition t is zero at the present instant."""
+    J = work.J0 if METHOD == place.RKF45 else work.C
+    beyond = True
+    for r in range(net.row_start[t], net.row_start[t + 1]):
+        beyond = beyond and J[work.w.shape[0] + net.rows[r, 0], 0] != 0.0
+    return beyond
+
+
+@once
 def take(i, t, fired, form, tables, net, work):
     """Take transition t (its indicator ``fired`` has just crossed; -1: none). Returns the new mode.
 
@@ -287,10 +297,7 @@ def make_step(i, form, net, section, wanted, work, r_max):
         if form.locate == 1:
             work.found[0] = 0
             forget_signs(n_i, work.side_next)
-            x, pending, hit = earliest(
-                mode, work.C, degree, n, work.powers, net, work.side, work.side_next, work.scale, tail, slack, work.a,
-                work.d, work.stack, work.found,
-            )  # fmt: skip
+            x, pending, hit = earliest(mode, degree, n, net, tail, slack, work)
             if work.found[0] == 1 and fixed <= 0.0 and halvings < place.HALVINGS:
                 h *= 0.5  # a graze nearer than the polynomial is sure of
                 tally[place.LANDING] = 0

@@ -8,16 +8,17 @@ path has gone through a boundary that it should have obeyed.
 
 from math import fabs, inf
 from math import log as ln
+from typing import Any, NamedTuple
 
 from numba import types
 
 from nonsmooth.kernels.compile.cache import device, inline, kernel
 from nonsmooth.kernels.compile.pointers import function_at
 from nonsmooth.kernels.hybrid.codes import DIVERGED, NO_CONVERGENCE, OK
-from nonsmooth.kernels.hybrid.records import NET
+from nonsmooth.kernels.hybrid.records import NET, type_of
 from nonsmooth.kernels.series.taylor import dense_states, step_length
 
-__all__ = ["follow"]
+__all__ = ["Margins", "Visits", "follow"]
 
 PARTS = 8  # of a step of the series: an extremum shows as a change of the slope's sign over one part
 BISECTIONS = 60
@@ -81,40 +82,46 @@ def extremum(C, m, row, a, b, sign):
     return 0.5 * (a + b)
 
 
-@kernel(
-    types.int64(
-        _i1, _i, _f, _f1, _i2, NET, _f1, _i1, _f1, _f1, _f2, _i1, _i1,
-        _f2, _f2, _f1, _f1, _f1, _f2, _f2, _f2, _i2, _f2, _i2, _f2, _f2, _f2,
-    )
-)  # fmt: skip
-def follow(
-    functions, order, rtol, weight, lacking, net, values, modes, t0, tau, z, fired,
-    fired_row, C, W, u, q, scale, extremes, inner, place, which, begin, begin_row, begin_size, end, slope,
-):  # fmt: skip
+class Visits(NamedTuple):
+    """The m visits of an orbit; those of no or negative length are passed over."""
+
+    modes: Any  # (m,)
+    t0: Any  # (m,) when each begins
+    tau: Any  # (m,) how long it lasts
+    z: Any  # (m, n + n_memory) where it begins
+    fired: Any  # (m,) the transition that ends it
+    fired_row: Any  # (m,) and the row of the net that is zero there; -1: the section
+
+
+class Margins(NamedTuple):
+    """What is found of m visits and all transitions."""
+
+    inner: Any  # (m, transitions) largest local maximum of the margin inside the visit (-inf: none)
+    place: Any  # its time
+    which: Any  # and the row it stands in
+    begin: Any  # the margin at the beginning of the visit
+    begin_row: Any  # the row it stands in
+    begin_size: Any  # and the size of that row's terms
+    end: Any  # the margin at the end; for the transition that fires there, without the row that is zero
+    slope: Any  # (m, 2) of the signed indicator that is zero at the end: time derivative just before it, and value
+
+
+VISITS = type_of(Visits, _i1, _f1, _f1, _f2, _i1, _i1)
+MARGINS = type_of(Margins, _f2, _f2, _i2, _f2, _i2, _f2, _f2, _f2)
+SCRATCH = types.Tuple((_f2, _f2, _f1, _f1, _f1))
+
+
+@kernel(types.int64(_i1, _i, _f, _f1, _i2, NET, _f1, VISITS, SCRATCH, _f2, MARGINS))
+def follow(functions, order, rtol, weight, lacking, net, values, visits, work, extremes, margins):
     """Follow all visits of an orbit.
 
-    Parameters
-    ----------
-    functions
-        Address of the model's jet (``pointers.addresses``).
-    net
-        The net of transitions.
-    modes, t0, tau, z : (m,), (m,), (m,), (m, n + n_memory)
-        The visits; those of no or negative length are passed over.
-    fired, fired_row : (m,)
-        The transition that ends the visit and the row (place in ``rows``) that is zero there; -1: the section.
-    extremes : (2, n), written
-        Largest and smallest value of each state.
-    inner, place, which : (m, n_transitions), written
-        Largest local maximum of the margin inside the visit (-inf: none), its time, and the row it stands in.
-    begin, begin_row, begin_size : (m, n_transitions), written
-        The margin at the beginning of the visit, the row it stands in, and the size of that row's terms.
-    end : (m, n_transitions), written
-        The margin at the end; for the transition that fires there, without the row that is zero.
-    slope : (m, 2), written
-        Time derivative of the signed indicator that is zero at the end, just before it, and its value.
-    """
+    ``functions`` holds the address of the model's jet (``pointers.addresses``), ``work`` room for a jet, its scratch,
+    states, parameters with memory, and sizes of indicators. ``extremes`` (2, n) become the largest and smallest value
+    of each state; ``margins`` are written."""
     jet, rows = jet_at(functions[0]), net.rows
+    modes, t0, tau, z, fired, fired_row = visits
+    inner, place, which, begin, begin_row, begin_size, end, slope = margins
+    C, W, u, q, scale = work
     n, n_p = weight.shape[0], values.shape[0]
     log_rtol = ln(rtol)
     for i in range(n_p):
