@@ -97,3 +97,12 @@ def test_sliding_into_a_two_fold_ends_with_a_sentence() -> None:
         ns.simulate(system, duration=5.0, start=[-0.5, 0.5, 0.0])
     assert caught.value.status == "chatter"
     assert np.abs(list(caught.value.state.values())).max() < 1e-8
+
+
+@pytest.mark.parametrize("f", [0.05, 0.1, 0.3])
+def test_an_end_of_sliding_is_no_return_to_it(f: float) -> None:
+    """On a belt, slipping begins without relative acceleration: rounding of either rate must not end it at once."""
+    system = ns.models.dry_friction_oscillator(f_k=f, f_s=f, v_b=0.5)
+    frequencies = np.linspace(0.05, 2.5, 99)
+    diagram = ns.sweep(system, "omega", frequencies, transient=100, keep=20, direction=None, progress=False)
+    assert set(diagram.status.values.tolist()) <= {0, 1, 2}
