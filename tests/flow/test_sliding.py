@@ -87,7 +87,7 @@ def test_a_start_on_a_repelling_surface_is_refused() -> None:
 
 
 def test_sliding_into_a_two_fold_ends_with_a_sentence() -> None:
-    """In the time scaled by y - x the sliding flow is x' = y, y' = -3 y - 2 x: a node that takes in all of x < 0 < y."""
+    """In the time scaled by y - x the sliding flow is x' = y, y' = -3 y - 2 x: a node that attracts x < 0 < y."""
     system = ns.System(
         states=["x", "y", "z"], parameters={},
         modes={"below": lambda t, u, p: (0, 2, u.y), "above": lambda t, u, p: (1, -3, u.x)},

@@ -88,7 +88,8 @@ def rub(system: Contacts, u: Any, duration: float) -> tuple[list[tuple[float, tu
 
     def field(t: float, u: Any) -> Any:
         force = system.force(t, u[:n], u[n:])
-        return np.array([*u[n:], *(0.0 if s == 0 else f - s * F for s, f, F in zip(signs, force, system.limit, strict=True))])
+        pulls = zip(signs, force, system.limit, strict=True)
+        return np.array([*u[n:], *(0.0 if s == 0 else f - s * F for s, f, F in pulls)])
 
     while True:
         events = []
@@ -99,9 +100,8 @@ def rub(system: Contacts, u: Any, duration: float) -> tuple[list[tuple[float, tu
                 events.append((i, lambda t, u, i=i: system.limit[i] - abs(system.force(t, u[:n], u[n:])[i])))
         for _, event in events:
             event.terminal, event.direction = True, -1
-        run = solve_ivp(
-            field, (t, duration), u, method="DOP853", rtol=1e-13, atol=1e-14, events=[e for _, e in events], max_step=0.05
-        )
+        watched = [event for _, event in events]
+        run = solve_ivp(field, (t, duration), u, method="DOP853", rtol=1e-13, atol=1e-14, events=watched, max_step=0.05)
         assert run.status >= 0, run.message
         t, u = float(run.t[-1]), run.y[:, -1]
         if run.status == 0:

@@ -45,7 +45,8 @@ def linear(seed: int, n: int, kind: str) -> tuple[ns.System, Filippov, np.ndarra
     )  # fmt: skip
     reference = Filippov(
         lambda t, u: A @ u + c * np.cos(w * t) + g, lambda t, u: A @ u + c * np.cos(w * t) - g,
-        lambda t, u: k @ u - b * (1 + m * np.cos(w * t)), lambda t, u: k, lambda t, u: b * m * w * np.sin(w * t), static,
+        lambda t, u: k @ u - b * (1 + m * np.cos(w * t)), lambda t, u: k,
+        lambda t, u: b * m * w * np.sin(w * t), static,
     )  # fmt: skip
     return system, reference, random.uniform(-1, 1, n)
 

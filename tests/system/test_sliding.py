@@ -81,10 +81,15 @@ def test_fields_whose_difference_turns_are_combined_by_filippov():
 
 def test_a_relay_keeps_its_plant_on_the_surface():
     """With e = b / (k b) the sliding field is (I - e k) A x, also where the relay's gain depends on the state."""
-    A, b, k = np.array([[0.2, 1.0, 0.0], [-1.0, 0.1, 0.3], [0.4, 0.0, -0.5]]), np.array([1.0, -2.0, 0.5]), np.array([2, 1, 0.5])
+    A = np.array([[0.2, 1.0, 0.0], [-1.0, 0.1, 0.3], [0.4, 0.0, -0.5]])
+    b, k = np.array([1.0, -2.0, 0.5]), np.array([2, 1, 0.5])
+
+    def side(sign: int) -> Any:
+        return lambda t, u, p: A @ u - sign * b * p.g * (1 + u.x**2)
+
     system = System(
         states=["x", "y", "z"], parameters={"g": 1.0},
-        modes={s: (lambda t, u, p, s=s: A @ u - (1 if s == "plus" else -1) * b * p.g * (1 + u.x**2)) for s in ("minus", "plus")},
+        modes={"minus": side(-1), "plus": side(1)},
         indicators={"h": lambda t, u, p: k @ u},
         transitions=[Surface("h", below="minus", above="plus")],
     )  # fmt: skip
@@ -141,7 +146,7 @@ def test_what_both_modes_do_happens_in_sliding_too():
 
 
 def utkin(field: Any) -> System:
-    """A control that enters squared: Utkin's equivalent control solves x' = 0, 0.2 + u = 0; Filippov mixes both ends."""
+    """A control c that enters squared: Utkin's solves x' = 0.2 + c = 0; Filippov mixes both ends."""
     return System(
         states=["x", "y"], parameters={},
         modes={s: (lambda t, u, p, c=c: (0.2 + c, c * c - u.y)) for s, c in (("below", 1.0), ("above", -1.0))},

@@ -38,14 +38,15 @@ def _not_unique(modes: tuple[str, ...], jump: TracedTransition) -> str:
     if not names:
         return ""
     return (
-        f"Sliding in mode {names[0].removesuffix(NOT_UNIQUE)!r} reached a point where the surface stops attracting from "
-        "both sides at once (a two-fold): motion from there is not unique. Change the model there, or start elsewhere."
+        f"Sliding in mode {names[0].removesuffix(NOT_UNIQUE)!r} reached a point where the surface stops attracting "
+        "from both sides at once (a two-fold): motion from there is not unique. Change the model there, or start "
+        "elsewhere."
     )
 
 
 def wrong_way(system: System, log: Log) -> str:
-    """A sentence where the last reset of a failed run left the state on its way on through the surface, or where sliding
-    had no unique way on; else nothing.
+    """A sentence where the last reset of a failed run left the state on its way on through the surface, or where
+    sliding had no unique way on; else nothing.
 
     An impact turns the rate of its indicator round. With the wrong sign it does not, and follows itself without end.
     """

@@ -224,8 +224,7 @@ class _Builder:
             return field, [x if x == y else x + b * (y - x) for x, y in ends]
         e, slope, length = found
         field = tuple(
-            x if along == 0 else sp.expand(x - along * (below + off) / slope)
-            for x, along in zip(first, e, strict=True)
+            x if along == 0 else sp.expand(x - along * (below + off) / slope) for x, along in zip(first, e, strict=True)
         )
         shown = [x if x == y else sp.expand(x - self.ratio(y - x, length) * below / slope) for x, y in ends]
         return field, shown

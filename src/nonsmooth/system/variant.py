@@ -55,7 +55,7 @@ class Variant:
 
 
 def _static_ratios(description: Description) -> Iterator[tuple[Any, str]]:
-    """What must not be negative for the static value to be the larger one, where that depends on parameters alone."""
+    """Excess of the static value over the kinetic one, not negative, where it depends on parameters alone."""
     declared = description.traced
     for surface in description.surfaces:
         if surface.static is not None and surface.static.free_symbols <= set(declared.p):
