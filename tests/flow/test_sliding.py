@@ -25,6 +25,50 @@ def test_a_start_goes_to_its_side(start: tuple[float, float], mode: str) -> None
     assert system.modes[int(run.mode.values[0])] == mode
 
 
+@pytest.mark.parametrize("rtol", [1e-9, 1e-12])
+def test_sliding_round_a_circle(rtol: float) -> None:
+    """Inside r' = r, theta' = 1, outside r' = -r, theta' = 3: on r = 1 half of each, theta' = 2."""
+    system = ns.System(
+        states=["x", "y"], parameters={},
+        modes={
+            "inside": lambda t, u, p: (u.x - u.y, u.x + u.y),
+            "outside": lambda t, u, p: (-u.x - 3 * u.y, 3 * u.x - u.y),
+        },
+        indicators={"radius": lambda t, u, p: u.x**2 + u.y**2 - 1},
+        transitions=[ns.Surface("radius", below="inside", above="outside")],
+    )  # fmt: skip
+    for r, arrives, angle in ((0.5, np.log(2), np.log(2)), (3.0, np.log(3), 3 * np.log(3))):
+        run = ns.simulate(system, duration=100.0, start={"x": r}, samples=1001, rtol=rtol)
+        assert run.crossing_time.values[-1] == pytest.approx(arrives, abs=1e-12)
+        slid = run.time.values > arrives
+        theta = angle + 2 * (run.time.values[slid] - arrives)
+        assert run.u.values[slid] == pytest.approx(np.array([np.cos(theta), np.sin(theta)]).T, abs=10 * rtol)
+        assert np.abs(np.hypot(*run.u.values[slid].T) - 1).max() < 0.01 * rtol
+
+
+def test_an_impact_out_of_a_stick() -> None:
+    """A belt carries a mass to a wall at x = 1; it rebounds with -e v_b and slips, x'' = F - x, back to the wall."""
+    rebound = {"when": "wall > 0", "reset": lambda t, u, p: (u.x, -p.e * u.v)}
+    system = ns.System(
+        states=["x", "v"], parameters={"F": 2.0, "v_b": 0.5, "e": 0.8},
+        modes={"slower": lambda t, u, p: (u.v, p.F - u.x), "faster": lambda t, u, p: (u.v, -p.F - u.x)},
+        indicators={"slip": lambda t, u, p: u.v - p.v_b, "wall": lambda t, u, p: u.x - 1},
+        transitions=[
+            ns.Surface("slip", below="slower", above="faster", mode="stick"),
+            ns.Transition("slower", "slower", **rebound), ns.Transition("faster", "faster", **rebound),
+        ],
+    )  # fmt: skip
+    run = ns.simulate(system, duration=3.0, start={"x": 0.5, "v": 0.5}, samples=2)
+    labels = [system.transitions[i].label for i in run.crossing_transition.values]
+    first = labels.index("stick -> slower")
+    assert labels[first + 1] == "slower -> slower"
+    assert run.crossing_time.values[first] == pytest.approx(1.0, abs=1e-14)
+    assert run.u_after.values[first] == pytest.approx([1.0, -0.4], abs=1e-14)
+    # x = 2 - cos s - 0.4 sin s comes back to x = 1 with the speed 0.4, slower than the belt
+    assert np.diff(run.crossing_time.values)[first] == pytest.approx(2 * np.arctan(0.4), abs=1e-14)
+    assert run.u_after.values[first + 1] == pytest.approx([1.0, -0.32], abs=1e-14)
+
+
 def derivatives(system: ns.System, duration: float, start: np.ndarray, step: float = 1e-6) -> np.ndarray:
     columns = []
     for i in range(len(start)):
