@@ -82,6 +82,9 @@ def test_a_cycle_that_sticks_twice(make: Callable[[float, float], ns.System]) ->
     assert orbit.maximum[0] == pytest.approx(x, abs=1e-11)
     slope = (next_rest(x + 1e-6) - next_rest(x - 1e-6)) / 2e-6
     assert np.sort(orbit.floquet_multipliers.real) == pytest.approx([0.0, slope**2], abs=1e-8)
+    exponents = ns.lyapunov(make(w, F), periods=200).exponents.values
+    assert exponents[0] == pytest.approx(np.log(slope**2) * w / (2 * np.pi), abs=1e-9)
+    assert exponents[1] == -np.inf
 
 
 @pytest.mark.parametrize("make", [coulomb, by_surface])

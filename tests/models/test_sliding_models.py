@@ -50,6 +50,13 @@ def test_the_belt_s_published_limit_cycle() -> None:
     assert np.diff(run.crossing_time.values)[0] == pytest.approx(4.296, abs=5e-7)
 
 
+def test_the_belt_s_exponents() -> None:
+    """A limit cycle whose stick forgets the velocity: 0 along it, and minus infinity."""
+    spectrum = ns.lyapunov(ns.models.stick_slip_belt(), start={"x": 0.5, "v": 0.2}, duration=600.0, transient=60.0)
+    assert spectrum.exponents.values[0] == pytest.approx(0.0, abs=1e-9)
+    assert spectrum.exponents.values[1] == -np.inf
+
+
 def test_the_relay_slides_until_its_control_saturates() -> None:
     """While x1 = 0: x2'' = 2 x2' - x2, x2 = -exp(t) (0.001 + 0.021 t) from the published start, until |x2| = 1."""
     system = ns.models.relay_feedback()
