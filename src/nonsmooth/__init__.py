@@ -13,6 +13,7 @@ from nonsmooth.kernels.compile.forking import watch_forks
 from nonsmooth.results import progress as _progress  # noqa: F401  it says when kernels are compiled
 
 if TYPE_CHECKING:
+    from nonsmooth import elements as elements
     from nonsmooth import models as models
     from nonsmooth import plot as plot
     from nonsmooth.attractors.basin_fractions import basin_fractions as basin_fractions
@@ -47,7 +48,7 @@ if TYPE_CHECKING:
     from nonsmooth.identification.parameter_set import ParameterSet as ParameterSet
     from nonsmooth.results.store import load as load
     from nonsmooth.results.store import save as save
-    from nonsmooth.system import elements as elements
+    from nonsmooth.system.mechanical import mechanical as mechanical
     from nonsmooth.system.mode import Band as Band
     from nonsmooth.system.mode import Mode as Mode
     from nonsmooth.system.origin import system_of as system_of
@@ -61,6 +62,7 @@ _WHERE = {
     "Transition": "system.transition",
     "Surface": "system.transition",
     "Mode": "system.mode",
+    "mechanical": "system.mechanical",
     "Band": "system.mode",
     "where": "system.scalar",
     "system_of": "system.origin",
@@ -97,7 +99,7 @@ _WHERE = {
     "DataFileError": "errors",
     "Interrupted": "errors",
 }
-_ROOMS = {"elements": "system.elements", "models": "models", "plot": "plot"}
+_ROOMS = ("elements", "models", "plot")
 
 __all__ = sorted([*_WHERE, *_ROOMS, "__version__"])
 
@@ -111,7 +113,7 @@ def __getattr__(name: str) -> Any:
 
         return package_version()
     if name in _ROOMS:
-        return import_module(f"nonsmooth.{_ROOMS[name]}")
+        return import_module(f"nonsmooth.{name}")
     if name in _WHERE:
         value = getattr(import_module(f"nonsmooth.{_WHERE[name]}"), name)
         globals()[name] = value
@@ -126,7 +128,7 @@ def _not_there(name: str) -> str:
         return text
     from nonsmooth.system.names import nearest
 
-    elsewhere = [f"ns.{room}.{name}" for room, where in _ROOMS.items() if name in import_module(f"nonsmooth.{where}").__all__]
+    elsewhere = [f"ns.{room}.{name}" for room in _ROOMS if name in import_module(f"nonsmooth.{room}").__all__]
     near = elsewhere or [f"ns.{one}" for one in nearest(name, __all__)]
     return text + (f"; nearest: {', '.join(near)}" if near else "") + "; dir(nonsmooth) lists all"
 

@@ -5,7 +5,8 @@ In a combination of phases the laws of the elements add to the field, ``f = f_0 
 
     d g_i / dt = 0:   sum_j (grad g_i . D_j) lambda_j = -(g_i,t + grad g_i . f)
 
-one linear system for all contacts that rest and all that stick. A contact opens where its force vanishes, friction
+one linear system for all contacts that rest and all that stick (the field has terms besides that vanish on the
+surface and bring a state back to it). A contact opens where its force vanishes, friction
 slips where its own leaves the range that it can have. Which rate vanishes where is known by construction; the resets
 into rest and stick project onto it.
 """
@@ -31,14 +32,14 @@ from nonsmooth.system.elements import (
 )
 from nonsmooth.system.mode import Mode
 from nonsmooth.system.names import unknown
-from nonsmooth.system.scalar import Scalar
+from nonsmooth.system.scalar import Scalar, to_expression
 from nonsmooth.system.tracing import Symbols, call_scalar, call_vector
 from nonsmooth.system.transition import Transition
 
-__all__ = ["assembled"]
+__all__ = ["assembled", "element_names"]
 
 MOST = 256  # modes
-SMALL = 1e-6  # of the states' scale: what a rate or a gap that is held at zero may be off where a run begins
+SMALL = 1e-4  # of the states' scale: what a rate or a gap that is held at zero may be off where a run begins
 CREEP = 1e-7  # of the same: the speed of approach below which impacts are not followed
 Condition = tuple[sp.Expr, int, str]  # an expression, its sign, a name for it
 Pattern = tuple[int, ...]  # the phase of each element
@@ -187,30 +188,48 @@ class _Assembler:
         if key in self._fields:
             return self._fields[key]
         phases = [part.element.phases[k] for part, k in zip(self.parts, pattern, strict=True)]
-        f, forces, held = list(self.base[mode]), {}, []
+        f, forces, held = list(self.base[mode]), {}, self.held(pattern)
         for k, (part, phase) in enumerate(zip(self.parts, phases, strict=True)):
             law = self.force(part, phase, mode, pattern)
             if law is None:
-                held.append(k)
                 continue
             forces[k] = law
             for i, d in part.direction.items():
                 f[i] += d * law
         if held:
-            rates = [self.rate(self.parts[k], mode) for k in held]
-            matrix = sp.Matrix([[self.across(g, self.parts[k]) for k in held] for g in rates])
-            if sp.simplify(matrix.det()) == 0:
-                names = " and ".join(repr(self.parts[k].name) for k in held)
-                raise SystemDefinitionError(f"elements {names} hold the same motion: their forces are not unique")
-            needed = sp.Matrix([-self.along(g, f) for g in rates])
-            for k, value in zip(held, matrix.LUsolve(needed), strict=True):
+            matrix = self.effects(held, mode)
+            needed = sp.Matrix([-self.along(self.rate(self.parts[k], mode), f) for k in held])
+            back = sp.Matrix([self.pull(self.parts[k], mode) for k in held])
+            for k, value, extra in zip(held, matrix.LUsolve(needed), matrix.LUsolve(back), strict=True):
                 forces[k] = sp.cancel(value) if len(held) > 1 else value
                 for i, d in self.parts[k].direction.items():
-                    f[i] += d * forces[k]
+                    f[i] += d * (forces[k] + extra)
         self._fields[key] = [sp.expand(part) for part in f], {k: sp.expand(forces[k]) for k in sorted(forces)}
         return self._fields[key]
 
     # What a user would have written
+
+    def effects(self, some: Sequence[int], mode: str) -> sp.Matrix:
+        """What unit forces of some elements add to the derivatives of their rates."""
+        parts = [self.parts[k] for k in some]
+        return sp.Matrix([[self.across(self.rate(one, mode), other) for other in parts] for one in parts])
+
+    def independent(self, some: Sequence[int], mode: str) -> bool:
+        """Whether the rates of some elements can be held at zero each by its own force."""
+        return not some or sp.simplify(self.effects(some, mode).det()) != 0
+
+    def held(self, pattern: Pattern) -> list[int]:
+        """Elements whose force is that of a constraint."""
+        phases = (part.element.phases[k] for part, k in zip(self.parts, pattern, strict=True))
+        return [k for k, phase in enumerate(phases) if phase in ("rest", "stick")]
+
+    def pull(self, part: _Part, mode: str) -> sp.Expr:
+        """What brings a state back onto the surface that rounding and truncation leave; zero there (Baumgarte 1972)."""
+        rate = self.rate(part, mode)
+        if isinstance(part.element, Coulomb):
+            return -rate
+        kappa = to_expression(self.size(rate) / self.size(part.where))
+        return -2 * kappa * rate - kappa**2 * part.where
 
     def size(self, expression: sp.Expr) -> float:
         """The scale of the states that an expression involves."""
@@ -232,18 +251,15 @@ class _Assembler:
             words.append(f"{self._known[key]} {'>' if sign > 0 else '<'} 0")
         return " and ".join(words)
 
-    def projected(self, part: _Part, rate: sp.Expr, factor: sp.Expr, held: Sequence[int], mode: str) -> list[sp.Expr]:
+    def projected(self, k: int, factor: sp.Expr, held: Sequence[int], mode: str) -> list[sp.Expr]:
         """States behind an impulse of the element that takes its rate to -factor times it.
 
         Contacts that rest and friction that sticks bear their part of it."""
-        group = [part, *(self.parts[k] for k in held)]
-        rates = [rate, *(self.rate(one, mode) for one in group[1:])]
-        matrix = sp.Matrix([[self.across(g, one) for one in group] for g in rates])
-        wanted = sp.Matrix([-(1 + factor) * rate, *([0] * len(held))])
-        impulses = matrix.LUsolve(wanted)
+        wanted = sp.Matrix([-(1 + factor) * self.rate(self.parts[k], mode), *([0] * len(held))])
+        impulses = self.effects([k, *held], mode).LUsolve(wanted)
         after = list(self.u)
-        for one, impulse in zip(group, impulses, strict=True):
-            for i, d in one.direction.items():
+        for one, impulse in zip([k, *held], impulses, strict=True):
+            for i, d in self.parts[one].direction.items():
                 after[i] += d * impulse
         return [sp.expand(sp.cancel(state)) for state in after]
 
@@ -292,33 +308,33 @@ class _Assembler:
         e, name, w = part.element, part.name, self.rate(part, mode)
         assert isinstance(e, Stop)
         pull = (self.along(w, self.flow(mode, opened)[0]), f"{name}_opens")  # the acceleration without its force
-        gap = (part.where, f"{name}_gap")
         if e.phases[pattern[k]] == "rest":
             off = sp.Float(SMALL * self.size(part.where))
             beyond = [(part.where + off, -1, f"{name}_beyond")]
-            same = self.back_on(part, self.projected(part, w, sp.Integer(0), (), mode))
+            same = self.back_on(part, self.projected(k, sp.Integer(0), (), mode))
             return [
                 ("open", [(pull[0], 1, pull[1])], None), ("open", [(part.where - off, 1, f"{name}_off")], None),
                 ("open", beyond, same),
             ]  # fmt: skip
-        held = [j for j in range(len(self.parts)) if j != k and self._is_held(j, pattern) and self._coupled(k, j, mode)]
-        held = self._borne(k, held, mode)
-        rebound = self.projected(part, w, self.of(part, "restitution"), held, mode)
-        closed: Condition = (gap[0], -1, gap[1])
+        held = self._bearing(k, pattern, mode)
+        if not self.independent([k, *held], mode):
+            return []  # what rests and sticks leaves it no way to move
+        rebound = self.projected(k, self.of(part, "restitution"), held, mode)
+        closed: Condition = (part.where, -1, f"{name}_gap")
         if not e.rest:
             return [("open", [closed], rebound)]
-        creep = sp.Float(e.creep if e.creep is not None else CREEP * self.size(w))
+        still = self.projected(k, sp.Integer(0), held, mode)
+        closing = [closed, (w, -1, f"{name}_closing")]
+        presses, lifts = (pull[0], -1, pull[1]), (pull[0], 1, pull[1])
         if self.of(part, "restitution") == 0:
-            return [
-                ("rest", [closed, (pull[0], -1, pull[1])], rebound), ("open", [closed, (pull[0], 1, pull[1])], rebound),
-            ]  # fmt: skip
+            return [("rest", [*closing, presses], still), ("open", [*closing, lifts], still)]
+        creep = sp.Float(e.creep if e.creep is not None else CREEP * self.size(w))
         slow = (w + creep, f"{name}_slow")
         return [
             ("open", [closed, (slow[0], -1, slow[1])], rebound),
-            ("rest", [closed, (slow[0], 1, slow[1]), (pull[0], -1, pull[1])],
-             self.projected(part, w, sp.Integer(0), held, mode)),
-            ("open", [closed, (slow[0], 1, slow[1]), (pull[0], 1, pull[1])], rebound),
-        ]  # fmt: skip
+            ("rest", [*closing, (slow[0], 1, slow[1]), presses], still),
+            ("open", [*closing, (slow[0], 1, slow[1]), lifts], rebound),
+        ]
 
     def _leaving_friction(
         self, k: int, mode: str, pattern: Pattern, stuck: Pattern
@@ -326,6 +342,8 @@ class _Assembler:
         part = self.parts[k]
         name, v = part.name, part.where
         phase = part.element.phases[pattern[k]]
+        if not self.independent(self.held(stuck), mode):
+            return []  # what rests and sticks leaves it no way to move
         hold, most = self.flow(mode, stuck)[1][k], self.static(part) * self.normal(part, mode, pattern)
         above, below = (hold - most, f"{name}_over"), (hold + most, f"{name}_under")
         if phase == "stick":
@@ -334,34 +352,31 @@ class _Assembler:
                 ("forward", [(v - off, 1, f"{name}_speed_above")], None), ("back", [(v + off, -1, f"{name}_speed_below")], None),
                 ("back", [(above[0], 1, above[1])], None), ("forward", [(below[0], -1, below[1])], None),
             ]  # fmt: skip
-        held = [j for j in range(len(self.parts)) if j != k and self._is_held(j, pattern) and self._coupled(k, j, mode)]
-        still = self.projected(part, v, sp.Integer(0), held, mode)
+        held = self._bearing(k, pattern, mode)
+        still = self.projected(k, sp.Integer(0), held, mode)
         sign = -1 if phase == "forward" else 1
         stopped: Condition = (v, sign, f"{name}_speed")
         within = [(above[0], -1, above[1]), (below[0], 1, below[1])]
         other, torn = ("back", (above[0], 1, above[1])) if phase == "forward" else ("forward", (below[0], -1, below[1]))
         return [("stick", [stopped, *within], still), (other, [stopped, torn], None)]
 
-    def _is_held(self, k: int, pattern: Pattern) -> bool:
-        return self.parts[k].element.phases[pattern[k]] in ("rest", "stick")
+    def _bearing(self, k: int, pattern: Pattern, mode: str) -> list[int]:
+        """Of what rests or sticks the elements that take part in an impulse of element k.
 
-    def _coupled(self, k: int, j: int, mode: str) -> bool:
-        """Whether an impulse of element k changes the rate that element j holds."""
-        return sp.simplify(self.across(self.rate(self.parts[j], mode), self.parts[k])) != 0
+        Contacts that it would pull open part instead."""
 
-    def _borne(self, k: int, held: list[int], mode: str) -> list[int]:
-        """Of contacts at rest those that an impulse of element k presses; from the others it parts."""
-        def pressed(j: int) -> bool:
+        def bears(j: int) -> bool:
             part = self.parts[j]
-            if not isinstance(part.element, Stop):
-                return True
-            change = self.across(self.rate(part, mode), self.parts[k]).subs(self.values)
-            return bool(change.is_number and float(change) < 0)
+            change = self.across(self.rate(part, mode), self.parts[k])
+            if sp.simplify(change) == 0:
+                return False
+            return isinstance(part.element, Coulomb) or float(change.subs(self.values)) < 0
 
-        return [j for j in held if pressed(j)]
+        return [j for j in self.held(pattern) if j != k and bears(j)]
 
 
-def _named(elements: Any) -> dict[str, Element]:
+def element_names(elements: Any) -> dict[str, Element]:
+    """Elements by name; those of a list are called after their kind."""
     if isinstance(elements, Mapping):
         return dict(elements)
     if isinstance(elements, (str, Element)) or not isinstance(elements, Sequence):
@@ -386,7 +401,7 @@ def assembled(
 
     ``given`` are those without elements: its transitions go from each combination of phases to the same of the target.
     """
-    parts = _named(elements)
+    parts = element_names(elements)
     for key, mode in modes.items():
         if isinstance(mode, Mode) and mode.states is not None:
             raise SystemDefinitionError(f"mode {key!r}: a system with elements has all its states in every mode")
@@ -403,14 +418,15 @@ def assembled(
         raise SystemDefinitionError(
             f"{len(parts)} elements have {number} combinations of phases; at most {MOST} are written out"
         )
-    patterns = list(product(*[range(count) for count in counts]))
+    every = product(base, product(*[range(count) for count in counts]))
+    pairs = [pair for pair in every if make.independent(make.held(pair[1]), pair[0])]
 
     def name(mode: str, pattern: Pattern) -> str:
         words = [f"{part.name}_{part.element.phases[k]}" for part, k in zip(make.parts, pattern, strict=True)]
         return "_".join(words if len(base) == 1 else [mode, *words])
 
     fields, forces, transitions = {}, {part.name: {} for part in make.parts}, []  # type: ignore[var-annotated]
-    for mode, pattern in product(base, patterns):
+    for mode, pattern in pairs:
         here = name(mode, pattern)
         f, found = make.flow(mode, pattern)
         fields[here] = _returns(f)
@@ -419,6 +435,8 @@ def assembled(
         for k, part in enumerate(make.parts):
             for phase, rows, states in make.leaving(k, mode, pattern):
                 there = (*pattern[:k], part.element.phases.index(phase), *pattern[k + 1 :])
+                if (mode, there) not in pairs:
+                    continue  # more contacts than can be held by forces of their own
                 reset = None if states is None else _returns(states)
                 transitions.append(Transition(here, name(mode, there), when=make.condition(rows), reset=reset))
         for item in given["transitions"]:
@@ -429,7 +447,7 @@ def assembled(
     for key, output in (given["outputs"] or {}).items():
         function, unit = output if isinstance(output, (tuple, list)) else (output, "")
         if isinstance(function, Mapping):
-            function = {name(mode, pattern): function[mode] for mode, pattern in product(base, patterns)}
+            function = {name(mode, pattern): function[mode] for mode, pattern in pairs}
         outputs[key] = function, unit
     return {
         "modes": fields, "transitions": transitions,
