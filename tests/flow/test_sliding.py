@@ -150,3 +150,23 @@ def test_an_end_of_sliding_is_no_return_to_it(f: float) -> None:
     frequencies = np.linspace(0.05, 2.5, 99)
     diagram = ns.sweep(system, "omega", frequencies, transient=100, keep=20, direction=None, progress=False)
     assert set(diagram.status.values.tolist()) <= {0, 1, 2}
+
+
+def test_four_fields_that_leave_the_motion_on_two_surfaces_open() -> None:
+    """All lead to x = y = 0, where z' depends on the order in which the fields are combined."""
+    z = {"mm": 0.0, "pm": 1.0, "mp": 0.0, "pp": 0.0}
+    speed = {"mm": (1, 1), "pm": (-1, 2), "mp": (3, -1), "pp": (-1, -1)}
+    system = ns.System(
+        states=["x", "y", "z"], parameters={},
+        modes={mode: (lambda t, u, p, mode=mode: (*speed[mode], z[mode] - u.z)) for mode in z},
+        indicators={"one": lambda t, u, p: u.x, "two": lambda t, u, p: u.y},
+        transitions=[
+            ns.Surface("one", below="mm", above="pm"), ns.Surface("one", below="mp", above="pp"),
+            ns.Surface("two", below="mm", above="mp"), ns.Surface("two", below="pm", above="pp"),
+        ],
+    )  # fmt: skip
+    assert not any(mode.startswith("one_two_sliding") for mode in system.modes)
+    with pytest.raises(ns.SolveError, match=r"do not determine one field on both") as caught:
+        ns.simulate(system, duration=5.0, start=[-0.5, -1.0, 0.2])
+    assert caught.value.status == "chatter"
+    assert caught.value.time < 1.5

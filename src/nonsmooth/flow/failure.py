@@ -30,11 +30,18 @@ def solve_error(code: int, because: str = "", **where: Any) -> SolveError:
     return SolveError(because or status.sentence, status=status.name, **where)
 
 
-def _not_unique(modes: tuple[str, ...], jump: TracedTransition) -> str:
+def _not_unique(system: System, jump: TracedTransition) -> str:
     """A sentence where sliding ended without a unique way on; else nothing."""
     from nonsmooth.system.sliding import NOT_UNIQUE
 
+    modes, declared = system.modes, len(system.declared.mode_names)
     names = [modes[i] for i in (jump.source, jump.target) if modes[i].endswith(NOT_UNIQUE)]
+    if not names and min(jump.source, jump.target) >= declared:
+        return (
+            f"Both {modes[jump.source]!r} and {modes[jump.target]!r} slide to where a second surface attracts too, and "
+            "the vector fields beside these surfaces do not determine one field on both (it depends on the order in "
+            "which they are combined). Write the motion on both surfaces as a mode of its own."
+        )
     if not names:
         return ""
     return (
@@ -53,7 +60,7 @@ def wrong_way(system: System, log: Log) -> str:
     if log.status not in (codes.CHATTER, codes.TOO_MANY_CROSSINGS) or not len(log.crossing_time):
         return ""
     t, jump = system.traced, system.transitions[int(log.crossing_transition[-1])]
-    if system.surfaces and (lost := _not_unique(t.mode_names, jump)):
+    if system.surfaces and (lost := _not_unique(system, jump)):
         return lost
     if jump.reset is None or jump.source != jump.target:
         return ""

@@ -60,7 +60,7 @@ class _Pair:
     indicator: int
     below: int
     above: int
-    mode: str
+    mode: str  # "": named after its indicators
     static: sp.Expr | None = None
     field: Field | None = None
 
@@ -84,9 +84,8 @@ def slide(traced: Traced, surfaces: Sequence[TracedSurface], scale: Mapping[str,
     declared = [_Pair(s.indicator, s.below, s.above, s.mode, s.static, s.field) for s in surfaces]
     pairs, level = list(declared), declared
     while level:
-        for pair in level:
-            build.add_mode(pair)
-        level = [pair for pair in build.meetings(pairs) if pair not in pairs]
+        build.add_modes(level)
+        level = [pair for pair in dict.fromkeys(build.meetings(pairs)) if pair not in pairs]
         pairs += level
     build.inherit({(pair.below, pair.above): build.sliding.get(pair) for pair in declared}, declared)
     for pair in pairs:
@@ -145,6 +144,7 @@ class _Builder:
         self.jumps: list[TracedTransition] = []
         self.sliding: dict[_Pair, int] = {}  # the mode in which motion slides along a surface; none where it cannot
         self.cells = [frozenset({mode}) for mode in range(len(self.modes))]  # declared modes that meet in each mode
+        self.along = [frozenset[int]() for _ in self.modes]  # the indicators that each mode keeps at zero
 
     # Expressions
 
@@ -190,27 +190,36 @@ class _Builder:
 
     # Modes
 
-    def add_mode(self, pair: _Pair) -> None:
-        """Add the mode in which motion slides along the pair's surface, where both fields differ in crossing it."""
-        below, above = self.rate(pair, pair.below), self.rate(pair, pair.above)
-        if sp.expand(below - above) == 0:
-            return
-        cell = self.cells[pair.below] | self.cells[pair.above]
-        field, shown = self._filippov(pair, below, above)
-        if pair.field is not None:
-            field = self._given(pair, pair.field)
-        if cell in self.cells:  # two surfaces that were met in the other order
-            known = self.cells.index(cell)
-            if _agree(field, self.fields[known]):
-                self.sliding[pair] = known
-            return
-        self.sliding[pair] = len(self.modes)
-        self.modes.append(pair.mode)
-        self.fields.append(field)
-        self.lacking.append(self.lacking[pair.below])
-        self.cells.append(cell)
-        for row, entry in zip(self.outputs, shown, strict=True):
-            row.append(entry)
+    def add_modes(self, pairs: Sequence[_Pair]) -> None:
+        """Add the modes in which motion slides along the surfaces of pairs, where their fields differ in crossing them.
+
+        Sliding along the same surfaces, taken in another order, is the same mode; where the order matters there is none.
+        """
+        found: dict[tuple[frozenset[int], frozenset[int]], list[tuple[_Pair, Field, list[sp.Expr]]]] = {}
+        for pair in pairs:
+            below, above = self.rate(pair, pair.below), self.rate(pair, pair.above)
+            if sp.expand(below - above) == 0:
+                continue
+            key = self.cells[pair.below] | self.cells[pair.above], self.along[pair.below] | {pair.indicator}
+            field, shown = self._filippov(pair, below, above)
+            if pair.field is not None:
+                field = self._given(pair, pair.field)
+            found.setdefault(key, []).append((pair, field, shown))
+        for (cell, along), ways in found.items():
+            first, field, shown = ways[0]
+            if not all(_agree(field, other) for _, other, _ in ways[1:]):
+                continue
+            name = first.mode or "_".join(self.indicator_names[i] for i in sorted(along)) + "_sliding"
+            if name in self.modes:
+                name += "".join(f"_{self.modes[mode]}" for mode in sorted(cell))
+            self.sliding |= {pair: len(self.modes) for pair, _, _ in ways}
+            self.modes.append(name)
+            self.fields.append(field)
+            self.lacking.append(self.lacking[first.below])
+            self.cells.append(cell)
+            self.along.append(along)
+            for row, entry in zip(self.outputs, shown, strict=True):
+                row.append(entry)
 
     def _filippov(self, pair: _Pair, below: sp.Expr, above: sp.Expr) -> tuple[Field, list[sp.Expr]]:
         """The convex combination that stays on the surface: vector field, outputs."""
@@ -260,12 +269,7 @@ class _Builder:
                         continue
                     ends = self.sliding[one], self.sliding[two]
                     if (other.indicator, *ends) not in known and ends[0] != ends[1]:
-                        cell = self.cells[ends[0]] | self.cells[ends[1]]
-                        named = sorted({one.indicator, other.indicator})
-                        name = "_".join(self.traced.indicator_names[i] for i in named) + "_sliding"
-                        if name in self.modes and cell not in self.cells:
-                            name += f"_{self.modes[ends[0]]}_{self.modes[ends[1]]}"
-                        yield _Pair(other.indicator, *ends, name, other.static)
+                        yield _Pair(other.indicator, *ends, "", other.static)
 
     # Transitions
 
