@@ -145,6 +145,27 @@ def test_what_both_modes_do_happens_in_sliding_too():
         friction(transitions=[Transition("slow", "slow", **stop), Transition("fast", "fast", **other)])
 
 
+def test_a_sliding_mass_that_meets_a_spring_slides_on() -> None:
+    """Both modes go over to their own contact modes: so does the stick, to the stick between those."""
+    def side(sign: int, stiffness: float) -> Any:
+        return lambda t, u, p: (u.v, -u.x - stiffness * (u.x - 1) - sign * p.F)
+
+    system = System(
+        states=["x", "v"], parameters={"F": 0.5},
+        modes={"m": side(-1, 0.0), "q": side(1, 0.0), "m_pressed": side(-1, 9.0), "q_pressed": side(1, 9.0)},
+        indicators={"slip": lambda t, u, p: u.v - 0.2, "wall": lambda t, u, p: u.x - 1},
+        transitions=[
+            Surface("slip", below="m", above="q", mode="stick"),
+            Surface("slip", below="m_pressed", above="q_pressed", mode="stick_pressed"),
+            Transition("m", "m_pressed", when="wall > 0"), Transition("q", "q_pressed", when="wall > 0"),
+            Transition("m_pressed", "m", when="wall < 0"), Transition("q_pressed", "q", when="wall < 0"),
+        ],
+    )  # fmt: skip
+    labels = [jump.label for jump in system.transitions]
+    assert labels.count("stick -> stick_pressed") == labels.count("stick_pressed -> stick") == 1
+    assert not {"stick -> m_pressed", "stick -> q_pressed"} & set(labels)
+
+
 def utkin(field: Any) -> System:
     """A control c that enters squared: Utkin's solves x' = 0.2 + c = 0; Filippov mixes both ends."""
     return System(

@@ -87,7 +87,7 @@ def slide(traced: Traced, surfaces: Sequence[TracedSurface], scale: Mapping[str,
         build.add_modes(level)
         level = [pair for pair in dict.fromkeys(build.meetings(pairs)) if pair not in pairs]
         pairs += level
-    build.inherit({(pair.below, pair.above): build.sliding.get(pair) for pair in declared}, declared)
+    build.inherit(declared)
     for pair in pairs:
         build.add_transitions(pair)
     return replace(
@@ -193,7 +193,7 @@ class _Builder:
     def add_modes(self, pairs: Sequence[_Pair]) -> None:
         """Add the modes in which motion slides along the surfaces of pairs, where their fields differ in crossing them.
 
-        Sliding along the same surfaces, taken in another order, is the same mode; where the order matters there is none.
+        Sliding along the same surfaces in another order is the same mode; where the order matters there is none.
         """
         found: dict[tuple[frozenset[int], frozenset[int]], list[tuple[_Pair, Field, list[sp.Expr]]]] = {}
         for pair in pairs:
@@ -336,33 +336,39 @@ class _Builder:
                 row.append(row[slid])
         return self.modes.index(name)
 
-    def inherit(self, between: Mapping[tuple[int, int], int | None], pairs: Sequence[_Pair]) -> None:
+    def inherit(self, pairs: Sequence[_Pair]) -> None:
         """Keep the transitions of the declared system and give the sliding modes those of the modes that meet there."""
         surfaces = {(pair.below, pair.above, Row(pair.indicator, 1)) for pair in pairs}
         surfaces |= {(pair.above, pair.below, Row(pair.indicator, -1)) for pair in pairs}
-        for declared in self.traced.transitions:
-            if (declared.source, declared.target, *declared.rows) not in surfaces:
-                self.jumps.append(declared)
+        self.jumps = [
+            jump for jump in self.traced.transitions if (jump.source, jump.target, *jump.rows) not in surfaces
+        ]
         plain = list(self.jumps)
         for slid in range(len(self.traced.mode_names), len(self.modes)):
-            known: dict[tuple[tuple[Row, ...], float | None], TracedTransition] = {}
-            for declared in plain:
-                if declared.source not in self.cells[slid]:
-                    continue
-                first = known.setdefault((declared.rows, declared.at), declared)
-                if first is not declared:
-                    same = (first.reset, first.writes) == (declared.reset, declared.writes)
-                    ends = {(first.target, declared.target), (declared.target, first.target)}
-                    beside = first.target == declared.target or bool(ends & between.keys())
-                    if not (same and beside):
-                        raise SystemDefinitionError(
-                            f"{self.traced.name!r}: {first.label} and {declared.label} have the same condition, but "
-                            f"other resets or targets, so that nothing says what happens while {self.modes[slid]!r} "
-                            "slides between their modes; give both the same, or different conditions"
-                        )
-                    continue
-                label = f"{self.modes[slid]} -> {self.modes[declared.target]}"
-                self.jumps.append(replace(declared, source=slid, label=label, contact=declared.reset is not None))
+            alike: dict[tuple[tuple[Row, ...], float | None], list[TracedTransition]] = {}
+            for jump in plain:
+                if jump.source in self.cells[slid]:
+                    alike.setdefault((jump.rows, jump.at), []).append(jump)
+            for group in alike.values():
+                self.jumps.append(self._inherited(slid, group))
+
+    def _inherited(self, slid: int, group: Sequence[TracedTransition]) -> TracedTransition:
+        """The transition out of a sliding mode that the modes meeting there have, all with the same condition.
+
+        Without a reset what slides goes on sliding, between the targets; behind one the first target finds its side."""
+        first, targets = group[0], frozenset(jump.target for jump in group)
+        other = [jump for jump in group if (jump.reset, jump.writes) != (first.reset, first.writes)]
+        if targets not in self.cells:
+            other = other or [jump for jump in group if jump.target != first.target]
+        if other:
+            raise SystemDefinitionError(
+                f"{self.traced.name!r}: {first.label} and {other[0].label} have the same condition, but other resets "
+                f"or targets, so that nothing says what happens while {self.modes[slid]!r} slides between their modes; "
+                "give both the same, or different conditions"
+            )
+        target = self.cells.index(targets) if first.reset is None else first.target
+        label = f"{self.modes[slid]} -> {self.modes[target]}"
+        return replace(first, source=slid, target=target, label=label, contact=first.reset is not None)
 
 
 def _agree(one: Field, two: Field) -> bool:
