@@ -33,7 +33,9 @@ def _input(t: Any, u: Any, p: Any) -> Any:
 
 
 def relay_feedback(**parameters: float) -> System:
-    r"""Return the relay feedback system: :math:`\dot x = A x - b \operatorname{sgn} x_1`.
+    r"""Return the relay feedback system: a linear plant whose input switches with the sign of its output.
+
+    :math:`\dot x = A x - b \operatorname{sgn} x_1` with the A and b of Piiroinen and Kuznetsov.
 
     Parameters
     ----------
