@@ -147,6 +147,7 @@ def test_what_both_modes_do_happens_in_sliding_too():
 
 def test_a_sliding_mass_that_meets_a_spring_slides_on() -> None:
     """Both modes go over to their own contact modes: so does the stick, to the stick between those."""
+
     def side(sign: int, stiffness: float) -> Any:
         return lambda t, u, p: (u.v, -u.x - stiffness * (u.x - 1) - sign * p.F)
 

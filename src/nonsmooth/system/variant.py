@@ -59,8 +59,9 @@ def _static_ratios(description: Description) -> Iterator[tuple[Any, str]]:
     declared = description.traced
     for surface in description.surfaces:
         if surface.static is not None and surface.static.free_symbols <= set(declared.p):
-            names = declared.indicator_names[surface.indicator], *(
-                declared.mode_names[mode] for mode in (surface.below, surface.above)
+            names = (
+                declared.indicator_names[surface.indicator],
+                *(declared.mode_names[mode] for mode in (surface.below, surface.above)),
             )
             yield surface.static - 1, "`static` of surface {} ({} | {}) must be 1 or more".format(*names)
 
