@@ -20,8 +20,8 @@ def numbers(system, expressions, u, t=0.0):
 
 def test_every_model_is_listed_documented_and_takes_parameters():
     assert models.names() == (
-        "border_collision", "bouncing_ball_map", "buck_converter", "discontinuous_support", "impact_oscillator",
-        "relief_valve", "square_root_map",
+        "border_collision", "bouncing_ball_map", "buck_converter", "discontinuous_support", "dry_friction_oscillator",
+        "impact_oscillator", "relay_feedback", "relief_valve", "square_root_map", "stick_slip_belt",
     )  # fmt: skip
     for name in models.names():
         make = getattr(models, name)

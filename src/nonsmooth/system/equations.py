@@ -13,21 +13,27 @@ from nonsmooth.system.condition import read_condition
 from nonsmooth.system.mode import Band
 from nonsmooth.system.names import unknown
 from nonsmooth.system.parameter import Parameter
-from nonsmooth.system.scalar import Scalar, as_written
+from nonsmooth.system.scalar import Scalar, as_written, to_expression
 from nonsmooth.system.traced import Row, Traced, TracedTransition
 from nonsmooth.system.tracing import Symbols, call_scalar, call_vector, refuse_corners
 from nonsmooth.system.transition import Surface, Transition
 
-__all__ = ["TracedBand", "TracedSurface", "trace_band", "trace_surface", "trace_system"]
+__all__ = ["TracedBand", "TracedSurface", "sliding_mode", "trace_band", "trace_surface", "trace_system"]
 
 
 @dataclass(frozen=True)
 class TracedSurface:
-    """A Filippov surface in integers: where ``indicator`` is negative the mode is ``below``."""
+    """A Filippov surface in integers: where ``indicator`` is negative the mode is ``below``.
+
+    ``mode`` names the sliding mode; ``static`` is the ratio of the static value to the kinetic one, ``field`` what is
+    given in place of Filippov's field (None: not given)."""
 
     indicator: int
     below: int
     above: int
+    mode: str
+    static: sp.Expr | None = None
+    field: tuple[sp.Expr, ...] | None = None
 
 
 @dataclass(frozen=True)
@@ -125,10 +131,33 @@ def _surface_jumps(
     ]
 
 
-def trace_surface(item: Surface, traced: Traced) -> TracedSurface:
+def sliding_mode(item: Surface, transitions: Sequence[Transition | Surface]) -> str:
+    """Name of the mode in which motion slides along a surface."""
+    alike = [one for one in transitions if isinstance(one, Surface) and one.indicator == item.indicator]
+    default = f"{item.indicator}_sliding" + (f"_{item.below}_{item.above}" if len(alike) > 1 else "")
+    return item.mode or default
+
+
+def trace_surface(item: Surface, mode: str, traced: Traced, symbols: Symbols) -> TracedSurface:
     """Return a surface in integers; its names were checked when its transitions were made."""
-    modes = traced.mode_names
-    return TracedSurface(traced.indicator_names.index(item.indicator), modes.index(item.below), modes.index(item.above))
+    modes, moving = traced.mode_names, {symbols.t, *symbols.u.values()}
+    below = modes.index(item.below)
+    own = tuple(n for n, gone in zip(traced.state_names, traced.lacking[below], strict=True) if not gone)
+    arguments = Scalar(symbols.t), symbols.states(own, f"mode {item.below!r}"), symbols.parameters()
+    static, field = item.static, None
+    if callable(static):
+        static = call_scalar(static, arguments, f"`static` of {item.label}")
+        refuse_corners(static, moving, f"`static` of {item.label}")
+    elif static is not None:
+        static = to_expression(static)
+    if item.field is not None:
+        part = call_vector(item.field, arguments, own, f"the field of {item.label}")
+        for entry in part:
+            refuse_corners(entry, moving, f"the field of {item.label}")
+        whole = dict(zip(own, part, strict=True))
+        field = tuple(whole.get(state, sp.Integer(0)) for state in traced.state_names)
+    i = traced.indicator_names.index(item.indicator)
+    return TracedSurface(i, below, modes.index(item.above), mode, static, field)
 
 
 def _jump(

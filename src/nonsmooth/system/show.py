@@ -86,11 +86,13 @@ def _rows(system: System) -> list[tuple[str, str]]:
     for name, e in zip(traced.indicator_names[:n], traced.indicators, strict=False):
         lines.append((f"indicator {name}", write_expression(e, names)))
     for surface in system.surfaces:
-        text = f"{traced.mode_names[surface.below]} | {traced.mode_names[surface.above]}"
-        lines.append((f"surface {traced.indicator_names[surface.indicator]}", f"{text}, crossed or slid on"))
+        text = f"{traced.mode_names[surface.below]} | {traced.mode_names[surface.above]}, crossed or slid on"
+        if surface.static is not None:
+            text += f", static {write_expression(surface.static, names)}"
+        lines.append((f"surface {traced.indicator_names[surface.indicator]}", text))
     either_side = {frozenset((surface.below, surface.above)) for surface in system.surfaces}
     head = "transitions"
-    for jump in traced.transitions:
+    for jump in system.declared.transitions:
         if frozenset((jump.source, jump.target)) not in either_side:
             lines.append((head, _jump(jump, traced, names)))
             head = ""

@@ -174,7 +174,7 @@ class System:
 
     @property
     def surfaces(self) -> tuple[TracedSurface, ...]:
-        """Surfaces on which motion may slide; empty for a smoothed system."""
+        """Surfaces on which motion may slide; empty for a smoothed system. Their sliding modes are among the modes."""
         return () if self.is_smoothed else self._description.surfaces
 
     @property
@@ -201,6 +201,15 @@ class System:
     def traced(self) -> Traced:
         """The equations as expressions; those of the smoothed system where it is smoothed."""
         return self._variant.traced
+
+    @property
+    def declared(self) -> Traced:
+        """The equations as expressions, without the sliding modes that are derived from them."""
+        return self.traced if self.is_smoothed else self._description.traced
+
+    def with_sliding(self, declared: Traced) -> Traced:
+        """Return what became of the declared equations with the sliding modes that belong to them."""
+        return declared if self.is_smoothed else self._description.with_sliding(declared)
 
     @property
     def derivatives(self) -> Derivatives:
