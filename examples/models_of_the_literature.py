@@ -83,9 +83,7 @@ def chua(system: ns.System) -> Number:
 
 
 def track(system: ns.System) -> Number:
-    run = ns.simulate(
-        system.with_parameters(zeta=0.0, A=0.0, d=2.0), duration=4 * ellipe(-0.64), start={"x": -0.8}
-    )
+    run = ns.simulate(system.with_parameters(zeta=0.0, A=0.0, d=2.0), duration=4 * ellipe(-0.64), start={"x": -0.8})
     return float(run.u[-1, 0]), -0.8, f"free period {4 * ellipe(-0.64):.4f}"
 
 

@@ -28,7 +28,8 @@ def test_the_bilinear_oscillator_grazes_its_outer_springs_at_the_linear_amplitud
 
 @pytest.mark.parametrize("v", [0.3, 2.0])
 def test_free_motion_of_the_bilinear_oscillator_has_the_period_of_its_pieces(v: float) -> None:
-    run = ns.simulate(ns.models.bilinear_oscillator(zeta=0.0, A=0.0), duration=20.0, start={"x": 0.0, "v_x": np.hypot(v, 1)})
+    system = ns.models.bilinear_oscillator(zeta=0.0, A=0.0)
+    run = ns.simulate(system, duration=20.0, start={"x": 0.0, "v_x": np.hypot(v, 1)})
     a, s = np.hypot(1, v), np.sqrt(11)
     period = 4 * np.arcsin(1 / a) + 4 / s * np.arctan(s * v)
     assert run.crossing_time.values[4] - run.crossing_time.values[0] == pytest.approx(period, rel=1e-13)
@@ -69,7 +70,8 @@ def test_rattling_gears_against_scipy() -> None:
 
     assert "teeth_free" in str(orbit)
     assert march({"all": field}, {}, "all", orbit.u, orbit.period)[1] == pytest.approx(orbit.u, abs=1e-9)
-    assert np.sort_complex(orbit.floquet_multipliers) == pytest.approx(multipliers(field, orbit.u, orbit.period), abs=1e-5)
+    expected = multipliers(field, orbit.u, orbit.period)
+    assert np.sort_complex(orbit.floquet_multipliers) == pytest.approx(expected, abs=1e-5)
 
 
 def test_chuas_outer_equilibria_lose_stability_where_routh_and_hurwitz_say() -> None:
@@ -88,9 +90,7 @@ def test_chuas_outer_equilibria_lose_stability_where_routh_and_hurwitz_say() -> 
 
 def test_the_double_scroll_has_the_published_exponents() -> None:
     """0.23, 0 and -1.78 per unit of the circuit's time, 1 / 0.7 of the dimensionless one (its conductance is 0.7)."""
-    found = ns.lyapunov(
-        ns.models.chua_circuit(), duration=4000.0, start={"x": 0.1, "y": 0.0, "z": 0.0}, progress=False
-    )
+    found = ns.lyapunov(ns.models.chua_circuit(), duration=4000.0, start={"x": 0.1, "y": 0.0, "z": 0.0}, progress=False)
     assert 0.7 * found.exponents.values == pytest.approx([0.23, 0.0, -1.78], abs=0.02)
     assert float(found.kaplan_yorke) == pytest.approx(2.13, abs=0.005)
 

@@ -108,7 +108,8 @@ def test_the_stribeck_oscillator_against_scipy() -> None:
 
     leaving = {
         "belt_stick": [
-            (lambda t, u: held(t, u) - 0.4, 1, "belt_forward", None), (lambda t, u: held(t, u) + 0.4, -1, "belt_back", None),
+            (lambda t, u: held(t, u) - 0.4, 1, "belt_forward", None),
+            (lambda t, u: held(t, u) + 0.4, -1, "belt_back", None),
         ],
         "belt_forward": [(lambda t, u: u[1] - 1, -1, "belt_stick", still)],
         "belt_back": [(lambda t, u: u[1] - 1, 1, "belt_stick", still)],
@@ -117,7 +118,6 @@ def test_the_stribeck_oscillator_against_scipy() -> None:
     _, u, log = march(fields, leaving, "belt_back", np.zeros(2), 50.0)
     system = ns.models.stribeck_oscillator()
     run = ns.simulate(system, duration=50.0)
-    assert [system.modes[int(m)] for m in run.mode.values[[0, -1]]][0] == "belt_back"
     assert run.u.values[-1] == pytest.approx(u, abs=1e-7)
     assert "belt_stick" in {mode for _, mode in log}
 
@@ -125,9 +125,9 @@ def test_the_stribeck_oscillator_against_scipy() -> None:
 def test_the_unforced_belt_lets_go_at_its_static_friction_and_drives_steady_sliding() -> None:
     system = ns.models.stribeck_oscillator(u_0=0.0)
     run = ns.simulate(system, duration=60.0)
-    off = [k for k, i in enumerate(run.crossing_transition.values) if system.transitions[i].label.startswith("belt_stick")]
-    assert off
-    assert run.u_before.values[off] == pytest.approx(np.tile([0.4, 1.0], (len(off), 1)), abs=1e-9)
+    off = np.array([system.transitions[i].label.startswith("belt_stick") for i in run.crossing_transition.values])
+    assert off.any()
+    assert run.u_before.values[off] == pytest.approx(np.tile([0.4, 1.0], (off.sum(), 1)), abs=1e-9)
     near = ns.simulate(system, duration=30.0, start={"x": stribeck(1.0) + 1e-4})
     slope = -0.3 * 1.42 / 2.42**2 + 0.02
     growth = np.exp(-slope / 2 * 30)  # of a small motion: eigenvalues of s^2 + mu' s + 1

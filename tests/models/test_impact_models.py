@@ -16,8 +16,8 @@ def symmetric_motion(omega: float, g: float = 0.5, e: float = 0.6) -> tuple[floa
     """Impact velocity and cosine of the phase of Peterka's symmetric motion; its map from impact to impact."""
     half, F = np.pi / omega, 1 / (1 - omega**2)
     C, S = np.cos(half), np.sin(half)
-    k, l = (1 + e) * S / (2 * (1 + C)), (1 - e) / (2 * omega)
-    V = (g * k + np.sqrt((g * k) ** 2 - (k * k + l * l) * (g * g - F * F))) / (k * k + l * l)
+    k, q = (1 + e) * S / (2 * (1 + C)), (1 - e) / (2 * omega)
+    V = (g * k + np.sqrt((g * k) ** 2 - (k * k + q * q) * (g * g - F * F))) / (k * k + q * q)
     cosine = (k * V - g) / F
     acceleration = -cosine - g
     saltation = np.array([[-e, 0.0], [(1 + e) * acceleration / V, -e]])

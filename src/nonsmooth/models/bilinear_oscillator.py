@@ -56,8 +56,8 @@ def bilinear_oscillator(**parameters: float) -> System:
 
     References
     ----------
-    M. Wiercigroch, V.W.T. Sin, J. Appl. Mech. 65 (1998) 657-663; S.W. Shaw, P.J. Holmes, J. Sound Vib. 90 (1983) 129-155
-    (one-sided).
+    M. Wiercigroch, V.W.T. Sin, J. Appl. Mech. 65 (1998) 657-663; S.W. Shaw, P.J. Holmes, J. Sound Vib. 90 (1983)
+    129-155 (one-sided).
 
     Examples
     --------

@@ -1,8 +1,9 @@
 r"""Chua's circuit, piecewise linear: Matsumoto, Chua & Komuro, IEEE Trans. Circuits Syst. 32 (1985) 797-818.
 
-Published for the double scroll (alpha 9, beta 100/7, slopes -1/7 and 2/7): Lyapunov exponents 0.23, 0 and -1.78 per unit
-of the circuit's time, which is 1 / 0.7 of the dimensionless one, and the dimension 2.13. Known in closed form: the outer
-equilibria are at x = +-(b - a) / b = +-1.5 and lose stability at (1 + alpha b) (alpha b - alpha + beta) = alpha beta b.
+Published for the double scroll (alpha 9, beta 100/7, slopes -1/7 and 2/7): Lyapunov exponents 0.23, 0 and -1.78 per
+unit of the circuit's time, which is 1 / 0.7 of the dimensionless one, and the dimension 2.13. Known in closed form:
+the outer equilibria are at x = +-(b - a) / b = +-1.5 and lose stability at (1 + alpha b) (alpha b - alpha + beta) =
+alpha beta b.
 """
 
 from __future__ import annotations
@@ -45,13 +46,15 @@ def chua_circuit(**parameters: float) -> System:
     Parameters
     ----------
     **parameters : float
-        ``alpha`` 9, ``beta`` 100/7, ``a`` -1/7 (slope within), ``b`` 2/7 (slope outside): the double scroll; dimensionless.
+        ``alpha`` 9, ``beta`` 100/7, ``a`` -1/7 (slope within), ``b`` 2/7 (slope outside): the double scroll;
+        dimensionless.
 
     Returns
     -------
     System
-        States ``x``, ``y``, ``z``; modes ``diode_free`` (within), ``diode_above`` and ``diode_below``; output ``diode_force``, by
-        what h differs from its inner slope. It is symmetric and without a forcing period: give a section.
+        States ``x``, ``y``, ``z``; modes ``diode_free`` (within), ``diode_above`` and ``diode_below``; output
+        ``diode_force``, by what h differs from its inner slope. It is symmetric and without a forcing period: give a
+        section.
 
     References
     ----------
@@ -67,7 +70,9 @@ def chua_circuit(**parameters: float) -> System:
     from nonsmooth.system.system import System
 
     system = System(
-        name="Chua's circuit", states=["x", "y", "z"], modes={"inner": _inner},
+        name="Chua's circuit",
+        states=["x", "y", "z"],
+        modes={"inner": _inner},
         parameters={"alpha": (9.0, "", r"\alpha"), "beta": (100 / 7, "", r"\beta"), "a": -1 / 7, "b": 2 / 7},
         elements={"diode": Backlash(displacement=_voltage, on={"x": "alpha"}, half_width=1.0, stiffness=_steeper)},
         symmetry=(_mirror, 0.0, {"diode_above": "diode_below", "diode_below": "diode_above"}),

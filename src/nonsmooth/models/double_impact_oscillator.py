@@ -1,9 +1,9 @@
 r"""A forced mass between two rigid stops: Peterka, Facta Universitatis 2 (10) (2000), the double impact oscillator.
 
 Known in closed form for c = 0: in the symmetric motion with one impact on each stop per period the impact velocity V
-solves a quadratic equation. With S = sin(pi / omega), C = cos(pi / omega), k = (1 + e) S / (2 (1 + C)):
-(g - k V)^2 + ((1 - e) V / (2 omega))^2 = 1 / (1 - omega^2)^2. Its bounds are those where an eigenvalue of the map from one
-impact to the next is 1 (saddle-node), -1 (loss of symmetry) or where the mass also grazes.
+solves a quadratic equation. With S = sin(pi / omega), C = cos(pi / omega), k = (1 + e) S / (2 (1 + C)): (g - k V)^2 +
+((1 - e) V / (2 omega))^2 = 1 / (1 - omega^2)^2. Its bounds are those where an eigenvalue of the map from one impact to
+the next is 1 (saddle-node), -1 (loss of symmetry) or where the mass also grazes.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 r"""An impact damper: a ball in a cavity of a vibrating mass, Masri & Caughey, J. Appl. Mech. 33 (1966) 586-592.
 
 Known in closed form: the symmetric motion with two impacts per period. The ball flies with the speed w, the momentum
-is kept, so that the mass leaves an impact with the velocity -2 mu w less that of its arrival. With the free flow Phi of the
-mass over half a period, (Phi + 1) h = (0, -2 mu w) gives its free part h, and the impact's phase follows from a
+is kept, so that the mass leaves an impact with the velocity -2 mu w less that of its arrival. With the free flow Phi
+of the mass over half a period, (Phi + 1) h = (0, -2 mu w) gives its free part h, and the impact's phase follows from a
 quadratic equation for w.
 """
 
@@ -62,8 +62,8 @@ def impact_damper(**parameters: float) -> System:
     Returns
     -------
     System
-        States ``x``, ``y`` (the ball), ``v_x``, ``v_y``; modes by what the elements ``right`` and ``left`` of the box do
-        (``open`` or ``rest``); outputs ``right_force`` and ``left_force``. It is symmetric.
+        States ``x``, ``y`` (the ball), ``v_x``, ``v_y``; modes by what the elements ``right`` and ``left`` of the box
+        do (``open`` or ``rest``); outputs ``right_force`` and ``left_force``. It is symmetric.
 
     References
     ----------

@@ -1,8 +1,8 @@
 r"""Two masses on hardening springs that hit one another: the impact Duffing oscillator with two degrees of freedom.
 
-The example of a tuned mass damper with limited room in PWSDDE-cont (Iklodi & Dombovari). Known in closed form: an impact
-keeps the momentum v1 + mu v2 and turns the relative velocity round, times r; with linear springs the motion without
-impacts just touches at the clearance |X2 - X1| of the linear response.
+The example of a tuned mass damper with limited room in PWSDDE-cont (Iklodi & Dombovari). Known in closed form: an
+impact keeps the momentum v1 + mu v2 and turns the relative velocity round, times r; with linear springs the motion
+without impacts just touches at the clearance |X2 - X1| of the linear response.
 """
 
 from __future__ import annotations
@@ -62,8 +62,8 @@ def impact_duffing(**parameters: float) -> System:
     -------
     System
         States ``x1``, ``x2``, ``v1``, ``v2``; modes by what the elements ``upper`` and ``lower`` do (``open`` or
-        ``rest``); outputs ``upper_force`` and ``lower_force``. With ``eta_1 = eta_2 = 0`` its flow is still computed as a
-        nonlinear one.
+        ``rest``); outputs ``upper_force`` and ``lower_force``. With ``eta_1 = eta_2 = 0`` its flow is still computed
+        as a nonlinear one.
 
     References
     ----------

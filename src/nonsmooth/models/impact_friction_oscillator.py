@@ -1,7 +1,7 @@
 r"""An oscillator with dry friction that hits a rigid stop: Virgin & Begley, Physica D 130 (1999) 43-57.
 
-Known in closed form: without damping the motion that slides all the time has Den Hartog's amplitude
-sqrt(V^2 - (f U)^2), V = 1 / (1 - omega^2), U = sin(pi / omega) / (omega (1 + cos(pi / omega))), and grazes a stop there.
+Known in closed form: without damping the motion that slides all the time has Den Hartog's amplitude sqrt(V^2 - (f
+U)^2), V = 1 / (1 - omega^2), U = sin(pi / omega) / (omega (1 + cos(pi / omega))), and grazes a stop there.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ def _damping(p: Any) -> Any:
 def impact_friction_oscillator(**parameters: float) -> System:
     r"""Return the impact-friction oscillator: a forced mass that rubs its support and hits a stop.
 
-    :math:`\ddot x + 2 \zeta \dot x + x + f \operatorname{sgn} \dot x = \cos \omega t`, it sticks while the force that holds it
-    is at most f, and :math:`\dot x^+ = -e \dot x^-` at :math:`x = g`.
+    :math:`\ddot x + 2 \zeta \dot x + x + f \operatorname{sgn} \dot x = \cos \omega t`, it sticks while the force that
+    holds it is at most f, and :math:`\dot x^+ = -e \dot x^-` at :math:`x = g`.
 
     Parameters
     ----------

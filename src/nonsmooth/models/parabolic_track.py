@@ -47,8 +47,8 @@ def parabolic_track(**parameters: float) -> System:
     Parameters
     ----------
     **parameters : float
-        ``zeta`` 0.02, ``A`` 0.2 (amplitude of the track's horizontal motion), ``omega`` 0.8, ``d`` 0.2 (the stop), ``e`` 0.6;
-        dimensionless.
+        ``zeta`` 0.02, ``A`` 0.2 (amplitude of the track's horizontal motion), ``omega`` 0.8, ``d`` 0.2 (the stop),
+        ``e`` 0.6; dimensionless.
 
     Returns
     -------
@@ -57,8 +57,8 @@ def parabolic_track(**parameters: float) -> System:
 
     References
     ----------
-    M.D. Todd, L.N. Virgin, Chaos Solitons Fractals 8 (1997) 699-714; K.N. Slade, L.N. Virgin, P.V. Bayly, Phys. Rev. E 56
-    (1997) 3705-3708.
+    M.D. Todd, L.N. Virgin, Chaos Solitons Fractals 8 (1997) 699-714; K.N. Slade, L.N. Virgin, P.V. Bayly, Phys. Rev. E
+    56 (1997) 3705-3708.
 
     Examples
     --------

@@ -1,8 +1,8 @@
 r"""A Jeffcott rotor that rubs its stator: Jiang & Ulbrich, Nonlinear Dynamics 24 (2001) 269-283.
 
-An unbalanced disc on a shaft meets an elastic ring at the clearance R_0, with Coulomb friction. Known in closed form: the
-disc that does not rub whirls on a circle of radius omega^2 / sqrt((beta - omega^2)^2 + (2 zeta omega)^2); in full annular
-rub the radius R solves (R (1 + beta - omega^2) - R_0)^2 + (2 zeta omega R + mu (R - R_0))^2 = omega^4.
+An unbalanced disc on a shaft meets an elastic ring at the clearance R_0, with Coulomb friction. Known in closed form:
+the disc that does not rub whirls on a circle of radius omega^2 / sqrt((beta - omega^2)^2 + (2 zeta omega)^2); in full
+annular rub the radius R solves (R (1 + beta - omega^2) - R_0)^2 + (2 zeta omega R + mu (R - R_0))^2 = omega^4.
 """
 
 from __future__ import annotations
@@ -56,15 +56,15 @@ def rubbing_rotor(**parameters: float) -> System:
     Parameters
     ----------
     **parameters : float
-        ``zeta`` 0.05, ``beta`` 0.04 (stiffness of the shaft over that of the stator), ``R_0`` 1.05 (clearance), ``mu`` 0.2
-        (friction), ``omega`` 0.2 (speed of rotation); dimensionless. The friction does not change its sign: the
+        ``zeta`` 0.05, ``beta`` 0.04 (stiffness of the shaft over that of the stator), ``R_0`` 1.05 (clearance), ``mu``
+        0.2 (friction), ``omega`` 0.2 (speed of rotation); dimensionless. The friction does not change its sign: the
         surface of the disc is taken to be faster than any backward whirl.
 
     Returns
     -------
     System
-        States ``x``, ``y``, ``v_x``, ``v_y``; modes ``stator_open`` and ``stator_contact``; output ``stator_force``, the normal
-        force. Start it away from the centre, ``{"x": 0.5}``, where the direction of the force is defined.
+        States ``x``, ``y``, ``v_x``, ``v_y``; modes ``stator_open`` and ``stator_contact``; output ``stator_force``,
+        the normal force. Start it away from the centre, ``{"x": 0.5}``, where the direction of the force is defined.
 
     References
     ----------

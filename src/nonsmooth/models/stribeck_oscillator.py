@@ -43,8 +43,8 @@ def stribeck_oscillator(**parameters: float) -> System:
     Parameters
     ----------
     **parameters : float
-        ``D`` 0, ``mu_s`` 0.4, ``mu_k`` 0.1, ``kappa`` 1.42, ``mu_v`` 0.01 (friction over the normal force), ``v_b`` 1 (speed of
-        the belt), ``u_0`` 0.5, ``omega`` 0.6; dimensionless.
+        ``D`` 0, ``mu_s`` 0.4, ``mu_k`` 0.1, ``kappa`` 1.42, ``mu_v`` 0.01 (friction over the normal force), ``v_b`` 1
+        (speed of the belt), ``u_0`` 0.5, ``omega`` 0.6; dimensionless.
 
     Returns
     -------

@@ -354,7 +354,8 @@ class _Assembler:
         if phase == "stick":
             off = sp.Float(SMALL * self.size(v))
             return [
-                ("forward", [(v - off, 1, f"{name}_speed_above")], None), ("back", [(v + off, -1, f"{name}_speed_below")], None),
+                ("forward", [(v - off, 1, f"{name}_speed_above")], None),
+                ("back", [(v + off, -1, f"{name}_speed_below")], None),
                 ("back", [(above[0], 1, above[1])], None), ("forward", [(below[0], -1, below[1])], None),
             ]  # fmt: skip
         held = [j for j in self.held(pattern) if sp.simplify(self.across(self.rate(self.parts[j], mode), part)) != 0]
