@@ -241,6 +241,17 @@ class _Assembler:
         found = [self.scale[name] for name, symbol in self.symbols.u.items() if expression.has(symbol)]
         return max(found, default=1.0)
 
+    def sign(self, effect: sp.Expr, one: _Part, other: _Part) -> int:
+        """The sign of what one element's impulse does to another's gap, which must be the same in all states."""
+        effect = sp.simplify(effect.subs(self.values))
+        for number, holds in ((-1, effect.is_negative), (0, effect.is_zero), (1, effect.is_positive)):
+            if holds:
+                return number
+        raise SystemDefinitionError(
+            f"elements {one.name!r} and {other.name!r}: whether an impact of one opens the other depends on the state "
+            f"({effect}), and that is decided once for all; give {one.name!r} rest=False"
+        )
+
     def condition(self, rows: Sequence[Condition]) -> str:
         """The text of a condition; its expressions become indicators, equal ones the same."""
         words = []
@@ -358,14 +369,17 @@ class _Assembler:
                 ("back", [(v + off, -1, f"{name}_speed_below")], None),
                 ("back", [(above[0], 1, above[1])], None), ("forward", [(below[0], -1, below[1])], None),
             ]  # fmt: skip
-        held = [j for j in self.held(pattern) if sp.simplify(self.across(self.rate(self.parts[j], mode), part)) != 0]
-        still = self.projected(k, sp.Integer(0), held, mode)
+        other = "back" if phase == "forward" else "forward"
         sign = -1 if phase == "forward" else 1
         stopped: Condition = (v, sign, f"{name}_speed")
+        if sp.expand(most) == 0:
+            return [(other, [stopped], None)]  # an open contact, which bears no friction
+        held = [j for j in self.held(pattern) if sp.simplify(self.across(self.rate(self.parts[j], mode), part)) != 0]
+        still = self.projected(k, sp.Integer(0), held, mode)
         off = -sign * sp.Float(CREEP * self.size(v))
         slow, turned = ((v + off, one * sign, f"{name}_turned_{phase}") for one in (-1, 1))
         within = [(above[0], -1, above[1]), (below[0], 1, below[1])]
-        other, torn = ("back", (above[0], 1, above[1])) if phase == "forward" else ("forward", (below[0], -1, below[1]))
+        torn = (above[0], 1, above[1]) if phase == "forward" else (below[0], -1, below[1])
         # An impact turns the speed round at once, and no finite force can stop it then.
         return [("stick", [stopped, slow, *within], still), (other, [stopped, torn], None), (other, [turned], None)]
 
@@ -378,7 +392,7 @@ class _Assembler:
             part = self.parts[j]
             if isinstance(part.element, Coulomb):
                 return False
-            return float(self.across(self.rate(part, mode), self.parts[k]).subs(self.values)) < 0
+            return self.sign(self.across(self.rate(part, mode), self.parts[k]), part, self.parts[k]) < 0
 
         return [j for j in self.held(pattern) if j != k and bears(j)]
 
