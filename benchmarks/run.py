@@ -21,6 +21,7 @@ import chain
 import chart
 import chart_size
 import diagram
+import friction
 import lyapunov
 import lyapunov_nonlinear
 import machine
@@ -38,8 +39,8 @@ def main() -> int:
     effort = 0.1 if options.quick else 1.0
     text, verdicts = ["# Benchmarks", "", *(f"- {fact}" for fact in machine.facts() if fact), ""], []
     parts = (
-        oscillator, chain, rigid_stops, valve, valve_scan, diagram, chart, chart_size, lyapunov, lyapunov_nonlinear,
-        branch,
+        oscillator, chain, rigid_stops, friction, valve, valve_scan, diagram, chart, chart_size, lyapunov,
+        lyapunov_nonlinear, branch,
     )  # fmt: skip
     for part in parts:
         lines, part_verdicts = part.run(effort)

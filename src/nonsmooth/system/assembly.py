@@ -14,7 +14,7 @@ into rest and stick project onto it.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Any
 
@@ -34,7 +34,7 @@ from nonsmooth.system.mode import Mode
 from nonsmooth.system.names import unknown
 from nonsmooth.system.scalar import Scalar, to_expression
 from nonsmooth.system.tracing import Symbols, call_scalar, call_vector
-from nonsmooth.system.transition import Transition
+from nonsmooth.system.transition import Surface, Transition
 
 __all__ = ["assembled", "element_names"]
 
@@ -116,7 +116,7 @@ class _Assembler:
         return total
 
     def across(self, expression: sp.Expr, part: _Part) -> sp.Expr:
-        """What a unit force of an element adds to the derivative of an expression."""
+        """Change of the derivative of an expression by a unit force of an element."""
         return sp.Add(*[sp.diff(expression, self.u[i]) * d for i, d in part.direction.items()])
 
     def rate(self, part: _Part, mode: str) -> sp.Expr:
@@ -215,12 +215,12 @@ class _Assembler:
     # What a user would have written
 
     def effects(self, some: Sequence[int], mode: str) -> sp.Matrix:
-        """What unit forces of some elements add to the derivatives of their rates."""
+        """Changes of the derivatives of the rates of some elements by their unit forces."""
         parts = [self.parts[k] for k in some]
         return sp.Matrix([[self.across(self.rate(one, mode), other) for other in parts] for one in parts])
 
     def independent(self, some: Sequence[int], mode: str) -> bool:
-        """Whether the rates of some elements can be held at zero each by its own force."""
+        """Return whether the rates of some elements can be held at zero each by its own force."""
         return not some or sp.simplify(self.effects(some, mode).det()) != 0
 
     def held(self, pattern: Pattern) -> list[int]:
@@ -229,7 +229,7 @@ class _Assembler:
         return [k for k, phase in enumerate(phases) if phase in ("rest", "stick")]
 
     def pull(self, part: _Part, mode: str) -> sp.Expr:
-        """What brings a state back onto the surface that rounding and truncation leave; zero there (Baumgarte 1972)."""
+        """Force that brings a state back onto the surface, which rounding leaves; zero there (Baumgarte 1972)."""
         rate = self.rate(part, mode)
         if isinstance(part.element, Coulomb):
             return -rate
@@ -447,7 +447,9 @@ def assembled(
         words = [f"{part.name}_{part.element.phases[k]}" for part, k in zip(make.parts, pattern, strict=True)]
         return "_".join(words if len(base) == 1 else [mode, *words])
 
-    fields, forces, transitions = {}, {part.name: {} for part in make.parts}, []  # type: ignore[var-annotated]
+    fields: dict[str, Any] = {}
+    forces: dict[str, dict[str, Any]] = {part.name: {} for part in make.parts}
+    transitions: list[Transition | Surface] = []
     for mode, pattern in pairs:
         here = name(mode, pattern)
         f, found = make.flow(mode, pattern)
@@ -462,7 +464,10 @@ def assembled(
                 reset = None if states is None else _returns(states)
                 transitions.append(Transition(here, name(mode, there), when=make.condition(rows), reset=reset))
         for item in given["transitions"]:
-            if item.source == mode:
+            if isinstance(item, Surface) and item.below == mode:
+                ends = name(item.below, pattern), name(item.above, pattern)
+                transitions.append(replace(item, below=ends[0], above=ends[1]))
+            elif isinstance(item, Transition) and item.source == mode:
                 ends = name(item.source, pattern), name(item.target, pattern)
                 transitions.append(Transition(*ends, item.when, item.at, item.reset, item.write))
     outputs = {}

@@ -255,6 +255,23 @@ def finest(tables, work, mode, rows, lo, hi, node, up):
 
 
 @inline
+def returns_at_once(tables, work, mode, rows, lo, hi):
+    """Whether a condition that begins on its surface comes back to it within one node spacing, as in chatter."""
+    w, zero, spacing = work.w, work.zero, tables.info[mode, 1]
+    soon = False
+    for r in range(lo, hi):
+        f = rows[r, 0]
+        if f < zero.shape[0] and zero[f] == 1:
+            bend = tables.tay[mode, f, ONE, 2]
+            for j in range(M):
+                if j != ONE:
+                    bend += tables.tay[mode, f, j, 2] * w[j]
+            slope = slope_of(tables, mode, f, w)
+            soon = soon or (slope * bend < 0.0 and fabs(slope) < fabs(bend) * spacing)
+    return soon
+
+
+@inline
 def search(tables, work, mode, rows, lo, hi, held, r_max):
     """First instant in [0, r_max] of the step at which all the rows lo..hi become positive; -1: none.
 
@@ -264,7 +281,7 @@ def search(tables, work, mode, rows, lo, hi, held, r_max):
     """
     spacing = tables.info[mode, 1]
     w, w1, wp, wq, end, zero, found = work.w, work.w1, work.wp, work.wq, work.there, work.zero, work.found
-    size = NODES
+    size = 1 if returns_at_once(tables, work, mode, rows, lo, hi) else NODES
     node = 0
     up = held
     while node < NODES and node * spacing <= r_max:
