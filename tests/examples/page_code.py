@@ -9,6 +9,7 @@ anything.
 
 from __future__ import annotations
 
+import ast
 import contextlib
 import io
 import os
@@ -37,8 +38,10 @@ def blocks(text: str) -> list[tuple[str, str, str | None, int]]:
     return result
 
 
-def run_page(page: Path, folder: Path) -> Iterator[tuple[str, str | None, int]]:
-    """Run every block of a page in ``folder``; yields (what it printed or raised, what is expected, line)."""
+def run_page(page: Path, folder: Path) -> Iterator[tuple[str, str, str | None, int]]:
+    """Run every block of a page in ``folder``, as the cells of a notebook.
+
+    Yields (what it printed or raised, what a notebook shows below it, what is expected, line)."""
     names: dict[str, Any] = {"__name__": "page"}
     text = page.read_text(encoding="utf-8")
     with contextlib.chdir(folder):
@@ -46,26 +49,29 @@ def run_page(page: Path, folder: Path) -> Iterator[tuple[str, str | None, int]]:
             Path(name).write_text(content, encoding="utf-8")
         for language, code, expected, line in blocks(text):
             if language == "python":
-                place = compile("\n" * line + code, str(page), "exec")
-                yield _python(place, names, may_raise=expected is not None), expected, line
+                parsed = ast.parse("\n" * line + code, str(page))
+                yield *_python(parsed, str(page), names, may_raise=expected is not None), expected, line
             elif language == "toml":
                 named = re.match(r"# (\S+\.toml)\n", code)
                 if named is not None:
                     Path(named[1]).write_text(code, encoding="utf-8")
             else:
-                yield _shell(code), expected, line
+                yield _shell(code), "", expected, line
 
 
-def _python(code: Any, names: dict[str, Any], may_raise: bool) -> str:
-    printed = io.StringIO()
+def _python(code: ast.Module, page: str, names: dict[str, Any], may_raise: bool) -> tuple[str, str]:
+    last = code.body.pop() if isinstance(code.body[-1], ast.Expr) else None
+    printed, shown = io.StringIO(), None
     with contextlib.redirect_stdout(printed):
         try:
-            exec(code, names)
+            exec(compile(code, page, "exec"), names)
+            if isinstance(last, ast.Expr):
+                shown = eval(compile(ast.Expression(last.value), page, "eval"), names)
         except Exception as error:
             if not may_raise:
                 raise
-            return f"{type(error).__name__}: {error}"
-    return printed.getvalue()
+            return f"{type(error).__name__}: {error}", ""
+    return printed.getvalue(), "" if shown is None else repr(shown)
 
 
 def _shell(code: str) -> str:
