@@ -12,10 +12,7 @@ from __future__ import annotations
 import ast
 import contextlib
 import io
-import os
 import re
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -75,14 +72,12 @@ def _python(code: ast.Module, page: str, names: dict[str, Any], may_raise: bool)
 
 
 def _shell(code: str) -> str:
-    printed = ""
-    for line in code.splitlines():
-        words = line.split("#")[0].split()
-        if words[:1] != ["nonsmooth"] or words[1:2] == ["reproduce"]:
-            continue
-        done = subprocess.run(
-            [sys.executable, "-m", "nonsmooth.cli.main", *words[1:]], capture_output=True, text=True,
-            env=os.environ | {"MPLBACKEND": "Agg"},
-        )  # fmt: skip
-        printed += done.stdout + done.stderr
-    return printed
+    from nonsmooth.cli.main import main
+
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed):
+        for line in code.splitlines():
+            words = line.split("#")[0].split()
+            if words[:1] == ["nonsmooth"] and words[1:2] != ["reproduce"]:
+                main(words[1:])
+    return printed.getvalue()
