@@ -106,5 +106,5 @@ $(VENV)/.installed-%: pyproject.toml | $(BIN)/python
 .PRECIOUS: $(VENV)/.installed-%
 
 $(VENV)/.compiled-%: $(VENV)/.installed-%
-	$(BIN)/python -m nonsmooth.kernels.ahead --shapes 2,1
+	$(BIN)/python -m nonsmooth.kernels.compile.ahead --shapes 2,1
 	@touch $@

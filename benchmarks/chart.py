@@ -20,7 +20,7 @@ import nonsmooth as ns
 import oscillator_heyoka
 import oscillator_heyoka_batch
 import oscillator_scipy
-from nonsmooth.analysis.chart import chart, plan_chart
+from nonsmooth.diagrams.chart import chart, plan_chart
 from timing import interleaved, ratio
 from work import TABLE_1
 
@@ -38,9 +38,7 @@ PLANES = {
 def periods_run(system: ns.System, ranges: dict[str, tuple[float, float]]) -> float:
     """Mean number of periods of a point with every period run, longer transients among them, on a coarser grid."""
     grid = {key: np.linspace(*ends, 40) for key, ends in ranges.items()}
-    settler = plan_chart(
-        system, grid, transient=PERIODS - 60, keep=60, extremes=False, stop_early=False
-    ).work.settler
+    settler = plan_chart(system, grid, transient=PERIODS - 60, keep=60, extremes=False, stop_early=False).work.settler
     a, b = (values.ravel() for values in np.meshgrid(*grid.values(), indexing="ij"))
     points = system.parameter_points(dict(zip(grid, (a, b), strict=True)))
     return float(settler.run(points, np.arange(len(points)), np.zeros((len(points), 2))).returns.mean())

@@ -25,16 +25,16 @@ import gpu_valve
 import machine
 import nonsmooth as ns
 from gpu_flops import PLANES
-from nonsmooth.analysis.chart import plan_chart
-from nonsmooth.analysis.chart_refine import labels_of_points
-from nonsmooth.flow.devices import gpu_name
-from nonsmooth.kernels import codes
+from nonsmooth.diagrams.chart import plan_chart
+from nonsmooth.diagrams.chart_refine import labels_of_points
+from nonsmooth.flow.engines.devices import gpu_name
+from nonsmooth.kernels.hybrid import codes
 from own_process import SCRIPTS, printed
 
 HERE = Path(__file__).parent
 # FP64 units of a multiprocessor, by compute capability; each makes a multiplication and an addition per clock.
 UNITS = {(6, 0): 32, (7, 0): 32, (8, 0): 32, (9, 0): 64, (10, 0): 64}
-SHAPE = (1, 2, 2, 1, 2, 5)  # of the paper's oscillator: see nonsmooth.kernels.cuda_module
+SHAPE = (1, 2, 2, 1, 2, 5)  # of the paper's oscillator: see nonsmooth.kernels.cuda.module
 PERIODS = 500
 
 
@@ -52,7 +52,7 @@ def counted() -> dict[str, Any]:
 
 def compiled() -> list[str]:
     """What the compiler makes of every kernel, for the argument types of a simulated run."""
-    from nonsmooth.kernels.cuda_ptx import resources_of
+    from nonsmooth.kernels.cuda.ptx import resources_of
 
     simulated = printed(str(SCRIPTS / "gpu_script.py"), NUMBA_ENABLE_CUDASIM="1")
     launched = json.loads(simulated.splitlines()[-1])["launched"]
@@ -61,7 +61,7 @@ def compiled() -> list[str]:
         "| kernel | registers | stack, bytes | spills (store, load), bytes | object, kB | seconds to PTX |",
         "|---|---|---|---|---|---|",
     ]  # fmt: skip
-    code = "import json, sys; from nonsmooth.kernels.cuda_ptx import ptx_of; print(ptx_of(*json.load(sys.stdin)))"
+    code = "import json, sys; from nonsmooth.kernels.cuda.ptx import ptx_of; print(ptx_of(*json.load(sys.stdin)))"
     for name, signature in launched.items():
         began = perf_counter()
         ptx = printed("-c", code, given=json.dumps([name, signature, SHAPE]))
@@ -129,8 +129,8 @@ def compared(plane: str, side: int) -> list[str]:
 
 def one_launch(plane: str, side: int, returns: int = 256) -> float:
     """Forcing periods per second while all trajectories of a chart are marched, tables included."""
-    from nonsmooth.flow.launches import States
-    from nonsmooth.flow.planar_cuda import PlanarOnGpu
+    from nonsmooth.flow.engines.launches import States
+    from nonsmooth.flow.engines.linear_cuda import PlanarOnGpu
 
     _, settler, points, starts = settlers(side, plane)
     gpu = PlanarOnGpu(settler.engine, points, settler.plan)

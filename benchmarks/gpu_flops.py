@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 import nonsmooth as ns
-from nonsmooth.flow.engine import Chain
-from nonsmooth.flow.methods import engine_for
+from nonsmooth.flow.engines.engine import Chain
+from nonsmooth.flow.engines.methods import engine_for
 from work import TABLE_1
 
 PLANES = {

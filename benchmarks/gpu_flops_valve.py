@@ -14,17 +14,11 @@ import numpy as np
 
 import nonsmooth as ns
 from gpu_flops import Counted, counted
-from nonsmooth.flow.engine import Chain, State
-from nonsmooth.flow.methods import engine_for
+from nonsmooth.flow.engines.engine import Chain, State
+from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.sections import section_plan
-from nonsmooth.kernels import (
-    crossing,
-    polynomial,
-    series_places,
-    taylor,
-    trust,
-)
-from nonsmooth.kernels.series_module import series_module
+from nonsmooth.kernels.series import crossing, places, polynomial, taylor, trust
+from nonsmooth.kernels.series.module import series_module
 
 FILES = (crossing, polynomial, series_module("sections", "taylor"), taylor, trust)
 TRANSIENT, RETURNS, TOLERANCE = 40, 20, 1e-10
@@ -70,7 +64,7 @@ def main() -> None:
             out, state = Chain.empty(1, 1, 3, 2, 0), State(np.array(START), np.zeros(0))
             Counted.done = 0
             engine.chain(tables, 0, 1, state, None, plan, returns - 1, 1, out)
-            totals.append((Counted.done, int(found["work"].tally[series_places.STEPS])))
+            totals.append((Counted.done, int(found["work"].tally[places.STEPS])))
         operations.append((totals[1][0] - totals[0][0]) / RETURNS)
         steps.append((totals[1][1] - totals[0][1]) / RETURNS)
     print(json.dumps({"per_return": float(np.mean(operations)), "steps_per_return": float(np.mean(steps))}))

@@ -15,8 +15,8 @@ import numpy as np
 
 import nonsmooth as ns
 from gpu_flops import PLANES
-from nonsmooth.flow.engine import Chain
-from nonsmooth.flow.methods import engine_for
+from nonsmooth.flow.engines.engine import Chain
+from nonsmooth.flow.engines.methods import engine_for
 from work import TABLE_1
 
 TABLES = 6  # of the scratch arrays, the first ones

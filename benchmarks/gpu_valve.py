@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 
 import nonsmooth as ns
-from nonsmooth.analysis.attractors import Settler
-from nonsmooth.flow.devices import batch_size
-from nonsmooth.flow.methods import engine_for
+from nonsmooth.attractors.settler import Settler
+from nonsmooth.flow.engines.devices import batch_size
+from nonsmooth.flow.engines.methods import engine_for
+from nonsmooth.flow.engines.series_cuda import PART
 from nonsmooth.flow.sections import section_plan
-from nonsmooth.flow.series_cuda import PART
-from nonsmooth.kernels import codes
+from nonsmooth.kernels.hybrid import codes
 from own_process import printed
 
 HERE = Path(__file__).parent
@@ -47,7 +47,7 @@ def launched() -> str:
     """Types with which the kernel is launched, by a run of one trajectory under Numba's simulator."""
     code = (
         "import json, numpy as np, gpu_both, gpu_valve\n"
-        "from nonsmooth.flow.series_cuda import SeriesOnGpu\n"
+        "from nonsmooth.flow.engines.series_cuda import SeriesOnGpu\n"
         "types = gpu_both.launches_of(SeriesOnGpu)\n"
         "gpu_valve.march(np.array([5.0]), 2, 1)\n"
         "print(types['advance'])"
@@ -57,15 +57,15 @@ def launched() -> str:
 
 def ptx(signature: str) -> str:
     """The kernel of the valve as PTX."""
-    from nonsmooth.flow.series_cuda import module_of
-    from nonsmooth.kernels.cuda_ptx import ptx_of_module
+    from nonsmooth.flow.engines.series_cuda import module_of
+    from nonsmooth.kernels.cuda.ptx import ptx_of_module
 
     engine, points = engine_and_points(np.array([5.0]))
     return ptx_of_module(module_of(engine, engine.prepare(points)), "advance", signature)
 
 
 def compiled() -> list[str]:
-    from nonsmooth.kernels.cuda_ptx import resources_of
+    from nonsmooth.kernels.cuda.ptx import resources_of
 
     began = process_time()
     text = ptx(launched())
@@ -100,9 +100,7 @@ def compared(n: int = 400) -> list[str]:
     inflows = np.linspace(LOWEST, HIGHEST, n)
     engine, points = engine_and_points(inflows)
     valve = ns.models.relief_valve()
-    cpu = Settler(
-        valve, engine, section_plan(valve, TOP)[1], TRANSIENT, KEEP, 16, stop_early=False, rtol=TOLERANCE
-    )
+    cpu = Settler(valve, engine, section_plan(valve, TOP)[1], TRANSIENT, KEEP, 16, stop_early=False, rtol=TOLERANCE)
     rows, starts = np.arange(n), np.tile(list(START.values()), (n, 1))
     began = perf_counter()
     a = cpu.run(points, rows, starts)
@@ -126,17 +124,15 @@ def compared(n: int = 400) -> list[str]:
 
 def march(inflows: np.ndarray, transient: int, keep: int) -> tuple[np.ndarray, np.ndarray]:
     """March the valve at each inflow: codes, and the seconds of each of three runs."""
-    from nonsmooth.flow.launches import States
-    from nonsmooth.flow.series_cuda import SeriesOnGpu
+    from nonsmooth.flow.engines.launches import States
+    from nonsmooth.flow.engines.series_cuda import SeriesOnGpu
 
     engine, points = engine_and_points(inflows)
     gpu = SeriesOnGpu(engine, points, section_plan(ns.models.relief_valve(), TOP)[1])
     n = len(inflows)
     jobs, out, seconds = np.arange(n), gpu.buffers(n, keep), []
     for _ in range(3):
-        states = States.of(
-            gpu.cuda, jobs, np.tile(list(START.values()), (n, 1)), np.zeros((n, 0)), 0, np.zeros((n, 3))
-        )
+        states = States.of(gpu.cuda, jobs, np.tile(list(START.values()), (n, 1)), np.zeros((n, 0)), 0, np.zeros((n, 3)))
         gpu.cuda.synchronize()
         began = perf_counter()
         gpu.run(jobs, states, transient, keep, out)
@@ -160,7 +156,5 @@ def timed(flops: dict[str, float], peak: float) -> list[str]:
         scan(inflows, device="cuda")
         whole = n * (TRANSIENT + KEEP) / (perf_counter() - began)
         best = max(best, rate)
-        lines.append(
-            f"| {n} | {rate:.3g} | {rate * flops['per_return'] / peak:.1%} | {whole:.3g} | {TITAN:.2g} |"
-        )
+        lines.append(f"| {n} | {rate:.3g} | {rate * flops['per_return'] / peak:.1%} | {whole:.3g} | {TITAN:.2g} |")
     return [*lines, "", f"Wanted {WANTED:.1g} returns/s: {'met' if best >= WANTED else '**not met**'}.", ""]

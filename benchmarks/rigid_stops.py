@@ -122,9 +122,7 @@ class SciPy:
     def run(self, periods: int) -> Array:
         end = self.t + periods * PERIOD
         while self.t < end:
-            s = solve_ivp(
-                self.field, (self.t, end), self.u, method="DOP853", rtol=RTOL, atol=ATOL, events=self.events
-            )
+            s = solve_ivp(self.field, (self.t, end), self.u, method="DOP853", rtol=RTOL, atol=ATOL, events=self.events)
             self.t, self.u = float(s.t[-1]), s.y[:, -1]
             for i, found in zip(STOPS, s.t_events, strict=True):
                 if len(found):

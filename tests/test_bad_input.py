@@ -245,7 +245,11 @@ SWEEP = {
     "keep as text": ("rho", VALUES, {"keep": "all"}, TypeError, r"keep must be a real number, not 'all'"),
     "max_period": ("rho", VALUES, {"max_period": 0}, ValueError, r"max_period = 0 .*at least 1"),
     "max_period beyond keep": (
-        "rho", VALUES, {"keep": 10, "max_period": 16}, ValueError, r"max_period = 16: 10 kept .* periods up to 9",
+        "rho",
+        VALUES,
+        {"keep": 10, "max_period": 16},
+        ValueError,
+        r"max_period = 16: 10 kept .* periods up to 9",
     ),
     "threads": ("rho", VALUES, {"threads": 0}, ValueError, r"threads = 0 .*at least 1"),
     "section as a number": ("rho", VALUES, {"section": 0.5}, TypeError, r"ns\.Stroboscopic\(\.\.\.\) or ns\.Poincare"),
@@ -419,7 +423,7 @@ def test_ctrl_c_in_a_long_sweep(direction: str, tmp_path: Path) -> None:
     )
     # tells when the work has begun, so that the signal does not meet the imports
     code = (
-        "import signal, sys, nonsmooth.analysis.sweep as s\n"
+        "import signal, sys, nonsmooth.diagrams.sweep as s\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # a job in the background inherits "ignore"
         "run = s.run_pieces\n"
         "def told(*a):\n    print('running', flush=True)\n    return run(*a)\n"

@@ -32,7 +32,7 @@ assert run["crossing_time"].size > 10
 
 COUNT = """
 import sys
-from nonsmooth.kernels.cache import _passing, cache_statistics
+from nonsmooth.kernels.compile.cache import _passing, cache_statistics
 joined = ("nonsmooth_generated_linear", "nonsmooth_generated_series")
 modules = [m for name, m in sys.modules.items() if name.startswith(("nonsmooth.kernels.", *joined))]
 counts = [one for module in modules for one in cache_statistics(module)]

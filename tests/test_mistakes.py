@@ -14,9 +14,9 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.cli import main as cli
-from nonsmooth.flow.linear import PlanarEngine
-from nonsmooth.flow.series import SeriesEngine
-from nonsmooth.kernels import cache
+from nonsmooth.flow.engines.linear import PlanarEngine
+from nonsmooth.flow.engines.series import SeriesEngine
+from nonsmooth.kernels.compile import cache
 
 IMPACT = "system(transitions=[ns.Transition('free', 'free', when='{}', reset=lambda t, u, p: (u.x, -p.e * u.v))])"
 FIELD = "system(modes={{'free': lambda t, u, p: {}}})"
@@ -354,5 +354,3 @@ def test_real_chatter_is_not_taken_for_a_wrong_sign() -> None:
     with pytest.raises(ns.SolveError, match="ever shorter times") as raised:
         ns.simulate(ball, duration=20.0, start=[1.0, 0.0])
     assert raised.value.status == "chatter" and "other sign" not in str(raised.value)
-
-

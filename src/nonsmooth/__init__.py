@@ -9,20 +9,15 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from nonsmooth.kernels.forking import watch_forks
+from nonsmooth.kernels.compile.forking import watch_forks
 from nonsmooth.results import progress as _progress  # noqa: F401  it says when kernels are compiled
 
 if TYPE_CHECKING:
+    from nonsmooth import elements as elements
     from nonsmooth import models as models
     from nonsmooth import plot as plot
-    from nonsmooth.analysis.basin_fractions import basin_fractions as basin_fractions
-    from nonsmooth.analysis.basins import basins as basins
-    from nonsmooth.analysis.chart import chart as chart
-    from nonsmooth.analysis.correlation_dimension import correlation_dimension as correlation_dimension
-    from nonsmooth.analysis.lyapunov import lyapunov as lyapunov
-    from nonsmooth.analysis.response import frequency_response as frequency_response
-    from nonsmooth.analysis.sweep import sweep as sweep
-    from nonsmooth.analysis.zero_one_test import zero_one_test as zero_one_test
+    from nonsmooth.attractors.basin_fractions import basin_fractions as basin_fractions
+    from nonsmooth.attractors.basins import basins as basins
     from nonsmooth.continuation.continue_curve import continue_curve as continue_curve
     from nonsmooth.continuation.continue_equilibrium import continue_equilibrium as continue_equilibrium
     from nonsmooth.continuation.continue_orbit import continue_orbit as continue_orbit
@@ -30,6 +25,12 @@ if TYPE_CHECKING:
     from nonsmooth.continuation.manifolds import manifolds as manifolds
     from nonsmooth.continuation.orbit import Orbit as Orbit
     from nonsmooth.continuation.special import special_points as special_points
+    from nonsmooth.diagrams.chart import chart as chart
+    from nonsmooth.diagrams.correlation_dimension import correlation_dimension as correlation_dimension
+    from nonsmooth.diagrams.lyapunov import lyapunov as lyapunov
+    from nonsmooth.diagrams.response import frequency_response as frequency_response
+    from nonsmooth.diagrams.sweep import sweep as sweep
+    from nonsmooth.diagrams.zero_one_test import zero_one_test as zero_one_test
     from nonsmooth.errors import DataFileError as DataFileError
     from nonsmooth.errors import Interrupted as Interrupted
     from nonsmooth.errors import SolveError as SolveError
@@ -47,6 +48,7 @@ if TYPE_CHECKING:
     from nonsmooth.identification.parameter_set import ParameterSet as ParameterSet
     from nonsmooth.results.store import load as load
     from nonsmooth.results.store import save as save
+    from nonsmooth.system.mechanical import mechanical as mechanical
     from nonsmooth.system.mode import Band as Band
     from nonsmooth.system.mode import Mode as Mode
     from nonsmooth.system.origin import system_of as system_of
@@ -60,6 +62,7 @@ _WHERE = {
     "Transition": "system.transition",
     "Surface": "system.transition",
     "Mode": "system.mode",
+    "mechanical": "system.mechanical",
     "Band": "system.mode",
     "where": "system.scalar",
     "system_of": "system.origin",
@@ -69,14 +72,14 @@ _WHERE = {
     "Stroboscopic": "flow.sections",
     "Poincare": "flow.sections",
     "random_starts": "flow.starts",
-    "sweep": "analysis.sweep",
-    "frequency_response": "analysis.response",
-    "lyapunov": "analysis.lyapunov",
-    "correlation_dimension": "analysis.correlation_dimension",
-    "zero_one_test": "analysis.zero_one_test",
-    "basins": "analysis.basins",
-    "basin_fractions": "analysis.basin_fractions",
-    "chart": "analysis.chart",
+    "sweep": "diagrams.sweep",
+    "frequency_response": "diagrams.response",
+    "lyapunov": "diagrams.lyapunov",
+    "correlation_dimension": "diagrams.correlation_dimension",
+    "zero_one_test": "diagrams.zero_one_test",
+    "basins": "attractors.basins",
+    "basin_fractions": "attractors.basin_fractions",
+    "chart": "diagrams.chart",
     "find_orbit": "continuation.find",
     "Orbit": "continuation.orbit",
     "continue_orbit": "continuation.continue_orbit",
@@ -96,7 +99,7 @@ _WHERE = {
     "DataFileError": "errors",
     "Interrupted": "errors",
 }
-_ROOMS = ("models", "plot")
+_ROOMS = ("elements", "models", "plot")
 
 __all__ = sorted([*_WHERE, *_ROOMS, "__version__"])
 

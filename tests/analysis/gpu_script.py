@@ -11,8 +11,8 @@ from typing import Any
 from gpu_both import both, launches_of
 
 import nonsmooth as ns
-from nonsmooth.flow import planar_cuda
-from nonsmooth.kernels.cuda_module import cuda_linear_module
+from nonsmooth.flow.engines import linear_cuda as planar_cuda
+from nonsmooth.kernels.cuda.module import cuda_linear_module
 
 LAUNCHED = launches_of(planar_cuda.PlanarOnGpu)
 paper = cuda_linear_module(1, 2, 2, 1, 2, 5)

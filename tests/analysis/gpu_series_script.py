@@ -12,7 +12,7 @@ from gpu_both import both, launches_of
 from gpu_series_systems import START, TOP, filtered, grows_to_a_stop, two_wells
 
 import nonsmooth as ns
-from nonsmooth.flow import series_cuda
+from nonsmooth.flow.engines import series_cuda
 
 LAUNCHED = launches_of(series_cuda.SeriesOnGpu)
 SHORT: dict[str, Any] = {"transient": 24, "keep": 10, "max_period": 4, "method": "taylor"}

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.analysis.basin_fractions import basin_fractions
-from nonsmooth.analysis.basins import basins
-from nonsmooth.analysis.basins_measures import (
+from nonsmooth.attractors.basin_fractions import basin_fractions
+from nonsmooth.attractors.basins import basins
+from nonsmooth.attractors.basins_measures import (
     basin_entropy,
     boundary_dimension,
     minimal_shock,

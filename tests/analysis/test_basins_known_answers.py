@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.analysis import basin_fractions, basins
-from nonsmooth.analysis.basins_found import Patience
+from nonsmooth.attractors import basin_fractions, basins
+from nonsmooth.attractors.basins_found import Patience
 from nonsmooth.flow.sections import Stroboscopic
 
 QUIET = {"progress": False}

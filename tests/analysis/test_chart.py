@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.analysis.attractors import Settler
-from nonsmooth.analysis.chart import chart
-from nonsmooth.analysis.settled import Settled
-from nonsmooth.flow.methods import engine_for
+from nonsmooth.attractors.settled import Settled
+from nonsmooth.attractors.settler import Settler
+from nonsmooth.diagrams.chart import chart
+from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.sections import section_plan
 from nonsmooth.results.provenance import read_provenance
 
@@ -158,9 +158,7 @@ def test_states_that_only_follow_add_their_own_multipliers() -> None:
     np.testing.assert_array_equal(three.period_number, p)
     cycles = p > 0
     own = np.exp(-p * 2 * np.pi / w)
-    np.testing.assert_allclose(
-        three.multiplier[cycles], np.maximum(two.multiplier, own)[cycles], rtol=1e-3, atol=1e-4
-    )
+    np.testing.assert_allclose(three.multiplier[cycles], np.maximum(two.multiplier, own)[cycles], rtol=1e-3, atol=1e-4)
     np.testing.assert_allclose(other[cycles], np.maximum(largest, -1.0)[cycles], atol=0.02)
 
 
@@ -183,7 +181,7 @@ def test_the_result_holds_its_input_and_survives_a_file(support: ns.System, tmp_
 
 def test_labels_only_stay_small(support: ns.System) -> None:
     """Bytes of the columns of a chart of 4000 x 4000 points without extremes: well below 1 GiB."""
-    from nonsmooth.analysis.chart_work import ChartWork
+    from nonsmooth.diagrams.chart_work import ChartWork
 
     _, plan = section_plan(support, None)
     settler = Settler(support, engine_for(support), plan, 440, 60, 16, extremes=False)

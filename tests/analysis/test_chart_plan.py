@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.analysis import chart_plan
-from nonsmooth.analysis.chart import plan_chart
+from nonsmooth.diagrams import chart_plan
+from nonsmooth.diagrams.chart import plan_chart
 
 
 def planned(monkeypatch: pytest.MonkeyPatch, side: int, launch: int) -> tuple[chart_plan.GpuPlan, list[Any]]:

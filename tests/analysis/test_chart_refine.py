@@ -8,8 +8,8 @@ import xarray as xr
 from scipy import ndimage
 
 import nonsmooth as ns
-from nonsmooth.analysis.chart import chart
-from nonsmooth.analysis.chart_refine import confidence_of, labels_of_points
+from nonsmooth.diagrams.chart import chart
+from nonsmooth.diagrams.chart_refine import confidence_of, labels_of_points
 
 FIGURE_9 = {"g": 0.02}, {"omega": (3.0, 7.0), "rho": (0.1, 0.3)}
 GAP = {"omega": 11.15}, {"g": (-0.0015, 0.002), "rho": (0.2, 0.5)}

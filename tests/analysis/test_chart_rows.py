@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.analysis.chart import plan_chart
-from nonsmooth.analysis.chart_rows import along_rows, side_by_side
-from nonsmooth.kernels import codes
+from nonsmooth.diagrams.chart import plan_chart
+from nonsmooth.diagrams.chart_rows import along_rows, side_by_side
+from nonsmooth.kernels.hybrid import codes
 
 SUPPORT = ns.models.discontinuous_support(g=0.02), {"omega": np.linspace(3, 7, 9), "rho": [0.12, 0.2, 0.3]}
 STOP = ns.models.impact_oscillator(), {"d": np.linspace(0.2, 1.2, 9), "omega": [0.9, 2.7]}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.analysis.correlation_dimension import correlation_dimension
+from nonsmooth.diagrams.correlation_dimension import correlation_dimension
 
 RNG = np.random.default_rng(5)
 

@@ -29,7 +29,7 @@ SCRIPT = Path(__file__).with_name("gpu_script.py")
 COMPILE = """
 import functools, json, sys
 import numba.cuda
-from nonsmooth.kernels.cuda_ptx import ptx_of
+from nonsmooth.kernels.cuda.ptx import ptx_of
 
 found, opt, kernels = {}, *json.load(sys.stdin)
 numba.cuda.compile = functools.partial(numba.cuda.compile, opt=opt)

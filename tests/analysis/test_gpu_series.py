@@ -28,10 +28,10 @@ COMPILE = """
 import json, sys
 import nonsmooth as ns
 from gpu_series_systems import filtered, two_wells
-from nonsmooth.flow.devices import engine_on
-from nonsmooth.flow.methods import engine_for
-from nonsmooth.flow.series_cuda import module_of
-from nonsmooth.kernels.cuda_ptx import ptx_of_module
+from nonsmooth.flow.engines.devices import engine_on
+from nonsmooth.flow.engines.methods import engine_for
+from nonsmooth.flow.engines.series_cuda import module_of
+from nonsmooth.kernels.cuda.ptx import ptx_of_module
 
 name, signatures = json.load(sys.stdin)
 system = {"valve": ns.models.relief_valve, "two wells": two_wells, "filtered": filtered}[name]()

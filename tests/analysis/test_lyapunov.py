@@ -11,7 +11,7 @@ import xarray as xr
 from scipy.integrate import solve_ivp
 
 import nonsmooth as ns
-from nonsmooth.analysis.lyapunov import kaplan_yorke
+from nonsmooth.diagrams.lyapunov import kaplan_yorke
 
 DEFECT = 1e-10
 
@@ -147,7 +147,7 @@ def test_lorenz(pieces: int, options: dict[str, Any], monkeypatch: pytest.Monkey
 
     Also in units of time in which the lengths of a frame would underflow, and (with an order of the engine's own the
     frame follows a record) with so few samples that a motion begun at one has forgotten it before the next."""
-    monkeypatch.setattr("nonsmooth.analysis.lyapunov.UNITS", pieces)
+    monkeypatch.setattr("nonsmooth.diagrams.lyapunov.UNITS", pieces)
     found = spectrum(lorenz(), duration=4000, start=[1.0, 1.0, 20.0], **options)
     assert found.equilibrium == 0 and "note" not in found.attrs
     error = found.standard_error.values

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.analysis.response import jumps_in
+from nonsmooth.diagrams.response import jumps_in
 
 
 def test_the_amplitude_of_the_linear_oscillator() -> None:

@@ -300,8 +300,16 @@ def test_a_stop_that_moves_past_a_carried_state_begins_anew(method: str) -> None
 def test_a_start_beyond_the_stop_is_a_status_in_a_sweep(method: str) -> None:
     system = ns.models.impact_oscillator()
     swept = ns.sweep(
-        system, "d", [0.5, 2.0], direction=None, start={"x": 1.0}, transient=20, keep=4, max_period=3,
-        method=method, **QUIET,
+        system,
+        "d",
+        [0.5, 2.0],
+        direction=None,
+        start={"x": 1.0},
+        transient=20,
+        keep=4,
+        max_period=3,
+        method=method,
+        **QUIET,
     )
     assert words(swept["status"])[0] == "no_convergence"
     assert words(swept["status"])[1] in ("ok", "slow", "not_periodic")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.analysis.zero_one_test import zero_one_test
+from nonsmooth.diagrams.zero_one_test import zero_one_test
 
 
 def logistic(mu: float, n: int = 2000) -> np.ndarray:

@@ -15,10 +15,10 @@ from unittest import mock
 from simple_work import hashes
 
 import nonsmooth as ns
-from nonsmooth.analysis import chart as chart_module
 from nonsmooth.campaign import processors
 from nonsmooth.cli.main import main
-from nonsmooth.flow import planar_cuda
+from nonsmooth.diagrams import chart as chart_module
+from nonsmooth.flow.engines import linear_cuda as planar_cuda
 
 STUDY = """
 [system]

@@ -13,13 +13,13 @@ import zarr
 from simple_work import Squares, Zeros, hashes, right
 
 import nonsmooth as ns
-from nonsmooth.analysis.basins import basins
-from nonsmooth.analysis.chart import chart, plan_chart
+from nonsmooth.attractors.basins import basins
 from nonsmooth.campaign import identity
 from nonsmooth.campaign import store as stores
 from nonsmooth.campaign.plan import plan
 from nonsmooth.campaign.run import run
 from nonsmooth.campaign.store import describe_store, open_store
+from nonsmooth.diagrams.chart import chart, plan_chart
 from nonsmooth.errors import DataFileError
 
 QUIET = {"progress": False}
@@ -160,8 +160,9 @@ def test_other_rules_of_judgement_are_another_version(monkeypatch: pytest.Monkey
     """Labels are decided by analysis as much as by the kernels."""
     version, read = identity._kernel_version.__wrapped__, Path.read_bytes
     now = version()
-    for changed in ("kernels/judge.py", "flow/linear.py", "kernels/linear_stepper.py"):
+    for changed in ("kernels/judging/judge.py", "flow/engines/linear.py", "kernels/linear/stepper.py"):
         with monkeypatch.context() as patched:
+
             def edited(file: Path, end: str = changed) -> bytes:
                 return read(file) + (b"#" if file.as_posix().endswith(end) else b"")
 
@@ -176,6 +177,7 @@ def test_trouble_while_reading_takes_no_mark_away(tmp_path: Path, monkeypatch: p
     run(Squares(), store=path, **QUIET)
     before = hashes(path)
     for trouble in (MemoryError("no room"), OSError(errno.EIO, "the cable is loose")):
+
         def fail(*_: object, error: BaseException = trouble) -> None:
             raise error
 

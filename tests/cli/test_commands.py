@@ -115,8 +115,8 @@ def test_ctrl_c_ends_with_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pyte
 
 
 def test_show_says_what_a_chart_varies() -> None:
-    from nonsmooth.analysis.chart import chart
     from nonsmooth.cli.show import summary
+    from nonsmooth.diagrams.chart import chart
 
     system = models.discontinuous_support(g=0.02)
     found = chart(system, {"omega": [3.0, 4.0], "rho": [0.1, 0.2]}, transient=20, keep=20, progress=False)

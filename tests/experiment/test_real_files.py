@@ -34,9 +34,7 @@ def test_labview() -> None:
 
 
 def test_matlab_response_curves() -> None:
-    recording = ns.load_recording(
-        Path(FOLDER) / "FrID_jointed_beam_ForcedFrequencyResponses.mat", axis="frequency"
-    )
+    recording = ns.load_recording(Path(FOLDER) / "FrID_jointed_beam_ForcedFrequencyResponses.mat", axis="frequency")
     assert recording.runs == tuple(
         [f"FRdata.ForceControl({k})" for k in range(1, 5)] + [f"FRdata.ResponseControl({k})" for k in range(1, 9)]
     )

@@ -118,7 +118,7 @@ def test_nothing_is_left_out_silently(tmp_path: Path) -> None:
         (HEAD + ENTRY.replace("response.csv", "none.csv"), DataFileError, r"none\.csv: no such file"),
         (HEAD + ENTRY.replace("procedure", "proc"), ValueError, "`proc` is not a key"),
         (HEAD + ENTRY.replace('procedure = "response"', ""), ValueError, "needs `procedure`"),
-        (HEAD + ENTRY + 'read = { rates = 100 }', ValueError, "`rates` is not an option of load_recording"),
+        (HEAD + ENTRY + "read = { rates = 100 }", ValueError, "`rates` is not an option of load_recording"),
         (HEAD + ENTRY + ENTRY, ValueError, r"response\.csv is named twice"),
         (HEAD + ENTRY.split("runs")[0] + "runs = 3", ValueError, "runs must be a list of tables"),
         (HEAD + ENTRY.split("runs")[0] + "runs = [3]", ValueError, "must be a table with keys, got 3"),

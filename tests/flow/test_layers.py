@@ -13,10 +13,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import nonsmooth as ns
-from nonsmooth.flow.engine import State
-from nonsmooth.flow.layers import layers
-from nonsmooth.flow.series import SeriesEngine
-from nonsmooth.kernels import series_places as at
+from nonsmooth.flow.engines.engine import State
+from nonsmooth.flow.engines.layers import layers
+from nonsmooth.flow.engines.series import SeriesEngine
+from nonsmooth.kernels.series import places as at
 
 WIDTHS = (1e-2, 1e-3, 1e-4, 1e-5)
 TOLERANCES = (1e-6, 1e-8, 1e-10, 1e-12)
@@ -134,9 +134,7 @@ def test_an_indicator_with_a_hidden_kink(rtol: float) -> None:
 def test_a_wall_that_is_felt_only_near_by(rtol: float) -> None:
     """x'' = c / x^3 from x = 1, x' = -1: x^2 = 1 - 2 t + (1 + c) t^2 turns at x = sqrt(c), here 1e-4."""
     c, end = 1e-8, 4.0
-    system = ns.System(
-        states=("x", "v"), parameters={"c": c}, modes={"flight": lambda t, u, p: (u.v, p.c / u.x**3)}
-    )
+    system = ns.System(states=("x", "v"), parameters={"c": c}, modes={"flight": lambda t, u, p: (u.v, p.c / u.x**3)})
     run = ns.simulate(
         system, duration=end, start={"x": 1.0, "v": -1.0}, method="taylor", rtol=rtol, atol=1e-12, samples=2
     )

@@ -172,8 +172,10 @@ def test_a_row_of_masses_with_rigid_stops(masses: int, stops: list[int]) -> None
     u = run["u"].values[np.isin(run["time"].values, instants)]
     v = u[:, masses:]
     work = np.cos(w * instants) * v[:, 0]
-    lost = 0.5 * (1 - e**2) * sum(
-        before[k, masses + stops[t]] ** 2 for k, t in enumerate(first["crossing_transition"].values)
+    lost = (
+        0.5
+        * (1 - e**2)
+        * sum(before[k, masses + stops[t]] ** 2 for k, t in enumerate(first["crossing_transition"].values))
     )
     end = first["u"].values[-1]
     energy = 0.5 * end[masses:] @ end[masses:] + 0.5 * end[:masses] @ K @ end[:masses]

@@ -7,10 +7,10 @@ import pytest
 from random_systems import Template, draw, growing
 
 import nonsmooth as ns
-from nonsmooth.flow.engine import Chain, SectionPlan, State
-from nonsmooth.flow.linear import LinearEngine, PlanarEngine
-from nonsmooth.flow.methods import engine_for
-from nonsmooth.flow.series import SeriesEngine
+from nonsmooth.flow.engines.engine import Chain, SectionPlan, State
+from nonsmooth.flow.engines.linear import LinearEngine, PlanarEngine
+from nonsmooth.flow.engines.methods import engine_for
+from nonsmooth.flow.engines.series import SeriesEngine
 
 
 def yielding() -> Template:
@@ -139,3 +139,38 @@ def test_a_lacking_state_has_no_value_and_no_part_in_extremes() -> None:
     speed = np.hypot(0.5, 0.2)  # of the arc about the spring's equilibrium
     np.testing.assert_allclose([out.minimum[0, 1], out.maximum[0, 1]], [-speed, 0.2], rtol=0, atol=1e-13)
     np.testing.assert_allclose(out.indicator_max[0, 1], 7.0 - 0.2, rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize(("length", "rate"), [(1.0, 2 * np.pi), (1e-3, 200.0)])
+def test_a_contact_lifts_off_where_its_force_vanishes(length: float, rate: float) -> None:
+    """A ball that chatters and rests on a vibrating table: it flies off where the table falls as fast as the ball.
+
+    Distance, speed and acceleration vanish together there; the flight from there is a parabola."""
+    g = length * rate**2 * 9.81 / (4 * np.pi**2)
+    system = ns.System(
+        states=["x", "v"], parameters={"A": 0.3 * length, "w": rate, "e": 0.4, "g": g, "creep": 1e-6 * length * rate},
+        modes={
+            "fly": lambda t, u, p: (u.v, -p.g),
+            "rest": ns.Mode(lambda t, u, p: (-p.A * p.w * np.sin(p.w * t),), states=["x"]),
+        },
+        indicators={
+            "gap": lambda t, u, p: u.x - p.A * np.cos(p.w * t),
+            "lift": lambda t, u, p: p.g - p.w**2 * u.x,
+            "away": lambda t, u, p: u.v + p.A * p.w * np.sin(p.w * t) + p.creep,
+        },
+        transitions=[
+            ns.Transition("fly", "fly", when="gap < 0 and away < 0", reset=lambda t, u, p: (
+                p.A * np.cos(p.w * t), -p.e * u.v - (1 + p.e) * p.A * p.w * np.sin(p.w * t))),
+            ns.Transition("fly", "rest", when="gap < 0 and away > 0", reset=lambda t, u, p: (p.A * np.cos(p.w * t),)),
+            ns.Transition("rest", "fly", when="lift < 0", reset=lambda t, u, p: (
+                p.A * np.cos(p.w * t), -p.A * p.w * np.sin(p.w * t))),
+        ],
+        scale={"x": 0.1 * length, "v": 0.1 * length * rate},
+    )  # fmt: skip
+    amplitudes = np.linspace(0.26, 0.31, 26) * length
+    found = ns.sweep(system, "A", amplitudes, start={"x": length}, direction=None, progress=False)
+    assert (found["period_number"] == 1).all() and (found["status"] == 0).all()
+    off = -np.arccos(g / (amplitudes * rate**2)) / rate
+    x, v = amplitudes * np.cos(rate * off), -amplitudes * rate * np.sin(rate * off)
+    expected = np.stack([x - v * off - g * off**2 / 2, v + g * off], axis=1)
+    assert np.allclose(found["section"].values[:, -1], expected, atol=1e-13 * length * max(rate, 1.0))

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from nonsmooth.flow.engine import State
-from nonsmooth.flow.series import SeriesEngine
+from nonsmooth.flow.engines.engine import State
+from nonsmooth.flow.engines.series import SeriesEngine
 from nonsmooth.system.system import System
 from nonsmooth.system.transition import Transition
 

@@ -7,8 +7,8 @@ import pytest
 from linear_flow import LinearFlow
 
 import nonsmooth as ns
-from nonsmooth.flow.linear import PlanarEngine
-from nonsmooth.flow.methods import engine_for
+from nonsmooth.flow.engines.linear import PlanarEngine
+from nonsmooth.flow.engines.methods import engine_for
 
 METHODS = {"exact": {}, "taylor": {"rtol": 1e-14}, "rkf45": {"rtol": 1e-13}}
 

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from nonsmooth.flow.engine import Chain, Log, SectionPlan, State
-from nonsmooth.flow.series import SeriesEngine, order_for
-from nonsmooth.kernels import codes
+from nonsmooth.flow.engines.engine import Chain, Log, SectionPlan, State
+from nonsmooth.flow.engines.series import SeriesEngine, order_for
+from nonsmooth.kernels.hybrid import codes
 from nonsmooth.system.mode import Mode
 from nonsmooth.system.system import System
 from nonsmooth.system.transition import Transition

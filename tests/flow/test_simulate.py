@@ -306,9 +306,12 @@ def test_a_run_is_saved_and_loaded_whole(suffix: str, tmp_path: Path) -> None:
 
 def test_a_motion_as_small_as_the_tolerance_is_warned_of() -> None:
     """x'' + x = 1e-9 cos 2t by a method whose atol is 1e-9: nothing of it is sure; with the right scale it is."""
+
     def system(**more):
         return ns.System(
-            states=["x", "v"], parameters={"F": 1e-9}, modes={"m": lambda t, u, p: (u.v, p.F * np.cos(2 * t) - u.x)},
+            states=["x", "v"],
+            parameters={"F": 1e-9},
+            modes={"m": lambda t, u, p: (u.v, p.F * np.cos(2 * t) - u.x)},
             **more,
         )
 

@@ -16,12 +16,12 @@ from scipy.linalg import expm
 
 import nonsmooth as ns
 from nonsmooth.errors import SolveError
-from nonsmooth.flow.engine import State
-from nonsmooth.flow.methods import engine_for
+from nonsmooth.flow.engines.engine import State
+from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.saltation import Jump
 from nonsmooth.flow.sensitivity import sensitivity, variation
 from nonsmooth.flow.variational import VariationalFlow
-from nonsmooth.kernels import codes
+from nonsmooth.kernels.hybrid import codes
 
 PER_TEMPLATE = 20  # ten templates: 200 systems
 NEAREST_GRAZE = 1e-2

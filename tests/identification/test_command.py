@@ -65,7 +65,9 @@ def test_what_was_not_recorded_cannot_be_asked_for(taps, capsys):
 
 @pytest.mark.filterwarnings("ignore::nonsmooth.experiment.recording.RecordingWarning")
 def test_a_study_writes_numbers_a_table_and_figures(taps, capsys):
-    path = study(taps.parent, f"""
+    path = study(
+        taps.parent,
+        f"""
 [identify]
 session = "{taps.name}"
 model = "discontinuous_support"
@@ -76,7 +78,8 @@ data = "out/found.nc"
 table = "out/found.md"
 figures = "out"
 format = "svg"
-""")
+""",
+    )
     assert cli.main(["identify", str(path)]) == 0
     out = taps.parent / "out"
     written = capsys.readouterr().out

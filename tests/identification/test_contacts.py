@@ -90,7 +90,7 @@ def test_a_piece_in_which_friction_all_but_holds_the_car_has_a_corner():
     piece = Piece(time, time, time, np.arange(11), lambda p: (p, p, p), np.zeros(2))
     angle = 4.5 * time
     swift = 0.01 * np.column_stack([-np.cos(angle), 4.5 * np.sin(angle)])
-    slow = 0.01 * np.column_stack([-np.cos(angle) ** 3, 3 * 4.5 * np.cos(angle) ** 2 * np.sin(angle)])
+    slow = 0.01 * np.column_stack([-(np.cos(angle) ** 3), 3 * 4.5 * np.cos(angle) ** 2 * np.sin(angle)])
     assert not _grazes(piece, swift, 1.0, 2e-5, 0.015) and _grazes(piece, slow, 1.0, 2e-5, 0.015)
     assert not _grazes(piece, slow, 1.0, 2e-5, np.inf)
     assert _grazes(piece, swift, 0.01 + 1e-5, 2e-5, np.inf)  # turns 10 um short of the gap

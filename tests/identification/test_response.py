@@ -145,9 +145,7 @@ def test_a_steady_run_is_its_closed_form():
     assert np.angle(one.response[0]) == pytest.approx(5.0 * 0.4 - 0.7, abs=2e-3)
     assert one.mean[0] == pytest.approx(1e-3, abs=COUNT / 20)
     t = np.linspace(0, 2 * np.pi, 100_001)
-    assert one.highest[0] == pytest.approx(
-        1e-3 + np.max(0.02 * np.cos(t - 0.7) + 1e-4 * np.cos(2 * t)), abs=COUNT / 10
-    )
+    assert one.highest[0] == pytest.approx(1e-3 + np.max(0.02 * np.cos(t - 0.7) + 1e-4 * np.cos(2 * t)), abs=COUNT / 10)
     time = np.arange(0, 2, 0.01)
     short = run("response", time, np.cos(5 * time), turns=[0, 1.257, 2.513], crank_length=0.01)
     with pytest.raises(ValueError, match="holds 1 whole turns"):

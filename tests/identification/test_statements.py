@@ -72,6 +72,7 @@ def test_the_report_has_all_of_it():
 def results(bias=0.0, n=40, seed=0):
     rng, rows = np.random.default_rng(seed), []
     for i in range(n):
+
         def row(truth, error):
             value = truth + error * (rng.standard_normal() + bias)
             return [truth, value, error, value - 1.96 * error, value + 1.96 * error]

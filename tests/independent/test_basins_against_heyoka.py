@@ -8,8 +8,8 @@ import pytest
 from where_runs_end import agreement
 
 import nonsmooth as ns
-from nonsmooth.analysis.basin_fractions import basin_fractions
-from nonsmooth.analysis.basins import basins
+from nonsmooth.attractors.basin_fractions import basin_fractions
+from nonsmooth.attractors.basins import basins
 
 #: Parameters, box, period numbers (0: chaos) of the attractors there, in rising order.
 SUPPORT = {

@@ -12,10 +12,10 @@ import numba
 import pytest
 
 import nonsmooth
-from nonsmooth.kernels import cache, target
+from nonsmooth.kernels.compile import cache, target
 
 KERNEL = """
-from nonsmooth.kernels.cache import kernel
+from nonsmooth.kernels.compile.cache import kernel
 
 
 @kernel("float64(float64)")
@@ -143,7 +143,7 @@ def decorated(path):
 
 
 def test_every_kernel_of_the_package_is_compiled_ahead():
-    from nonsmooth.kernels import ahead
+    from nonsmooth.kernels.compile import ahead
 
     written = {name for path in Path(nonsmooth.__file__).parent.rglob("*.py") for name in decorated(path)}
     modules = {ahead._module(task) for task in ahead.tasks()}
@@ -157,7 +157,8 @@ def test_every_kernel_of_the_package_is_compiled_ahead():
 LATER = """
 import json, sys
 from pathlib import Path
-from nonsmooth.kernels import cache, histogram, target
+from nonsmooth.kernels import histogram
+from nonsmooth.kernels.compile import cache, target
 target.AHEAD = Path(sys.argv[1])
 histogram.count.compile_now()
 print(json.dumps([list(found) for found in cache.cache_statistics(histogram)]))
@@ -165,7 +166,7 @@ print(json.dumps([list(found) for found in cache.cache_statistics(histogram)]))
 
 
 def test_what_is_compiled_ahead_is_what_a_later_process_looks_for(tmp_path):
-    from nonsmooth.kernels.ahead import compile_ahead
+    from nonsmooth.kernels.compile.ahead import compile_ahead
 
     if not target.level():
         pytest.skip("this processor has none of the levels")

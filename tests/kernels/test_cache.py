@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-KERNELS = '''
+KERNELS = """
 from numba import types
-from nonsmooth.kernels.cache import device, kernel
+from nonsmooth.kernels.compile.cache import device, kernel
 
 STEP = types.FunctionType(types.void(types.int64, types.float64, types.float64[::1]))
 
@@ -32,10 +32,10 @@ def drive(f, g, u, n):
         f(i, 0.5, u)
         g(i, 0.5, u)
     return twice(u[0])
-'''
+"""
 
-MODEL = '''
-from nonsmooth.kernels.cache import callback
+MODEL = """
+from nonsmooth.kernels.compile.cache import callback
 
 
 @callback("void(int64, float64, float64[::1])")
@@ -46,13 +46,13 @@ def f(mode, t, u):
 @callback("void(int64, float64, float64[::1])")
 def g(mode, t, u):
     u[0] *= {0!r}
-'''
+"""
 
-SCRIPT = '''
+SCRIPT = """
 import json, sys
 import numpy as np
 from nonsmooth import kernels
-from nonsmooth.kernels import cache
+from nonsmooth.kernels.compile import cache
 import driver
 
 told = []
@@ -68,7 +68,7 @@ print(json.dumps({
     "told": told,
     "file": model.__file__,
 }))
-'''
+"""
 
 
 def expected(factor):
@@ -122,9 +122,9 @@ def test_second_process_compiles_nothing_and_a_new_model_only_itself(tmp_path, f
     assert other["overloads"] == 1
 
 
-LAZY = '''
+LAZY = """
 import json, threading
-from nonsmooth.kernels import cache
+from nonsmooth.kernels.compile import cache
 import driver
 
 def statistics():
@@ -143,7 +143,7 @@ for thread in threads:
 for thread in threads:
     thread.join()
 print(json.dumps([before, refused, values, len(driver.twice.signatures), statistics()]))
-'''
+"""
 
 
 def test_a_kernel_is_compiled_when_it_is_first_called(tmp_path):
@@ -188,7 +188,7 @@ def test_without_jit(tmp_path):
 
 
 def test_stamp_follows_imports_through_kernel_files(monkeypatch):
-    from nonsmooth.kernels import cache
+    from nonsmooth.kernels.compile import cache
 
     sources = {
         "low": "x = 1", "mid": "from .low import x", "top": "from . import mid",
@@ -210,7 +210,7 @@ def test_stamp_follows_imports_through_kernel_files(monkeypatch):
 
 
 def test_old_entries_are_pruned(tmp_path):
-    from nonsmooth.kernels.folder import prune
+    from nonsmooth.kernels.compile.folder import prune
 
     for name, age_days in (("old", 200), ("new", 1)):
         (tmp_path / name).write_text("")
@@ -221,7 +221,7 @@ def test_old_entries_are_pruned(tmp_path):
 
 
 def test_cache_folder(tmp_path, monkeypatch):
-    from nonsmooth.kernels.folder import cache_folder
+    from nonsmooth.kernels.compile.folder import cache_folder
 
     monkeypatch.setenv("NONSMOOTH_CACHE_DIR", str(tmp_path / "a" / "b"))
     assert cache_folder() == tmp_path / "a" / "b"
@@ -234,7 +234,7 @@ def test_cache_folder(tmp_path, monkeypatch):
 
 @pytest.mark.skipif(sys.platform in ("win32", "darwin"), reason="XDG folders")
 def test_unwritable_user_folder_falls_back_to_a_private_one(tmp_path, monkeypatch):
-    from nonsmooth.kernels.folder import cache_folder, usable_folder
+    from nonsmooth.kernels.compile.folder import cache_folder, usable_folder
 
     (tmp_path / "file").write_text("")
     monkeypatch.delenv("NONSMOOTH_CACHE_DIR", raising=False)
@@ -251,7 +251,7 @@ def test_unwritable_user_folder_falls_back_to_a_private_one(tmp_path, monkeypatc
 @pytest.mark.parametrize("part", ["", "compiled"])
 def test_a_folder_that_others_may_write_is_refused(tmp_path, monkeypatch, part):
     """What stands there is executed. A folder that was chosen: an error; the user's own: a private one in its place."""
-    from nonsmooth.kernels.folder import cache_folder, usable_folder
+    from nonsmooth.kernels.compile.folder import cache_folder, usable_folder
 
     open_to_all = tmp_path / "nonsmooth"
     (open_to_all / part).mkdir(parents=True)
@@ -286,7 +286,7 @@ from pathlib import Path
 def none():
     raise RuntimeError("Could not determine home directory.")
 Path.home = none
-from nonsmooth.kernels.folder import cache_folder
+from nonsmooth.kernels.compile.folder import cache_folder
 print(cache_folder())
 """
     unset = ("HOME", "USER", "LOGNAME", "XDG_CACHE_HOME", "NONSMOOTH_CACHE_DIR")
@@ -299,7 +299,7 @@ print(cache_folder())
 
 
 def test_one_signature_only(tmp_path, monkeypatch):
-    from nonsmooth.kernels import cache
+    from nonsmooth.kernels.compile import cache
 
     monkeypatch.setenv("NONSMOOTH_CACHE_DIR", str(tmp_path))
     module = cache.load_module(MODEL.format(7.0), "single")
@@ -311,7 +311,7 @@ def test_one_signature_only(tmp_path, monkeypatch):
 
 
 def test_failed_module_is_not_kept(tmp_path, monkeypatch):
-    from nonsmooth.kernels import cache
+    from nonsmooth.kernels.compile import cache
 
     monkeypatch.setenv("NONSMOOTH_CACHE_DIR", str(tmp_path))
     for _ in range(2):

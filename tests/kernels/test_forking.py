@@ -12,12 +12,12 @@ import pytest
 SCRIPT = '''
 import os, sys, threading, time, warnings
 import nonsmooth
-from nonsmooth.kernels import cache
+from nonsmooth.kernels.compile import cache
 
 warnings.simplefilter("ignore")  # later Pythons warn of any fork beside threads
 SOURCE = """
 from math import sin
-from nonsmooth.kernels.cache import callback
+from nonsmooth.kernels.compile.cache import callback
 
 @callback("float64(float64)")
 def value(x):

@@ -9,31 +9,40 @@ from pathlib import Path
 
 import pytest
 
-from nonsmooth.kernels import cuda_module, cuda_series_module, linear_module
+from nonsmooth.kernels.cuda import module as cuda_module
+from nonsmooth.kernels.cuda import series_module as cuda_series_module
+from nonsmooth.kernels.linear import module as linear_module
+from nonsmooth.kernels.series import module as series_module
 
-FOLDER = Path(cuda_module.__file__).parent
+ROOM = "nonsmooth.kernels."
+FOLDER = Path(cuda_module.__file__).parents[1]
 TEXTS = {
     **{name: (*linear_module.STEPPER, *parts) for name, parts in linear_module.OBSERVERS.items()},
     **{f"cuda {name}": (*cuda_module.STEPPER, *parts) for name, parts in cuda_module.OBSERVERS.items()},
+    **{f"series {name}": (*series_module.STEPPER, *parts) for name, parts in series_module.OBSERVERS.items()},
     "cuda series": cuda_series_module.PARTS,
 }
 MARKERS = {"device", "inline", "kernel", "callback", "once", "sum_rows", "sum_columns"}  # another compiler's on a GPU
 ON_PURPOSE = MARKERS | {"build", "may_pause", "__all__"}  # replaced on a GPU
-SWAPPED = {"linear_stepper", "linear_extremes", "linear_touches", "generated"}  # for the stepper that is joined
+SWAPPED = {"linear.stepper", "linear.extremes", "linear.touches", "series.generated"}  # for the stepper that is joined
 
 
 @cache
 def names(file: str) -> dict[str, str]:
     """Where each name of a kernel file comes from."""
     found: dict[str, str] = {}
-    for node in ast.parse((FOLDER / f"{file}.py").read_text(encoding="utf-8")).body:
+    for node in ast.parse((FOLDER / f"{file.replace('.', '/')}.py").read_text(encoding="utf-8")).body:
         if isinstance(node, ast.FunctionDef | ast.ClassDef):
             found[node.name] = file
         elif isinstance(node, ast.Assign):
             targets = [one for target in node.targets for one in ast.walk(target) if isinstance(one, ast.Name)]
             found |= {one.id: file for one in targets}
-        elif isinstance(node, ast.ImportFrom) and node.level and node.module:
-            found |= {one.asname or one.name: names(node.module).get(one.name, node.module) for one in node.names}
+        elif isinstance(node, ast.ImportFrom) and str(node.module).startswith(ROOM):
+            origin = str(node.module).removeprefix(ROOM)
+            if (FOLDER / origin.replace(".", "/")).is_dir():
+                found |= {one.asname or one.name: f"{origin}.{one.name}" for one in node.names}
+            else:
+                found |= {one.asname or one.name: names(origin).get(one.name, origin) for one in node.names}
         elif isinstance(node, ast.ImportFrom):
             found |= {one.asname or one.name: str(node.module) for one in node.names}
     return found

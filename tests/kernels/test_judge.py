@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from nonsmooth.analysis.settle import longest_period
-from nonsmooth.kernels import codes
-from nonsmooth.kernels.judge import MARGIN, ROUNDS, contraction, multiplier
-from nonsmooth.kernels.settle import END, FRESH, PROBE, RUN, Jobs, Rules, begin_job, new_jobs, next_run
+from nonsmooth.attractors.settle import longest_period
+from nonsmooth.kernels.hybrid import codes
+from nonsmooth.kernels.judging.judge import MARGIN, ROUNDS, contraction, multiplier
+from nonsmooth.kernels.judging.settle import END, FRESH, PROBE, RUN, Jobs, Rules, begin_job, new_jobs, next_run
 
 SIZE = np.array([1.0, 10.0])
 
@@ -24,9 +24,20 @@ def cycle(p: int, n: int, decay: float = 0.0, mu: float = 0.5) -> np.ndarray:
 
 def rules(keep: int, size: np.ndarray = SIZE, max_period: int = 16, **given: Any) -> Rules:
     """Rules under which the motion has this size whatever its extremes."""
-    usual = {"transient": 0, "keep": keep, "max_period": max_period, "first_look": 0, "attempts": 0, "beyond": 0,
-             "tolerance": 1e-9, "difference": 1e-6, "least": size, "rounded": 0.0, "perturb_least": size,
-             "perturb_rounded": 0.0}
+    usual = {
+        "transient": 0,
+        "keep": keep,
+        "max_period": max_period,
+        "first_look": 0,
+        "attempts": 0,
+        "beyond": 0,
+        "tolerance": 1e-9,
+        "difference": 1e-6,
+        "least": size,
+        "rounded": 0.0,
+        "perturb_least": size,
+        "perturb_rounded": 0.0,
+    }
     return Rules(**(usual | given))  # fmt: skip
 
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from numba import njit
 
-from nonsmooth.kernels.block import LINE, one_block
-from nonsmooth.kernels.lanes import LANES, plain, sum_columns, sum_rows
-from nonsmooth.kernels.linear_tables import DEGREE
+from nonsmooth.kernels.compile.block import LINE, one_block
+from nonsmooth.kernels.compile.lanes import LANES, plain, sum_columns, sum_rows
+from nonsmooth.kernels.linear.tables import DEGREE
 
 # states and terms of a sum: one by one, in vectors, in loops over terms, in several vectors
 SHAPES = ((2, 5), (2, 7), (5, 8), (20, 23), (20, 43), (70, 73))

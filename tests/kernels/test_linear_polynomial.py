@@ -7,7 +7,7 @@ import pytest
 from numba import njit
 from numpy.polynomial import polynomial as P
 
-from nonsmooth.kernels import linear_polynomial as linear
+from nonsmooth.kernels.linear import polynomial as linear
 
 NAMES = {linear.NEVER: "never", linear.ALWAYS: "always", linear.ONCE: "once", linear.OPEN: "open"}
 

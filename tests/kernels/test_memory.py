@@ -10,7 +10,7 @@ import pytest
 
 MODEL = """
 from math import sin
-from nonsmooth.kernels.cache import callback
+from nonsmooth.kernels.compile.cache import callback
 
 
 @callback("void(int64, float64, float64[::1], float64[::1], float64[::1])")
@@ -21,7 +21,7 @@ def field(mode, t, u, q, du):
 
 def test_machine_code_ends_with_the_last_function_of_its_file(tmp_path, monkeypatch):
     """Compiled and loaded from the cache alike; while a function is held it can be called."""
-    from nonsmooth.kernels import cache
+    from nonsmooth.kernels.compile import cache
 
     monkeypatch.setenv("NONSMOOTH_CACHE_DIR", str(tmp_path))
     for misses in (1, 0):

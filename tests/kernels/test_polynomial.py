@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from nonsmooth.kernels import polynomial as poly
+from nonsmooth.kernels.series import polynomial as poly
 
 UP, DOWN, EITHER = 1, -1, 0
 

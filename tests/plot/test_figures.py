@@ -42,9 +42,7 @@ def test_a_figure_of_its_own_has_a_column_width_and_saves_the_same_twice(
 
 
 @pytest.mark.parametrize(("figure", "name"), CASES)
-def test_given_axes_are_used_and_the_callers_style_kept(
-    figure: str, name: str, request: pytest.FixtureRequest
-) -> None:
+def test_given_axes_are_used_and_the_callers_style_kept(figure: str, name: str, request: pytest.FixtureRequest) -> None:
     _, mine = plt.subplots()
     before = dict(mpl.rcParams)
     assert getattr(plot, figure)(request.getfixturevalue(name), mine) is mine

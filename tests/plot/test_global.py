@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.analysis.basin_fractions import basin_fractions
-from nonsmooth.analysis.basins import basins
-from nonsmooth.analysis.chart import chart
+from nonsmooth.attractors.basin_fractions import basin_fractions
+from nonsmooth.attractors.basins import basins
+from nonsmooth.diagrams.chart import chart
 from nonsmooth.plot.basin_fractions import basin_fractions as draw_fractions
 from nonsmooth.plot.basins import basins as draw_basins
 from nonsmooth.plot.basins import told_apart

@@ -235,9 +235,7 @@ def test_one_slope_of_many_pulls_is_one_number() -> None:
 def motion() -> xr.Dataset:
     system = ns.models.discontinuous_support(g=0.0009, rho=0.33, omega=11.15)
     run = ns.simulate(system, periods=60, transient=200, samples=60 * 50 + 1)
-    measured = xr.Dataset(
-        {"u": run["u"], "phase": ("time", run["time"].values * 11.15 / (2 * np.pi))}, attrs=SYNTHETIC
-    )
+    measured = xr.Dataset({"u": run["u"], "phase": ("time", run["time"].values * 11.15 / (2 * np.pi))}, attrs=SYNTHETIC)
     return compare(measured, system, noise=[1e-5, 1e-4], draws=0)
 
 

@@ -171,9 +171,7 @@ def test_the_rigs_section_points_lie_over_the_models_marks() -> None:
 
 def test_records_in_transient_chaos_are_told_apart() -> None:
     """At 0.9 mm one of two records has period 2, the other none yet; at 1.8 mm none has: that is chaos."""
-    runs = xr.Dataset(
-        {"setting": ("run", [0.9, 1.8, 0.9, 1.8, -1.2]), "period_number": ("run", [0, 0, 2, 0, 1])}
-    )
+    runs = xr.Dataset({"setting": ("run", [0.9, 1.8, 0.9, 1.8, -1.2]), "period_number": ("run", [0, 0, 2, 0, 1])})
     compared = xr.Dataset({"measured_g": ("sample", np.repeat(runs["setting"].values, 3))})
     np.testing.assert_array_equal(transient_points(compared, runs), [True] * 3 + [False] * 12)
 

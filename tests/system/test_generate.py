@@ -153,7 +153,7 @@ def test_published_models_compile_and_agree_with_their_expressions(name):
 SCRIPT = """
 import json, time, numpy as np
 from nonsmooth import models
-from nonsmooth.kernels.cache import _passing, cache_statistics
+from nonsmooth.kernels.compile.cache import _passing, cache_statistics
 from nonsmooth.system.generate import compile_model, model_source
 import sys
 traced = models.discontinuous_support().traced

@@ -12,7 +12,7 @@ from nonsmooth.campaign.work import Work
 
 __all__ = ["described", "difference"]
 
-ROOMS = ("kernels", "system", "flow", "analysis")  # whose text decides what a chunk holds
+ROOMS = ("kernels", "system", "flow", "attractors", "diagrams")  # whose text decides what a chunk holds
 
 
 @cache
@@ -25,7 +25,7 @@ def _kernel_version() -> str:
     digest = hashlib.sha256(numba.__version__.encode())
     package = Path(str(nonsmooth.__file__)).parent
     for room in ROOMS:
-        for file in sorted((package / room).glob("*.py")):
+        for file in sorted((package / room).rglob("*.py")):
             digest.update(file.read_bytes())
     return digest.hexdigest()[:16]
 

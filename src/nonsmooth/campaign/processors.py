@@ -26,7 +26,7 @@ def cpu_type() -> str:
     """The processor as the linear algebra sees it, and the level that kernels are made for: both decide last digits."""
     from llvmlite import binding
 
-    from nonsmooth.kernels.target import level
+    from nonsmooth.kernels.compile.target import level
 
     features = binding.get_host_cpu_features().flatten()
     stamp = hashlib.sha256(features.encode()).hexdigest()[:8]

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.campaign.work import Work
-from nonsmooth.kernels.stopping import obey
+from nonsmooth.kernels.hybrid.stopping import obey
 
 __all__ = ["cores", "on_threads", "over_items"]
 

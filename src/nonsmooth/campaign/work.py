@@ -4,15 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.results.memory import room_for
 
-__all__ = ["Column", "Work", "check_room", "empty_columns"]
+if TYPE_CHECKING:
+    from nonsmooth.system.system import System
 
+__all__ = ["CHUNK", "STORED", "Column", "Work", "check_room", "empty_columns", "inputs"]
+
+CHUNK = 256  # runs of one chunk, at least: a tenth of a second
+STORED = 4096  # and of one that is kept in a store or sent to a cluster: a second
 LISTED = 40  # bytes of a chunk's number in a list
 
 
@@ -61,3 +66,13 @@ def empty_columns(work: Work) -> dict[str, NDArray[Any]]:
     chunks = work.n_chunks()
     size = work.bounds(chunks - 1)[1] if chunks else 0
     return {name: np.zeros((size, *column.shape), column.dtype) for name, column in work.columns().items()}
+
+
+def inputs(system: System, verb: str, options: Mapping[str, Any]) -> dict[str, Any]:
+    """Everything that a work's outcome depends on, as plain data."""
+    from nonsmooth.results.provenance import options_as_data
+
+    return {
+        "verb": verb, "system": system.to_text(), "parameters": {k: float(v) for k, v in system.values.items()},
+        "options": options_as_data(options),
+    }  # fmt: skip

@@ -42,9 +42,7 @@ def add(commands: Any) -> None:
         help="compare a measurement with a model",
         description="Lay a measurement of a session over a model, as the study file describes it: [system], "
         "[identified], [measured], [compare], [output]. Paths in the file are relative to the file.",
-        epilog="examples:\n"
-        "  nonsmooth compare compare.toml\n"
-        "  nonsmooth compare session/ --identified parameters.nc",
+        epilog="examples:\n  nonsmooth compare compare.toml\n  nonsmooth compare session/ --identified parameters.nc",
     )
     parser.add_argument(
         "study", type=Path, metavar="STUDY.toml",
@@ -132,9 +130,7 @@ def _run_study(
     return 0
 
 
-def _offset(
-    study: Mapping[str, Any], parameters: Any, session: Any, folder: Path, read: Callable[[Path], Any]
-) -> Any:
+def _offset(study: Mapping[str, Any], parameters: Any, session: Any, folder: Path, read: Callable[[Path], Any]) -> Any:
     """Identified gap less the screw's reading; 0 where the gap was not identified, or not from contact."""
     from nonsmooth.identification.compare import gap_offset
 

@@ -47,9 +47,7 @@ def add(commands: Any) -> None:
         "`crank_length` and `apparatus`; [output] with `data` (.nc or .zarr), `table` (.md) and `figures` (a folder). "
         "Paths in the file are relative to the file. A session folder in its place prints what is found. "
         "The exit code is 3 where something contradicts itself: each such anomaly is named.",
-        epilog="examples:\n"
-        "  nonsmooth identify session/\n"
-        "  nonsmooth identify rig.toml --out parameters.nc",
+        epilog="examples:\n  nonsmooth identify session/\n  nonsmooth identify rig.toml --out parameters.nc",
     )
     parser.add_argument("study", type=Path, metavar="STUDY.toml", help="the study file, or a session folder")
     parser.add_argument("--out", type=Path, help="write the parameters with their covariance (.nc or .zarr)")

@@ -12,10 +12,10 @@ __all__ = ["add"]
 def add(commands: Any) -> None:
     """Declare the sub-command."""
     parser = commands.add_parser(
-        "models", help="list the models that come ready", description="List the models that come ready.",
-        epilog="examples:\n"
-        "  nonsmooth models\n"
-        "  nonsmooth models discontinuous_support",
+        "models",
+        help="list the models that come ready",
+        description="List the models that come ready.",
+        epilog="examples:\n  nonsmooth models\n  nonsmooth models discontinuous_support",
     )
     parser.add_argument("name", nargs="?", metavar="MODEL", help="show this model's equations and parameters")
     parser.set_defaults(run=_run)

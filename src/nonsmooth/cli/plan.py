@@ -18,9 +18,7 @@ def add(commands: Any) -> None:
         help="say what a chart would take",
         description="Run a small sample of a chart's points and print what the whole would take: time, memory, and "
         "the bytes of a store. Where this machine has a GPU, a sample is run on it too.",
-        epilog="examples:\n"
-        "  nonsmooth plan chart.toml\n"
-        "  nonsmooth plan chart.toml --workers 256 --seconds 20",
+        epilog="examples:\n  nonsmooth plan chart.toml\n  nonsmooth plan chart.toml --workers 256 --seconds 20",
     )
     parser.add_argument("study", type=Path, metavar="STUDY.toml", help="a study file with a table [chart]")
     parser.add_argument("--workers", type=int, help="cores of a cluster to reckon with")
@@ -32,12 +30,12 @@ def _run(options: argparse.Namespace) -> int:
     for library in ("h5netcdf", "xarray"):  # what the run itself loads counts in its memory
         import_module(library)
 
-    from nonsmooth.analysis.chart import plan_chart
-    from nonsmooth.analysis.chart_work import STORED
     from nonsmooth.campaign.plan import plan
+    from nonsmooth.campaign.work import STORED
     from nonsmooth.cli.study import read_study
+    from nonsmooth.diagrams.chart import plan_chart
     from nonsmooth.flow.arguments import real_number, whole_number
-    from nonsmooth.flow.devices import BATCH
+    from nonsmooth.flow.engines.devices import BATCH
 
     if options.workers is not None:
         whole_number(options.workers, "--workers", 1)
@@ -59,8 +57,8 @@ def _run(options: argparse.Namespace) -> int:
 
 def _on_gpu(system: Any, given: Mapping[str, Any], seconds: float) -> str:
     """A line about the GPU: measured where there is one, else why there is no number."""
-    from nonsmooth.analysis.chart import plan_chart
-    from nonsmooth.analysis.chart_plan import plan_on_gpu
+    from nonsmooth.diagrams.chart import plan_chart
+    from nonsmooth.diagrams.chart_plan import plan_on_gpu
 
     try:
         work = plan_chart(system, **given, device="cuda").work

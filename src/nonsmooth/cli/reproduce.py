@@ -54,9 +54,7 @@ def _run(options: argparse.Namespace) -> int:
         print(f"reproducing {options.study} into {out}", file=sys.stderr, flush=True)
     _draw_without_screen()
     study = importlib.import_module(f"nonsmooth.studies.{options.study}")
-    study.reproduce(
-        out=out, figures=options.figure, quick=options.quick, full=options.full, progress=not options.quiet
-    )
+    study.reproduce(out=out, figures=options.figure, quick=options.quick, full=options.full, progress=not options.quiet)
     print(f"written to {out}", file=sys.stderr)
     return 0
 

@@ -133,7 +133,7 @@ def _place(key: str, endings: tuple[str, ...]) -> dict[str, Any]:
 def _option(option: Option) -> dict[str, Any]:
     found = dict(_WRITTEN.get(option.name) or _of_annotation(option.annotation))
     if option.name == "method":
-        from nonsmooth.flow.methods import METHODS
+        from nonsmooth.flow.engines.methods import METHODS
 
         found = {"enum": list(METHODS)}
     elif option.kind.startswith("{"):

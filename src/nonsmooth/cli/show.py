@@ -18,7 +18,8 @@ __all__ = ["add", "progress_of", "summary"]
 def add(commands: Any) -> None:
     """Declare the sub-command."""
     parser = commands.add_parser(
-        "show", help="show what a file holds",
+        "show",
+        help="show what a file holds",
         description="Show what a saved result (.nc, .zarr), a store of chunks or a recording (.csv, .cap, ...) holds.",
         epilog="examples:\n"
         "  nonsmooth show fig11.nc\n"

@@ -42,9 +42,7 @@ def _numbers(rest: Rest) -> dict[str, float]:
     }  # fmt: skip
 
 
-def march_rest(
-    curve: Equilibria, rest: Rest, bounds: tuple[float, float], largest: float, most: int
-) -> RestMarch:
+def march_rest(curve: Equilibria, rest: Rest, bounds: tuple[float, float], largest: float, most: int) -> RestMarch:
     """Follow an equilibrium along its tangent until the branch ends."""
     return march_until(RestMarch(), _follow, curve, rest, bounds, largest, most)
 

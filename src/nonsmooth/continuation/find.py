@@ -18,16 +18,16 @@ from nonsmooth.continuation.settled import CLOSED, NEAR, Guess, forced_guesses, 
 from nonsmooth.continuation.shooting import Shooting
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.arguments import check_system, real_number, whole_number
+from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.failure import solve_error
-from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.starts import first_state, plain_start
-from nonsmooth.kernels import codes
+from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.progress import Progress
 from nonsmooth.system.names import by_name
 
 if TYPE_CHECKING:
     from nonsmooth.continuation.search import Search
-    from nonsmooth.flow.engine import State
+    from nonsmooth.flow.engines.engine import State
     from nonsmooth.system.system import System
 
 __all__ = ["find_orbit"]

@@ -48,7 +48,7 @@ def stable_by(mu: ComplexArray, forced: bool) -> bool:
 
 
 def stability(mu: ComplexArray, forced: bool) -> str:
-    """"stable", "unstable", or "neutral" where the largest multiplier (but the orbit's own 1) has modulus 1."""
+    """ "stable", "unstable", or "neutral" where the largest multiplier (but the orbit's own 1) has modulus 1."""
     if stable_by(mu, forced):
         return "stable"
     return "neutral" if np.abs(without_own(mu, forced)).max() <= 1.0 + NEUTRAL else "unstable"

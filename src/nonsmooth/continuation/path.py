@@ -59,8 +59,8 @@ class Walk:
     """Walks along orbits of one system with one signature."""
 
     def __init__(self, shooting: Shooting) -> None:
-        from nonsmooth.flow.loop import pack_net
-        from nonsmooth.kernels.pointers import addresses
+        from nonsmooth.flow.engines.loop import pack_net
+        from nonsmooth.kernels.compile.pointers import addresses
         from nonsmooth.system.generate import compile_model
 
         self.shooting, system = shooting, shooting.system
@@ -117,7 +117,7 @@ class Walk:
         """Walk along the visits of a solved orbit; ``states`` (m + 1, n_z) begin them.
 
         None where the states grow without bound."""
-        from nonsmooth.kernels.orbit_path import follow
+        from nonsmooth.kernels.tangent.orbit_path import Margins, Visits, follow
 
         m, n_t = self.shape
         extremes = np.empty((2, self.n))
@@ -126,9 +126,9 @@ class Walk:
         which, slope = np.empty((m, n_t), dtype=np.int64), np.empty((m, 2))
         tau = np.where(self.at_once, 0.0, solved.times[1:] - solved.times[:-1])
         status = follow(
-            self.functions, ORDER, RTOL, self.weight, self.lacking, self.net, solved.values, self.modes,
-            solved.times[:-1], tau, np.ascontiguousarray(states), self.fired, self.fired_row, *self.scratch, extremes,
-            inner, place, which, begin, begin_row, size, end, slope,
+            self.functions, ORDER, RTOL, self.weight, self.lacking, self.net, solved.values,
+            Visits(self.modes, solved.times[:-1], tau, np.ascontiguousarray(states), self.fired, self.fired_row),
+            self.scratch, extremes, Margins(inner, place, which, begin, begin_row, size, end, slope),
         )  # fmt: skip
         if status:
             return None

@@ -10,9 +10,7 @@ __all__ = ["zero_on"]
 T = TypeVar("T")
 
 
-def zero_on(
-    at: Callable[[float], T | None], end: float, number: Callable[[T], float]
-) -> tuple[float, T] | None:
+def zero_on(at: Callable[[float], T | None], end: float, number: Callable[[T], float]) -> tuple[float, T] | None:
     """The zero of ``number`` between the distances 0 and ``end``: its distance, and the point ``at`` it.
 
     None where there is no change of sign, or where a trial has no point (``at`` gives None) or no number (NaN).

@@ -12,13 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.errors import SolveError
-from nonsmooth.flow.engine import Log, State
-from nonsmooth.kernels import before_compiling, codes
+from nonsmooth.flow.engines.engine import Log, State
+from nonsmooth.kernels import before_compiling
+from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.progress import Progress
 from nonsmooth.results.progress import progress as progress_bar
 
 if TYPE_CHECKING:
-    from nonsmooth.flow.engine import Engine
+    from nonsmooth.flow.engines.engine import Engine
 
 __all__ = ["Search", "search_within"]
 

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.flow.engine import Chain, SectionPlan, State
-from nonsmooth.flow.methods import engine_for
-from nonsmooth.kernels import codes
+from nonsmooth.flow.engines.engine import Chain, SectionPlan, State
+from nonsmooth.flow.engines.methods import engine_for
+from nonsmooth.kernels.hybrid import codes
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System

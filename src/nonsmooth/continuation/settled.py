@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.continuation.signature import AT_ONCE, Signature, Visit
-from nonsmooth.flow.engine import Chain, Log, SectionPlan, State
+from nonsmooth.flow.engines.engine import Chain, Log, SectionPlan, State
 from nonsmooth.flow.variational import VariationalFlow
-from nonsmooth.kernels import codes
+from nonsmooth.kernels.hybrid import codes
 
 if TYPE_CHECKING:
     from nonsmooth.continuation.search import Search
-    from nonsmooth.flow.engine import Engine
+    from nonsmooth.flow.engines.engine import Engine
     from nonsmooth.system.system import System
 
 __all__ = ["CLOSED", "NEAR", "Guess", "fired_row", "forced_guesses", "settle_forced", "touching"]
@@ -56,9 +56,7 @@ class Settled:
     tables: Any
 
 
-def settle_forced(
-    system: System, engine: Engine, state: State, transient: int, keep: int, search: Search
-) -> Settled:
+def settle_forced(system: System, engine: Engine, state: State, transient: int, keep: int, search: Search) -> Settled:
     """Run a forced system through a transient and keep the section points after it."""
     traced = system.traced
     sizes = len(traced.u), len(traced.indicators), len(traced.outputs)

@@ -15,15 +15,15 @@ from nonsmooth.continuation.anchor import anchored
 from nonsmooth.continuation.settled import NEAR, Guess, fired_row
 from nonsmooth.continuation.signature import Signature, Visit
 from nonsmooth.errors import SolveError
-from nonsmooth.flow.engine import Log, State
+from nonsmooth.flow.engines.engine import Log, State
 from nonsmooth.flow.equilibria import AT_REST, ROUNDING, equilibrium_at
 from nonsmooth.flow.failure import solve_error
 from nonsmooth.flow.variational import VariationalFlow
-from nonsmooth.kernels import codes
+from nonsmooth.kernels.hybrid import codes
 
 if TYPE_CHECKING:
     from nonsmooth.continuation.search import Search
-    from nonsmooth.flow.engine import Engine
+    from nonsmooth.flow.engines.engine import Engine
     from nonsmooth.system.system import System
 
 __all__ = ["autonomous_guesses"]

@@ -144,9 +144,7 @@ def _clock(trace: Trace, where: str, source: Source, note: Callable[[str], None]
             f"({trace.place(i)}); split the recording there before using methods that need one rate"
         )
     for i, count in clock.gaps[:3]:
-        note(
-            f"gap of {count} samples after t = {time[i]:.9g} s ({trace.place(i)}); nothing was filled in"
-        )
+        note(f"gap of {count} samples after t = {time[i]:.9g} s ({trace.place(i)}); nothing was filled in")
     if len(clock.gaps) > 3:
         note(f"{len(clock.gaps) - 3} more gaps")
     kind = "regular" if clock.regular else "irregular"

@@ -98,9 +98,7 @@ def write_capstone_csv(
     return _put(Path(path), mark + table.getvalue().encode("utf-8"))
 
 
-def write_cap(
-    recording: Recording, path: str | os.PathLike[str], *, sensors: Sequence[Mapping[str, str]] = ()
-) -> Path:
+def write_cap(recording: Recording, path: str | os.PathLike[str], *, sensors: Sequence[Mapping[str, str]] = ()) -> Path:
     """Write a recording as a Capstone experiment, labelled synthetic; values and times come back bit for bit.
 
     Runs are numbered from 1 in the recording's order: the format has no names for them. An even clock is written as

@@ -103,9 +103,7 @@ def load_recording(
     return recording
 
 
-def parse_recording(
-    data: bytes, name: str, options: Options | None = None, *, format: str | None = None
-) -> Recording:
+def parse_recording(data: bytes, name: str, options: Options | None = None, *, format: str | None = None) -> Recording:
     """The recording in ``data``; ``name`` is what errors call it."""
     options = options or Options()
     unread = Source(name, len(data), "", "")

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.errors import shortened
-from nonsmooth.flow.engine import FloatArray
+from nonsmooth.flow.engines.engine import FloatArray
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["check_options", "check_system", "float_array", "real_number", "whole_number", "yes_or_no"]
+__all__ = ["check_options", "check_system", "float_array", "real_number", "swept_values", "whole_number", "yes_or_no"]
 
 _MOST = 2**53  # whole numbers up to here are exact in floating point
 
@@ -42,7 +42,7 @@ def check_options(system: System, given: Mapping[str, Any], verb: Callable[..., 
     verb : callable
         Its signature names what is allowed.
     """
-    from nonsmooth.flow.methods import EXPERT
+    from nonsmooth.flow.engines.methods import EXPERT
     from nonsmooth.system.names import unknown
 
     for name in given:
@@ -93,3 +93,33 @@ def float_array(values: Any, name: str) -> FloatArray:
     except (TypeError, ValueError) as error:
         raise TypeError(f"{name} must be real numbers, not {shortened(values)} ({error})") from None
     raise TypeError(f"{name} must be real numbers, not {shortened(values)}")
+
+
+def swept_values(system: System, parameter: str, values: Any) -> FloatArray:
+    """The values of a parameter that is varied, as an array.
+
+    Raises
+    ------
+    ValueError, TypeError
+        A parameter that does not exist; values that are no list of finite numbers, each there once.
+    """
+    if not isinstance(parameter, str):
+        raise TypeError(
+            f'the parameter that is varied is given by its name in quotes, as "{next(iter(system.values), "rho")}", '
+            f"before its values; not {shortened(parameter)}"
+        )
+    if parameter not in system.values:
+        system.with_parameters({parameter: 0.0})  # raises with the names there are
+    numbers = float_array(values, f"values of {parameter!r}")
+    if numbers.ndim != 1 or not len(numbers):
+        hints = ["for one value write [value]", "give at least one", "give one axis, no mesh of two"]
+        hint = f"; {hints[min(numbers.ndim, 2)]}"
+        raise ValueError(f"values of {parameter!r} must be a list of numbers, not of shape {numbers.shape}{hint}")
+    if not np.isfinite(numbers).all():
+        where = int(np.argmin(np.isfinite(numbers)))
+        raise ValueError(f"values of {parameter!r} must be finite; number {where} is {numbers[where]}")
+    distinct, count = np.unique(numbers, return_counts=True)
+    if (count > 1).any():
+        twice = distinct[count > 1][0]
+        raise ValueError(f"values of {parameter!r} must differ from each other; {twice} is there more than once")
+    return numbers

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from nonsmooth.errors import SolveError
-from nonsmooth.kernels import codes
+from nonsmooth.kernels.hybrid import codes
 
 if TYPE_CHECKING:
-    from nonsmooth.flow.engine import Log
+    from nonsmooth.flow.engines.engine import Log
     from nonsmooth.system.system import System
 
 __all__ = ["solve_error", "wrong_way"]

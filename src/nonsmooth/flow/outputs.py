@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.flow.engine import FloatArray
+from nonsmooth.flow.engines.engine import FloatArray
 
 if TYPE_CHECKING:
     from nonsmooth.system.traced import Traced

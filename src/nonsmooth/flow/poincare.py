@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.flow.arguments import check_options, check_system, whole_number
-from nonsmooth.flow.engine import Chain, State
+from nonsmooth.flow.engines.engine import Chain, State
+from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.equilibria import refuse_resting
 from nonsmooth.flow.failure import solve_error
-from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.flow.starts import is_one_start, plain_start, start_states
-from nonsmooth.kernels import codes
+from nonsmooth.kernels.hybrid import codes
 from nonsmooth.system.names import by_name
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ def poincare(
     start : state or list of states, optional
         Zeros where not given.
     method, rtol, atol
-        See :func:`nonsmooth.flow.methods.engine_for`.
+        See :func:`nonsmooth.flow.engines.methods.engine_for`.
 
     Returns
     -------

@@ -141,7 +141,7 @@ def chained(jumps: list[Jump]) -> Jump:
 
 
 def _then(a: Jump, b: Jump) -> Jump:
-    from nonsmooth.kernels.legs import Crossing, follow
+    from nonsmooth.kernels.tangent.legs import Crossing, follow
 
     both = Crossing(a.S.copy(), b.R, np.empty_like(a.S), b.fields, a.instant)
     follow(both)

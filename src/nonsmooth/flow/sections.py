@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from nonsmooth.errors import shortened
 from nonsmooth.flow.arguments import real_number, whole_number
-from nonsmooth.flow.engine import SectionPlan
+from nonsmooth.flow.engines.engine import SectionPlan
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System

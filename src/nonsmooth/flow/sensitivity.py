@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.flow.arguments import check_system
-from nonsmooth.flow.engine import FloatArray, Log, State
-from nonsmooth.flow.methods import engine_for
+from nonsmooth.flow.engines.engine import FloatArray, Log, State
+from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.saltation import Jump
 from nonsmooth.flow.simulate import check_complete, run_length
 from nonsmooth.flow.starts import first_state, plain_start

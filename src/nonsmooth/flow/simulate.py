@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.flow.arguments import check_options, check_system, float_array, real_number, whole_number
-from nonsmooth.flow.engine import FloatArray, Log, State
+from nonsmooth.flow.engines.engine import FloatArray, Log, State
+from nonsmooth.flow.engines.methods import engine_for, warn_if_coarse
 from nonsmooth.flow.equilibria import ROUNDING, equilibrium_at
 from nonsmooth.flow.failure import solve_error, wrong_way
-from nonsmooth.flow.methods import engine_for, warn_if_coarse
 from nonsmooth.flow.starts import first_state, is_one_start, plain_start
-from nonsmooth.kernels import codes
+from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.memory import room_for
 from nonsmooth.system.names import by_name
 
@@ -68,7 +68,7 @@ def simulate(
     ramps : mapping of parameter to (first, last) or callable, optional
         Parameters as functions of time in this run: linear over the recorded time, or ``f(t)``.
     method, rtol, atol
-        See :func:`nonsmooth.flow.methods.engine_for`; rtol is 1e-9 where not given.
+        See :func:`nonsmooth.flow.engines.methods.engine_for`; rtol is 1e-9 where not given.
 
     Returns
     -------

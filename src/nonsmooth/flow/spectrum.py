@@ -20,11 +20,11 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.flow.engine import Engine, FloatArray, Log, State
-from nonsmooth.flow.linear import LinearEngine
-from nonsmooth.flow.series import SeriesEngine, order_for
+from nonsmooth.flow.engines.engine import Engine, FloatArray, Log, State
+from nonsmooth.flow.engines.linear import LinearEngine
+from nonsmooth.flow.engines.series import SeriesEngine, order_for
 from nonsmooth.flow.variational import VariationalFlow
-from nonsmooth.kernels import codes
+from nonsmooth.kernels.hybrid import codes
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
@@ -69,7 +69,7 @@ class _LinearFrame:
     """One kernel of the exact flow for the trajectory and its frame."""
 
     def __init__(self, engine: LinearEngine, tables: Any, i: int, scale: FloatArray) -> None:
-        from nonsmooth.kernels.records import Growth as Record
+        from nonsmooth.kernels.hybrid.records import Growth as Record
 
         self.engine, self.tables, self.i = engine, tables, i
         n = len(scale)
@@ -95,7 +95,7 @@ class _SeriesFrame:
     def __init__(
         self, engine: Engine, tables: Any, flow: VariationalFlow, values: FloatArray, period: float | None, timed: bool
     ) -> None:
-        from nonsmooth.kernels.spectrum import Pace
+        from nonsmooth.kernels.tangent.spectrum import Pace
 
         self.engine, self.tables, self.flow, self.values = engine, tables, flow, values
         self.period, self.timed = period, timed
@@ -149,7 +149,7 @@ class _SeriesFrame:
 
     def _march(self, state: State, count: int, unit: float) -> tuple[int, FloatArray, FloatArray]:
         """The motion itself with its frame, by the tolerance of the frame."""
-        from nonsmooth.kernels.spectrum import Pieces
+        from nonsmooth.kernels.tangent.spectrum import Pieces
 
         mode, begun = int(state.counters[0]), float(state.clock[0])
         self._widen({mode}, set())
@@ -183,8 +183,8 @@ class _SeriesFrame:
 
     def _grow(self, pieces: Any, count: int) -> tuple[int, FloatArray, FloatArray]:
         """Carry the frame along the pieces."""
-        from nonsmooth.kernels.records import Growth as Record
-        from nonsmooth.kernels.spectrum import grow
+        from nonsmooth.kernels.hybrid.records import Growth as Record
+        from nonsmooth.kernels.tangent.spectrum import grow
 
         flow, n, columns = self.flow, self.flow.n, self.Q.shape[1]
         sums, square = np.array([0.0, 0.0, 0.0, 1.0, 0.0]), np.zeros((n, n))
@@ -215,7 +215,7 @@ def _pieces(traced: Traced, log: Log, instants: FloatArray, density: int) -> Any
     """Smooth pieces between samples and crossings (``kernels.spectrum.Pieces``).
 
     A sample at the instant of a crossing is left out; transitions at one instant (a chain) form a group."""
-    from nonsmooth.kernels.spectrum import Pieces
+    from nonsmooth.kernels.tangent.spectrum import Pieces
 
     times, first = np.unique(log.crossing_time, return_index=True)
     ends = np.append(first, len(log.crossing_time))[1:]

@@ -9,7 +9,7 @@ import numpy as np
 
 from nonsmooth.errors import shortened
 from nonsmooth.flow.arguments import float_array, real_number, whole_number
-from nonsmooth.flow.engine import FloatArray, State
+from nonsmooth.flow.engines.engine import FloatArray, State
 from nonsmooth.results.memory import room_for
 from nonsmooth.system.names import by_name, unknown
 

@@ -65,8 +65,8 @@ class VariationalFlow:
     """
 
     def __init__(self, traced: Traced, active: tuple[str, ...], scale: FloatArray) -> None:
-        from nonsmooth.kernels.legs import Equations
-        from nonsmooth.kernels.pointers import addresses
+        from nonsmooth.kernels.compile.pointers import addresses
+        from nonsmooth.kernels.tangent.legs import Equations
         from nonsmooth.system.variations import variational_model
 
         self.traced, self.active = traced, active
@@ -116,7 +116,7 @@ class VariationalFlow:
             Beginning (forced systems: within the orbit, not a large absolute time) and duration, of either sign.
         z0 : array (m, n)
         """
-        from nonsmooth.kernels.legs import Ends, march_legs
+        from nonsmooth.kernels.tangent.legs import Ends, march_legs
 
         modes = np.ascontiguousarray(modes, dtype=np.int64)
         m, n = len(modes), self.n
@@ -136,7 +136,7 @@ class VariationalFlow:
         ``row`` is the row of the (first) condition that is zero there, -1: the nearest to it. For a transition at a
         given phase t must be the time since the orbit's beginning: dt/dp = (t / T) dT/dp.
         """
-        from nonsmooth.kernels.legs import Crossing, cross
+        from nonsmooth.kernels.tangent.legs import Crossing, cross
 
         if not isinstance(k, int | np.integer):
             jumps: list[Jump] = []
@@ -150,8 +150,9 @@ class VariationalFlow:
             period, gradient = self.period(values)
             timing = (t / period) * gradient
         square = n + a, n + a
-        out, seen = np.empty(self.n_out), Crossing(
-            np.empty(square), np.empty(square), np.empty(square), np.empty((3, n + a)), np.empty(n + a)
+        out, seen = (
+            np.empty(self.n_out),
+            Crossing(np.empty(square), np.empty(square), np.empty(square), np.empty((3, n + a)), np.empty(n + a)),
         )
         row = cross(self.equations, k, row, t, _floats(z), values, timing, self.scale, seen, out, self.scratch())
         at = n + n * n + n + n * a + row * (2 + n + a)
@@ -196,9 +197,9 @@ class VariationalFlow:
         """The thread's scratch memory."""
         found = getattr(self._local, "work", None)
         if found is None:
-            from nonsmooth.kernels.block import one_block
-            from nonsmooth.kernels.lanes import FOUR
-            from nonsmooth.kernels.legs import ORDER, Steps
+            from nonsmooth.kernels.compile.block import one_block
+            from nonsmooth.kernels.compile.lanes import FOUR
+            from nonsmooth.kernels.tangent.legs import ORDER, Steps
 
             columns, width = self.n + self.n_active, ORDER + 1
             rows, changes = 2 * self.n_u + len(self.model.entries), np.zeros((self.n_u, columns))

@@ -210,7 +210,7 @@ class _Chain:
         if contacts is not None and contacts.poor:
             sentences.append(
                 f"contact: the motion is not that of the model: root of chi^2 per degree of freedom "
-                f"{contacts.fit.reduced ** 0.5:.3g}, {np.count_nonzero(~contacts.fit.used)} of {len(contacts.pieces)} "
+                f"{contacts.fit.reduced**0.5:.3g}, {np.count_nonzero(~contacts.fit.used)} of {len(contacts.pieces)} "
                 "pieces left out. Look at the crank's length, the photogate and the gap of these runs"
             )
         for sentence in sentences:
@@ -245,7 +245,8 @@ class _Chain:
         for procedure in ("response", "grazing", "contact"):
             seen = [
                 drive_phase(run.passages).wander(1e-4 if known is None else known.value)
-                for run in self.runs(procedure) if run.turns is not None
+                for run in self.runs(procedure)
+                if run.turns is not None
             ]
             if unsteady := [size for size, steady in seen if not steady]:
                 self.say(
@@ -288,9 +289,7 @@ class _Chain:
         """The steady runs without support, and the dampings found from them."""
         free = [run for run in self.runs("response") if "gap" not in run.settings]
         if mounted := len(self.runs("response")) - len(free):
-            self.say(
-                f"{mounted} runs of the response state a gap: the support was mounted, no damping from them"
-            )
+            self.say(f"{mounted} runs of the response state a gap: the support was mounted, no damping from them")
         seen = steady(free)
         if sentence := not_driven(seen, self.evidence.resolution):
             raise ValueError(sentence)
@@ -391,9 +390,7 @@ class _Chain:
         m = rough["m"]
         gamma = rough["c_s"] / m if "c_s" in rough.names else 1e-3 * rough["k_s"] / m
         try:
-            found = shoot_contacts(
-                runs, decay, resolution=resolution, kappa=rough["k_s"] / m, gamma=gamma, mark=mark
-            )
+            found = shoot_contacts(runs, decay, resolution=resolution, kappa=rough["k_s"] / m, gamma=gamma, mark=mark)
         except SolveError as reason:
             self.say(f"contact: not used, so that the gap is not known: {reason}")
             return None, None

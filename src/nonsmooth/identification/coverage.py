@@ -108,9 +108,7 @@ def _moved(truth: Mapping[str, float], crank: float) -> float:
     return truth["motor_side"] * drive_mean(truth, crank) / 2
 
 
-def campaign(
-    seeds: Sequence[int], folder: Path, processes: int = 2, *, awkward: bool = False
-) -> list[dict[str, Any]]:
+def campaign(seeds: Sequence[int], folder: Path, processes: int = 2, *, awkward: bool = False) -> list[dict[str, Any]]:
     """All rigs, spread over processes; what was finished before is not computed again."""
     folder.mkdir(parents=True, exist_ok=True)
     found: dict[int, dict[str, Any]] = {}

@@ -30,9 +30,7 @@ ANOMALIES: Mapping[str, tuple[Callable[[Mapping[str, float]], bool], str]] = {
     "zeroed where it sticks": (lambda truth: abs(truth["sensor_zero"]) > _COUNT, "not where it was zeroed"),
     "motor on the other side": (lambda truth: truth["motor_side"] < 0, "the motor pulls from the side away"),
     "motor wanders": (lambda truth: truth["motor_wander"] > 0, "wanders"),
-    "slipped tap": (
-        lambda truth: truth["slipped_tap"] > 0, "impulse: run 'Run #{slipped_tap:.0f}', channel 'Angle': "
-    ),
+    "slipped tap": (lambda truth: truth["slipped_tap"] > 0, "impulse: run 'Run #{slipped_tap:.0f}', channel 'Angle': "),
     "rotary sensor reversed": (lambda truth: truth["angle_sign"] < 0, "the rotary sensor counts away from the support"),
     "force sensor reversed": (lambda truth: truth["force_sign"] < 0, "the force sensor counts against"),
     "photogate reversed": (lambda truth: truth["turn_sign"] < 0, "the photogate counts backwards"),

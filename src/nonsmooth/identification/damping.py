@@ -118,9 +118,7 @@ def viscous_bias(omega_0: float, b: float, f: float, crank_length: float, omega:
 
 
 def _predicted(omega: FloatArray, crank: FloatArray, natural: float, b: float, f: float) -> FloatArray:
-    return np.array(
-        [grazing_amplitude(float(w), natural, b, f, float(a)) for w, a in zip(omega, crank, strict=True)]
-    )
+    return np.array([grazing_amplitude(float(w), natural, b, f, float(a)) for w, a in zip(omega, crank, strict=True)])
 
 
 def _fit(

@@ -9,7 +9,7 @@ below 2^20 is exact. What is left, at most pi/4, goes into the Taylor polynomial
 
 from math import cos, fabs, floor, sin
 
-from .cache import inline
+from nonsmooth.kernels.compile.cache import inline
 
 TWO_OVER_PI = 0.6366197723675814
 QUARTER = float.fromhex("0x1.921fb544p+0")  # the first 33 bits of pi/2

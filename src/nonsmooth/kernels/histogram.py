@@ -2,7 +2,7 @@
 
 from numba import types
 
-from .cache import kernel
+from nonsmooth.kernels.compile.cache import kernel
 
 _i, _f, _i4 = types.int64, types.float64, types.int32
 _f2, _f3, _i1 = _f[:, ::1], _f[:, :, ::1], _i[::1]

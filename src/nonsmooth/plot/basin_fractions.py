@@ -63,9 +63,7 @@ def basin_fractions(result: xr.Dataset, ax: Axes | None = None, *, y: str | None
 def _names(result: xr.Dataset, k: int) -> str:
     """Kinds of an attractor along the parameter, each once, in the order met."""
     there = np.flatnonzero(result["period_number"].values[:, k] >= 0)
-    kinds = [
-        kind_of(int(result["period_number"].values[i, k]), bool(result["chaotic"].values[i, k])) for i in there
-    ]
+    kinds = [kind_of(int(result["period_number"].values[i, k]), bool(result["chaotic"].values[i, k])) for i in there]
     distinct = list(dict.fromkeys(kinds))
     periods = [kind.removeprefix("period ") for kind in distinct if kind.startswith("period")]
     words = [f"period {', '.join(periods)}"] if periods else []

@@ -102,7 +102,11 @@ def _numbers(values: xr.DataArray, drawn: Axes, first: str, second: str, show: s
         limit = float(np.percentile(finite, 98)) if len(finite) else 1.0
         options = {"cmap": "RdBu_r", "vmin": -limit, "vmax": limit}
     mesh = drawn.pcolormesh(
-        cell_edges(values[first].values), cell_edges(values[second].values), table, shading="flat", rasterized=True,
+        cell_edges(values[first].values),
+        cell_edges(values[second].values),
+        table,
+        shading="flat",
+        rasterized=True,
         **options,
     )
     unit = values.attrs.get("units", "1")

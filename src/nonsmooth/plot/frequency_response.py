@@ -91,9 +91,7 @@ def _jumps(result: xr.Dataset, direction: str, start: int) -> list[float]:
     return [float(value) for value in result["jump_value"].values[mine]]
 
 
-def _intervals(
-    values: NDArray[np.float64], curve: NDArray[np.float64], places: list[float]
-) -> list[tuple[float, int]]:
+def _intervals(values: NDArray[np.float64], curve: NDArray[np.float64], places: list[float]) -> list[tuple[float, int]]:
     """Each jump with the i such that it lies between the points i - 1 and i.
 
     A jump may be reported at a point itself, on either side: of the intervals next to it the steepest is meant.

@@ -132,9 +132,7 @@ def _draw_surfaces(ax: Axes, x: Any, y: Any, margins: NDArray[np.float64]) -> No
 def _others(margins: NDArray[np.float64]) -> list[tuple[int, NDArray[np.float64]]]:
     """For each row, the least of the other rows (infinite where there is one row only)."""
     infinite = np.full((1, *margins.shape[1:]), np.inf)
-    return [
-        (r, np.concatenate([np.delete(margins, r, axis=0), infinite]).min(axis=0)) for r in range(len(margins))
-    ]
+    return [(r, np.concatenate([np.delete(margins, r, axis=0), infinite]).min(axis=0)) for r in range(len(margins))]
 
 
 def _surface_name(r: int, count: int) -> str:

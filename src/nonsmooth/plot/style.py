@@ -40,6 +40,7 @@ COLORS = {
 
 _DOT = 7.0  # of a point cloud in a legend, in points; the mark "." is half of it wide
 
+
 @cache
 def _settings() -> Any:
     """The settings of ``journal.mplstyle``."""

@@ -107,7 +107,7 @@ def basins(
     uncertain: tuple[Any, Any],
     status: ArrayLike,
 ) -> xr.Dataset:
-    """The result of ``basins``. ``attractors`` have the fields of ``analysis.basins_attractors.Attractor``."""
+    """The result of ``basins``. ``attractors`` have the fields of ``attractors.basins_attractors.Attractor``."""
     plane = tuple(grid)
     variables: dict[str, Any] = {"label": (plane, np.asarray(label, np.int32), {"long_name": LABEL})}
     variables["status"] = (plane, np.asarray(status, np.int8), status_attributes())

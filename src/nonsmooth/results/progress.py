@@ -110,7 +110,7 @@ def _say_compiling(name: str) -> None:
     if now - _mentioned < AGAIN or not is_watched():
         return
     _mentioned = now
-    from nonsmooth.kernels.folder import cache_folder
+    from nonsmooth.kernels.compile.folder import cache_folder
 
     say(f"nonsmooth: compiling (once; kept in {cache_folder()}) ...")
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.kernels import codes
+from nonsmooth.kernels.hybrid import codes
 
 __all__ = ["EQUILIBRIA", "STATUSES", "Status", "by_code", "by_name", "flag_attributes", "status_attributes"]
 

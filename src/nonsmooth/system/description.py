@@ -6,7 +6,7 @@ it can be stored as text and read back.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -69,6 +69,7 @@ def describe(
     scale: Mapping[str, float] | None,
     period: Any,
     bands: Mapping[str, Band] | None,
+    elements: Any = None,
 ) -> Description:
     """Check everything, call each function once with symbols, and return the description."""
     units = _units(states, "states", name)
@@ -79,8 +80,20 @@ def describe(
     _is_mapping(modes, "modes", name, '{"free": free, "contact": contact}')
     if not modes:
         raise SystemDefinitionError(f"{name!r}: a system needs at least one mode")
-    indicators = dict(indicators or {})
     remembered = {key: _memory(key, given) for key, given in _units(memory or {}, "memory", name, raw=True).items()}
+    symbols = Symbols(
+        name, units, {k: v.unit for k, v in known.items()}, {k: unit for k, (_, unit) in remembered.items()}
+    )
+    derived: Collection[str] = ()
+    if elements:
+        from nonsmooth.system.assembly import assembled
+
+        given = {"indicators": indicators, "transitions": transitions, "outputs": outputs}
+        now = {symbols.p[key]: parameter.value for key, parameter in known.items()}
+        made = assembled(symbols, modes, elements, given, _scale(scale, units, name), now)
+        derived = made["indicators"].keys() - (indicators or {}).keys()
+        modes, indicators, transitions, outputs = (made[k] for k in ("modes", "indicators", "transitions", "outputs"))
+    indicators = dict(indicators or {})
     shown = {key: _output(key, given) for key, given in (outputs or {}).items()}
     bands = dict(bands or {})
     for key, band in bands.items():
@@ -94,11 +107,8 @@ def describe(
         },
         name,
     )  # fmt: skip
-    symbols = Symbols(
-        name, units, {k: v.unit for k, v in known.items()}, {k: unit for k, (_, unit) in remembered.items()}
-    )
     kinds = {key: _mode(mode, key, units) for key, mode in modes.items()}
-    traced = trace_system(name, symbols, kinds, indicators, transitions, shown)
+    traced = trace_system(name, symbols, kinds, indicators, transitions, shown, derived)
     _check_phases(traced)
     surfaces = tuple(trace_surface(item, traced) for item in transitions if isinstance(item, Surface))
     values = {symbol: known[key].value for key, symbol in symbols.p.items()}

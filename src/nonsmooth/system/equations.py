@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -48,8 +48,10 @@ def trace_system(
     indicators: Mapping[str, Callable[..., Any]],
     transitions: Sequence[Transition | Surface],
     outputs: Mapping[str, tuple[Any, str]],
+    derived: Collection[str] = (),
 ) -> Traced:
-    """Trace everything but the period. ``modes``: name -> (function, its states); ``outputs``: name -> (f, unit)."""
+    """Trace everything but the period. ``modes``: name -> (function, its states); ``outputs``: name -> (f, unit);
+    ``derived``: indicators that may be without states, as one of several conditions."""
     time, p = Scalar(symbols.t), symbols.parameters()
     moving = {symbols.t, *symbols.u.values()}
     everything = tuple(symbols.u)
@@ -67,7 +69,7 @@ def trace_system(
         what = f"indicator {key!r}"
         expression = call_scalar(function, (time, symbols.states(), p), what)
         refuse_corners(expression, moving, what)
-        if not expression.free_symbols & set(symbols.u.values()):
+        if key not in derived and not expression.free_symbols & set(symbols.u.values()):
             raise SystemDefinitionError(
                 f"{what} never involves the state ({as_written(expression)}): nothing can cross it. "
                 f"For a switch at a given time use Transition(..., at=phase)"

@@ -79,7 +79,7 @@ def compile_model(traced: Traced) -> CompiledModel:
     SystemDefinitionError
         A field or an indicator has a corner, or an expression holds a function that is not supported.
     """
-    from nonsmooth.kernels.cache import load_module
+    from nonsmooth.kernels.compile.cache import load_module
 
     source = model_source(traced)
     module = load_module(source, "model", lasting=False)
@@ -115,7 +115,7 @@ def model_source(traced: Traced) -> str:
     n_indicators = len(traced.indicators)
     smooth = tuple(all(jet.smooth[n_indicators + i] for jet in jets) for i in range(len(traced.outputs)))
     parts = [
-        "from nonsmooth.kernels.cache import callback",
+        "from nonsmooth.kernels.compile.cache import callback",
         f"from math import {', '.join(sorted(functions))}" if functions else "",
         f"from nonsmooth.kernels.circular import {', '.join(inlined)}" if inlined else "",
         f"N_SCRATCH = {max([1, *(jet.n_scratch for jet in jets)])}",

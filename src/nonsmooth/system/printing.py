@@ -214,9 +214,7 @@ def _number(e: Basic) -> str:
     return "(0.0*1e400)" if math.isnan(value) else ("1e400" if value > 0 else "-1e400")
 
 
-def assignments(
-    targets: Iterable[tuple[str, Basic]], printer: Printer, prefix: str
-) -> list[str]:
+def assignments(targets: Iterable[tuple[str, Basic]], printer: Printer, prefix: str) -> list[str]:
     """Lines ``target = expression``, after lines for what is shared between them.
 
     Parameters

@@ -113,6 +113,7 @@ class Scalar:
     __mul__, __rmul__ = _binary(lambda a, b: a * b)
     __truediv__, __rtruediv__ = _binary(lambda a, b: a / b)
     __pow__, __rpow__ = _binary(lambda a, b: a**b)
+
     def __xor__(self, other: Any) -> Any:
         raise SystemDefinitionError(
             "`^` is not a power in Python (it is the exclusive or of bits): write x**3 for x to the third"

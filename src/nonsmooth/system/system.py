@@ -54,6 +54,9 @@ class System:
         Forcing period, a number or a function of ``p``; read off sin and cos of ``w * t`` where not given.
     bands : mapping of str to Band, optional
         Fields prescribed inside the bands of the smoothed system, by indicator.
+    elements : mapping of str to element, or sequence, optional
+        Stops, friction, backlash (:mod:`nonsmooth.elements`): modes and transitions are written for all combinations of
+        their phases; the force of each is an output ``<name>_force``.
     name : str
 
     Raises
@@ -86,6 +89,7 @@ class System:
         scale: Mapping[str, float] | None = None,
         period: Any = None,
         bands: Mapping[str, Band] | None = None,
+        elements: Any = None,
         name: str = "system",
     ) -> None:
         if not isinstance(name, str) or not name:
@@ -93,7 +97,7 @@ class System:
         description = describe(
             name=name, states=states, parameters=parameters, modes=modes, indicators=indicators,
             transitions=transitions, memory=memory, outputs=outputs, symmetry=symmetry, scale=scale,
-            period=period, bands=bands,
+            period=period, bands=bands, elements=elements,
         )  # fmt: skip
         values = {key: parameter.value for key, parameter in description.parameters.items()}
         self._set(description, values, variant_of(description, SHARP))

@@ -42,9 +42,7 @@ def changed_values(
     return new
 
 
-def parameter_rows(
-    variant: Variant, values: Mapping[str, float], name: str, columns: Mapping[str, Any]
-) -> np.ndarray:
+def parameter_rows(variant: Variant, values: Mapping[str, float], name: str, columns: Mapping[str, Any]) -> np.ndarray:
     """Rows of values (P, n_parameters) in declared order, for columns of equal length P."""
     lists = {key: np.atleast_1d(np.asarray(column, dtype=np.float64)) for key, column in columns.items()}
     sizes = {column.shape for column in lists.values()}

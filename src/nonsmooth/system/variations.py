@@ -63,7 +63,7 @@ class VariationalModel:
 @lru_cache(maxsize=MOST_MODELS)
 def variational_model(traced: Traced, active: tuple[int, ...]) -> VariationalModel:
     """Generate and compile (or load from the cache) for some active parameters, given by index."""
-    from nonsmooth.kernels.cache import load_module
+    from nonsmooth.kernels.compile.cache import load_module
 
     wanted = [*traced.u, *traced.m, *(traced.p[i] for i in active)]
     jacobians = [[[_derivative(e, s) for s in wanted] for e in field] for field in traced.fields]
@@ -82,12 +82,19 @@ def variational_model(traced: Traced, active: tuple[int, ...]) -> VariationalMod
     switches = [_code(traced, _switch(traced, jump, wanted)) for jump in traced.transitions]
     functions = set().union(*(jet.functions for jet in jets), *(used for _, used in [*fields, *switches]))
     parts = [
-        "from nonsmooth.kernels.cache import callback",
-        "from nonsmooth.kernels.lanes import load, plus, store, times",
+        "from nonsmooth.kernels.compile.cache import callback",
+        "from nonsmooth.kernels.compile.lanes import load, plus, store, times",
         f"from math import {', '.join(sorted(functions))}" if functions else "",
-        _function("jet", _JET, "mode, order, t, u, q, C, W, D", traced, [
-            [*jet.lines, *_small_changes(entries, kind, n, len(wanted))] for jet, kind in zip(jets, kinds, strict=True)
-        ]),
+        _function(
+            "jet",
+            _JET,
+            "mode, order, t, u, q, C, W, D",
+            traced,
+            [
+                [*jet.lines, *_small_changes(entries, kind, n, len(wanted))]
+                for jet, kind in zip(jets, kinds, strict=True)
+            ],
+        ),
         _function("field", SIGNATURES["field"], "mode, t, u, q, du", traced, [lines for lines, _ in fields]),
         _function("switch", _SWITCH, "transition, t, u, q, out", traced, [lines for lines, _ in switches]),
     ]

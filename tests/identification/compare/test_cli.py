@@ -27,7 +27,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     settings = [Setting(voltage_for(rig, 11.15), length, gap, 25.0, (), place) for place in (None, -0.02)]
     made = {
         "section": records(rig, "section", settings, settle=30.0),
-        "response": records(rig, "response", without_support(rig, 14)), "impulse": rig.impulse(velocities=TAPS),
+        "response": records(rig, "response", without_support(rig, 14)),
+        "impulse": rig.impulse(velocities=TAPS),
     }
     top = tmp_path_factory.mktemp("lab")
     write_session(rig, top / "session", made, title="a test")

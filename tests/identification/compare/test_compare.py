@@ -90,9 +90,7 @@ def test_the_band_is_the_spread_of_the_prediction() -> None:
     """For a free motion x depends on the draw through a closed form; its band is that of the drawn amplitudes."""
     free = {"rho": 0.14, "omega": 6.5, "g": 1.0}
     known = Known(k=(8.47, 0.08))
-    found = compare(
-        record(MODEL.with_parameters(free), 30.0), MODEL, parameters=known, settings=free, draws=40, seed=3
-    )
+    found = compare(record(MODEL.with_parameters(free), 30.0), MODEL, parameters=known, settings=free, draws=40, seed=3)
     drawn = found["drawn_k"].values
     response = (0.14 / 0.838) / (2 * drawn / 0.838 - 6.5**2 + 1j * 0.87 * 6.5 / 0.838)
     x = (response[:, None] * np.exp(2j * np.pi * found["phase"].values)).real
@@ -100,9 +98,7 @@ def test_the_band_is_the_spread_of_the_prediction() -> None:
     np.testing.assert_allclose(found["theory_low"].sel(state="x").values, low, atol=1e-9)
     np.testing.assert_allclose(found["theory_high"].sel(state="x").values, high, atol=1e-9)
     assert float(found["band_share"]) == 1.0
-    again = compare(
-        record(MODEL.with_parameters(free), 30.0), MODEL, parameters=known, settings=free, draws=40, seed=3
-    )
+    again = compare(record(MODEL.with_parameters(free), 30.0), MODEL, parameters=known, settings=free, draws=40, seed=3)
     xr.testing.assert_identical(found, again)
 
 

@@ -67,8 +67,11 @@ def test_the_campaign_asks_what_a_miss_needs(tmp_path: Path, monkeypatch: pytest
             if name == "periods" and trial.folder.name == "seed_4":
                 return [{**RIG["periods"][0], "rig": [2, 2, 2]}]
             kept = RIG.get(name, [10, 20])
-            return {**ATTRACTOR, "energy_ratio": distances[trial.folder.parts[-1]]} if (
-                name == "attractor" and trial.folder.parts[-1] in distances) else kept
+            return (
+                {**ATTRACTOR, "energy_ratio": distances[trial.folder.parts[-1]]}
+                if (name == "attractor" and trial.folder.parts[-1] in distances)
+                else kept
+            )
 
         return result
 

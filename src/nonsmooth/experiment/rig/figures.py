@@ -101,9 +101,7 @@ def rise(
     return driven.rise(rig, voltage=knob, crank_length=lengths, gap=screw, duration=duration)
 
 
-def stairs(
-    rig: VirtualRig, *, forcing: Sequence[float], settle: float = 1800.0, duration: float = 60.0
-) -> Recording:
+def stairs(rig: VirtualRig, *, forcing: Sequence[float], settle: float = 1800.0, duration: float = 60.0) -> Recording:
     """The rise of Fig. 11 in steps (N), the motion carried along, ``settle`` seconds of waiting at each."""
     omega, _, _, at_rest = _RISE
     screw, knob = screw_for(rig, at_rest, 0.0), voltage_for(rig, omega)

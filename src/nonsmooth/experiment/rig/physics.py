@@ -94,9 +94,7 @@ def wander_of(p: Any) -> Wander:
     )
 
 
-def car(
-    *, relaxing: bool = True, rising: bool = False, wandering: bool = False, side: int = 1
-) -> System:
+def car(*, relaxing: bool = True, rising: bool = False, wandering: bool = False, side: int = 1) -> System:
     """The car with its springs, strings and support.
 
     Parameters
@@ -189,6 +187,7 @@ def _car(relaxing: bool, rising: bool, wandering: bool, side: int) -> System:
         Transition("slack_fixed", "free", when="pull_fixed > 0"),
     ]
     if relaxing:
+
         def released(t: Any, u: Any, p: Any) -> Any:
             return (u.x, u.v, u.x - p.g, u.a) if rising else (u.x, u.v, u.x - p.g)
 

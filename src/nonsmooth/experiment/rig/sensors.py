@@ -80,9 +80,7 @@ def angle(rig: VirtualRig, run: str, time: FloatArray, x: FloatArray, v: FloatAr
     return _sensor(time, "Angle", "rad", counts * (2 * np.pi / COUNTS_PER_TURN))
 
 
-def force(
-    rig: VirtualRig, rng: np.random.Generator, run: str, time: FloatArray, pulled: FloatArray
-) -> xr.Dataset:
+def force(rig: VirtualRig, rng: np.random.Generator, run: str, time: FloatArray, pulled: FloatArray) -> xr.Dataset:
     """The channel ``Force`` (N) of a sensor that is pulled with the force ``pulled``; saturation is a warning."""
     reading = rig.truth["force_gain"] * pulled + rig.truth["force_noise"] * rng.standard_normal(len(pulled))
     reading = rig.truth["force_sign"] * reading

@@ -165,9 +165,7 @@ class VirtualRig:
             found["Turn"] = sensors.turns(self, crossed)
         return found
 
-    def recording(
-        self, procedure: str, runs: Sequence[tuple[str, Mapping[str, Any], Mapping[str, Any]]]
-    ) -> Recording:
+    def recording(self, procedure: str, runs: Sequence[tuple[str, Mapping[str, Any], Mapping[str, Any]]]) -> Recording:
         """The runs (name, sensors, settings) as a Recording that says that it is synthetic."""
         from nonsmooth.experiment.recording import Recording
 

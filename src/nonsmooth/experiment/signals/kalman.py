@@ -17,7 +17,7 @@ from __future__ import annotations
 from math import isfinite, log, sqrt
 from typing import Any
 
-from nonsmooth.kernels.cache import inline, kernel
+from nonsmooth.kernels.compile.cache import inline, kernel
 
 __all__ = ["filter_nodes", "smooth_nodes"]
 

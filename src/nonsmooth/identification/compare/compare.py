@@ -96,7 +96,7 @@ def compare(
     seed : int
         Of all that is drawn at random.
     **options
-        ``method``, ``rtol``, ``atol``: see :func:`nonsmooth.flow.methods.engine_for`.
+        ``method``, ``rtol``, ``atol``: see :func:`nonsmooth.flow.engines.methods.engine_for`.
 
     Returns
     -------

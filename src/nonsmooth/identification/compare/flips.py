@@ -49,9 +49,7 @@ class Flip(NamedTuple):
     read: float
 
 
-def delayed_flips(
-    at: FloatArray, points: FloatArray, noise: FloatArray, numbers: NDArray[np.int64]
-) -> dict[str, Flip]:
+def delayed_flips(at: FloatArray, points: FloatArray, noise: FloatArray, numbers: NDArray[np.int64]) -> dict[str, Flip]:
     """The flips along a slow and even rise (or fall) of a parameter, ``{"1-2": Flip, "2-4": ...}``.
 
     Parameters

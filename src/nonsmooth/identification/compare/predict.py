@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.analysis.settle import Attractors, longest_period, tolerance_of
-from nonsmooth.analysis.settled import usable
-from nonsmooth.flow.engine import Chain, SectionPlan, State
+from nonsmooth.attractors.settle import Attractors, longest_period, tolerance_of
+from nonsmooth.attractors.settled import usable
+from nonsmooth.flow.engines.engine import Chain, SectionPlan, State
+from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.failure import solve_error
-from nonsmooth.flow.methods import engine_for
 from nonsmooth.flow.sections import Stroboscopic, section_plan
 from nonsmooth.flow.simulate import check_complete
 from nonsmooth.identification.compare.fold import fold
-from nonsmooth.kernels import codes
+from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.statuses import by_code
 
 if TYPE_CHECKING:

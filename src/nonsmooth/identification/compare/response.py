@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.analysis.response import jumps_in
-from nonsmooth.analysis.sweep import sweep
+from nonsmooth.diagrams.response import jumps_in
+from nonsmooth.diagrams.sweep import sweep
 from nonsmooth.identification.compare.draws import Settings, draw_systems, drawn_variables, nominal
 from nonsmooth.identification.compare.jumps import Jump, Jumps, jumps_in_steps, match_jumps
 

@@ -69,9 +69,7 @@ class RigTrial:
     def without(self, feature: str) -> RigTrial:
         """The same rig with one feature switched off, over the same identified parameters."""
         off: dict[str, Any] = {feature: False}
-        return RigTrial(
-            replace(self.rig, **off), self.folder / f"without_{feature}", self.identified, self.reading
-        )
+        return RigTrial(replace(self.rig, **off), self.folder / f"without_{feature}", self.identified, self.reading)
 
     @cached_property
     def session(self) -> Session:
@@ -188,7 +186,7 @@ class RigTrial:
 
     def _first_flip(self, gap: float) -> float:
         """Roughly where the model halves its period in a rise."""
-        from nonsmooth.analysis.sweep import sweep
+        from nonsmooth.diagrams.sweep import sweep
 
         system = self.model.with_parameters(self.identified).with_parameters(omega=3.69, g=gap)
         values = np.arange(0.2, 0.7, 0.004)
@@ -214,7 +212,7 @@ class RigTrial:
 
     def _coexisting(self, settings: Mapping[str, Any]) -> dict[int, int]:
         """Number of seeded starts that lead the model to each period number."""
-        from nonsmooth.analysis.sweep import sweep
+        from nonsmooth.diagrams.sweep import sweep
         from nonsmooth.identification.compare.draws import nominal, read_settings
 
         system = nominal(self.model, self.identified, read_settings(settings, self.model))

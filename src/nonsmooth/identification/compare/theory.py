@@ -63,9 +63,7 @@ def predict(
     best: tuple[float, Attractor, list[FloatArray]] | None = None
     for one in found:
         sections = [motions.cloud(0, one, phase, n) for phase in phases]
-        away = sum(
-            energy_distance(a[-400:] / scale, b[-400:] / scale) for a, b in zip(measured, sections, strict=True)
-        )
+        away = sum(energy_distance(a[-400:] / scale, b[-400:] / scale) for a, b in zip(measured, sections, strict=True))
         if best is None or away < best[0]:
             best = (away, one, sections)
     assert best is not None  # `attractors` raises where there is none

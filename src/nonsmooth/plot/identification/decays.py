@@ -44,9 +44,7 @@ def free_decay(finding: Any, ax: Axes | None = None) -> Axes:
             if name in data:
                 curve = 1e3 * data[name].values
                 shown = curve > 0
-                drawn.plot(
-                    data["fine_time"].values[shown], curve[shown], line, color=style.COLORS[color], label=word
-                )
+                drawn.plot(data["fine_time"].values[shown], curve[shown], line, color=style.COLORS[color], label=word)
         drawn.set_yscale("log")
         drawn.set_ylim(0.5 * np.nanmin(height[height > 0]), 1.6 * np.nanmax(height))
         drawn.margins(x=0.02)

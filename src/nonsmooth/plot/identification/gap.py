@@ -48,9 +48,7 @@ def grazing(finding: Any, ax: Axes | None = None) -> Axes:
             )
         if np.isfinite(gap := number(data, "gap")):
             text = with_error(1e3 * gap, 1e3 * number(data, "gap_error"), "mm")
-            drawn.axhline(
-                gap, color=style.COLORS["second"], linestyle="--", linewidth=0.9, label=f"$g$ = {text}"
-            )
+            drawn.axhline(gap, color=style.COLORS["second"], linestyle="--", linewidth=0.9, label=f"$g$ = {text}")
         drawn.legend(**ABOVE, ncols=2, columnspacing=1.0)
         attrs = data["setting"].attrs
         setting_named = str(attrs.get("long_name", "setting")), str(attrs.get("units", ""))
@@ -94,9 +92,7 @@ def multiple_shooting(finding: Any, ax: Axes | None = None, *, seconds: float = 
             )  # fmt: skip
         if np.isfinite(gap := number(data, "gap")):
             text = with_error(1e3 * gap, 1e3 * number(data, "gap_error"), "mm")
-            drawn.axhline(
-                gap, color=style.COLORS["second"], linestyle="--", linewidth=0.8, label=f"$g$ = {text}"
-            )
+            drawn.axhline(gap, color=style.COLORS["second"], linestyle="--", linewidth=0.8, label=f"$g$ = {text}")
         drawn.margins(x=0)
         drawn.legend(**ABOVE, ncols=2, columnspacing=1.0, markerscale=2)
         name_axes(drawn, ("time", "s"), ("displacement", "m"))

@@ -35,8 +35,10 @@ def impulse_response(finding: Any, ax: Axes | None = None) -> Axes:
     """
     data = data_of(finding, "magnitude", "frequency", "peak_frequency")
     frequency, magnitude = data["frequency"].values, data["magnitude"].values
-    top = int(np.argmin(np.abs(frequency - number(data, "grid_peak")))) if "grid_peak" in data else int(
-        np.nanargmax(magnitude)
+    top = (
+        int(np.argmin(np.abs(frequency - number(data, "grid_peak"))))
+        if "grid_peak" in data
+        else int(np.nanargmax(magnitude))
     )
     first, last = max(top - BINS, 0), min(top + BINS + 1, len(frequency))
     at, heights = frequency[first:last], magnitude[first:last]

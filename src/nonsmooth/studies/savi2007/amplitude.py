@@ -42,7 +42,8 @@ def _caption_11(data: Mapping[str, xr.Dataset]) -> str:
     return (
         "Bifurcation diagram over the forcing amplitude, omega = 3.69 rad/s, g = -4.5 mm: velocity at the section. "
         "Dotted: the paper's printed ends of chaos (0.26 N), period 4 (0.28 N) and period 2 (0.406 N). "
-        + ABOUT_BRANCHES + how(data)
+        + ABOUT_BRANCHES
+        + how(data)
     )
 
 

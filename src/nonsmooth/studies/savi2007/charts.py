@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth import plot
-from nonsmooth.analysis.chart import chart
 from nonsmooth.continuation.continue_curve import continue_curve
 from nonsmooth.continuation.continue_orbit import continue_orbit
 from nonsmooth.continuation.find import find_orbit
+from nonsmooth.diagrams.chart import chart
 from nonsmooth.errors import SolveError
 from nonsmooth.plot.curve import KINDS
 from nonsmooth.results.statuses import by_code
@@ -81,7 +81,8 @@ def curves(plane: Plane) -> list[xr.Dataset]:
     lines = list(branches(plane.figure).values())
     for period, value in plane.further.items():
         orbit = find_orbit(
-            EXACT.system(**begin.parameters).with_parameters({begin.parameter: value}), period_number=period,
+            EXACT.system(**begin.parameters).with_parameters({begin.parameter: value}),
+            period_number=period,
             progress=False,
         )
         lines.append(continue_orbit(orbit, begin.parameter, begin.range))
@@ -151,7 +152,8 @@ def _caption(data: Mapping[str, xr.Dataset]) -> str:
     fixed = "g" if "g" not in (first, second) else "omega"
     rays = (
         " The system is piecewise linear, so all depends on g / rho alone: every boundary is a straight line."
-        if fixed == "omega" else ""
+        if fixed == "omega"
+        else ""
     )
     shown = "Contacts per forcing period and period number" if fixed == "g" else "Period number"
     return (

@@ -128,8 +128,7 @@ def f10(data: Data) -> list[Cell]:
         Cell(f"rising {up}, falling {down} rad/s", Verdict.UNDECIDED if up is None or down is None else Verdict.AGREES),
         against(down, grazing[-1]),
         _no_doubled(runs),
-        Cell(f"rising {words[0]}, falling {words[1]} rad/s",
-             Verdict.UNDECIDED if small is None else Verdict.AGREES),
+        Cell(f"rising {words[0]}, falling {words[1]} rad/s", Verdict.UNDECIDED if small is None else Verdict.AGREES),
         against(small, grazing[0]),
     ]
 

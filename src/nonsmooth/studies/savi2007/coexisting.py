@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from nonsmooth import plot
-from nonsmooth.analysis.basins import basins
+from nonsmooth.attractors.basins import basins
 from nonsmooth.flow.simulate import simulate
 from nonsmooth.plot.basins import names_of as kinds_of
 from nonsmooth.plot.basins import section_mark

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth import plot
-from nonsmooth.analysis.sweep import sweep
+from nonsmooth.diagrams.sweep import sweep
 from nonsmooth.plot.branch import draw_branch
 from nonsmooth.plot.style import even_dots, halo, small
 from nonsmooth.results.provenance import read_provenance
@@ -113,9 +113,7 @@ def other_motions(many: xr.Dataset, swept: xr.Dataset) -> xr.DataArray:
 def mark_values(ax: Axes, values: Mapping[float, str], words: str, foot: bool = False) -> None:
     """A dotted line with its number at each of these values, at the top or at the foot."""
     for i, (value, text) in enumerate(values.items()):
-        ax.axvline(
-            value, color="black", linewidth=0.7, linestyle=":", zorder=2.5, label=words if i == 0 else None
-        )
+        ax.axvline(value, color="black", linewidth=0.7, linestyle=":", zorder=2.5, label=words if i == 0 else None)
         ax.annotate(
             text, (value, 0.0 if foot else 1.0), (-1.5, 3 if foot else -3), xycoords=ax.get_xaxis_transform(),
             textcoords="offset points", rotation=90, ha="right", va="bottom" if foot else "top", fontsize=small(ax),

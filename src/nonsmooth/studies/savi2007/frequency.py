@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth import plot
-from nonsmooth.analysis.sweep import sweep
+from nonsmooth.diagrams.sweep import sweep
 from nonsmooth.flow.poincare import poincare
 from nonsmooth.plot.style import halo, small
 from nonsmooth.studies.savi2007.branches import branches
@@ -90,7 +90,8 @@ def _caption_17(data: Mapping[str, xr.Dataset]) -> str:
         f"motion without contact ({grazing} rad/s; in (b) that of a gap g - eta). Above it chaos dies out, given time: "
         "what has no period in (b) had no time to. "
         f"Grey shows motions that coexist with what the sweeps follow. {_about_windows(data)}"
-        + ABOUT_BRANCHES + how(data)
+        + ABOUT_BRANCHES
+        + how(data)
     )
 
 

@@ -49,7 +49,8 @@ def _caption_13(data: Mapping[str, xr.Dataset]) -> str:
     return (
         "Bifurcation diagram over the gap, omega = 11.15 rad/s, rho = 0.33 N: velocity at the section. Dotted: the "
         "four gaps of Fig. 14. Grey shows motions that coexist with what the sweeps follow. "
-        + ABOUT_BRANCHES + how(data)
+        + ABOUT_BRANCHES
+        + how(data)
     )
 
 

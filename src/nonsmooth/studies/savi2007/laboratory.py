@@ -160,9 +160,7 @@ class Laboratory:
         """The measurement over the model with the identified parameters."""
         from nonsmooth.identification.compare.compare import compare
 
-        return compare(
-            measured, self.model, parameters=self.identified, settings=settings, **{"draws": 0, **options}
-        )
+        return compare(measured, self.model, parameters=self.identified, settings=settings, **{"draws": 0, **options})
 
     @property
     def model(self) -> System:

@@ -96,9 +96,7 @@ class Picture:
     caption: str
 
 
-Block: TypeAlias = (
-    Heading | Paragraph | Notice | Lines | Bullets | Contents | Tally | Comparison | Table | Picture
-)
+Block: TypeAlias = Heading | Paragraph | Notice | Lines | Bullets | Contents | Tally | Comparison | Table | Picture
 
 
 def to_markdown(blocks: Sequence[Block]) -> str:
@@ -197,9 +195,7 @@ def _link(text: str) -> str:
 
 def _tally_table(tally: Tally) -> Table:
     """The numbers of each verdict, with their sums."""
-    rows = [
-        (str(verdict), *(str(counts.get(verdict, 0)) for counts in tally.counts.values())) for verdict in Verdict
-    ]
+    rows = [(str(verdict), *(str(counts.get(verdict, 0)) for counts in tally.counts.values())) for verdict in Verdict]
     sums = tuple(str(sum(counts.values())) for counts in tally.counts.values())
     return Table(("verdict", *tally.counts), (*rows, ("all statements", *sums)))
 

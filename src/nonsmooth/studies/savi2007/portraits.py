@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth import plot
-from nonsmooth.analysis.sweep import sweep
+from nonsmooth.diagrams.sweep import sweep
 from nonsmooth.flow.simulate import simulate
 from nonsmooth.plot.units import prefixed
 from nonsmooth.studies.savi2007.diagrams import shared_legend

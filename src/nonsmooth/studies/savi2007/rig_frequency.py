@@ -44,9 +44,7 @@ def _compute_17(settings: Settings) -> dict[str, xr.Dataset]:
     found = motions(bench, 17, steps, periods=40 if settings.quick else 60)
     measured, set_ = diagram_of(found, "omega")
     fine = 101 if settings.quick else 401
-    result = bench.compare(
-        measured, set_, parameter="omega", direction="both", values=np.linspace(8.4, 10.4, fine)
-    )
+    result = bench.compare(measured, set_, parameter="omega", direction="both", values=np.linspace(8.4, 10.4, fine))
     return {"compared": result, "runs": runs_of(found, "omega")}
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth import plot
-from nonsmooth.analysis.sweep import sweep
+from nonsmooth.diagrams.sweep import sweep
 from nonsmooth.plot.comparison import MEASURED, THEORY
 from nonsmooth.plot.comparison_diagram import comparison_diagram
 from nonsmooth.plot.labels import name_and_unit, name_axes

@@ -161,9 +161,7 @@ def _name(period: int) -> str:
     return "no period" if period == APERIODIC else f"period {period}"
 
 
-def draw_pairs(
-    unit: str, symbol: str, shown: Mapping[float, int]
-) -> Callable[[Mapping[str, xr.Dataset]], Canvas]:
+def draw_pairs(unit: str, symbol: str, shown: Mapping[float, int]) -> Callable[[Mapping[str, xr.Dataset]], Canvas]:
     """The sheet: columns are values; the model above, the rig below, in the same axes."""
 
     def draw(data: Mapping[str, xr.Dataset]) -> Canvas:

@@ -1,1 +1,0 @@
-"""Brute-force questions to a flow, one per file."""

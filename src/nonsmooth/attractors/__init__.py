@@ -1,0 +1,1 @@
+"""Attractors: settled, recognised, counted, and their basins."""

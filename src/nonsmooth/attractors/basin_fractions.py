@@ -1,0 +1,186 @@
+"""``basin_fractions``: every attractor over a parameter, with its share of random starts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.attractors.basins import failed, settler_of
+from nonsmooth.attractors.basins_attractors import Attractor, Patience, find_attractors
+from nonsmooth.attractors.basins_matching import numbered
+from nonsmooth.attractors.basins_measures import share_errors, starts_needed
+from nonsmooth.attractors.basins_work import StartsWork, settled_from
+from nonsmooth.attractors.settle import warn_if_small
+from nonsmooth.campaign.run import run
+from nonsmooth.campaign.work import CHUNK, STORED, inputs
+from nonsmooth.errors import shortened
+from nonsmooth.flow.arguments import check_options, check_system, real_number, swept_values, whole_number
+from nonsmooth.flow.engines.devices import BATCH, workers_of
+from nonsmooth.flow.sections import Poincare, Stroboscopic
+from nonsmooth.flow.starts import random_starts, start_states
+from nonsmooth.results.memory import room_for
+from nonsmooth.results.progress import Progress
+from nonsmooth.system.names import by_name
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from nonsmooth.flow.engines.engine import IntArray
+    from nonsmooth.system.system import System
+
+__all__ = ["basin_fractions"]
+
+
+@by_name
+def basin_fractions(
+    system: System,
+    parameter: str,
+    values: Any,
+    *,
+    n_starts: int = 200,
+    box: Mapping[str, tuple[float, float]] | None = None,
+    seed: int = 0,
+    section: Stroboscopic | Poincare | None = None,
+    transient: int = 500,
+    keep: int = 60,
+    max_period: int | None = None,
+    method: str = "auto",
+    rtol: float | None = None,
+    atol: Any = None,
+    threads: int | None = None,
+    device: str = "cpu",
+    store: Any = None,
+    client: Any = None,
+    any_cpu: bool = False,
+    progress: Progress = True,
+    **expert: Any,
+) -> xr.Dataset:
+    """Attractors over a parameter, and the share of random starts that each attracts: the multistability diagram.
+
+    Parameters
+    ----------
+    system : System
+    parameter : str
+    values : array (P,)
+        Attractors are matched from each value to the next in the order of rising values.
+    n_starts : int
+        Random starts at each value, the same at all of them.
+    box : mapping
+        Lowest and highest value of each state at the start; states that are not named start at zero.
+    seed : int
+        Seed of the starts.
+    section, transient, keep, max_period, method, rtol, atol, threads, device, store, client, any_cpu, progress
+        See :func:`nonsmooth.basins`.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over the parameter and ``attractor``: ``fraction`` with its binomial ``fraction_error``, ``period_number`` (0:
+        no cycle, -1: not there), ``chaotic``, ``lyapunov`` with its error, ``maximum``, ``minimum``, a point on the
+        ``section``. A number stays with an attractor along the parameter: one that a run carried over ends on, and is
+        carried back from. A share of 0 beside a period number is an attractor that only a run
+        carried from the value before has met. Over the parameter: ``not_converged`` and ``diverged`` (shares; of the
+        first, ``failed`` are runs that could not be followed, as from a start beyond a stop) and ``n_starts_99``, the
+        number of starts that meet every attractor met there by random starts with 99 %.
+
+    Raises
+    ------
+    ValueError, TypeError
+        Arguments that do not fit.
+    ImportError, RuntimeError
+        ``device="cuda"`` without the package numba-cuda, or without a GPU.
+    """
+    check_system(system, "basin_fractions")
+    check_options(system, expert, basin_fractions)
+    numbers = swept_values(system, parameter, values)
+    n_starts = whole_number(n_starts, "n_starts", 1)
+    # a start is named, state by state; of each run at each value a row is kept
+    room_for((500.0 + 64.0 * len(numbers)) * n_starts, f"{n_starts:.6g} starts at {len(numbers)} values", "take fewer")
+    starts = start_states(system, _starts(system, box, n_starts, seed))
+    section, settler = settler_of(
+        system, section, transient, keep, max_period, method, rtol, atol, expert, threads=threads, device=device,
+        verb="basin_fractions",
+    )  # fmt: skip
+    gpu, threads = device == "cuda", workers_of(device, threads, client)
+    options = {
+        "parameter": parameter, "values": numbers, "n_starts": n_starts, "box": box and dict(box), "seed": seed,
+        "section": section, "transient": transient, "keep": keep, "max_period": max_period, "method": method,
+        "rtol": rtol, "atol": atol, **({"device": device} if gpu else {}), **expert,
+    }  # fmt: skip
+    points = system.parameter_points({parameter: numbers})
+    chunk = BATCH if gpu else CHUNK if store is None and client is None else STORED
+    work = StartsWork(settler, points, starts, chunk, inputs(system, "basin_fractions", options))
+    columns = run(
+        work, threads=threads, progress=progress, label=f"basins over {parameter}", store=store, client=client,
+        any_cpu=any_cpu,
+    )  # fmt: skip
+    runs = settled_from(columns)
+    warn_if_small(system, starts, runs.maximum, runs.minimum)
+    rising = [int(i) for i in np.argsort(numbers, kind="stable")]
+    per_value: list[dict[int, Attractor]] = [{} for _ in numbers]
+    labels = np.full((len(numbers), n_starts), -1, dtype=np.int64)
+    seen: dict[int, Attractor] = {}
+    last: dict[int, Attractor] = {}
+    single = replace(settler, device="cpu")  # a few runs from one value to the next
+    status, before = np.zeros_like(labels), points[rising[0] : rising[0] + 1]
+    for i in rising:
+        point = points[i : i + 1]
+        found, label, status[i] = find_attractors(settler, point, runs[i * n_starts : (i + 1) * n_starts], Patience())
+        ids = numbered(single, point, found, before, last, seen)
+        before = point
+        last = dict(zip(ids, found, strict=True))
+        seen |= {k: replace(item, tree=None) for k, item in last.items()}
+        per_value[i] = last
+        labels[i] = np.append(ids, [-2, -1])[label] if len(ids) else label
+    return _dataset(
+        system, settler.engine.name, parameter, numbers, per_value, labels, status, len(seen), options, seed
+    )
+
+
+def _starts(system: System, box: Any, n_starts: int, seed: int) -> Any:
+    form = ", ".join(f'"{name}": (low, high)' for name in system.states)
+    if not isinstance(box, Mapping) or not box:
+        raise ValueError(f"box = {shortened(box)}: give the box from which starts are drawn, box={{{form}}}")
+    for name, ends in box.items():
+        if np.shape(ends) != (2,):
+            raise ValueError(f"box[{name!r}] = {shortened(ends)}: give its lowest and highest value; box={{{form}}}")
+    low, high = ({name: real_number(ends[k], f"box[{name!r}]") for name, ends in box.items()} for k in (0, 1))
+    return random_starts(n_starts, low, high, whole_number(seed, "seed", 0))
+
+
+def _dataset(
+    system: System, method: str, parameter: str, numbers: Any, per_value: list[dict[int, Attractor]],
+    labels: IntArray, status: IntArray, n_attractors: int, options: Mapping[str, Any], seed: int,
+) -> xr.Dataset:  # fmt: skip
+    from nonsmooth.results.global_schema import basin_fractions as build
+    from nonsmooth.results.labels import labels_of
+    from nonsmooth.results.provenance import provenance
+
+    n_starts, n = labels.shape[1], len(system.states)
+    count = np.stack([(labels == k).sum(axis=1) for k in range(n_attractors)], axis=1).reshape(len(numbers), -1)
+    fraction, error = share_errors(count, n_starts)
+    period = np.full(count.shape, -1, dtype=np.int64)
+    exponent, spread = np.full(count.shape, np.nan), np.full(count.shape, np.nan)
+    chaotic = np.zeros(count.shape, dtype=np.int8)
+    maximum, minimum, section = (np.full((*count.shape, n), np.nan) for _ in range(3))
+    for i, found in enumerate(per_value):
+        for k, item in found.items():
+            period[i, k], chaotic[i, k] = item.period_number, item.chaotic
+            exponent[i, k], spread[i, k] = item.exponent, item.exponent_error
+            maximum[i, k], minimum[i, k], section[i, k] = item.maximum, item.minimum, item.points[0]
+    arrays = {
+        "fraction": fraction, "fraction_error": error, "period_number": period, "lyapunov": exponent,
+        "lyapunov_error": spread, "chaotic": chaotic,
+        "maximum": maximum, "minimum": minimum, "section": section,
+        "not_converged": (labels == -1).mean(axis=1), "diverged": (labels == -2).mean(axis=1),
+        "failed": (failed(status) & (labels == -1)).mean(axis=1),
+        "n_starts_99": np.array([starts_needed(row) for row in fraction], dtype=np.int64),
+    }  # fmt: skip
+    named = labels_of(system)
+    return build(
+        named, provenance(named, "basin_fractions", options, method=method, seed=seed), parameter, numbers,
+        arrays,
+    )  # fmt: skip

@@ -1,0 +1,268 @@
+"""``basins``: which start leads to which attractor; the attractors are found, not given."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.attractors.basins_attractors import Attractor, Patience, find_attractors
+from nonsmooth.attractors.basins_measures import (
+    basin_entropy,
+    boundary_dimension,
+    minimal_shock,
+    share_errors,
+    starts_needed,
+    uncertain_part,
+)
+from nonsmooth.attractors.basins_work import StartsWork, settled_from
+from nonsmooth.attractors.settle import longest_period, warn_if_small
+from nonsmooth.attractors.settled import usable
+from nonsmooth.attractors.settler import Settler
+from nonsmooth.campaign.run import run
+from nonsmooth.campaign.work import CHUNK, STORED, inputs
+from nonsmooth.errors import shortened
+from nonsmooth.flow.arguments import check_options, check_system, float_array, real_number, whole_number
+from nonsmooth.flow.engines.devices import BATCH, engine_on, on_gpu, workers_of
+from nonsmooth.flow.engines.methods import engine_for
+from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
+from nonsmooth.kernels.hybrid import codes
+from nonsmooth.results.memory import room_for
+from nonsmooth.results.progress import Progress
+from nonsmooth.system.names import by_name
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from nonsmooth.flow.engines.engine import FloatArray, IntArray
+    from nonsmooth.system.system import System
+
+__all__ = ["basins", "by_share", "failed", "settler_of"]
+
+
+@by_name
+def basins(
+    system: System,
+    grid: Mapping[str, Any],
+    *,
+    fixed: Mapping[str, float] | None = None,
+    section: Stroboscopic | Poincare | None = None,
+    transient: int = 500,
+    keep: int = 60,
+    max_period: int | None = None,
+    method: str = "auto",
+    rtol: float | None = None,
+    atol: Any = None,
+    threads: int | None = None,
+    device: str = "cpu",
+    store: Any = None,
+    client: Any = None,
+    any_cpu: bool = False,
+    progress: Progress = True,
+    **expert: Any,
+) -> xr.Dataset:
+    """Attractors and their basins on a plane of starts.
+
+    Parameters
+    ----------
+    system : System
+    grid : mapping
+        Two states and the values from which runs start: ``{"x": (A,), "v": (B,)}``.
+    fixed : mapping, optional
+        Values of the other states at the start; zero where not given.
+    section : Stroboscopic or Poincare, optional
+        ``Stroboscopic(0)`` where the system has a period. With another phase the runs start at that phase,
+        in the mode to which transitions at earlier phases (``at=``) have led.
+    transient, keep : int
+        Section returns passed over, then judged; a run ends earlier where its cycle is certain, and is followed for
+        20 000 returns and more where it has no period.
+    max_period : int, optional
+        Longest period number looked for, less than ``keep``; the smaller of 16 and ``keep`` - 1 where not given.
+    method, rtol, atol
+        See :func:`nonsmooth.flow.engines.methods.engine_for`.
+    threads : int, optional
+        Threads for independent work; the result does not depend on it. Default: one per core.
+    device : {"cpu", "cuda"}
+        ``"cuda"`` runs the starts on an NVIDIA GPU, one per thread, by the exact flow or by
+        ``method="taylor"``: see the guide "A chart on a GPU". What a few single runs decide stays on the processor.
+    store : path, optional
+        A Zarr store for finished chunks; what is there already is not computed again.
+    client : dask.distributed.Client, optional
+        Computes the chunks on its workers.
+    any_cpu : bool
+        Go on with a store that was begun on another type of processor, or of GPU with ``device="cuda"``.
+    progress : bool, or function
+        A bar, on a terminal and in a notebook; nothing elsewhere. A function hears the fraction done, and cancels the
+        work by returning False (:func:`nonsmooth.results.progress.progress`).
+
+    Returns
+    -------
+    xarray.Dataset
+        ``label`` over the two states: the attractor's number, in the order of falling share; -1 not converged, -2
+        diverged; ``status`` says why a start has no label (one beyond a stop, say). Over ``attractor``:
+        ``period_number`` (0: no cycle), ``confirmed`` (1 where Newton's method has found the cycle), ``fraction`` of
+        the starts with its binomial ``fraction_error``, ``lyapunov`` with its error, ``chaotic`` (1 where that is above
+        zero beyond doubt), ``multiplier``, ``maximum``, ``minimum``, a point on the ``section``, and
+        ``minimal_shock``: the least jump of the state, in units of the states' scales,
+        that leads from the section to a start of this plane in another basin or one that diverges.
+        ``section_points`` holds the attractors' points one after the other, with ``point_attractor``.
+        Of the picture: ``entropy``, ``boundary_entropy``, ``boundary_dimension``, ``uncertain`` over ``distance``,
+        and ``n_starts_99``, the number of random starts that meet every one of these attractors with 99 %.
+
+    Raises
+    ------
+    ValueError, TypeError
+        Arguments that do not fit. A run that fails keeps the label -1 or -2.
+    ImportError, RuntimeError
+        ``device="cuda"`` without the package numba-cuda, or without a GPU.
+
+    Notes
+    -----
+    A cycle counts with a certificate only (``kernels.judging.judge``), and Newton's method on the section's
+    map then gives its points and multipliers to rounding. Motion without a period counts only where a run of 20 000
+    returns neither settles nor leaves the places it has visited, and where runs that begin beside it come back
+    (:mod:`nonsmooth.attractors.basins_candidate`); so motion without damping, and a slow transient, keep the label -1.
+    A start exactly on a boundary, as at a saddle, is pushed off it to one side. Cycles whose multipliers are nearer
+    than 0.002 to the unit circle are not certified; their starts keep -1 with the status ``slow``.
+
+    ``lyapunov`` of a cycle is minus infinity where its multipliers are zero, NaN where they are not zero but lost in
+    rounding (below 1e-8). Where a Poincare section is used, ``lyapunov`` and ``multiplier`` are those of its map: the
+    exponent 0 along the flow is not among them.
+    """
+    check_system(system, "basins")
+    check_options(system, expert, basins)
+    values = _plane(system, grid)
+    rest = _fixed(system, values, fixed)
+    section, settler = settler_of(
+        system, section, transient, keep, max_period, method, rtol, atol, expert, threads=threads, device=device
+    )
+    gpu, threads = device == "cuda", workers_of(device, threads, client)
+    names = list(system.states)
+    (x_name, x), (y_name, y) = values.items()
+    room_for(16.0 * len(names) * len(x) * len(y), f"a plane of {len(x)} x {len(y)} starts", "take fewer")
+    starts = np.tile(rest, (len(x) * len(y), 1))
+    starts[:, names.index(x_name)] = np.repeat(x, len(y))
+    starts[:, names.index(y_name)] = np.tile(y, len(x))
+    options = {
+        "grid": values, "fixed": None if fixed is None else dict(fixed), "section": section,
+        "transient": transient, "keep": keep, "max_period": max_period, "method": method, "rtol": rtol, "atol": atol,
+        **({"device": device} if gpu else {}), **expert,
+    }  # fmt: skip
+    point = system.parameter_vector()[None, :]
+    chunk = BATCH if gpu else CHUNK if store is None and client is None else STORED
+    work = StartsWork(settler, point, starts, chunk, inputs(system, "basins", options))
+    columns = run(
+        work, threads=threads, progress=progress, label=f"basins over {x_name} and {y_name}", store=store,
+        client=client, any_cpu=any_cpu,
+    )  # fmt: skip
+    runs = settled_from(columns)
+    warn_if_small(system, starts, runs.maximum, runs.minimum)
+    found, labels, status = find_attractors(settler, point, runs, Patience())
+    found, labels = by_share(found, labels)
+    label = labels.reshape(len(x), len(y))
+    from nonsmooth.results.global_schema import basins as build
+    from nonsmooth.results.labels import labels_of
+    from nonsmooth.results.provenance import provenance
+
+    fraction, error = share_errors([np.sum(labels == k) for k in range(len(found))], labels.size)
+    scale, at = system.scale_vector(), [names.index(x_name), names.index(y_name)]
+    others = [k for k in range(len(names)) if k not in at]
+    shocks = [
+        minimal_shock(
+            label, x / scale[at[0]], y / scale[at[1]], item.points[:, at] / scale[at], k,
+            np.linalg.norm((item.points - rest)[:, others] / scale[others], axis=1),
+        )
+        for k, item in enumerate(found)
+    ]  # fmt: skip
+    entropy, boundary = basin_entropy(label)
+    steps, parts = uncertain_part(label)
+    named = labels_of(system)
+    return build(
+        named, provenance(named, "basins", options, method=settler.engine.name), values, label, found,
+        status=status.reshape(label.shape),
+        fixed={name: rest[names.index(name)] for name in names if name not in values},
+        per_attractor={"fraction": fraction, "fraction_error": error, "minimal_shock": np.array(shocks)},
+        measures={
+            "entropy": entropy, "boundary_entropy": boundary, "boundary_dimension": boundary_dimension(label),
+            "n_starts_99": starts_needed(fraction),
+        },
+        uncertain=(steps, parts),
+    )  # fmt: skip
+
+
+def settler_of(
+    system: System, section: Any, transient: Any, keep: Any, max_period: Any, method: str, rtol: Any, atol: Any,
+    expert: Mapping[str, Any], *, threads: Any = None, device: str = "cpu", verb: str = "basins",
+) -> tuple[Any, Settler]:  # fmt: skip
+    """Check the options that basins share, and the settler they describe."""
+    transient, keep = whole_number(transient, "transient", 0), whole_number(keep, "keep", 2)
+    max_period = longest_period(keep, max_period)
+    if threads is not None:
+        whole_number(threads, "threads", 1)
+    section, plan = section_plan(system, section)
+    if isinstance(section, Poincare) and system.period() is not None:
+        raise ValueError(
+            f"{system.name!r} is forced: its fate depends on the phase at which a run starts, so its section must be "
+            "one too: section=ns.Stroboscopic(phase)"
+        )
+    if plan.every > 1:
+        raise ValueError(
+            f"section with every = {plan.every}: the returns that are passed over make several attractors of one "
+            "cycle, by the one at which a run begins; leave `every` out"
+        )
+    engine = engine_on(device, engine_for(system, method, rtol, atol, **expert), plan)
+    on_gpu(device, verb, engine, plan)
+    settler = Settler(
+        system, engine, plan, transient, keep, max_period, rtol=rtol, atol=atol, expert=expert, device=device
+    )  # fmt: skip
+    return section, settler
+
+
+def failed(status: Any) -> Any:
+    """Which runs could not be followed to an end, other than by diverging."""
+    return ~usable(status) & (np.asarray(status) != codes.DIVERGED)
+
+
+def by_share(found: list[Attractor], labels: IntArray) -> tuple[list[Attractor], IntArray]:
+    """The same with the most common attractor first; those that no run ended on are left out."""
+    count = np.array([np.sum(labels == k) for k in range(len(found))], dtype=np.int64)
+    order = [int(k) for k in np.argsort(-count, kind="stable") if count[k]]
+    new = np.full(len(found) + 2, -1, dtype=np.int64)
+    new[order] = np.arange(len(order))
+    new[-1], new[-2] = -1, -2
+    return [found[k] for k in order], new[labels]
+
+
+def _plane(system: System, grid: Any) -> dict[str, FloatArray]:
+    from nonsmooth.system.names import unknown
+
+    names = dict(system.states)
+    if not isinstance(grid, Mapping) or len(grid) != 2:
+        given = list(grid) if isinstance(grid, Mapping) else grid
+        raise ValueError(f"grid must name two of the states {list(names)} with their values; given: {shortened(given)}")
+    values = {}
+    for name, numbers in grid.items():
+        if name not in names:
+            raise ValueError(unknown(name, "a state", repr(system.name), names))
+        axis = float_array(numbers, f"values of {name!r}")
+        if axis.ndim != 1 or not len(axis) or not np.isfinite(axis).all() or (np.diff(axis) <= 0).any():
+            raise ValueError(f"values of {name!r} must be a rising list of finite numbers")
+        values[str(name)] = axis
+    return values
+
+
+def _fixed(system: System, values: Mapping[str, Any], fixed: Any) -> FloatArray:
+    from nonsmooth.system.names import unknown
+
+    names = list(system.states)
+    rest = np.zeros(len(names))
+    if not isinstance(fixed, Mapping | None):
+        raise TypeError(f"fixed = {shortened(fixed)}: name the states that are not in the grid, fixed={{name: value}}")
+    for name, value in (fixed or {}).items():
+        if name not in names:
+            raise ValueError(unknown(name, "a state", repr(system.name), dict(system.states)))
+        if name in values:
+            raise ValueError(f"state {name!r} is in the grid and in fixed; give it once")
+        rest[names.index(name)] = real_number(value, f"fixed {name!r}")
+    return rest

@@ -1,0 +1,55 @@
+"""What an attractor is here, and how long is waited for one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from nonsmooth.flow.engines.engine import FloatArray, IntArray
+
+__all__ = ["Attractor", "Patience"]
+
+
+@dataclass(frozen=True)
+class Patience:
+    """How long runs without a period are followed, in section returns."""
+
+    candidate: int = 20_000  # for a candidate for a chaotic attractor
+    more: int = 1000  # between two looks at the other runs
+    rounds: int = 10  # of such looks
+    exponent: int = 4000
+    window: int = 60  # points compared with an attractor's
+
+
+@dataclass(frozen=True)
+class Attractor:
+    """One attractor on the section.
+
+    ``period_number`` is 0 where it is no cycle; ``points`` are its section points (a sample of them then) with their
+    ``modes``, and ``end``, ``mode`` a place on it from which a run can go on. ``exponent`` is the largest Lyapunov
+    exponent per unit time, ``multiplier`` the largest multiplier of a cycle (else NaN); ``confirmed`` says that
+    Newton's method has found the cycle.
+    """
+
+    period_number: int
+    points: FloatArray  # (k, n)
+    modes: IntArray  # (k,)
+    end: FloatArray  # (width,)
+    mode: int
+    maximum: FloatArray  # (n,)
+    minimum: FloatArray
+    multiplier: float
+    exponent: float
+    exponent_error: float
+    least: FloatArray  # (n,): a motion smaller than this is one that has come to rest
+    confirmed: bool = False
+    chaotic: bool = False  # its exponent is above zero beyond doubt
+    near: float = 0.0  # of its size: section points nearer than this belong to it
+    tree: Any = field(default=None, repr=False, compare=False)
+
+    @property
+    def size(self) -> FloatArray:
+        """Half the range of each state on it, and no less than the least size."""
+        return np.maximum(0.5 * (self.maximum - self.minimum), self.least)

@@ -1,0 +1,93 @@
+"""What became of many starts: one array per quantity, one row per job."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.flow.engines.engine import FloatArray, IntArray
+from nonsmooth.flow.poincare import result_status
+from nonsmooth.kernels.hybrid import codes
+
+if TYPE_CHECKING:
+    from nonsmooth.kernels.judging.settle import Jobs
+
+__all__ = ["LEAST", "ROUNDED", "Settled", "least_sizes", "usable"]
+
+LEAST = 1e-3  # the least size of a motion, in units of the states' scales
+ROUNDED = 1e-4  # of a state's value: what is smaller cannot be told from rounding where returns are to be nil
+
+USABLE = (codes.OK, codes.SLOW, codes.NOT_PERIODIC, codes.NOT_GUARANTEED)
+
+
+def usable(status: Any) -> NDArray[np.bool_]:
+    """Where a run came to its end, so that its extremes and last point mean something."""
+    return np.isin(status, USABLE)
+
+
+def least_sizes(method: str, scale: FloatArray) -> tuple[FloatArray, float]:
+    """The least size of a motion (n,), and as a part of the states' values, where a method integrates.
+
+    A Runge-Kutta pair does not come to rest: its steps grow until its error, ``rtol`` of the value and the scale, holds
+    them, and a return cannot be smaller. The others settle to rounding."""
+    return (scale, 1.0) if method == "rkf45" else (LEAST * scale, ROUNDED)
+
+
+@dataclass
+class Settled:
+    """What became of J jobs. Extremes and counts are over whole cycles where there is a period, else the kept window.
+
+    ``multiplier`` is the largest modulus over ``period_number`` returns (NaN: unknown); ``returns`` the section
+    returns run.
+    """
+
+    period_number: IntArray  # (J,)
+    status: IntArray
+    residual: FloatArray
+    multiplier: FloatArray
+    crossings: FloatArray
+    contacts: FloatArray
+    maximum: FloatArray  # (J, n)
+    minimum: FloatArray  # (J, n)
+    last: FloatArray  # (J, width): the section point at the end, and what else is needed to go on from there
+    mode: IntArray
+    returns: IntArray
+
+    @classmethod
+    def empty(cls, jobs: int, n: int, width: int | None = None) -> Settled:
+        """Room for so many jobs of n states."""
+
+        def whole() -> IntArray:
+            return np.zeros(jobs, dtype=np.int64)
+
+        def one() -> FloatArray:
+            return np.full(jobs, np.nan)
+
+        def state(size: int = n) -> FloatArray:
+            return np.full((jobs, size), np.nan)
+
+        return cls(
+            whole(), whole(), one(), one(), one(), one(), state(), state(), state(width or n), whole(),
+            whole(),
+        )  # fmt: skip
+
+    @classmethod
+    def joined(cls, parts: Sequence[Settled]) -> Settled:
+        """The jobs of all parts, one after the other."""
+        return cls(*(np.concatenate([getattr(part, item.name) for part in parts]) for item in fields(cls)))
+
+    def judged(self, jobs: Jobs) -> Settled:
+        """The same with what was found out about the jobs; statuses of results in place of the kernel's codes."""
+        for name in ("period_number", "status", "residual", "multiplier"):
+            getattr(self, name)[:] = getattr(jobs, name)
+        self.returns[:] = jobs.spent
+        failed = ~usable(self.status)
+        self.status[failed] = [result_status(code) for code in self.status[failed]]
+        return self
+
+    def __getitem__(self, which: Any) -> Settled:
+        return Settled(*(getattr(self, item.name)[which] for item in fields(self)))

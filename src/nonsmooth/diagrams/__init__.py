@@ -1,0 +1,1 @@
+"""Diagrams over parameters, and measures of a trajectory."""

@@ -1,0 +1,168 @@
+"""The points of a chart as chunks of work."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from nonsmooth.attractors.settled import Settled, usable
+from nonsmooth.attractors.settler import Settler
+from nonsmooth.campaign.work import CHUNK, Column
+from nonsmooth.diagrams.chart_rows import along_rows
+from nonsmooth.flow.engines.engine import FloatArray, IntArray
+from nonsmooth.kernels.hybrid import codes
+
+__all__ = ["ChartWork", "attractors_among"]
+
+SIDE_BY_SIDE = 1 << 21  # places of one chunk of carried rows on a GPU, at most: a gigabyte while it is computed
+SAME = 1e-6  # extremes that agree to this part of the motion's size belong to one attractor
+POINT = 1e-5  # and section points that agree to this part
+
+
+@dataclass(frozen=True)
+class ChartWork:
+    """Points of a plane of two parameters, in rows along the second one (``carried``: runs go along these rows).
+
+    Parameters
+    ----------
+    grid : mapping
+        The two parameters' values, the rows' one last, in the order in which a carried state meets them.
+    where : array of int, optional
+        Flat places in the plane, where not all are wanted.
+    lyapunov : int
+        Returns over which the exponent is measured; 0: not wanted.
+    """
+
+    settler: Settler
+    grid: Mapping[str, FloatArray]
+    starts: FloatArray  # (S, n)
+    carried: bool = False
+    lyapunov: int = 0
+    where: IntArray | None = None
+    chunk: int = CHUNK
+    described: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def _shape(self) -> tuple[int, int]:
+        first, second = (len(values) for values in self.grid.values())
+        return first, second
+
+    @property
+    def _size(self) -> int:
+        first, second = self._shape
+        return first * second if self.where is None else len(self.where)
+
+    @property
+    def _step(self) -> int:
+        row = self._shape[1]
+        least = max(1, self.chunk // len(self.starts))
+        if self.carried:  # whole rows; on a GPU many, side by side
+            return (min(least, max(1, SIDE_BY_SIDE // row)) if self.device == "cuda" else -(-least // row)) * row
+        return least
+
+    @property
+    def device(self) -> str:
+        return self.settler.device
+
+    def columns(self) -> dict[str, Column]:
+        many = () if len(self.starts) == 1 else (len(self.starts),)
+        n = self.starts.shape[1]
+        found = {
+            "period_number": Column("i2", many), "status": Column("i1", many),
+            "crossings_per_period": Column("f8", many), "contacts_per_period": Column("f8", many),
+        }  # fmt: skip
+        if self.settler.extremes:
+            found |= {"maximum": Column("f8", (*many, n)), "minimum": Column("f8", (*many, n))}
+        if self.lyapunov:
+            found |= {"lyapunov": Column("f8", many), "lyapunov_error": Column("f8", many)}
+        if many:
+            found["n_attractors"] = Column("i2")
+        return found
+
+    def n_chunks(self) -> int:
+        return -(-self._size // self._step)
+
+    def bounds(self, chunk: int) -> tuple[int, int]:
+        return chunk * self._step, min((chunk + 1) * self._step, self._size)
+
+    def describe(self) -> dict[str, Any]:
+        return dict(self.described)
+
+    def load(self) -> None:
+        self.settler.load()
+
+    def compute(self, chunk: int) -> dict[str, Any]:
+        """Every run of the places of one chunk."""
+        first, last = self.bounds(chunk)
+        places = np.arange(first, last) if self.where is None else self.where[first:last]
+        row, column = np.divmod(places, self._shape[1])
+        (a, values_a), (b, values_b) = self.grid.items()
+        points = self.settler.system.parameter_points({a: values_a[row], b: values_b[column]})
+        n_places, n_starts = len(places), len(self.starts)
+        if self.carried:
+            found = along_rows(self.settler, points, self._shape[1], self.starts)
+        else:
+            rows = np.repeat(np.arange(n_places), n_starts)
+            found = self.settler.run(points, rows, np.tile(self.starts, (n_places, 1)))
+        arrays = {
+            "period_number": found.period_number, "status": found.status,
+            "crossings_per_period": found.crossings, "contacts_per_period": found.contacts,
+            "maximum": found.maximum, "minimum": found.minimum,
+        }  # fmt: skip
+        if self.lyapunov:
+            good = np.flatnonzero(usable(found.status))
+            exponent, error = np.full(len(found.status), np.nan), np.full(len(found.status), np.nan)
+            rows = np.repeat(np.arange(n_places), n_starts)[good]
+            exponent[good], error[good] = self.settler.exponents(
+                points,
+                rows,
+                found.last[good],
+                found.mode[good],
+                self.lyapunov,
+                found.maximum[good],
+                found.minimum[good],
+            )
+            arrays |= {"lyapunov": exponent, "lyapunov_error": error}
+        kept = {
+            name: arrays[name].reshape(n_places, *item.shape) for name, item in self.columns().items() if name in arrays
+        }
+        if n_starts > 1:
+            kept["n_attractors"] = attractors_among(found, n_places, n_starts, self.settler, points)
+        return kept
+
+
+def attractors_among(found: Settled, n_places: int, n_starts: int, settler: Settler, points: FloatArray) -> IntArray:
+    """Distinct attractors among the starts of each place; what has no period is one.
+
+    Cycles are told apart by period number and extremes, which do not depend on where in the cycle a run ended. Where
+    both agree but the last section points do not, the section points of a whole cycle decide: cycles that differ by a
+    shift in time have equal extremes. What is still settling, or failed, is none.
+    """
+    period = found.period_number.reshape(n_places, n_starts)
+    wandering = found.status.reshape(n_places, n_starts) == codes.NOT_PERIODIC
+    extremes = np.concatenate([found.maximum, found.minimum], axis=1).reshape(n_places, n_starts, -1)
+    least = settler.least_at(found.maximum, found.minimum)
+    size = np.maximum(found.maximum - found.minimum, least).reshape(n_places, n_starts, -1)
+    n = size.shape[2]
+    last, mode = found.last.reshape(n_places, n_starts, -1)[..., :n], found.mode.reshape(n_places, n_starts)
+    count = wandering.any(axis=1).astype(np.int64)
+    every, whole = settler.plan.every, replace(settler, plan=replace(settler.plan, every=1))
+    for k in range(n_starts):
+        new = period[:, k] > 0
+        for j in range(k):
+            near = np.abs(extremes[:, k] - extremes[:, j]) <= SAME * np.tile(size[:, k], 2)
+            alike = new & (period[:, j] == period[:, k]) & near.all(axis=1)
+            apart = np.abs(last[:, k] - last[:, j]) > POINT * size[:, k]
+            apart = apart.any(axis=1) | (mode[:, k] != mode[:, j])
+            for i in np.flatnonzero(alike & apart):
+                run = whole.trace(
+                    points[i : i + 1], found.last[i * n_starts + j], int(mode[i, j]), 0, every * int(period[i, j])
+                )
+                at = (np.abs(run.points - last[i, k]) <= POINT * size[i, k]).all(axis=1) & (run.modes == mode[i, k])
+                alike[i] = at.any() or not len(run.points)
+            new &= ~alike
+        count += new
+    return count

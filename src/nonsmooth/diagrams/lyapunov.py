@@ -1,0 +1,292 @@
+r"""``lyapunov``: how fast neighbouring motions part or come together, with all saltation matrices.
+
+.. math:: \lambda_1 \ge \dots \ge \lambda_n, \qquad
+    \lambda_1 + \dots + \lambda_k = \lim_{t\to\infty} \tfrac1t \log \operatorname{vol}_k(\Phi(t) Q_0)
+
+The sum of all is known independently, :math:`\frac1t(\int \operatorname{div} f\,dt + \sum\log|\det S|)`; the difference
+is reported as ``trace_defect`` and must be rounding. It sees determinants only, not a wrong entry of S.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.diagrams.spectrum import (
+    ALIGN,
+    BATCHES,
+    GOOD,
+    Spectrum,
+    at_rest,
+    batch_ends,
+    evaluated,
+    failed_spectrum,
+    kaplan_yorke,
+    spectrum_along,
+)
+from nonsmooth.diagrams.sweep import DIRECTIONS
+from nonsmooth.flow.arguments import check_options, check_system, real_number, swept_values, whole_number
+from nonsmooth.flow.engines.devices import on_gpu
+from nonsmooth.flow.engines.engine import FloatArray, State
+from nonsmooth.flow.engines.methods import engine_for
+from nonsmooth.flow.failure import solve_error
+from nonsmooth.flow.poincare import result_status
+from nonsmooth.flow.starts import first_state, is_one_start, plain_start
+from nonsmooth.kernels.hybrid import codes
+from nonsmooth.results.progress import Progress
+from nonsmooth.results.progress import progress as progress_bar
+from nonsmooth.results.statuses import EQUILIBRIA
+from nonsmooth.system.names import by_name
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from nonsmooth.system.system import System
+
+__all__ = ["kaplan_yorke", "lyapunov"]
+
+UNITS = 4096  # pieces into which a duration is cut
+
+
+@by_name
+def lyapunov(
+    system: System,
+    *,
+    parameter: str | None = None,
+    values: Any = None,
+    direction: str | None = "up",
+    periods: int | None = None,
+    duration: float | None = None,
+    transient: float | None = None,
+    start: Any = None,
+    mode: str | None = None,
+    method: str = "auto",
+    rtol: float | None = None,
+    atol: Any = None,
+    device: str = "cpu",
+    progress: Progress = True,
+    **expert: Any,
+) -> xr.Dataset:
+    r"""Lyapunov exponents, all of them, at one parameter point or along a sweep.
+
+    Parameters
+    ----------
+    system : System
+    parameter, values : str, array (P,), optional
+        A parameter that is varied, and its values.
+    direction : {"up", "down", None}
+        Carry the state along with rising or falling values (at equal phase of the forcing), or begin every point at
+        ``start``. Where a stop has moved past a carried state, that point begins at ``start`` too.
+    periods, duration : int, float
+        Length in forcing periods (10 000 where neither is given), or in time: needed where there is no period.
+    transient : float, optional
+        Passed over before, in the same unit: 500 periods, or a twentieth of the duration.
+    start, mode
+        First state and mode, as in :func:`nonsmooth.simulate`.
+    method, rtol, atol
+        Of the trajectory; see ``flow.engines.methods.engine_for``. Its derivatives are accurate to rounding where
+        the flow is exact, else to a tenth of ``rtol`` and at least 1e-11 in every step.
+    device : {"cpu", "cuda"}
+        ``"cuda"`` runs a sweep with ``direction=None`` on an NVIDIA GPU, one point per thread, for
+        systems with the planar exact flow: see the guide "A chart on a GPU".
+    progress : bool, or function
+        A bar, on a terminal and in a notebook; nothing elsewhere. A function hears the fraction done, and cancels the
+        work by returning False (:func:`nonsmooth.results.progress.progress`).
+
+    Returns
+    -------
+    xarray.Dataset
+        Over the parameter where one is given: ``exponents(exponent)``, descending, per unit time; ``standard_error``
+        (from 32 batches of equal length); ``running(batch, exponent)``, the estimate after each batch;
+        ``trace_defect``, their sum less what the trace identity demands; ``kaplan_yorke``; ``nearest_graze``, the least
+        \|h'\| / (\|h_u\| \|u'\|) of all crossings; ``equilibrium``, whether the run stayed at one; ``status``.
+
+    Raises
+    ------
+    ValueError, TypeError
+        Arguments that do not fit.
+    SolveError
+        A single run that could not be completed. In a sweep such a point keeps its status.
+    ImportError, RuntimeError
+        ``device="cuda"`` without the package numba-cuda, or without a GPU.
+
+    Notes
+    -----
+    There are as many exponents as states and memory. One is minus infinity where a transition has a saltation matrix
+    without full rank (sticking, a plastic impact, memory that is written anew): such a direction is lost in finite
+    time. One is NaN, and comes last, for memory that is never written or a state of modes that are never visited: it
+    is constant. The phase of the forcing is no state, so a forced limit cycle has negative exponents only; an
+    autonomous motion that does not end in an equilibrium has one exponent zero.
+
+    A run that comes to rest at a stable equilibrium has the real parts of its eigenvalues, and the standard error is no
+    less than the distance from them. A run that begins at an unstable one, as the start of zeros often is, stays there:
+    its exponents are no attractor's. A warning names the equilibrium, ``equilibrium`` and the attribute ``note`` say it
+    in the result, and ``standard_error`` and ``kaplan_yorke`` are NaN. Give ``start=``, a state beside it.
+
+    The Kaplan-Yorke dimension is that of the attractor in the space of the states: for forced systems that of its
+    stroboscopic section. Near an attractor whose leading exponents are equal, or the moduli of complex multipliers,
+    single exponents settle like 1/t, their sum at once.
+
+    Examples
+    --------
+    >>> import nonsmooth as ns
+    >>> chaos = ns.models.discontinuous_support().with_parameters(rho=0.33, g=0.0018, omega=11.15)
+    >>> found = ns.lyapunov(chaos, periods=2000)
+    >>> bool(found.exponents[0] > 0)
+    True
+    """
+    check_system(system, "lyapunov")
+    check_options(system, expert, lyapunov)
+    if (parameter is None) != (values is None):
+        raise ValueError("parameter and values belong together: give both for a sweep, or neither")
+    if not isinstance(direction, str | None) or direction not in DIRECTIONS or direction == "both":
+        raise ValueError(f"direction = {direction!r}; allowed: 'up', 'down', None")
+    if not is_one_start(start):
+        raise ValueError("lyapunov follows one trajectory: give one start")
+    numbers = None if parameter is None else swept_values(system, parameter, values)
+    points = system.parameter_points({} if numbers is None else {str(parameter): numbers})
+    forced = system.period() is not None
+    count, length, wait = _length(system, periods, duration, transient, forced)
+    first_state(system, start, mode)  # refused before anything is compiled
+    engine = engine_for(system, method, rtol, atol, **expert)
+    options = {
+        "parameter": parameter, "values": values, "direction": direction, "periods": periods, "duration": duration,
+        "transient": transient, "start": plain_start(system, start), "mode": mode, "method": method, "rtol": rtol,
+        "atol": atol, **({"device": device} if device != "cpu" else {}), **expert,
+    }  # fmt: skip
+    if on_gpu(device, "lyapunov", engine, None, carried=numbers is not None and direction is not None):
+        if numbers is None or not forced or duration is not None:
+            raise ValueError(
+                'lyapunov with device="cuda" takes a sweep (parameter, values, direction=None) counted in forcing '
+                'periods: a single trajectory is one thread, which a processor runs faster; use device="cpu"'
+            )
+        with progress_bar(len(points), "lyapunov", progress) as advance:
+            first = first_state(system, start, mode)
+            done = _on_gpu(system, engine, points, first.copy(), count, int(wait), advance)
+            done = [at_rest(one, system, at, first, first) for one, at in zip(done, points, strict=True)]
+        return _dataset(system, engine.name, options, parameter, numbers, done)
+    tables = engine.prepare(points)
+    order = np.arange(len(points)) if numbers is None else np.argsort(numbers, kind="stable")
+    if direction == "down":
+        order = order[::-1]
+    found: list[Spectrum | None] = [None] * len(points)
+    state: State | None = None
+    with progress_bar(len(points), "lyapunov", progress if numbers is not None else False) as advance:
+        for i in order:
+            carried = state is not None and direction is not None
+            if state is None or direction is None:
+                state = first_state(system, start, mode)
+            kept = state.copy()
+            here = system.period_at(points[i]) if forced else None
+            unit = length if here is None or duration is not None else here
+            one = spectrum_along(system, engine, tables, int(i), points[i], state, here, unit, count, wait)
+            if carried and one.status == codes.BEYOND_STOP:  # a stop has moved past it: as in a sweep, begin anew
+                state = first_state(system, start, mode)
+                kept = state.copy()
+                one = spectrum_along(system, engine, tables, int(i), points[i], state, here, unit, count, wait)
+            found[i] = one
+            if one.status not in GOOD:
+                state = kept if i != order[0] else None
+            advance(1)
+    done = [one for one in found if one is not None]
+    if numbers is None and done[0].status not in GOOD:
+        raise solve_error(done[0].status)
+    return _dataset(system, engine.name, options, parameter, numbers, done)
+
+
+def _length(system: System, periods: Any, duration: Any, transient: Any, forced: bool) -> tuple[int, float, int]:
+    """(units of time, the length of one where it is not the period, units of the transient)."""
+    if periods is not None and duration is not None:
+        raise ValueError("give the length of the run once: periods=... or duration=...")
+    if periods is not None and not forced:
+        raise ValueError(f"{system.name!r} has no forcing period: give duration=... in place of periods")
+    if duration is None:
+        if not forced:
+            raise ValueError(f"{system.name!r} has no forcing period: give the length of the run, duration=...")
+        count = whole_number(10_000 if periods is None else periods, "periods", 1)
+        return count, 0.0, whole_number(500 if transient is None else transient, "transient", 0)
+    time = real_number(duration, "duration")
+    if time <= 0:
+        raise ValueError(f"duration = {duration!r}: the length of a run must be positive")
+    before = 0.05 * time if transient is None else real_number(transient, "transient")
+    if before < 0:
+        raise ValueError(f"transient = {transient!r} must be zero or more")
+    return UNITS, time / UNITS, int(np.ceil(before / (time / UNITS)))
+
+
+def _on_gpu(
+    system: System, engine: Any, points: FloatArray, state: State, count: int, wait: int, advance: Any
+) -> list[Spectrum]:
+    """Every point from one start, on the GPU."""
+    from nonsmooth.diagrams.lyapunov_cuda import growth_on_gpu
+
+    edges = batch_ends(count) if count >= BATCHES else np.array([0, count], dtype=np.int64)
+    growth, sums, status = growth_on_gpu(
+        engine, points, state.u, int(state.counters[0]), system.scale_vector(), min(ALIGN, wait), wait, edges, advance
+    )
+    found = []
+    for i, logs in enumerate(growth):
+        unit = float(system.period_at(points[i]) or np.nan)
+        if status[i] not in GOOD:
+            found.append(failed_spectrum(2, count * unit, int(status[i])))
+            continue
+        total, demanded = float(logs.sum()), float(sums[i, 0] + sums[i, 1])
+        defect = 0.0 if total == demanded else total - demanded
+        found.append(evaluated(
+            2, logs.sum(axis=0) / (count * unit), logs if count >= BATCHES else None, count, unit, defect,
+            float(sums[i, 3]), int(status[i]), True,
+        ))  # fmt: skip
+    return found
+
+
+def _dataset(
+    system: System, method: str, options: Mapping[str, Any], parameter: str | None, numbers: FloatArray | None,
+    found: list[Spectrum],
+) -> xr.Dataset:  # fmt: skip
+    from nonsmooth.results.labels import labels_of
+    from nonsmooth.results.provenance import provenance
+    from nonsmooth.results.variations import spectrum
+
+    labels = labels_of(system)
+    attrs = provenance(labels, "lyapunov", options, method=method)
+    if note := _note(system, parameter, numbers, found):
+        attrs = {**attrs, "note": note}
+    return spectrum(
+        labels, attrs, parameter, numbers,
+        equilibrium=[EQUILIBRIA.index(one.rest.kind) if one.rest else 0 for one in found],
+        exponents=[one.exponents for one in found], standard_error=[one.error for one in found],
+        running=[one.running for one in found], trace_defect=[one.defect for one in found],
+        kaplan_yorke=[one.dimension for one in found], nearest_graze=[one.nearest for one in found],
+        elapsed=[one.elapsed for one in found], status=[result_status(one.status) for one in found],
+    )  # fmt: skip
+
+
+def _note(system: System, parameter: str | None, numbers: FloatArray | None, found: list[Spectrum]) -> str:
+    """The equilibria at which runs stayed, in sentences; unstable ones in a warning too."""
+    told = []
+    for kind in EQUILIBRIA[1:]:
+        which = [i for i, one in enumerate(found) if one.rest is not None and one.rest.kind == kind]
+        if not which:
+            continue
+        rest = found[which[0]].rest
+        assert rest is not None
+        where = ""
+        if numbers is not None:
+            values = [f"{numbers[i]:.6g}" for i in which]
+            where = f", at {len(which)} of {len(found)} values of {parameter!r}, {values[0]} the first"
+        text = f"{rest.words(list(system.states))}{where}: "
+        if kind == "unstable":
+            text += (
+                "the run began there, and nothing but rounding errors leads away. These are the exponents of this "
+                "equilibrium, not of an attractor; give start=, a state beside it"
+            ) + (", and direction=None" if numbers is not None else "")
+            warnings.warn(f"lyapunov of {system.name!r}: {text}", stacklevel=4)
+        else:
+            text += "the motion rests there" + (
+                ", and the exponents are the real parts of its eigenvalues" if kind == "stable" else ""
+            )
+        told.append(text)
+    return "; ".join(told)

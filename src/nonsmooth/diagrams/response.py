@@ -1,0 +1,112 @@
+"""``frequency_response``: amplitude over a parameter, up and down, with its jumps as numbers."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.diagrams.sweep import sweep
+from nonsmooth.flow.arguments import check_system
+from nonsmooth.flow.engines.engine import FloatArray
+from nonsmooth.results.progress import Progress
+from nonsmooth.system.names import by_name
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from nonsmooth.system.system import System
+
+__all__ = ["frequency_response", "jumps_in"]
+
+STEEPER = 5.0  # a jump's step in amplitude exceeds both neighbouring steps by this factor
+LEAST = 5e-3  # and this fraction of the amplitude
+
+
+@by_name
+def frequency_response(
+    system: System,
+    values: Any,
+    *,
+    parameter: str = "omega",
+    direction: str | None = "both",
+    progress: Progress = True,
+    **options: Any,
+) -> xr.Dataset:
+    r"""Amplitude over the forcing frequency (or another parameter), carried along up and down.
+
+    The amplitude of a state is half its true range, :math:`a = (\max x - \min x) / 2`, over the kept returns.
+
+    Parameters
+    ----------
+    system : System
+    values : array (P,)
+        Values of the parameter.
+    parameter : str
+        ``"omega"`` where not given.
+    direction : {"up", "down", "both", None}
+        See :func:`nonsmooth.sweep`.
+    progress : bool, or function
+        A bar, on a terminal and in a notebook; nothing elsewhere. A function hears the fraction done, and cancels the
+        work by returning False (:func:`nonsmooth.results.progress.progress`).
+    **options
+        All other options of :func:`nonsmooth.sweep`.
+
+    Returns
+    -------
+    xarray.Dataset
+        The sweep with ``amplitude`` and, over ``jump``: ``jump_value`` (the middle of the step in which the first
+        state's amplitude jumps), ``jump_step`` (its width, the uncertainty), ``jump_direction``, ``jump_start``,
+        ``jump_before`` and ``jump_after`` (amplitudes in the order of the sweep).
+
+    Notes
+    -----
+    A jump is a step between neighbouring values in which the amplitude changes by more than 0.5 % and more than five
+    times as much as in the steps before and after it.
+    """
+    from nonsmooth.results.provenance import attribute, read_provenance, with_short_record
+    from nonsmooth.results.schema import response
+
+    check_system(system, "frequency_response")
+    if parameter not in system.parameters:
+        from nonsmooth.system.names import unknown
+
+        known = {name: item.unit for name, item in system.parameters.items()}
+        raise ValueError(unknown(parameter, "a parameter", repr(system.name), known) + "; choose one with parameter=")
+    swept = sweep(system, parameter, values, direction=direction, progress=progress, **options)
+    full = [("direction", 1), ("start", 1), (parameter, swept.sizes[parameter]), ("state", swept.sizes["state"])]
+    half = 0.5 * (swept["maximum"] - swept["minimum"])
+    expanded = half.expand_dims([dim for dim, _ in full if dim not in half.dims]).transpose(*[dim for dim, _ in full])
+    amplitude = expanded.values
+    names = np.atleast_1d(swept["direction"].values).astype(str)
+    x = np.asarray(swept[parameter].values, dtype=float)
+    found: list[tuple[Any, ...]] = []
+    for d, name in enumerate(names):
+        for k in range(amplitude.shape[1]):
+            order = np.argsort(-x if name == "down" else x, kind="stable")
+            for i in jumps_in(amplitude[d, k, order, 0]):
+                a, b = order[i], order[i + 1]
+                before, after = amplitude[d, k, a, 0], amplitude[d, k, b, 0]
+                found.append((0.5 * (x[a] + x[b]), abs(x[b] - x[a]), name, k, before, after))
+    columns = list(zip(*found, strict=True)) if found else [()] * 6
+    keys = ("value", "step", "direction", "start", "before", "after")
+    kinds = (float, float, str, int, float, float)
+    jumps: dict[str, np.ndarray] = {
+        key: np.array(column, dtype=kind) for key, column, kind in zip(keys, columns, kinds, strict=True)
+    }
+    result = response(swept, amplitude=amplitude, jumps=jumps)
+    record = read_provenance(swept) | {"verb": "frequency_response"}
+    return with_short_record(result.assign_attrs(attribute(record)))
+
+
+def jumps_in(amplitude: FloatArray) -> list[int]:
+    """Indices i where the amplitude (P,) jumps from point i to point i + 1."""
+    change = np.abs(np.diff(amplitude))
+    n = len(change)
+    found = []
+    for i in range(n):
+        beside = [change[j] for j in (i - 1, i + 1) if 0 <= j < n]
+        enough = change[i] > LEAST * max(abs(amplitude[i]), abs(amplitude[i + 1]))
+        if enough and beside and change[i] > STEEPER * max(beside):
+            found.append(i)
+    return found

@@ -1,0 +1,257 @@
+"""``sweep``: brute force over a parameter, as a rig would do it; its picture is the bifurcation diagram."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.attractors.settle import Attractors, longest_period, tolerance_of, warn_if_small
+from nonsmooth.diagrams.density import bin_edges, coarse_values, given_ranges
+from nonsmooth.diagrams.sweep_pieces import Report, Slot, ended, largest_of, pieces_of, run_on_gpu, run_pieces
+from nonsmooth.flow.arguments import check_options, check_system, swept_values, whole_number
+from nonsmooth.flow.engines.devices import engine_on, on_gpu, workers_of
+from nonsmooth.flow.engines.engine import FloatArray, State
+from nonsmooth.flow.engines.methods import engine_for, warn_if_coarse
+from nonsmooth.flow.equilibria import refuse_resting
+from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
+from nonsmooth.flow.starts import is_one_start, plain_start, start_states
+from nonsmooth.results.memory import room_for
+from nonsmooth.results.progress import Progress
+from nonsmooth.system.names import by_name
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from nonsmooth.system.system import System
+
+__all__ = ["DIRECTIONS", "sweep"]
+
+DIRECTIONS: dict[str | None, tuple[str, ...]] = {
+    "up": ("up",), "down": ("down",), "both": ("up", "down"), None: ("none",),
+}  # fmt: skip
+
+
+@by_name
+def sweep(
+    system: System,
+    parameter: str,
+    values: Any,
+    *,
+    direction: str | None = "up",
+    start: Any = None,
+    section: Stroboscopic | Poincare | None = None,
+    transient: int = 500,
+    keep: int = 100,
+    max_period: int | None = None,
+    density: bool | Mapping[str, Any] = False,
+    bins: int = 400,
+    method: str = "auto",
+    rtol: float | None = None,
+    atol: Any = None,
+    threads: int | None = None,
+    device: str = "cpu",
+    progress: Progress = True,
+    **expert: Any,
+) -> xr.Dataset:
+    """Long-time behaviour over a parameter: section points, extremes, period numbers.
+
+    Parameters
+    ----------
+    system : System
+    parameter : str
+        The parameter that is varied.
+    values : array (P,)
+        Its values, in any order; the result keeps it.
+    direction : {"up", "down", "both", None}
+        Carry the state along with rising or falling values (at equal phase of the forcing), both, or begin every point
+        at ``start``.
+    start : state or list of states, optional
+        First state; zeros where not given. Several starts show attractors that coexist.
+    section : Stroboscopic or Poincare, optional
+        ``Stroboscopic(0)`` where the system has a period.
+    transient, keep : int
+        Section returns passed over, then recorded, at each value. A point that is still settling gets up to eight
+        transients; what is not settled then has the status ``slow``.
+    max_period : int, optional
+        Longest period number looked for, less than ``keep``; the smaller of 16 and ``keep`` - 1 where not given.
+    density : bool or mapping
+        Store a histogram of each state's section points instead of the points. A mapping gives ranges,
+        ``{"x": (lowest, highest)}``; where none is given it is that of a coarse sweep and a twentieth more either side.
+    bins : int
+        Bins of these histograms.
+    method, rtol, atol
+        See :func:`nonsmooth.flow.engines.methods.engine_for`.
+    threads : int, optional
+        Threads for independent work; the result does not depend on it. Default: one per core.
+    device : {"cpu", "cuda"}
+        ``"cuda"`` runs the points on an NVIDIA GPU, one per thread, with ``direction=None`` and without
+        ``density``: by the exact flow or by ``method="taylor"``. See the guide "A chart on a GPU".
+    progress : bool, or function
+        A bar, on a terminal and in a notebook; nothing elsewhere. A function hears the fraction done, and cancels the
+        work by returning False (:func:`nonsmooth.results.progress.progress`).
+
+    Returns
+    -------
+    xarray.Dataset
+        Over the parameter (and ``direction``, ``start``): ``section(..., iterate, state)``, true extremes ``maximum``,
+        ``minimum``, ``period_number`` (0: none found), ``residual``, ``crossings_per_period``,
+        ``contacts_per_period``, ``clearance``, extremes of the outputs, ``status``. With ``density``, in place of
+        ``section``: ``density(..., state, bin)`` (section points in each bin), ``outside(..., state)`` (those beyond
+        the range) and ``bin_edge(state, edge)``.
+
+    Raises
+    ------
+    ValueError, TypeError
+        Arguments that do not fit, and starts at an equilibrium of a system without forcing. A point that fails keeps
+        its status; the others are whole.
+    ImportError, RuntimeError
+        ``device="cuda"`` without the package numba-cuda, or without a GPU.
+
+    Notes
+    -----
+    With ``density`` memory does not depend on ``keep``: points are counted as soon as they have been judged.
+    A period number p is granted only where the p-th return is below 1e-9 of the motion's size and contracts:
+    see :mod:`nonsmooth.kernels.judging.judge`.
+    """
+    check_system(system, "sweep")
+    check_options(system, expert, sweep)
+    numbers = swept_values(system, parameter, values)
+    directions = _directions(direction)
+    transient, keep = whole_number(transient, "transient", 0), whole_number(keep, "keep", 2)
+    max_period = longest_period(keep, max_period)
+    if threads is not None:
+        threads = whole_number(threads, "threads", 1)
+    section, plan = section_plan(system, section)
+    engine = engine_on(device, engine_for(system, method, rtol, atol, **expert), plan)
+    gpu = on_gpu(device, "sweep", engine, plan, carried=direction is not None)
+    if gpu and density is not False:
+        raise ValueError('section points are counted on the processor: leave out density, or device="cuda"')
+    threads = workers_of(device, threads)
+    starts = start_states(system, start)
+    points = system.parameter_points({parameter: numbers})
+    if plan.indicator >= 0:
+        refuse_resting(system, starts, points, "sweep")
+    traced = system.traced
+    sizes = len(traced.u), len(traced.indicators), len(traced.outputs)
+    ranges, n_bins = ({}, 0) if density is False else given_ranges(system, density, bins)
+    width = keep * (len(traced.u) + 2) if density is False else len(traced.u) * (n_bins + 1) / 2
+    room_for(
+        16.0 * width * len(points) * len(directions) * len(starts), f"a sweep over {len(points)} values",
+        "take fewer values, starts or bins, keep fewer returns, or count them with density=True",
+    )  # fmt: skip
+    edges = None
+    if density is not False:
+        coarse = None
+        if len(ranges) < len(system.states):
+            few = min(keep, 1000)
+            coarse = sweep(
+                system, parameter, coarse_values(numbers), direction=direction, start=start, section=section,
+                transient=transient, keep=few, max_period=min(max_period, few - 1), method=method, rtol=rtol,
+                atol=atol, threads=threads, progress=False, **expert,
+            )["section"].transpose(..., "state").values  # fmt: skip
+        edges = bin_edges(system, ranges, n_bins, coarse)
+    attractors = Attractors(
+        engine, engine.prepare(points), plan, transient, keep, max_period, tolerance_of(engine, rtol),
+        system.scale_vector(),
+    )  # fmt: skip
+    slots = {(d, k): Slot(attractors, points, sizes, edges) for d in range(len(directions)) for k in range(len(starts))}
+    options = {
+        "parameter": parameter, "values": values, "direction": direction, "start": plain_start(system, start),
+        "section": section, "transient": transient, "keep": keep, "max_period": max_period,
+        **({} if density is False else {"density": density, "bins": bins}),
+        "method": method, "rtol": rtol, "atol": atol, **({"device": device} if gpu else {}), **expert,
+    }  # fmt: skip
+    squeeze = (() if direction == "both" else ("direction",)) + (("start",) if is_one_start(start) else ())
+    memory = system.memory_vector()
+
+    def march(slot: tuple[int, int], order: Sequence[int], report: Report) -> None:
+        d, k = slot
+        state: State | None = None
+        for i, row, judge, chain in slots[slot].places(order):
+            if report.stop.is_set():
+                return
+            if state is None or directions[d] == "none":
+                state = State(starts[k].copy(), memory.copy())
+            verdict = judge.settle(row, state, chain, lambda: State(starts[k].copy(), memory.copy()))
+            slots[slot].keep(i, row, verdict, chain)
+            report.advance(1)
+
+    if gpu:
+        run_on_gpu(points, starts, memory, attractors, slots, progress, parameter)
+    else:
+        run_pieces(march, pieces_of(directions, len(starts), numbers), threads, progress, parameter)
+    largest = largest_of(starts, slots.values())
+    warn_if_coarse(system, engine, largest)
+    warn_if_small(system, largest)
+    return _dataset(system, engine.name, parameter, numbers, directions, starts, slots, options, squeeze)
+
+
+def _directions(direction: Any) -> tuple[str, ...]:
+    if not isinstance(direction, str | None) or direction not in DIRECTIONS:
+        raise ValueError(f"direction = {direction!r}; allowed: {', '.join(map(repr, DIRECTIONS))}")
+    return DIRECTIONS[direction]
+
+
+def _dataset(
+    system: System,
+    method: str,
+    parameter: str,
+    numbers: FloatArray,
+    directions: Sequence[str],
+    starts: FloatArray,
+    slots: Mapping[tuple[int, int], Slot],
+    options: Mapping[str, Any],
+    squeeze: Iterable[str],
+) -> xr.Dataset:
+    from nonsmooth.results.labels import labels_of
+    from nonsmooth.results.provenance import provenance
+    from nonsmooth.results.schema import sweep as build
+
+    def gather(read: Callable[[Slot], Any]) -> np.ndarray:
+        return np.stack([np.stack([read(slots[d, k]) for k in range(len(starts))]) for d in range(len(directions))])
+
+    failed = gather(lambda slot: ~ended(slot))
+    sides = armed_signs(system)
+
+    def whole(values: np.ndarray) -> np.ndarray:
+        """NaN where the point failed: the kernel's buffers hold what it had by then."""
+        return np.where(failed.reshape(failed.shape + (1,) * (values.ndim - 3)), np.nan, values)
+
+    returns = gather(lambda slot: np.full(len(numbers), slot.attractors.keep, dtype=float))
+    arrays = {
+        "section": whole(gather(lambda s: s.chain.section)),
+        "maximum": whole(gather(lambda s: s.chain.maximum)),
+        "minimum": whole(gather(lambda s: s.chain.minimum)),
+        "period_number": gather(lambda s: s.period_number),
+        "residual": gather(lambda s: s.residual),
+        "crossings_per_period": whole(gather(lambda s: s.chain.crossings) / returns),
+        "contacts_per_period": whole(gather(lambda s: s.chain.contacts) / returns),
+        "clearance": whole(gather(lambda s: np.where(sides > 0, -s.chain.indicator_max, s.chain.indicator_min))),
+        "output_maximum": whole(gather(lambda s: s.chain.output_max)),
+        "output_minimum": whole(gather(lambda s: s.chain.output_min)),
+        "status": gather(lambda s: s.status),
+    }
+    if not system.outputs or arrays["output_maximum"].shape[-1] != len(system.outputs):
+        del arrays["output_maximum"], arrays["output_minimum"]
+    counted = next(iter(slots.values())).counted
+    if counted is not None:
+        del arrays["section"]
+        arrays["density"] = gather(lambda s: s.counter.counts)
+        arrays["outside"] = gather(lambda s: s.counter.outside)
+    labels = labels_of(system)
+    return build(
+        labels, provenance(labels, "sweep", options, method=method), parameter, numbers, arrays,
+        directions=directions, starts=starts, squeeze=tuple(squeeze),
+        edges=None if counted is None else counted.counter.edges,
+    )  # fmt: skip
+
+
+def armed_signs(system: System) -> np.ndarray:
+    """+1 or -1 for each indicator: the sign with which it first stands in a transition (+1 where in none)."""
+    signs = np.ones(len(system.indicators), dtype=np.int64)
+    for jump in reversed(system.transitions):
+        for row in reversed(jump.rows):
+            signs[row.indicator] = row.sign
+    return signs

@@ -1,0 +1,1 @@
+"""Steppers bound to systems, one engine for each."""

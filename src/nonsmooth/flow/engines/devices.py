@@ -1,0 +1,156 @@
+"""Where work runs: ``device="cpu"`` or ``device="cuda"``, and what a GPU takes."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+from typing import Any
+
+from nonsmooth.errors import not_installed
+from nonsmooth.flow.engines.engine import Engine, SectionPlan
+from nonsmooth.flow.engines.linear import LinearEngine, PlanarEngine
+from nonsmooth.flow.engines.series import SeriesEngine
+
+__all__ = ["BATCH", "DEVICES", "batch_size", "check_device", "engine_on", "gpu_name", "on_gpu", "workers_of"]
+
+DEVICES = ("cpu", "cuda")
+BATCH = 65536  # trajectories of one chunk of work on a GPU
+SERIES = ("taylor", "exact")  # methods of the series kernels that a GPU runs
+PER_MULTIPROCESSOR = 512  # of one launch: twice what its registers hold, so that a small GPU is not busy for long
+
+
+def batch_size() -> int:
+    """Trajectories of one launch on the present GPU; results do not depend on it."""
+    from numba import cuda
+
+    if _simulated():
+        return BATCH
+    return min(BATCH, PER_MULTIPROCESSOR * int(cuda.get_current_device().MULTIPROCESSOR_COUNT))
+
+
+def gpu_name() -> str:
+    """What the present GPU calls itself."""
+    from numba import cuda
+
+    if _simulated():
+        return "Numba's CUDA simulator"
+    name = cuda.get_current_device().name
+    return name.decode() if isinstance(name, bytes) else str(name)
+
+
+def _simulated() -> bool:
+    return os.environ.get("NUMBA_ENABLE_CUDASIM", "0") not in ("", "0")
+
+
+def check_device(device: Any) -> str:
+    """``device`` where it is one.
+
+    Raises
+    ------
+    ValueError
+        No device of this package.
+    """
+    if not isinstance(device, str) or device not in DEVICES:
+        raise ValueError(f"device = {device!r} does not exist; allowed: {', '.join(map(repr, DEVICES))}")
+    return device
+
+
+def workers_of(device: str, threads: int | None, client: Any = None) -> int | None:
+    """Threads for chunks of work: one where a GPU runs them.
+
+    Raises
+    ------
+    ValueError
+        Threads or a cluster together with a GPU.
+    """
+    if device == "cpu":
+        return threads
+    if client is not None:
+        raise ValueError('device="cuda" uses the GPU of this machine: leave client out, or use device="cpu"')
+    if threads is not None:
+        raise ValueError('threads are those of device="cpu": leave threads out with device="cuda"')
+    return 1
+
+
+def engine_on(device: Any, engine: Engine, plan: SectionPlan | None) -> Engine:
+    """The engine for a device.
+
+    The planar kernels of a GPU know two states and stroboscopic sections only: else the same flow goes there by the
+    series kernels."""
+    if device != "cuda" or not isinstance(engine, LinearEngine):
+        return engine
+    if isinstance(engine, PlanarEngine) and (plan is None or plan.indicator < 0):
+        return engine
+    from nonsmooth.flow.engines.methods import RTOL
+
+    return SeriesEngine(engine.traced, engine.scale, "exact", RTOL, None)
+
+
+def on_gpu(device: Any, verb: str, engine: Engine, plan: SectionPlan | None, *, carried: bool = False) -> bool:
+    """Whether the work of a verb goes to the GPU; every reason why it cannot is raised before anything is compiled.
+
+    Parameters
+    ----------
+    engine : Engine
+        The method resolved for the system.
+    plan : SectionPlan, optional
+        The section, where the verb has one.
+    carried : bool
+        Whether a state is to be carried from one parameter value to the next.
+
+    Raises
+    ------
+    ValueError
+        A device that does not exist; a system, method or section without a path to a GPU; passed-over returns; a
+        carried state.
+    ImportError
+        The package numba-cuda is not installed.
+    RuntimeError
+        No NVIDIA driver, or no GPU.
+    """
+    if check_device(device) == "cpu":
+        return False
+    planar = isinstance(engine, PlanarEngine)
+    if not planar and verb == "lyapunov":
+        raise ValueError(
+            'lyapunov with device="cuda" takes systems of two states whose modes are linear with harmonic forcing, '
+            f'whose indicators and resets are affine, by their exact flow; this one runs by method="{engine.name}": '
+            'use device="cpu", or chart with lyapunov'
+        )
+    if not planar and not (isinstance(engine, SeriesEngine) and engine.name in SERIES and engine.locate):
+        raise ValueError(
+            f'{verb} with device="cuda" runs by method="exact" or method="taylor" with crossings located; this call '
+            f'asks for method="{engine.name}"{"" if engine.name not in SERIES else ", locate=False"}: choose one of '
+            'them, or use device="cpu"'
+        )
+    if plan is not None and plan.every > 1:
+        raise ValueError(
+            f'{verb} with device="cuda" takes every return of a section, this one passes over some (every = '
+            f'{plan.every}): leave `every` out, or use device="cpu"'
+        )
+    if carried:
+        raise ValueError(
+            f'{verb} with device="cuda" runs all points at once, so none can go on from the state of another: begin '
+            'each at start (chart: leave carry out; sweep, lyapunov: direction=None), or use device="cpu"'
+        )
+    if importlib.util.find_spec("numba_cuda") is None:
+        raise ImportError(f'device="cuda" needs {not_installed("numba-cuda", "cuda")}, or use device="cpu"')
+    if not _simulated():
+        _find_gpu()
+    return True
+
+
+def _find_gpu() -> None:
+    from numba import cuda
+
+    try:
+        if len(cuda.gpus):
+            return
+        reason = "the driver reports no GPU"
+    except Exception as error:  # the driver's loader raises whatever its own layers do
+        lines = [line.strip(" .:") for line in str(error).splitlines() if line.strip(" .:")]
+        reason = ": ".join(lines[:2]) or type(error).__name__
+    raise RuntimeError(
+        f'device="cuda" found no GPU on this machine ({reason}). It needs an NVIDIA GPU and its driver (nvidia-smi '
+        'shows both); without one use device="cpu"'
+    )

@@ -1,0 +1,65 @@
+"""Work for a GPU cut up: jobs in batches, one thread for each job of a launch."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from nonsmooth.flow.engines.engine import FloatArray, IntArray
+
+__all__ = ["States", "batches", "launch"]
+
+
+@dataclass
+class States:
+    """Where N trajectories are, on the GPU: states, memory, clocks, modes, and the parameter row of each."""
+
+    u: Any  # (N, n)
+    memory: Any  # (N, n_memory), at least one column
+    clock: Any  # (N, 3)
+    counters: Any  # (N, 4)
+    rows: Any  # (N,)
+
+    @classmethod
+    def of(cls, cuda: Any, rows: IntArray, u: FloatArray, memory: FloatArray, modes: Any, clock: FloatArray) -> States:
+        """Those of N trajectories with their clocks (:class:`.engine.State`), which have no transition behind them."""
+        counters, room = np.zeros((len(rows), 4), dtype=np.int64), np.zeros((len(rows), max(memory.shape[1], 1)))
+        counters[:, 0], counters[:, 1], room[:, : memory.shape[1]] = modes, -1, memory
+        parts = (np.array(u, dtype=float), room, np.array(clock, dtype=float), counters, np.asarray(rows))
+        return cls(*map(cuda.to_device, parts))
+
+    def room(self, cuda: Any, times: int) -> States:
+        """Room for so many states at the parameter rows of each of these."""
+        shapes = [(times * len(part), *part.shape[1:]) for part in self.all()]
+        rows = np.tile(self.rows.copy_to_host(), times)
+        arrays = (cuda.device_array(shape, part.dtype) for shape, part in zip(shapes, self.all(), strict=True))
+        return States(*[*arrays, cuda.to_device(rows)])
+
+    def all(self) -> tuple[Any, ...]:
+        return self.u, self.memory, self.clock, self.counters
+
+    def place(self) -> tuple[Any, ...]:
+        """Without memory, as the linear kernels take it."""
+        return self.u, self.clock, self.counters
+
+
+def batches(points: FloatArray, rows: IntArray, size: int) -> Iterator[tuple[slice, FloatArray, IntArray]]:
+    """Jobs in batches: which, the parameter points that they need, and their rows among these."""
+    for first in range(0, len(rows), size):
+        some = slice(first, first + size)
+        needed, own = np.unique(rows[some], return_inverse=True)
+        yield some, points[needed], own.astype(np.int64)
+
+
+def launch(entry: Any, threads: int, jobs: Any, *arguments: Any) -> None:
+    """One thread for each job, in blocks of ``threads``; waits for nothing."""
+    from numba.core.errors import NumbaPerformanceWarning
+
+    with warnings.catch_warnings():  # a few threads on a large GPU: Numba warns of it
+        warnings.simplefilter("ignore", NumbaPerformanceWarning)
+        configured = entry[-(-len(jobs) // threads), threads]
+    configured(jobs, *arguments)

@@ -1,0 +1,164 @@
+"""Trajectories of the planar exact flow on a GPU: copies of the tables there, and launches that stay short."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from nonsmooth.flow.engines.engine import FloatArray, IntArray, SectionPlan
+from nonsmooth.flow.engines.launches import States, launch
+from nonsmooth.flow.engines.linear import PlanarEngine
+from nonsmooth.flow.engines.loop import DIVERGENCE
+from nonsmooth.kernels.hybrid import codes
+
+__all__ = ["SLICE", "Buffers", "PlanarOnGpu"]
+
+SLICE = 256  # section returns of one launch, at most: below a second also on a small GPU
+
+
+@dataclass
+class Buffers:
+    """What a run leaves behind for N trajectories, on the GPU; the order is that of :class:`engine.Chain`."""
+
+    section: Any
+    maximum: Any
+    minimum: Any
+    indicator_max: Any
+    indicator_min: Any
+    output_max: Any
+    output_min: Any
+    crossings: Any
+    contacts: Any
+    elapsed: Any
+    section_time: Any
+    section_mode: Any
+    status: Any
+
+    def all(self) -> tuple[Any, ...]:
+        return tuple(vars(self).values())
+
+
+class PlanarOnGpu:
+    """A planar engine's parameter points on the GPU, and the runs from there.
+
+    Parameters
+    ----------
+    engine : PlanarEngine
+    points : array (P, n_parameters)
+    plan : SectionPlan
+        A stroboscopic section.
+    """
+
+    n, n_memory = 2, 0
+
+    def __init__(self, engine: PlanarEngine, points: FloatArray, plan: SectionPlan) -> None:
+        from nonsmooth.kernels.cuda.module import cuda_linear_module
+        from nonsmooth.kernels.cuda.target import THREADS, cuda
+
+        tables = engine.prepare(points)
+        n_modes, n_indicators, n_outputs, n_rows = tables.sizes
+        self.sizes = max(n_indicators, 1), max(n_outputs, 1)
+        self.void = [] if n_indicators else [self.n]  # a row of no indicator: no array is empty there
+        shape = len(engine.form.multiples), n_modes, *self.sizes, max(len(engine.net.transitions), 1), n_rows
+        self.module = cuda_linear_module(*shape)
+        self.growth = partial(cuda_linear_module, *shape, "growth")
+        self.cuda, self.threads, self.plan, self.phase = cuda, THREADS, plan, float(plan.phase)
+        self.period: FloatArray = tables.period
+        multiples = tables.form.multiples if len(tables.form.multiples) else np.ones(1, dtype=np.int64)
+        given = cuda.to_device(_packed(tables.form)), cuda.to_device(multiples)
+        of_point = sum(part.size for part in self.module.scratch(n_modes, *self.sizes, n_rows)[0])
+        self.tables = *given, cuda.device_array((of_point, len(points)))
+        self.launch(self.module.tabulate, np.arange(len(points)), self.tables)
+        self.net = tuple(cuda.to_device(_not_empty(part)) for part in engine.net)
+        self.limit = cuda.to_device(DIVERGENCE * engine.scale)
+        self.plans = [cuda.to_device(np.array([-1, 1, -1, 1, 1, extremes], dtype=np.int64)) for extremes in (0, 1)]
+        self.periods = cuda.to_device(self.period)
+
+    def launch(self, entry: Any, jobs: IntArray, *arguments: Any) -> None:
+        """One thread for each job; waits for nothing."""
+        launch(entry, self.threads, self.cuda.to_device(jobs), *arguments)
+
+    def buffers(self, n: int, keep: int) -> Buffers:
+        """Room for ``keep`` section points of each of n trajectories."""
+        array, whole = self.cuda.device_array, np.int64
+        n_i, n_o = self.sizes
+        return Buffers(
+            array((n, keep, 2)), array((n, 2)), array((n, 2)), array((n, n_i)), array((n, n_i)), array((n, n_o)),
+            array((n, n_o)), array(n, whole), array(n, whole), array(n), array((n, keep)), array((n, keep), whole),
+            array(n, whole),
+        )  # fmt: skip
+
+    def extremes(self, out: Buffers) -> tuple[FloatArray, FloatArray]:
+        """Maxima and minima (N, rows) of states, indicators and outputs over the kept window."""
+        high = (out.maximum, out.indicator_max, out.output_max)
+        low = (out.minimum, out.indicator_min, out.output_min)
+        found = (np.concatenate([part.copy_to_host() for part in parts], axis=1) for parts in (high, low))
+        return tuple(np.delete(one, self.void, axis=1) for one in found)  # type: ignore[return-value]
+
+    def run(
+        self, jobs: IntArray, states: States, transient: int, keep: Any, out: Buffers, settled: Any = False, *,
+        extremes: bool = False, one_more: Buffers | None = None,
+    ) -> IntArray:  # fmt: skip
+        """March jobs by ``transient`` returns, then ``keep`` more into ``out`` (a number, or one for each trajectory).
+
+        Parameters
+        ----------
+        settled
+            Of no concern here: what holds where a run begins is always taken.
+        one_more : Buffers, optional
+            One return more, with extremes, goes in here.
+
+        Returns
+        -------
+        array
+            The jobs that came to their end; the others have their code in ``out.status`` (or ``one_more.status``).
+        """
+        while transient > SLICE and len(jobs):
+            jobs = self._advance(jobs, states, SLICE - 1, 1, out)
+            transient -= SLICE
+        if not len(jobs):
+            return jobs
+        if one_more is None:
+            return self._advance(jobs, states, transient, keep, out, extremes)
+        done = self._advance(jobs, states, transient, keep, out, extremes, one_more, True)
+        return done[one_more.status.copy_to_host()[done] == codes.OK]
+
+    def run_beside(
+        self, jobs: IntArray, others: States, period: IntArray, whole: Buffers, arrived: Buffers, extremes: bool
+    ) -> None:
+        """March jobs j by period[j] returns into ``whole``, and their neighbours, which stand behind them in
+        ``others``; of these the last return goes into ``arrived``."""
+        self._advance(jobs, others, 0, period, whole, extremes, arrived, False, 3, len(period))
+
+    def _advance(
+        self, jobs: IntArray, states: States, transient: int, keep: Any, out: Buffers, extremes: bool = False,
+        other: Buffers | None = None, after: bool = False, legs: int = 2, apart: int = 0,
+    ) -> IntArray:  # fmt: skip
+        counts = tuple(self.cuda.to_device(np.atleast_1d(np.asarray(n, dtype=np.int64))) for n in (transient, keep))
+        self.launch(
+            self.module.advance, jobs, states.rows, self.tables, self.net, states.place(), counts,
+            (self.plans[extremes], self.plans[after]), (1 if other is None else legs, apart), self.phase, self.limit,
+            out.all(), (out if other is None else other).all(),
+        )  # fmt: skip
+        return jobs[out.status.copy_to_host()[jobs] == codes.OK]
+
+
+def _not_empty(array: Any) -> Any:
+    """A kernel's array of constant shape has no dimension of length zero; what fills it is never read."""
+    found = np.ascontiguousarray(array)
+    return found if found.size else np.zeros([max(n, 1) for n in found.shape], dtype=found.dtype)
+
+
+def _packed(form: Any) -> FloatArray:
+    """All numbers of a parameter point as one column, in the order in which a thread unpacks them."""
+    n_points = len(form.A)
+    parts = [form.omega, form.period, *form[:4], *form[7:-1]]
+    columns = []
+    for part in parts:
+        shape = [n_points, *(max(n, 1) for n in part.shape[1:])]
+        full = part if part.shape == tuple(shape) else np.zeros(shape)
+        columns.append(full.reshape(n_points, -1))
+    return np.ascontiguousarray(np.concatenate(columns, axis=1).T)

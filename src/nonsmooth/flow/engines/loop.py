@@ -1,0 +1,200 @@
+"""Both engines' way into the hybrid loop: they differ in what they give it, not in how it is run."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.flow.engines.engine import Chain, FloatArray, Log, SectionPlan, State
+from nonsmooth.kernels.hybrid import codes
+from nonsmooth.kernels.hybrid.places import BEGUN, CROSSINGS, PATIENCE, TOUCHES
+from nonsmooth.kernels.hybrid.stopping import flag
+
+if TYPE_CHECKING:
+    from nonsmooth.system.traced import Traced
+
+__all__ = ["DIVERGENCE", "LoopEngine", "pack_net"]
+
+DIVERGENCE = 1e9  # in units of a state's scale
+SPARE = 64  # crossings that one leg may add to a log
+
+
+class LoopEngine:
+    """``chain`` and ``record`` of an engine over the kernels of ``kernels.hybrid``.
+
+    An engine says which compiled module observes a run (:meth:`module`), and what stands for the system there:
+    model, tables and work (:meth:`given`).
+    """
+
+    traced: Traced
+    scale: FloatArray
+    net: Any  # ``kernels.records.Net``
+
+    def module(self, tables: Any, observer: str) -> ModuleType:
+        """The kernels of this engine's stepper with an observer: ``"sections"`` or ``"record"``."""
+        raise NotImplementedError
+
+    def given(self, tables: Any, observer: str) -> tuple[Any, Any, Any]:
+        """Model, tables and work of the kernels."""
+        raise NotImplementedError
+
+    def touches_of_a_leg(self) -> int:
+        """How many touches one leg may add to a log, at most."""
+        raise NotImplementedError
+
+    @cached_property
+    def lacking(self) -> Any:
+        """(modes, n) 1 where a mode has not that state."""
+        return np.array(self.traced.lacking, dtype=np.int64).reshape(len(self.traced.mode_names), -1)
+
+    def chain(
+        self, tables: Any, first: int, last: int, state: State, starts: FloatArray | None,
+        plan: SectionPlan, transient: int, keep: int, out: Chain,
+    ) -> None:  # fmt: skip
+        """See :class:`nonsmooth.flow.engines.engine.Engine`."""
+        from nonsmooth.kernels.hybrid.records import Section
+
+        carry, clock = starts is None, state.clock.copy()
+        if carry:
+            state.keep_phase(float(tables.period[first]), plan.phase if plan.indicator < 0 else -1.0)
+            state.clock[2] = 0.0  # for the kernel: done, take the time as it stands
+        section = Section(
+            plan.indicator, plan.rising, plan.mode, int(plan.after), plan.every, int(plan.extremes),
+            float(plan.phase) if plan.indicator < 0 else -1.0, min(float(plan.t_max), 1e300),
+        )  # fmt: skip
+        model, own, work = self.given(tables, "sections")
+        rest = (
+            np.zeros((0, 0)) if starts is None else _with_memory(starts, state.memory), model,
+            with_section(self.net, plan.indicator), section, self._goal(transient, keep, 0.0, 0.0),
+            self._motion(state, carry and state.settled), out.record(), own, work,
+        )  # fmt: skip
+        kernel = self.module(tables, "sections").chain
+        work.tally[BEGUN] = 0
+        while first < last:  # Ctrl-C comes in between
+            first = kernel(first, last, *rest)
+            _end_if_not_wanted()
+        if carry:
+            state.settled = True
+            if state.clock[2] == 0.0 and tables.period[last - 1] < np.inf:
+                state.clock[:] = clock  # failed at the first point: nothing was written
+
+    def record(self, tables: Any, state: State, until: float, samples: FloatArray) -> Log:
+        """See :class:`nonsmooth.flow.engines.engine.Engine`. A state that a mode lacks is NaN."""
+        from nonsmooth.kernels.hybrid import records
+
+        n, n_u, n_m = len(samples), len(self.scale), len(self.traced.m)
+        model, own, work = self.given(tables, "record")
+        rest = model, self.net, nowhere(), self._goal(0, 0, until, 0.0), self._motion(state, state.settled)
+        sampled = (
+            np.ascontiguousarray(samples, dtype=float), np.full((n, n_u), np.nan), np.full((n, n_m), np.nan),
+            np.full(n, -1, dtype=np.int64), np.zeros(n, dtype=np.int64),
+        )  # fmt: skip
+        crossings, touches = _crossings(1024, n_u, n_m), _touches(1024, n_u)
+        kernel = self.module(tables, "record").record
+        spare, code = self.touches_of_a_leg(), codes.LOG_FULL
+        work.tally[BEGUN] = 0
+        while code in (codes.LOG_FULL, codes.PAUSED):
+            code = kernel(*rest, records.Log(*(*sampled, *crossings, *touches, spare)), own, work)
+            _end_if_not_wanted()
+            if code == codes.LOG_FULL:
+                crossings = _longer(crossings, _crossings(2 * len(crossings[0]), n_u, n_m))
+                touches = _longer(touches, _touches(2 * len(touches[0]) + spare, n_u))
+        state.settled = True
+        n_c, n_t = work.tally[[CROSSINGS, TOUCHES]]
+        times, transitions, before, after, memory = (part[:n_c].copy() for part in crossings)
+        touch_times, indicators, touch_u, clearances = (part[:n_t].copy() for part in touches)
+        _, sample_u, sample_memory, sample_mode, sample_segment = sampled
+        lacking = self.lacking == 1
+        if lacking.any():
+            jumps = self.traced.transitions
+            sample_u[lacking[sample_mode] & (sample_mode >= 0)[:, None]] = np.nan
+            before[lacking[[t.source for t in jumps]][transitions]] = np.nan
+            after[lacking[[t.target for t in jumps]][transitions]] = np.nan
+        return Log(
+            sample_u, sample_memory, sample_mode, sample_segment, times, transitions, before, after, memory,
+            touch_times, indicators, touch_u, clearances, int(code),
+        )  # fmt: skip
+
+    def _goal(self, transient: int, keep: int, until: float, unit: float) -> Any:
+        from nonsmooth.kernels.hybrid.records import Goal
+
+        limit = DIVERGENCE * np.asarray(self.scale, dtype=float)
+        return Goal(int(transient), int(keep), float(until), float(unit), limit, PATIENCE)
+
+    def _motion(self, state: State, settled: bool) -> Any:
+        from nonsmooth.kernels.hybrid.records import Motion
+
+        state.counters[1] = int(settled)
+        return Motion(state.u, state.memory, state.clock, state.counters)
+
+
+def _with_memory(starts: FloatArray, memory: FloatArray) -> FloatArray:
+    """States and memory side by side: every start begins with the memory that is given."""
+    return np.ascontiguousarray(np.hstack([starts, np.tile(memory, (len(starts), 1))]), dtype=float)
+
+
+def _end_if_not_wanted() -> None:
+    if flag()[0]:
+        raise KeyboardInterrupt
+
+
+def nowhere() -> Any:
+    """A section that is never met."""
+    from nonsmooth.kernels.hybrid.records import Section
+
+    return Section(-1, 0, -1, 0, 1, 0, -1.0, 0.0)
+
+
+def _crossings(size: int, n: int, n_memory: int) -> list[Any]:
+    """Room for crossings: time, transition, states before and after, memory after."""
+    return [
+        np.zeros(size), np.zeros(size, dtype=np.int64), np.zeros((size, n)), np.zeros((size, n)),
+        np.zeros((size, n_memory)),
+    ]  # fmt: skip
+
+
+def _touches(size: int, n: int) -> list[Any]:
+    """Room for touches: time, indicator, states, clearance."""
+    return [np.zeros(size), np.zeros(size, dtype=np.int64), np.zeros((size, n)), np.zeros(size)]
+
+
+def _longer(old: list[Any], new: list[Any]) -> list[Any]:
+    for one, other in zip(old, new, strict=True):
+        other[: len(one)] = one
+    return new
+
+
+def with_section(net: Any, indicator: int) -> Any:
+    """The net, its last two rows being the section's (rising, falling)."""
+    rows = net.rows.copy()
+    rows[-2:, 0] = max(indicator, 0)
+    return net._replace(rows=rows)
+
+
+def pack_net(traced: Traced) -> Any:
+    """The net of transitions (``kernels.records.Net``), with two more rows for a section."""
+    from nonsmooth.kernels.hybrid.records import Net
+
+    integer = np.int64
+    transitions = np.array(
+        [(t.target, 1 if t.reset is not None else 2 * bool(t.writes), t.contact) for t in traced.transitions],
+        dtype=integer,
+    ).reshape(-1, 3)
+    rows = [(r.indicator, r.sign, r.strict) for t in traced.transitions for r in t.rows]
+    row_start = np.cumsum([0] + [len(t.rows) for t in traced.transitions], dtype=integer)
+    leaving = [
+        [j for j, t in enumerate(traced.transitions) if t.source == mode] for mode in range(len(traced.mode_names))
+    ]
+    mode_start = np.cumsum([0] + [len(one) for one in leaving], dtype=integer)
+    mode_list = np.array([j for one in leaving for j in one], dtype=integer)
+    at = np.array([-1.0 if t.at is None else t.at for t in traced.transitions], dtype=float)
+    both = np.array([*rows, (0, 1, 1), (0, -1, 1)], dtype=integer).reshape(-1, 3)
+    changed = np.zeros((len(transitions), len(traced.u) + len(traced.m) + 1), dtype=integer)
+    for j, t in enumerate(traced.transitions):
+        moved = [i for i, e in enumerate(t.reset or ()) if e != traced.u[i]]
+        moved += [len(traced.u) + i for i, _ in t.writes]
+        changed[j, : len(moved) + 1] = [len(moved), *moved]
+    return Net(transitions, both, row_start, mode_start, mode_list, at, changed)

@@ -1,0 +1,146 @@
+"""Which engine runs a system: the meaning of ``method=``, ``rtol=``, ``atol=`` and ``step=`` everywhere."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.errors import SystemDefinitionError, shortened
+from nonsmooth.flow.arguments import float_array, real_number, whole_number
+from nonsmooth.flow.engines.engine import Engine, FloatArray
+
+if TYPE_CHECKING:
+    from nonsmooth.system.system import System
+    from nonsmooth.system.traced import Traced
+
+__all__ = ["EXPERT", "METHODS", "RTOL", "engine_for", "warn_if_coarse"]
+
+METHODS = ("auto", "exact", "taylor", "rkf45")
+RTOL = 1e-9
+EXPERT = ("order", "locate")  # options of the series engine, beyond those of the verbs
+
+
+def engine_for(
+    system: System,
+    method: str = "auto",
+    rtol: float | None = None,
+    atol: Any = None,
+    step: float | None = None,
+    *,
+    traced: Traced | None = None,
+    **expert: Any,
+) -> Engine:
+    """The engine for a system, a method and tolerances.
+
+    Parameters
+    ----------
+    system : System
+    method : str
+        ``"auto"``: ``"exact"`` where every mode is linear with harmonic forcing, else ``"taylor"``.
+    rtol, atol : float; float, mapping of state to float, or array (n,)
+        Tolerances per step; rtol 1e-9 and atol = rtol * scale where not given.
+    step : float, optional
+        A fixed step (``"taylor"`` and ``"rkf45"``).
+    traced : Traced, optional
+        Equations in place of the system's own (parameters that are functions of time).
+    **expert
+        ``order`` of the Taylor series; ``locate=False`` judges transitions at the ends of steps only.
+
+    Raises
+    ------
+    ValueError, TypeError
+        A method that does not exist or does not fit, or tolerances for a method that has none.
+    SystemDefinitionError
+        A system with sliding surfaces.
+    """
+    if not isinstance(method, str) or method not in METHODS:
+        raise ValueError(f"method = {shortened(method)} does not exist; allowed: {', '.join(map(repr, METHODS))}")
+    if getattr(system, "surfaces", ()):
+        names = ", ".join(repr(system.indicators[surface.indicator]) for surface in system.surfaces)
+        raise SystemDefinitionError(
+            f"{system.name!r} has sliding surfaces ({names}); motion along a Surface cannot be simulated yet. "
+            "Write the stick or slide mode and its transitions out, or use .smoothed(eta)"
+        )
+    tolerance = RTOL if rtol is None else real_number(rtol, "rtol")
+    if not 1e-15 <= tolerance <= 1e-2:
+        raise ValueError(f"rtol = {rtol!r} is outside 1e-15 ... 1e-2")
+    absolute = _absolute(system, atol)
+    if step is not None and not real_number(step, "step") > 0:
+        raise ValueError(f"step = {step!r}: a fixed step is a positive time")
+    if "order" in expert:
+        expert["order"] = whole_number(expert["order"], "order", 2)
+        if method in ("exact", "rkf45"):
+            raise ValueError(f'order is that of method="taylor"; method={method!r} has its own')
+    equations = system.traced if traced is None else traced
+    form = None
+    if method in ("auto", "exact") and traced is None:
+        from nonsmooth.system.linear import linear_form
+
+        form = linear_form(equations)
+    if method == "exact":
+        if form is None:
+            raise ValueError(
+                f"{system.name!r} has no exact flow: some mode is not linear with constant coefficients and harmonic "
+                'forcing; use method="taylor" or "rkf45"'
+            )
+        if rtol is not None or atol is not None or step is not None:
+            raise ValueError('method="exact" has no tolerance and no step; leave rtol, atol and step out')
+    # A smoothed system runs by its series, also where its bands happen to be linear: one method for all of them.
+    # A step or an order asks for a method that has one.
+    if form is not None and not system.is_smoothed and step is None and "order" not in expert:
+        from nonsmooth.flow.engines.linear import LinearEngine, PlanarEngine, is_linear
+
+        if is_linear(equations, form) and not expert:
+            plain = not equations.m and not any(map(any, equations.lacking))
+            kind = PlanarEngine if plain and len(equations.u) == 2 else LinearEngine
+            return kind(equations, form, system.scale_vector())
+        name = "exact"
+    elif method == "exact":
+        name = "exact"
+    else:
+        name = "taylor" if method == "auto" else method
+    from nonsmooth.flow.engines.series import SeriesEngine
+
+    return SeriesEngine(equations, system.scale_vector(), name, tolerance, absolute, step=step, **expert)
+
+
+def warn_if_coarse(system: System, engine: Engine, largest: FloatArray) -> None:
+    """Warn where no state ever exceeds a hundred times its ``atol``: the tolerance is then as large as the motion.
+
+    Parameters
+    ----------
+    largest : array (n,)
+        The largest size of each state, that at the start included.
+    """
+    absolute = getattr(engine, "norms", (None, None))[1]
+    if engine.name == "exact" or absolute is None or not (largest > 0).any():
+        return
+    if (largest[np.isfinite(largest)] < 100.0 * absolute[np.isfinite(largest)]).all():
+        sizes = ", ".join(f"{name!r}: {size:.2g}" for name, size in zip(system.states, largest, strict=True))
+        warnings.warn(
+            f"{system.name!r}: the states stay below a hundred times atol, so they may be wrong by as much as they "
+            f"are; give System(scale={{{sizes}}}), or atol",
+            stacklevel=3,
+        )
+
+
+def _absolute(system: System, atol: Any) -> FloatArray | None:
+    """Absolute tolerances per state."""
+    if atol is None:
+        return None
+    names = list(system.states)
+    if isinstance(atol, Mapping):
+        missing = set(names) ^ set(atol)
+        if missing:
+            raise ValueError(f"atol must name each state of {names} once; wrong: {sorted(missing)}")
+        atol = [atol[name] for name in names]
+    values = float_array(atol, "atol")
+    if values.shape not in ((), (1,), (len(names),)):
+        raise ValueError(f"atol must be one number or one for each of {', '.join(names)}, not of shape {values.shape}")
+    values = np.broadcast_to(values, (len(names),)).copy()
+    if not (np.isfinite(values).all() and (values > 0).all()):
+        raise ValueError(f"atol = {atol} must be positive and finite")
+    return values

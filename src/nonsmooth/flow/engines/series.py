@@ -1,0 +1,186 @@
+"""The engine of the series methods: generated Taylor series, Runge-Kutta-Fehlberg 4(5), and the exact flow for any n.
+
+It packs a system into the records of ``kernels.series``; no numerics of its own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from math import ceil, log
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.flow.engines.engine import FloatArray
+from nonsmooth.flow.engines.layers import Layers, layers
+from nonsmooth.flow.engines.loop import DIVERGENCE, LoopEngine, pack_net
+from nonsmooth.flow.engines.series_tables import Tables, exact_steps, periods, work_of
+from nonsmooth.kernels.series.places import METHODS
+
+if TYPE_CHECKING:
+    from nonsmooth.system.generate import CompiledModel
+    from nonsmooth.system.traced import Traced
+
+__all__ = ["SeriesEngine", "order_for"]
+
+EXACT_ORDER = 22
+
+
+def order_for(rtol: float, fixed_step: bool = False) -> int:
+    """Order of the Taylor series for a tolerance: p = ceil(1 - ln(rtol) / 2) (Jorba and Zou 2005), and 3 more; 4 to 22.
+
+    That optimum counts the cost of the series alone. A step also has its crossings to exclude, at a cost that hardly
+    grows with p, so that longer steps of a higher order are cheaper. With a fixed step it is the bare optimum.
+    """
+    return min(max(ceil(1.0 - 0.5 * log(rtol)), 4) + (0 if fixed_step else 3), 22)
+
+
+@dataclass
+class SeriesEngine(LoopEngine):
+    """``Engine`` over ``kernels.series`` for one system, method and tolerance.
+
+    Parameters
+    ----------
+    traced : Traced
+        The system.
+    scale : array (n,)
+        Size of each state; ``atol`` defaults to ``rtol * scale``.
+    name : str
+        ``"taylor"``, ``"rkf45"``, or ``"exact"``: Taylor series of the matrix exponential, of order 22 and with
+        steps so short that the remainder is below rounding, for systems whose modes are all linear.
+    rtol : float
+        Relative tolerance per step, 1e-15 to 1e-2 (not used by ``"exact"``).
+    atol : array (n,), optional
+        Absolute tolerance per state.
+    step : float, optional
+        A fixed step. ``"rkf45"`` then has order 4 (no local extrapolation).
+    order : int, optional
+        Order of the Taylor series, 2 to 30; else from ``rtol``.
+    locate : bool
+        False judges transitions at the ends of steps only: for showing what that costs.
+    """
+
+    traced: Traced
+    scale: FloatArray
+    name: str = "taylor"
+    rtol: float = 1e-9
+    atol: FloatArray | None = None
+    step: float | None = None
+    order: int | None = None
+    locate: bool = True
+    net: Any = field(init=False)  # ``kernels.records.Net``
+
+    def __post_init__(self) -> None:
+        if self.name not in METHODS:
+            raise ValueError(f"method {self.name!r} is not a series method; allowed: {', '.join(METHODS)}")
+        if not 1e-15 <= self.rtol <= 1e-2:
+            raise ValueError(f"rtol = {self.rtol} is outside 1e-15 ... 1e-2")
+        if self.step is not None and not (0.0 < self.step < np.inf):
+            raise ValueError(f"step = {self.step}: a fixed step is a positive time")
+        if self.order is not None and not 2 <= self.order <= 30:
+            raise ValueError(f"order = {self.order} is outside 2 ... 30")
+        self.scale = np.array(self.scale, dtype=float)
+        self.net = pack_net(self.traced)
+
+    @cached_property
+    def repeats(self) -> dict[int, int]:
+        """Rows (indicators, outputs) that are a state and nothing else: row -> state. Their extremes are its."""
+        traced = self.traced
+        outputs = [row[0] if len(set(row)) == 1 else None for row in traced.outputs]
+        found = {}
+        for row, expression in enumerate([*traced.indicators, *outputs], start=len(traced.u)):
+            if expression in traced.u:
+                state = traced.u.index(expression)
+                if not self.lacking[:, state].any():
+                    found[row] = state
+        return found
+
+    @cached_property
+    def kinds(self) -> Any:
+        """Per row of the jets: 1 it has a polynomial, 0 an output with a corner, -1 - s it repeats the state s."""
+        traced = self.traced
+        kinds = np.ones(len(traced.u) + len(traced.indicators) + len(traced.outputs), dtype=np.int64)
+        kinds[len(traced.u) + len(traced.indicators) :] = self.smooth_outputs
+        for row, state in self.repeats.items():
+            kinds[row] = -1 - state
+        return kinds
+
+    @cached_property
+    def norms(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Per state: atol / rtol, atol, and the size beyond which it has diverged."""
+        absolute = self.rtol * self.scale if self.atol is None else np.array(self.atol, dtype=float)
+        return absolute / self.rtol, absolute, DIVERGENCE * self.scale
+
+    @cached_property
+    def model(self) -> CompiledModel:
+        """The generated functions of the system."""
+        from nonsmooth.system.generate import compile_model
+
+        return compile_model(self.layers.model)
+
+    @cached_property
+    def layers(self) -> Layers:
+        """What a step has to be checked for: only Taylor steps whose length follows from the tolerance."""
+        if self.name == "taylor" and self.step is None:
+            return layers(self.traced)
+        return Layers(self.traced, 0, False)
+
+    @property
+    def smooth_outputs(self) -> tuple[bool, ...]:
+        """Per output of the system: whether it has a series."""
+        return self.model.smooth_outputs[: len(self.traced.outputs)]
+
+    def prepare(self, points: FloatArray) -> Tables:
+        """Periods, and for ``"exact"`` the length of a step in each mode, at the parameter points (P, n_parameters)."""
+        points = np.ascontiguousarray(points, dtype=float)
+        n_modes = len(self.traced.mode_names)
+        steps, smooth = np.zeros((len(points), n_modes)), False
+        if self.name == "exact":
+            steps, smooth = exact_steps(self.traced, points, EXACT_ORDER)
+        return Tables(points, periods(self.traced, points), steps, smooth)
+
+    def module(self, tables: Tables, observer: str) -> ModuleType:
+        from nonsmooth.kernels.series.module import series_module
+
+        return series_module(observer, self.name)
+
+    def given(self, tables: Tables, observer: str) -> tuple[Any, Any, Any]:
+        return self.generated(tables), (), self._work()
+
+    def touches_of_a_leg(self) -> int:
+        return (len(self.net.rows) + 1) * (self.series_order + 1)
+
+    def generated(self, tables: Tables) -> Any:
+        """What stands for system and method in the kernels (``kernels.records.Generated``)."""
+        from nonsmooth.kernels.hybrid.records import Generated
+
+        traced = self.traced
+        weight, absolute, _ = self.norms
+        return Generated(
+            self.functions, tables.points, tables.period, tables.steps, self.lacking, self.kinds, weight, absolute,
+            float(self.rtol), 0.0 if self.step is None else float(self.step), self.series_order,
+            int(self.locate), int(self.layers.checked), int(not all(self.smooth_outputs)), int(tables.nonlinear_rows),
+            self.layers.count, len(traced.indicators), len(traced.outputs),
+        )  # fmt: skip
+
+    @cached_property
+    def functions(self) -> Any:
+        """Addresses of the generated functions; ``model`` keeps them alive."""
+        from nonsmooth.kernels.compile.pointers import addresses
+
+        return addresses(self.model.field, self.model.jet, self.model.values, self.model.jump)
+
+    @property
+    def series_order(self) -> int:
+        """Order of the series."""
+        if self.name == "exact":
+            return EXACT_ORDER
+        return order_for(self.rtol, self.step is not None) if self.order is None else self.order
+
+    def _work(self) -> Any:
+        traced = self.traced
+        rows = len(traced.u) + len(traced.indicators) + len(traced.outputs) + self.layers.count
+        sizes = (len(traced.u), len(traced.indicators), rows, len(traced.mode_names), len(self.net.rows))
+        return work_of(*sizes, len(traced.p) + len(traced.m), self.series_order, self.model.n_scratch)

@@ -1,0 +1,127 @@
+"""Compiles what no model changes, to come with the package: `python -m nonsmooth.kernels.compile.ahead`.
+
+It runs when a wheel is built, when a checkout is installed and whenever it is called (after an upgrade of Numba, say).
+An entry is named as in the cache (``cache``), so that one which does not fit the installed versions or an edited source
+is never found, and the code is then compiled as if none had come. It needs Numba and NumPy, nothing else.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import os
+import re
+import shutil
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from inspect import signature
+from itertools import product
+from multiprocessing import get_context
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from types import ModuleType
+from typing import Any
+
+from nonsmooth.kernels.compile.target import AHEAD, level
+
+__all__ = ["compile_ahead", "kernels_of", "plain_files", "tasks"]
+
+#: Numbers of states and of harmonics that the exact flow is compiled for ahead; others when they are first met.
+SHAPES = ("2,1", "2,0")
+_ROOT = Path(__file__).parents[2]
+_Task = tuple[str, str, tuple[Any, ...]]  # a module, or a function in it that makes one and its arguments
+
+
+def plain_files() -> Iterator[str]:
+    """Modules of the package with kernels of one shape, found by their decorators."""
+    from nonsmooth.kernels.compile.cache import reached
+
+    for path in sorted(_ROOT.rglob("*.py")):
+        text = path.read_text(encoding="utf-8")
+        if re.search(r"^@kernel\(", text, flags=re.MULTILINE):
+            texts = [text, *reached(text).values()]
+            if not any(re.search(r"^STATES = ", found, flags=re.MULTILINE) for found in texts):
+                yield ".".join(["nonsmooth", *path.relative_to(_ROOT).with_suffix("").parts])
+
+
+def tasks(shapes: Sequence[str] = SHAPES) -> list[_Task]:
+    """What is compiled, each by one process: the plain files, then what every ``*_module`` function of a stepper makes.
+
+    Its arguments are told by their names: ``states`` and ``harmonics`` of a shape, and each of the file's observers and
+    methods."""
+    found: list[_Task] = [(name, "", ()) for name in plain_files()]
+    for stepper in ("series", "linear"):
+        file = importlib.import_module(f"nonsmooth.kernels.{stepper}.module")
+        for name in (name for name in file.__all__ if name.endswith("_module")):
+            for states, harmonics in (map(int, shape.split(",")) for shape in shapes):
+                choices: dict[str, Any] = {"states": [states], "harmonics": [harmonics]}
+                choices |= {one: getattr(file, f"{one.upper()}S", []) for one in ("observer", "method")}
+                names = signature(getattr(file, name)).parameters
+                given = product(*(choices.get(one, [names[one].default]) for one in names))
+                found += [(file.__name__, name, arguments) for arguments in given]
+    return list(dict.fromkeys(found))
+
+
+def _module(task: _Task) -> ModuleType:
+    file, name, arguments = task
+    module = importlib.import_module(file)
+    return getattr(module, name)(*arguments) if name else module
+
+
+def kernels_of(module: ModuleType) -> list[Any]:
+    """The kernels that stand in a module, not those that it imports."""
+    found = [value for value in vars(module).values() if hasattr(value, "compile_now")]
+    return [value for value in found if value.py_func.__module__ == module.__name__]
+
+
+def _begin(chosen: str, cache: str) -> None:
+    """What a process that compiles is told: nothing of the user's own cache."""
+    os.environ.update(NONSMOOTH_LEVEL=chosen, NONSMOOTH_CACHE_DIR=cache)
+
+
+def _compile(task: _Task) -> list[str]:
+    """Compile a module's kernels, where they are not there yet; the names of their entries."""
+    from nonsmooth.kernels.compile.cache import compiled
+
+    return [compiled(kernel).entry() for kernel in kernels_of(_module(task))]
+
+
+def compile_ahead(into: Path, chosen: str, work: Sequence[_Task]) -> int:
+    """Fill ``into / chosen`` for a level of this processor, with all processors; returns the number of kernels.
+
+    What stands there and fits is kept, what does not fit is removed."""
+    folder = into / chosen
+    folder.mkdir(parents=True, exist_ok=True)
+    processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    with TemporaryDirectory() as cache:
+        with ProcessPoolExecutor(
+            min(processors, len(work)), mp_context=get_context("spawn"), initializer=_begin, initargs=(chosen, cache)
+        ) as pool:
+            wanted = [name for names in pool.map(_compile, work) for name in names]
+        for name in wanted:
+            made = Path(cache) / "compiled" / name
+            source = made if made.exists() else AHEAD / chosen / name
+            if source != folder / name:
+                unfinished = folder / f"{name}.tmp"
+                shutil.copyfile(source, unfinished)
+                os.replace(unfinished, folder / name)
+    for path in folder.iterdir():
+        if path.name not in wanted:
+            path.unlink()
+    return len(wanted)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="python -m nonsmooth.kernels.compile.ahead", description=__doc__)
+    parser.add_argument("levels", nargs="*", help="levels of the architecture; without one, this processor's highest")
+    parser.add_argument("--shapes", nargs="+", default=SHAPES, metavar="STATES,HARMONICS", help="of the exact flow")
+    parser.add_argument("--into", type=Path, default=AHEAD, help="another folder than the package's own")
+    options = parser.parse_args()
+    for chosen in filter(None, options.levels or [level()]):
+        number = compile_ahead(options.into, chosen, tasks(options.shapes))
+        print(f"{number} kernels compiled for {chosen} in {options.into / chosen}")
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,38 @@
+"""Texts of kernel files joined into one module, with the sizes of a system as constants.
+
+A stepper, the loop and an observer are written once, each in its file. What one of them calls in another is found by
+name in the joined text, so each can stand beside any of its siblings, and every inner loop has constant bounds (a
+factor of two).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+__all__ = ["joined", "with_numbers"]
+
+_ROOM = Path(__file__).parents[1]
+#: Files that name a place others can take: what is imported of them is in the joined text under the same name.
+_PLACES = ("linear.stepper", "linear.extremes", "linear.touches")
+
+
+def joined(parts: Iterable[str], absent: Iterable[str] = ()) -> str:
+    """The text of some kernel files (``hybrid.loop``, ...) in one, without what they import of each other.
+
+    Imports from ``absent`` files are left out too."""
+    parts = tuple(parts)
+    text = "\n".join(_ROOM.joinpath(*part.split(".")).with_suffix(".py").read_text(encoding="utf-8") for part in parts)
+    own = "|".join(re.escape(part) for part in {*parts, *_PLACES, *absent})
+    return re.sub(
+        rf"^from nonsmooth\.kernels\.(?:{own}) import (\([^)]*\).*|[^(\n]*)$", "", text, flags=re.MULTILINE
+    )  # fmt: skip
+
+
+def with_numbers(text: str, numbers: Mapping[str, int]) -> str:
+    """The text with other numbers in its lines ``NAME = 0``."""
+    for name, number in numbers.items():
+        text, found = re.subn(rf"^{name} = \d+\b", f"{name} = {number}", text, flags=re.MULTILINE)
+        assert found == 1, name
+    return text

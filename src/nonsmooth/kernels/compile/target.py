@@ -1,0 +1,133 @@
+"""What our code is made for, and the engines that hold it: a level of the processor's architecture, an engine per file.
+
+Numba makes code for one processor. Ours is made for a level of the architecture, so that it can be made on one machine,
+travel with the package and run on another; what the level costs stands in ``docs/decisions.md``. And Numba keeps all
+code in one engine until the process ends; here each file has its own, which goes with the file's last function.
+
+Leans on private parts of Numba: ``JITCPUCodegen``, a target context's ``_internal_codegen``, a dispatcher's
+``add_overload``, ``_make_finalizer`` and ``targetdescr``. Checked with 0.68.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numba
+from numba.core.codegen import JITCPUCodegen, get_host_cpu_features
+from numba.core.registry import CPUDispatcher, CPUTarget, cpu_target
+
+__all__ = ["AHEAD", "LEVELS", "Function", "level", "made_ahead"]
+
+AHEAD = Path(__file__).parents[1] / "ahead"  # a folder for each level; what they hold comes with the package
+
+_V2 = "cx16 popcnt sahf sse3 sse4.1 sse4.2 ssse3"
+_V3 = f"{_V2} avx avx2 bmi bmi2 f16c fma lzcnt movbe xsave"
+#: Machine -> level -> what a processor must have for it, as LLVM calls it; the highest level first.
+LEVELS: dict[str, dict[str, str]] = {
+    "x86_64": {"x86-64-v3": _V3},  # v4 is slower: docs/decisions.md
+    "aarch64": {"generic": "neon"},
+}
+_SAME = {"amd64": "x86_64", "arm64": "aarch64"}
+
+
+@cache
+def level() -> str:
+    """The level that code is made for: that of the code that came with the package, else this processor's highest.
+
+    ``NONSMOOTH_LEVEL`` chooses another. Empty where the processor has none of ``LEVELS``, or where ``NUMBA_CPU_NAME``
+    and the like say what code is made for: then it is made as Numba makes it.
+
+    Raises
+    ------
+    ValueError
+        ``NONSMOOTH_LEVEL`` is not a level of this processor.
+    """
+    if numba.config.CPU_NAME is not None or numba.config.CPU_FEATURES is not None:
+        return ""
+    machine = platform.machine().lower()
+    there = set(get_host_cpu_features().split(","))
+    possible = [
+        name for name, needed in LEVELS.get(_SAME.get(machine, machine), {}).items()
+        if there.issuperset(f"+{feature}" for feature in needed.split())
+    ]  # fmt: skip
+    chosen = os.environ.get("NONSMOOTH_LEVEL", "")
+    if chosen and chosen not in possible:
+        raise ValueError(f"NONSMOOTH_LEVEL={chosen}: this processor has {', '.join(possible) or 'no level'}; unset it")
+    with_code = [name for name in possible if (AHEAD / name).is_dir()]
+    return chosen or [*with_code, *possible, ""][0]
+
+
+def made_ahead(entry: str) -> bytes:
+    """The content of an entry that came with the package; empty where there is none.
+
+    Who may write there may write the package's sources as well: nothing is asked but the entry's own hash."""
+    try:
+        return (AHEAD / level() / entry).read_bytes() if level() else b""
+    except OSError:
+        return b""
+
+
+class _Codegen(JITCPUCodegen):
+    """An engine of its own, for the level."""
+
+    def _get_host_cpu_name(self) -> Any:
+        return level() or super()._get_host_cpu_name()
+
+    def _get_host_cpu_features(self) -> Any:
+        return "" if level() else super()._get_host_cpu_features()
+
+    def _function_pass_manager(self, **options: Any) -> Any:
+        """One for all functions: Numba makes one for each, and llvmlite never frees it (15 kB)."""
+        return super()._function_pass_manager(**options) if options else _function_passes()[0]
+
+
+@cache
+def _function_passes() -> tuple[Any, Any]:
+    """The passes, and an engine that does nothing but live as long: they need its description of the processor."""
+    engine = _Codegen("passes")
+    return JITCPUCodegen._function_pass_manager(engine), engine
+
+
+class _Target(CPUTarget):
+    """Numba's own target with another engine."""
+
+    def __init__(self) -> None:
+        super().__init__("cpu")
+        self._context = cpu_target.target_context.subtarget(_internal_codegen=_Codegen("nonsmooth"))
+
+    @property
+    def target_context(self) -> Any:
+        return self._context
+
+    @property
+    def typing_context(self) -> Any:
+        return cpu_target.typing_context
+
+
+class Function(CPUDispatcher):
+    """What ``numba.njit`` makes of a function, in the engine of the file it stands in."""
+
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
+        names = function.__globals__
+        if "_target" not in names:
+            names["_target"] = _Target()
+        self.targetdescr = names["_target"]
+        super().__init__(py_func=function, targetoptions={"nopython": True, "boundscheck": None, **options})
+
+    def add_overload(self, found: Any) -> None:
+        """Without what Numba noted on every line, half of what a compile leaves in memory."""
+        super().add_overload(found._replace(type_annotation=None))
+
+    def never_inlined(self) -> None:
+        """Forget the code where other kernels would look for it: it is called by address alone, and ends with this."""
+        for found in self.overloads.values():
+            self.targetctx.remove_user_function(found.entry_point)
+
+    def _make_finalizer(self) -> Callable[[], None]:
+        """Numba's holds the code, which holds the names of its file, which hold this function: it would never end."""
+        return lambda: None

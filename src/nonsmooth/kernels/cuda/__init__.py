@@ -1,0 +1,1 @@
+"""The GPU's entries over the same texts."""

@@ -1,0 +1,57 @@
+"""Trajectories of planar systems on a GPU, one per thread.
+
+This file is text of a generated module (``cuda.module``), behind the planar files of the CPU. ``advance`` is the one
+heavy kernel: it marches every trajectory by its own number of section returns with ``chain``. What becomes of the
+returns is decided outside, so that all threads do the same thing at the same time, finished trajectories are left out
+of the next launch, and a launch stays short.
+"""
+
+from nonsmooth.kernels.cuda.tables import tabled
+from nonsmooth.kernels.cuda.target import cuda, device, entry
+from nonsmooth.kernels.hybrid.codes import OK
+from nonsmooth.kernels.hybrid.records import Flow, Kept, Motion, Net
+from nonsmooth.kernels.linear.many import go
+
+
+@device
+def row_of(buffers, row):
+    """What ``chain`` writes for one trajectory, from the buffers of all."""
+    section, maximum, minimum, i_max, i_min, o_max, o_min, crossings, contacts, elapsed, times, modes, status = buffers
+    return Kept(
+        section[row : row + 1], maximum[row : row + 1], minimum[row : row + 1], i_max[row : row + 1],
+        i_min[row : row + 1], o_max[row : row + 1], o_min[row : row + 1], crossings[row : row + 1],
+        contacts[row : row + 1], elapsed[row : row + 1], times[row : row + 1], modes[row : row + 1],
+        status[row : row + 1],
+    )  # fmt: skip
+
+
+@entry
+def advance(jobs, rows, point, net, place, counts, plans, way, phase, limit, out, other):
+    """Thread k: march the state of job j = jobs[k] under parameter row rows[j] by transient[j] section returns, then
+    keep[j] more into row j of ``out``. (One number for all jobs where these arrays are short.)
+
+    ``place``: states, clocks, counters of all; ``counts``: transient, keep; ``plans``: plan, after; ``way``: legs and
+    apart. With more legs the tables serve again, under the plan ``after``: ``apart`` = 0, for one more return, into row
+    j of ``other``; else for as many returns of the states j + apart, j + 2 apart, ..., the last of each into that row
+    of ``other``. A state is left at its last return; statuses stand in the buffers, and legs are left out behind one
+    that failed."""
+    k = cuda.grid(1)
+    if k >= jobs.shape[0]:
+        return
+    j = jobs[k]
+    u, clock, counters = place
+    transient, keep = counts
+    legs, apart = way
+    linear, scratch = tabled(point, rows[j])
+    n_transient = transient[min(j, transient.shape[0] - 1)]
+    n_keep = keep[min(j, keep.shape[0] - 1)]
+    flow = Flow(linear, Net(*net), phase, 1e300, limit, scratch[0], scratch[1], u[0:0], 1 << 62, jobs)
+    for leg in range(legs):
+        row = j + leg * apart
+        if leg > 0:
+            n_transient, n_keep = n_transient + n_keep - 1 if apart > 0 else 0, 1
+        motion = Motion(u[row], u[row, 0:0], clock[row], counters[row])
+        plan, into = (plans[1], other) if leg > 0 else (plans[0], out)
+        code = go(0, motion, flow, plan, n_transient, n_keep, row_of(into, row))
+        if code != OK:
+            break

@@ -1,0 +1,51 @@
+"""Growth by two neighbours on a GPU, one pair per thread: text of a generated module.
+
+``neighbours`` follows a run and a neighbour over some section returns, and goes on from where the launch before left
+them, so that a launch stays short.
+"""
+
+from numba import float64, int64
+
+from nonsmooth.kernels.cuda.arrays import N_INDICATORS, N_OUTPUTS
+from nonsmooth.kernels.cuda.tables import tabled
+from nonsmooth.kernels.cuda.target import cuda, entry, local
+from nonsmooth.kernels.hybrid.records import Flow, Kept, Motion, Net
+from nonsmooth.kernels.linear.many import follow_pair
+
+
+@local
+def single():
+    """What ``chain`` leaves behind, for one return of one trajectory."""
+    section = cuda.local.array((1, 1, 2), float64)
+    top = cuda.local.array((1, 2), float64)
+    bottom = cuda.local.array((1, 2), float64)
+    i_top = cuda.local.array((1, N_INDICATORS), float64)
+    i_bottom = cuda.local.array((1, N_INDICATORS), float64)
+    o_top = cuda.local.array((1, N_OUTPUTS), float64)
+    o_bottom = cuda.local.array((1, N_OUTPUTS), float64)
+    crossings = cuda.local.array(1, int64)
+    contacts = cuda.local.array(1, int64)
+    elapsed = cuda.local.array(1, float64)
+    times = cuda.local.array((1, 1), float64)
+    modes = cuda.local.array((1, 1), int64)
+    status = cuda.local.array(1, int64)
+    return Kept(
+        section, top, bottom, i_top, i_bottom, o_top, o_bottom, crossings, contacts, elapsed, times, modes, status
+    )
+
+
+@entry
+def neighbours(jobs, rows, point, net, place, span, size, pair, plan, phase, limit, status):
+    """Returns begin <= n < end of each job and its neighbour (``span``: begin, end, batch): see ``follow_pair``."""
+    k = cuda.grid(1)
+    if k >= jobs.shape[0]:
+        return
+    j = jobs[k]
+    u, clock, counters = place
+    begin, end, batch = span
+    offsets, sums = pair
+    linear, scratch = tabled(point, rows[j])
+    motion = Motion(u[j], u[j, 0:0], clock[j], counters[j])
+    moved = Motion(cuda.local.array(2, float64), u[j, 0:0], cuda.local.array(3, float64), cuda.local.array(4, int64))
+    flow = Flow(linear, Net(*net), phase, 1e300, limit, scratch[0], scratch[1], u[0:0], 1 << 62, jobs)
+    status[j] = follow_pair(begin, end, batch, 0, size, motion, moved, offsets[j], sums[j], flow, plan, single())

@@ -1,0 +1,1 @@
+"""The hybrid loop, its records, and what observes it."""

@@ -1,0 +1,207 @@
+"""The hybrid loop: one trajectory through legs and transitions, over a stepper and an observer.
+
+The *stepper* knows the flow: ``linear.stepper`` (linear modes with harmonic forcing, any number of states) or
+``series.stepper`` (generated Taylor series, Runge-Kutta-Fehlberg). It prepares a point, marches a leg to its first
+crossing, lands there, takes transitions and says which conditions hold just after. The *observer* (``sections``,
+``record`` or ``growth``) says how far to go and looks at each leg and each transition. Their functions stand in the
+text that is joined with this file. Everything else is here: start rule, transitions of one instant in declared order,
+guards of chatter, the clock.
+
+All that a run knows beside its arrays stands in ``work.tally`` and ``work.memo``: it may pause and go on.
+"""
+
+from nonsmooth.kernels.compile.cache import inline, once
+from nonsmooth.kernels.hybrid.codes import (
+    BEYOND_STOP,
+    CHATTER,
+    DIVERGED,
+    NOT_GUARANTEED,
+    OK,
+    PAUSED,
+    TOO_MANY_CROSSINGS,
+)
+from nonsmooth.kernels.hybrid.places import (
+    BEGUN,
+    BURST,
+    BURST_LENGTH,
+    FIRED,
+    JUMPS,
+    MODE,
+    MOST_CROSSINGS,
+    NO_END,
+    PERIODS,
+    RESET,
+    SHORT,
+    SINCE,
+    TIME,
+)
+
+
+@inline
+def next_holding(mode, tables, net, work):
+    """The first outgoing transition (in declared order) whose rows all hold just after the present instant, or -1."""
+    for k in range(net.mode_start[mode], net.mode_start[mode + 1]):
+        if holds(net.mode_list[k], mode, tables, net, work):
+            return net.mode_list[k]
+    return -1
+
+
+@once
+def settle(i, form, net, tables, work):
+    """Start rule: transitions that hold already are taken, each mode at most once; so is an impact that begins there.
+
+    Returns a status: BEYOND_STOP where one with a reset holds and the start does not lie on its surface."""
+    tally, visited = work.tally, work.visited
+    for k in range(visited.shape[0]):
+        visited[k] = 0
+    visited[tally[MODE]] = 1
+    for _ in range(visited.shape[0]):
+        mode, t = tally[MODE], -1
+        for k in range(net.mode_start[mode], net.mode_start[mode + 1]):
+            one = net.mode_list[k]
+            if holds(one, mode, tables, net, work):
+                impact = net.transitions[one, 1] == RESET
+                if impact and lies_beyond(one, form, net, work):
+                    return BEYOND_STOP
+                if visited[net.transitions[one, 0]] == 0 or (impact and net.transitions[one, 0] == mode):
+                    t = one
+                    break
+        if t < 0:
+            break
+        tally[MODE] = take(i, t, -1, form, tables, net, work)
+        visited[tally[MODE]] = 1
+    return OK
+
+
+@once
+def begin(i, form, net, section, motion, tables, work):
+    """State and mode where a run begins, by the start rule. Returns a status."""
+    tally, memo = work.tally, work.memo
+    for k in range(tally.shape[0]):
+        tally[k] = 0
+    for k in range(memo.shape[0]):
+        memo[k] = 0.0
+    tally[BEGUN], tally[MODE] = 1, motion.counters[0]
+    memo[TIME], memo[PERIODS], memo[SINCE] = motion.clock[0], motion.clock[1], NO_END
+    prepare(i, form, motion, tables, work)
+    look(i, form, tables, work, tally[MODE])
+    code = OK
+    if motion.counters[1] != 1:
+        code = settle(i, form, net, tables, work)
+    if section.indicator >= 0:  # a start on the section is no return
+        start_on_section(form, section, tables, work)
+    return code
+
+
+@once
+def land(i, step, stop, t, full, form, net, tables, work):
+    """End a leg: clock and state; ``stop`` is the time at which it ends exactly, or -1.
+
+    Returns (transition, a period has ended, closely behind a crossing)."""
+    memo, T = work.memo, form.period[i]
+    since = memo[SINCE] + step
+    short = since < SHORT * time_scale(i, since, form, tables, work)
+    s = stop if stop >= 0.0 else memo[TIME] + step
+    wrapped = s >= T
+    if wrapped:
+        s -= T
+        memo[PERIODS] += 1.0
+    memo[TIME] = s
+    t = arrive_at(t, since, full, wrapped, form, net, tables, work)
+    memo[SINCE] = 0.0 if t >= 0 else since
+    return t, wrapped, short
+
+
+@once
+def transit(i, t, short, form, net, section, goal, seen, tables, work):
+    """Transition t and those that hold just after it, at the same instant. Returns (status, section direction)."""
+    tally = work.tally
+    mode, code = tally[MODE], OK
+    source, fired, first = mode, tally[FIRED], t
+    approach(mode, fired, seen, tables, work)
+    jumps = 0
+    while t >= 0:
+        if jumps > net.mode_start.shape[0] + 1:  # as many as modes, and three
+            code = CHATTER
+            break
+        mode = take(i, t, fired if jumps == 0 else -1, form, tables, net, work)
+        cross(i, t, mode, jumps, form, net, goal, seen, tables, work)
+        tally[MODE] = mode
+        jumps += 1
+        t = next_holding(mode, tables, net, work)
+    depart(jumps, seen, work)
+    tally[JUMPS] += jumps
+    tally[BURST] = tally[BURST] + 1 if short else 0
+    if tally[BURST] > BURST_LENGTH:
+        code = CHATTER
+    elif tally[JUMPS] > MOST_CROSSINGS:
+        code = TOO_MANY_CROSSINGS
+    sense = 0  # where the section lies on the surface just crossed
+    if section.indicator >= 0 and fired >= 0:
+        if section.mode < 0 or section.mode == (mode if section.after != 0 else source):
+            sense = met(first, fired, form, net, section, work)
+    return code, sense
+
+
+@once
+def march(i, form, net, section, goal, motion, seen, tables, work):
+    """Point i until its goal is reached. Returns a status: PAUSED and LOG_FULL ask to be called again.
+
+    ``work`` then holds where it stands; ``leave`` writes that to the motion."""
+    w, tally, memo = work.w, work.tally, work.memo
+    code = OK
+    if tally[BEGUN] == 0:
+        code = begin(i, form, net, section, motion, tables, work)
+        open_window(i, form, section, seen, tables, work)
+    patience = goal.patience
+    strides = may_stride(i, form, net, section, seen)
+    while code == OK and not reached(goal, work):
+        patience -= 1
+        code = PAUSED if patience < 0 and may_pause(work) else room(seen, work)
+        if code != OK:
+            break
+        ready, clear = False, False
+        if strides:
+            ready, clear, patience = hurry(i, form, net, section, goal, seen, tables, work, patience)
+        stop, timed = NO_END, -1
+        if not strides:
+            stop, timed = next_stop(i, form, net, section, goal, work)
+        wait, rest = stop - memo[TIME], remaining(section, goal, work)
+        step, t, full, sense = leg(i, form, net, section, goal, tables, work, min(wait, rest), ready, clear)
+        if not step >= 0.0:
+            code = DIVERGED
+            break
+        stopped = t < 0 and sense == 0 and step >= wait
+        if stopped and timed >= 0:
+            t = timed
+        state = observe(i, step, stop if stopped else -1.0, t >= 0 and t == timed, form, net, section, goal, seen,
+                        tables, work)  # fmt: skip
+        if state == CLOSED:
+            break
+        source = tally[MODE]
+        ended = step >= rest and t < 0
+        t, wrapped, short = land(i, step, stop if stopped else -1.0, t, full, form, net, tables, work)
+        mark(i, wrapped, ended, t >= 0, step, form, goal, seen, work)
+        if section.indicator >= 0:
+            for j in range(w.shape[0]):
+                work.before[j] = w[j]
+        if t >= 0:
+            code, sense = transit(i, t, short, form, net, section, goal, seen, tables, work)
+        elif sense != 0:
+            touch_section(section, work)
+        if not bounded(work, goal.limit):
+            code = DIVERGED
+        code = arrive(i, code, source, t, sense, state, form, section, goal, seen, tables, work)
+    return NOT_GUARANTEED if code == OK and doubtful(work) else code
+
+
+@once
+def leave(i, form, motion, work):
+    """Write where a run stands to the motion."""
+    T = form.period[i]
+    put_state(motion, work)
+    motion.clock[0] = work.memo[TIME]
+    motion.clock[1] = work.memo[PERIODS]
+    motion.clock[2] = T if T < NO_END else 0.0
+    motion.counters[0] = work.tally[MODE]
+    work.tally[BEGUN] = 0

@@ -1,0 +1,280 @@
+"""Arguments of the kernels by name: each concept's arrays in one named tuple, which costs nothing inside a kernel.
+
+``type_of`` gives the Numba type of a record; the names of types are those of the records in capitals.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from numba import types
+
+__all__ = [
+    "FLOW", "FORM", "GENERATED", "GOAL", "GROWTH", "KEPT", "LOG", "MOTION", "NET", "SECTION", "SERIES_WORK", "TABLES",
+    "WORK",
+    "Flow", "Form", "Generated", "Goal", "Growth", "Kept", "Log", "Motion", "Net", "Section", "SeriesWork",
+    "Tables", "Work", "type_of",
+]  # fmt: skip
+
+_i, _f = types.int64, types.float64
+_f1, _f2, _f3, _f4, _i1, _i2 = _f[::1], _f[:, ::1], _f[:, :, ::1], _f[:, :, :, ::1], _i[::1], _i[:, ::1]
+
+
+def type_of(record: Any, *kinds: Any) -> Any:
+    """The Numba type of a named tuple whose fields have these types."""
+    if len(set(kinds)) == 1:
+        return types.NamedUniTuple(kinds[0], len(kinds), record)
+    return types.NamedTuple(kinds, record)
+
+
+class Form(NamedTuple):
+    """A linear system at P parameter points: modes, indicators, outputs and resets with their harmonics."""
+
+    A: Any  # (P, modes, n, n)
+    b: Any  # (P, modes, n)
+    c: Any  # (P, modes, harmonics, n): of the cosines
+    s: Any  # (P, modes, harmonics, n): of the sines
+    multiples: Any  # (harmonics,) of the base frequency
+    omega: Any  # (P,)
+    period: Any  # (P,), inf where nothing depends on time
+    ia: Any  # (P, indicators, n)
+    ib: Any  # (P, indicators)
+    ic: Any  # (P, indicators, harmonics)
+    is_: Any
+    oa: Any  # (P, outputs, modes, n)
+    ob: Any  # (P, outputs, modes)
+    oc: Any  # (P, outputs, modes, harmonics)
+    os: Any
+    ra: Any  # (P, transitions, n, n)
+    rb: Any  # (P, transitions, n)
+    rc: Any  # (P, transitions, harmonics, n)
+    rs: Any
+    lacking: Any  # (modes, n) 1: memory, or a state that the mode does not have
+
+
+class Tables(NamedTuple):
+    """What ``linear_tables.build`` makes of one point of a ``Form``; shapes are there."""
+
+    prop: Any
+    rot: Any
+    fun: Any
+    tay: Any
+    field: Any
+    info: Any
+    some: Any
+
+
+class Net(NamedTuple):
+    """The net of transitions of a linear system."""
+
+    transitions: Any  # (transitions, 3): target, what it changes (0, or see ``run_places.RESET``), is contact
+    rows: Any  # (rows + 2, 3): functional, sign, strict; the last two belong to the section (rising, falling)
+    row_start: Any  # (transitions + 1,)
+    mode_start: Any  # (modes + 1,)
+    mode_list: Any  # outgoing transitions of each mode in declared order
+    at: Any  # (transitions,) phase of a transition at a time, or -1
+    changed: Any  # (transitions, n + 1) how many states a transition changes, and which
+
+
+class Work(NamedTuple):
+    """Working memory of one running trajectory of a linear system. Vectors are w = (u, 1, cos, sin, ...)."""
+
+    w: Any  # where the present leg begins
+    w1: Any  # at the end of its whole step
+    wn: Any  # at the node last used
+    wp: Any
+    wq: Any
+    end: Any  # at the end of the leg
+    there: Any  # at the crossing just found
+    before: Any  # just before a transition
+    row: Any  # rows of the generator's powers
+    scr: Any  # (rows + n + 1, 8) Taylor polynomials
+    points: Any  # (4,) critical points
+    rates: Any  # (harmonics,)
+    zero: Any  # (indicators,) how many of value, slope and further derivatives are zero just now
+    found: Any  # (4,) see ``linear.search``
+    visited: Any  # (modes,) by the start rule
+    twin: Any  # (indicators,) the state that an indicator is but for a constant, or -1
+    built: Any  # (1,) the point for which the tables stand there already, plus one
+    tally: Any  # counts of the run, at the places of ``hybrid.places``
+    memo: Any  # and times
+
+
+class Generated(NamedTuple):
+    """A system by its generated functions at P parameter points, and the method by which it is marched."""
+
+    functions: Any  # addresses of field, jet, values and jump (see ``generated``)
+    points: Any  # (P, parameters)
+    period: Any  # (P,), inf where nothing depends on time
+    exact_steps: Any  # (P, modes) lengths of exact steps
+    lacking: Any  # (modes, n) 1: a state that the mode has not
+    kinds: Any  # (rows,) of the jets: 1 a polynomial, 0 an output with a corner, -1 - s: it repeats state s
+    weight: Any  # (n,) atol / rtol
+    absolute: Any  # (n,) atol
+    rtol: Any
+    step: Any  # a fixed one, or 0
+    order: Any
+    locate: Any  # 0: transitions are judged at the ends of steps
+    checked: Any  # 1: polynomials are held against the equations
+    corners: Any  # 1: some output has corners
+    nonlinear_rows: Any  # 1: some indicator is not affine, so that an exact step must be watched
+    guards: Any  # rows behind the outputs where a polynomial may miss something
+    indicators: Any
+    outputs: Any
+
+
+class SeriesWork(NamedTuple):
+    """Working memory of one running trajectory of the series stepper."""
+
+    w: Any  # (n,) where the present leg begins
+    end: Any  # at its end
+    before: Any  # just before a transition
+    wp: Any
+    dense: Any
+    q: Any  # parameters, then memory
+    q_new: Any
+    C: Any  # (rows, order + 1) polynomials of the step
+    W: Any  # scratch of the jets
+    J0: Any  # jets at its two ends
+    J1: Any
+    K: Any  # eight vectors: the stages of a Runge-Kutta step
+    powers: Any
+    a: Any  # one polynomial
+    d: Any
+    vals: Any
+    near: Any
+    scale: Any  # (indicators,) size so far
+    measured: Any  # (indicators,) of one that is zero: its rounding
+    side: Any  # (indicators,) sign at the beginning of the step
+    side_next: Any  # and at its end
+    rise: Any  # (rows,) sign of the slope at the end of the step before
+    usual: Any  # (modes,) length of the last step
+    dwell: Any  # (modes,) time spent there the last time
+    visited: Any  # (modes,) by the start rule
+    stack: Any
+    found: Any
+    rest: Any  # (n,) about which it has stayed
+    tally: Any
+    memo: Any
+
+
+class Motion(NamedTuple):
+    """A trajectory's place: left at its end by every kernel."""
+
+    u: Any  # (n,)
+    memory: Any  # (n_memory,)
+    clock: Any  # (3,) time since the period began, periods done, the period in which that time was measured
+    counters: Any  # (4,) mode, and for others what they count
+
+
+class Section(NamedTuple):
+    """The section whose returns are counted, and how long one is waited for."""
+
+    indicator: Any  # -1: at a phase of the forcing
+    rising: Any  # direction 1, -1, or 0 for both
+    mode: Any  # -1: any
+    after: Any  # 1: the state after a transition on the section
+    every: Any  # so many passes are one return
+    extremes: Any  # 1: wanted in the kept window
+    phase: Any  # in periods
+    t_max: Any
+
+
+class Goal(NamedTuple):
+    """When a run is over, and when it has failed or is to pause. A kernel takes of it what it has use for."""
+
+    transient: Any  # section returns that are not kept
+    keep: Any  # and that are; or units of time
+    until: Any  # time
+    unit: Any  # of time, after which logarithms of a frame are put away
+    limit: Any  # (n,) sizes beyond which a state has diverged
+    patience: Any  # steps after which it pauses, to be called again
+
+
+class Kept(NamedTuple):
+    """What is kept of P points of a sweep (see ``flow.engine.Chain``)."""
+
+    section: Any  # (P, keep, n)
+    maximum: Any  # (P, n)
+    minimum: Any
+    i_max: Any  # (P, indicators)
+    i_min: Any
+    o_max: Any  # (P, outputs)
+    o_min: Any
+    crossings: Any  # (P,)
+    contacts: Any
+    elapsed: Any
+    section_time: Any  # (P, keep)
+    section_mode: Any
+    status: Any  # (P,)
+
+
+class Log(NamedTuple):
+    """The record of one trajectory; logs of crossings and touches grow on demand."""
+
+    samples: Any  # instants asked for
+    sample_u: Any
+    sample_memory: Any
+    sample_mode: Any
+    sample_segment: Any
+    crossing_time: Any
+    crossing_transition: Any
+    u_before: Any
+    u_after: Any
+    memory_after: Any
+    touch_time: Any
+    touch_indicator: Any
+    touch_u: Any
+    touch_gap: Any
+    spare: Any  # touches that one leg may add
+
+
+class Growth(NamedTuple):
+    """A frame that follows a trajectory, and how it has grown."""
+
+    scale: Any  # (n,) units of the states
+    frame: Any  # (n, n) directions in these units, in columns
+    growth: Any  # (units of time, n) logarithms
+    lengths: Any  # (n,) not yet in ``growth``
+    sums: Any  # integral of div f, sum of log|det S|, crossings, least |h'| / (|h_u| |u'|) of a crossing
+    step: Any  # (n, n) the matrix of a leg or of the transitions of an instant
+    reset: Any  # (n, n) the derivative of a transition's map
+    matrix: Any  # (n, n) scratch
+    fields: Any  # (3, n) vector field before and after, derivative of the map in time
+    t_z: Any  # (n,) derivative of the instant of a transition in the state
+    scratch: Any  # (n,)
+
+
+class Flow(NamedTuple):
+    """What runs a linear system to a stroboscopic section."""
+
+    form: Any
+    net: Any
+    phase: Any  # of the section, in periods
+    t_max: Any
+    limit: Any  # (n,) sizes beyond which a state has diverged
+    tables: Any
+    work: Any
+    starts: Any  # (0, n): runs go on from a ``Motion``
+    patience: Any  # steps between two looks at the flag
+    stop: Any  # (1,) not zero: the work is not wanted any more
+
+
+FORM = type_of(
+    Form, _f4, _f3, _f4, _f4, _i1, _f1, _f1, _f3, _f2, _f3, _f3, _f4, _f3, _f4, _f4, _f4, _f3, _f4, _f4, _i2
+)  # fmt: skip
+TABLES = type_of(Tables, _f4, _f3, _f3, _f4, _f3, _f2, _i[:, :, :, ::1])
+NET = type_of(Net, _i2, _i2, _i1, _i1, _i1, _f1, _i2)
+WORK = type_of(Work, *[_f1] * 8, _f2, _f2, _f1, _f1, *[_i1] * 6, _f1)
+GENERATED = type_of(Generated, _i1, _f2, _f1, _f2, _i2, _i1, _f1, _f1, _f, _f, *[_i] * 8)
+SERIES_WORK = type_of(
+    SeriesWork, *[_f1] * 7, *[_f2] * 4, types.UniTuple(_f1, 8), *[_f1] * 7, *[_i1] * 3, _f1, _f1, _i1, _f1, _i1, _f1,
+    _i1, _f1,
+)  # fmt: skip
+MOTION = type_of(Motion, _f1, _f1, _f1, _i1)
+SECTION = type_of(Section, *[_i] * 6, _f, _f)
+FLOW = type_of(Flow, FORM, NET, _f, _f, _f1, TABLES, WORK, _f2, _i, _i1)
+GOAL = type_of(Goal, _i, _i, _f, _f, _f1, _i)
+KEPT = type_of(Kept, _f3, *[_f2] * 6, _i1, _i1, _f1, _f2, _i2, _i1)
+LOG = type_of(Log, _f1, _f2, _f2, _i1, _i1, _f1, _i1, _f2, _f2, _f2, _f1, _i1, _f2, _f1, _i)
+GROWTH = type_of(Growth, _f1, _f2, _f2, _f1, _f1, _f2, _f2, _f2, _f2, _f1, _f1)

@@ -1,0 +1,282 @@
+"""Observer of section returns: points of a sweep one after the other, with extremes and counts of the kept window.
+
+Of ``transient`` + ``keep`` returns the last ones are kept. The window reaches from the last transient return (or the
+start) to the last kept one; its end is where a carried state goes on.
+"""
+
+from math import fabs, inf
+
+from numba import types
+
+from nonsmooth.kernels.compile.cache import inline, kernel, once
+from nonsmooth.kernels.hybrid.codes import NO_CONVERGENCE, NOT_GUARANTEED, OK, PAUSED
+from nonsmooth.kernels.hybrid.loop import leave, march
+from nonsmooth.kernels.hybrid.places import (
+    BEGUN,
+    JUMPS,
+    MODE,
+    MOST_STEPS,
+    NO_END,
+    PASSES,
+    PERIODS,
+    RETURNS,
+    SINCE,
+    TIME,
+    TRIES,
+    WAITED,
+)
+from nonsmooth.kernels.hybrid.records import GOAL, KEPT, MOTION, NET, SECTION
+from nonsmooth.kernels.linear.extremes import finish, include, widen
+from nonsmooth.kernels.linear.stepper import (
+    STEPPER,
+    at_rest,
+    n_states,
+    note_side,
+    state_at,
+    steps_at_a_stride,
+    stride,
+)
+
+OPEN_RUN, LATE, CLOSED = 0, 1, 2
+
+
+@once
+def stroboscopic_hit(s, s1, target, period):
+    """Time after s at which the section phase is met within (s, s1], or -1; judged on the clock: none counts twice."""
+    if s < target and target <= s1:
+        return target - s
+    if s < target + period and target + period <= s1:
+        return target + period - s
+    return -1.0
+
+
+@once
+def forget(i, kept):
+    """Begin the extremes of point i."""
+    for k in range(kept.maximum.shape[1]):
+        kept.maximum[i, k], kept.minimum[i, k] = -inf, inf
+    for k in range(kept.i_max.shape[1]):
+        kept.i_max[i, k], kept.i_min[i, k] = -inf, inf
+    for k in range(kept.o_max.shape[1]):
+        kept.o_max[i, k], kept.o_min[i, k] = -inf, inf
+
+
+@once
+def open_window(i, form, section, seen, tables, work):
+    """Begin the counts of point i."""
+    forget(i, seen)
+    seen.crossings[i] = 0
+    seen.contacts[i] = 0
+    seen.elapsed[i] = 0.0
+
+
+@once
+def reached(goal, work):
+    """Whether the run is over."""
+    return work.tally[RETURNS] >= goal.transient + goal.keep
+
+
+@once
+def room(seen, work):
+    """Nothing is logged."""
+    return OK
+
+
+@once
+def remaining(section, goal, work):
+    """Time for which a return to a surface is waited still."""
+    return section.t_max - work.memo[WAITED] if section.indicator >= 0 else NO_END
+
+
+@once
+def may_stride(i, form, net, section, seen):
+    """Whether whole steps may be made at a stride."""
+    return steps_at_a_stride(i, form, net, section)
+
+
+@once
+def watched(section, goal, work):
+    """Whether extremes on the leg are wanted."""
+    return section.extremes != 0 and work.tally[RETURNS] >= goal.transient
+
+
+@once
+def next_is_edge(section, goal, work):
+    """Whether the next pass of the section opens or closes the kept window."""
+    if (work.tally[PASSES] + 1) % section.every != 0:
+        return False
+    returns = work.tally[RETURNS] + 1
+    return returns == goal.transient or returns == goal.transient + goal.keep
+
+
+@once
+def hurry(i, form, net, section, goal, seen, tables, work, patience):
+    """Whole steps without crossings, where extremes need not be seen. Returns (w1 stands at the end of the step that is
+    next, that step is clear, patience left)."""
+    tally, memo = work.tally, work.memo
+    returns = tally[RETURNS]
+    if not (returns < goal.transient or section.extremes == 0):
+        return False, False, patience
+    T = form.period[i]
+    began, turns = memo[TIME], memo[PERIODS]
+    s, whole, counted, clear, patience = stride(
+        tables, net, work, tally[MODE], began, turns, section.phase * T, T, returns,
+        goal.transient if returns < goal.transient else 0, patience,
+    )  # fmt: skip
+    if counted > returns:
+        tally[RETURNS] = counted
+        tally[JUMPS] = 0
+    if s != began or whole != turns:
+        memo[SINCE] = 1e300
+        if counted >= goal.transient:
+            seen.elapsed[i] += (whole - turns) * T + (s - began)
+        memo[TIME], memo[PERIODS] = s, whole
+    return True, clear, patience
+
+
+@inline
+def keep_point(i, k, u, mode, time, seen, work):
+    """The k-th kept point of the section."""
+    for j in range(n_states(work)):
+        seen.section[i, k, j] = u[j]
+    seen.section_mode[i, k] = mode
+    seen.section_time[i, k] = time
+
+
+@once
+def observe(i, step, stop, triggered, form, net, section, goal, seen, tables, work):
+    """Returns at a phase of the forcing on the leg, and extremes of its part in the kept window.
+
+    CLOSED: the last return, where the run ends. LATE: a transition at the section's own phase comes first; a run that
+    ends here goes on behind it."""
+    tally, memo = work.tally, work.memo
+    s, T = memo[TIME], form.period[i]
+    is_open = tally[RETURNS] >= goal.transient
+    a, b, state = 0.0, step, OPEN_RUN
+    if section.indicator < 0:
+        target = section.phase * T
+        after = stop if stop >= 0.0 else s + step
+        r = stroboscopic_hit(s, after, target, T)
+        if r >= step and triggered:
+            state = LATE
+        elif r >= 0.0:
+            r = min(r, step)
+            tally[RETURNS] += 1
+            tally[JUMPS], tally[TRIES] = 0, 0
+            if is_open:
+                state_at(r, form, tables, work, work.wp)
+                turn = memo[PERIODS] if s < target and target <= after else memo[PERIODS] + 1.0
+                keep_point(i, tally[RETURNS] - goal.transient - 1, work.wp, tally[MODE], turn * T + target, seen, work)
+                if reached(goal, work):
+                    state, b = CLOSED, r
+                    memo[PERIODS] = turn
+            elif tally[RETURNS] == goal.transient:
+                is_open, a = True, r
+    if is_open:
+        if section.extremes != 0:
+            widen(i, a, b, form, tables, work, seen)
+        seen.elapsed[i] += b - a
+    if state == CLOSED:
+        memo[TIME] = section.phase * T
+        for j in range(n_states(work)):
+            work.w[j] = seen.section[i, goal.keep - 1, j]
+    return state
+
+
+@once
+def mark(i, wrapped, ended, crossed, step, form, goal, seen, work):
+    """Count a leg."""
+    work.memo[WAITED] += step
+    work.tally[TRIES] += 1
+
+
+@once
+def approach(mode, fired, seen, tables, work):
+    """Nothing is asked of a crossing before it is made."""
+
+
+@once
+def cross(i, t, mode, jumps, form, net, goal, seen, tables, work):
+    """Count a transition in the kept window."""
+    if work.tally[RETURNS] >= goal.transient:
+        seen.crossings[i] += 1
+        seen.contacts[i] += net.transitions[t, 2]
+        include(i, mode, form, tables, work, seen)
+
+
+@once
+def depart(jumps, seen, work):
+    """Nothing is asked of a crossing after it was made."""
+
+
+@once
+def arrive(i, code, source, t, sense, state, form, section, goal, seen, tables, work):
+    """Returns at the end of a leg: on a surface, or behind a transition at the section's phase. Gives the status."""
+    tally, memo, T = work.tally, work.memo, form.period[i]
+    mode = tally[MODE]
+    if sense != 0:
+        tally[PASSES] += 1
+        tally[TRIES] = 0
+        tally[JUMPS] = 0
+        memo[WAITED] = 0.0
+        if tally[PASSES] % section.every == 0:
+            tally[RETURNS] += 1
+            if tally[RETURNS] > goal.transient:
+                after = section.after != 0 or t < 0
+                time = (memo[PERIODS] * T if T < NO_END else 0.0) + memo[TIME]
+                keep_point(
+                    i, tally[RETURNS] - goal.transient - 1, work.w if after else work.before, mode if after else source,
+                    time, seen, work,
+                )  # fmt: skip
+    if state == LATE and code == OK:
+        memo[TIME] = section.phase * T
+        tally[RETURNS] += 1
+        tally[JUMPS] = 0
+        if tally[RETURNS] > goal.transient:
+            keep_point(
+                i, tally[RETURNS] - goal.transient - 1, work.w, mode, memo[PERIODS] * T + memo[TIME], seen, work
+            )  # fmt: skip
+    if section.indicator >= 0:
+        note_side(t, sense, section, tables, work)
+        waited = memo[WAITED] >= section.t_max * (1.0 - 1e-12)
+        if code == OK and (waited or memo[WAITED] > 1e100 or at_rest(form, section, tables, work)):
+            code = NO_CONVERGENCE
+    if code == OK and tally[TRIES] > MOST_STEPS:
+        code = NO_CONVERGENCE
+    return code
+
+
+@kernel(types.int64(
+    types.int64, types.int64, types.float64[:, ::1], STEPPER[0], NET, SECTION, GOAL, MOTION, KEPT, *STEPPER[1:]
+))  # fmt: skip
+def chain(first, last, starts, form, net, section, goal, motion, seen, tables, work):
+    """Run points first <= i < last into ``seen``; returns the point that has paused, or ``last``.
+
+    Without ``starts`` each point goes on from where the last good one ended, at equal phase of the forcing; else it
+    begins at its own row of them (states, memory), in the first mode. A point that fails leaves the motion where it
+    was."""
+    for i in range(first, last):
+        T = form.period[i]
+        if work.tally[BEGUN] == 0:
+            if starts.shape[0] > 0:
+                for j in range(motion.u.shape[0]):
+                    motion.u[j] = starts[i, j]
+                for j in range(motion.memory.shape[0]):
+                    motion.memory[j] = starts[i, motion.u.shape[0] + j]
+                motion.counters[0], motion.counters[1] = 0, 0
+                motion.clock[0], motion.clock[1], motion.clock[2] = 0.0, 0.0, 0.0
+            elif motion.clock[2] > 0.0:
+                motion.clock[0] = motion.clock[0] / motion.clock[2] * T
+                if fabs(motion.clock[0] - section.phase * T) <= 1e-12 * T:  # else rounding would count it once more
+                    motion.clock[0] = section.phase * T
+                motion.clock[2] = T if T < NO_END else 0.0
+        code = march(i, form, net, section, goal, motion, seen, tables, work)
+        if code == PAUSED:
+            return i
+        work.tally[BEGUN] = 0
+        motion.counters[1] = 0
+        finish(i, form, tables, work, seen)
+        seen.status[i] = code
+        if code == OK or code == NOT_GUARANTEED:
+            leave(i, form, motion, work)
+    return last

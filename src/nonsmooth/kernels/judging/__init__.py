@@ -1,0 +1,1 @@
+"""Period numbers, transient-judge-perturb cycles, exponents of two neighbours."""

@@ -1,0 +1,112 @@
+"""True extremes of states, indicators and outputs over the kept window of a trajectory.
+
+A step that certainly does not leave the extremes so far costs a dozen multiplications per functional; else the step
+is halved down to two node spacings, where the polynomial's critical points decide.
+"""
+
+from nonsmooth.kernels.compile.cache import device, inline, once
+from nonsmooth.kernels.hybrid.places import MODE
+from nonsmooth.kernels.linear.polynomial import NEVER, THIRD, classify, critical_points, horner
+from nonsmooth.kernels.linear.search import bound_at, compose, slope_of, to_node, value_of
+from nonsmooth.kernels.linear.tables import MEMORY, NODES, ONE, OWN, STATES
+
+
+@device
+def locate_maximum(tables, work, mode, f, sign, a, b, best):
+    """The larger of ``best`` and the maximum of sign * functional over [a, b] of the step, piece by piece."""
+    spacing = tables.info[mode, 1]
+    w, wn, wq, scr, points = work.w, work.wn, work.wq, work.scr, work.points
+    bound = bound_at(tables, mode, f, w)
+    size = NODES // 4
+    node = min(int(a / spacing) // size * size, NODES - size)
+    while node < NODES and node * spacing <= b:
+        to_node(tables, mode, node, w, wn)
+        to_node(tables, mode, node + size, w, wq)
+        g0 = sign * value_of(tables, mode, f, wn) - best
+        g1 = sign * value_of(tables, mode, f, wq) - best
+        s0 = sign * slope_of(tables, mode, f, wn)
+        s1 = sign * slope_of(tables, mode, f, wq)
+        if classify(g0, s0, g1, s1, size * spacing, bound) != NEVER:
+            if size > 2:
+                size //= 2
+                continue
+            to_node(tables, mode, node + 1, w, wn)
+            compose(tables, mode, f, wn, scr, 0)
+            lo = max(a - (node + 1) * spacing, -spacing)
+            hi = min(b - (node + 1) * spacing, spacing)
+            if lo <= hi:
+                n = critical_points(scr, 0, lo, hi, points)
+                best = max(best, sign * horner(scr, 0, lo), sign * horner(scr, 0, hi))
+                for k in range(n):
+                    best = max(best, sign * horner(scr, 0, points[k]))
+        node += size
+        while size < NODES // 4 and node % (2 * size) == 0:
+            size *= 2
+    return best
+
+
+@inline
+def exceeds(tables, mode, f, w, w1, lowest, highest):
+    """Whether functional f may leave [lowest, highest] on the step from w to w1: (below, above)."""
+    g0 = value_of(tables, mode, f, w)
+    g1 = value_of(tables, mode, f, w1)
+    h = tables.info[mode, 0]
+    b1 = g0 + h * slope_of(tables, mode, f, w) * THIRD
+    b2 = g1 - h * slope_of(tables, mode, f, w1) * THIRD
+    c1 = 0.25 * (g0 + 3.0 * b1)
+    c2 = 0.5 * (b1 + b2)
+    c3 = 0.25 * (3.0 * b2 + g1)
+    h2 = h * h
+    wide = bound_at(tables, mode, f, w) * h2 * h2 * (1.0 / 144.0)
+    below = min(min(min(g0, g1), min(c1, c3)), c2 - wide) < lowest
+    above = max(max(max(g0, g1), max(c1, c3)), c2 + wide) > highest
+    return below, above
+
+
+@inline
+def extremes_of(f, kept, n_i):
+    """Maxima and minima in which those of functional f are kept, and its column there."""
+    if f < n_i:
+        return kept.i_max, kept.i_min, f
+    if f < n_i + STATES:
+        return kept.maximum, kept.minimum, f - n_i
+    return kept.o_max, kept.o_min, f - n_i - STATES
+
+
+@once
+def widen(i, a, b, form, tables, work, kept):
+    """Extend the extremes of point i by the piece [a, b] of a leg."""
+    n_i, mode = work.zero.shape[0], work.tally[MODE]
+    for f in range(tables.fun.shape[1]):
+        if f < n_i and work.twin[f] >= 0:
+            continue  # a state but for a constant: see ``finish``
+        if MEMORY > 0 and n_i + OWN <= f < n_i + STATES:
+            continue
+        hi, lo, k = extremes_of(f, kept, n_i)
+        below, above = exceeds(tables, mode, f, work.w, work.w1, lo[i, k], hi[i, k])
+        if above:
+            hi[i, k] = locate_maximum(tables, work, mode, f, 1.0, a, b, hi[i, k])
+        if below:
+            lo[i, k] = -locate_maximum(tables, work, mode, f, -1.0, a, b, -lo[i, k])
+
+
+@once
+def finish(i, form, tables, work, kept):
+    """Extremes of the indicators that are a state but for a constant."""
+    for f in range(work.zero.shape[0]):
+        if work.twin[f] >= 0:
+            kept.i_max[i, f] = kept.maximum[i, work.twin[f]] + tables.fun[0, f, ONE]
+            kept.i_min[i, f] = kept.minimum[i, work.twin[f]] + tables.fun[0, f, ONE]
+
+
+@once
+def include(i, mode, form, tables, work, kept):
+    """Extend the extremes of point i by the present instant."""
+    n_i = work.zero.shape[0]
+    for f in range(tables.fun.shape[1]):
+        if MEMORY > 0 and n_i + OWN <= f < n_i + STATES:
+            continue
+        hi, lo, k = extremes_of(f, kept, n_i)
+        value = value_of(tables, mode, f, work.w)
+        hi[i, k] = max(hi[i, k], value)
+        lo[i, k] = min(lo[i, k], value)

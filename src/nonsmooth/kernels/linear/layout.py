@@ -1,0 +1,25 @@
+"""Working memory of the kernels of the exact flow."""
+
+import numpy as np
+
+from nonsmooth.kernels.compile.block import one_block
+from nonsmooth.kernels.hybrid.places import N_MEMO, N_TALLY
+from nonsmooth.kernels.hybrid.records import Tables, Work
+from nonsmooth.kernels.linear.search import WIDTH
+from nonsmooth.kernels.linear.tables import DEGREE, HARMONICS, MANY, NODES, STATES, TERMS, M
+
+
+def scratch(n_modes, n_indicators, n_outputs, n_rows):
+    """Tables and working memory for one thread, in one block."""
+    n_f = n_indicators + STATES + n_outputs
+    vectors = [np.zeros(M) for _ in range(8)]
+    integers = [np.zeros(n, dtype=np.int64) for n in (n_indicators, 4, n_modes, n_indicators, 1, N_TALLY)]
+    block = one_block(
+        np.zeros((n_modes, NODES + 1, M, STATES)), np.zeros((n_modes, NODES + 1, 2 * HARMONICS + 1)),
+        np.zeros((n_modes, n_f, 2 * (M + STATES + 1))), np.zeros((n_modes, n_f, M, DEGREE + 1)),
+        np.zeros((n_modes, STATES, M)), np.zeros((n_modes, 2 + STATES)),
+        np.zeros((n_modes, n_f, 2, M + 1) if STATES >= MANY else (1, 1, 1, 1), dtype=np.int64),
+        *vectors, np.zeros((max(TERMS, STATES) + 1, M)), np.zeros((n_rows + STATES + 1, WIDTH)), np.zeros(4),
+        np.zeros(HARMONICS), *integers, np.zeros(N_MEMO),
+    )  # fmt: skip
+    return Tables(*block[:7]), Work(*block[7:])

@@ -1,0 +1,37 @@
+"""The kernels of the exact flow for given numbers of states, harmonics and values in memory."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from types import ModuleType
+
+from nonsmooth.kernels.compile.assembly import joined, with_numbers
+from nonsmooth.kernels.compile.cache import load_module
+
+__all__ = ["STEPPER", "linear_module", "settle_module"]
+
+STEPPER = ("linear.tables", "linear.polynomial", "linear.search", "linear.stepper", "linear.layout", "hybrid.loop")
+OBSERVERS = {
+    "sections": ("linear.extremes", "hybrid.sections"),
+    "record": ("linear.touches", "hybrid.every_step", "hybrid.record"),
+    "growth": ("hybrid.every_step", "hybrid.growth"),
+}
+
+
+@cache
+def linear_module(states: int, harmonics: int, observer: str = "sections", memory: int = 0) -> ModuleType:
+    """The module for ``states`` >= 1 (the last ``memory`` of them being that) and ``harmonics`` >= 0
+    harmonics, with ``scratch`` and one observer's kernel: ``chain`` (sections), ``record`` or ``grow`` (growth)."""
+    text = joined((*STEPPER, *OBSERVERS[observer]))
+    text = with_numbers(text, {"STATES": states, "HARMONICS": harmonics, "MEMORY": memory})
+    return load_module(text, f"linear_{observer}_{states}_{harmonics}" + (f"_{memory}" if memory else ""))
+
+
+@cache
+def settle_module(states: int, harmonics: int) -> ModuleType:
+    """The module with ``settle_many`` over the kernels of those numbers of states and harmonics."""
+    below = linear_module(states, harmonics).__name__
+    taken = r"^from nonsmooth\.kernels\.(?:hybrid\.sections|linear\.tables) import"
+    text = re.sub(taken, f"from {below} import", joined(("linear.many",)), flags=re.MULTILINE)
+    return load_module(text, f"linear_many_{states}_{harmonics}")

@@ -1,0 +1,472 @@
+"""The stepper of the exact flow: legs of linear modes with harmonic forcing, landing, jumps and after-limits.
+
+A leg is one step of the mode, or its part up to the first crossing, section return or stop. ``work.w`` holds
+(u_1, ..., u_n, 1, cos k_1 w t, sin k_1 w t, ...); times count from the start of the forcing period.
+"""
+
+from math import cos, fabs, isfinite, sin
+
+from nonsmooth.kernels.compile.cache import device, inline, once
+from nonsmooth.kernels.compile.lanes import dot, sizes
+from nonsmooth.kernels.hybrid.places import FIRED, MODE, NO_END, TIME
+from nonsmooth.kernels.hybrid.records import FORM, TABLES, WORK
+from nonsmooth.kernels.linear.search import (
+    FUNCTIONAL,
+    NEVER,
+    NODE,
+    SIDE,
+    bound_at,
+    classify,
+    dense,
+    search,
+    slope_of,
+    to_node,
+    turn,
+    value_of,
+)
+from nonsmooth.kernels.linear.tables import HARMONICS, MANY, MEMORY, NODES, ONE, OWN, STATES, WAVE, M, build
+
+EPS = 2.3e-16
+STEPPER = FORM, TABLES, WORK  # the types of this stepper's records: model, tables, work
+
+
+@inline
+def set_phase(work, s):
+    """Harmonics of the forcing at the time s in the period."""
+    w, rates = work.w, work.rates
+    for h in range(HARMONICS):
+        w[WAVE + 2 * h] = cos(rates[h] * s)
+        w[WAVE + 1 + 2 * h] = sin(rates[h] * s)
+
+
+@inline
+def wrap_phase(tables, work, mode, s):
+    """Harmonics of the forcing at a time s shorter than a step of the mode, from its table: no drift over periods."""
+    w, rates, rot = work.w, work.rates, tables.rot
+    spacing = tables.info[mode, 1]
+    node = min(int(s / spacing + 0.5), NODES)
+    local = s - node * spacing
+    for h in range(HARMONICS):
+        c, s_ = turn(rates[h] * local, rot[mode, node, 2 * h], rot[mode, node, 2 * h + 1])
+        w[WAVE + 2 * h] = c
+        w[WAVE + 1 + 2 * h] = s_
+
+
+@inline
+def rounding(tables, mode, f, at, w):
+    """Below this the row fun[mode, f, at:] is zero within rounding at w."""
+    total = 0.0
+    if STATES >= MANY:
+        total = sizes(total, tables.fun[mode, f], at, w, M)
+    else:
+        for j in range(M):
+            total += fabs(tables.fun[mode, f, at + j] * w[j])
+    return 16.0 * EPS * total
+
+
+@inline
+def flat(tables, mode, f, w):
+    """Whether the slope of functional f is zero within rounding at w."""
+    return fabs(slope_of(tables, mode, f, w)) <= rounding(tables, mode, f, M, w)
+
+
+@device
+def vanishing(tables, mode, f, w):
+    """(k, sign): the first derivative of functional f from the second on that is not zero within rounding at w.
+
+    Of those up to the fourth; (5, 0) where they vanish all."""
+    tay = tables.tay
+    for k in range(2, 5):
+        total = tay[mode, f, ONE, k]
+        size = fabs(total)
+        for j in range(M):
+            if j != ONE:
+                total += tay[mode, f, j, k] * w[j]
+                size += fabs(tay[mode, f, j, k] * w[j])
+        if fabs(total) > 64.0 * EPS * size:
+            return k, 1 if total > 0.0 else -1
+    return 5, 0
+
+
+@inline
+def mark_zeros(tables, work, mode):
+    """Of each indicator, how many of its value, slope and further derivatives vanish within rounding at w.
+
+    Two where a stick ends, three where a contact lifts off: what is rounding there must not decide. At a crossing w
+    carries the rounding of the step that led there: it decides where an indicator has no constant part, such as that of
+    a stop at x = 0."""
+    w, zero = work.w, work.zero
+    step = 0.0
+    for k in range(tables.info.shape[0]):
+        step = max(step, tables.info[k, 0])
+    for f in range(zero.shape[0]):
+        noise = rounding(tables, mode, f, 0, w) + 0.25 * step * rounding(tables, mode, f, M, w)
+        zero[f] = 1 if fabs(value_of(tables, mode, f, w)) <= noise else 0
+        if zero[f] != 0 and flat(tables, mode, f, w):
+            zero[f], _ = vanishing(tables, mode, f, w)
+
+
+@inline
+def sign_after(tables, work, mode, f):
+    """Sign (-1, 0, 1) of functional f just after w along the mode: its value's, or its first non-zero derivative's."""
+    w, zero = work.w, work.zero
+    if f >= zero.shape[0] or zero[f] == 0:
+        return 1 if value_of(tables, mode, f, w) > 0.0 else -1
+    if not flat(tables, mode, f, w):
+        return 1 if slope_of(tables, mode, f, w) > 0.0 else -1
+    _, sign = vanishing(tables, mode, f, w)
+    return sign
+
+
+@inline
+def holds(t, mode, tables, net, work):
+    """Whether all rows of transition t hold just after the present instant."""
+    rows = net.rows
+    lo = net.row_start[t]
+    hi = net.row_start[t + 1]
+    holds = lo < hi
+    for r in range(lo, hi):
+        sign = sign_after(tables, work, mode, rows[r, 0]) * rows[r, 1]
+        if sign < 0 or (sign == 0 and rows[r, 2] != 0):
+            holds = False
+            break
+    return holds
+
+
+@once
+def lies_beyond(t, form, net, work):
+    """Whether no indicator of transition t is zero at the present instant."""
+    beyond = True
+    for r in range(net.row_start[t], net.row_start[t + 1]):
+        beyond = beyond and work.zero[net.rows[r, 0]] == 0
+    return beyond
+
+
+@once
+def prepare(i, form, motion, tables, work):
+    """Tables of point i, and where the motion is."""
+    build(i, form, tables, work)
+    w = work.w
+    for j in range(OWN):
+        w[j] = motion.u[j]
+    for j in range(MEMORY):
+        w[OWN + j] = motion.memory[j]
+    w[ONE] = 1.0
+    set_phase(work, motion.clock[0])
+
+
+@inline
+def look(i, form, tables, work, mode):
+    """What holds just after the present instant is judged from here on."""
+    mark_zeros(tables, work, mode)
+
+
+@once
+def start_on_section(form, section, tables, work):
+    """The sign of the section's functional where a run begins."""
+    work.found[SIDE] = sign_after(tables, work, work.tally[MODE], section.indicator)
+
+
+@inline
+def mapped(i, t, r, form, w):
+    """State r behind transition t."""
+    total = form.rb[i, t, r]
+    if STATES >= MANY:
+        total = dot(total, form.ra[i, t, r], 0, w, STATES)
+    else:
+        for j in range(STATES):
+            total += form.ra[i, t, r, j] * w[j]
+    for h in range(HARMONICS):
+        total += form.rc[i, t, h, r] * w[WAVE + 2 * h] + form.rs[i, t, h, r] * w[WAVE + 1 + 2 * h]
+    return total
+
+
+@inline
+def apply_map(i, t, form, net, work):
+    """The states behind transition t, into w; of many only those that it changes are looked at."""
+    w, wn = work.w, work.wn
+    if STATES >= MANY:
+        for q in range(1, net.changed[t, 0] + 1):
+            wn[net.changed[t, q]] = mapped(i, t, net.changed[t, q], form, w)
+        for q in range(1, net.changed[t, 0] + 1):
+            w[net.changed[t, q]] = wn[net.changed[t, q]]
+    else:
+        for r in range(STATES):
+            wn[r] = mapped(i, t, r, form, w)
+        for r in range(STATES):
+            w[r] = wn[r]
+
+
+@inline
+def take(i, t, fired, form, tables, net, work):
+    """Take transition t (its functional ``fired`` has just crossed; -1: a time trigger). Returns the new mode.
+
+    What has crossed is zero, also behind a reset that leaves it where it was. ``work.wp`` keeps w just before."""
+    w, wp, zero = work.w, work.wp, work.zero
+    for j in range(M):
+        wp[j] = w[j]
+    mode = net.transitions[t, 0]
+    if net.transitions[t, 1] != 0:
+        off = fabs(value_of(tables, mode, fired, w)) if fired >= 0 else 0.0
+        apply_map(i, t, form, net, work)
+        if fired >= 0 and fabs(value_of(tables, mode, fired, w)) > 2.0 * off:
+            fired = -1
+    mark_zeros(tables, work, mode)
+    if fired >= 0:
+        zero[fired] = 1
+        if flat(tables, mode, fired, w):
+            zero[fired], _ = vanishing(tables, mode, fired, w)
+    return mode
+
+
+@once
+def next_stop(i, form, net, section, goal, work):
+    """Time of the next time-triggered transition of the mode, and that transition (-1: none)."""
+    period, s, mode = form.period[i], work.memo[TIME], work.tally[MODE]
+    stop = NO_END
+    which = -1
+    for k in range(net.mode_start[mode], net.mode_start[mode + 1]):
+        t = net.mode_list[k]
+        if net.at[t] >= 0.0:
+            r = net.at[t] * period
+            if r <= s:
+                r += period
+            if r < stop:
+                stop = r
+                which = t
+    return stop, which
+
+
+@once
+def clear_step(tables, net, work, mode):
+    """Whether no transition can fire on the whole step from w to w1: each has a row that certainly stays <= 0."""
+    w, w1, zero, rows = work.w, work.w1, work.zero, net.rows
+    clear = True
+    for k in range(net.mode_start[mode], net.mode_start[mode + 1]):
+        t = net.mode_list[k]
+        blocked = False
+        for r in range(net.row_start[t], net.row_start[t + 1]):
+            f = rows[r, 0]
+            sign = float(rows[r, 1])
+            g0 = sign * value_of(tables, mode, f, w)
+            if zero[f] != 0:
+                g0 = 0.0
+            g1 = sign * value_of(tables, mode, f, w1)
+            s0 = sign * slope_of(tables, mode, f, w)
+            s1 = sign * slope_of(tables, mode, f, w1)
+            if zero[f] >= 2:
+                s0 = 0.0
+            if classify(g0, s0, g1, s1, tables.info[mode, 0], bound_at(tables, mode, f, w)) == NEVER:
+                blocked = True
+                break
+        if not blocked:
+            clear = False
+            break
+    return clear
+
+
+@once
+def stride(tables, net, work, mode, s, whole, target, period, returns, most, patience):
+    """Whole steps without crossings, past section phases, as long as ``returns`` < ``most``; ``patience`` of them.
+
+    Returns (s, whole, returns, clear, patience left); w1 then stands at the end of the step that is not clear, or that
+    would be one return too many (``clear``: no transition on it)."""
+    w, w1 = work.w, work.w1
+    step = tables.info[mode, 0]
+    to_node(tables, mode, NODES, w, w1)
+    clear = False
+    while patience > 0 and clear_step(tables, net, work, mode):
+        patience -= 1
+        after = s + step
+        if (s < target and target <= after) or (s < target + period and target + period <= after):
+            if returns + 1 >= most:
+                clear = True
+                break
+            returns += 1
+        s = after
+        for j in range(M):
+            w[j] = w1[j]
+        if s >= period:
+            s -= period
+            whole += 1.0
+            wrap_phase(tables, work, mode, s)
+            lost = False
+            for r in range(STATES):
+                lost = lost or not fabs(w[r]) < 1e300
+            if lost:
+                break
+        for f in range(work.zero.shape[0]):
+            work.zero[f] = 0
+        to_node(tables, mode, NODES, w, w1)
+    return s, whole, returns, clear, patience
+
+
+@once
+def steps_at_a_stride(i, form, net, section):
+    """Whether whole steps may be made at a stride: nothing but a crossing can end one."""
+    strides = section.indicator < 0 and form.period[i] < NO_END
+    for k in range(net.at.shape[0]):
+        strides = strides and net.at[k] < 0.0
+    return strides
+
+
+@once
+def leg(i, form, net, section, goal, tables, work, r_max, ready, clear):
+    """March one step of the mode, or less: to r_max, or to the first crossing or section return.
+
+    w1 stands at the end of the whole step (``ready``: it does so already; ``clear``: and nothing happens on it),
+    ``end`` at the leg's end where that is shorter (the third number returned tells). Returns (time marched, transition
+    or -1, whole step or not, section direction or 0).
+    """
+    w, w1, end, there, found, rows = work.w, work.w1, work.end, work.there, work.found, net.rows
+    mode = work.tally[MODE]
+    found[NODE] = -1
+    step = tables.info[mode, 0]
+    if clear:
+        return step, -1, True, 0
+    if not ready:
+        to_node(tables, mode, NODES, w, w1)
+    best = min(step, r_max)
+    fired = -1
+    crossed = 0
+    functional = -1
+    n_rows = rows.shape[0]
+    start = net.mode_start[mode]
+    n_own = net.mode_start[mode + 1] - start
+    n_all = n_own + 2 if section.indicator >= 0 and (section.mode < 0 or section.mode == mode) else n_own
+    for k in range(n_all):
+        t = -1
+        sense = 0
+        if k < n_own:
+            t = net.mode_list[start + k]
+            lo = net.row_start[t]
+            hi = net.row_start[t + 1]
+        else:
+            sense = 1 - 2 * (k - n_own)
+            lo = n_rows - 2 + k - n_own
+            hi = lo + 1
+        if lo == hi or section.rising * sense < 0:
+            continue
+        tau = search(tables, work, mode, rows, lo, hi, sense * found[SIDE] > 0, best)
+        if tau >= 0.0 and (tau < best or (fired < 0 and crossed == 0 and tau <= best)):
+            best = tau
+            fired = t
+            crossed = sense
+            functional = found[FUNCTIONAL]
+            for j in range(M):
+                end[j] = there[j]
+    work.tally[FIRED] = functional
+    whole = fired < 0 and crossed == 0 and r_max >= step
+    if not whole and functional < 0:
+        dense(tables, work, mode, best, end)
+    return best, fired, whole, crossed
+
+
+@once
+def time_scale(i, since, form, tables, work):
+    """The time beside which crossings are close to each other."""
+    return tables.info[work.tally[MODE], 0]
+
+
+@once
+def arrive_at(t, since, full, wrapped, form, net, tables, work):
+    """State and phase at the end of a leg. Returns its transition."""
+    w, w1, end, zero = work.w, work.w1, work.end, work.zero
+    for j in range(M):
+        w[j] = w1[j] if full else end[j]
+    if wrapped:
+        wrap_phase(tables, work, work.tally[MODE], work.memo[TIME])
+    for f in range(zero.shape[0]):
+        zero[f] = 0
+    return t
+
+
+@once
+def met(t, fired, form, net, section, work):
+    """Direction in which transition t, whose functional ``fired`` has crossed, meets the section; 0: it does not."""
+    sense = 0
+    if fired == section.indicator:
+        for k in range(net.row_start[t], net.row_start[t + 1]):
+            if net.rows[k, 0] == fired:
+                sense = net.rows[k, 1]
+    return sense if section.rising * sense >= 0 else 0
+
+
+@once
+def touch_section(section, work):
+    """The section's indicator is zero just now."""
+    work.zero[section.indicator] = 1
+
+
+@once
+def note_side(t, sense, section, tables, work):
+    """The sign of the section's functional where the next leg begins."""
+    mode = work.tally[MODE]
+    if t >= 0:
+        work.found[SIDE] = sign_after(tables, work, mode, section.indicator)
+    elif sense != 0:
+        work.found[SIDE] = sense
+    else:
+        value = value_of(tables, mode, section.indicator, work.w)
+        if value != 0.0:
+            work.found[SIDE] = 1 if value > 0.0 else -1
+
+
+@once
+def at_rest(form, section, tables, work):
+    """Rest is not looked for: a return is waited for as long as is said."""
+    return False
+
+
+@once
+def state_at(tau, form, tables, work, out):
+    """The state at any instant of the leg."""
+    dense(tables, work, work.tally[MODE], tau, out)
+
+
+@once
+def n_states(work):
+    """Number of states, without memory."""
+    return OWN
+
+
+@once
+def n_memory(form, work):
+    """Number of values in memory: the last of the kernel's states."""
+    return MEMORY
+
+
+@once
+def memory_at(k, form, work):
+    """The k-th of them."""
+    return work.w[OWN + k]
+
+
+@once
+def put_state(motion, work):
+    """Write the state to the motion."""
+    for j in range(OWN):
+        motion.u[j] = work.w[j]
+    for j in range(MEMORY):
+        motion.memory[j] = work.w[OWN + j]
+
+
+@once
+def bounded(work, limit):
+    """Finite and below the limits of divergence."""
+    within = True
+    for r in range(OWN):
+        within = within and isfinite(work.w[r]) and fabs(work.w[r]) < limit[r]
+    return within
+
+
+@once
+def may_pause(work):
+    """All that is known stands in the arrays."""
+    return True
+
+
+@once
+def doubtful(work):
+    """Crossings are found with certainty."""
+    return False

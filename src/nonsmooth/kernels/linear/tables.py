@@ -1,0 +1,359 @@
+"""Tables of one parameter point of a piecewise-linear system with harmonic forcing, for any number of states.
+
+In a mode u' = A u + b + sum_h (c_h cos k_h w t + s_h sin k_h w t). With w = (u_1, ..., u_n, 1, cos k_1 w t,
+sin k_1 w t, ...) this is w' = M w, whose flow exp(M tau) needs no eigenvectors: singular, defective and resonant
+matrices are no special case. ``build`` sums the Taylor series of the upper n rows of exp(M tau) at 33 equidistant
+nodes of a step that is a quarter of the mode's fastest period.
+
+These files become one generated module for each number of states and of harmonics (``linear.module``), so that
+every inner loop has constant bounds. Arrays (M columns of w, functionals = indicators, states, affine outputs):
+    prop[mode, node, M, n]         columns of the states' rows at the node, to be applied to w at the step's start
+    rot[mode, node, 2 H + 1]       cos and sin of k_h w tau
+    fun[mode, functional, 2 (M + n + 1)]  row of the value, row of the slope, then k_1, ..., k_n, k (and scratch): on a
+                                   step that starts at u the fourth derivative is below sum_j k_j |u_j - u_eq_j| + k
+    tay[mode, functional, M, 8]    columns of the normalised Taylor coefficients of the functional: coefficient k
+                                   at w is the sum over j of tay[mode, f, j, k] w[j]
+    field[mode, n, M]              rows of u'
+    info[mode, 2 + n]              step, node spacing, u_eq
+    some[mode, functional, 2, M + 1]  of many states: how many columns of the Taylor rows are not zero, and which; and
+                                   of the states in value and slope
+"""
+
+from math import cos, fabs, nan, sin, sqrt
+
+from nonsmooth.kernels.compile.cache import device, inline
+from nonsmooth.kernels.compile.lanes import dot
+
+STATES = 2
+HARMONICS = 1
+MEMORY = 0  # of the states: the last of them, which only transitions change
+OWN = STATES - MEMORY
+ONE = STATES  # the place of the constant in w
+WAVE = STATES + 1  # and of the first harmonic
+M = WAVE + 2 * HARMONICS
+NODES = 32
+TERMS = 26
+GROUP = 8  # nodes up to here, and its multiples, by their own series
+FEWER_TERMS = 18  # enough within the first GROUP nodes
+DEGREE = 7  # of the Taylor polynomials: within 3/4 of a node spacing the remainder is below 1e-16 of the amplitude
+STEP_ANGLE = 1.5707963267948966  # 2 pi / 4: longer is faster, but the polynomials of degree 7 would not reach
+MANY = 8  # states from which on sums over them go in vectors (``lanes``)
+FREE_STEP = 1.0  # a mode without a time scale of its own moves on polynomials: any step is exact
+
+
+@device
+def fastest_rate(A, row):
+    """The largest |eigenvalue| of two states; of more a bound on it (``row`` is scratch)."""
+    if STATES == 2:
+        half = 0.5 * (A[0, 0] + A[STATES - 1, STATES - 1])
+        det = A[0, 0] * A[STATES - 1, STATES - 1]
+        det -= A[0, STATES - 1] * A[STATES - 1, 0]
+        disc = half * half - det
+        return fabs(half) + sqrt(disc) if disc >= 0.0 else sqrt(fabs(det))
+    return balanced_norm(A, row)
+
+
+@device
+def balanced_norm(A, row):
+    """The largest sum of a row of |A| after a scaling of the states that makes each row as large as its column.
+
+    What only leads one way can be scaled away altogether."""
+    for r in range(STATES):
+        for j in range(STATES):
+            row[r, j] = fabs(A[r, j])
+    for _ in range(4):
+        for k in range(STATES):
+            across = -row[k, k]
+            down = -row[k, k]
+            for j in range(STATES):
+                across += row[k, j]
+                down += row[j, k]
+            kept = row[k, k]
+            factor = sqrt(across / down) if across > 0.0 and down > 0.0 else 0.0
+            for j in range(STATES):
+                row[k, j] = row[k, j] / factor if factor > 0.0 else 0.0
+                row[j, k] *= factor
+            row[k, k] = kept
+    largest = 0.0
+    for r in range(STATES):
+        total = 0.0
+        for j in range(STATES):
+            total += row[r, j]
+        largest = max(largest, total)
+    return largest
+
+
+@device
+def find_equilibrium(A, b, row, info):
+    """The solution of A u + b = 0 into info[2:], by elimination in ``row``; the origin where A is singular."""
+    for r in range(STATES):
+        info[2 + r] = 0.0
+        moved = b[r] != 0.0
+        for j in range(STATES):
+            row[r, j] = A[r, j]
+            moved = moved or A[r, j] != 0.0
+        row[r, STATES] = -b[r]
+        if not moved:  # memory, or a state that the mode lacks
+            row[r, r] = 1.0
+    for k in range(STATES):
+        best = k
+        size = 0.0
+        for r in range(k, STATES):
+            if fabs(row[r, k]) > fabs(row[best, k]):
+                best = r
+        for j in range(STATES):
+            size = max(size, fabs(A[best, j]))
+        if not (fabs(row[best, k]) > 1e-9 * size):
+            return
+        for j in range(k, STATES + 1):
+            kept = row[k, j]
+            row[k, j] = row[best, j]
+            row[best, j] = kept
+        for r in range(k + 1, STATES):
+            factor = row[r, k] / row[k, k]
+            for j in range(k, STATES + 1):
+                row[r, j] -= factor * row[k, j]
+    for k in range(STATES - 1, -1, -1):
+        total = row[k, STATES]
+        for j in range(k + 1, STATES):
+            total -= row[k, j] * info[2 + j]
+        info[2 + k] = total / row[k, k]
+
+
+@inline
+def times_generator(row, k, field, mode, rates, scale):
+    """row[k + 1] = scale * row[k] M, for the generator M of the mode."""
+    if STATES >= MANY:
+        for j in range(M):
+            row[k + 1, j] = 0.0
+        for r in range(STATES):
+            factor = scale * row[k, r]
+            if factor != 0.0:
+                for j in range(M):
+                    row[k + 1, j] += factor * field[mode, r, j]
+    else:
+        for j in range(M):
+            total = row[k, 0] * field[mode, 0, j]
+            for r in range(1, STATES):
+                total += row[k, r] * field[mode, r, j]
+            row[k + 1, j] = scale * total
+    for h in range(HARMONICS):
+        rate = scale * rates[h]
+        row[k + 1, WAVE + 2 * h] += rate * row[k, WAVE + 1 + 2 * h]
+        row[k + 1, WAVE + 1 + 2 * h] -= rate * row[k, WAVE + 2 * h]
+
+
+@device
+def fill_mode(i, mode, form, tables, rates, row):
+    """The states' rows of M; step, node spacing and equilibrium (the origin where the matrix is singular)."""
+    field, info, period = tables.field, tables.info, form.period[i]
+    for r in range(STATES):
+        for j in range(STATES):
+            field[mode, r, j] = form.A[i, mode, r, j]
+        field[mode, r, ONE] = form.b[i, mode, r]
+        for h in range(HARMONICS):
+            field[mode, r, WAVE + 2 * h] = form.c[i, mode, h, r]
+            field[mode, r, WAVE + 1 + 2 * h] = form.s[i, mode, h, r]
+    rate = fastest_rate(form.A[i, mode], row)
+    for h in range(HARMONICS):
+        rate = max(rate, rates[h])
+    if rate > 0.0:
+        step = STEP_ANGLE / rate
+    elif period < 1e300:
+        step = period / 8.0
+    else:
+        step = FREE_STEP
+    if period < 1e300:  # at most one end of a period on a step, also where nothing but transitions depends on time
+        step = min(step, 0.3 * period)
+    info[mode, 0] = step
+    info[mode, 1] = step / NODES
+    find_equilibrium(form.A[i, mode], form.b[i, mode], row, info[mode])
+
+
+@device
+def fill_propagators(mode, field, rates, spacing, prop, rot, row):
+    """Rows of exp(M tau) at the nodes: by Horner's rule from the smallest term in the first ``GROUP`` nodes and at its
+    multiples, elsewhere as the product of two of these."""
+    for r in range(STATES):
+        for j in range(M):
+            row[0, j] = 1.0 if j == r else 0.0
+        for k in range(TERMS):
+            times_generator(row, k, field, mode, rates, 1.0 / (k + 1))
+        for node in range(NODES + 1):
+            if node > GROUP and node % GROUP != 0:
+                continue
+            terms = TERMS if node >= GROUP else FEWER_TERMS
+            tau = node * spacing
+            for j in range(M):
+                total = row[terms, j]
+                for k in range(terms - 1, -1, -1):
+                    total = total * tau + row[k, j]
+                prop[mode, node, j, r] = total
+    for node in range(NODES + 1):
+        first = node % GROUP
+        base = node - first
+        if first == 0 or base == 0:
+            for h in range(HARMONICS):
+                angle = rates[h] * node * spacing
+                rot[mode, node, 2 * h] = cos(angle)
+                rot[mode, node, 2 * h + 1] = sin(angle)
+            continue
+        for h in range(HARMONICS):
+            c, s = rot[mode, base, 2 * h], rot[mode, base, 2 * h + 1]
+            c1, s1 = rot[mode, first, 2 * h], rot[mode, first, 2 * h + 1]
+            rot[mode, node, 2 * h] = c * c1 - s * s1
+            rot[mode, node, 2 * h + 1] = s * c1 + c * s1
+        for j in range(M):
+            for r in range(STATES):
+                prop[mode, node, j, r] = prop[mode, base, 0, r] * prop[mode, first, j, 0]
+            for q in range(1, STATES):
+                for r in range(STATES):
+                    prop[mode, node, j, r] += prop[mode, base, q, r] * prop[mode, first, j, q]
+        for r in range(STATES):
+            prop[mode, node, ONE, r] += prop[mode, base, ONE, r]
+            for h in range(HARMONICS):
+                c1, s1 = rot[mode, first, 2 * h], rot[mode, first, 2 * h + 1]
+                ec, es = prop[mode, base, WAVE + 2 * h, r], prop[mode, base, WAVE + 1 + 2 * h, r]
+                prop[mode, node, WAVE + 2 * h, r] += ec * c1 + es * s1
+                prop[mode, node, WAVE + 1 + 2 * h, r] += es * c1 - ec * s1
+
+
+@inline
+def column(row, k, prop, mode, node, j):
+    """Entry j of row[k] exp(M tau) at a node, without what the harmonics of row[k] add."""
+    if STATES >= MANY:
+        return dot(0.0, row[k], 0, prop[mode, node, j], STATES)
+    total = row[k, 0] * prop[mode, node, j, 0]
+    for r in range(1, STATES):
+        total += row[k, r] * prop[mode, node, j, r]
+    return total
+
+
+@device
+def bound_of(row, k, mode, every, tables, out, at):
+    """Largest |entries| over each ``every``-th node of row[k] exp(M tau) into out[at:]: of each state, of the rest."""
+    prop, rot = tables.prop, tables.rot
+    for j in range(STATES + 1):
+        out[at + j] = 0.0
+    for node in range(0, NODES + 1, every):
+        rest = column(row, k, prop, mode, node, ONE) + row[k, ONE]
+        for j in range(STATES):
+            entry = column(row, k, prop, mode, node, j)
+            out[at + j] = max(out[at + j], fabs(entry))
+            rest += entry * tables.info[mode, 2 + j]
+        rest = fabs(rest)
+        for h in range(HARMONICS):
+            bc = row[k, WAVE + 2 * h]
+            bs = row[k, WAVE + 1 + 2 * h]
+            cos_ = rot[mode, node, 2 * h]
+            sin_ = rot[mode, node, 2 * h + 1]
+            ec = column(row, k, prop, mode, node, WAVE + 2 * h) + bc * cos_ + bs * sin_
+            es = column(row, k, prop, mode, node, WAVE + 1 + 2 * h) - bc * sin_ + bs * cos_
+            rest += sqrt(ec * ec + es * es)
+        out[at + STATES] = max(out[at + STATES], rest)
+
+
+@device
+def fill_functional(mode, f, tables, rates, row):
+    """Taylor rows, slope row and fourth-derivative bound of the functional whose value row stands in fun[mode, f]."""
+    fun = tables.fun
+    for j in range(M):
+        row[0, j] = fun[mode, f, j]
+    scale = 1.0
+    for k in range(DEGREE + 1):
+        for j in range(M):
+            tables.tay[mode, f, j, k] = scale * row[k, j]
+        times_generator(row, k, tables.field, mode, rates, 1.0)
+        scale /= k + 1
+    for j in range(M):
+        fun[mode, f, M + j] = row[1, j]
+    at = 2 * M
+    bound_of(row, 4, mode, 1, tables, fun[mode, f], at)
+    bound_of(row, 5, mode, 4, tables, fun[mode, f], at + STATES + 1)
+    for j in range(STATES + 1):  # between two nodes the entries move by at most half a spacing times their slope
+        fun[mode, f, at + j] += 0.7 * tables.info[mode, 1] * fun[mode, f, at + STATES + 1 + j]
+
+
+@device
+def list_columns(mode, f, tables):
+    """Which columns of a functional's Taylor rows are not zero, and which states of its value and slope: few where a
+    state moves with few others."""
+    every, few = 0, 0
+    for j in range(M):
+        moved = False
+        for k in range(DEGREE + 1):
+            moved = moved or tables.tay[mode, f, j, k] != 0.0
+        if moved:
+            every += 1
+            tables.some[mode, f, 0, every] = j
+        if j < STATES and (tables.fun[mode, f, j] != 0.0 or tables.fun[mode, f, M + j] != 0.0):
+            few += 1
+            tables.some[mode, f, 1, few] = j
+    tables.some[mode, f, 0, 0] = every
+    tables.some[mode, f, 1, 0] = few
+
+
+@device
+def hide_lacking(form, tables, work):
+    """No value for a state that a mode lacks, and for memory: NaN takes no part in extremes."""
+    n_i = work.zero.shape[0]
+    for mode in range(form.lacking.shape[0]):
+        for j in range(form.lacking.shape[1]):
+            if form.lacking[mode, j] != 0:
+                tables.fun[mode, n_i + j, ONE] = nan
+                for f in range(n_i):
+                    if work.twin[f] == j:
+                        work.twin[f] = -1
+
+
+@device
+def build(i, form, tables, work):
+    """Fill the tables for parameter point ``i``, where they do not stand there already."""
+    if work.built[0] == i + 1:
+        return
+    n_i, fun, rates = form.ia.shape[1], tables.fun, work.rates
+    for h in range(HARMONICS):
+        rates[h] = form.multiples[h] * form.omega[i]
+    for mode in range(form.A.shape[1]):
+        fill_mode(i, mode, form, tables, rates, work.row)
+        fill_propagators(mode, tables.field, rates, tables.info[mode, 1], tables.prop, tables.rot, work.row)
+        for f in range(fun.shape[1]):
+            for j in range(M):
+                fun[mode, f, j] = 0.0
+            if f < n_i:
+                for j in range(STATES):
+                    fun[mode, f, j] = form.ia[i, f, j]
+                fun[mode, f, ONE] = form.ib[i, f]
+                for h in range(HARMONICS):
+                    fun[mode, f, WAVE + 2 * h] = form.ic[i, f, h]
+                    fun[mode, f, WAVE + 1 + 2 * h] = form.is_[i, f, h]
+            elif f < n_i + STATES:
+                fun[mode, f, f - n_i] = 1.0
+            else:
+                o = f - n_i - STATES
+                for j in range(STATES):
+                    fun[mode, f, j] = form.oa[i, o, mode, j]
+                fun[mode, f, ONE] = form.ob[i, o, mode]
+                for h in range(HARMONICS):
+                    fun[mode, f, WAVE + 2 * h] = form.oc[i, o, mode, h]
+                    fun[mode, f, WAVE + 1 + 2 * h] = form.os[i, o, mode, h]
+            fill_functional(mode, f, tables, rates, work.row)
+            if STATES >= MANY:
+                list_columns(mode, f, tables)
+    for f in range(n_i):
+        work.twin[f] = twin_of(f, n_i, fun)
+    hide_lacking(form, tables, work)
+    work.built[0] = i + 1
+
+
+@device
+def twin_of(f, n_i, fun):
+    """The state that indicator f is but for a constant, so that its extremes follow from the state's; -1: none."""
+    twin = -1
+    for k in range(STATES):
+        same = fun[0, f, k] == 1.0
+        for j in range(M):
+            same = same and (j == k or j == ONE or fun[0, f, j] == 0.0)
+        if same:
+            twin = k
+    return twin

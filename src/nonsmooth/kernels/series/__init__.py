@@ -1,0 +1,1 @@
+"""The stepper of generated Taylor series, and Runge-Kutta-Fehlberg."""

@@ -1,0 +1,540 @@
+"""The stepper of the series methods: legs on polynomials in the local time, landing, jumps and after-limits.
+
+Every step is a polynomial for each row (states, indicators, outputs): the Taylor jet itself, or the quintic of a
+Runge-Kutta-Fehlberg step. Crossings, sections, extremes, touches and samples are read off it. A step ends exactly at
+stops: the phase of a section, the end of a period, time-triggered transitions, the end of the run. A leg is a step, or
+its part up to a pass of a section on a surface: behind it the same polynomial goes on.
+"""
+
+from math import fabs, inf, sqrt
+from math import log as ln
+
+from numba import types
+from numpy import float32
+
+import nonsmooth.kernels.series.places as place
+from nonsmooth.kernels.compile.cache import device, inline, once
+from nonsmooth.kernels.hybrid.places import FIRED, MODE, NO_END, RETURNS, TIME, TRIES, WAITED
+from nonsmooth.kernels.hybrid.records import GENERATED, SERIES_WORK
+from nonsmooth.kernels.series.crossing import NOISE, earliest, rows_hold, section_crossing, sides_at, snap
+from nonsmooth.kernels.series.generated import field_of, jet_of, jump_of, values_of
+from nonsmooth.kernels.series.polynomial import NONE, row_bounds
+from nonsmooth.kernels.series.rkf45 import first_step, hermite, quiet, stages, time_to_transition
+from nonsmooth.kernels.series.step import METHOD, at_end, judged_at_end, planned_length, polished
+from nonsmooth.kernels.series.taylor import copied, dense_states, end_states, fill_powers, step_length
+from nonsmooth.kernels.series.trust import trusted
+
+STEPPER = GENERATED, types.Tuple(()), SERIES_WORK  # the types of this stepper's records: model, tables, work
+
+# --------------------------------------------------------------------------------------------------------------
+# At one instant
+
+
+@once
+def prepare(i, form, motion, tables, work):
+    """Parameters of point i, and where the motion is."""
+    n_p = form.points.shape[1]
+    for j in range(n_p):
+        work.q[j] = form.points[i, j]
+    for j in range(motion.memory.shape[0]):
+        work.q[n_p + j] = motion.memory[j]
+    for j in range(motion.u.shape[0]):
+        work.w[j] = motion.u[j]
+    for j in range(form.indicators):
+        work.scale[j], work.measured[j], work.side[j] = 0.0, 0.0, 0
+    for j in range(work.rise.shape[0]):
+        work.rise[j] = 0
+    for j in range(work.usual.shape[0]):
+        work.usual[j], work.dwell[j] = 0.0, 0.0
+    work.tally[place.ZERO_ROW] = -1
+
+
+@device
+def look(i, form, tables, work, mode):
+    """Jets and after-limits at a start or after a jump."""
+    t, u, q, scale = work.memo[TIME], work.w, work.q, work.scale
+    n, n_indicators = u.shape[0], form.indicators
+    X = work.J0 if METHOD == place.RKF45 else work.C
+    m = 4 if METHOD == place.RKF45 else form.order
+    jet = jet_of(form)
+    jet(mode, m, t, u, q, X, work.W)
+    h = work.usual[mode]
+    if form.step > 0.0:
+        h = form.step
+    elif METHOD == place.EXACT:
+        h = form.exact_steps[i, mode]
+    elif METHOD == place.RKF45:
+        if h <= 0.0:
+            h = first_step(X, u, n, form.absolute, form.rtol)
+    else:
+        h = step_length(X, m, n, n_indicators, u, form.weight, scale, log_tolerance(form))
+    if not (h < inf):
+        h = 1.0
+    for j in range(n_indicators):
+        if scale[j] == 0.0:
+            scale[j] = max(fabs(X[n + j, 0]), fabs(X[n + j, 1]) * h)
+    snap(X, m, n, n_indicators, h, scale, work.measured, work.side)
+    for j in range(n_indicators):
+        scale[j] = max(scale[j], fabs(X[n + j, 0]))
+    work.tally[place.READY] = 1
+
+
+@inline
+def log_tolerance(form):
+    """Logarithm of what the last terms of a series may be."""
+    return ln(max(0.1 * form.rtol, 1e-16))
+
+
+@once
+def start_on_section(form, section, tables, work):
+    """A start on the section is no return, nor is a carried state left there."""
+    J = work.J0 if METHOD == place.RKF45 else work.C
+    s = section.indicator
+    if fabs(J[work.w.shape[0] + s, 0]) <= 1e-9 * work.scale[s]:
+        J[work.w.shape[0] + s, 0] = 0.0
+        work.side[s] = 0
+
+
+@inline
+def holds(t, mode, tables, net, work):
+    """Whether all rows of transition t hold just after the present instant."""
+    return rows_hold(t, net, work.side)
+
+
+@once
+def lies_beyond(t, form, net, work):
+    """Whether no indicator of transition t is zero at the present instant."""
+    J = work.J0 if METHOD == place.RKF45 else work.C
+    beyond = True
+    for r in range(net.row_start[t], net.row_start[t + 1]):
+        beyond = beyond and J[work.w.shape[0] + net.rows[r, 0], 0] != 0.0
+    return beyond
+
+
+@once
+def take(i, t, fired, form, tables, net, work):
+    """Take transition t (its indicator ``fired`` has just crossed; -1: none). Returns the new mode.
+
+    ``work.wp`` keeps the state just before."""
+    w, q, time = work.w, work.q, work.memo[TIME]
+    if fired >= 0:
+        values = values_of(form)
+        values(work.tally[MODE], time, w, q, work.vals)
+        work.measured[fired] = fabs(work.vals[fired])
+    jump = jump_of(form)
+    jump(t, time, w, q, work.end, work.q_new)
+    for j in range(w.shape[0]):
+        work.wp[j] = w[j]
+        w[j] = work.end[j]
+    for j in range(q.shape[0]):
+        q[j] = work.q_new[j]
+    mode = net.transitions[t, 0]
+    look(i, form, tables, work, mode)
+    if fired >= 0:
+        work.measured[fired] = 0.0
+        if work.usual[mode] <= 0.0:
+            work.usual[mode] = work.memo[place.PLANNED]
+    for j in range(work.rise.shape[0]):
+        work.rise[j] = 0
+    return mode
+
+
+@once
+def met(t, fired, form, net, section, work):
+    """Whether a transition at this instant is also a pass of the section: its indicator was zero before the jump.
+
+    The direction may be that of the arrival or, where the indicator stays zero, of the departure (an impact does
+    both)."""
+    J = work.J0 if METHOD == place.RKF45 else work.C
+    row = work.w.shape[0] + section.indicator
+    noise, way = NOISE * work.scale[section.indicator], section.rising
+    if fabs(work.memo[place.VALUE_BEFORE]) > noise:
+        return 0
+    if way == 0 or work.memo[place.SLOPE_BEFORE] * way > 0.0:
+        return 1
+    return 1 if fabs(J[row, 0]) <= noise and J[row, 1] * way > 0.0 else 0
+
+
+# --------------------------------------------------------------------------------------------------------------
+# A leg
+
+
+@once
+def next_stop(i, form, net, section, goal, work):
+    """The time at which a step must end, and the transition that is triggered there (-1: none)."""
+    period, t, mode = form.period[i], work.memo[TIME], work.tally[MODE]
+    timed = False
+    for k in range(net.at.shape[0]):
+        timed = timed or net.at[k] >= 0.0
+    if not period < NO_END or (  # returns of the transient are only counted, so no step needs to end there
+        section.indicator < 0 and section.phase >= 0.0 and not timed and work.tally[RETURNS] + 1 < goal.transient
+    ):
+        return NO_END, -1
+    stop, which = period, -1
+    if section.indicator < 0 and t < section.phase * period < stop:
+        stop = section.phase * period
+    for k in range(net.mode_start[mode], net.mode_start[mode + 1]):
+        one = net.mode_list[k]
+        if net.at[one] >= 0.0:
+            at = net.at[one] * period
+            if at <= t:
+                at += period
+            if at < stop or (at <= stop and which < 0):
+                stop, which = at, one
+    return stop, which
+
+
+@once
+def steps_at_a_stride(i, form, net, section):
+    """Every step is a leg."""
+    return False
+
+
+@once
+def stride(tables, net, work, mode, s, whole, target, period, returns, most, patience):
+    """Every step is a leg."""
+    return s, whole, returns, False, patience
+
+
+@once
+def length_of_step(i, form, net, work, r_max):
+    """The length of the next step, before crossings in sight shorten it; -1: there is none."""
+    tally, memo, rkf = work.tally, work.memo, METHOD == place.RKF45
+    J = work.J0 if rkf else work.C
+    n, mode, t = work.w.shape[0], tally[MODE], memo[TIME]
+    if tally[place.READY] == 0:
+        jet = jet_of(form)
+        jet(mode, 2 if rkf else form.order, t, work.w, work.q, J, work.W)
+        for j in range(form.indicators):
+            work.scale[j] = max(work.scale[j], fabs(J[n + j, 0]))
+        if tally[place.ZERO_ROW] >= 0:
+            J[n + tally[place.ZERO_ROW], 0] = 0.0
+            work.side[tally[place.ZERO_ROW]] = 0
+            tally[place.ZERO_ROW] = -1
+        tally[place.READY] = 1
+    h = planned_length(i, mode, form, J, log_tolerance(form), work)
+    if not (h > 1e-16 * t):
+        return -1.0
+    if form.period[i] < NO_END:
+        h = min(h, form.period[i])
+    elif h >= NO_END and r_max >= NO_END:  # a polynomial solution: any length is right
+        h = max(1.0, memo[WAITED])
+    memo[place.PLANNED] = h
+    if rkf and form.step <= 0.0 and work.dwell[mode] < 2.0 * h:  # a mode that was left soon the last time
+        h = min(h, 1.1 * time_to_transition(mode, work.J0, n, net, h))
+    tally[place.LANDING] = 0
+    if h >= r_max * (1.0 - 1e-13):
+        h = r_max
+        tally[place.LANDING] = 1
+    elif form.step <= 0.0 and h > 0.5 * r_max:
+        h = 0.5 * r_max
+    return h
+
+
+@once
+def runge_kutta(form, work, h, shortest):
+    """A Runge-Kutta step of length h or less, whose error is small enough: (length, error); a length of -1: none."""
+    mode, t, n, error, K = work.tally[MODE], work.memo[TIME], work.w.shape[0], 0.0, work.K
+    field = field_of(form)
+    j = 0
+    while True:
+        K[0][j] = work.J0[j, 1]
+        j += 1
+        if j >= n:
+            break
+    while True:
+        error = stages(field, mode, t, work.w, work.q, h, n, K, form.step <= 0.0, form.absolute, form.rtol)
+        if form.step > 0.0 or error <= 1.0:
+            break
+        h *= max(0.2, 0.9 * error**-0.1) if error < inf else 0.1
+        work.memo[place.PLANNED], work.tally[place.LANDING] = h, 0
+        if not (h > shortest):
+            return -1.0, error
+    jet = jet_of(form)
+    jet(mode, 2, t + h, K[7], work.q, work.J1, work.W)
+    return h, error
+
+
+@inline
+def forget_signs(n, side):
+    """No signs are known. (Written so that the compiler does not prepare the loop for many.)"""
+    j = 0
+    while n > 0:
+        side[j] = 0
+        j += 1
+        if j >= n:
+            break
+
+
+@once
+def make_step(i, form, net, section, wanted, work, r_max):
+    """A step and its first transition, into ``work``; False where there is none (the motion has left every bound)."""
+    tally, memo, rkf = work.tally, work.memo, METHOD == place.RKF45
+    mode, t, n, fixed = tally[MODE], memo[TIME], work.w.shape[0], form.step
+    degree, n_i = 5 if rkf else form.order, form.indicators
+    checked = form.checked == 1 and METHOD == place.TAYLOR and fixed <= 0.0
+    tail = 1.0 if METHOD == place.TAYLOR else 0.0
+    h = length_of_step(i, form, net, work, r_max)
+    pending, hit, x, calm, halvings, error, sure = -1, -1, NONE, False, 0, 0.0, 0.0
+    if h < 0.0:
+        return False
+    while True:
+        if rkf:
+            h, error = runge_kutta(form, work, h, 1e-16 * t)
+            if h < 0.0:
+                return False
+        forget_signs(n_i, work.side_next)
+        slack = form.rtol if rkf and fixed <= 0.0 else 0.0
+        if rkf:
+            calm = form.locate == 0 or quiet(mode, n, h, slack, net, section, work)
+            if calm and not wanted:
+                break
+            hermite(work.J0, work.J1, work.C.shape[0] - form.guards, h, work.C)
+            slack *= sqrt(error)
+        fill_powers(h, degree, work.powers)
+        if calm:
+            break
+        if form.locate == 1:
+            work.found[0] = 0
+            forget_signs(n_i, work.side_next)
+            x, pending, hit = earliest(mode, degree, n, net, tail, slack, work)
+            if work.found[0] == 1 and fixed <= 0.0 and halvings < place.HALVINGS:
+                h *= 0.5  # a graze nearer than the polynomial is sure of
+                tally[place.LANDING] = 0
+                halvings += 1
+                continue
+            if work.found[0] == 1:
+                tally[place.DOUBTFUL] = 1
+        if not checked or h <= sure:
+            break
+        whole = x * h if pending >= 0 else h
+        sure = trusted(form, work, h, whole)
+        if sure >= whole:
+            break
+        h, tally[place.LANDING] = sure, 0
+        if not (h > 1e-16 * t):
+            return False
+    part = h
+    if pending >= 0:
+        part = x * h
+        tally[place.LANDING] = 0
+        if rkf:
+            part = polished(form, work, net.rows[hit, 0], t, h, part)
+    if rkf:
+        growth = min(5.0, 0.9 * float32(error) ** float32(-0.1)) if error > 1e-30 else 5.0
+        work.usual[mode] = growth * h if growth < 1.0 else max(memo[place.PLANNED], growth * h)
+    tally[place.PENDING], tally[place.HIT] = pending, net.rows[hit, 0] if pending >= 0 else -1
+    tally[place.CALM] = 1 if calm else 0
+    memo[place.BASE], memo[place.LENGTH], memo[place.PART], memo[place.CURSOR] = t, h, part, 0.0
+    tally[place.STEPS] += 1
+    return True
+
+
+@once
+def next_pass(form, section, work):
+    """Local time of the next pass of a section on the step, before its transition (-1: none), and the direction."""
+    tally, memo, s = work.tally, work.memo, section.indicator
+    mode, n = tally[MODE], work.w.shape[0]
+    if s < 0 or tally[place.CALM] == 1 or not (section.mode < 0 or section.mode == mode):
+        return -1.0, 0
+    degree = 5 if METHOD == place.RKF45 else form.order
+    h, part, cursor = memo[place.LENGTH], memo[place.PART], memo[place.CURSOR]
+    if cursor == 0.0:
+        _, low, high = row_bounds(work.C, n + s, 1.0, degree, work.powers)
+        if (low > 0.0 and work.side[s] >= 0) or (high < 0.0 and work.side[s] <= 0):
+            work.side_next[s] = 1 if low > 0.0 else -1
+            return -1.0, 0
+    x = section_crossing(
+        work.C, n + s, degree, section.rising, work.side[s] if cursor == 0.0 else 0, cursor, work.powers,
+        work.scale[s], work.a, work.stack, work.found,
+    )  # fmt: skip
+    sense = work.found[1]
+    work.side_next[s] = sense
+    if x == NONE or (tally[place.PENDING] >= 0 and x * h >= part * (1.0 - 1e-10)):
+        return -1.0, 0
+    memo[place.AHEAD] = x
+    tau = x * h
+    if METHOD == place.RKF45:
+        tau = polished(form, work, s, memo[place.BASE], h, tau)
+    return tau, 1 if sense >= 0 else -1
+
+
+@once
+def leg(i, form, net, section, goal, tables, work, r_max, ready, clear):
+    """March to the next pass of a section, transition or end of a step, not beyond r_max; ``work.end`` is the state
+    there. Returns (time marched, transition or -1, False, section direction or 0); a negative time: it diverges."""
+    tally, memo, C, n = work.tally, work.memo, work.C, work.w.shape[0]
+    wanted = watched(section, goal, work)
+    if tally[place.OPEN_STEP] == 0:
+        if not make_step(i, form, net, section, wanted, work, r_max):
+            return -1.0, -1, False, 0
+    tally[place.OPEN_STEP] = 0
+    rkf, degree = METHOD == place.RKF45, 5 if METHOD == place.RKF45 else form.order
+    h, part, gone = memo[place.LENGTH], memo[place.PART], memo[place.CURSOR] * memo[place.LENGTH]
+    tau, sense = next_pass(form, section, work)
+    if tau >= 0.0:
+        if next_is_edge(section, goal, work):  # the kept window begins or ends here: so does a step
+            sides_at(C, degree, n, form.indicators, tau / h, work.powers, work.scale, work.a, work.side)
+            fill_powers(tau, degree, work.powers)
+            tally[place.ZERO_ROW] = section.indicator
+            memo[place.PART] = tau
+        else:
+            tally[place.OPEN_STEP] = 1
+        dense_states(C, degree, n, tau, work.end)
+        return tau - gone, -1, False, sense
+    pending = tally[place.PENDING]
+    tally[FIRED] = tally[place.HIT]
+    if pending >= 0:
+        if part != h:
+            fill_powers(part, degree, work.powers)
+        if section.indicator >= 0:
+            memo[place.VALUE_BEFORE], memo[place.SLOPE_BEFORE] = at_end(C, degree, n + section.indicator, part)
+    if rkf and pending < 0:
+        copied(work.K[7], work.end)
+    else:
+        end_states(C, degree, n, work.powers, work.end)
+    return r_max if tally[place.LANDING] == 1 else part - gone, pending, False, 0
+
+
+@once
+def time_scale(i, since, form, tables, work):
+    """The time beside which crossings are close to each other: a tenth of the period, or of the longest dwell."""
+    work.memo[place.LONGEST] = max(work.memo[place.LONGEST], since if since < NO_END else 0.0)
+    return 0.1 * (form.period[i] if form.period[i] < NO_END else work.memo[place.LONGEST])
+
+
+@once
+def arrive_at(t, since, full, wrapped, form, net, tables, work):
+    """State and signs at the end of a leg. Returns its transition, where that is judged there only."""
+    tally, rkf, n = work.tally, METHOD == place.RKF45, work.w.shape[0]
+    copied(work.end, work.w)
+    if tally[place.OPEN_STEP] == 1:
+        work.memo[place.CURSOR] = work.memo[place.AHEAD]
+        return t
+    tally[place.READY] = 0
+    if tally[place.ZERO_ROW] >= 0:
+        return t
+    if t >= 0:
+        work.dwell[tally[MODE]] = since
+    if tally[place.PENDING] >= 0:
+        return t
+    if rkf:
+        J0, J1 = work.J0, work.J1
+        j = 0
+        while True:
+            J0[j, 0], J0[j, 1], J0[j, 2] = J1[j, 0], J1[j, 1], J1[j, 2]
+            j += 1
+            if j >= J0.shape[0]:
+                break
+        tally[place.READY] = 1
+    if form.locate == 1:
+        j = 0
+        while j < form.indicators:
+            work.side[j] = work.side_next[j]
+            if rkf and fabs(work.J1[n + j, 0]) > work.scale[j]:
+                work.scale[j] = fabs(work.J1[n + j, 0])
+            j += 1
+        return t
+    if tally[place.READY] == 0:
+        jet = jet_of(form)
+        jet(tally[MODE], form.order, work.memo[TIME], work.w, work.q, work.C, work.W)
+        tally[place.READY] = 1
+    J = work.J0 if rkf else work.C
+    judged = judged_at_end(tally[MODE], J, n, form.indicators, net, work)
+    if judged < 0:
+        return t
+    tally[FIRED] = -1
+    return judged
+
+
+# --------------------------------------------------------------------------------------------------------------
+# For the loop and its observers
+
+
+@once
+def touch_section(section, work):
+    """Signs are kept by the leg."""
+
+
+@once
+def note_side(t, sense, section, tables, work):
+    """Signs are kept by the leg."""
+
+
+@once
+def at_rest(form, section, tables, work):
+    """Whether a state without forcing has come to rest, so that no section is met again: ``AT_REST`` steps in a row,
+    and no return among them, have left it where it was within a hundred tolerances."""
+    tally, mode = work.tally, work.tally[MODE]
+    if form.period[0] < NO_END:
+        return False
+    moved = 0.0
+    for j in range(work.w.shape[0]):
+        if form.lacking[mode, j] == 0:
+            moved = max(moved, fabs(work.w[j] - work.rest[j]) / (fabs(work.w[j]) + form.weight[j]))
+    tally[place.RESTING] += 1
+    if not (moved <= 1e2 * form.rtol) or tally[TRIES] <= 1:
+        tally[place.RESTING] = 0
+        for j in range(work.w.shape[0]):
+            work.rest[j] = work.w[j]
+    return tally[place.RESTING] > place.AT_REST
+
+
+@once
+def state_at(tau, form, tables, work, out):
+    """The state at any instant of the leg."""
+    degree = 5 if METHOD == place.RKF45 else form.order
+    if tau >= work.memo[place.PART]:
+        for j in range(work.w.shape[0]):
+            out[j] = work.end[j]
+    else:
+        dense_states(work.C, degree, work.w.shape[0], tau, out)
+
+
+@once
+def n_states(work):
+    """Number of states."""
+    return work.w.shape[0]
+
+
+@once
+def n_memory(form, work):
+    """Number of memory variables."""
+    return work.q.shape[0] - form.points.shape[1]
+
+
+@once
+def memory_at(k, form, work):
+    """A memory variable."""
+    return work.q[form.points.shape[1] + k]
+
+
+@once
+def put_state(motion, work):
+    """Write state and memory to the motion."""
+    first = work.q.shape[0] - motion.memory.shape[0]
+    for j in range(motion.u.shape[0]):
+        motion.u[j] = work.w[j]
+    for j in range(motion.memory.shape[0]):
+        motion.memory[j] = work.q[first + j]
+
+
+@once
+def bounded(work, limit):
+    """Finite and below the limits of divergence."""
+    for j in range(work.w.shape[0]):
+        if not (fabs(work.w[j]) <= limit[j]):
+            return False
+    return True
+
+
+@once
+def may_pause(work):
+    """All that is known stands in the arrays."""
+    return True
+
+
+@once
+def doubtful(work):
+    """Whether a graze was left undecided."""
+    return work.tally[place.DOUBTFUL] == 1

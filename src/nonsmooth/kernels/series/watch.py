@@ -1,0 +1,148 @@
+"""What is observed while a step's polynomials are at hand: extremes and touches."""
+
+import nonsmooth.kernels.series.places as place
+from nonsmooth.kernels.compile.cache import inline, once
+from nonsmooth.kernels.hybrid.places import DONE, MODE, TOUCHES
+from nonsmooth.kernels.series.crossing import NOISE
+from nonsmooth.kernels.series.generated import values_of
+from nonsmooth.kernels.series.polynomial import (
+    DOWN,
+    NONE,
+    dense,
+    first_crossing,
+    largest,
+    load,
+    row_bounds,
+    shift,
+    strip,
+)
+from nonsmooth.kernels.series.step import METHOD
+from nonsmooth.kernels.series.taylor import dense_states
+
+__all__ = ["finish", "include", "log_touches", "widen"]
+
+
+@inline
+def extremes_of(row, n, n_i, kept):
+    """Maxima and minima in which those of a row of the jets are kept, and its column there."""
+    if row < n:
+        return kept.maximum, kept.minimum, row
+    if row < n + n_i:
+        return kept.i_max, kept.i_min, row - n
+    return kept.o_max, kept.o_min, row - n - n_i
+
+
+@once
+def widen(i, a, b, form, tables, work, kept):
+    """Extend the extremes of point i by a step, when it is over; rows that cannot exceed the old ones cost a bound."""
+    if work.tally[place.OPEN_STEP] == 1 or not (b > a):
+        return
+    C, n, n_i, mode, poly = work.C, work.w.shape[0], form.indicators, work.tally[MODE], work.a
+    m = 5 if METHOD == place.RKF45 else form.order
+    for row in range(form.kinds.shape[0]):
+        if form.kinds[row] != 1 or (row < n and form.lacking[mode, row] == 1):
+            continue
+        top, bottom, k = extremes_of(row, n, n_i, kept)
+        _, low, high = row_bounds(C, row, 1.0, m, work.powers)
+        if high > top[i, k]:
+            top[i, k] = largest(poly, load(C, row, 1.0, m, work.powers, poly), top[i, k], work.stack)
+        if low < bottom[i, k]:
+            bottom[i, k] = -largest(poly, load(C, row, -1.0, m, work.powers, poly), -bottom[i, k], work.stack)
+    if form.corners == 1:
+        widen_corners(i, m, form, work, kept)
+
+
+@once
+def widen_corners(i, m, form, work, kept):
+    """Outputs with a corner have no polynomial: sampled four times on the step."""
+    n, h = work.w.shape[0], work.memo[place.PART]
+    values = values_of(form)
+    for j in range(1, 5):
+        dense_states(work.C, m, n, 0.25 * j * h, work.dense)
+        values(work.tally[MODE], work.memo[place.BASE] + 0.25 * j * h, work.dense, work.q, work.vals)
+        for row in range(n, form.kinds.shape[0]):
+            if form.kinds[row] == 0:
+                top, bottom, k = extremes_of(row, n, form.indicators, kept)
+                top[i, k] = max(top[i, k], work.vals[row - n])
+                bottom[i, k] = min(bottom[i, k], work.vals[row - n])
+
+
+@once
+def include(i, mode, form, tables, work, kept):
+    """Extend the extremes of point i by the present instant, just after a transition."""
+    n = work.w.shape[0]
+    jets = work.J0 if METHOD == place.RKF45 else work.C
+    for row in range(form.kinds.shape[0]):
+        if row < n and form.lacking[mode, row] == 1:
+            continue
+        top, bottom, k = extremes_of(row, n, form.indicators, kept)
+        value = jets[row, 0]
+        if value > top[i, k]:
+            top[i, k] = value
+        if value < bottom[i, k]:
+            bottom[i, k] = value
+
+
+@once
+def finish(i, form, tables, work, kept):
+    """Extremes of the rows that repeat a state."""
+    n = work.w.shape[0]
+    for row in range(n, form.kinds.shape[0]):
+        if form.kinds[row] < 0:
+            top, bottom, k = extremes_of(row, n, form.indicators, kept)
+            top[i, k] = kept.maximum[i, -1 - form.kinds[row]]
+            bottom[i, k] = kept.minimum[i, -1 - form.kinds[row]]
+
+
+@once
+def log_touches(step, form, net, log, tables, work):
+    """Log every local maximum <= 0 of an armed row on the step.
+
+    ``work.rise`` is the sign of each row's slope at the end of the step before (0: just after a jump)."""
+    C, n, powers, rows, rise = work.C, work.w.shape[0], work.powers, net.rows, work.rise
+    a, d, stack, found, u, scale = work.a, work.d, work.stack, work.found, work.dense, work.scale
+    m = 5 if METHOD == place.RKF45 else form.order
+    mode, t, h, count = work.tally[MODE], work.memo[DONE], work.memo[place.PART], work.tally[TOUCHES]
+    begin = net.mode_start[mode]
+    for j in range(begin, net.mode_start[mode + 1]):
+        for r in range(net.row_start[net.mode_list[j]], net.row_start[net.mode_list[j] + 1]):
+            i, sign = rows[r, 0], rows[r, 1]
+            known = False  # the same row may stand in several transitions
+            for jj in range(begin, j):
+                for rr in range(net.row_start[net.mode_list[jj]], net.row_start[net.mode_list[jj] + 1]):
+                    known = known or (rows[rr, 0] == i and rows[rr, 1] == sign)
+            if known:
+                continue
+            mr = load(C, n + i, float(sign), m, powers, a)
+            cursor, before, begun = 0.0, rise[r], False
+            for _ in range(mr):
+                for k in range(mr):
+                    d[k] = (k + 1) * a[k + 1]
+                for k in range(mr, 5):
+                    d[k] = 0.0
+                md = mr - 1 if mr > 5 else 4
+                if begun:
+                    before = 0
+                    if cursor > 0.0:
+                        shift(d, md, cursor, 1.0 - cursor, d)
+                        d[0] = 0.0
+                md = strip(d, md)
+                if md < 0:
+                    rise[r] = 0
+                    break
+                x = first_crossing(d, md, DOWN, before, 0.0, stack, found)
+                rise[r] = found[1]
+                if x == NONE:
+                    break
+                cursor, begun = cursor + x * (1.0 - cursor), True
+                v = dense(a, mr, cursor)
+                if v <= NOISE * scale[i] and count < log.touch_time.shape[0]:
+                    dense_states(C, m, n, cursor * h, u)
+                    log.touch_time[count], log.touch_indicator[count] = t + cursor * h, i
+                    log.touch_gap[count] = max(-v, 0.0)
+                    for k in range(n):
+                        log.touch_u[count, k] = u[k]
+                    count += 1
+                if cursor >= 1.0:
+                    break
+    work.tally[TOUCHES] = count

@@ -1,0 +1,1 @@
+"""Frames carried along trajectories: saltation, legs of an orbit, spectra."""

@@ -1,0 +1,344 @@
+"""Smooth motion in one mode with its first variations, and what a transition does to them.
+
+A leg is marched by Taylor series. On every step the matrix X of the step begins afresh: the identity in the columns of
+the states, zero in those of the memory and of the active parameters; its series follows from those of the Jacobians'
+entries, X_(k+1) = (sum_j A_j X_(k-j) + B_k) / (k + 1). So its error can be judged without units, and the steps'
+matrices are multiplied up.
+
+Small changes are those of the N = n + n_active numbers (states, memory, active parameters).
+"""
+
+from __future__ import annotations
+
+from math import fabs, inf, sqrt
+from typing import Any, NamedTuple
+
+from numba import types
+
+from nonsmooth.kernels.compile.cache import device, kernel
+from nonsmooth.kernels.compile.lanes import FOUR, load, plus, store
+from nonsmooth.kernels.compile.pointers import function_at
+from nonsmooth.kernels.hybrid.codes import DIVERGED, NO_CONVERGENCE, OK
+from nonsmooth.kernels.hybrid.records import type_of
+from nonsmooth.kernels.tangent.frame import saltation
+
+__all__ = ["ORDER", "Crossing", "Ends", "Equations", "Steps", "cross", "follow", "march_legs"]
+
+ORDER = 24
+ACCURACY = 1e-17  # of the last two terms of a series against its largest one
+MOST_STEPS = 100_000  # in one leg
+
+_i, _f = types.int64, types.float64
+_f1, _f2, _f3, _i1, _i2 = _f[::1], _f[:, ::1], _f[:, :, ::1], _i[::1], _i[:, ::1]
+JET = types.FunctionType(types.void(_i, _i, _f, _f1, _f1, _f2, _f2, _f3))
+FIELD = types.FunctionType(types.void(_i, _f, _f1, _f1, _f1))
+jet_at, field_at, switch_at = function_at(JET), function_at(FIELD), function_at(FIELD)
+
+
+class Equations(NamedTuple):
+    """A system's equations and those of its small changes (see ``system.variations``)."""
+
+    functions: Any  # addresses of the jet, the field and the switch (see ``pointers``)
+    entries: Any  # (entries, 2) row and column of each entry of the Jacobians
+    kinds: Any  # (modes, entries) 0: zero in this mode, 1: constant, 2: varying
+    transitions: Any  # (transitions, 3) source, target, rows of the condition
+
+
+class Steps(NamedTuple):
+    """Working memory of a Taylor step with small changes."""
+
+    C: Any  # (n_u + entries + n_u, order + 1) series of the states and the entries, sizes of the small changes
+    D: Any  # (order + 1, N, columns in whole blocks) series of the small changes, zero in columns without one
+    W: Any  # scratch of the jet
+    X: Any  # (n_u, N) small changes at the end of a step
+    Y: Any  # (n_u, N) scratch
+    total: Any  # (n_u, N) products of X
+    powers: Any  # (order + 1,) of a step
+    u: Any  # (n_u,)
+    q: Any  # parameters, then memory
+
+
+class Ends(NamedTuple):
+    """Ends and derivatives of m legs."""
+
+    z: Any  # (m, n)
+    Phi: Any  # (m, n, n)
+    P: Any  # (m, n, n_active)
+    f_begin: Any  # (m, n)
+    f_end: Any
+    divergence: Any  # (m,) integral of div f
+    status: Any
+
+
+class Crossing(NamedTuple):
+    """What the transitions of one instant do to small changes."""
+
+    step: Any  # (N, N) saltation matrix of all of them
+    reset: Any  # (N, N) derivative of the last one's map
+    matrix: Any  # (N, N) scratch
+    fields: Any  # (3, N) vector field before and after it, derivative of its map in time
+    t_z: Any  # (N,) derivative of the instant
+
+
+EQUATIONS = type_of(Equations, _i1, _i2, _i2, _i2)
+STEPS = type_of(Steps, _f2, _f3, *[_f2] * 4, *[_f1] * 3)
+ENDS = type_of(Ends, _f2, _f3, _f3, _f2, _f2, _f1, _i1)
+CROSSING = type_of(Crossing, *[_f2] * 4, _f1)
+
+
+@device
+def excess(C, D, n_u, columns, powers):
+    """The last two terms of every series against the largest of its first ones: the worst of them.
+
+    Small changes of one number are judged together in the columns of the states, and alone in the others."""
+    order = C.shape[1] - 1
+    half, worst = order // 2, 0.0
+    high, low = powers[order], powers[order - 1]
+    for i in range(n_u):
+        top, last = 0.0, 0.0
+        for k in range(half):
+            top = max(top, fabs(C[i, k]) * powers[k])
+        last = fabs(C[i, order]) * high + fabs(C[i, order - 1]) * low
+        if not (last < inf):
+            return inf
+        if top > 0.0:
+            worst = max(worst, last / top)
+        top, last = 0.0, 0.0
+        for c in range(columns):
+            for k in range(half):
+                top = max(top, fabs(D[k, i, c]) * powers[k])
+            last = max(last, fabs(D[order, i, c]) * high + fabs(D[order - 1, i, c]) * low)
+            if c >= n_u - 1:
+                if not (last < inf):
+                    return inf
+                if top > 0.0:
+                    worst = max(worst, last / top)
+                top, last = 0.0, 0.0
+    return worst
+
+
+@device
+def step_for(C, D, n_u, columns, remaining, guess, powers):
+    """A step on which all series have converged, at most ``remaining``; negative where there is none."""
+    order = C.shape[1] - 1
+    h = min(guess, remaining)
+    for attempt in range(60):
+        powers[0] = 1.0
+        for k in range(order):
+            powers[k + 1] = powers[k] * h
+        worst = excess(C, D, n_u, columns, powers)
+        if not (worst < inf):
+            return -1.0
+        # after four attempts a step may be shorter than it could be, but not longer
+        if worst <= ACCURACY and (h >= remaining or worst > 1e-3 * ACCURACY or attempt >= 4):
+            return h
+        factor = 10.0 if worst <= 0.0 else min(10.0, 0.97 * (ACCURACY / worst) ** (1.0 / order))
+        h = min(h * factor, remaining)
+    return -1.0
+
+
+@device
+def step_end(C, D, equations, mode, order, s, u, X):
+    """State and small changes at s from the step's begin; returns the integral of the divergence up to there."""
+    entries, kinds = equations.entries, equations.kinds
+    n_u, columns, rows, width = X.shape[0], X.shape[1], D.shape[1], D.shape[2]
+    divergence = 0.0
+    for e in range(entries.shape[0]):
+        if entries[e, 0] == entries[e, 1] and kinds[mode, e] != 0:
+            v = C[n_u + e, 0]
+            if kinds[mode, e] == 2:
+                v = 0.0
+                for k in range(order - 1, -1, -1):
+                    v = v * s + C[n_u + e, k] / (k + 1)
+            divergence += v * s
+    for i in range(n_u):
+        v = C[i, order]
+        for k in range(order - 1, -1, -1):
+            v = v * s + C[i, k]
+        u[i] = v
+        for c in range(0, width, FOUR):
+            x = load(D, (order * rows + i) * width + c)
+            for k in range(order - 1, -1, -1):
+                x = plus(load(D, (k * rows + i) * width + c), s, x)
+            store(D, (order * rows + i) * width + c, x)
+        for c in range(columns):
+            X[i, c] = D[order, i, c]
+    return divergence
+
+
+@device
+def march_one(jet, mode, t0, tau, equations, work, guess):
+    """March u over the time tau; ``total`` is multiplied up. Returns (status, integral of div f, next guess)."""
+    C, D, X, Y, total, u = work.C, work.D, work.X, work.Y, work.total, work.u
+    n_u, n_c, order = X.shape[0], X.shape[1], C.shape[1] - 1
+    for i in range(n_u):
+        for c in range(n_c):
+            total[i, c] = 1.0 if i == c else 0.0
+    done, divergence = 0.0, 0.0
+    sign = 1.0 if tau >= 0.0 else -1.0
+    length = fabs(tau)
+    for _ in range(MOST_STEPS):
+        remaining = length - done
+        if remaining <= 0.0:
+            return OK, divergence, guess
+        for i in range(n_c):
+            for c in range(n_c):
+                D[0, i, c] = 1.0 if i == c else 0.0
+        jet(mode, order, t0 + sign * done, u, work.q, C, work.W, D)
+        h = step_for(C, D, n_u, n_c, remaining, guess, work.powers)
+        if not (h > 1e-15 * length):
+            return DIVERGED, divergence, guess
+        if h < remaining:
+            guess = h
+            h = remaining / float(int(remaining / h) + 1)  # equal steps to the end, were all alike
+        s = sign * h
+        divergence += step_end(C, D, equations, mode, order, s, u, X)
+        for i in range(n_u):
+            for c in range(n_c):
+                v = X[i, c] if c >= n_u else 0.0
+                for j in range(n_u):
+                    v += X[i, j] * total[j, c]
+                Y[i, c] = v
+        for i in range(n_u):
+            for c in range(n_c):
+                total[i, c] = Y[i, c]
+        done = length if h >= remaining else done + h
+    return (OK if done >= length else NO_CONVERGENCE), divergence, guess
+
+
+@device
+def put(z, n, u, q):
+    """The first n numbers of z as the states u, and as the memory at the end of q."""
+    n_u = u.shape[0]
+    for i in range(n):
+        if i < n_u:
+            u[i] = z[i]
+        else:
+            q[q.shape[0] - n + i] = z[i]
+
+
+@kernel(types.void(EQUATIONS, _i1, _f1, _f1, _f2, _f1, ENDS, STEPS))
+def march_legs(equations, modes, t0, tau, z0, values, ends, work):
+    """Legs one after the other: state at the end, dz/dz0, dz/dp, the field at both ends, integral of div f, status."""
+    jet, field = jet_at(equations.functions[0]), field_at(equations.functions[1])
+    total, u, q = work.total, work.u, work.q
+    n_u, n = u.shape[0], z0.shape[1]
+    guess = inf
+    for j in range(values.shape[0]):
+        q[j] = values[j]
+    for leg in range(modes.shape[0]):
+        mode = modes[leg]
+        put(z0[leg], n, u, q)
+        for i in range(n_u, n):
+            ends.f_begin[leg, i], ends.f_end[leg, i] = 0.0, 0.0
+        field(mode, t0[leg], u, q, ends.f_begin[leg])
+        if guess == inf or guess == 0.0:  # a leg of no length says nothing of the next
+            guess = fabs(tau[leg])
+        ends.status[leg], ends.divergence[leg], guess = march_one(jet, mode, t0[leg], tau[leg], equations, work, guess)
+        field(mode, t0[leg] + tau[leg], u, q, ends.f_end[leg])
+        for i in range(n):
+            ends.z[leg, i] = u[i] if i < n_u else z0[leg, i]
+            for c in range(n):
+                ends.Phi[leg, i, c] = total[i, c] if i < n_u else (1.0 if i == c else 0.0)
+            for c in range(n, total.shape[1]):
+                ends.P[leg, i, c - n] = total[i, c] if i < n_u else 0.0
+
+
+@device
+def jump_at(k, t, n, equations, seen, out, work):
+    """Transition k at the state in ``work``: both fields and the derivative of its map; that state is moved on."""
+    field, switch = field_at(equations.functions[1]), switch_at(equations.functions[2])
+    f, R, u, q = seen.fields, seen.reset, work.u, work.q
+    both = seen.t_z.shape[0]
+    n_a, r_z, r_t = both - n, n, n + n * n
+    for i in range(both):
+        f[0, i], f[1, i], f[2, i] = 0.0, 0.0, 0.0
+    switch(k, t, u, q, out)
+    field(equations.transitions[k, 0], t, u, q, f[0])
+    put(out, n, u, q)
+    field(equations.transitions[k, 1], t, u, q, f[1])
+    for i in range(both):
+        for c in range(both):
+            R[i, c] = 1.0 if i == c else 0.0
+        if i < n:
+            f[2, i] = out[r_t + i]
+            for c in range(n):
+                R[i, c] = out[r_z + i * n + c]
+            for c in range(n_a):
+                R[i, n + c] = out[r_t + n + i * n_a + c]
+
+
+@device
+def instant_of(n_rows, row, scale, timing, seen, out):
+    """Derivative of the instant of a transition whose ``out`` and field before are known, to ``t_z``.
+
+    ``row``: the row of the condition that is zero, or -1: the one nearest to zero. ``timing``: dt/dp where there are no
+    rows. Returns the row and |h'| / (|h_z| |f|), 1 without rows."""
+    t_z, f = seen.t_z, seen.fields[0]
+    n, n_a = scale.shape[0], timing.shape[0]
+    if n_rows == 0:
+        for i in range(n):
+            t_z[i] = 0.0
+        for c in range(n_a):
+            t_z[n + c] = timing[c]
+        return row, 1.0
+    rows, width = n + n * n + n + n * n_a, 2 + n + n_a
+    if row < 0:
+        best = inf
+        for r in range(n_rows):
+            at = rows + r * width
+            size = 0.0
+            for i in range(n):
+                size += fabs(out[at + 1 + i]) * scale[i]
+            distance = fabs(out[at]) / size if size > 0.0 else inf
+            if row < 0 or distance < best:
+                row, best = r, distance
+    at = rows + row * width
+    rate, across, speed = out[at + 1 + n], 0.0, 0.0
+    for i in range(n):
+        h_z = out[at + 1 + i]
+        rate += h_z * f[i]
+        across += h_z * h_z
+        speed += f[i] * f[i]
+    for i in range(n):
+        t_z[i] = -out[at + 1 + i] / rate
+    for c in range(n_a):
+        t_z[n + c] = -out[at + 2 + n + c] / rate
+    return row, (fabs(rate) / sqrt(across * speed) if across * speed > 0.0 else inf)
+
+
+@device
+def begin(seen):
+    """No transition of the instant yet."""
+    for i in range(seen.step.shape[0]):
+        for c in range(seen.step.shape[0]):
+            seen.step[i, c] = 1.0 if i == c else 0.0
+
+
+@device
+def add(seen):
+    """One more transition of the instant: the saltation matrix becomes that of all."""
+    f, n = seen.fields, seen.t_z.shape[0]
+    saltation(seen.reset, f[2], f[0], f[1], seen.t_z, n, seen.step, seen.matrix)
+
+
+@kernel(types.int64(EQUATIONS, _i, _i, _f, _f1, _f1, _f1, _f1, CROSSING, _f1, STEPS))
+def cross(equations, k, row, t, z, values, timing, scale, seen, out, work):
+    """Transition k at (t, z), into ``seen``, by the row that is zero (-1: the nearest to zero). Returns the row.
+
+    ``timing`` = dt/dp where the transition happens at a given phase (no rows). ``out`` is filled by ``switch``."""
+    n = z.shape[0]
+    for j in range(values.shape[0]):
+        work.q[j] = values[j]
+    put(z, n, work.u, work.q)
+    jump_at(k, t, n, equations, seen, out, work)
+    row, _ = instant_of(equations.transitions[k, 2], row, scale, timing, seen, out)
+    begin(seen)
+    add(seen)
+    return row
+
+
+@kernel(types.void(CROSSING))
+def follow(seen):
+    """A transition at the instant of those whose saltation matrix stands in ``step`` already."""
+    add(seen)

@@ -1,0 +1,231 @@
+"""Systems with elements: closed forms of balls, dry friction and impacts; what is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+from nonsmooth.elements import Backlash, Coulomb, ElasticStop, PreloadedSpring, Stop
+
+
+def shaken(**values: float) -> ns.System:
+    """A mass under a force cos(w t), with a rigid stop on its right."""
+    return ns.System(
+        states=["x", "v"], parameters={"w": 1.0, "k": 1.0, "c": 0.0, "d": 0.3, "e": 0.5},
+        modes={"all": lambda t, u, p: (u.v, np.cos(p.w * t) - p.k * u.x - p.c * u.v)},
+        elements={"stop": Stop(gap=lambda t, u, p: p.d - u.x, on={"v": -1.0}, restitution="e")},
+    ).with_parameters(values)  # fmt: skip
+
+
+def test_a_ball_comes_to_rest_when_its_bounces_end() -> None:
+    """Accumulation 2 v0 / (g (1 - e)) after the first impact that leaves with the speed v0."""
+    ball = ns.System(
+        states=["x", "v"], parameters={"g": 9.81, "e": 0.5}, modes={"fly": lambda t, u, p: (u.v, -p.g)},
+        elements={"floor": Stop(gap=lambda t, u, p: u.x, on={"v": 1.0}, restitution="e", creep=1e-12)},
+    )  # fmt: skip
+    run = ns.simulate(ball, duration=2.0, start={"x": 1.0})
+    first = np.sqrt(2 / 9.81)
+    assert run["crossing_time"].values[-1] == pytest.approx(first + 2 * 0.5 * 9.81 * first / (9.81 * 0.5), abs=1e-12)
+    assert ball.modes[int(run["mode"][-1])] == "floor_rest"
+    assert run["floor_force"].values[-1] == pytest.approx(9.81, rel=1e-15)
+    assert abs(run["u"].values[-1]).max() < 1e-15
+    heights = 0.5**2 * run["u_before"].values[:, 1] ** 2 - run["u_after"].values[:, 1] ** 2
+    assert abs(heights[:-1]).max() < 1e-12  # each impact leaves e of the speed; the last one nothing
+
+
+@pytest.mark.parametrize("method", ["exact", "taylor"])
+@pytest.mark.parametrize("e", [0.0, 0.5])
+def test_a_ball_on_a_vibrating_table_lifts_off_with_its_acceleration(method: str, e: float) -> None:
+    """It rests through a part of each period: the flight that follows begins where the table falls as fast as it."""
+    g, rate = 9.81, 2 * np.pi
+    ball = ns.System(
+        states=["x", "v"], parameters={"A": 0.3, "w": rate, "g": g, "e": e},
+        modes={"fly": lambda t, u, p: (u.v, -p.g)}, scale={"x": 0.1},
+        elements=[Stop(gap=lambda t, u, p: u.x - p.A * np.cos(p.w * t), on={"v": 1.0}, restitution="e")],
+    )  # fmt: skip
+    amplitudes = np.linspace(0.26, 0.31, 26)
+    found = ns.sweep(ball, "A", amplitudes, start={"x": 1.0}, direction=None, progress=False, method=method)
+    assert (found["period_number"] == 1).all() and (found["status"] == 0).all()
+    off = -np.arccos(g / (amplitudes * rate**2)) / rate
+    x, v = amplitudes * np.cos(rate * off), -amplitudes * rate * np.sin(rate * off)
+    expected = np.stack([x - v * off - g * off**2 / 2, v + g * off], axis=1)
+    assert np.allclose(found["section"].values[:, -1], expected, atol=1e-12 if method == "exact" else 1e-8)
+
+
+@pytest.mark.parametrize("e", [0.0, 0.5])
+def test_chatter_ends_in_rest_over_a_sweep(e: float) -> None:
+    found = ns.sweep(shaken(c=0.1, e=e), "w", np.linspace(0.2, 2.0, 40), progress=False)
+    assert (found["status"] == 0).all() and (found["period_number"] > 0).all()
+
+
+def test_a_stop_holds_and_no_impact_adds_energy() -> None:
+    """Sticking at the stop (Budd and Dux 1994): where cos(w t) > d the force presses the mass against it."""
+    system = shaken(w=0.4)
+    starts = ns.random_starts(20, {"x": -1.5, "v": -1.0}, {"x": 0.3, "v": 1.0}, seed=0)
+    found = ns.sweep(system, "w", [0.4], start=starts, direction=None, transient=20, keep=10, progress=False)
+    assert (found["status"] == 0).all()
+    assert float(found["maximum"].sel(state="x").max()) <= 0.3 + 1e-12
+    run = ns.simulate(system, periods=10, start={"x": -1.0})
+    assert float(run["u"].sel(state="x").max()) <= 0.3 + 1e-12
+    assert (abs(run["u_after"].values[:, 1]) <= abs(run["u_before"].values[:, 1])).all()
+    rests = np.array(system.modes)[run["mode"].values] == "stop_rest"
+    assert rests.any()
+    assert np.allclose(run["stop_force"].values[rests], np.cos(0.4 * run["time"].values[rests]) - 0.3, atol=1e-12)
+    assert (run["stop_force"].values[rests] > -1e-12).all()
+
+
+@pytest.mark.parametrize("method", ["exact", "taylor"])
+@pytest.mark.parametrize(
+    ("start", "mode", "speed"), [((0.3, 0.0), "stop_rest", 0.0), ((0.3, 1.0), "stop_open", -0.5), ((0.3, -1.0), "stop_open", -1.0)]
+)  # fmt: skip
+def test_a_start_on_the_stop(method: str, start: tuple[float, float], mode: str, speed: float) -> None:
+    """It rests where the force presses, rebounds where it moves in, leaves where it moves out."""
+    system = shaken()
+    run = ns.simulate(system, duration=1e-6, samples=2, start=list(start), method=method)
+    assert system.modes[int(run["mode"][-1])] == mode
+    assert run["u"].values[-1] == pytest.approx([0.3, speed], abs=1e-5)
+    with pytest.raises(ns.SolveError, match="beyond a stop"):
+        ns.simulate(system, periods=1, start={"x": 0.4}, method=method)
+
+
+@pytest.mark.parametrize("w", [0.7, 0.8, 1.3, 2.0])
+def test_dry_friction_without_stops(w: float) -> None:
+    """Amplitude of continuous sliding under P cos(w t) with friction mu P (Den Hartog 1931), k = m = 1."""
+    rig = ns.mechanical(
+        1.0, 0.0, 1.0, parameters={"w": w}, forcing={"q": lambda t, p: np.cos(p.w * t)},
+        elements={"rub": Coulomb(at="q", friction=0.3)},
+    )  # fmt: skip
+    turn = np.pi / w
+    amplitude = np.sqrt((1 / (1 - w**2)) ** 2 - (0.3 * np.sin(turn) / (w * (1 + np.cos(turn)))) ** 2)
+    orbit = ns.find_orbit(rig).to_dataset()
+    assert float(orbit["maximum"].sel(state="q")) == pytest.approx(amplitude, rel=1e-13)
+
+
+def test_friction_sticks_below_its_static_force_and_slips_with_its_kinetic_one() -> None:
+    """Under a slowly rising force P sin(w t) the mass holds until P sin(w t) = static, then feels the kinetic one."""
+    rig = ns.mechanical(
+        1.0, 0.0, 0.0, parameters={"w": 0.1}, forcing={"q": lambda t, p: np.sin(p.w * t)},
+        elements={"rub": Coulomb(at="q", friction=0.3, static=0.5)},
+    )  # fmt: skip
+    run = ns.simulate(rig, duration=12.0)
+    slip = np.arcsin(0.5) / 0.1
+    assert run["crossing_time"].values[0] == pytest.approx(slip, rel=1e-13)
+    last = float(run["time"][-1])
+    speed = (np.cos(0.1 * slip) - np.cos(0.1 * last)) / 0.1 - 0.3 * (last - slip)
+    assert run["u"].values[-1, 1] == pytest.approx(speed, rel=1e-12)
+    stuck = run["time"].values < slip
+    assert np.allclose(run["rub_force"].values[stuck], -np.sin(0.1 * run["time"].values[stuck]), atol=1e-13)
+
+
+def test_impacts_between_masses_keep_the_momentum() -> None:
+    """Two free masses with an elastic bumper, an inelastic one and a spring each: momentum before and after."""
+    pair = ns.mechanical(
+        [[2.0, 0.0], [0.0, 1.0]], np.zeros((2, 2)), np.zeros((2, 2)), coordinates=["a", "b"],
+        elements={"bumper": Stop(at={"b": 1, "a": -1}, position=0.0, side=-1, restitution=0.25)},
+    )  # fmt: skip
+    run = ns.simulate(pair, duration=3.0, start={"a": 0.0, "b": 1.0, "v_a": 1.0, "v_b": 0.0})
+    before, after = run["u_before"].values[0], run["u_after"].values[0]
+    assert run["crossing_time"].values == pytest.approx([1.0], rel=1e-14)
+    assert 2 * after[2] + after[3] == pytest.approx(2 * before[2] + before[3], rel=1e-14)
+    assert after[3] - after[2] == pytest.approx(0.25 * (before[2] - before[3]), rel=1e-14)
+
+
+def test_a_block_rests_on_two_feet_and_tips_over_one() -> None:
+    """Forces of two contacts at once: statics of a bar on two supports under a load that moves out.
+
+    Height h and angle of a bar of mass 1 and inertia 1 on feet at -1 and 1, loaded by g = 1 and a moment a t: the feet
+    bear (1 -+ a t) / 2, and one of them opens at a t = 1."""
+    bar = ns.mechanical(
+        np.eye(2), np.zeros((2, 2)), np.zeros((2, 2)), coordinates=["h", "angle"], parameters={"a": 0.5},
+        forcing={"h": lambda t, p: -1.0, "angle": lambda t, p: p.a * t},
+        elements={"left": Stop(at={"h": 1, "angle": 1}, side=-1), "right": Stop(at={"h": 1, "angle": -1}, side=-1)},
+    )  # fmt: skip
+    run = ns.simulate(bar, duration=1.9, samples=20)
+    t = run["time"].values
+    assert np.allclose(run["left_force"].values[1:], 0.5 * (1 - 0.5 * t[1:]), atol=1e-13)
+    assert np.allclose(run["right_force"].values[1:], 0.5 * (1 + 0.5 * t[1:]), atol=1e-13)
+    assert abs(run["u"].values).max() < 1e-13
+    run = ns.simulate(bar, duration=2.5)
+    assert run["crossing_time"].values[-1] == pytest.approx(2.0, rel=1e-13)
+    assert bar.modes[int(run["mode"][-1])] == "left_open_right_rest"
+
+
+def test_the_papers_oscillator_is_one_elastic_stop() -> None:
+    """A support that relaxes at once (Savi et al. 2007): the same motion as by modes and transitions."""
+    paper = ns.models.discontinuous_support()
+    p = paper.values
+    stop = ElasticStop(
+        gap=lambda t, u, p: p.g - u.x, on={"v": lambda t, u, p: -1 / p.m}, stiffness="k_s", damping="c_s"
+    )
+    own = ns.System(
+        states=["x", "v"], parameters=dict(p), elements={"support": stop}, scale=dict(paper.scale),
+        modes={"free": lambda t, u, p: (
+            u.v, (p.rho * np.cos(p.omega * t) - 2 * p.k * u.x - p.c * u.v) / p.m)},
+    )  # fmt: skip
+    a, b = (ns.poincare(one, n=50, transient=50)["section"].values for one in (paper, own))
+    assert np.allclose(a, b, atol=1e-11 * abs(a).max())
+
+
+def test_backlash_and_preload_by_energy() -> None:
+    """Free motion without damping keeps the energy; its period is that of the pieces in closed form."""
+    play = ns.mechanical(1.0, 0.0, 0.0, elements=[Backlash(at="q", half_width=0.5, stiffness=4.0)])
+    run = ns.simulate(play, duration=20.0, start={"v_q": 1.0})
+    period = 4 * 0.5 + 2 * np.pi / 2.0
+    assert np.allclose(np.diff(run["crossing_time"].values[::4]), period, rtol=1e-13)
+    loaded = ns.mechanical(1.0, 0.0, 0.0, elements=[PreloadedSpring(at="q", preload=1.0, stiffness=1.0)])
+    run = ns.simulate(loaded, duration=20.0, start={"v_q": 1.0})
+    quarter = np.pi / 4  # from q = 0 at the speed 1: q = sqrt(2) sin(t + pi/4) - 1 turns at t = pi / 4
+    assert np.allclose(np.diff(run["crossing_time"].values), 2 * quarter, rtol=1e-13)
+    assert np.allclose(abs(run["u_before"].values[:, 1]), 1.0, rtol=1e-13)
+
+
+def test_the_text_of_a_system_with_elements_is_read_back() -> None:
+    system = shaken()
+    again = ns.System.from_text(system.to_text())
+    assert again == system
+    assert again.modes == ("stop_open", "stop_rest")
+
+
+def test_what_is_refused_says_what_to_write() -> None:
+    with pytest.raises(ns.SystemDefinitionError, match=r"give gap= .* and on="):
+        Stop(restitution=0.5)
+    with pytest.raises(ns.SystemDefinitionError, match="between 0 and 1"):
+        Stop(at="q", restitution=1.5)
+    with pytest.raises(ns.SystemDefinitionError, match="nearest|parameters"):
+        ns.mechanical(1.0, 0.0, 1.0, parameters={"mu": 0.1}, elements=[Coulomb(at="q", friction="mue")])
+    with pytest.raises(ns.SystemDefinitionError, match="coordinate"):
+        ns.mechanical(1.0, 0.0, 1.0, elements=[Coulomb(at="x", friction=0.1)])
+    with pytest.raises(ns.SystemDefinitionError, match="shape"):
+        ns.mechanical(np.eye(2), np.eye(3), np.eye(2))
+    with pytest.raises(ns.SystemDefinitionError, match="inverted"):
+        ns.mechanical(np.zeros((2, 2)), np.eye(2), np.eye(2))
+    with pytest.raises(ns.SystemDefinitionError, match="at= is for ns.mechanical"):
+        ns.System(states=["x"], parameters={}, modes={"a": lambda t, u, p: (-u.x,)}, elements=[Stop(at="x")])
+    with pytest.raises(ns.SystemDefinitionError, match="combinations"):
+        ns.mechanical(np.eye(9), 0 * np.eye(9), np.eye(9), elements=[Stop(at=f"q{i}") for i in range(1, 10)])
+
+
+def test_multipliers_through_stick_and_rest() -> None:
+    """Against differences of the map over one period, where the orbit sticks and, with a stop, also rests."""
+    rig = ns.mechanical(
+        np.diag([1.0, 0.5]), [[0.1, -0.05], [-0.05, 0.05]], [[2.0, -1.0], [-1.0, 1.0]], parameters={"w": 0.7},
+        forcing={"q1": lambda t, p: np.cos(p.w * t)},
+        elements={
+            "rub": Coulomb(at="q1", friction=0.5, static=0.6),
+            "wall": Stop(at="q2", position=0.5, restitution=0.3),
+        },
+    )  # fmt: skip
+    orbit = ns.find_orbit(rig)
+    start = orbit.to_dataset()["section"].values.reshape(-1, 4)[0]
+    visited = set(np.array(rig.modes)[ns.simulate(rig, periods=1, start=start, samples=200)["mode"].values])
+    assert any("stick" in mode for mode in visited) and any("rest" in mode for mode in visited)
+    columns = []
+    for k in range(4):
+        ends = [
+            ns.poincare(rig, n=1, start=start + sign * 1e-6 * np.eye(4)[k])["section"].values[0] for sign in (1, -1)
+        ]
+        columns.append((ends[0] - ends[1]) / 2e-6)
+    expected = np.linalg.eigvals(np.array(columns).T)
+    found = np.asarray(orbit.floquet_multipliers)
+    assert np.allclose(np.sort(abs(found)), np.sort(abs(expected)), atol=1e-6)
