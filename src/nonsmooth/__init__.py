@@ -48,6 +48,8 @@ if TYPE_CHECKING:
     from nonsmooth.identification.parameter_set import ParameterSet as ParameterSet
     from nonsmooth.results.store import load as load
     from nonsmooth.results.store import save as save
+    from nonsmooth.system.maps import Branch as Branch
+    from nonsmooth.system.maps import Map as Map
     from nonsmooth.system.mechanical import mechanical as mechanical
     from nonsmooth.system.mode import Band as Band
     from nonsmooth.system.mode import Mode as Mode
@@ -61,6 +63,8 @@ _WHERE = {
     "System": "system.system",
     "Transition": "system.transition",
     "Surface": "system.transition",
+    "Map": "system.maps",
+    "Branch": "system.maps",
     "Mode": "system.mode",
     "mechanical": "system.mechanical",
     "Band": "system.mode",

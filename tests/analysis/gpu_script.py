@@ -47,6 +47,10 @@ results = {
         ns.chart, ns.models.impact_oscillator(), {"omega": [1.0, 2.7], "A": [0.05, 1.0]}, transient=30, keep=12,
         max_period=4, start=[{"x": 0.0}, {"x": 5.0}],
     ),
+    "sliding": both(
+        ns.chart, ns.models.dry_friction_oscillator(f_s=0.4, v_b=0.1), {"omega": [0.3, 0.4, 0.7], "f_0": [0.5, 1.0]},
+        transient=20, keep=8, max_period=3,
+    ),
     "carried": both(
         ns.chart, ns.models.impact_oscillator(), {"d": [0.4, 0.7, 1.0], "omega": [0.9, 2.7]}, carry={"d": "down"},
         transient=30, keep=12, max_period=4,

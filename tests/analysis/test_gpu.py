@@ -60,7 +60,7 @@ def pair(simulated: dict[str, Any], verb: str, name: str) -> tuple[np.ndarray, n
     return np.array(both["cpu"][name]), np.array(both["cuda"][name])
 
 
-@pytest.mark.parametrize("verb", ["chart", "every_period", "stop", "carried"])
+@pytest.mark.parametrize("verb", ["chart", "every_period", "stop", "sliding", "carried"])
 def test_a_chart_has_the_labels_and_extremes_of_the_processor(simulated: dict[str, Any], verb: str) -> None:
     for name in ("period_number", "status", "crossings_per_period", "contacts_per_period"):
         np.testing.assert_array_equal(*pair(simulated, verb, name), err_msg=name)

@@ -154,8 +154,12 @@ def test_odd_arguments_are_one_message(arguments: tuple[str | bytes, ...], messa
 # A first study file
 
 
-@pytest.mark.parametrize("verb", VERBS)
-@pytest.mark.parametrize("model", models.names())
+#: Basins are a picture of two states.
+NONE = ("square_root_map", "basins")
+POSSIBLE = [(model, verb) for model in models.names() for verb in VERBS if (model, verb) != NONE]
+
+
+@pytest.mark.parametrize(("model", "verb"), POSSIBLE)
 def test_a_first_study_file_reads_with_each_of_its_comments_taken_out(model: str, verb: str, tmp_path: Path) -> None:
     path = tmp_path / "study.toml"
     text = study_text(named_model(model), model, verb, "study")
@@ -219,9 +223,8 @@ def test_the_schema_takes_every_study_of_the_documentation_and_of_init() -> None
     wrong = [study for study in studies if not judge.is_valid(study)]
     assert len(studies) >= 6
     assert [sorted(set(study) & set(VERBS)) for study in wrong] == [["sweep"], ["simulate", "sweep"]]  # under "Errors"
-    for model in models.names():
-        for verb in VERBS:
-            judge.validate(tomllib.loads(study_text(named_model(model), model, verb, "study")))
+    for model, verb in POSSIBLE:
+        judge.validate(tomllib.loads(study_text(named_model(model), model, verb, "study")))
 
 
 @pytest.mark.parametrize(

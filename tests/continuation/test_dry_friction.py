@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -33,6 +35,11 @@ def coulomb(w: float, F: float) -> ns.System:
     )  # fmt: skip
 
 
+def by_surface(w: float, F: float) -> ns.System:
+    """The same with the stick derived."""
+    return ns.models.dry_friction_oscillator(omega=w, f_k=F, f_s=F)
+
+
 @pytest.mark.parametrize("r", [0.6, 0.8, 1.3, 2.0])
 @pytest.mark.parametrize("F", [0.1, 0.3])
 def test_den_hartogs_amplitude(r: float, F: float) -> None:
@@ -61,7 +68,8 @@ def slip(t0: float, x0: float, w: float, F: float) -> tuple[float, float]:
     return t0 + s, x(s)
 
 
-def test_a_cycle_that_sticks_twice() -> None:
+@pytest.mark.parametrize("make", [coulomb, by_surface])
+def test_a_cycle_that_sticks_twice(make: Callable[[float, float], ns.System]) -> None:
     """w = 0.4, F = 0.3: one slip each way. The place x of rest gives the next, -x, in closed form; its slope too."""
     w, F = 0.4, 0.3
 
@@ -70,15 +78,21 @@ def test_a_cycle_that_sticks_twice() -> None:
         return slip(t, x, w, -F)[1]
 
     x = float(brentq(lambda x: next_rest(x) + x, 0.8, 1.25, xtol=1e-14))
-    orbit = ns.find_orbit(coulomb(w, F))
+    orbit = ns.find_orbit(make(w, F))
     assert orbit.maximum[0] == pytest.approx(x, abs=1e-11)
     slope = (next_rest(x + 1e-6) - next_rest(x - 1e-6)) / 2e-6
     assert np.sort(orbit.floquet_multipliers.real) == pytest.approx([0.0, slope**2], abs=1e-8)
+    exponents = ns.lyapunov(make(w, F), periods=200).exponents.values
+    assert exponents[0] == pytest.approx(np.log(slope**2) * w / (2 * np.pi), abs=1e-9)
+    assert exponents[1] == -np.inf
 
 
+@pytest.mark.parametrize("make", [coulomb, by_surface])
 @pytest.mark.parametrize("method", ["exact", "taylor"])
 @pytest.mark.parametrize(("w", "F", "each"), [(0.5, 0.1, 3), (0.4, 0.3, 4), (0.3, 0.1, 8), (0.5, 0.3, 3)])
-def test_leaving_the_stick_is_no_return_to_it(method: str, w: float, F: float, each: int) -> None:
+def test_leaving_the_stick_is_no_return_to_it(
+    make: Callable[[float, float], ns.System], method: str, w: float, F: float, each: int
+) -> None:
     """A slip begins with no speed and no acceleration: rounding of either must not stop it again."""
-    run = ns.simulate(coulomb(w, F), periods=40, transient=40, method=method)
+    run = ns.simulate(make(w, F), periods=40, transient=40, method=method)
     assert len(run["crossing_time"]) == each * 40

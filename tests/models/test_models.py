@@ -19,7 +19,10 @@ def numbers(system, expressions, u, t=0.0):
 
 
 def test_every_model_is_listed_documented_and_takes_parameters():
-    assert models.names() == ("discontinuous_support", "impact_oscillator", "relief_valve")
+    assert models.names() == (
+        "border_collision", "bouncing_ball_map", "buck_converter", "discontinuous_support", "dry_friction_oscillator",
+        "impact_oscillator", "relay_feedback", "relief_valve", "square_root_map", "stick_slip_belt",
+    )  # fmt: skip
     for name in models.names():
         make = getattr(models, name)
         assert "References" in make.__doc__

@@ -77,7 +77,8 @@ def test_a_stop_holds_and_no_impact_adds_energy() -> None:
 
 @pytest.mark.parametrize("method", ["exact", "taylor"])
 @pytest.mark.parametrize(
-    ("start", "mode", "speed"), [((0.3, 0.0), "stop_rest", 0.0), ((0.3, 1.0), "stop_open", -0.5), ((0.3, -1.0), "stop_open", -1.0)]
+    ("start", "mode", "speed"),
+    [((0.3, 0.0), "stop_rest", 0.0), ((0.3, 1.0), "stop_open", -0.5), ((0.3, -1.0), "stop_open", -1.0)],
 )  # fmt: skip
 def test_a_start_on_the_stop(method: str, start: tuple[float, float], mode: str, speed: float) -> None:
     """It rests where the force presses, rebounds where it moves in, leaves where it moves out."""
@@ -132,7 +133,7 @@ def test_impacts_between_masses_keep_the_momentum() -> None:
 
 
 def test_a_block_rests_on_two_feet_and_tips_over_one() -> None:
-    """Forces of two contacts at once: statics of a bar on two supports under a load that moves out.
+    """Forces of two contacts at once: equilibrium of a bar on two supports under a load that moves out.
 
     Height h and angle of a bar of mass 1 and inertia 1 on feet at -1 and 1, loaded by g = 1 and a moment a t: the feet
     bear (1 -+ a t) / 2, and one of them opens at a t = 1."""

@@ -262,6 +262,28 @@ def test_a_surface_is_smoothed_as_a_pair():
     assert sp.expand(traced.fields[2][1] + F * (traced.u[1] - sp.Float(0.2)) / width + traced.u[0]) == 0
 
 
+@pytest.mark.parametrize(
+    ("given", "why"),
+    [
+        ({"static": 1.5}, "static value"), ({"static": lambda t, u, p: 1 + u.x**2}, "static value"),
+        ({"static": lambda t, u, p: 1.2 * p.F}, "static value"),
+        ({"field": lambda t, u, p: (u.v, 0)}, "`field` of its own"),
+    ],
+)  # fmt: skip
+def test_a_band_has_no_static_friction_and_no_field_of_its_own(given, why):
+    def sticking(**values):
+        return System(
+            states=["x", "v"], parameters={"F": 1.0},
+            modes={"left": lambda t, u, p: (u.v, p.F - u.x), "right": lambda t, u, p: (u.v, -p.F - u.x)},
+            indicators={"slip": lambda t, u, p: u.v - 0.2},
+            transitions=[Surface("slip", below="left", above="right", **values)],
+        )  # fmt: skip
+
+    with pytest.raises(SystemDefinitionError, match=f"'left' and 'right': .*{why}"):
+        sticking(**given).smoothed(0.01)
+    assert len(sticking(static=lambda t, u, p: p.F).smoothed(0.01).modes) == 3  # F = 1: there is none
+
+
 def corner(enter="one > 0", leave="one < 0", **more):
     return System(
         states=["x", "y"],

@@ -24,6 +24,7 @@ from nonsmooth.flow.engines.engine import Chain, Engine, FloatArray, IntArray, S
 from nonsmooth.flow.engines.linear import LinearEngine
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.results.memory import room_for
+from nonsmooth.system.phases import varying_phases
 
 if TYPE_CHECKING:
     from nonsmooth.kernels.judging.settle import Rules
@@ -79,7 +80,9 @@ class Settler:
     @property
     def linear(self) -> LinearEngine | None:
         """The engine whose jobs run in one compiled call; None where they run one by one."""
-        return self.engine if isinstance(self.engine, LinearEngine) and self.plan.indicator < 0 else None
+        if not isinstance(self.engine, LinearEngine) or self.engine.phases is not None:
+            return None
+        return self.engine if self.plan.indicator < 0 else None
 
     def load(self) -> None:
         """Compile or load the kernel now, before threads ask for it."""
@@ -119,10 +122,12 @@ class Settler:
         """
         rows = np.ascontiguousarray(rows, dtype=np.int64)
         starts = np.ascontiguousarray(starts, dtype=float)
-        if modes is None:
-            modes = np.full(len(rows), mode_at(self.system, begin))
-        modes = np.array(modes, dtype=np.int64)
         points = np.ascontiguousarray(points, dtype=float)
+        if modes is None:
+            one = varying_phases(self.system.traced) is None
+            modes = np.array([mode_at(self.system, begin, values) for values in points[: 1 if one else None]])
+            modes = np.full(len(rows), modes[0]) if one else modes[rows]
+        modes = np.array(modes, dtype=np.int64)
         if self.device == "cuda":
             assert not carried  # refused at the door
             return settle_on_gpu(self, points, rows, starts, modes, begin, attempts)

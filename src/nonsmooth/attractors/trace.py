@@ -14,6 +14,7 @@ import numpy as np
 
 from nonsmooth.flow.engines.engine import Chain, Engine, FloatArray, IntArray, SectionPlan, State
 from nonsmooth.kernels.hybrid import codes
+from nonsmooth.system.phases import phases, varying_phases
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
@@ -37,16 +38,19 @@ def period_of(tables: Any, row: int = 0) -> float:
     return float(tables.period[row])
 
 
-def mode_at(system: System, phase: float) -> int:
+def mode_at(system: System, phase: float, values: FloatArray) -> int:
     """The mode in which a run begins at a phase of the forcing: the first, or where transitions before it lead.
+
+    ``values`` are those of the parameters.
 
     A start says nothing of the mode. At phase 0 it is the first; a run that begins later in the period, on a bang-bang
     force say, must not begin on the branch that is over by then."""
-    mode = 0
-    jumps = [jump for jump in system.traced.transitions if jump.at is not None and 0.0 < jump.at <= phase]
-    for jump in sorted(jumps, key=lambda jump: float(jump.at or 0.0)):
-        if jump.source == mode:
-            mode = jump.target
+    mode, jumps = 0, system.traced.transitions
+    varying = varying_phases(system.traced)
+    at = phases(system.traced) if varying is None else varying(values)
+    for k in np.argsort(at, kind="stable"):
+        if 0.0 < at[k] <= phase and jumps[k].source == mode:
+            mode = jumps[k].target
     return mode
 
 

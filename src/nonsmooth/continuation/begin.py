@@ -76,9 +76,13 @@ def limits(
 
 
 def size_of(maximum: FloatArray, minimum: FloatArray, system: System) -> FloatArray:
-    """Half the range of each state, and 1 for the memory."""
+    """Half the range of each state, and 1 for the memory; of a state that no mode moves at least its absolute value.
+
+    Between two resets such a state has no range that could tell how far it moves along a branch."""
     half = np.maximum(np.nan_to_num(0.5 * (maximum - minimum)), 1e-3 * system.scale_vector())
-    return np.concatenate([half, np.ones(len(system.memory))])
+    still = np.array([all(field[i] == 0 for field in system.traced.fields) for i in range(len(half))])
+    largest = np.nan_to_num(np.maximum(np.abs(maximum), np.abs(minimum)))
+    return np.concatenate([np.where(still, np.maximum(half, largest), half), np.ones(len(system.memory))])
 
 
 def curve_of(orbit: Orbit, name: str, width: float) -> tuple[Curve, FloatArray]:

@@ -50,7 +50,8 @@ def changed(curve: Curve, point: Point, kind: str) -> list[Change]:
     if kind == "landed":
         return _landed(curve, point)
     i = int(point.path.others.argmax())
-    return _around(curve, point, i, i + 1)
+    at_once = curve.shooting.signature.visits[i].row == AT_ONCE
+    return _instead(curve, point, i) if at_once else _around(curve, point, i, i + 1)
 
 
 def _parts(curve: Curve, point: Point) -> tuple[tuple[Visit, ...], FloatArray, FloatArray]:
@@ -76,13 +77,36 @@ def _landed(curve: Curve, point: Point) -> list[Change]:
     """A reset leads onto the boundary of a transition: it is taken at once, and led back by a visit of no length."""
     visits, times, states = _parts(curve, point)
     place = int(point.path.landed.argmax())
-    k = int(point.path.landing[place])
-    if place == 0 or visits[place].row == AT_ONCE:
+    if place and visits[place].row == AT_ONCE:
+        return _instead(curve, point, place)
+    if place == 0:
         return []
+    k = int(point.path.landing[place])
     t, z = float(times[place - 1]), states[place]
     row = curve.shooting.flow.jump(point.solved.values, k, t, z).row
     first = Visit(visits[place].mode, k, AT_ONCE)
     return _inserted(curve, point, "corner", place, first, row, t, z)
+
+
+def _instead(curve: Curve, point: Point, place: int) -> list[Change]:
+    """A condition that holds at once is about to fail: another transition to the same mode takes its place.
+
+    For a map this is a border collision: beyond it the point is mapped by another branch."""
+    visits, times, states = _parts(curve, point)
+    traced = curve.shooting.system.traced
+    was = visits[place].transition
+    found = []
+    for k, jump in enumerate(traced.transitions):
+        if k == was or jump.at is not None or jump.source != visits[place].mode:
+            continue
+        if jump.target != traced.transitions[was].target:
+            continue
+        there = curve.shooting.flow.jump(point.solved.values, k, float(times[place]), states[place])
+        after = states.copy()
+        after[place + 1] = there.z_after
+        new = (*visits[:place], Visit(jump.source, k, AT_ONCE), *visits[place + 1 :])
+        found.append(Change("corner", Signature(new), times, after, there.indicator))
+    return found
 
 
 def _inserted(

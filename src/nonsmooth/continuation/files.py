@@ -115,7 +115,7 @@ def orbit_dataset(orbit: Orbit) -> xr.Dataset:
         "maximum": ("state", orbit.maximum, {"long_name": "largest value"}),
         "minimum": ("state", orbit.minimum, {"long_name": "smallest value"}),
         "period": ((), orbit.period, {"long_name": "period", **unit}),
-        "period_number": ((), orbit.period_number, {"long_name": "forcing periods once round (0: autonomous)"}),
+        "period_number": ((), orbit.period_number, {"long_name": f"{labels.turn}s once round (0: autonomous)"}),
         "mode": ((), orbit.mode, {"long_name": "mode at the section"}),
         "crossing_time": ("crossing", orbit.crossing_times, {"long_name": "time of the crossing", **unit}),
         "crossing_state": (

@@ -134,7 +134,7 @@ def _guesses(
             raise solve_error(settled.status)
         guesses = forced_guesses(system, settled, period_number, max_period)
     if not guesses:
-        unit = "rounds" if system.period() is None else "forcing periods"
+        unit = "rounds" if system.period() is None else "iterates" if system.is_map else "forcing periods"
         raise SolveError(
             f"no periodic motion was found: after {transient} {unit} no return up to the period number "
             f"{period_number or max_period} came near its beginning (chaotic, quasi-periodic, a longer period). Give "

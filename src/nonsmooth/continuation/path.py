@@ -97,7 +97,10 @@ class Walk:
         self.at_once = np.array([*shooting.at_once, False], dtype=bool)  # visits of no length
         fixed = [shooting.forced]
         for visit in visits[:-1]:
-            fixed.append(fixed[-1] if visit.row == AT_ONCE else visit.row < 0)
+            if visit.row == AT_ONCE:
+                fixed.append(fixed[-1])
+            else:  # at a phase that does not depend on the parameters
+                fixed.append(isinstance(traced.transitions[visit.transition].at, int | float))
         fixed.append(shooting.forced)
         ends = np.array(fixed, dtype=bool)
         # Visits whose length cannot vanish

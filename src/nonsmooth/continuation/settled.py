@@ -191,7 +191,7 @@ def _signature(system: System, log: Log, start: FloatArray, mode: int) -> Signat
     for i, k in enumerate(log.crossing_transition):
         jump, t = traced.transitions[k], float(log.crossing_time[i])
         if jump.at is not None:
-            visits.append(Visit(jump.source, int(k), -1, round(t / period - jump.at)))
+            visits.append(Visit(jump.source, int(k), -1, round(t / period - flow.phase(values, int(k))[0])))
         else:
             z = np.concatenate([np.nan_to_num(log.u_before[i]), memory])
             same = i > 0 and t == log.crossing_time[i - 1]

@@ -200,10 +200,11 @@ class Shooting:
                 if self.divided[i]:
                     divide(self, i, F, J, r, values, times, z)
             else:
-                F[r] = t[i] - (turn + at) * T
+                phase, slopes = self.flow.phase(values, k)
+                F[r] = t[i] - (turn + phase) * T
                 J[r, ti] = 1.0
                 if a:
-                    J[r, size:] = -(turn + at) * dT
+                    J[r, size:] = -(turn + phase) * dT - T * slopes
             F[r + 1 : r + 1 + n] = z[i + 1] - jump.z_after
             block = -(jump.R_z @ D)
             block[:, ti] -= jump.R_t

@@ -87,7 +87,7 @@ class Signature:
             if visit.row == AT_ONCE:
                 parts.append("(at once)")
             elif jump.at is not None:
-                parts.append(f"(at {jump.at:g})")
+                parts.append(f"(at {traced.phase_text(jump)})")
             else:
                 row = jump.rows[visit.row]
                 parts.append(f"({traced.indicator_names[row.indicator]} {'>' if row.sign > 0 else '<'} 0)")

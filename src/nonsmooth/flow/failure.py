@@ -10,6 +10,7 @@ from nonsmooth.kernels.hybrid import codes
 if TYPE_CHECKING:
     from nonsmooth.flow.engines.engine import Log
     from nonsmooth.system.system import System
+    from nonsmooth.system.traced import TracedTransition
 
 __all__ = ["solve_error", "wrong_way"]
 
@@ -29,14 +30,38 @@ def solve_error(code: int, because: str = "", **where: Any) -> SolveError:
     return SolveError(because or status.sentence, status=status.name, **where)
 
 
+def _not_unique(system: System, jump: TracedTransition) -> str:
+    """A sentence where sliding ended without a unique way on; else nothing."""
+    from nonsmooth.system.sliding import NOT_UNIQUE
+
+    modes, declared = system.modes, len(system.declared.mode_names)
+    names = [modes[i] for i in (jump.source, jump.target) if modes[i].endswith(NOT_UNIQUE)]
+    if not names and min(jump.source, jump.target) >= declared:
+        return (
+            f"Both {modes[jump.source]!r} and {modes[jump.target]!r} slide to where a second surface attracts too, and "
+            "the vector fields beside these surfaces do not determine one field on both (it depends on the order in "
+            "which they are combined). Write the motion on both surfaces as a mode of its own."
+        )
+    if not names:
+        return ""
+    return (
+        f"Sliding in mode {names[0].removesuffix(NOT_UNIQUE)!r} reached a point where the surface stops attracting "
+        "from both sides at once (a two-fold): motion from there is not unique. Change the model there, or start "
+        "elsewhere."
+    )
+
+
 def wrong_way(system: System, log: Log) -> str:
-    """A sentence where the last reset of a failed run left the state on its way on through the surface; else nothing.
+    """A sentence where the last reset of a failed run left the state on its way on through the surface, or where
+    sliding had no unique way on; else nothing.
 
     An impact turns the rate of its indicator round. With the wrong sign it does not, and follows itself without end.
     """
     if log.status not in (codes.CHATTER, codes.TOO_MANY_CROSSINGS) or not len(log.crossing_time):
         return ""
     t, jump = system.traced, system.transitions[int(log.crossing_transition[-1])]
+    if system.surfaces and (lost := _not_unique(system, jump)):
+        return lost
     if jump.reset is None or jump.source != jump.target:
         return ""
     fixed = {t.t: float(log.crossing_time[-1]), **dict(zip(t.p, system.parameter_vector(), strict=True))}

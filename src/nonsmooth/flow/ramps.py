@@ -47,7 +47,7 @@ def with_ramps(system: System, ramps: Mapping[str, Any], t_begin: float, t_end: 
     from nonsmooth.system.scalar import Scalar
     from nonsmooth.system.tracing import call_scalar, refuse_corners
 
-    traced = system.traced
+    traced = system.declared
     if not isinstance(ramps, Mapping):
         raise TypeError(f'ramps must map parameters to ramps, {{"rho": (0.2, 0.5)}}, not {shortened(ramps)}')
     changes: dict[Any, Any] = {}
@@ -79,7 +79,7 @@ def with_ramps(system: System, ramps: Mapping[str, Any], t_begin: float, t_end: 
     )
     if any(jump.at is not None for jump in transitions):
         raise ValueError("ramps cannot be combined with time-triggered transitions: their phase has no fixed period")
-    return replace(
+    moved = replace(
         traced,
         fields=tuple(put(field) for field in traced.fields),
         indicators=put(traced.indicators),
@@ -87,3 +87,4 @@ def with_ramps(system: System, ramps: Mapping[str, Any], t_begin: float, t_end: 
         outputs=tuple(put(output) for output in traced.outputs),
         period=None,
     )
+    return system.with_sliding(moved)

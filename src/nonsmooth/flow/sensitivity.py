@@ -104,7 +104,7 @@ def settled(
         mode = flow.traced.transitions[chain[-1]].target if chain else start[0]
         visited = {start[0], *(flow.traced.transitions[k].target for k in chain)}
         for k, jump in enumerate(flow.traced.transitions):
-            if jump.source != mode or jump.target in visited or jump.reset is not None or jump.at is not None:
+            if jump.source != mode or jump.target in visited or jump.at is not None or not flow.traced.keeps(jump):
                 continue
             if jump.target == first[0]:
                 found = flow.jump(values, (*chain, k), t, start[1])

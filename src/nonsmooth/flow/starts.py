@@ -101,11 +101,22 @@ def start_states(system: System, start: Any) -> FloatArray:
     Raises
     ------
     ValueError, TypeError
-        A state that does not exist, a wrong number of them, a value that is not finite.
+        A state that does not exist, a wrong number of them, a value that is not finite, or a start on a surface from
+        which both vector fields lead away.
     """
-    if is_one_start(start):
-        return _state(system, start)[None, :]
-    return np.stack([_state(system, one) for one in start])
+    alone = is_one_start(start)
+    states = _state(system, start)[None, :] if alone else np.stack([_state(system, one) for one in start])
+    if system.surfaces:
+        from nonsmooth.system.sliding import repelled
+
+        if found := repelled(system, states):
+            surface, which = found
+            raise ValueError(
+                f"the start {dict(zip(system.states, map(float, states[which]), strict=True))} lies on the surface "
+                f"{surface!r} where both vector fields lead away from it, so that motion from there is not unique: "
+                "move it to one side"
+            )
+    return states
 
 
 def first_state(system: System, start: Any, mode: str | None = None) -> State:

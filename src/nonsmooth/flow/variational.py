@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.flow.saltation import Jump, Touch, chained
+from nonsmooth.system.phases import phase_slopes, varying_phases
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
@@ -134,7 +135,7 @@ class VariationalFlow:
         """Transition ``k`` at (t, z), or several that are taken there one after the other.
 
         ``row`` is the row of the (first) condition that is zero there, -1: the nearest to it. For a transition at a
-        given phase t must be the time since the orbit's beginning: dt/dp = (t / T) dT/dp.
+        given phase t must be the time since the orbit's beginning: dt/dp = (t / T) dT/dp + T d(at)/dp.
         """
         from nonsmooth.kernels.tangent.legs import Crossing, cross
 
@@ -148,7 +149,7 @@ class VariationalFlow:
         values, timing = _floats(values), self._no_timing
         if a and self.traced.transitions[k].at is not None:
             period, gradient = self.period(values)
-            timing = (t / period) * gradient
+            timing = (t / period) * gradient + period * self.phase(values, int(k))[1]
         square = n + a, n + a
         out, seen = (
             np.empty(self.n_out),
@@ -177,6 +178,18 @@ class VariationalFlow:
             found[0], g[1 : 1 + n], found[1 + n], g[2 + n : s],
             found[s], g[s + 1 : s + 1 + n], found[s + 1 + n], g[s + 2 + n : 2 * s], found[2 * s],
         )  # fmt: skip
+
+    def phase(self, values: Any, k: int) -> tuple[float, FloatArray]:
+        """Phase of the time-triggered transition k and its derivatives (n_active,) in the active parameters."""
+        at = self.traced.transitions[k].at
+        if isinstance(at, int | float):
+            return float(at), self._no_timing
+        found, slopes = self._phases
+        return float(found(values)[k]), slopes(values)[k]
+
+    @cached_property
+    def _phases(self) -> Any:
+        return varying_phases(self.traced), phase_slopes(self.traced, self.places)
 
     def period(self, values: Any) -> tuple[float, FloatArray]:
         """Forcing period T and dT/dp (n_active,); infinite and zeros where there is none."""

@@ -70,7 +70,8 @@ def branch(
     d = labels
     variables: dict[str, Any] = {}
     for name, (dims, long_name) in _BRANCH_ARRAYS.items():
-        variables[name] = (("point", *dims), np.asarray(arrays[name]), {"long_name": long_name})
+        words = long_name.replace("forcing period", d.turn)
+        variables[name] = (("point", *dims), np.asarray(arrays[name]), {"long_name": words})
     variables["period"][2]["units"] = d.time_unit
     variables["mode"] = ("point", np.asarray(arrays["mode"], np.int16), {
         "long_name": "mode at the section", **flag_attributes(d.modes, dtype=np.int16)})  # fmt: skip
@@ -84,7 +85,7 @@ def branch(
         array = strings(column) if name in ("kind", "indicator", "grazing") else np.asarray(column)
         variables[stem] = (("special", *dims), array, {"long_name": long_name})
     variables["special_value"] = _special_value(d, parameter, along, marks["place"])
-    variables["period_number"] = ((), np.int64(period_number), {"long_name": "forcing periods (0: autonomous)"})
+    variables["period_number"] = ((), np.int64(period_number), {"long_name": f"{d.turn}s (0: autonomous)"})
     coords = _coords(d, {parameter: values})
     coords["indicator"] = ("indicator", strings(d.indicators), {"long_name": "indicator"})
     variables |= _ends(endings, ended, sentences)
@@ -112,7 +113,7 @@ def curve(
     }
     variables["period"][2]["units"] = d.time_unit
     variables["kind"] = ((), kind, {"long_name": "kind of the special point that is followed"})
-    variables["period_number"] = ((), np.int64(period_number), {"long_name": "forcing periods (0: autonomous)"})
+    variables["period_number"] = ((), np.int64(period_number), {"long_name": f"{d.turn}s (0: autonomous)"})
     variables["signature"] = ((), signature, {"long_name": "signature"})
     variables["special_kind"] = ("special", strings(name for name, _ in special), {"long_name": "codimension two"})
     variables["special_point"] = _places(special)

@@ -35,7 +35,13 @@ class Labels:
     outputs: Mapping[str, Quantity] = field(default_factory=dict)
     memory: Mapping[str, Quantity] = field(default_factory=dict)
     time_unit: str = "s"
+    is_map: bool = False  # the time counts iterates
     text: str = ""
+
+    @property
+    def turn(self) -> str:
+        """Word for the time between two returns to a section at a phase."""
+        return "iterate" if self.is_map else "forcing period"
 
     @property
     def transition_labels(self) -> tuple[str, ...]:
@@ -59,7 +65,8 @@ def labels_of(system: Any) -> Labels:
         indicators=tuple(system.indicators),
         outputs={name: Quantity(unit or "1") for name, unit in system.outputs.items()},
         memory={name: Quantity(unit or "1") for name, unit in system.memory.items()},
-        # A system whose states have no units is written in a scaled time.
-        time_unit="s" if any(quantity.unit != "1" for quantity in states.values()) else "1",
+        # A system whose states have no units is written in a scaled time; that of a map counts iterates.
+        time_unit="s" if any(quantity.unit != "1" for quantity in states.values()) and not system.is_map else "1",
+        is_map=system.is_map,
         text=system.to_text(),
     )

@@ -121,7 +121,7 @@ def trajectory(
         for i, (name, quantity) in enumerate(names.items()):
             variables[name] = ("time", table[:, i], quantity_attributes(name, quantity))
     coords: dict[str, Any] = {
-        "time": ("time", floats(time), {"long_name": "time", **t_unit}),
+        "time": ("time", floats(time), {"long_name": "time", **t_unit, **({"symbol": "n"} if d.is_map else {})}),
         "segment": ("time", np.asarray(segment, np.int64), {"long_name": "number of crossings before this sample"}),
         **state_coords(d),
         **parameter_coords(d),

@@ -349,7 +349,8 @@ class _Assembler:
         if phase == "stick":
             off = sp.Float(SMALL * self.size(v))
             return [
-                ("forward", [(v - off, 1, f"{name}_speed_above")], None), ("back", [(v + off, -1, f"{name}_speed_below")], None),
+                ("forward", [(v - off, 1, f"{name}_speed_above")], None),
+                ("back", [(v + off, -1, f"{name}_speed_below")], None),
                 ("back", [(above[0], 1, above[1])], None), ("forward", [(below[0], -1, below[1])], None),
             ]  # fmt: skip
         held = self._bearing(k, pattern, mode)

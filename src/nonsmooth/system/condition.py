@@ -11,11 +11,11 @@ from nonsmooth.system.names import unknown
 __all__ = ["GRAMMAR", "condition_text", "read_condition"]
 
 GRAMMAR = "<indicator> > 0  or  <indicator> < 0,  joined by 'and'"
-_SIGN = re.compile(r"\s*([A-Za-z_]\w*)\s*([<>])\s*0(?:\.0*)?\s*\Z")
+_SIGN = re.compile(r"\s*([A-Za-z_]\w*)\s*([<>])(=?)\s*0(?:\.0*)?\s*\Z")
 
 
-def read_condition(text: object, indicators: Sequence[str], label: str) -> tuple[tuple[str, int], ...]:
-    """Return the (indicator, sign) pairs of a condition.
+def read_condition(text: object, indicators: Sequence[str], label: str) -> tuple[tuple[str, int, bool], ...]:
+    """Return (indicator, sign, strict) for each sign of a condition; ``>= 0`` is not strict.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def read_condition(text: object, indicators: Sequence[str], label: str) -> tuple
     """
     if not isinstance(text, str):
         raise SystemDefinitionError(f"{label}: `when` must be a string of the form: {GRAMMAR}; not {shortened(text)}")
-    signs: dict[str, int] = {}
+    signs: dict[str, tuple[int, bool]] = {}
     for part in re.split(r"\band\b", text):
         match = _SIGN.match(part)
         if match is None:
@@ -43,14 +43,16 @@ def read_condition(text: object, indicators: Sequence[str], label: str) -> tuple
                 "('or' is a second transition; anything else is a new indicator: for x > g declare "
                 'indicators={"gap": lambda t, u, p: u.x - p.g} and write "gap > 0".)'
             )
-        name, sign = match[1], 1 if match[2] == ">" else -1
+        name, sign = match[1], (1 if match[2] == ">" else -1, not match[3])
         if name not in indicators:
             raise SystemDefinitionError(f"{label}: {unknown(name, 'an indicator', 'this system', indicators)}")
-        if signs.setdefault(name, sign) != sign:
+        if signs.setdefault(name, sign)[0] != sign[0]:
             raise SystemDefinitionError(f"{label}: {shortened(text)} asks for both signs of {name!r} at once")
-    return tuple(signs.items())
+    return tuple((name, sign, strict) for name, (sign, strict) in signs.items())
 
 
-def condition_text(rows: Sequence[tuple[str, int]]) -> str:
+def condition_text(rows: Sequence[tuple[str, int, bool]]) -> str:
     """Return the condition as the user would write it; inverse of `read_condition`."""
-    return " and ".join(f"{name} {'>' if sign > 0 else '<'} 0" for name, sign in rows)
+    return " and ".join(
+        f"{name} {'>' if sign > 0 else '<'}{'' if strict else '='} 0" for name, sign, strict in rows
+    )

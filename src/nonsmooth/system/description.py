@@ -6,7 +6,7 @@ it can be stored as text and read back.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -14,7 +14,14 @@ import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError, shortened
 from nonsmooth.system.domain import Domain
-from nonsmooth.system.equations import TracedBand, TracedSurface, trace_band, trace_surface, trace_system
+from nonsmooth.system.equations import (
+    TracedBand,
+    TracedSurface,
+    sliding_mode,
+    trace_band,
+    trace_surface,
+    trace_system,
+)
 from nonsmooth.system.mode import Band, Mode
 from nonsmooth.system.names import check_names, unknown
 from nonsmooth.system.parameter import Parameter, finite_number
@@ -44,6 +51,14 @@ class Description:
     symmetry: Symmetry | None = None
     explicit_time: bool = False  # depends on the time, and not periodically
     variants: dict[Any, Any] = field(default_factory=dict, compare=False, repr=False)  # a cache, see variant.py
+
+    def with_sliding(self, traced: Traced) -> Traced:
+        """Return the declared equations, or what they became, with their sliding modes."""
+        if not self.surfaces:
+            return traced
+        from nonsmooth.system.sliding import slide
+
+        return slide(traced, self.surfaces, self.scale)
 
     @property
     def symbol_names(self) -> dict[sp.Symbol, str]:
@@ -100,17 +115,18 @@ def describe(
         if not isinstance(band, Band):
             raise SystemDefinitionError(f"{name!r}: the band of {key!r} must be an ns.Band, not {band!r}")
     inside = {key for band in bands.values() for key in (band.write or {})}
+    slid = [(item, sliding_mode(item, transitions)) for item in _surfaces(transitions)]
     check_names(
         {
             "state": units, "parameter": known, "memory": remembered, "mode": modes, "indicator": indicators,
-            "output": shown, "memory of a band": sorted(inside),
+            "output": shown, "memory of a band": sorted(inside), "sliding mode": [mode for _, mode in slid],
         },
         name,
     )  # fmt: skip
     kinds = {key: _mode(mode, key, units) for key, mode in modes.items()}
     traced = trace_system(name, symbols, kinds, indicators, transitions, shown, derived)
     _check_phases(traced)
-    surfaces = tuple(trace_surface(item, traced) for item in transitions if isinstance(item, Surface))
+    surfaces = tuple(trace_surface(item, mode, traced, symbols) for item, mode in slid)
     values = {symbol: known[key].value for key, symbol in symbols.p.items()}
     traced, explicit = _with_period(traced, symbols, values, period)
     if symmetry is not None:
@@ -123,6 +139,11 @@ def describe(
         symmetry=None if symmetry is None else trace_symmetry(symmetry, traced, symbols, values),
         explicit_time=explicit,
     )  # fmt: skip
+
+
+def _surfaces(transitions: Any) -> list[Surface]:
+    """The surfaces among what may yet turn out to be no list."""
+    return [item for item in transitions if isinstance(item, Surface)] if isinstance(transitions, Iterable) else []
 
 
 def _is_mapping(given: Any, what: str, system: str, example: str) -> None:
@@ -218,16 +239,16 @@ def _with_period(
 
 def _check_phases(traced: Traced) -> None:
     """Of two transitions from one mode at one phase only the first would ever be taken."""
-    met: dict[tuple[int, float], str] = {}
+    met: dict[tuple[int, Any], str] = {}
     for jump in traced.transitions:
         if jump.at is None:
             continue
-        place = (jump.source, float(jump.at))
+        place = (jump.source, jump.at)
         if place in met:
             raise SystemDefinitionError(
                 f"transitions {met[place]} and {jump.label} both leave mode {traced.mode_names[jump.source]!r} at "
-                f"phase {float(jump.at):g}: only the first would be taken. Put what both do into one reset, or give "
-                "them different phases"
+                f"phase {traced.phase_text(jump)}: only the first would be taken. Put what both do into one reset, or "
+                "give them different phases"
             )
         met[place] = jump.label
 

@@ -53,6 +53,8 @@ class _Rule:
         finite = np.isfinite(number)
         if self.kind == "nonzero":
             return finite & (number != 0)
+        if self.kind == "phase":
+            return finite & (number >= 0) & (number < 1)
         if self.kind in ("nonnegative", "apart"):
             return finite & (number >= 0)
         return finite & (number > 0)
@@ -70,6 +72,8 @@ class _Rule:
             return f"{given}: {self.owner}"
         if self.kind == "period":
             return f"{given} makes the forcing period {text} = {number}; it must be positive and finite"
+        if self.kind == "phase":
+            return f"{given} makes {self.owner}, {text}, {number}; a phase is in forcing periods, 0 <= at < 1"
         if self.kind == "nonzero":
             return f"{given} makes {self.owner} divide by zero: {text} = {number}"
         what = "root" if self.kind == "nonnegative" else "logarithm"
@@ -94,6 +98,8 @@ class Domain:
         owned = timed_expressions(traced)
         if traced.period is not None:
             owned["the forcing period"] = traced.period
+        phases = {f"`at` of {jump.label}": jump.at for jump in traced.transitions if hasattr(jump.at, "free_symbols")}
+        owned |= phases
         seen: set[tuple[sp.Expr, str]] = set()
         for owner, expression in owned.items():
             for part, kind in _restricted(expression, symbols):
@@ -106,6 +112,7 @@ class Domain:
                     self._rules.append(_Rule(part, kind, owner, traced))
         if traced.period is not None:
             self._rules.append(_Rule(traced.period, "period", "", traced))
+        self._rules += [_Rule(phase, "phase", owner, traced) for owner, phase in phases.items()]
         self._rules += [_Rule(expression, "apart", message, traced) for expression, message in apart]
 
     def check(self, values: Mapping[str, float], changed: Iterable[str] | None = None) -> None:

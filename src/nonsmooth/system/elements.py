@@ -21,7 +21,7 @@ Law = float | str | Callable[..., Any]
 
 @dataclass(frozen=True, kw_only=True)
 class Element:
-    """What all elements share: where they act.
+    """The place where an element acts, which all of them have.
 
     Parameters
     ----------

@@ -13,21 +13,27 @@ from nonsmooth.system.condition import read_condition
 from nonsmooth.system.mode import Band
 from nonsmooth.system.names import unknown
 from nonsmooth.system.parameter import Parameter
-from nonsmooth.system.scalar import Scalar, as_written
+from nonsmooth.system.scalar import Scalar, as_written, to_expression
 from nonsmooth.system.traced import Row, Traced, TracedTransition
 from nonsmooth.system.tracing import Symbols, call_scalar, call_vector, refuse_corners
 from nonsmooth.system.transition import Surface, Transition
 
-__all__ = ["TracedBand", "TracedSurface", "trace_band", "trace_surface", "trace_system"]
+__all__ = ["TracedBand", "TracedSurface", "sliding_mode", "trace_band", "trace_surface", "trace_system"]
 
 
 @dataclass(frozen=True)
 class TracedSurface:
-    """A Filippov surface in integers: where ``indicator`` is negative the mode is ``below``."""
+    """A Filippov surface in integers: where ``indicator`` is negative the mode is ``below``.
+
+    ``mode`` names the sliding mode; ``static`` is the ratio of the static value to the kinetic one, ``field`` what is
+    given in place of Filippov's field (None: not given)."""
 
     indicator: int
     below: int
     above: int
+    mode: str
+    static: sp.Expr | None = None
+    field: tuple[sp.Expr, ...] | None = None
 
 
 @dataclass(frozen=True)
@@ -125,10 +131,33 @@ def _surface_jumps(
     ]
 
 
-def trace_surface(item: Surface, traced: Traced) -> TracedSurface:
+def sliding_mode(item: Surface, transitions: Sequence[Transition | Surface]) -> str:
+    """Name of the mode in which motion slides along a surface."""
+    alike = [one for one in transitions if isinstance(one, Surface) and one.indicator == item.indicator]
+    default = f"{item.indicator}_sliding" + (f"_{item.below}_{item.above}" if len(alike) > 1 else "")
+    return item.mode or default
+
+
+def trace_surface(item: Surface, mode: str, traced: Traced, symbols: Symbols) -> TracedSurface:
     """Return a surface in integers; its names were checked when its transitions were made."""
-    modes = traced.mode_names
-    return TracedSurface(traced.indicator_names.index(item.indicator), modes.index(item.below), modes.index(item.above))
+    modes, moving = traced.mode_names, {symbols.t, *symbols.u.values()}
+    below = modes.index(item.below)
+    own = tuple(n for n, gone in zip(traced.state_names, traced.lacking[below], strict=True) if not gone)
+    arguments = Scalar(symbols.t), symbols.states(own, f"mode {item.below!r}"), symbols.parameters()
+    static, field = item.static, None
+    if callable(static):
+        static = call_scalar(static, arguments, f"`static` of {item.label}")
+        refuse_corners(static, moving, f"`static` of {item.label}")
+    elif static is not None:
+        static = to_expression(static)
+    if item.field is not None:
+        part = call_vector(item.field, arguments, own, f"the field of {item.label}")
+        for entry in part:
+            refuse_corners(entry, moving, f"the field of {item.label}")
+        whole = dict(zip(own, part, strict=True))
+        field = tuple(whole.get(state, sp.Integer(0)) for state in traced.state_names)
+    i = traced.indicator_names.index(item.indicator)
+    return TracedSurface(i, below, modes.index(item.above), mode, static, field)
 
 
 def _jump(
@@ -144,7 +173,8 @@ def _jump(
     before, after, order = modes[item.source], modes[item.target], list(indicators)
     rows: tuple[Row, ...] = ()
     if item.when is not None:
-        rows = tuple(Row(order.index(key), sign) for key, sign in read_condition(item.when, order, label))
+        conditions = read_condition(item.when, order, label)
+        rows = tuple(Row(order.index(key), sign, strict) for key, sign, strict in conditions)
     hidden = {symbols.u[state]: state for state in symbols.u if state not in before}
     for row in rows:
         for symbol in expressions[row.indicator].free_symbols & hidden.keys():
@@ -171,7 +201,21 @@ def _jump(
         value = call_scalar(function, (time, u, p), f"what {label} writes to {key!r}")
         writes.append((list(symbols.m).index(key), value))
     contact = source == 0 or reset is not None
-    return TracedTransition(source, target, rows, item.at, reset, tuple(writes), contact, item.label)
+    at = _phase(item.at, label, symbols) if callable(item.at) else item.at
+    return TracedTransition(source, target, rows, at, reset, tuple(writes), contact, item.label)
+
+
+def _phase(given: Callable[..., Any], label: str, symbols: Symbols) -> float | sp.Expr:
+    """The phase of a transition as an expression of the parameters; a number where it depends on none."""
+    phase = call_scalar(given, (symbols.parameters(),), f"`at` of {label}")
+    if not phase.free_symbols:
+        number = float(phase)
+        if not 0 <= number < 1:
+            raise SystemDefinitionError(f"{label}: `at` is a phase in forcing periods, 0 <= at < 1; not {number!r}")
+        return number
+    if not phase.free_symbols <= set(symbols.p.values()):
+        raise SystemDefinitionError(f"{label}: `at` may depend on the parameters only, not on {as_written(phase)}")
+    return phase
 
 
 def _trace_output(

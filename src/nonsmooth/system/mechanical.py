@@ -11,7 +11,7 @@ import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError, shortened
 from nonsmooth.system.assembly import element_names
-from nonsmooth.system.elements import Coulomb, Element, ElasticStop, Stop
+from nonsmooth.system.elements import Coulomb, ElasticStop, Element, Stop
 from nonsmooth.system.names import by_name, unknown
 from nonsmooth.system.scalar import Scalar, to_expression
 from nonsmooth.system.system import System
@@ -123,7 +123,8 @@ def mechanical(
         def acts(i: int) -> Callable[..., Any]:
             def into(t: Any, u: Any, p: Any) -> Any:
                 inverse, _, _ = matrices(p)
-                return Scalar(sp.Add(*[sign * to_expression(w) * inverse[i, names.index(k)] for k, w in weights.items()]))
+                shares = [to_expression(w) * inverse[i, names.index(k)] for k, w in weights.items()]
+                return Scalar(sign * sp.Add(*shares))
 
             return into
 

@@ -34,7 +34,7 @@ def _row(row: Row, traced: Traced) -> str:
 def _jump(jump: TracedTransition, traced: Traced, names: dict[sp.Symbol, str]) -> str:
     text = jump.label
     if jump.at is not None:
-        text += f"  at phase {jump.at:g}"
+        text += f"  at phase {traced.phase_text(jump)}"
     else:
         text += "  when " + " and ".join(_row(row, traced) for row in jump.rows)
     if jump.reset is not None:
@@ -86,11 +86,13 @@ def _rows(system: System) -> list[tuple[str, str]]:
     for name, e in zip(traced.indicator_names[:n], traced.indicators, strict=False):
         lines.append((f"indicator {name}", write_expression(e, names)))
     for surface in system.surfaces:
-        text = f"{traced.mode_names[surface.below]} | {traced.mode_names[surface.above]}"
-        lines.append((f"surface {traced.indicator_names[surface.indicator]}", f"{text}, crossed or slid on"))
+        text = f"{traced.mode_names[surface.below]} | {traced.mode_names[surface.above]}, crossed or slid on"
+        if surface.static is not None:
+            text += f", static {write_expression(surface.static, names)}"
+        lines.append((f"surface {traced.indicator_names[surface.indicator]}", text))
     either_side = {frozenset((surface.below, surface.above)) for surface in system.surfaces}
     head = "transitions"
-    for jump in traced.transitions:
+    for jump in system.declared.transitions:
         if frozenset((jump.source, jump.target)) not in either_side:
             lines.append((head, _jump(jump, traced, names)))
             head = ""
@@ -136,7 +138,7 @@ def latex(system: System) -> str:
     for jump in traced.transitions:
         arrow = rf"{word(traced.mode_names[jump.source])} &\to {word(traced.mode_names[jump.target])}"
         if jump.at is not None:
-            condition = rf"t / T = {jump.at:g}"
+            condition = "t / T = " + (f"{jump.at:g}" if isinstance(jump.at, int | float) else write(jump.at))
         else:
             signs = (
                 (">" if r.sign > 0 else "<") if r.strict else (r"\ge" if r.sign > 0 else r"\le") for r in jump.rows

@@ -239,7 +239,7 @@ def smooth(description: Description, single: bool) -> Smoothed:
     symbols = {name: sp.Symbol(f"p_{name}", real=True) for name, _ in etas}
     of = {name: symbols["eta" if single else f"eta_{name}"] for name in wanted}
     build = _Builder(description, of)
-    apart = _check_apart(build, pairs)
+    apart = [*_check_apart(build, pairs), *_check_surfaces(description)]
     for pair in pairs:
         build.add(pair)
     old = description.traced
@@ -254,6 +254,24 @@ def smooth(description: Description, single: bool) -> Smoothed:
         transitions=tuple(build.jumps), outputs=tuple(tuple(row) for row in build.outputs),
     )  # fmt: skip
     return Smoothed(traced, etas, tuple(build.memory), tuple(apart))
+
+
+def _check_surfaces(description: Description) -> list[tuple[sp.Expr, str]]:
+    """A band has neither static friction nor a field of its own: (expression, message) that must not be negative."""
+    found = []
+    for surface in description.surfaces:
+        modes = _label(description.traced, surface.below, surface.above)
+        what = f"{description.name!r} cannot be smoothed between {modes}"
+        if surface.field is not None:
+            raise SystemDefinitionError(f"{what}: the surface has a `field` of its own, and a band interpolates")
+        if surface.static is None:
+            continue
+        above = f"{what}: the static value exceeds the kinetic one, which a band cannot; make them equal"
+        excess = surface.static - 1
+        if excess.is_positive or not excess.free_symbols <= set(description.traced.p):
+            raise SystemDefinitionError(above)
+        found.append((-excess, above))
+    return found
 
 
 def _check_apart(build: _Builder, pairs: Sequence[_Pair]) -> list[tuple[sp.Expr, str]]:

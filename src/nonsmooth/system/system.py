@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -110,7 +110,7 @@ class System:
         put(self, "_variant", variant)
 
     @classmethod
-    def _make(cls, description: Description, values: dict[str, float], variant: Variant) -> System:
+    def _make(cls, description: Description, values: dict[str, float], variant: Variant) -> Self:
         new = object.__new__(cls)
         new._set(description, values, variant)
         return new
@@ -174,7 +174,7 @@ class System:
 
     @property
     def surfaces(self) -> tuple[TracedSurface, ...]:
-        """Surfaces on which motion may slide; empty for a smoothed system."""
+        """Surfaces on which motion may slide; empty for a smoothed system. Their sliding modes are among the modes."""
         return () if self.is_smoothed else self._description.surfaces
 
     @property
@@ -201,6 +201,15 @@ class System:
     def traced(self) -> Traced:
         """The equations as expressions; those of the smoothed system where it is smoothed."""
         return self._variant.traced
+
+    @property
+    def declared(self) -> Traced:
+        """The equations as expressions, without the sliding modes that are derived from them."""
+        return self.traced if self.is_smoothed else self._description.traced
+
+    def with_sliding(self, declared: Traced) -> Traced:
+        """Return what became of the declared equations with the sliding modes that belong to them."""
+        return declared if self.is_smoothed else self._description.with_sliding(declared)
 
     @property
     def derivatives(self) -> Derivatives:
@@ -230,6 +239,12 @@ class System:
     def explicit_time(self) -> bool:
         """Return whether the equations depend on time without a known period: runs then need a ``duration``."""
         return self._description.explicit_time
+
+    @property
+    def is_map(self) -> bool:
+        """Return whether the states change by transitions alone and the period is 1, as those of a `Map` do."""
+        fields = self.traced.fields
+        return self.traced.period == 1 and all(entry == 0 for field in fields for entry in field)
 
     # Numbers
 
@@ -273,7 +288,7 @@ class System:
     # Copies
 
     @by_name
-    def with_parameters(self, given: Any = None, /, **values: float) -> System:
+    def with_parameters(self, given: Any = None, /, **values: float) -> Self:
         """Return the same system at other values of its parameters.
 
         Parameters
@@ -293,7 +308,7 @@ class System:
         new = changed_values(self._variant, self._values, self.name, given, values)
         return self._make(self._description, new, self._variant)
 
-    def smoothed(self, eta: float | Mapping[str, float] | None) -> System:
+    def smoothed(self, eta: float | Mapping[str, float] | None) -> Self:
         """Return the system with its switches smoothed over bands (Savi et al. 2007, Eqs. 6-10).
 
         Parameters

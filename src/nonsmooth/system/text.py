@@ -15,6 +15,7 @@ import sympy as sp
 from nonsmooth.errors import SystemDefinitionError, shortened
 from nonsmooth.system.condition import condition_text
 from nonsmooth.system.description import Description
+from nonsmooth.system.equations import TracedSurface
 from nonsmooth.system.expressions import read_expression, write_expression
 from nonsmooth.system.mode import Band, Mode
 from nonsmooth.system.scalar import Scalar
@@ -73,7 +74,7 @@ def _content(d: Description) -> dict[str, Any]:
     def text(expression: sp.Expr) -> str:
         return write_expression(expression, names)
 
-    upward = {(s.below, s.above, (Row(s.indicator, 1),)) for s in d.surfaces}
+    upward = {(s.below, s.above, (Row(s.indicator, 1),)): s for s in d.surfaces}
     downward = {(s.above, s.below, (Row(s.indicator, -1),)) for s in d.surfaces}
     transitions: list[dict[str, Any]] = []
     for jump in t.transitions:
@@ -81,15 +82,14 @@ def _content(d: Description) -> dict[str, Any]:
         if crossing in downward:  # the second half of a surface
             continue
         if crossing in upward:
-            below, above = t.mode_names[jump.source], t.mode_names[jump.target]
-            surface = t.indicator_names[jump.rows[0].indicator]
-            transitions.append({"surface": surface, "below": below, "above": above})
+            transitions.append(_surface_content(upward[crossing], d))
             continue
         entry: dict[str, Any] = {"source": t.mode_names[jump.source], "target": t.mode_names[jump.target]}
         if jump.at is None:
-            entry["when"] = condition_text([(t.indicator_names[row.indicator], row.sign) for row in jump.rows])
+            rows = [(t.indicator_names[row.indicator], row.sign, row.strict) for row in jump.rows]
+            entry["when"] = condition_text(rows)
         else:
-            entry["at"] = float(jump.at)
+            entry["at"] = float(jump.at) if isinstance(jump.at, int | float) else text(jump.at)
         if jump.reset is not None:
             own = t.lacking[jump.target]
             entry["reset"] = {s: text(e) for s, e, gone in zip(t.state_names, jump.reset, own, strict=True) if not gone}
@@ -126,6 +126,23 @@ def _content(d: Description) -> dict[str, Any]:
     if d.bands:
         content["bands"] = {t.indicator_names[band.indicator]: _band_content(band, d) for band in d.bands}
     return content
+
+
+def _surface_content(surface: TracedSurface, d: Description) -> dict[str, Any]:
+    """Return a surface; what was not given is left out."""
+    t, names = d.traced, d.symbol_names
+    entry: dict[str, Any] = {
+        "surface": t.indicator_names[surface.indicator],
+        "below": t.mode_names[surface.below],
+        "above": t.mode_names[surface.above],
+        "mode": surface.mode,
+    }
+    if surface.static is not None:
+        entry["static"] = write_expression(surface.static, names)
+    if surface.field is not None:
+        own = zip(t.state_names, surface.field, t.lacking[surface.below], strict=True)
+        entry["field"] = {state: write_expression(e, names) for state, e, gone in own if not gone}
+    return entry
 
 
 def _band_content(band: Any, d: Description) -> dict[str, Any]:
@@ -213,12 +230,16 @@ class _Reader:
 
     def transition(self, entry: Mapping[str, Any]) -> Transition | Surface:
         if "surface" in entry:
-            return Surface(entry["surface"], below=entry["below"], above=entry["above"])
+            return Surface(
+                entry["surface"], below=entry["below"], above=entry["above"], mode=entry.get("mode"),
+                static=self.function(entry["static"]) if "static" in entry else None,
+                field=self.vector(entry["field"]) if "field" in entry else None,
+            )  # fmt: skip
         return Transition(
             entry["source"],
             entry["target"],
             when=entry.get("when"),
-            at=entry.get("at"),
+            at=self.function(entry["at"]) if isinstance(entry.get("at"), str) else entry.get("at"),
             reset=self.vector(entry["reset"]) if "reset" in entry else None,
             write={k: self.function(e) for k, e in entry["write"].items()} if "write" in entry else None,
         )

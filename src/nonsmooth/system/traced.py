@@ -19,8 +19,8 @@ __all__ = ["Row", "Traced", "TracedTransition"]
 class Row:
     """One sign condition: ``sign * indicator > 0`` (``>= 0`` where not strict).
 
-    A non-strict row only occurs in derived systems (the smoothed switch), where it settles a tie:
-    the region of an indicator that vanishes identically.
+    A non-strict row settles a tie in derived systems (the smoothed switch, the regions of a map): it also holds where
+    the indicator vanishes identically.
     """
 
     indicator: int
@@ -32,17 +32,16 @@ class Row:
 class TracedTransition:
     """An allowed jump from mode ``source`` to mode ``target``.
 
-    It fires at the instant all ``rows`` hold (``rows``), or at the forcing phase ``at`` (in periods,
-    0..1); one of the two is empty. ``reset`` has one expression per state, or is None (identity).
-    ``writes`` are (memory index, expression) pairs, evaluated with the state just before the jump.
-    ``contact`` marks the transitions counted as contacts: those with a reset, and those that leave the
-    first mode.
+    It fires at the instant all ``rows`` hold (``rows``), or at the forcing phase ``at`` (in periods, 0..1: a number,
+    or an expression of the parameters); one of the two is empty. ``reset`` has one expression per state, or is None
+    (identity). ``writes`` are (memory index, expression) pairs, evaluated with the state just before the jump.
+    ``contact`` marks the transitions counted as contacts: those with a reset, and those that leave the first mode.
     """
 
     source: int
     target: int
     rows: tuple[Row, ...]
-    at: float | None = None
+    at: float | Expr | None = None
     reset: tuple[Expr, ...] | None = None
     writes: tuple[tuple[int, Expr], ...] = ()
     contact: bool = False
@@ -74,3 +73,19 @@ class Traced:
     transitions: tuple[TracedTransition, ...]
     outputs: tuple[tuple[Expr, ...], ...]
     period: Expr | None
+
+    def phase_text(self, jump: TracedTransition) -> str:
+        """The phase of a transition as it was written."""
+        if isinstance(jump.at, int | float):
+            return f"{jump.at:g}"
+        from nonsmooth.system.expressions import write_expression
+
+        assert jump.at is not None
+        return write_expression(jump.at, dict(zip(self.p, self.parameter_names, strict=True)))
+
+    def keeps(self, jump: TracedTransition) -> bool:
+        """Return whether a transition leaves every state of its source as it is; states that it lacks may begin."""
+        if jump.reset is None:
+            return True
+        both = zip(jump.reset, self.u, self.lacking[jump.source], self.lacking[jump.target], strict=True)
+        return all(before or (new == old and not after) for new, old, before, after in both)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.system.parameter import finite_number
 
 __all__ = ["Surface", "Transition"]
 
@@ -21,9 +22,10 @@ class Transition:
         Names of modes; equal for an impact that stays in its mode.
     when : str, optional
         Signs of indicators joined by ``and``: ``"penetration > 0 and separation < 0"``. The transition fires
-        at the instant the condition *becomes* true.
-    at : float, optional
-        Instead of ``when``: a phase of the forcing, in periods (0 <= at < 1).
+        at the instant the condition *becomes* true. ``>= 0`` also holds where an indicator is and stays zero.
+    at : float or callable, optional
+        Instead of ``when``: a phase of the forcing, in periods (0 <= at < 1), or a function of the parameters that
+        returns it: ``at=lambda p: p.duty``.
     reset : callable, optional
         ``reset(t, u, p)`` returns the new state (in the order of the target mode's states).
     write : mapping of str to callable, optional
@@ -33,7 +35,7 @@ class Transition:
     source: str
     target: str
     when: str | None = None
-    at: float | None = None
+    at: float | Callable[..., Any] | None = None
     reset: Callable[..., Any] | None = None
     write: Mapping[str, Callable[..., Any]] | None = field(default=None)
 
@@ -43,9 +45,10 @@ class Transition:
                 f"{self.label}: give either `when` (a condition) or `at` (a phase of the forcing), not "
                 + ("neither" if self.when is None else "both")
             )
-        if self.at is not None and not (isinstance(self.at, (int, float)) and 0 <= self.at < 1):
+        if not (self.at is None or callable(self.at) or (isinstance(self.at, (int, float)) and 0 <= self.at < 1)):
             raise SystemDefinitionError(
-                f"{self.label}: `at` is a phase in forcing periods, 0 <= at < 1; not {self.at!r}"
+                f"{self.label}: `at` is a phase in forcing periods, 0 <= at < 1, or a function of the parameters; not "
+                f"{self.at!r}"
             )
         if self.reset is not None and not callable(self.reset):
             raise SystemDefinitionError(f"{self.label}: `reset` must be a function reset(t, u, p), not {self.reset!r}")
@@ -64,9 +67,11 @@ class Transition:
 
 @dataclass(frozen=True)
 class Surface:
-    """Two modes either side of the surface where an indicator vanishes (Filippov's form).
+    r"""Two modes either side of the surface where an indicator vanishes (Filippov's form).
 
-    Whether a trajectory crosses the surface or slides on it is decided by the two vector fields themselves.
+    Whether a trajectory crosses the surface or slides on it is decided by the two vector fields themselves. Where both
+    point at the surface, motion goes on in a further mode with Filippov's convex combination
+    :math:`f_s = (1-a) f_- + a f_+` that stays on the surface, until one of them turns away.
 
     Parameters
     ----------
@@ -74,17 +79,39 @@ class Surface:
         The surface is its zero set.
     below, above : str
         The modes where the indicator is negative and positive.
+    mode : str, optional
+        Name of the mode in which motion slides; ``<indicator>_sliding`` where not given.
+    static : float or callable, optional
+        How much the static value exceeds the kinetic one (1 or more): a number or ``f(t, u, p)``. Sliding then ends,
+        and is avoided at the surface, only where the field between both would have to be outside by this factor:
+        static friction that is larger than kinetic friction.
+    field : callable, optional
+        ``field(t, u, p)``: the vector field on the surface in place of Filippov's, such as Utkin's equivalent
+        control. The states are those of the two modes, and the surface must be invariant under it.
     """
 
     indicator: str
     below: str
     above: str
+    mode: str | None = None
+    static: Any = None
+    field: Callable[..., Any] | None = None
 
     def __post_init__(self) -> None:
         if self.below == self.above:
             raise SystemDefinitionError(
                 f"surface {self.indicator!r}: `below` and `above` are both {self.below!r}; they must be two modes"
             )
+        if self.mode is not None and not isinstance(self.mode, str):
+            raise SystemDefinitionError(f"{self.label}: `mode` is the name of the sliding mode, not {self.mode!r}")
+        if self.field is not None and not callable(self.field):
+            raise SystemDefinitionError(f"{self.label}: `field` must be a function field(t, u, p), not {self.field!r}")
+        if not (self.static is None or callable(self.static)):
+            ratio = finite_number(self.static, f"{self.label}: `static`")
+            if ratio < 1:
+                raise SystemDefinitionError(
+                    f"{self.label}: `static` is the static value over the kinetic one, 1 or more; not {self.static!r}"
+                )
 
     @property
     def label(self) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
 from typing import Any
 
@@ -25,7 +25,8 @@ class Variant:
         self.memory: dict[str, tuple[float, str]] = dict(description.memory)
         extra: tuple[Any, ...] = ()
         if kind == SHARP:
-            self.traced: Traced = description.traced
+            self.traced: Traced = description.with_sliding(description.traced)
+            extra = tuple(_static_ratios(description))
         else:
             from nonsmooth.system.smoothing import smooth
 
@@ -51,6 +52,18 @@ class Variant:
     def derivatives(self) -> Derivatives:
         """Exact derivatives, built on demand."""
         return Derivatives(self.traced)
+
+
+def _static_ratios(description: Description) -> Iterator[tuple[Any, str]]:
+    """Excess of the static value over the kinetic one, not negative, where it depends on parameters alone."""
+    declared = description.traced
+    for surface in description.surfaces:
+        if surface.static is not None and surface.static.free_symbols <= set(declared.p):
+            names = (
+                declared.indicator_names[surface.indicator],
+                *(declared.mode_names[mode] for mode in (surface.below, surface.above)),
+            )
+            yield surface.static - 1, "`static` of surface {} ({} | {}) must be 1 or more".format(*names)
 
 
 def variant_of(description: Description, kind: str = SHARP) -> Variant:

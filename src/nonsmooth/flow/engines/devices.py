@@ -9,6 +9,7 @@ from typing import Any
 from nonsmooth.errors import not_installed
 from nonsmooth.flow.engines.engine import Engine, SectionPlan
 from nonsmooth.flow.engines.linear import LinearEngine, PlanarEngine
+from nonsmooth.flow.engines.loop import LoopEngine
 from nonsmooth.flow.engines.series import SeriesEngine
 
 __all__ = ["BATCH", "DEVICES", "batch_size", "check_device", "engine_on", "gpu_name", "on_gpu", "workers_of"]
@@ -110,6 +111,11 @@ def on_gpu(device: Any, verb: str, engine: Engine, plan: SectionPlan | None, *, 
     """
     if check_device(device) == "cpu":
         return False
+    if isinstance(engine, LoopEngine) and engine.phases is not None:
+        raise ValueError(
+            f'{verb} with device="cuda" takes transitions at fixed phases; here `at` depends on the parameters: use '
+            'device="cpu"'
+        )
     planar = isinstance(engine, PlanarEngine)
     if not planar and verb == "lyapunov":
         raise ValueError(

@@ -123,7 +123,7 @@ class LinearEngine(LoopEngine):
         goal, motion = self._goal(0, count, 0.0, unit), self._motion(state, False)
         work.tally[BEGUN], code = 0, codes.PAUSED
         while code == codes.PAUSED:
-            code = kernel(i, form, self.net, nowhere(), goal, motion, growth, own, work)
+            code = kernel(i, form, self.net_of(tables, i), nowhere(), goal, motion, growth, own, work)
         state.settled = True
         return int(code)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -10,11 +11,12 @@ import numpy as np
 
 from nonsmooth.flow.engines.engine import Chain, FloatArray, Log, SectionPlan, State
 from nonsmooth.kernels.hybrid import codes
-from nonsmooth.kernels.hybrid.places import BEGUN, CROSSINGS, PATIENCE, TOUCHES
+from nonsmooth.kernels.hybrid.places import BEGUN, CROSSINGS, PATIENCE, RESET, TOUCHES
 from nonsmooth.kernels.hybrid.stopping import flag
+from nonsmooth.system.phases import phases, varying_phases
 
 if TYPE_CHECKING:
-    from nonsmooth.system.traced import Traced
+    from nonsmooth.system.traced import Traced, TracedTransition
 
 __all__ = ["DIVERGENCE", "LoopEngine", "pack_net"]
 
@@ -46,6 +48,15 @@ class LoopEngine:
         raise NotImplementedError
 
     @cached_property
+    def phases(self) -> Callable[[Any], FloatArray] | None:
+        """``Net.at`` as a function of the parameters; None where no phase depends on them."""
+        return varying_phases(self.traced)
+
+    def net_of(self, tables: Any, i: int) -> Any:
+        """The net of transitions with its phases at point i."""
+        return self.net if self.phases is None else self.net._replace(at=self.phases(tables.points[i]))
+
+    @cached_property
     def lacking(self) -> Any:
         """(modes, n) 1 where a mode has not that state."""
         return np.array(self.traced.lacking, dtype=np.int64).reshape(len(self.traced.mode_names), -1)
@@ -57,6 +68,10 @@ class LoopEngine:
         """See :class:`nonsmooth.flow.engines.engine.Engine`."""
         from nonsmooth.kernels.hybrid.records import Section
 
+        if self.phases is not None and last - first > 1:  # each point has a net of its own
+            for i in range(first, last):
+                self.chain(tables, i, i + 1, state, starts, plan, transient, keep, out)
+            return
         carry, clock = starts is None, state.clock.copy()
         if carry:
             state.keep_phase(float(tables.period[first]), plan.phase if plan.indicator < 0 else -1.0)
@@ -68,7 +83,7 @@ class LoopEngine:
         model, own, work = self.given(tables, "sections")
         rest = (
             np.zeros((0, 0)) if starts is None else _with_memory(starts, state.memory), model,
-            with_section(self.net, plan.indicator), section, self._goal(transient, keep, 0.0, 0.0),
+            with_section(self.net_of(tables, first), plan.indicator), section, self._goal(transient, keep, 0.0, 0.0),
             self._motion(state, carry and state.settled), out.record(), own, work,
         )  # fmt: skip
         kernel = self.module(tables, "sections").chain
@@ -87,7 +102,8 @@ class LoopEngine:
 
         n, n_u, n_m = len(samples), len(self.scale), len(self.traced.m)
         model, own, work = self.given(tables, "record")
-        rest = model, self.net, nowhere(), self._goal(0, 0, until, 0.0), self._motion(state, state.settled)
+        net, goal = self.net_of(tables, 0), self._goal(0, 0, until, 0.0)
+        rest = model, net, nowhere(), goal, self._motion(state, state.settled)
         sampled = (
             np.ascontiguousarray(samples, dtype=float), np.full((n, n_u), np.nan), np.full((n, n_m), np.nan),
             np.full(n, -1, dtype=np.int64), np.zeros(n, dtype=np.int64),
@@ -174,15 +190,25 @@ def with_section(net: Any, indicator: int) -> Any:
     return net._replace(rows=rows)
 
 
+def _change(traced: Traced, jump: TracedTransition) -> int:
+    """Place 1 of ``Net.transitions``: RESET, or 2 for one that also happens where it holds at a start already.
+
+    It writes memory, or begins states that its source lacks."""
+    if not traced.keeps(jump):
+        return RESET
+    return 0 if jump.reset is None and not jump.writes else 2
+
+
 def pack_net(traced: Traced) -> Any:
-    """The net of transitions (``kernels.records.Net``), with two more rows for a section."""
+    """The net of transitions (``kernels.records.Net``), with two more rows for a section.
+
+    Phases that depend on the parameters are zero here; see :meth:`LoopEngine.net_of`."""
     from nonsmooth.kernels.hybrid.records import Net
 
     integer = np.int64
     transitions = np.array(
-        [(t.target, 1 if t.reset is not None else 2 * bool(t.writes), t.contact) for t in traced.transitions],
-        dtype=integer,
-    ).reshape(-1, 3)
+        [(t.target, _change(traced, t), t.contact) for t in traced.transitions], dtype=integer,
+    ).reshape(-1, 3)  # fmt: skip
     rows = [(r.indicator, r.sign, r.strict) for t in traced.transitions for r in t.rows]
     row_start = np.cumsum([0] + [len(t.rows) for t in traced.transitions], dtype=integer)
     leaving = [
@@ -190,11 +216,10 @@ def pack_net(traced: Traced) -> Any:
     ]
     mode_start = np.cumsum([0] + [len(one) for one in leaving], dtype=integer)
     mode_list = np.array([j for one in leaving for j in one], dtype=integer)
-    at = np.array([-1.0 if t.at is None else t.at for t in traced.transitions], dtype=float)
     both = np.array([*rows, (0, 1, 1), (0, -1, 1)], dtype=integer).reshape(-1, 3)
     changed = np.zeros((len(transitions), len(traced.u) + len(traced.m) + 1), dtype=integer)
     for j, t in enumerate(traced.transitions):
         moved = [i for i, e in enumerate(t.reset or ()) if e != traced.u[i]]
         moved += [len(traced.u) + i for i, _ in t.writes]
         changed[j, : len(moved) + 1] = [len(moved), *moved]
-    return Net(transitions, both, row_start, mode_start, mode_list, at, changed)
+    return Net(transitions, both, row_start, mode_start, mode_list, phases(traced), changed)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.errors import SystemDefinitionError, shortened
+from nonsmooth.errors import shortened
 from nonsmooth.flow.arguments import float_array, real_number, whole_number
 from nonsmooth.flow.engines.engine import Engine, FloatArray
 
@@ -53,17 +53,9 @@ def engine_for(
     ------
     ValueError, TypeError
         A method that does not exist or does not fit, or tolerances for a method that has none.
-    SystemDefinitionError
-        A system with sliding surfaces.
     """
     if not isinstance(method, str) or method not in METHODS:
         raise ValueError(f"method = {shortened(method)} does not exist; allowed: {', '.join(map(repr, METHODS))}")
-    if getattr(system, "surfaces", ()):
-        names = ", ".join(repr(system.indicators[surface.indicator]) for surface in system.surfaces)
-        raise SystemDefinitionError(
-            f"{system.name!r} has sliding surfaces ({names}); motion along a Surface cannot be simulated yet. "
-            "Write the stick or slide mode and its transitions out, or use .smoothed(eta)"
-        )
     tolerance = RTOL if rtol is None else real_number(rtol, "rtol")
     if not 1e-15 <= tolerance <= 1e-2:
         raise ValueError(f"rtol = {rtol!r} is outside 1e-15 ... 1e-2")

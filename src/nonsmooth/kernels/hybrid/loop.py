@@ -171,7 +171,8 @@ def march(i, form, net, section, goal, motion, seen, tables, work):
         if not step >= 0.0:
             code = DIVERGED
             break
-        stopped = t < 0 and sense == 0 and step >= wait
+        # a step that ends before the stop may still end there when it is added to the clock
+        stopped = t < 0 and sense == 0 and (step >= wait or memo[TIME] + step >= stop)
         if stopped and timed >= 0:
             t = timed
         state = observe(i, step, stop if stopped else -1.0, t >= 0 and t == timed, form, net, section, goal, seen,

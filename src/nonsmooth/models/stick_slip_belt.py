@@ -1,0 +1,71 @@
+r"""A mass on a spring that rubs on a moving belt: friction that falls with the relative velocity, and sticks.
+
+Leine et al. (1998), alternate friction model of their example with one degree of freedom. At the default values the
+stable limit cycle sticks until the spring force reaches the static friction, x = F, slips for 4.296000 and has the
+period 12.001031 and the multipliers 1 and 0.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from nonsmooth.system.transition import Surface
+
+if TYPE_CHECKING:
+    from nonsmooth.system.system import System
+
+__all__ = ["stick_slip_belt"]
+
+
+def _dragged(t: Any, u: Any, p: Any) -> Any:
+    x, v = u
+    return v, p.F / (1 + p.delta * (p.v_b - v)) - x
+
+
+def _ahead(t: Any, u: Any, p: Any) -> Any:
+    x, v = u
+    return v, -p.F / (1 + p.delta * (v - p.v_b)) - x
+
+
+def _relative(t: Any, u: Any, p: Any) -> Any:
+    return u.v - p.v_b
+
+
+def stick_slip_belt(**parameters: float) -> System:
+    r"""Return the friction oscillator on a belt: self-excited stick-slip vibration.
+
+    :math:`\ddot x = -x + F \operatorname{sgn}(v_b - \dot x) / (1 + \delta |v_b - \dot x|)`.
+
+    Parameters
+    ----------
+    **parameters : float
+        ``F`` 1 (static friction), ``delta`` 3 (decrease of friction), ``v_b`` 0.2 (belt); dimensionless.
+
+    Returns
+    -------
+    System
+        Modes ``dragged`` (slower than the belt), ``ahead`` and ``stick``, which is derived from the surface
+        ``relative`` (v - v_b); output ``friction``.
+
+    References
+    ----------
+    R. I. Leine, D. H. van Campen, A. de Kraker, L. van den Steen, Stick-slip vibrations induced by alternate
+    friction models, *Nonlinear Dynamics* 16 (1998) 41-54.
+    """
+    from nonsmooth.system.system import System
+
+    system = System(
+        name="stick-slip oscillator on a belt",
+        states={"x": "", "v": ""},
+        parameters={"F": 1.0, "delta": 3.0, "v_b": 0.2},
+        modes={"dragged": _dragged, "ahead": _ahead},
+        indicators={"relative": _relative},
+        transitions=[Surface("relative", below="dragged", above="ahead", mode="stick")],
+        outputs={
+            "friction": {
+                "dragged": lambda t, u, p: p.F / (1 + p.delta * (p.v_b - u.v)),
+                "ahead": lambda t, u, p: -p.F / (1 + p.delta * (u.v - p.v_b)),
+            }
+        },
+    )
+    return system.with_parameters(parameters) if parameters else system

@@ -1,0 +1,172 @@
+"""Motion along surfaces: where a run begins, how perturbations pass, ramps, and where there is no unique way on."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+
+
+@pytest.mark.parametrize(
+    ("start", "mode"),
+    [
+        ((0.0, 2.0), "forward"), ((3.0, 2.0), "forward"), ((-3.0, 0.5), "forward"), ((3.0, 0.31), "forward"),
+        ((0.0, -2.0), "backward"), ((-3.0, 0.2), "backward"), ((3.0, -0.5), "backward"),
+        ((1.0, 0.3), "stick"), ((0.6, 0.3), "forward"), ((1.4, 0.3), "backward"),
+    ],
+)  # fmt: skip
+def test_a_start_goes_to_its_side(start: tuple[float, float], mode: str) -> None:
+    """Beside the surface by its indicator alone, on it by the forces: |cos 0 - x| < 0.3 sticks."""
+    system = ns.models.dry_friction_oscillator(v_b=0.3)
+    run = ns.simulate(system, start=start, duration=1e-6, samples=2)
+    assert system.modes[int(run.mode.values[0])] == mode
+
+
+@pytest.mark.parametrize("rtol", [1e-9, 1e-12])
+def test_sliding_round_a_circle(rtol: float) -> None:
+    """Inside r' = r, theta' = 1, outside r' = -r, theta' = 3: on r = 1 half of each, theta' = 2."""
+    system = ns.System(
+        states=["x", "y"], parameters={},
+        modes={
+            "inside": lambda t, u, p: (u.x - u.y, u.x + u.y),
+            "outside": lambda t, u, p: (-u.x - 3 * u.y, 3 * u.x - u.y),
+        },
+        indicators={"radius": lambda t, u, p: u.x**2 + u.y**2 - 1},
+        transitions=[ns.Surface("radius", below="inside", above="outside")],
+    )  # fmt: skip
+    for r, arrives, angle in ((0.5, np.log(2), np.log(2)), (3.0, np.log(3), 3 * np.log(3))):
+        run = ns.simulate(system, duration=100.0, start={"x": r}, samples=1001, rtol=rtol)
+        assert run.crossing_time.values[-1] == pytest.approx(arrives, abs=0.01 * rtol)
+        slid = run.time.values > arrives
+        theta = angle + 2 * (run.time.values[slid] - arrives)
+        assert run.u.values[slid] == pytest.approx(np.array([np.cos(theta), np.sin(theta)]).T, abs=10 * rtol)
+        assert np.abs(np.hypot(*run.u.values[slid].T) - 1).max() < 0.01 * rtol
+
+
+def test_an_impact_out_of_a_stick() -> None:
+    """A belt carries a mass to a wall at x = 1; it rebounds with -e v_b and slips, x'' = F - x, back to the wall."""
+    rebound = {"when": "wall > 0", "reset": lambda t, u, p: (u.x, -p.e * u.v)}
+    system = ns.System(
+        states=["x", "v"], parameters={"F": 2.0, "v_b": 0.5, "e": 0.8},
+        modes={"slower": lambda t, u, p: (u.v, p.F - u.x), "faster": lambda t, u, p: (u.v, -p.F - u.x)},
+        indicators={"slip": lambda t, u, p: u.v - p.v_b, "wall": lambda t, u, p: u.x - 1},
+        transitions=[
+            ns.Surface("slip", below="slower", above="faster", mode="stick"),
+            ns.Transition("slower", "slower", **rebound), ns.Transition("faster", "faster", **rebound),
+        ],
+    )  # fmt: skip
+    run = ns.simulate(system, duration=3.0, start={"x": 0.5, "v": 0.5}, samples=2)
+    labels = [system.transitions[i].label for i in run.crossing_transition.values]
+    first = labels.index("stick -> slower")
+    assert labels[first + 1] == "slower -> slower"
+    assert run.crossing_time.values[first] == pytest.approx(1.0, abs=1e-14)
+    assert run.u_after.values[first] == pytest.approx([1.0, -0.4], abs=1e-14)
+    # x = 2 - cos s - 0.4 sin s comes back to x = 1 with the speed 0.4, slower than the belt
+    assert np.diff(run.crossing_time.values)[first] == pytest.approx(2 * np.arctan(0.4), abs=1e-14)
+    assert run.u_after.values[first + 1] == pytest.approx([1.0, -0.32], abs=1e-14)
+
+
+def derivatives(system: ns.System, duration: float, start: np.ndarray, step: float = 1e-6) -> np.ndarray:
+    columns = []
+    for i in range(len(start)):
+        ends = []
+        for sign in (1, -1):
+            moved = start.copy()
+            moved[i] += sign * step
+            ends.append(ns.simulate(system, duration=duration, start=moved, samples=2).u.values[-1])
+        columns.append((ends[0] - ends[1]) / (2 * step))
+    return np.array(columns).T
+
+
+def through(system: ns.System, duration: float, start: Any) -> list[str]:
+    run = ns.simulate(system, duration=duration, start=start, samples=2)
+    return [system.modes[system.transitions[i].target] for i in run.crossing_transition.values]
+
+
+@pytest.mark.parametrize(("duration", "last"), [(8.0, "stick"), (12.0, "forward"), (16.0, "stick"), (20.0, "backward")])
+def test_derivatives_into_and_out_of_a_stick(duration: float, last: str) -> None:
+    """With static friction: the field jumps where the stick ends."""
+    system = ns.models.dry_friction_oscillator(omega=0.4, f_s=0.4, zeta=0.05, v_b=0.1)
+    start = np.array([0.2, 1.2])
+    assert through(system, duration, start)[-1] == last
+    found = ns.sensitivity(system, duration=duration, start=start).Phi.values
+    assert found == pytest.approx(derivatives(system, duration, start), abs=1e-6)
+    assert np.linalg.matrix_rank(found, tol=1e-9) == 1
+
+
+def test_derivatives_of_the_relay() -> None:
+    """Into sliding and out of it, several times."""
+    system = ns.models.relay_feedback()
+    start = np.array([0.1, -0.4, 0.3])
+    path = through(system, 4.0, start)
+    assert path.count("sliding") >= 2
+    found = ns.sensitivity(system, duration=4.0, start=start).Phi.values
+    expected = derivatives(system, 4.0, start, step=1e-7)
+    assert found == pytest.approx(expected, abs=1e-6 * np.abs(expected).max())
+    assert np.linalg.matrix_rank(found, tol=1e-9 * np.abs(found).max()) == 2
+
+
+def test_a_belt_that_speeds_up() -> None:
+    """A ramp of the belt's speed: while the mass sticks, dv/dt is that of the belt and the friction carries it."""
+    system = ns.models.stick_slip_belt()
+    run = ns.simulate(system, duration=1.0, start={"x": 0.0, "v": 0.2}, ramps={"v_b": (0.2, 0.6)}, samples=11)
+    t = run.time.values
+    assert run.u.values[:, 1] == pytest.approx(0.2 + 0.4 * t, abs=1e-13)
+    assert run.u.values[:, 0] == pytest.approx(0.2 * t + 0.2 * t**2, abs=1e-12)
+    assert run.friction.values == pytest.approx(0.4 + 0.2 * t + 0.2 * t**2, abs=1e-12)
+
+
+def test_a_start_on_a_repelling_surface_is_refused() -> None:
+    system = ns.System(
+        states=["x", "v"], parameters={"F": 0.3},
+        modes={"low": lambda t, u, p: (u.v, -u.x - p.F), "high": lambda t, u, p: (u.v, -u.x + p.F)},
+        indicators={"h": lambda t, u, p: u.v}, transitions=[ns.Surface("h", below="low", above="high")],
+    )  # fmt: skip
+    with pytest.raises(ValueError, match=r"'v': 0.0.* lies on the surface 'h' where both vector fields lead away"):
+        ns.simulate(system, duration=1.0)
+    assert len(ns.simulate(system, duration=1.0, start={"x": 1.0}).crossing_time) <= 1  # crossing is no question
+
+
+def test_sliding_into_a_two_fold_ends_with_a_sentence() -> None:
+    """In the time scaled by y - x the sliding flow is x' = y, y' = -3 y - 2 x: a node that attracts x < 0 < y."""
+    system = ns.System(
+        states=["x", "y", "z"], parameters={},
+        modes={"below": lambda t, u, p: (0, 2, u.y), "above": lambda t, u, p: (1, -3, u.x)},
+        indicators={"h": lambda t, u, p: u.z}, transitions=[ns.Surface("h", below="below", above="above")],
+    )  # fmt: skip
+    with pytest.raises(ns.SolveError, match="Sliding in mode 'h_sliding' .* two-fold.* not unique") as caught:
+        ns.simulate(system, duration=5.0, start=[-0.5, 0.5, 0.0])
+    assert caught.value.status == "chatter"
+    assert np.abs(list(caught.value.state.values())).max() < 1e-8
+
+
+@pytest.mark.parametrize("f", [0.05, 0.1, 0.3])
+def test_an_end_of_sliding_is_no_return_to_it(f: float) -> None:
+    """On a belt, slipping begins without relative acceleration: rounding of either rate must not end it at once."""
+    system = ns.models.dry_friction_oscillator(f_k=f, f_s=f, v_b=0.5)
+    frequencies = np.linspace(0.05, 2.5, 99)
+    diagram = ns.sweep(system, "omega", frequencies, transient=100, keep=20, direction=None, progress=False)
+    assert set(diagram.status.values.tolist()) <= {0, 1, 2}
+
+
+def test_four_fields_that_leave_the_motion_on_two_surfaces_open() -> None:
+    """All lead to x = y = 0, where z' depends on the order in which the fields are combined."""
+    z = {"mm": 0.0, "pm": 1.0, "mp": 0.0, "pp": 0.0}
+    speed = {"mm": (1, 1), "pm": (-1, 2), "mp": (3, -1), "pp": (-1, -1)}
+    system = ns.System(
+        states=["x", "y", "z"], parameters={},
+        modes={mode: (lambda t, u, p, mode=mode: (*speed[mode], z[mode] - u.z)) for mode in z},
+        indicators={"one": lambda t, u, p: u.x, "two": lambda t, u, p: u.y},
+        transitions=[
+            ns.Surface("one", below="mm", above="pm"), ns.Surface("one", below="mp", above="pp"),
+            ns.Surface("two", below="mm", above="mp"), ns.Surface("two", below="pm", above="pp"),
+        ],
+    )  # fmt: skip
+    assert not any(mode.startswith("one_two_sliding") for mode in system.modes)
+    with pytest.raises(ns.SolveError, match=r"do not determine one field on both") as caught:
+        ns.simulate(system, duration=5.0, start=[-0.5, -1.0, 0.2])
+    assert caught.value.status == "chatter"
+    assert caught.value.time < 1.5
