@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -130,6 +133,80 @@ def test_impacts_between_masses_keep_the_momentum() -> None:
     assert run["crossing_time"].values == pytest.approx([1.0], rel=1e-14)
     assert 2 * after[2] + after[3] == pytest.approx(2 * before[2] + before[3], rel=1e-14)
     assert after[3] - after[2] == pytest.approx(0.25 * (before[2] - before[3]), rel=1e-14)
+
+
+def test_what_friction_holds_is_driven_away_by_an_impact() -> None:
+    """A finite force bears no impulse: the struck mass leaves with (1 + e) / 2 and the momentum is kept."""
+    pair = ns.mechanical(
+        np.eye(2), np.zeros((2, 2)), np.zeros((2, 2)), coordinates=["a", "b"],
+        elements={
+            "bumper": Stop(at={"b": 1, "a": -1}, side=-1, restitution=0.25), "rub": Coulomb(at="b", friction=0.1),
+        },
+    )  # fmt: skip
+    run = ns.simulate(pair, duration=1.5, start={"a": 0.0, "b": 1.0, "v_a": 1.0})
+    assert run["u_after"].values[0] == pytest.approx([1.0, 1.0, 0.375, 0.625], abs=1e-14)
+    assert run["u"].values[-1] == pytest.approx([1.1875, 1.3, 0.375, 0.575], abs=1e-13)
+
+
+def test_a_mass_that_rubs_rebounds() -> None:
+    """The impact turns the speed round and with it the friction: v - f t before, f t - e (v - f) after."""
+    puck = ns.mechanical(
+        1.0, 0.0, 0.0, elements=[Coulomb(at="q", friction=0.1), Stop(at="q", position=0.95, restitution=0.5)]
+    )
+    run = ns.simulate(puck, duration=3.0, start={"v_q": 1.0})
+    assert run["crossing_time"].values[0] == pytest.approx(1.0, abs=1e-13)
+    assert run["u"].values[-1] == pytest.approx([0.95 - 0.45 * 2 + 0.05 * 4, -0.25], abs=1e-13)
+
+
+def test_friction_under_the_force_of_an_elastic_contact() -> None:
+    """A wall pressed by 1 brakes the slider with 0.3 until it sticks; an open one lets it go."""
+    slider = ns.mechanical(
+        np.eye(2), np.zeros((2, 2)), np.zeros((2, 2)), forcing={"q1": lambda t, p: 1.0},
+        elements={
+            "wall": ElasticStop(at="q1", stiffness=20.0), "rub": Coulomb(at="q2", friction=0.3, normal="wall"),
+        },
+    )  # fmt: skip
+    run = ns.simulate(slider, duration=5.0, start={"q1": 0.05, "v_q2": 1.0}, samples=11)
+    assert run["u"].values[-1] == pytest.approx([0.05, 0.5 / 0.3, 0.0, 0.0], abs=1e-12)
+    assert slider.modes[int(run["mode"][-1])] == "wall_contact_rub_stick"
+    away = ns.simulate(slider, duration=1.0, start={"q1": -1.0, "v_q2": 1.0})
+    assert away["u"].values[-1] == pytest.approx([-0.5, 1.0, 1.0, 1.0], abs=1e-12)
+
+
+@pytest.mark.parametrize("rest", [True, False])
+def test_two_stops_of_a_mass_that_varies(rest: bool) -> None:
+    """Impacts push with 1 / (1 + x^2), which has one sign; one that has not is refused."""
+
+    def between(push: Callable[[Any], Any]) -> ns.System:
+        return ns.System(
+            states=["x", "v"], parameters={"e": 0.5},
+            modes={"all": lambda t, u, p: (u.v, -u.x * u.v**2 / (1 + u.x**2))},
+            elements={
+                "right": Stop(gap=lambda t, u, p: 1 - u.x, on={"v": lambda t, u, p: -push(u)}, restitution="e",
+                              rest=rest),
+                "left": Stop(gap=lambda t, u, p: 1 + u.x, on={"v": lambda t, u, p: push(u)}, restitution="e"),
+            },
+        )  # fmt: skip
+
+    run = ns.simulate(between(lambda u: 1 / (1 + u.x**2)), duration=3.0, start={"v": 1.0})
+    length = (np.sqrt(2) + np.arcsinh(1)) / 2  # of the track from 0 to 1: (1 + x^2) v^2 is kept
+    assert run["crossing_time"].values[:1] == pytest.approx([length], abs=1e-9)
+    assert run["u_after"].values[0] == pytest.approx([1.0, -0.5 / np.sqrt(2)], abs=1e-9)
+    if rest:
+        with pytest.raises(ns.SystemDefinitionError, match="depends on the state"):
+            between(lambda u: 1 + u.x)
+
+
+def test_an_elastic_contact_without_a_damper_acts_on_any_state() -> None:
+    """x' = -x + F with F = -3 (x - 1) above 1: decay with the rate 4 down to x = 1, then with the rate 1."""
+    diode = ns.System(
+        states=["x"], parameters={}, modes={"all": lambda t, u, p: (-u.x,)},
+        elements=[Backlash(displacement=lambda t, u, p: u.x, on={"x": 1.0}, half_width=1.0, stiffness=3.0)],
+    )  # fmt: skip
+    run = ns.simulate(diode, duration=2.0, start={"x": 2.0})
+    turn = np.log((2 - 0.75) / (1 - 0.75)) / 4  # x = 3/4 + (2 - 3/4) exp(-4 t)
+    assert run["crossing_time"].values[-1] == pytest.approx(turn, rel=1e-13)
+    assert float(run["u"][-1, 0]) == pytest.approx(np.exp(-(2.0 - turn)), rel=1e-12)
 
 
 def test_a_block_rests_on_two_feet_and_tips_over_one() -> None:

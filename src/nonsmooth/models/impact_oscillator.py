@@ -1,8 +1,10 @@
 r"""A harmonically forced oscillator that hits a rigid stop: the rigid relative of the discontinuous support.
 
-Dankowicz & Schilder, *Recipes for Continuation* (SIAM 2013), Ex. 15.2. Known in closed form: the orbit
-that does not reach the stop grazes it at A = d sqrt((k - omega^2)^2 + (c omega)^2) (0.1 at the default values); the
-monodromy matrix of an orbit with one impact per period T has the determinant e^2 exp(-c T).
+Dankowicz & Schilder, *Recipes for Continuation* (SIAM 2013), Ex. 15.2. Known in closed form: the orbit that does not
+reach the stop grazes it at A = d sqrt((k - omega^2)^2 + (c omega)^2) (0.1 at the default values); the monodromy matrix
+of an orbit with one impact per period T has the determinant e^2 exp(-c T). It is Nordmark's oscillator, too (J. Sound
+Vib. 145 (1991) 279-297): from motion of an amplitude X above d the first impact has the speed omega sqrt(X^2 - d^2),
+the square root of its normal form.
 """
 
 from __future__ import annotations
@@ -49,7 +51,8 @@ def impact_oscillator(**parameters: float) -> System:
 
     References
     ----------
-    H. Dankowicz, F. Schilder, *Recipes for Continuation*, SIAM 2013, Ex. 15.2.
+    H. Dankowicz, F. Schilder, *Recipes for Continuation*, SIAM 2013, Ex. 15.2; A.B. Nordmark, J. Sound Vib. 145 (1991)
+    279-297.
     """
     from nonsmooth.system.system import System
 

@@ -138,13 +138,13 @@ class _Assembler:
         if isinstance(e, ElasticStop):
             if phase == "open":
                 return sp.Integer(0)
-            return -self.of(part, "stiffness") * part.where - self.of(part, "damping") * self.rate(part, mode)
+            return -self.of(part, "stiffness") * part.where + self.damped(part, mode)
         if isinstance(e, Backlash):
             if phase == "free":
                 return sp.Integer(0)
             side = 1 if phase == "above" else -1
             pressed = part.where - side * self.of(part, "half_width")
-            return -self.of(part, "stiffness") * pressed - self.of(part, "damping") * self.rate(part, mode)
+            return -self.of(part, "stiffness") * pressed + self.damped(part, mode)
         if isinstance(e, PreloadedSpring):
             side = 1 if phase == "above" else -1
             return -side * self.of(part, "preload") - self.of(part, "stiffness") * part.where
@@ -152,6 +152,11 @@ class _Assembler:
             return None
         side = 1 if phase == "forward" else -1
         return -side * self.friction(part, side * part.where) * self.normal(part, mode, pattern)
+
+    def damped(self, part: _Part, mode: str) -> sp.Expr:
+        """The damper's force of an elastic contact; without one no speed is asked for, and states need not have one."""
+        damping = self.of(part, "damping")
+        return sp.Integer(0) if damping == 0 else -damping * self.rate(part, mode)
 
     def friction(self, part: _Part, speed: sp.Expr) -> sp.Expr:
         """The kinetic law at a magnitude of the speed."""
@@ -236,6 +241,17 @@ class _Assembler:
         found = [self.scale[name] for name, symbol in self.symbols.u.items() if expression.has(symbol)]
         return max(found, default=1.0)
 
+    def sign(self, effect: sp.Expr, one: _Part, other: _Part) -> int:
+        """The sign of what one element's impulse does to another's gap, which must be the same in all states."""
+        effect = sp.simplify(effect.subs(self.values))
+        for number, holds in ((-1, effect.is_negative), (0, effect.is_zero), (1, effect.is_positive)):
+            if holds:
+                return number
+        raise SystemDefinitionError(
+            f"elements {one.name!r} and {other.name!r}: whether an impact of one opens the other depends on the state "
+            f"({effect}), and that is decided once for all; give {one.name!r} rest=False"
+        )
+
     def condition(self, rows: Sequence[Condition]) -> str:
         """The text of a condition; its expressions become indicators, equal ones the same."""
         words = []
@@ -254,7 +270,7 @@ class _Assembler:
     def projected(self, k: int, factor: sp.Expr, held: Sequence[int], mode: str) -> list[sp.Expr]:
         """States behind an impulse of the element that takes its rate to -factor times it.
 
-        Contacts that rest and friction that sticks bear their part of it."""
+        What is held bears its part of it."""
         wanted = sp.Matrix([-(1 + factor) * self.rate(self.parts[k], mode), *([0] * len(held))])
         impulses = self.effects([k, *held], mode).LUsolve(wanted)
         after = list(self.u)
@@ -353,25 +369,30 @@ class _Assembler:
                 ("back", [(v + off, -1, f"{name}_speed_below")], None),
                 ("back", [(above[0], 1, above[1])], None), ("forward", [(below[0], -1, below[1])], None),
             ]  # fmt: skip
-        held = self._bearing(k, pattern, mode)
-        still = self.projected(k, sp.Integer(0), held, mode)
+        other = "back" if phase == "forward" else "forward"
         sign = -1 if phase == "forward" else 1
         stopped: Condition = (v, sign, f"{name}_speed")
+        if sp.expand(most) == 0:
+            return [(other, [stopped], None)]  # an open contact, which bears no friction
+        held = [j for j in self.held(pattern) if sp.simplify(self.across(self.rate(self.parts[j], mode), part)) != 0]
+        still = self.projected(k, sp.Integer(0), held, mode)
+        off = -sign * sp.Float(CREEP * self.size(v))
+        slow, turned = ((v + off, one * sign, f"{name}_turned_{phase}") for one in (-1, 1))
         within = [(above[0], -1, above[1]), (below[0], 1, below[1])]
-        other, torn = ("back", (above[0], 1, above[1])) if phase == "forward" else ("forward", (below[0], -1, below[1]))
-        return [("stick", [stopped, *within], still), (other, [stopped, torn], None)]
+        torn = (above[0], 1, above[1]) if phase == "forward" else (below[0], -1, below[1])
+        # An impact turns the speed round at once, and no finite force can stop it then.
+        return [("stick", [stopped, slow, *within], still), (other, [stopped, torn], None), (other, [turned], None)]
 
     def _bearing(self, k: int, pattern: Pattern, mode: str) -> list[int]:
-        """Of what rests or sticks the elements that take part in an impulse of element k.
+        """Of the contacts that rest those that take part in an impulse of element k.
 
-        Contacts that it would pull open part instead."""
+        Those that it would pull open part instead; friction is finite and lets go of what it held."""
 
         def bears(j: int) -> bool:
             part = self.parts[j]
-            change = self.across(self.rate(part, mode), self.parts[k])
-            if sp.simplify(change) == 0:
+            if isinstance(part.element, Coulomb):
                 return False
-            return isinstance(part.element, Coulomb) or float(change.subs(self.values)) < 0
+            return self.sign(self.across(self.rate(part, mode), self.parts[k]), part, self.parts[k]) < 0
 
         return [j for j in self.held(pattern) if j != k and bears(j)]
 

@@ -108,6 +108,8 @@ class Stop(Element):
             raise SystemDefinitionError(f"Stop: restitution = {self.restitution}; it lies between 0 and 1")
         if self.creep is not None and not (isinstance(self.creep, (int, float)) and self.creep > 0):
             raise SystemDefinitionError(f"Stop: creep is a positive speed, not {self.creep!r}")
+        if not self.rest:
+            object.__setattr__(self, "phases", ("open",))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -32,6 +32,7 @@ def mechanical(
     base: Callable[..., Any] | None = None,
     scale: Mapping[str, float] | None = None,
     outputs: Mapping[str, Any] | None = None,
+    symmetry: Any = None,
     period: Any = None,
     name: str = "mechanical system",
 ) -> System:
@@ -55,7 +56,7 @@ def mechanical(
         Names of the coordinates (``q1``, ``q2``, ...; ``q`` for one). Speeds are called ``v_<coordinate>``.
     base : callable, optional
         Acceleration of the base, ``lambda t, p: -p.Y * p.w**2 * np.cos(p.w * t)``; coordinates are relative to it.
-    scale, outputs, period, name
+    scale, outputs, symmetry, period, name
         As for :class:`nonsmooth.System`.
 
     Returns
@@ -141,8 +142,8 @@ def mechanical(
     states = {**units, **{v: f"{units[q]}/s" if units[q] else "" for q, v in zip(names, speeds, strict=True)}}
     parts = {key: placed(key, element) for key, element in element_names(elements or {}).items()}
     return System(
-        name=name, states=states, parameters=given, modes={"all": field}, outputs=outputs, scale=scale, period=period,
-        elements=parts or None,
+        name=name, states=states, parameters=given, modes={"all": field}, outputs=outputs, scale=scale,
+        symmetry=symmetry, period=period, elements=parts or None,
     )  # fmt: skip
 
 
