@@ -25,8 +25,8 @@ class CompileAhead(BuildHookInterface):  # type: ignore[misc]
             arguments += ["--into", self.folder.name]
         paths = os.pathsep.join([str(sources), *filter(None, [os.environ.get("PYTHONPATH")])])
         done = subprocess.run(
-            [sys.executable, "-m", "nonsmooth.kernels.compile.ahead", *arguments], env={**os.environ, "PYTHONPATH": paths},
-            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+            [sys.executable, "-m", "nonsmooth.kernels.compile.ahead", *arguments],
+            env={**os.environ, "PYTHONPATH": paths}, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
         )  # fmt: skip
         if done.returncode:
             self.app.display_warning(f"nothing is compiled ahead; kernels will be when they are called:\n{done.stdout}")

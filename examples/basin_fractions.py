@@ -15,14 +15,14 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-def main() -> Axes:
+def main(points: int = 101, starts: int = 150) -> Axes:
     """At rho = 0.33 N a motion of period 4 coexists with that of period 3 which the paper shows."""
     from matplotlib.figure import Figure
 
     support = ns.models.discontinuous_support(omega=11.15, g=0.0014)
     shares = ns.basin_fractions(
-        support, "rho", np.linspace(0.25, 0.5, 101), n_starts=150, box={"x": (-0.02, 0.02), "v": (-0.2, 0.2)}, seed=1,
-        progress=False,
+        support, "rho", np.linspace(0.25, 0.5, points), n_starts=starts, box={"x": (-0.02, 0.02), "v": (-0.2, 0.2)},
+        seed=1, progress=False,
     )  # fmt: skip
     there = shares.sel(rho=0.33, method="nearest")
     periods = there.period_number.values[there.fraction.values > 0]

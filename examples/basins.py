@@ -12,11 +12,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-def main() -> Axes:
+def main(points: int = 160) -> Axes:
     """Two attractors, found from the initial conditions alone."""
     support = ns.models.discontinuous_support(rho=0.23, g=0.0036, omega=9.55)
     found = ns.basins(
-        support, {"x": np.linspace(-0.02, 0.02, 160), "v": np.linspace(-0.2, 0.2, 160)}, progress=False
+        support, {"x": np.linspace(-0.02, 0.02, points), "v": np.linspace(-0.2, 0.2, points)}, progress=False
     )
     ax = ns.plot.basins(found)
     assert sorted(found.period_number.values.tolist()) == [0, 3]

@@ -45,6 +45,10 @@ ALLOWED: dict[str, tuple[str, ...]] = {
 }
 
 
+#: Logs, left as they were written, and the page for those who work on the code, which names what stands in it.
+LOGS = ("decisions.md", "CHANGELOG.md", "CONTRIBUTING.md")
+
+
 def words(text: str) -> str:
     """The text without code, formulas and links."""
     text = re.sub(r"^(```|~~~).*?^\1", " ", text, flags=re.S | re.M)
@@ -82,15 +86,23 @@ def of_source(path: Path) -> Iterator[str]:
                 yield f"{path.relative_to(ROOT)}:{node.lineno}: {complaint}"
 
 
+def unmerged(text: str) -> bool:
+    """True where both sides of a merge are left in a text."""
+    return bool(re.search(r"^(<{7}|>{7}) ", text, re.MULTILINE))
+
+
 def complaints() -> Iterator[str]:
     """All complaints, one a line."""
     sources = ROOT / "src" / "nonsmooth"
     for path in sorted(sources.rglob("*.py")):
         if path.relative_to(sources).parts[0] not in NOT_COVERED_YET:
             yield from of_source(path)
-    for path in [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]:
-        if "_build" not in path.parts and path.name != "decisions.md":  # a log, left as it was written
-            for complaint in terms(path.read_text(encoding="utf-8"), ALLOWED.get(path.name, ())):
+    for path in [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").rglob("*.md"))]:
+        text = path.read_text(encoding="utf-8")
+        if unmerged(text):
+            yield f"{path.relative_to(ROOT)}: both sides of a merge are left in it"
+        if "_build" not in path.parts and path.name not in LOGS:
+            for complaint in terms(text, ALLOWED.get(path.name, ())):
                 yield f"{path.relative_to(ROOT)}: {complaint}"
 
 

@@ -62,9 +62,10 @@ def test_ctrl_c_while_a_study_follows_a_branch(
 
 
 LONG = """
-import os, signal, threading, time, warnings
+import faulthandler, os, signal, threading, time, warnings
 import nonsmooth as ns
 
+faulthandler.dump_traceback_later(280, exit=True)  # says where it is
 warnings.simplefilter("ignore")
 o = ns.models.discontinuous_support()
 valve, top = ns.models.relief_valve(), ns.Poincare("lift_velocity", rising=False)
@@ -87,24 +88,24 @@ for name, call in cases.items():
     call(False)
     began = []
     def interrupt():
-        began.append(time.perf_counter())
+        began.append(time.process_time())
         os.kill(os.getpid(), signal.SIGINT)
-    timer = threading.Timer(0.5, interrupt)
-    timer.start()
     try:
+        threading.Timer(0.5, interrupt).start()
         call(True)
-        print(name, "came to its end")
+        print(name, "came to its end", flush=True)
     except KeyboardInterrupt:
-        print(name, "took", time.perf_counter() - began[0])
+        print(name, "took", time.process_time() - began[0], flush=True)
 """
 
 
 def test_every_verb_ends_soon_after_ctrl_c() -> None:
-    """Whatever the length of a transient, a period or a step: kernels pause. (2 s are promised on a quiet machine.)"""
-    done = subprocess.run([sys.executable, "-c", LONG], capture_output=True, text=True, timeout=300)
-    assert done.returncode == 0, done.stderr
+    """Whatever the length of a transient, a period or a step: kernels pause. 2 s are promised on a quiet machine: of
+    processor time, that of two threads."""
+    done = subprocess.run([sys.executable, "-c", LONG], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
     lines = done.stdout.splitlines()
     assert len(lines) == 8
     for line in lines:
         assert " took " in line, line
-        assert float(line.rpartition(" ")[2]) < 10.0, line
+        assert float(line.rpartition(" ")[2]) < 4.0, line

@@ -31,3 +31,7 @@ def test_strings_of_a_source_are_read(tmp_path: Path, monkeypatch: pytest.Monkey
     path.write_text('def f():\n    """How it goes."""\n    return f"refused at the door: {f}"\nleg = "leg"\n')
     found = list(prose.of_source(path))
     assert len(found) == 2 and "a.py:1: the docstring begins with 'How'" in found[0] and "before any" in found[1]
+
+
+def test_both_sides_of_a_merge_are_named() -> None:
+    assert prose.unmerged("a\n<<<<<<< HEAD\nb\n") and not prose.unmerged("a\n=======\nb << c")

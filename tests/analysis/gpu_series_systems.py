@@ -39,16 +39,16 @@ def grows_to_a_stop() -> ns.System:
 
 
 def filtered() -> ns.System:
-    """Three states, linear in both modes: the exact flow by series."""
+    """Four states, linear in both modes: the exact flow by series."""
 
     def free(t: Any, u: Any, p: Any) -> Any:
-        return u.v, p.F * np.cos(p.w * t) - u.x - 0.1 * u.v, u.v - u.z
+        return u.v, p.F * np.cos(p.w * t) - u.x - 0.1 * u.v, u.v - u.z, u.z - 2 * u.y
 
     def contact(t: Any, u: Any, p: Any) -> Any:
-        return u.v, free(t, u, p)[1] - p.k * (u.x - p.g), u.v - u.z
+        return u.v, free(t, u, p)[1] - p.k * (u.x - p.g), u.v - u.z, u.z - 2 * u.y
 
     return ns.System(
-        name="filtered", states=["x", "v", "z"], parameters={"F": 0.3, "w": 0.8, "k": 10.0, "g": 0.4},
+        name="filtered", states=["x", "v", "z", "y"], parameters={"F": 0.3, "w": 0.8, "k": 10.0, "g": 0.4},
         modes={"free": free, "contact": contact}, indicators={"wall": lambda t, u, p: u.x - p.g},
         transitions=[ns.Transition("free", "contact", when="wall > 0"),
                      ns.Transition("contact", "free", when="wall < 0")],

@@ -124,26 +124,26 @@ def test_compiled_and_uncompiled_judgement_agree() -> None:
 
 
 def oscillator_at_a_wall(*, filtered: bool) -> ns.System:
-    """Two states, linear with and without contact; or a third one beside them that filters the speed: z' = v - z."""
+    """Two states, linear with and without contact; with two more states beside them, z' = v - z and y' = -8 y."""
 
     def field(contact: bool) -> Any:
         def rates(t: Any, u: Any, p: Any) -> Any:
             push = p.F * np.cos(p.w * t) - u.x - 0.1 * u.v - (100.0 * (u.x + 0.2) if contact else 0.0)
-            return (u.v, push, u.v - u.z) if filtered else (u.v, push)
+            return (u.v, push, u.v - u.z, -8 * u.y) if filtered else (u.v, push)
 
         return rates
 
     return ns.System(
-        name="at a wall", states=["x", "v", *(["z"] if filtered else [])], parameters={"F": 0.3, "w": 0.8},
+        name="at a wall", states=["x", "v", *(["z", "y"] if filtered else [])], parameters={"F": 0.3, "w": 0.8},
         modes={"free": field(False), "contact": field(True)}, indicators={"wall": lambda t, u, p: u.x + 0.2},
         transitions=[ns.Transition("free", "contact", when="wall > 0"),
                      ns.Transition("contact", "free", when="wall < 0")],
     )  # fmt: skip
 
 
-def test_a_third_state_that_only_follows_adds_its_own_multiplier() -> None:
-    """It changes no period number; exp(-p T) joins the multipliers, and -1 the exponents."""
-    F, w = (values.ravel() for values in np.meshgrid(np.linspace(0.2, 1.0, 6), np.linspace(0.5, 3.6, 6)))
+def test_states_that_only_follow_add_their_own_multipliers() -> None:
+    """They change no period number; exp(-p T) and exp(-8 p T) join the multipliers, -1 and -8 the exponents."""
+    F, w = (values.ravel() for values in np.meshgrid(np.linspace(0.2, 0.9, 6), np.linspace(0.5, 3.5, 6)))
     found = []
     for filtered in (False, True):
         system = oscillator_at_a_wall(filtered=filtered)

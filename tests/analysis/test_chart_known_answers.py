@@ -144,10 +144,13 @@ def test_returns_that_are_passed_over_change_the_count_only(rising: bool | None,
 @pytest.mark.parametrize("phase", [0.0, 0.3, 0.5])
 def test_a_section_at_the_phase_of_a_transition_lies_behind_it(method: str, phase: float) -> None:
     """x'' = -k x, turned into -(x, v) / 2 once per period at phase 1/2: multipliers of modulus 1/2; and a
-    force that changes its sign at phases 0 and 1/2: its extremes do not depend on the phase of the section."""
+    force that changes its sign at phases 0 and 1/2: its extremes do not depend on the phase of the section.
+
+    (Forces of size 0: a shape of code that is there.)"""
     section = ns.Stroboscopic(phase)
     kicked = ns.System(
-        states=["x", "v"], parameters={"k": 1.3, "w": 1.0}, modes={"free": lambda t, u, p: (u.v, -p.k * u.x)},
+        states=["x", "v"], parameters={"k": 1.3, "w": 1.0, "A": 0.0},
+        modes={"free": lambda t, u, p: (u.v, -p.k * u.x + p.A * np.cos(p.w * t))},
         transitions=[ns.Transition("free", "free", at=0.5, reset=lambda t, u, p: (1.0 - u.x / 2, -u.v / 2))],
         period=lambda p: 2 * np.pi / p.w,
     )  # fmt: skip
@@ -157,10 +160,10 @@ def test_a_section_at_the_phase_of_a_transition_lies_behind_it(method: str, phas
     np.testing.assert_allclose(plane["lyapunov"][0], np.log(0.5) * np.array([0.9, 1.1]) / (2 * np.pi), rtol=2e-2)
 
     force = ns.System(
-        states=["x", "v"], parameters={"a": 6.0, "w": 1.05},
+        states=["x", "v"], parameters={"a": 6.0, "w": 1.05, "A": 0.0},
         modes={
-            "plus": lambda t, u, p: (u.v, -u.x - 0.2 * u.v + p.a),
-            "minus": lambda t, u, p: (u.v, -u.x - 0.2 * u.v - p.a),
+            "plus": lambda t, u, p: (u.v, -u.x - 0.2 * u.v + p.a + p.A * np.cos(p.w * t)),
+            "minus": lambda t, u, p: (u.v, -u.x - 0.2 * u.v - p.a + p.A * np.cos(p.w * t)),
         },
         transitions=[ns.Transition("plus", "minus", at=0.5), ns.Transition("minus", "plus", at=0.0)],
         period=lambda p: 2 * np.pi / p.w,

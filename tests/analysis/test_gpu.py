@@ -6,12 +6,14 @@ types that are compiled are those with which the simulated run launched the kern
 
 from __future__ import annotations
 
+import hashlib
 import importlib.util
 import json
 import os
 import re
 import subprocess
 import sys
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -25,11 +27,13 @@ pytestmark = pytest.mark.skipif(not COMPILER[0], reason="numba-cuda is not insta
 SCRIPT = Path(__file__).with_name("gpu_script.py")
 
 COMPILE = """
-import json, sys
+import functools, json, sys
+import numba.cuda
 from nonsmooth.kernels.cuda.ptx import ptx_of
 
-found = {}
-for name, signature in json.load(sys.stdin).items():
+found, opt, kernels = {}, *json.load(sys.stdin)
+numba.cuda.compile = functools.partial(numba.cuda.compile, opt=opt)
+for name, signature in kernels.items():
     text = ptx_of(name, signature, (1, 2, 2, 1, 2, 5))
     found[name] = [text.count(".visible .entry"), ".target sm_90" in text]
 print(json.dumps(found))
@@ -112,11 +116,23 @@ def test_spectra_are_those_of_the_processor(simulated: dict[str, Any]) -> None:
 
 @pytest.mark.skipif(not COMPILER[1], reason="nvidia-nvvm is not installed (extra `test`, Linux only)")
 @pytest.mark.parametrize(
-    "entries", [ENTRIES - {"neighbours"}, pytest.param({"neighbours"}, marks=pytest.mark.slow)], ids=["most", "rest"]
-)
-def test_every_kernel_compiles_for_the_types_it_is_launched_with(simulated: dict[str, Any], entries: set[str]) -> None:
-    printed = run(["-c", COMPILE], json.dumps({name: simulated["launched"][name] for name in sorted(entries)}))
-    assert json.loads(printed) == {name: [1, True] for name in entries}
+    ("entries", "optimised"), [(ENTRIES - {"neighbours"}, False), pytest.param(ENTRIES, True, marks=pytest.mark.slow)],
+    ids=["most", "all optimised"],
+)  # fmt: skip
+def test_every_kernel_compiles_for_the_types_it_is_launched_with(
+    simulated: dict[str, Any], entries: set[str], optimised: bool, request: pytest.FixtureRequest
+) -> None:
+    """Half a minute, so not again for the same texts, types and compiler. Without optimising it refuses the same."""
+    given = json.dumps([optimised, {name: simulated["launched"][name] for name in sorted(entries)}])
+    compiler = [version(name) for name in ("numba-cuda", "nvidia-nvvm", "llvmlite")]
+    texts = [path.read_bytes() for path in sorted((Path(ns.__file__).parent / "kernels").rglob("*.py"))]
+    stamp = hashlib.sha256(repr([given, compiler, texts]).encode()).hexdigest()
+    cache = getattr(request.config, "cache", None)  # there is none where pytest was told so
+    if cache and cache.get(f"gpu/{optimised}", "") == stamp:
+        return
+    assert json.loads(run(["-c", COMPILE], given)) == {name: [1, True] for name in entries}
+    if cache:
+        cache.set(f"gpu/{optimised}", stamp)
 
 
 def test_tables_are_built_once_for_each_point(simulated: dict[str, Any]) -> None:

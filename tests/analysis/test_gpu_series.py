@@ -66,7 +66,7 @@ def pair(simulated: dict[str, Any], verb: str, name: str) -> tuple[np.ndarray, n
 
 @pytest.mark.parametrize("verb", ["sweep", "memory", "exact", "planar"])
 def test_a_sweep_is_that_of_the_processor(simulated: dict[str, Any], verb: str) -> None:
-    """The valve on its maxima of the lift; a forced system with steep layers, memory and corners; three linear
+    """The valve on its maxima of the lift; a forced system with steep layers, memory and corners; four linear
     states; two without forcing.
     """
     assert pair(simulated, verb, "period_number")[0].max() > 0

@@ -38,16 +38,18 @@ def multipliers(system: ns.System, period_number: int, transient: int = 2000) ->
 
 
 def folded(expansion: float, contraction: float, reset: float = 0.0) -> ns.System:
-    """A tent map as a flow: x grows by mu in a period; what is beyond mu / 2 at its end is folded back; y shrinks."""
+    """A tent map as a flow: x grows by mu in a period; what is beyond mu / 2 at its end is folded back; y shrinks.
+
+    (A force of size 0: a shape of code that is there. So below.)"""
 
     def grow(t: Any, u: Any, p: Any) -> Any:
-        return np.log(p.mu) * u.x, -p.b * u.y
+        return np.log(p.mu) * u.x, p.A * np.cos(2 * np.pi * t) - p.b * u.y
 
     def fold(t: Any, u: Any, p: Any) -> Any:
         return p.mu - u.x, u.y + p.r * u.x
 
     return ns.System(
-        states=["x", "y"], parameters={"mu": expansion, "b": contraction, "r": reset}, period=1.0,
+        states=["x", "y"], parameters={"mu": expansion, "b": contraction, "r": reset, "A": 0.0}, period=1.0,
         modes={"low": grow, "high": grow}, indicators={"middle": lambda t, u, p: u.x - p.mu / 2},
         transitions=[ns.Transition("low", "high", when="middle > 0"),
                      ns.Transition("high", "low", at=0.999, reset=fold)],
@@ -78,8 +80,11 @@ def test_what_a_saltation_matrix_adds_is_counted() -> None:
         return 1.0 - (u.x - p.edge) / 1.5, u.y
 
     system = ns.System(
-        states=["x", "y"], parameters={"k": k, "low": low, "high": high, "edge": edge}, period=1.0,
-        modes={"slow": lambda t, u, p: (p.low + 0 * u.x, -u.y), "fast": lambda t, u, p: (p.high + 0 * u.x, -u.y)},
+        states=["x", "y"], parameters={"k": k, "low": low, "high": high, "edge": edge, "A": 0.0}, period=1.0,
+        modes={
+            "slow": lambda t, u, p: (p.low + p.A * np.cos(2 * np.pi * t), -u.y),
+            "fast": lambda t, u, p: (p.high + p.A * np.cos(2 * np.pi * t), -u.y),
+        },
         indicators={"middle": lambda t, u, p: u.x - p.edge},
         transitions=[ns.Transition("slow", "fast", when="middle > 0"),
                      ns.Transition("slow", "slow", at=0.999, reset=pulse),
@@ -306,11 +311,11 @@ def test_a_sweep_is_its_points() -> None:
 
 def test_a_point_that_fails_keeps_its_status() -> None:
     system = ns.System(
-        states=["x"], parameters={"a": -1.0}, modes={"all": lambda t, u, p: (p.a * u.x + np.cos(t),)},
+        states=["x", "y"], parameters={"a": -1.0}, modes={"all": lambda t, u, p: (p.a * u.x + np.cos(t), -9 * u.y)},
     )  # fmt: skip
     found = spectrum(system, parameter="a", values=[-1.0, 5.0, -2.0], periods=64, transient=64, direction=None)
     assert list(found.status.values) == [0, 3, 0] and np.isnan(found.exponents.values[1]).all()
-    assert np.abs(found.exponents.values[[0, 2], 0] - [-1.0, -2.0]).max() < 1e-12
+    assert np.abs(found.exponents.values[[0, 2]] - [[-1.0, -9.0], [-2.0, -9.0]]).max() < 1e-12
     with pytest.raises(ns.SolveError, match="grew beyond"):
         ns.lyapunov(system.with_parameters(a=5.0), periods=64)
 

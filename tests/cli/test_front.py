@@ -8,6 +8,7 @@ import re
 import shutil
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -201,6 +202,7 @@ def test_a_study_file_elsewhere_finds_the_model_of_a_file(tmp_path: Path, monkey
 # Editors
 
 
+@cache
 def schema() -> dict:
     done = process("schema")
     assert done.returncode == 0

@@ -103,20 +103,20 @@ def test_generalised_flip_of_a_cubic_map() -> None:
     assert found[0] == "generalised_flip" and found[1] == pytest.approx(-0.49, abs=1e-8)
 
 
-@pytest.mark.parametrize("linear", [0.0, 0.4])
-def test_chenciner_point_of_a_rotation(linear: float) -> None:
+@pytest.mark.parametrize("shear", [0.0, 0.4])
+def test_chenciner_point_of_a_rotation(shear: float) -> None:
     """z -> e^(i w) z (1 + m + (d + i) |z|^2), seen in sheared coordinates: soft to hard at d = 0."""
 
     def turn(u: Any, p: Any) -> Any:
-        x, y = u.x - linear * u.y, u.y
+        x, y = u.x - p.shear * u.y, u.y
         r = x * x + y * y
         c, s = np.cos(1.3), np.sin(1.3)
         a, b = 1 + p.m + p.d * r, r
         X, Y = c * x - s * y, s * x + c * y
         X, Y = a * X - b * Y, b * X + a * Y
-        return X + linear * Y, Y
+        return X + p.shear * Y, Y
 
-    _, orbit = mapping(turn, {"x": 0.0, "y": 0.0}, m=-0.3, d=-0.5)
+    _, orbit = mapping(turn, {"x": 0.0, "y": 0.0}, m=-0.3, d=-0.5, shear=shear)
     branch = ns.continue_orbit(orbit, "m", (-0.5, 0.5))
     curve = ns.continue_curve(row(branch, "neimark_sacker"), {"d": (-1.0, 1.0), "m": (-0.5, 0.5)})
     assert curve["m"].values == pytest.approx(0.0, abs=1e-11)
@@ -172,12 +172,12 @@ def test_a_torus_beside_a_fold_or_a_flip(own: str) -> None:
     c, s = np.cos(0.8), np.sin(0.8)
 
     def step(u: Any, p: Any) -> Any:
-        alone = -(1 + p.h) * u.x + u.x**3 if own == "flip" else u.x + p.h - u.x**2
+        alone = p.flip * (u.x**3 - (1 + p.h) * u.x) + (1 - p.flip) * (u.x + p.h - u.x**2)
         return alone, p.m * (c * u.y - s * u.z), p.m * (s * u.y + c * u.z)
 
     start = {"x": 0.0 if own == "flip" else 0.3, "y": 0.0, "z": 0.0}
     h = -0.1 if own == "flip" else 0.09
-    _, orbit = mapping(step, start, h=h, m=0.8)
+    _, orbit = mapping(step, start, h=h, m=0.8, flip=float(own == "flip"))
     name = "m" if own == "neimark_sacker" else "h"
     branch = ns.continue_orbit(orbit, name, (0.5, 1.5) if name == "m" else (-0.2, 0.4))
     curve = ns.continue_curve(row(branch, own), {"h": (-0.2, 0.4), "m": (0.6, 1.4)})

@@ -18,20 +18,20 @@ import nonsmooth as ns
 def quadrants() -> ns.System:
     """Modes by the signs of x and of y - c; y is driven by a cosine (q = 1) or by the sign of x (q = 0).
 
-    z adds up the time spent in each mode, with its own weight."""
+    z adds up the time spent in each mode, with its own weight. r is there because four states are compiled anyhow."""
     modes, transitions = {}, []
     for i in (0, 1):
         for j in (0, 1):
 
             def field(t: Any, u: Any, p: Any, i: int = i, j: int = j) -> Any:
                 drive = p.q * np.cos(t - 1.0 - p.phi) + (1 - p.q) * (-1.0 if i else 1.0)
-                return np.cos(t - 1.0) - u.x, drive - u.y, i + 2.0 * j + i * j - u.z
+                return np.cos(t - 1.0) - u.x, drive - u.y, i + 2.0 * j + i * j - u.z, np.cos(t) - u.r
 
             modes[f"m{i}{j}"] = field
             transitions.append(ns.Transition(f"m{i}{j}", f"m{1 - i}{j}", when=f"right {'<' if i else '>'} 0"))
             transitions.append(ns.Transition(f"m{i}{j}", f"m{i}{1 - j}", when=f"above {'<' if j else '>'} 0"))
     return ns.System(
-        name="quadrants", states=["x", "y", "z"], parameters={"phi": 0.0, "c": 0.1, "q": 1.0}, modes=modes,
+        name="quadrants", states=["x", "y", "z", "r"], parameters={"phi": 0.0, "c": 0.1, "q": 1.0}, modes=modes,
         transitions=transitions, period=2 * np.pi,
         indicators={"right": lambda t, u, p: u.x, "above": lambda t, u, p: u.y - p.c},
     )  # fmt: skip
@@ -50,7 +50,7 @@ def settled(branch: xr.Dataset, system: ns.System, values: list[float]) -> None:
         k = int(np.argmin(np.abs(branch[name].values - value)))
         orbit = ns.find_orbit(system.with_parameters({name: float(branch[name][k])}))
         assert branch["section"].values[k] == pytest.approx(orbit.u, abs=1e-9)
-        assert branch["floquet_multipliers"].values[k] == pytest.approx([np.exp(-2 * np.pi)] * 3, rel=1e-6)
+        assert branch["floquet_multipliers"].values[k] == pytest.approx([np.exp(-2 * np.pi)] * 4, rel=1e-6)
 
 
 @pytest.mark.parametrize("start", [-0.4, 0.4])

@@ -44,11 +44,13 @@ def test_an_equilibrium_is_no_cycle() -> None:
 
 
 def test_an_unstable_orbit_whose_motion_diverges() -> None:
-    """x' = x + cos t has the orbit (sin t - cos t) / 2 with the multiplier exp(2 pi); the motion leaves it."""
-    system = ns.System(states=["x"], parameters={}, modes={"one": lambda t, u, p: u.x + np.cos(t)})
+    """x' = x + cos t has the orbit (sin t - cos t) / 2 with the multiplier exp(2 pi); the motion leaves it.
+
+    (A second state: a shape of code that is there.)"""
+    system = ns.System(states=["x", "y"], parameters={}, modes={"one": lambda t, u, p: (u.x + np.cos(t), -u.y)})
     orbit = ns.find_orbit(system, start={"x": -0.5}, transient=0, period_number=1)
-    assert orbit.u == pytest.approx([-0.5], abs=1e-12)
-    assert orbit.floquet_multipliers == pytest.approx([np.exp(2 * np.pi)], rel=1e-10)
+    assert orbit.u == pytest.approx([-0.5, 0.0], abs=1e-12)
+    assert orbit.floquet_multipliers == pytest.approx([np.exp(2 * np.pi), np.exp(-2 * np.pi)], rel=1e-10)
 
 
 def test_a_branch_that_is_interrupted(monkeypatch: pytest.MonkeyPatch) -> None:

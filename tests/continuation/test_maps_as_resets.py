@@ -57,13 +57,19 @@ def test_a_period_number_that_the_orbit_has_not() -> None:
 
 @pytest.mark.parametrize("phase", [0.0, 0.3])
 def test_modes_that_alternate(phase: float) -> None:
-    """x' = -x and x' = -3 x in turn: x = 0 returns after one period, the mode after two, with exp(-4)."""
+    """x' = -x and x' = -3 x in turn: x = 0 returns after one period, the mode after two, with exp(-4).
+
+    (y and a force of size 0: a shape of code that is there.)"""
+
+    def decay(rate: float) -> Any:
+        return lambda t, u, p: (-rate * u.x, p.A * np.cos(2 * np.pi * t) - 2 * rate * u.y)
+
     system = ns.System(
-        states=["x"], parameters={}, modes={"slow": lambda t, u, p: -u.x, "fast": lambda t, u, p: -3 * u.x}, period=1.0,
+        states=["x", "y"], parameters={"A": 0.0}, modes={"slow": decay(1.0), "fast": decay(3.0)}, period=1.0,
         transitions=[ns.Transition("slow", "fast", at=phase), ns.Transition("fast", "slow", at=phase)],
     )  # fmt: skip
     orbit = ns.find_orbit(system, start={"x": 1.0})
     assert orbit.period_number == 2
-    assert orbit.floquet_multipliers == pytest.approx([np.exp(-4.0)], abs=1e-12)
+    assert orbit.floquet_multipliers == pytest.approx([np.exp(-4.0), np.exp(-8.0)], abs=1e-12)
     with pytest.raises(ns.SolveError, match="no periodic motion"):
         ns.find_orbit(system, period_number=1)

@@ -9,12 +9,10 @@ anything.
 
 from __future__ import annotations
 
+import ast
 import contextlib
 import io
-import os
 import re
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -37,8 +35,10 @@ def blocks(text: str) -> list[tuple[str, str, str | None, int]]:
     return result
 
 
-def run_page(page: Path, folder: Path) -> Iterator[tuple[str, str | None, int]]:
-    """Run every block of a page in ``folder``; yields (what it printed or raised, what is expected, line)."""
+def run_page(page: Path, folder: Path) -> Iterator[tuple[str, str, str | None, int]]:
+    """Run every block of a page in ``folder``, as the cells of a notebook.
+
+    Yields (what it printed or raised, what a notebook shows below it, what is expected, line)."""
     names: dict[str, Any] = {"__name__": "page"}
     text = page.read_text(encoding="utf-8")
     with contextlib.chdir(folder):
@@ -46,37 +46,38 @@ def run_page(page: Path, folder: Path) -> Iterator[tuple[str, str | None, int]]:
             Path(name).write_text(content, encoding="utf-8")
         for language, code, expected, line in blocks(text):
             if language == "python":
-                place = compile("\n" * line + code, str(page), "exec")
-                yield _python(place, names, may_raise=expected is not None), expected, line
+                parsed = ast.parse("\n" * line + code, str(page))
+                yield *_python(parsed, str(page), names, may_raise=expected is not None), expected, line
             elif language == "toml":
                 named = re.match(r"# (\S+\.toml)\n", code)
                 if named is not None:
                     Path(named[1]).write_text(code, encoding="utf-8")
             else:
-                yield _shell(code), expected, line
+                yield _shell(code), "", expected, line
 
 
-def _python(code: Any, names: dict[str, Any], may_raise: bool) -> str:
-    printed = io.StringIO()
+def _python(code: ast.Module, page: str, names: dict[str, Any], may_raise: bool) -> tuple[str, str]:
+    last = code.body.pop() if isinstance(code.body[-1], ast.Expr) else None
+    printed, shown = io.StringIO(), None
     with contextlib.redirect_stdout(printed):
         try:
-            exec(code, names)
+            exec(compile(code, page, "exec"), names)
+            if isinstance(last, ast.Expr):
+                shown = eval(compile(ast.Expression(last.value), page, "eval"), names)
         except Exception as error:
             if not may_raise:
                 raise
-            return f"{type(error).__name__}: {error}"
-    return printed.getvalue()
+            return f"{type(error).__name__}: {error}", ""
+    return printed.getvalue(), "" if shown is None else repr(shown)
 
 
 def _shell(code: str) -> str:
-    printed = ""
-    for line in code.splitlines():
-        words = line.split("#")[0].split()
-        if words[:1] != ["nonsmooth"] or words[1:2] == ["reproduce"]:
-            continue
-        done = subprocess.run(
-            [sys.executable, "-m", "nonsmooth.cli.main", *words[1:]], capture_output=True, text=True,
-            env=os.environ | {"MPLBACKEND": "Agg"},
-        )  # fmt: skip
-        printed += done.stdout + done.stderr
-    return printed
+    from nonsmooth.cli.main import main
+
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed):
+        for line in code.splitlines():
+            words = line.split("#")[0].split()
+            if words[:1] == ["nonsmooth"] and words[1:2] != ["reproduce"]:
+                main(words[1:])
+    return printed.getvalue()

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+#: Sizes that show the same in less time than those of the pictures.
+SMALL = {"basins": {"points": 60}, "chart": {"points": 60}, "basin_fractions": {"points": 26, "starts": 60}}
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.py"))
 
 
@@ -22,6 +24,6 @@ def test_example(path: Path) -> None:
     needs = getattr(module, "NEEDS", "")
     if needs and not (Path(os.environ.get("NONSMOOTH_DATA", "")) / needs).is_file():
         pytest.skip(f"{needs} is others' work and not shipped: docs/gallery says where it is; set NONSMOOTH_DATA")
-    drawn = module.main()
+    drawn = module.main(**SMALL.get(path.stem, {}))
     assert hasattr(drawn, "savefig") or hasattr(drawn, "plot")
     plt.close("all")

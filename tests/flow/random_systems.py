@@ -99,16 +99,16 @@ def impact() -> Template:
 
 @cache
 def relay() -> Template:
-    """Three states, two full matrices, a relay with hysteresis whose upper threshold moves."""
-    ranges = _matrix("A", 3) | _matrix("B", 3) | {
+    """Four states, two full matrices, a relay with hysteresis whose upper threshold moves."""
+    ranges = _matrix("A", 4) | _matrix("B", 4) | {
         "c1": (-1.0, 1.0), "c2": (-1.0, 1.0), "g1": (0.3, 0.8), "g2": (0.3, 0.8), "a": (0.0, 0.2), "w": (0.5, 2.0),
         "s": (0.5, 2.0), "F": (0.0, 1.0),
     }  # fmt: skip
 
     def field(name, sign):
         def vector(t, u, p):
-            x, y, z = _product(p, name, u)
-            return x + sign * p.s, y, z + p.F * np.cos(p.w * t)
+            x, y, z, r = _product(p, name, u)
+            return x + sign * p.s, y, z + p.F * np.cos(p.w * t), r
 
         return vector
 
@@ -116,7 +116,7 @@ def relay() -> Template:
         return u.x + p.c1 * u.y + p.c2 * u.z
 
     system = ns.System(
-        name="relay", states=["x", "y", "z"], parameters=_parameters(ranges),
+        name="relay", states=["x", "y", "z", "r"], parameters=_parameters(ranges),
         modes={"up": field("A", 1.0), "down": field("B", -1.0)},
         indicators={"high": lambda t, u, p: signal(u, p) - p.g1 - p.a * np.sin(p.w * t),
                     "low": lambda t, u, p: signal(u, p) + p.g2},
@@ -239,7 +239,7 @@ def remembering() -> Template:
 
 @cache
 def growing() -> Template:
-    """A mode of two states and one of three, the third being made at the entry and dropped at the way out."""
+    """A mode of two states and one of four, two being made at the entry and dropped at the way out."""
     ranges = {
         "k": (0.5, 2.0), "c": (0.05, 0.4), "F": (0.5, 2.0), "w": (0.6, 1.8), "g": (-0.2, 0.5), "s": (1.0, 4.0),
         "T": (0.3, 1.0), "e": (0.1, 0.6),
@@ -250,14 +250,16 @@ def growing() -> Template:
 
     def pressed(t, u, p):
         v, a = free(t, u, p)
-        return v, a - p.s * (u.x - p.g) - u.y, (u.v - u.y) / p.T
+        return v, a - p.s * (u.x - p.g) - u.y, (u.v - u.y) / p.T, u.y - u.z
 
     system = ns.System(
-        name="growing", states=["x", "v", "y"], parameters=_parameters(ranges),
+        name="growing", states=["x", "v", "y", "z"], parameters=_parameters(ranges),
         modes={"free": ns.Mode(free, states=["x", "v"]), "pressed": pressed},
         indicators={"wall": lambda t, u, p: u.x - p.g},
-        transitions=[ns.Transition("free", "pressed", when="wall > 0", reset=lambda t, u, p: (u.x, u.v, p.e * u.v)),
-                     ns.Transition("pressed", "free", when="wall < 0", reset=lambda t, u, p: (u.x, u.v + p.e * u.y))],
+        transitions=[ns.Transition("free", "pressed", when="wall > 0",
+                                   reset=lambda t, u, p: (u.x, u.v, p.e * u.v, u.x)),
+                     ns.Transition("pressed", "free", when="wall < 0",
+                                   reset=lambda t, u, p: (u.x, u.v + p.e * (u.y - u.z)))],
     )  # fmt: skip
     return Template(system, ("w", "g", "e", "T"), ranges, (-1.5, -0.2), (4.0, 10.0))
 

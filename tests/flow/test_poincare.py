@@ -202,11 +202,12 @@ def test_how_long_a_return_is_waited_for(swing: ns.System) -> None:
 
 @pytest.mark.parametrize("method", ["exact", "taylor"])
 def test_every_start_begins_with_the_initial_memory(method: str) -> None:
-    """A point that only a kick of the memory's size moves, once a period: by arithmetic."""
+    """A point that only a kick of the memory's size moves, once a period: by arithmetic. (A second state and a force of
+    size 0: a shape of code that is there.)"""
     system = ns.System(
-        states=["x"], parameters={"v": 0.0}, memory={"m": 0.3}, period=1.0,
-        modes={"all": lambda t, u, p: (p.v,)},
-        transitions=[ns.Transition("all", "all", at=0.5, reset=lambda t, u, p: (u.x + p.m,))],
+        states=["x", "y"], parameters={"A": 0.0, "w": 2 * np.pi}, memory={"m": 0.3},
+        modes={"all": lambda t, u, p: (0.0, p.A * np.cos(p.w * t))},
+        transitions=[ns.Transition("all", "all", at=0.5, reset=lambda t, u, p: (u.x + p.m, u.y))],
     )  # fmt: skip
-    found = ns.poincare(system, n=2, start=[[0.0], [1.0]], method=method)
-    assert np.allclose(found["section"].values.reshape(2, 2), [[0.3, 0.6], [1.3, 1.6]], atol=1e-12)
+    found = ns.poincare(system, n=2, start=[[0.0, 0.0], [1.0, 0.0]], method=method)
+    assert np.allclose(found["section"].values[..., 0], [[0.3, 0.6], [1.3, 1.6]], atol=1e-12)

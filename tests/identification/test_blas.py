@@ -45,7 +45,7 @@ assert told == [1] * len(libraries), told
 @pytest.mark.skipif((os.cpu_count() or 1) < 2, reason="one core has one thread anyway")
 def test_fits_run_on_one_thread_and_leave_the_setting_as_it_was() -> None:
     plain = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
-    done = subprocess.run([sys.executable, "-c", CODE], env=plain, capture_output=True, text=True, timeout=120)
+    done = subprocess.run([sys.executable, "-c", CODE], env=plain, capture_output=True, text=True, timeout=600)
     if done.returncode == 77:
         pytest.skip("NumPy and SciPy bring no OpenBLAS of their own here")
     assert done.returncode == 0, done.stderr

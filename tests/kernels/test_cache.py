@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -88,11 +89,24 @@ def run(folder, factor, script=SCRIPT, **environment):
     return json.loads(done.stdout.splitlines()[-1])
 
 
-def test_second_process_compiles_nothing_and_a_new_model_only_itself(tmp_path):
-    first = run(tmp_path, 2.0)
-    assert first["value"] == expected(2.0)
-    assert ["drive", 0, 1] in first["driver"]
-    assert sorted(first["told"]) == ["drive", "f", "g", "twice"]
+@pytest.fixture(scope="module")
+def first(tmp_path_factory):
+    """The folder of a first process, and what that process said."""
+    folder = tmp_path_factory.mktemp("first")
+    return folder, run(folder, 2.0)
+
+
+@pytest.fixture
+def filled(tmp_path, first):
+    """The folder that a first process left."""
+    shutil.copytree(first[0], tmp_path, dirs_exist_ok=True)
+
+
+def test_second_process_compiles_nothing_and_a_new_model_only_itself(tmp_path, first, filled):
+    said = first[1]
+    assert said["value"] == expected(2.0)
+    assert ["drive", 0, 1] in said["driver"]
+    assert sorted(said["told"]) == ["drive", "f", "g", "twice"]
 
     again = run(tmp_path, 2.0)
     assert again["value"] == expected(2.0)
@@ -153,17 +167,17 @@ def three_bits_flipped(data):
     return bytes(changed)
 
 
-@pytest.mark.parametrize("damage", [cut, three_bits_flipped])
-def test_damaged_entries_are_compiled_anew(tmp_path, damage):
-    run(tmp_path, 2.0)
+def test_damaged_entries_are_compiled_anew(tmp_path, filled):
+    """Cut ones and such with wrong bits; the text of a model that does not match its name is written again."""
     for entry in (tmp_path / "cache" / "compiled").iterdir():
+        damage = cut if entry.name[0] in "fd" else three_bits_flipped
         entry.write_bytes(damage(entry.read_bytes()))
     for source in (tmp_path / "cache" / "generated").glob("*.py"):
         source.write_text("damaged")
     damaged = run(tmp_path, 2.0)
     assert damaged["value"] == expected(2.0)
-    assert ["drive", 0, 1] in damaged["driver"]
-    assert ["drive", 1, 0] in run(tmp_path, 2.0)["driver"]
+    assert sorted(damaged["told"]) == ["drive", "f", "g", "twice"]
+    assert run(tmp_path, 2.0)["told"] == []
 
 
 def test_without_jit(tmp_path):
@@ -255,8 +269,7 @@ def test_a_folder_that_others_may_write_is_refused(tmp_path, monkeypatch, part):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="permissions of POSIX")
-def test_new_entries_are_the_users_alone_and_others_are_not_executed(tmp_path):
-    run(tmp_path, 2.0)
+def test_new_entries_are_the_users_alone_and_others_are_not_executed(tmp_path, filled):
     entries = [*(tmp_path / "cache").rglob("*")]
     assert entries and all(path.stat().st_mode & 0o022 == 0 for path in entries)
     for entry in (tmp_path / "cache" / "compiled").iterdir():

@@ -179,7 +179,7 @@ def test_what_takes_for_ever_is_refused_before_it_is_worked_out():
         "    except ValueError as error:\n        print(error)\n"
     )
     done = subprocess.run(
-        [sys.executable, "-c", code], input=json.dumps(list(HOSTILE)), capture_output=True, text=True, timeout=60
+        [sys.executable, "-c", code], input=json.dumps(list(HOSTILE)), capture_output=True, text=True, timeout=600
     )
     said = done.stdout.splitlines()
     assert not done.stderr and len(said) == len(HOSTILE)

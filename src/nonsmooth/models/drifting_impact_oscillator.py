@@ -2,7 +2,7 @@ r"""An impact oscillator that drifts: Pavlovskaia, Wiercigroch & Grebogi, Phys. 
 
 A mass under a constant and a harmonic force drives a slider forwards through a spring and a damper; dry friction holds
 the slider up to the force 1. Positions are taken relative to the slider, so that the motion is bounded (Pavlovskaia &
-Wiercigroch, Chaos Solitons Fractals 19 (2004) 151-161). Known: without forcing (a = 0) the mass comes to rest with the
+Wiercigroch, Chaos Solitons Fractals 19 (2004) 151-161). Known: without forcing (a = 0) the mass stops with the
 spring pressed by b < 1, and in a periodic motion the slider advances by the mean velocity of the mass.
 """
 

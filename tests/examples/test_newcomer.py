@@ -1,0 +1,101 @@
+"""A newcomer's first quarter of an hour: README and the first tutorial, typed line by line in a fresh folder.
+
+The blocks of Python go into an interactive interpreter, those of a shell to the installed program ``nonsmooth``, on a
+terminal; what the pages say is printed must be printed, in that order, and the files they name must be there.
+"""
+
+from __future__ import annotations
+
+import doctest
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from page_code import blocks
+
+ROOT = Path(__file__).parents[2]
+FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+MARK = "- end of block -"
+
+
+def environment() -> dict[str, str]:
+    """That of a terminal in which the package's environment is active."""
+    program = Path(sys.executable).parent
+    return os.environ | {"MPLBACKEND": "Agg", "PATH": os.pathsep.join([str(program), os.environ.get("PATH", "")])}
+
+
+def typed(page: Path, folder: Path) -> list[tuple[str, str | None, int]]:
+    """(what it printed, what the page says, line) of each block of Python, all in one interactive interpreter."""
+    python = [block for block in blocks(page.read_text(encoding="utf-8")) if block[0] == "python"]
+    # An empty line ends a function, here as for somebody who types it.
+    lines = "".join(f"{code}\n\nprint({MARK!r})\n" for _, code, _, _ in python)
+    done = subprocess.run(
+        [sys.executable, "-q", "-i"], input=lines, cwd=folder, env=environment(), capture_output=True, text=True
+    )
+    assert done.returncode == 0 and "Traceback" not in done.stderr and "Error" not in done.stderr, done.stderr
+    printed = done.stdout.split(f"{MARK}\n")[:-1]
+    return [(out, expected, line) for out, (_, _, expected, line) in zip(printed, python, strict=True)]
+
+
+def on_a_terminal(words: list[str], folder: Path) -> str:
+    """The output of a command that writes to a terminal."""
+    import pty
+
+    ours, theirs = pty.openpty()
+    program = subprocess.Popen(
+        words, cwd=folder, env=environment() | {"TERM": "xterm", "COLUMNS": "80"}, stdin=subprocess.DEVNULL,
+        stdout=theirs, stderr=theirs,
+    )  # fmt: skip
+    os.close(theirs)
+    said = b""
+    while True:
+        try:
+            more = os.read(ours, 4096)
+        except OSError:  # Linux says so where nobody writes any more
+            more = b""
+        if not more:
+            break
+        said += more
+    os.close(ours)
+    text = said.decode().replace("\r\n", "\n")
+    assert program.wait() == 0, text
+    return text
+
+
+def study(page: Path) -> str:
+    """The study file that a page shows."""
+    [code] = [code for language, code, _, _ in blocks(page.read_text(encoding="utf-8")) if language == "toml"]
+    assert code.startswith("# fig11.toml\n")
+    return code
+
+
+README, TUTORIAL = ROOT / "README.md", ROOT / "docs" / "tutorials" / "first_diagram.md"
+
+
+@pytest.mark.parametrize("page", [README, TUTORIAL], ids=lambda page: page.stem)
+def test_lines_of_python(page: Path, tmp_path: Path) -> None:
+    checker = doctest.OutputChecker()
+    for printed, expected, line in typed(page, tmp_path):
+        said = re.sub(r"^<Axes: .*>\n", "", printed, flags=re.MULTILINE)  # an interpreter shows what a function returns
+        assert expected is None or checker.check_output(expected, said, FLAGS), (
+            f"{page.name}, block at line {line}, prints\n{said}\nand not\n{expected}"
+        )
+    assert {"fig11.nc", "fig11.pdf"} <= {path.name for path in tmp_path.iterdir()}
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="terminals of POSIX")
+def test_commands(tmp_path: Path) -> None:
+    """The README's; the tutorial shows the same file."""
+    assert study(README) == study(TUTORIAL)
+    (tmp_path / "fig11.toml").write_text(study(README), encoding="utf-8")
+    shell = [code for language, code, _, _ in blocks(README.read_text(encoding="utf-8")) if language == "sh"]
+    commands = [line.split("#")[0].split() for code in shell for line in code.splitlines()]
+    said = {words[1]: on_a_terminal(words, tmp_path) for words in commands if words[:1] == ["nonsmooth"]}
+    assert list(said) == ["models", "init", "run", "show"]
+    assert "discontinuous_support" in said["models"] and "Savi" in said["models"]
+    assert "sweep over rho:" in said["run"] and "/601 [" in said["run"]  # a bar
+    assert "written to fig11.nc" in said["run"] and "discontinuous support" in said["show"]
+    assert {"fig11.nc", "fig11.pdf"} <= {path.name for path in tmp_path.iterdir()}
