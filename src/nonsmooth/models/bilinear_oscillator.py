@@ -38,7 +38,7 @@ def bilinear_oscillator(**parameters: float) -> System:
     .. math::
 
         \ddot x + 2 \zeta \dot x + x + \beta f(x) = A \omega^2 \cos \omega t, \qquad
-        f(x) = x - g \;(x > g), \quad 0 \;(|x| < g), \quad x + g \;(x < -g)
+        f(x) = x - g \quad (x > g), \quad 0 \quad (|x| < g), \quad x + g \quad (x < -g)
 
     for the displacement x relative to the base; time in units of the free mass on its soft springs.
 

@@ -41,7 +41,7 @@ def chua_circuit(**parameters: float) -> System:
     .. math::
 
         \dot x = \alpha (y - h(x)), \quad \dot y = x - y + z, \quad \dot z = -\beta y, \qquad
-        h(x) = b x + \tfrac{1}{2} (a - b) (|x + 1| - |x - 1|)
+        h(x) = b x + \frac{1}{2} (a - b) (|x + 1| - |x - 1|)
 
     Parameters
     ----------

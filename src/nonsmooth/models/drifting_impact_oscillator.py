@@ -66,7 +66,7 @@ def drifting_impact_oscillator(**parameters: float) -> System:
 
     .. math::
 
-        \dot x = y - \dot s, \quad \dot y = a \cos \omega t + b - F, \quad F = 0, \; 2 \xi y + q, \; 1
+        \dot x = y - \dot s, \quad \dot y = a \cos \omega t + b - F, \quad F = 0, \quad 2 \xi y + q, \quad 1
 
     with the mass at x and the top of the slider at q, both relative to the slider, which moves with
     :math:`\dot s = y + (q - 1) / (2 \xi)` where the force has reached 1 and stands still else. Out of contact the

@@ -33,7 +33,7 @@ def gear_pair(**parameters: float) -> System:
     .. math::
 
         \ddot q + 2 \zeta \dot q + f(q) = F_m + F_a \omega^2 \cos \omega t, \qquad
-        f(q) = q - b \;(q > b), \quad 0 \;(|q| < b), \quad q + b \;(q < -b)
+        f(q) = q - b \quad (q > b), \quad 0 \quad (|q| < b), \quad q + b \quad (q < -b)
 
     q is the transmission error less the static one along the line of action, b half the backlash.
 
