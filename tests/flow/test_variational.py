@@ -121,7 +121,7 @@ class Case:
 
     def products(self, matrix, column):
         """Phi and P put together with saltation as the two functions of a jump give it."""
-        legs = self.variation.legs
+        legs = self.variation.segments
         phi, p = legs.Phi[0], legs.P[0]
         if self.variation.start is not None:
             phi, p = phi @ self.variation.start.R_z, p + phi @ self.variation.start.R_p
@@ -212,7 +212,7 @@ def test_the_trace_identity_does_not_see_it() -> None:
 
 
 # ---------------------------------------------------------------------------------------------------------------
-# Legs, jumps and indicators one by one
+# Segments, jumps and indicators one by one
 
 
 def test_legs_are_exponentials_of_linear_modes() -> None:
@@ -222,7 +222,7 @@ def test_legs_are_exponentials_of_linear_modes() -> None:
     stiffness, damping = 2 * v["k"] + np.array([0.0, v["k_s"]]), v["c"] + np.array([0.0, v["c_s"]])
     tau = np.array([1.5, 0.08, -0.3, 0.0])
     modes = np.array([0, 1, 0, 1])
-    legs = flow.legs(system.parameter_vector(), modes, [0.1, 0.5, 2.0, 0.0], tau, np.full((4, 2), -0.003))
+    legs = flow.segments(system.parameter_vector(), modes, [0.1, 0.5, 2.0, 0.0], tau, np.full((4, 2), -0.003))
     for i, mode in enumerate(modes):
         matrix = np.array([[0.0, 1.0], [-stiffness[mode] / v["m"], -damping[mode] / v["m"]]])
         rate = np.sqrt(stiffness[mode] / v["m"])
@@ -237,8 +237,8 @@ def test_a_leg_and_its_way_back_cancel() -> None:
     template = TEMPLATES["shell"]()
     flow = VariationalFlow.of(template.system, template.active)
     values = template.system.parameter_vector()
-    there = flow.legs(values, [1], [0.4], [2.5], [[0.4, -0.3, 0.5]])
-    back = flow.legs(values, [1], [2.9], [-2.5], there.z)
+    there = flow.segments(values, [1], [0.4], [2.5], [[0.4, -0.3, 0.5]])
+    back = flow.segments(values, [1], [2.9], [-2.5], there.z)
     assert np.abs(back.z[0] - [0.4, -0.3, 0.5]).max() < 1e-13
     assert np.abs(back.Phi[0] @ there.Phi[0] - np.eye(3)).max() < 1e-12
     assert np.abs(back.Phi[0] @ there.P[0] + back.P[0]).max() < 1e-12
@@ -252,9 +252,9 @@ def test_derivative_in_the_beginning() -> None:
     z0 = np.array([[0.3, -0.2, 0.1, 0.4]])
 
     def end(h: float) -> np.ndarray:
-        return flow.legs(values, [1], [0.7 + h], [1.3], z0).z[0]
+        return flow.segments(values, [1], [0.7 + h], [1.3], z0).z[0]
 
-    exact = flow.legs(values, [1], [0.7], [1.3], z0).start_time()[0]
+    exact = flow.segments(values, [1], [0.7], [1.3], z0).start_time()[0]
     difference, error = differenced(end, 1e-2)
     assert error < 1e-11 and np.abs(exact - difference).max() < 1e-10
 
@@ -267,7 +267,7 @@ def test_an_indicator_and_its_lie_derivatives() -> None:
     touch = flow.indicator(values, 0, 1, t, z)
 
     def along(h: float) -> np.ndarray:
-        leg = flow.legs(values, [1], [t], [h], z[None])
+        leg = flow.segments(values, [1], [t], [h], z[None])
         there = flow.indicator(values, 0, 1, t + h, leg.z[0])
         return np.array([there.h, there.L])
 

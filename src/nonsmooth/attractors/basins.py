@@ -78,7 +78,7 @@ def basins(
         Section returns passed over, then judged; a run ends earlier where its cycle is certain, and is followed for
         20 000 returns and more where it has no period.
     max_period : int, optional
-        Longest period number looked for, less than ``keep``; the smaller of 16 and ``keep`` - 1 where not given.
+        Longest period number searched, less than ``keep``; the smaller of 16 and ``keep`` - 1 where not given.
     method, rtol, atol
         See :func:`nonsmooth.flow.engines.methods.engine_for`.
     threads : int, optional
@@ -195,7 +195,7 @@ def settler_of(
     system: System, section: Any, transient: Any, keep: Any, max_period: Any, method: str, rtol: Any, atol: Any,
     expert: Mapping[str, Any], *, threads: Any = None, device: str = "cpu", verb: str = "basins",
 ) -> tuple[Any, Settler]:  # fmt: skip
-    """Check the options that basins share, and the settler they describe."""
+    """Check the options that basins share, and the attractor mapper they describe."""
     transient, keep = whole_number(transient, "transient", 0), whole_number(keep, "keep", 2)
     max_period = longest_period(keep, max_period)
     if threads is not None:
@@ -220,7 +220,7 @@ def settler_of(
 
 
 def failed(status: Any) -> Any:
-    """Which runs could not be followed to an end, other than by diverging."""
+    """Marks of runs that could not be followed to an end, other than by diverging."""
     return ~usable(status) & (np.asarray(status) != codes.DIVERGED)
 
 

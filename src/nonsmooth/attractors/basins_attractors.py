@@ -96,7 +96,7 @@ def _label_cycles(
 
 
 def _on_cycle(attractor: Attractor, runs: Settled) -> Any:
-    """Which runs ended on this cycle: on one of its points, in the mode that it has there.
+    """Marks of runs that ended on this cycle: on one of its points, in the mode that it has there.
 
     Extremes would not tell: the cycle that is shifted by a part of its period has the same ones."""
     n = attractor.points.shape[1]

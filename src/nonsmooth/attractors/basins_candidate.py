@@ -121,7 +121,7 @@ class Search:
         return item
 
     def _attracts(self, item: Attractor) -> bool:
-        """Whether runs that begin beside it, here and there, come back to it."""
+        """Return whether runs that begin beside it, here and there, come back to it."""
         rng = np.random.default_rng(0)
         n, back, came = len(item.size), 0, 0
         place, mode = item.end, item.mode
@@ -139,7 +139,7 @@ class Search:
         return back >= max(2.0, COME_BACK * came)
 
     def _keeps_areas(self, item: Attractor) -> bool:
-        """Whether the section's map neither stretches nor shrinks areas (volumes) on the average."""
+        """Return whether the section's map keeps areas (volumes) on the average."""
         if self.settler.plan.indicator >= 0:
             return False  # a map of the surface: the states are no coordinates on it
         n, total = len(item.size), 0.0
@@ -168,7 +168,7 @@ class Search:
 
 
 def _recurrent(points: FloatArray) -> bool:
-    """Whether either half of a run comes nearly always near to where the other half has been.
+    """Return whether either half of a run comes nearly always near to where the other half has been.
 
     Near is a small part of the range, or as near as a half comes to itself: in many dimensions that is farther off."""
     from scipy.spatial import cKDTree

@@ -1,4 +1,4 @@
-"""What an attractor is here, and how long is waited for one."""
+"""An attractor, and how long one is waited for."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["Attractor", "Patience"]
 
 @dataclass(frozen=True)
 class Patience:
-    """How long runs without a period are followed, in section returns."""
+    """Patience with runs without a period, in section returns."""
 
     candidate: int = 20_000  # for a candidate for a chaotic attractor
     more: int = 1000  # between two looks at the other runs

@@ -80,7 +80,7 @@ def numbered(
 
 
 def _carried(settler: Settler, point: FloatArray, begin: list[Attractor], found: list[Attractor]) -> list[int]:
-    """Where runs that begin on attractors end at another point: places in ``found``, which may grow."""
+    """Ends of runs that begin on attractors at another point, as places in ``found``, which may grow."""
     if not begin:
         return []
     runs = settler.run(

@@ -126,7 +126,7 @@ class Attractors:
         self.engine.chain(self.tables, i, i + 1, state, None, plan, transient, keep, out)
 
     def _beside(self, i: int, state: State, offset: FloatArray, transient: int, keep: int, out: Chain) -> Chain | None:
-        """What a run leaves in row i that begins beside a state; None where it failed."""
+        """Traces in row i of a run that begins beside a state; None where it failed."""
         moved, plan = state.copy(), replace(self.plan, extremes=False, every=1)
         moved.u += offset
         moved.settled = moved.settled and not offset.any()
@@ -179,7 +179,7 @@ def rules_of(
 
 
 def tolerance_of(engine: Engine, rtol: float | None) -> float:
-    """What counts as a return, in units of the motion's size: no less than the engine's own tolerance shows."""
+    """Tolerance of a return, in units of the motion's size: no less than the engine's own tolerance shows."""
     return TOLERANCE if engine.name == "exact" else max(TOLERANCE, 10.0 * (RTOL if rtol is None else rtol))
 
 

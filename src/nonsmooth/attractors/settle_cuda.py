@@ -127,7 +127,7 @@ class Rounds:
             )  # fmt: skip
 
     def found(self, width: int) -> Settled:
-        """What was found; counts and extremes over one whole cycle where there is one, else over the kept window, or as
+        """Results; counts and extremes over one whole cycle where there is one, else over the kept window, or as
         many returns behind it."""
         gpu, n, jobs = self.gpu, len(self.states.rows), type(self.jobs)(*(part.copy_to_host() for part in self.jobs))
         found = Settled.empty(n, gpu.n, width)

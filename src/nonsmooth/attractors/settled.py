@@ -1,4 +1,4 @@
-"""What became of many starts: one array per quantity, one row per job."""
+"""Ends of many starts: one array per quantity, one row per job."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ USABLE = (codes.OK, codes.SLOW, codes.NOT_PERIODIC, codes.NOT_GUARANTEED)
 
 
 def usable(status: Any) -> NDArray[np.bool_]:
-    """Where a run came to its end, so that its extremes and last point mean something."""
+    """Marks of runs that came to their end, so that extremes and last points mean something."""
     return np.isin(status, USABLE)
 
 
 def least_sizes(method: str, scale: FloatArray) -> tuple[FloatArray, float]:
     """The least size of a motion (n,), and as a part of the states' values, where a method integrates.
 
-    A Runge-Kutta pair does not come to rest: its steps grow until its error, ``rtol`` of the value and the scale, holds
+    A Runge-Kutta pair does not stop: its steps grow until its error, ``rtol`` of the value and the scale, holds
     them, and a return cannot be smaller. The others settle to rounding."""
     return (scale, 1.0) if method == "rkf45" else (LEAST * scale, ROUNDED)
 
 
 @dataclass
 class Settled:
-    """What became of J jobs. Extremes and counts are over whole cycles where there is a period, else the kept window.
+    """Results of J jobs. Extremes and counts are over whole cycles where there is a period, else the kept window.
 
     ``multiplier`` is the largest modulus over ``period_number`` returns (NaN: unknown); ``returns`` the section
     returns run.

@@ -37,7 +37,7 @@ FIRST_LOOK = 40  # returns after which a point is judged for the first time, whe
 
 @dataclass(frozen=True)
 class Settler:
-    """How jobs are run: an engine, a section, and how long to wait.
+    """The way jobs are run: an engine, a section, and how long to wait.
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ class Settler:
 
     @property
     def least(self) -> FloatArray:
-        """The least size of a motion in each state: what is smaller has come to rest."""
+        """The least size of a motion in each state: what is smaller has stopped."""
         return least_sizes(self.engine.name, self.system.scale_vector())[0]
 
     def least_at(self, maximum: FloatArray, minimum: FloatArray) -> FloatArray:

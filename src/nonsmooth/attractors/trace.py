@@ -1,4 +1,4 @@
-"""Where a run stands, as numbers from which it can go on, and the section points it visits from there.
+"""The place of a run, as numbers from which it can go on, and the section points it visits from there.
 
 A *place* is a start with everything that the run needs besides its mode: the states, then the memory, then, where a
 forced system is looked at on a Poincare section, the time since the forcing period began (:attr:`Settler.width` numbers

@@ -28,7 +28,7 @@ def anchored(
     i = int(lengths.argmax())
     crossings = signature.crossings
     after = crossings[(i + 1) % m]
-    z = flow.legs(values, [after.mode], [0.0], [0.5 * lengths[i]], states[i + 1][None, :]).z
+    z = flow.segments(values, [after.mode], [0.0], [0.5 * lengths[i]], states[i + 1][None, :]).z
     order = [(i + 1 + j) % m for j in range(m)]
     begin = times[i] + 0.5 * lengths[i]
     moved = np.array([(times[j] - begin) % period for j in order])
@@ -41,7 +41,7 @@ def anchor_at(shooting: Shooting, values: FloatArray, z: FloatArray, size: Float
     """Put the phase condition of an orbit without forcing and transitions through z; others need none."""
     if shooting.forced or shooting.m:
         return
-    field = shooting.flow.legs(values, [shooting.at_section], [0.0], [0.0], z[None, :]).f_begin[0]
+    field = shooting.flow.segments(values, [shooting.at_section], [0.0], [0.0], z[None, :]).f_begin[0]
     shooting.reference = plane_across(z, field, size)
 
 

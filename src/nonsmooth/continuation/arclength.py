@@ -171,7 +171,7 @@ class Curve:
     def anchored_anew(self, point: Point) -> Point:
         """The same point with the phase condition of an orbit without transitions put through it."""
         shooting, z = self.shooting, point.X[: self.shooting.n]
-        shooting.reference = plane_across(z, point.solved.legs.f_begin[0], self.size)
+        shooting.reference = plane_across(z, point.solved.segments.f_begin[0], self.size)
         row = point.solved.jacobian[-1]
         row[:] = 0.0
         row[: shooting.n] = shooting.reference[1]

@@ -69,7 +69,7 @@ def _touched(curve: Curve, point: Point) -> list[Change]:
     row = int(path.which[place, k] - curve.walk.net.row_start[k])
     t = float(path.place[place, k])
     begin = float(point.solved.times[place])
-    z = flow.legs(values, [visits[place].mode], [begin], [t - begin], states[place][None, :]).z[0]
+    z = flow.segments(values, [visits[place].mode], [begin], [t - begin], states[place][None, :]).z[0]
     return _inserted(curve, point, "grazing", place, Visit(jump.source, k, row), row, t, z)
 
 
@@ -174,7 +174,7 @@ def _rotated(curve: Curve, point: Point, first: bool) -> Change:
     end = float(point.solved.times[-1])
     if first:
         order = [*visits[1:-1], Visit(visits[-1].mode, visits[0].transition, visits[0].row)]
-        z0 = shooting.flow.legs(values, [visits[1].mode], times[:1], -times[:1], states[1][None, :]).z
+        z0 = shooting.flow.segments(values, [visits[1].mode], times[:1], -times[:1], states[1][None, :]).z
         moved = np.concatenate([times[1:], times[:1] + end])
         after = np.concatenate([z0, states[2:], states[1:2]])
         mode = visits[1].mode
@@ -183,8 +183,8 @@ def _rotated(curve: Curve, point: Point, first: bool) -> Change:
         moved = np.concatenate([times[-1:] - end, times[:-1]])
         before = visits[-2].mode
         # The state at the section lies before that crossing now.
-        z_before = point.solved.legs.z[-2]
-        z0 = shooting.flow.legs(values, [before], times[-1:], end - times[-1:], z_before[None, :]).z
+        z_before = point.solved.segments.z[-2]
+        z0 = shooting.flow.segments(values, [before], times[-1:], end - times[-1:], z_before[None, :]).z
         after = np.concatenate([z0, states[-1:], states[1:-1]])
         mode = before
     turns = shooting.period_number
@@ -222,7 +222,7 @@ def _other_row(curve: Curve, point: Point) -> list[Change]:
     i = int(curve.walk.conditional[int(point.path.own.argmin())])
     visit = visits[i]
     jump = curve.shooting.system.traced.transitions[visit.transition]
-    z, t = point.solved.legs.z[i], float(times[i])
+    z, t = point.solved.segments.z[i], float(times[i])
     found = []
     for r, row in enumerate(jump.rows):
         if r != visit.row:

@@ -76,5 +76,5 @@ def other_ways(curve: Curve, point: Point, first: int, last: int) -> list[Way]:
         rows = [traced.transitions[v.transition].rows[v.row].indicator for v in way if v.row >= 0]
         return rows[0] if rows else -1
 
-    go(visits[first].mode, point.solved.legs.z[first], [], [])
+    go(visits[first].mode, point.solved.segments.z[first], [], [])
     return sorted(found, key=lambda way: len(way[0]))

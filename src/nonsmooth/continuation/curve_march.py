@@ -137,7 +137,7 @@ def _follow(
 
 def _anchor_anew(locus: Locus, place: Point) -> None:
     """Put the phase condition of an orbit without transitions through the last point."""
-    locus.shooting.reference = plane_across(place.X[: locus.shooting.n], place.solved.legs.f_begin[0], locus.size)
+    locus.shooting.reference = plane_across(place.X[: locus.shooting.n], place.solved.segments.f_begin[0], locus.size)
     found = locus.place((place.solved, place.Y, place.tangent, 0), place.tangent)
     if found is not None:
         place.tangent = found.tangent

@@ -114,8 +114,8 @@ class _Product:
         return np.asarray(M)
 
     def _leg(self, mode: int, begin: float, end: float, z: FloatArray) -> tuple[FloatArray, FloatArray]:
-        legs = self.flow.legs(self.values, [mode], [begin], [end - begin], z[None, :])
-        return legs.Phi[0], legs.z[0]
+        segments = self.flow.segments(self.values, [mode], [begin], [end - begin], z[None, :])
+        return segments.Phi[0], segments.z[0]
 
     def _through(
         self, mode: int, begin: float, end: float, z: FloatArray, aside: float

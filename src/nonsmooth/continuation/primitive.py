@@ -36,7 +36,7 @@ def primitive(shooting: Shooting, solved: Solved, size: FloatArray) -> tuple[Sho
         if once.repeated(rounds, turns) != shooting.signature:
             continue
         begin = float(times[few - 1]) if few else 0.0
-        there = shooting.flow.legs(
+        there = shooting.flow.segments(
             solved.values, [visits[few].mode], [begin], [end / rounds - begin], states[few][None, :]
         ).z[0]
         if not np.abs((there - states[0]) / size).max() < SAME:

@@ -31,7 +31,7 @@ from nonsmooth.flow.saltation import chained
 from nonsmooth.flow.variational import VariationalFlow
 
 if TYPE_CHECKING:
-    from nonsmooth.flow.variational import Jump, Legs
+    from nonsmooth.flow.variational import Jump, Segments
     from nonsmooth.system.system import System
 
 __all__ = ["Shooting", "Solved"]
@@ -47,7 +47,7 @@ class Solved:
     residual: FloatArray
     jacobian: FloatArray  # (N, N + n_active)
     times: FloatArray  # (m + 2,): 0, the instants, the end
-    legs: Legs
+    segments: Segments
     jumps: list[Jump]
     values: FloatArray
     free: list[int]
@@ -56,14 +56,14 @@ class Solved:
     @property
     def monodromy(self) -> FloatArray:
         """Derivative of the return map (autonomous: with the trivial multiplier 1; zero for what is constant)."""
-        M = self.legs.Phi[0]
+        M = self.segments.Phi[0]
         for i in range(len(self.jumps)):
             if i + 1 < len(self.jumps) and self.at_once[i + 1]:
                 continue  # its instant is that of the first of them
             first = i
             while self.at_once[first]:
                 first -= 1
-            M = self.legs.Phi[i + 1] @ (chained(self.jumps[first : i + 1]).saltation @ M)
+            M = self.segments.Phi[i + 1] @ (chained(self.jumps[first : i + 1]).saltation @ M)
         if self.free:
             M = M.copy()
             M[self.free], M[:, self.free] = 0.0, 0.0
@@ -169,24 +169,24 @@ class Shooting:
             T, dT, end = float(X[size - 1]), np.zeros(a), float(X[size - 1])
         times = np.empty(m + 2)
         times[0], times[1:-1], times[-1] = 0.0, t, end
-        legs = self.flow.legs(values, self.modes, times[:-1], times[1:] - times[:-1], z)
+        segments = self.flow.segments(values, self.modes, times[:-1], times[1:] - times[:-1], z)
         F, J = np.zeros(size), np.zeros((size, size + a))
         jumps = []
-        pull = np.matmul(legs.Phi, legs.f_begin[:, :, None])[:, :, 0]
+        pull = np.matmul(segments.Phi, segments.f_begin[:, :, None])[:, :, 0]
         for i in range(m):
             k, row, at, turn = self.jumps[i]
-            before = legs.z[i]
+            before = segments.z[i]
             jump = self.flow.jump(values, k, float(t[i]), before, row)
             jumps.append(jump)
             D = np.zeros((n, size + a))  # derivative of the state before the transition
             zi = self.z_at[i]
-            D[:, zi : zi + n] = legs.Phi[i]
+            D[:, zi : zi + n] = segments.Phi[i]
             if i:
                 D[:, self.t_at[i - 1]] = -pull[i]
             ti = self.t_at[i]
-            D[:, ti] = legs.f_end[i]
+            D[:, ti] = segments.f_end[i]
             if a:
-                D[:, size:] = legs.P[i]
+                D[:, size:] = segments.P[i]
             r = ti
             if self.at_once[i]:
                 F[r] = t[i] - t[i - 1]
@@ -214,24 +214,24 @@ class Shooting:
             block[:, zn : zn + n] += self._one
             J[r + 1 : r + 1 + n] = block
         # Closure
-        F[:n] = legs.z[m] - z[0]
+        F[:n] = segments.z[m] - z[0]
         zi = self.z_at[m]
-        J[:n, zi : zi + n] += legs.Phi[m]
+        J[:n, zi : zi + n] += segments.Phi[m]
         J[:n, :n] -= self._one
         if m:
             J[:n, self.t_at[-1]] -= pull[m]
         if a:
-            J[:n, size:] = legs.P[m]
+            J[:n, size:] = segments.P[m]
             if self.forced:
-                J[:n, size:] += legs.f_end[m][:, None] * (self.period_number * dT)
+                J[:n, size:] += segments.f_end[m][:, None] * (self.period_number * dT)
         for j in self.free:
             F[j] = 0.0
             J[j] = 0.0
             J[j, j] = 1.0
         if not self.forced:
-            J[:n, size - 1] += legs.f_end[m]
+            J[:n, size - 1] += segments.f_end[m]
             self._anchor(F, J, X, t, z[0])
-        return Solved(X, F, J, times, legs, jumps, values, self.free, self.at_once)
+        return Solved(X, F, J, times, segments, jumps, values, self.free, self.at_once)
 
     def _anchor(self, F: FloatArray, J: FloatArray, X: FloatArray, t: FloatArray, z0: FloatArray) -> None:
         """The phase condition of an autonomous orbit."""

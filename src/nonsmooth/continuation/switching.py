@@ -132,8 +132,8 @@ def _state_at(curve: Curve, point: Point, t: float) -> FloatArray:
     begins = np.concatenate([[0.0], times])
     i = int(np.searchsorted(begins, t, side="right")) - 1
     mode = curve.shooting.signature.visits[i].mode
-    legs = curve.shooting.flow.legs(point.solved.values, [mode], [begins[i]], [t - begins[i]], states[i][None, :])
-    return np.asarray(legs.z[0, : len(curve.shooting.system.states)])
+    segments = curve.shooting.flow.segments(point.solved.values, [mode], [begins[i]], [t - begins[i]], states[i][None, :])
+    return np.asarray(segments.z[0, : len(curve.shooting.system.states)])
 
 
 def emanating(curve: Curve, X: FloatArray, along: FloatArray, kind: str) -> list[tuple[Curve, FloatArray, FloatArray]]:

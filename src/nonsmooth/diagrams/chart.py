@@ -78,7 +78,7 @@ def chart(
     transient, keep : int
         Section returns passed over, then judged. A point that is still settling gets up to eight transients.
     max_period : int, optional
-        Longest period number looked for, less than ``keep``; the smaller of 16 and ``keep`` - 1 where not given.
+        Longest period number searched, less than ``keep``; the smaller of 16 and ``keep`` - 1 where not given.
     stop_early : bool
         A point ends as soon as its period number is certain (a small return, and multipliers inside the unit circle)
         instead of at the end of its transient. Labels are the same, but for chaotic transients that end about then.

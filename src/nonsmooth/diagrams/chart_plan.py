@@ -1,4 +1,4 @@
-"""What a chart would take on the GPU of this machine: a sample of its points, spread over the plane, run there.
+"""Time that a chart would take on the GPU of this machine: a sample of its points, spread over the plane, run there.
 
 Nothing is reckoned from operations and peaks: the part of its peak that a GPU reaches is what nobody knows before it is
 measured. A sample fills the GPU as a launch of the chart itself does, because a GPU that is half empty is no faster,

@@ -165,7 +165,7 @@ def _drift(a: FloatArray, b: FloatArray) -> float:
 
 
 def _range(radius: FloatArray, slope: FloatArray, pairs: FloatArray, extent: float) -> tuple[float, float]:
-    """The widest stretch of a steady slope; where there is none, the steadiest of the least width."""
+    """The widest interval of a steady slope; where there is none, the steadiest of the least width."""
     usable = np.flatnonzero((pairs >= PAIRS) & (radius <= WIDEST * extent) & np.isfinite(slope))
     least = int(np.ceil(LEAST_DECADES * PER_DECADE))
     if len(usable) <= least:

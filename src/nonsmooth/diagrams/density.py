@@ -91,7 +91,7 @@ def bin_edges(
 
 
 class Counter:
-    """Where section points are counted: one histogram per parameter value and state."""
+    """Counts of section points: one histogram per parameter value and state."""
 
     def __init__(self, n_points: int, edges: FloatArray) -> None:
         self.edges = edges

@@ -121,7 +121,7 @@ def lyapunov(
     is constant. The phase of the forcing is no state, so a forced limit cycle has negative exponents only; an
     autonomous motion that does not end in an equilibrium has one exponent zero.
 
-    A run that comes to rest at a stable equilibrium has the real parts of its eigenvalues, and the standard error is no
+    A run that stops at a stable equilibrium has the real parts of its eigenvalues, and the standard error is no
     less than the distance from them. A run that begins at an unstable one, as the start of zeros often is, stays there:
     its exponents are no attractor's. A warning names the equilibrium, ``equilibrium`` and the attribute ``note`` say it
     in the result, and ``standard_error`` and ``kaplan_yorke`` are NaN. Give ``start=``, a state beside it.

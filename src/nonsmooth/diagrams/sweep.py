@@ -75,7 +75,7 @@ def sweep(
         Section returns passed over, then recorded, at each value. A point that is still settling gets up to eight
         transients; what is not settled then has the status ``slow``.
     max_period : int, optional
-        Longest period number looked for, less than ``keep``; the smaller of 16 and ``keep`` - 1 where not given.
+        Longest period number searched, less than ``keep``; the smaller of 16 and ``keep`` - 1 where not given.
     density : bool or mapping
         Store a histogram of each state's section points instead of the points. A mapping gives ranges,
         ``{"x": (lowest, highest)}``; where none is given it is that of a coarse sweep and a twentieth more either side.

@@ -57,7 +57,7 @@ class Slot:
 
 
 class Report:
-    """What the pieces of work tell the thread that waits for them, and it them."""
+    """Messages that the pieces of work give the thread that waits for them, and it them."""
 
     def __init__(self, advance: Callable[..., None]) -> None:
         self.advance = advance
@@ -115,5 +115,5 @@ def largest_of(starts: FloatArray, slots: Iterable[Slot]) -> FloatArray:
 
 
 def ended(slot: Slot) -> np.ndarray:
-    """Which runs came to their end."""
+    """Marks of runs that came to their end."""
     return usable(slot.status)

@@ -1,4 +1,4 @@
-"""What a verb was given: each check names the argument, what it was, what is allowed and what to do."""
+"""Arguments of verbs: each check names the argument, what it was, what is allowed and what to do."""
 
 from __future__ import annotations
 

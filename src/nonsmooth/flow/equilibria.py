@@ -72,7 +72,7 @@ class ModeField:
         return found[:n], found[n:].reshape(n, n_u)
 
     def margins(self, h: FloatArray) -> FloatArray:
-        """How far each transition's condition holds (n_transitions,), -inf for those that are not of the mode."""
+        """Margins by which conditions of transitions hold (n_transitions,), -inf for those that are not of the mode."""
         return np.array([
             min(row.sign * h[row.indicator] for row in jump.rows) if jump.source == self.mode and jump.rows else -np.inf
             for jump in self.traced.transitions
@@ -206,7 +206,7 @@ def _under_forcing(
 
 
 def _fixed(traced: Traced, reset: Sequence[Any], u: FloatArray, values: FloatArray, memory: FloatArray) -> bool:
-    """Whether a reset leaves the state alone."""
+    """Return whether a reset leaves the state alone."""
     import sympy as sp
 
     image = sp.lambdify([traced.t, list(traced.u), list(traced.p), list(traced.m)], list(reset), modules="numpy")

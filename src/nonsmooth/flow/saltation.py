@@ -1,4 +1,4 @@
-r"""What a transition does to small changes of the state and of the parameters.
+r"""Effects of a transition to small changes of the state and of the parameters.
 
 At a transition the motion leaves one field, :math:`f^-`, and goes on from :math:`z^+ = R(t, z^-, p)` along another,
 :math:`f^+`. A neighbouring motion meets the surface :math:`h(t, z, p) = 0` earlier or later, by

@@ -13,7 +13,7 @@ from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.saltation import Jump
 from nonsmooth.flow.simulate import check_complete, run_length
 from nonsmooth.flow.starts import first_state, plain_start
-from nonsmooth.flow.variational import Legs, VariationalFlow
+from nonsmooth.flow.variational import Segments, VariationalFlow
 from nonsmooth.system.names import by_name
 
 if TYPE_CHECKING:
@@ -27,15 +27,15 @@ RTOL = 1e-15  # where the flow is not exact
 
 
 class Variation:
-    """One run taken apart: its legs, the jumps between them, and their products.
+    """One run taken apart: its segments, the jumps between them, and their products.
 
     Attributes
     ----------
     modes : list of int, times : list of float
-        Mode and beginning of each leg.
-    legs : Legs
+        Mode and beginning of each segment.
+    segments : Segments
     jumps : list of Jump
-        Between the legs; transitions at one instant are one.
+        Between the segments; transitions at one instant are one.
     transitions : list of tuple of int
     start : Jump or None
         The transitions taken at the start because they held already: nothing moves in time there.
@@ -66,26 +66,26 @@ class Variation:
                 self.times.append(float(t))
             memory = log.memory_after[i]
         taus = np.diff([*self.times, t_end])
-        self.legs: Legs = flow.legs(values, self.modes, self.times, taus, starts)
+        self.segments: Segments = flow.segments(values, self.modes, self.times, taus, starts)
         self.jumps: list[Jump] = [
             flow.jump(values, chain, t, z) for chain, t, z in zip(self.transitions, self.times[1:], before, strict=True)
         ]
-        self.Phi, self.P = self.legs.Phi[0], self.legs.P[0]
+        self.Phi, self.P = self.segments.Phi[0], self.segments.P[0]
         if self.start is not None:
             self.Phi, self.P = self.Phi @ self.start.R_z, self.P + self.Phi @ self.start.R_p
         for i, jump in enumerate(self.jumps, start=1):
-            self.Phi = self.legs.Phi[i] @ (jump.saltation @ self.Phi)
-            self.P = self.legs.Phi[i] @ (jump.saltation @ self.P + jump.parameter_column) + self.legs.P[i]
+            self.Phi = self.segments.Phi[i] @ (jump.saltation @ self.Phi)
+            self.P = self.segments.Phi[i] @ (jump.saltation @ self.P + jump.parameter_column) + self.segments.P[i]
 
     @property
     def log_determinant(self) -> float:
-        """log\\|det Phi\\| from the determinants of the legs' matrices and of the saltation matrices."""
-        return float(np.linalg.slogdet(self.legs.Phi)[1].sum()) + self._of_jumps()
+        """log\\|det Phi\\| from the determinants of the segments' matrices and of the saltation matrices."""
+        return float(np.linalg.slogdet(self.segments.Phi)[1].sum()) + self._of_jumps()
 
     @property
     def trace(self) -> float:
-        """What it must be: the integral of div f, and log\\|det S\\| of every transition."""
-        return float(self.legs.divergence.sum()) + self._of_jumps()
+        """The value it must have: the integral of div f, and log\\|det S\\| of every transition."""
+        return float(self.segments.divergence.sum()) + self._of_jumps()
 
     def _of_jumps(self) -> float:
         at_start = 0.0 if self.start is None else float(np.linalg.slogdet(self.start.R_z)[1])
@@ -185,7 +185,7 @@ def sensitivity(
     parameter_part = found.P
     if periods is not None and names:
         _, gradient = flow.period(system.parameter_vector())
-        parameter_part = parameter_part + np.outer(found.legs.f_end[-1], periods * gradient)
+        parameter_part = parameter_part + np.outer(found.segments.f_end[-1], periods * gradient)
     from nonsmooth.results.labels import labels_of
     from nonsmooth.results.provenance import provenance
     from nonsmooth.results.variations import derivatives_of_run
@@ -198,11 +198,11 @@ def sensitivity(
     n = flow.n
     return derivatives_of_run(
         labels, provenance(labels, "sensitivity", options, method="variational"), names,
-        Phi=found.Phi, P=parameter_part, end=found.legs.z[-1], crossing_time=found.times[1:],
+        Phi=found.Phi, P=parameter_part, end=found.segments.z[-1], crossing_time=found.times[1:],
         crossing_transition=[chain[-1] for chain in found.transitions],
         saltation=np.array([jump.saltation for jump in found.jumps]).reshape(-1, n, n),
         log_det_saltation=[jump.log_determinant for jump in found.jumps],
         transversality=[jump.transversality for jump in found.jumps],
-        log_det=found.log_determinant, divergence=float(found.legs.divergence.sum()), trace=found.trace,
+        log_det=found.log_determinant, divergence=float(found.segments.divergence.sum()), trace=found.trace,
         status=log.status,
     )  # fmt: skip

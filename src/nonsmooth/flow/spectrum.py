@@ -1,4 +1,4 @@
-r"""How small changes grow along a trajectory: frames carried through legs and transitions, kept orthonormal.
+r"""Growth of small changes along a trajectory: frames carried through segments and transitions, kept orthonormal.
 
 The sums of the logarithms of what is divided out, over the elapsed time, are finite-time Lyapunov exponents. Their sum
 is :math:`\frac1t \log|\det\Phi(t)|`, which must equal
@@ -41,7 +41,7 @@ FINEST = 1e-11  # and no coarser than this
 
 @dataclass
 class Growth:
-    """What happened to a frame over K units of time."""
+    """Growth of a frame over K units of time."""
 
     logarithms: FloatArray  # (K, n) by unit of time; minus infinity where a direction was lost
     divergence: float  # integral of div f
@@ -125,7 +125,7 @@ class _SeriesFrame:
         """Follow ``count`` units, into the rows of ``total`` from ``done`` on.
 
         A piece is marched from its recorded beginning, so in chaos it parts from the record; the frame would then go on
-        along another motion. Where a piece ends too far away the stretch is done again with more samples."""
+        along another motion. Where a piece ends too far away the piece is done again with more samples."""
         # Times count from here, by whole periods, so that no digits are lost in long runs.
         state.clock[1] = 0.0
         if self.period is None and not self.timed:
@@ -244,7 +244,7 @@ def _pieces(traced: Traced, log: Log, instants: FloatArray, density: int) -> Any
 
 
 def _smooth(engine: Engine, traced: Traced) -> bool:
-    """Whether the motion is one Taylor series after the other, of steps that the engine chooses and need not check."""
+    """Return whether motion is one Taylor series after the other, of steps that need not be checked."""
     if not isinstance(engine, SeriesEngine) or engine.name != "taylor" or traced.transitions:
         return False
     return engine.step is None and engine.order is None and not engine.layers.checked

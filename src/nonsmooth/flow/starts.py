@@ -73,7 +73,7 @@ def _check_box(a: FloatArray, b: FloatArray, low: Any, high: Any) -> None:
 
 
 def is_one_start(start: Any) -> bool:
-    """Whether ``start`` is one state (None, a mapping, a flat sequence of numbers) rather than several."""
+    """Return whether ``start`` is one state (None, a mapping, a flat sequence of numbers) rather than several."""
     if not _is_list(start):
         return True  # None, a mapping, a result; or no start at all: start_states says so
     first = start[0] if len(start) else 0.0
@@ -81,7 +81,7 @@ def is_one_start(start: Any) -> bool:
 
 
 def _is_list(start: Any) -> bool:
-    """Whether ``start`` has entries: a sequence or an array (NumPy's, xarray's, a row of a table)."""
+    """Return whether ``start`` has entries: a sequence or an array (NumPy's, xarray's, a row of a table)."""
     if isinstance(start, str) or hasattr(start, "data_vars") or getattr(start, "ndim", 1) == 0:
         return False
     return isinstance(start, Sequence) or hasattr(start, "__array__")

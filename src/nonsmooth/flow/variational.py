@@ -1,13 +1,13 @@
-r"""The variational flow: smooth legs and transitions, each with its derivatives in state and parameters.
+r"""The variational flow: smooth segments and transitions, each with its derivatives in state and parameters.
 
-The extended state is z = (u, memory). A leg is motion in one mode for a given duration, transitions ignored:
+The extended state is z = (u, memory). A segment is motion in one mode for a given duration, transitions ignored:
 :math:`z(t_0 + \tau)`, :math:`\Phi = \partial z / \partial z_0`, :math:`P = \partial z / \partial p`, from
 :math:`\dot\Phi = f_z \Phi` and :math:`\dot P = f_z P + f_p`. A transition at (t, z) has the saltation matrix
 
 .. math:: S = R_z + \frac{(f^+ - R_z f^- - R_t)\, h_z}{h_t + h_z f^-}
 
 and, with :math:`h_p` in place of :math:`h_z` and :math:`R_p` in place of :math:`R_z`, a column for each parameter.
-A motion's derivative is the product of those of its legs and transitions.
+A motion's derivative is the product of those of its segments and transitions.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ if TYPE_CHECKING:
     from nonsmooth.system.system import System
     from nonsmooth.system.traced import Traced
 
-__all__ = ["Jump", "Legs", "Touch", "VariationalFlow"]
+__all__ = ["Jump", "Segments", "Touch", "VariationalFlow"]
 
 FloatArray = NDArray[np.float64]
 
 
 @dataclass(slots=True)
-class Legs:
-    """Ends and derivatives of m legs."""
+class Segments:
+    """Ends and derivatives of m segments."""
 
     z: FloatArray  # (m, n)
     Phi: FloatArray  # (m, n, n)
@@ -51,7 +51,7 @@ class Legs:
 
 
 class VariationalFlow:
-    """Legs and jumps of one system's equations, with derivatives in the ``active`` parameters.
+    """Segments and jumps of one system's equations, with derivatives in the ``active`` parameters.
 
     Made by :meth:`of`; it holds no parameter values, and threads may share it.
 
@@ -105,8 +105,8 @@ class VariationalFlow:
                 raise ValueError(unknown(name, "a parameter", repr(system.name), units))
         return _flow(system.traced, names, tuple(system.scale_vector().tolist()))
 
-    def legs(self, values: Any, modes: Any, t0: Any, tau: Any, z0: Any) -> Legs:
-        """March legs, each in one mode, with derivatives; accurate to rounding.
+    def segments(self, values: Any, modes: Any, t0: Any, tau: Any, z0: Any) -> Segments:
+        """March segments, each in one mode, with derivatives; accurate to rounding.
 
         Parameters
         ----------
@@ -121,7 +121,7 @@ class VariationalFlow:
 
         modes = np.ascontiguousarray(modes, dtype=np.int64)
         m, n = len(modes), self.n
-        out = Legs(
+        out = Segments(
             np.empty((m, n)), np.empty((m, n, n)), np.empty((m, n, self.n_active)), np.empty((m, n)),
             np.empty((m, n)), np.empty(m), np.empty(m, dtype=np.int64),
         )  # fmt: skip

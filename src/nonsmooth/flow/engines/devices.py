@@ -1,4 +1,4 @@
-"""Where work runs: ``device="cpu"`` or ``device="cuda"``, and what a GPU takes."""
+"""Places where work runs: ``device="cpu"`` or ``device="cuda"``, and what a GPU takes."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def batch_size() -> int:
 
 
 def gpu_name() -> str:
-    """What the present GPU calls itself."""
+    """Name of the present GPU."""
     from numba import cuda
 
     if _simulated():
@@ -88,7 +88,7 @@ def engine_on(device: Any, engine: Engine, plan: SectionPlan | None) -> Engine:
 
 
 def on_gpu(device: Any, verb: str, engine: Engine, plan: SectionPlan | None, *, carried: bool = False) -> bool:
-    """Whether the work of a verb goes to the GPU; every reason why it cannot is raised before anything is compiled.
+    """Return whether a verb's work goes to the GPU; every reason why it cannot is raised before anything is compiled.
 
     Parameters
     ----------

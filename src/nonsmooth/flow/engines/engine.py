@@ -1,4 +1,4 @@
-"""What a flow method offers to the analyses: two calls, the same for every method.
+"""Interface that a flow method offers to the analyses: two calls, the same for every method.
 
 An engine is bound to one system (its parameters' values apart), one method and one tolerance. It never
 raises for numerical trouble; it writes a status code (``kernels.codes``).
@@ -22,7 +22,7 @@ IntArray = NDArray[np.int64]
 
 @dataclass
 class State:
-    """Where a trajectory is: everything needed to go on. Kernels read and write it in place.
+    """Place of a trajectory: everything needed to go on. Kernels read and write it in place.
 
     ``clock[0]`` is the time since the start of the current forcing period (autonomous: the time), ``clock[1]``
     the number of whole periods before it, so that no digits are lost in long runs: t = clock[1] * T + clock[0].
@@ -124,7 +124,7 @@ class Chain:
 
 @dataclass
 class Log:
-    """What ``record`` collected, already trimmed: samples at the times asked for, crossings and touches."""
+    """Everything that ``record`` collected, already trimmed: samples at the times asked for, crossings and touches."""
 
     sample_u: FloatArray  # (n_samples, n)
     sample_memory: FloatArray  # (n_samples, n_memory)

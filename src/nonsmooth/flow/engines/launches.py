@@ -16,7 +16,7 @@ __all__ = ["States", "batches", "launch"]
 
 @dataclass
 class States:
-    """Where N trajectories are, on the GPU: states, memory, clocks, modes, and the parameter row of each."""
+    """Places of N trajectories, on the GPU: states, memory, clocks, modes, and the parameter row of each."""
 
     u: Any  # (N, n)
     memory: Any  # (N, n_memory), at least one column

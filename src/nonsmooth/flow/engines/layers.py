@@ -1,9 +1,9 @@
-"""Where the right-hand sides of a system may hide something from a Taylor step, and what to watch there.
+"""Places where the right-hand sides of a system may hide something from a Taylor step, and what to watch there.
 
 The length of a Taylor step is read off its last coefficients. They tell nothing of a term that is below rounding at
 the beginning of the step and large at its end: a saturated tanh, the flank of a bell, a wall x**40. Such a term rests
 on a function whose singularities (or growth) lie off the solution; what decides is its argument, and it is largest, or
-turns over, where the argument vanishes or is stationary. These arguments are the *guards*: they become further rows
+turns over, where the argument vanishes or is stationary. These *watched arguments* become further rows
 of the generated jets, and ``kernels.trust`` compares the polynomial with the equations at their zeros and extremes.
 
 Right-hand sides without such functions need no comparison: polynomials of a low degree in the states, sines, cosines
@@ -31,9 +31,9 @@ LOW_DEGREE = 4
 
 @dataclass(frozen=True)
 class Layers:
-    """What :func:`layers` finds.
+    """Result of :func:`layers`.
 
-    ``model`` is the system with the guards as further outputs (the system itself where there are none), ``count``
+    ``model`` is the system with the watched arguments as further outputs (itself where there are none), ``count``
     their number; ``checked`` says whether steps need checking at all.
     """
 
@@ -44,7 +44,7 @@ class Layers:
 
 @lru_cache(maxsize=256)
 def layers(traced: Traced) -> Layers:
-    """The guards of a system's fields and indicators, mode by mode."""
+    """The watched arguments of a system's fields and indicators, mode by mode."""
     from sympy import S
 
     variables = frozenset({traced.t, *traced.u})
@@ -75,7 +75,7 @@ class _Finder:
         return list(found)
 
     def suspicious(self, e: Expr) -> bool:
-        """Whether the expression holds anything to be watched, or a high power."""
+        """Return whether the expression holds anything to be watched, or a high power."""
         return self._degree(e) > LOW_DEGREE or any(self._arguments(part) for part in self._parts(e))
 
     def _varies(self, e: Any) -> bool:
@@ -87,7 +87,7 @@ class _Finder:
         return (part for part in preorder_traversal(e) if self._varies(part))
 
     def _linear(self, e: Expr) -> bool:
-        """Whether all slopes are constant."""
+        """Return whether all slopes are constant."""
         return not any(self._varies(e.diff(v)) for v in sorted(e.free_symbols & self.variables, key=str))
 
     def _degree(self, e: Any) -> int:

@@ -70,7 +70,7 @@ class LinearEngine(LoopEngine):
 
     @property
     def is_plain(self) -> bool:
-        """Whether there is no memory and every mode has every state."""
+        """Return whether there is no memory and every mode has every state."""
         return not self.traced.m and not self.lacking.any()
 
     def prepare(self, points: FloatArray) -> Tables:

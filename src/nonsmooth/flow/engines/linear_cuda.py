@@ -21,7 +21,7 @@ SLICE = 256  # section returns of one launch, at most: below a second also on a 
 
 @dataclass
 class Buffers:
-    """What a run leaves behind for N trajectories, on the GPU; the order is that of :class:`engine.Chain`."""
+    """Room for what a run leaves behind for N trajectories, on the GPU; the order is that of :class:`engine.Chain`."""
 
     section: Any
     maximum: Any

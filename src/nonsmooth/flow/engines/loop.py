@@ -44,7 +44,7 @@ class LoopEngine:
         raise NotImplementedError
 
     def touches_of_a_leg(self) -> int:
-        """How many touches one leg may add to a log, at most."""
+        """Number of touches that one segment may add to a log, at most."""
         raise NotImplementedError
 
     @cached_property
@@ -53,7 +53,7 @@ class LoopEngine:
         return varying_phases(self.traced)
 
     def net_of(self, tables: Any, i: int) -> Any:
-        """The net of transitions with its phases at point i."""
+        """The transition table with its phases at point i."""
         return self.net if self.phases is None else self.net._replace(at=self.phases(tables.points[i]))
 
     @cached_property
@@ -184,7 +184,7 @@ def _longer(old: list[Any], new: list[Any]) -> list[Any]:
 
 
 def with_section(net: Any, indicator: int) -> Any:
-    """The net, its last two rows being the section's (rising, falling)."""
+    """The transition table, its last two rows being the section's (rising, falling)."""
     rows = net.rows.copy()
     rows[-2:, 0] = max(indicator, 0)
     return net._replace(rows=rows)
@@ -200,7 +200,7 @@ def _change(traced: Traced, jump: TracedTransition) -> int:
 
 
 def pack_net(traced: Traced) -> Any:
-    """The net of transitions (``kernels.records.Net``), with two more rows for a section.
+    """The transition table (``kernels.records.Net``), with two more rows for a section.
 
     Phases that depend on the parameters are zero here; see :meth:`LoopEngine.net_of`."""
     from nonsmooth.kernels.hybrid.records import Net

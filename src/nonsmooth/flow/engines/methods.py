@@ -1,4 +1,4 @@
-"""Which engine runs a system: the meaning of ``method=``, ``rtol=``, ``atol=`` and ``step=`` everywhere."""
+"""The engine that runs a system: the meaning of ``method=``, ``rtol=``, ``atol=`` and ``step=`` everywhere."""
 
 from __future__ import annotations
 

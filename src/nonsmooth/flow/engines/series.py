@@ -122,7 +122,7 @@ class SeriesEngine(LoopEngine):
 
     @cached_property
     def layers(self) -> Layers:
-        """What a step has to be checked for: only Taylor steps whose length follows from the tolerance."""
+        """Places that a step has to be checked for: only Taylor steps whose length follows from the tolerance."""
         if self.name == "taylor" and self.step is None:
             return layers(self.traced)
         return Layers(self.traced, 0, False)
@@ -153,7 +153,7 @@ class SeriesEngine(LoopEngine):
         return (len(self.net.rows) + 1) * (self.series_order + 1)
 
     def generated(self, tables: Tables) -> Any:
-        """What stands for system and method in the kernels (``kernels.records.Generated``)."""
+        """Record that stands for system and method in the kernels (``kernels.records.Generated``)."""
         from nonsmooth.kernels.hybrid.records import Generated
 
         traced = self.traced

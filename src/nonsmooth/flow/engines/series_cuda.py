@@ -22,7 +22,7 @@ PART = 0.75  # of ``devices.batch_size`` in one launch: what the registers hold 
 
 @dataclass
 class Buffers:
-    """What a run leaves behind for N trajectories, on the GPU, and what it needs to go on after a launch."""
+    """Room for what a run leaves behind for N trajectories, on the GPU, and what it needs to go on after a launch."""
 
     whole: Any  # (numbers, N)
     real: Any

@@ -1,4 +1,4 @@
-"""What the series kernels need to know of a system: its net of transitions, periods, exact steps and scratch."""
+"""All that the series kernels need to know of a system: its transition table, periods, exact steps and scratch."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ __all__ = ["Tables", "exact_steps", "periods", "work_of"]
 
 @dataclass(frozen=True)
 class Tables:
-    """What ``prepare`` finds for P points; read only, shared by threads."""
+    """Result of ``prepare`` for P points; read only, shared by threads."""
 
     points: FloatArray  # (P, n_parameters)
     period: FloatArray  # (P,), inf where autonomous
