@@ -132,7 +132,8 @@ def _state_at(curve: Curve, point: Point, t: float) -> FloatArray:
     begins = np.concatenate([[0.0], times])
     i = int(np.searchsorted(begins, t, side="right")) - 1
     mode = curve.shooting.signature.visits[i].mode
-    segments = curve.shooting.flow.segments(point.solved.values, [mode], [begins[i]], [t - begins[i]], states[i][None, :])
+    flow, values = curve.shooting.flow, point.solved.values
+    segments = flow.segments(values, [mode], [begins[i]], [t - begins[i]], states[i][None, :])
     return np.asarray(segments.z[0, : len(curve.shooting.system.states)])
 
 
