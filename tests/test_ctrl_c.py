@@ -66,6 +66,7 @@ import faulthandler, os, signal, threading, time, warnings
 import nonsmooth as ns
 
 faulthandler.dump_traceback_later(280, exit=True)  # says where it is
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs are begun deaf to Ctrl-C
 warnings.simplefilter("ignore")
 o = ns.models.discontinuous_support()
 valve, top = ns.models.relief_valve(), ns.Poincare("lift_velocity", rising=False)

@@ -272,7 +272,7 @@ def test_bash_completes_commands_options_and_names(tmp_path: Path) -> None:
         "nonsmooth ": " ".join(COMMANDS),
         "nonsmooth re": "reproduce",
         "nonsmooth --v": "--version",
-        "nonsmooth init im": "impact_oscillator",
+        "nonsmooth init impact_o": "impact_oscillator",
         "nonsmooth init impact_oscillator --verb ba": "basins basin_fractions",
         "nonsmooth run --s": "--store --scheduler",
         "nonsmooth --traceback reproduce ": "savi2007",

@@ -34,7 +34,7 @@ DUTIES = np.array([0.1, 0.35, 0.4, 0.7, 0.95])  # at 0.1, 0.4 and 0.7 a step rea
 def test_a_sweep_over_the_phase(method: str):
     found = ns.sweep(heater(), "duty", DUTIES, transient=40, keep=2, max_period=1, method=method)
     expected = [steady(duty) for duty in DUTIES]
-    assert found.period_number.values.tolist() == [1] * 4
+    assert found.period_number.values.tolist() == [1] * len(DUTIES)
     assert found.section.values[:, -1, 0] == pytest.approx(expected, rel=1e-9)
 
 
@@ -42,8 +42,8 @@ def test_points_of_one_call_have_their_own_phases():
     system = heater()
     engine = engine_for(system)
     tables = engine.prepare(system.parameter_points({"duty": DUTIES}))
-    out, state = Chain.empty(4, 1, 1, 0, 0), State(np.zeros(1), np.zeros(0))
-    engine.chain(tables, 0, 4, state, np.zeros((4, 1)), SectionPlan(), 40, 1, out)
+    out, state = Chain.empty(len(DUTIES), 1, 1, 0, 0), State(np.zeros(1), np.zeros(0))
+    engine.chain(tables, 0, len(DUTIES), state, np.zeros((len(DUTIES), 1)), SectionPlan(), 40, 1, out)
     assert out.section.ravel() == pytest.approx([steady(duty) for duty in DUTIES], rel=1e-12)
 
 

@@ -36,7 +36,7 @@ def _mirror(u: Any) -> Any:
 
 
 def chua_circuit(**parameters: float) -> System:
-    r"""Return Chua's circuit with its piecewise-linear diode.
+    r"""Return the circuit of Chua with its piecewise-linear diode.
 
     .. math::
 
