@@ -129,7 +129,7 @@ MISTAKES = {
         "ns.plot.bifurcaton(osc)", "`bifurcaton` is not a figure", "all: COLORS", "nearest: bifurcation;"
     ),
     "a misspelt model": (
-        "ns.models.discontinous_support()", "`discontinous_support`", "chua_circuit, discontinuous_support, double_impact",
+        "ns.models.discontinous_support()", "`discontinous_support`", "chua_circuit, discontinuous_support,",
         "nearest: discontinuous_support;",
     ),
     # verbs and their arguments
