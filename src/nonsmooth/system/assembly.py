@@ -61,9 +61,9 @@ class _Assembler:
 
     def __init__(
         self, symbols: Symbols, base: Mapping[str, tuple[sp.Expr, ...]], elements: Mapping[str, Element],
-        scale: Mapping[str, float], values: Mapping[sp.Symbol, float],
+        scale: Mapping[str, float], values: Mapping[sp.Symbol, float], resets: bool,
     ) -> None:  # fmt: skip
-        self.symbols, self.base, self.scale, self.values = symbols, base, scale, values
+        self.symbols, self.base, self.scale, self.values, self.resets = symbols, base, scale, values, resets
         self.u = tuple(symbols.u.values())
         self.names = list(symbols.u)
         self.parts = [self._part(name, element) for name, element in elements.items()]
@@ -380,8 +380,15 @@ class _Assembler:
         slow, turned = ((v + off, one * sign, f"{name}_turned_{phase}") for one in (-1, 1))
         within = [(above[0], -1, above[1]), (below[0], 1, below[1])]
         torn = (above[0], 1, above[1]) if phase == "forward" else (below[0], -1, below[1])
+        if not self.is_struck(part):
+            return [("stick", [stopped, *within], still), (other, [stopped, torn], None)]
         # An impact turns the speed round at once, and no finite force can stop it then.
         return [("stick", [stopped, slow, *within], still), (other, [stopped, torn], None), (other, [turned], None)]
+
+    def is_struck(self, part: _Part) -> bool:
+        """Return whether a speed may jump: by the impact of a stop, or by a reset of the system's own."""
+        stops = (other for other in self.parts if isinstance(other.element, Stop))
+        return self.resets or any(sp.simplify(self.across(part.where, other)) != 0 for other in stops)
 
     def _bearing(self, k: int, pattern: Pattern, mode: str) -> list[int]:
         """Of the contacts that rest those that take part in an impulse of element k.
@@ -433,7 +440,8 @@ def assembled(
                          f"the vector field of mode {key!r}")
         for key, mode in modes.items()
     }  # fmt: skip
-    make = _Assembler(symbols, base, parts, scale, values)
+    resets = any(isinstance(item, Transition) and item.reset is not None for item in given["transitions"])
+    make = _Assembler(symbols, base, parts, scale, values, resets)
     counts = [len(part.element.phases) for part in make.parts]
     number = len(base) * int(sp.prod(counts))
     if number > MOST:
