@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from functools import cached_property
 from types import ModuleType
@@ -24,7 +25,7 @@ DIVERGENCE = 1e9  # in units of a state's scale
 SPARE = 64  # crossings that one leg may add to a log
 
 
-class LoopEngine:
+class LoopEngine(ABC):
     """``chain`` and ``record`` of an engine over the kernels of ``kernels.hybrid``.
 
     An engine says which compiled module observes a run (:meth:`module`), and what stands for the system there:
@@ -35,17 +36,17 @@ class LoopEngine:
     scale: FloatArray
     net: Any  # ``kernels.records.Net``
 
+    @abstractmethod
     def module(self, tables: Any, observer: str) -> ModuleType:
         """The kernels of this engine's stepper with an observer: ``"sections"`` or ``"record"``."""
-        raise NotImplementedError
 
+    @abstractmethod
     def given(self, tables: Any, observer: str) -> tuple[Any, Any, Any]:
         """Model, tables and work of the kernels."""
-        raise NotImplementedError
 
+    @abstractmethod
     def touches_of_a_leg(self) -> int:
         """Number of touches that one segment may add to a log, at most."""
-        raise NotImplementedError
 
     @cached_property
     def phases(self) -> Callable[[Any], FloatArray] | None:
