@@ -49,7 +49,7 @@ STATUSES: tuple[Status, ...] = (
         codes.CHATTER, "chatter",
         "Transitions followed each other in ever shorter times without end (an infinite number in finite time).",
         "Check the signs of the reset first: after it the state must move away from the surface. Where impacts do "
-        "accumulate, describe what happens then: a mode that sticks, or a sliding surface.",
+        "accumulate, write the stop as ns.elements.Stop, which ends them in rest, or a mode that sticks.",
     ),
     Status(
         codes.TOO_MANY_CROSSINGS, "too_many_crossings",
