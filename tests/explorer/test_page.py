@@ -10,9 +10,9 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from tests.explorer.conftest import FEW
 
 import nonsmooth as ns
-from tests.explorer.conftest import FEW
 
 MOVES = int(os.environ.get("NONSMOOTH_MOVES", "3"))  # of the slider whose latency is measured
 
@@ -59,8 +59,9 @@ def test_a_moved_slider_redraws_the_diagram_live(server: Any, new_page: Callable
     page.tab.evaluate("""() => {
         const source = Bokeh.documents[0].get_model_by_name("diagram image");
         window.drawn = [];
-        source.properties.data.change.connect(() => requestAnimationFrame(() => setTimeout(() =>
-            window.drawn.push([performance.now(), source.data.of[0], source.data.stage[0], source.data.image[0].shape]))));
+        const note = () => window.drawn.push(
+            [performance.now(), source.data.of[0], source.data.stage[0], source.data.image[0].shape]);
+        source.properties.data.change.connect(() => requestAnimationFrame(() => setTimeout(note)));
     }""")
     first, judged = [], []
     for k in range(MOVES):
@@ -76,7 +77,7 @@ def test_a_moved_slider_redraws_the_diagram_live(server: Any, new_page: Callable
             -0.0045 - 0.0002 * (k + 1),
         )
         shown = page.until(
-            "(() => { const own = window.drawn.filter(one => Math.abs(JSON.parse(one[1]).values.g - window.sent) < 1e-12);"
+            "(() => { const own = window.drawn.filter(one => JSON.parse(one[1]).values.g === window.sent);"
             " const done = own.find(one => one[2] === 'judged'); return done && [own[0], done]; })()"
         ).json_value()
         assert shown[0][2] == "first look"

@@ -113,7 +113,8 @@ class Diagram(_Figure):
                   "stage": [""], "of": [""]},
         )  # fmt: skip
         self.plot.image_rgba("image", "x", "y", "dw", "dh", source=self.image)
-        self.columns = ColumnDataSource(name="columns", data={key: [] for key in ("value", "low", "high", "words", "period", "status")})
+        keys = ("value", "low", "high", "words", "period", "status")
+        self.columns = ColumnDataSource(name="columns", data={key: [] for key in keys})
         bars = self.plot.segment(
             "value", "low", "value", "high", source=self.columns, line_alpha=0.0, line_width=4, hover_line_alpha=0.25,
             hover_line_color=COLORS["muted"],
@@ -178,7 +179,7 @@ class Diagram(_Figure):
         }  # fmt: skip
 
     def _fits(self, points: Any) -> bool:
-        """Whether the present axis shows the points, and they fill it well."""
+        """Return True if the present axis shows the points and they fill it well."""
         low, high = np.quantile(points, [0.001, 0.999])
         start, end = self.plot.y_range.start, self.plot.y_range.end
         return bool(start <= low and high <= end and high - low > 0.55 * (end - start))
@@ -242,7 +243,9 @@ class Portrait(_Curves):
 
     def __init__(self) -> None:
         super().__init__("portrait")
-        self.zone = BoxAnnotation(fill_color=COLORS["zone"], fill_alpha=0.14, line_alpha=0, level="underlay", visible=False)
+        self.zone = BoxAnnotation(
+            fill_color=COLORS["zone"], fill_alpha=0.14, line_alpha=0, level="underlay", visible=False
+        )
         self.plot.add_layout(self.zone)
         self.points = ColumnDataSource(data={"x": [], "y": []})
         self.dots = self.plot.scatter(

@@ -1,4 +1,4 @@
-"""Where a page begins: the figures of the paper, and a sensible view of any other model."""
+"""First views: the figures of the paper, and a sensible view of any other model."""
 
 from __future__ import annotations
 

@@ -9,6 +9,8 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from nonsmooth.errors import not_installed
+
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
@@ -51,7 +53,7 @@ def explore(
     try:
         import bokeh  # noqa: F401
     except ImportError as error:
-        raise ImportError('the explorer needs the package bokeh: pip install "nonsmooth[explorer]"') from error
+        raise ImportError(f"the explorer needs {not_installed('bokeh', 'explorer')}") from error
     from bokeh.application import Application
     from bokeh.application.handlers.function import FunctionHandler
     from bokeh.server.server import Server

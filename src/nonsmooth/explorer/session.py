@@ -20,7 +20,8 @@ from jinja2 import Template
 from nonsmooth.explorer.figures import CLOUDS, MOST, Diagram, History, Portrait, Section, theme, words_of
 from nonsmooth.explorer.labels import html_of, number, plain_of, symbols_of
 from nonsmooth.explorer.presets import PAPER, first_state, presets_of, slider_range
-from nonsmooth.explorer.state import CHOICES, History as Past, State, changed, from_query, to_query
+from nonsmooth.explorer.state import CHOICES, State, changed, from_query, to_query
+from nonsmooth.explorer.state import History as Past
 from nonsmooth.explorer.worker import Answer, Worker
 
 if TYPE_CHECKING:
@@ -101,7 +102,7 @@ class Session:
 
     @property
     def state(self) -> State:
-        """What the page shows now."""
+        """The state that the page shows."""
         return self.past.state
 
     @property
@@ -161,7 +162,7 @@ class Session:
             message = json.loads(text)
             self._heard = message["n"]
             action, name, value = message["do"], str(message.get("name", "")), message.get("value")
-            known = {
+            known: dict[str, Callable[[str, Any], object]] = {
                 "set": self._set, "model": self._model, "preset": self._preset, "end": self._end_step,
                 "undo": lambda *_: self.past.undo(), "redo": lambda *_: self.past.redo(), "look": self._look,
                 "reset": self._reset, "begin": self._begin,
@@ -185,8 +186,7 @@ class Session:
             value = state.values[getattr(state, name)]
             ends = slider_range(value)
             low, high = (0.6 * value, 1.4 * value) if value > 0 else ends
-            return replace(state, **dict(zip(("low", "high") if name == "over" else ("least", "most"), (low, high),
-                                             strict=True)))  # fmt: skip
+            return replace(state, low=low, high=high) if name == "over" else replace(state, least=low, most=high)
         if state.low == state.high:
             raise ValueError("the two ends of the range are equal; give two different numbers")
         return replace(state, low=min(state.low, state.high), high=max(state.low, state.high))
@@ -300,7 +300,7 @@ class Session:
             self.worker.end()
 
     def _take(self, answer: Answer) -> None:
-        """What the worker said."""
+        """Receive an answer of the worker."""
         kind, count, content = answer
         running = self._running
         if kind == "ended":

@@ -25,7 +25,7 @@ _WHOLE = {"transient": (0, 100_000), "keep": (4, 2000), "columns": (10, 4000)}
 
 @dataclass(frozen=True)
 class State:
-    """What a page shows.
+    """The contents of a page.
 
     Attributes
     ----------
@@ -72,6 +72,11 @@ class State:
         """The same with another value of a parameter."""
         return replace(self, values={**self.values, name: value})
 
+    def but(self, field: str, value: Any) -> State:
+        """The same with another value of a field."""
+        given: dict[str, Any] = {field: value}
+        return replace(self, **given)
+
 
 def to_query(state: State) -> str:
     """The state as the query of a URL; a parameter stands under its name with ``p.`` before it."""
@@ -117,17 +122,17 @@ def changed(state: State, name: str, value: Any, states: Sequence[str]) -> State
             raise ValueError(f"{parameter!r} is no parameter; there are: {', '.join(state.values)}")
         return state.with_value(parameter, number_of(value, parameter))
     if name in ("over", "beside"):
-        return replace(state, **{name: _one_of(value, list(state.values), name)})
+        return state.but(name, _one_of(value, list(state.values), name))
     if name in ("x", "y", "shown"):
-        return replace(state, **{name: _one_of(value, states, name)})
+        return state.but(name, _one_of(value, states, name))
     if name in CHOICES:
-        return replace(state, **{name: _one_of(value, list(CHOICES[name]), name)})
+        return state.but(name, _one_of(value, list(CHOICES[name]), name))
     if name in _WHOLE:
         least, most = _WHOLE[name]
         number = number_of(value, name)
         if number != int(number) or not least <= number <= most:
             raise ValueError(f"{name} = {value}: give a whole number from {least} to {most}")
-        return replace(state, **{name: int(number)})
+        return state.but(name, int(number))
     if name == "start":
         parts = value.split() if isinstance(value, str) else list(value)
         if len(parts) != len(states):
@@ -141,7 +146,7 @@ def changed(state: State, name: str, value: Any, states: Sequence[str]) -> State
             raise ValueError(f"eta = {eta:g}: half the width of the band must be greater than 0")
         return replace(state, eta=eta)
     if name in ("low", "high", "least", "most"):
-        return replace(state, **{name: number_of(value, name)})
+        return state.but(name, number_of(value, name))
     raise ValueError(f"{name!r} is nothing that a view holds")
 
 
@@ -200,7 +205,7 @@ class History:
 
     @property
     def can(self) -> tuple[bool, bool]:
-        """Whether there is a step back, and one forward."""
+        """Availability of a step back, and of one forward."""
         return bool(self._back), bool(self._forth)
 
     def end_step(self) -> None:

@@ -1,4 +1,4 @@
-"""What a page asks for, computed by the public verbs: one function per view, run in the worker's process."""
+"""Computations of the views by the public verbs, one function each; they run in the worker's process."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def section_of(system: ns.System, phase: float = 0.0) -> Any:
 
 
 def _orbit(system: ns.System, job: Mapping[str, Any], options: dict[str, Any], heard: Heard) -> dict[str, Any]:
-    """Where the motion from a start ends: its period number and residual, and a record of it."""
+    """The motion reached from a start: its period number and residual, and a record of it."""
     start, transient = list(job["start"]), job["transient"]
     name = next(iter(system.parameters))
     judged = ns.sweep(
@@ -61,7 +61,8 @@ def _orbit(system: ns.System, job: Mapping[str, Any], options: dict[str, Any], h
     if system.period() is not None:
         run = ns.simulate(system, periods=shown, transient=transient, start=start, **options)
     else:
-        times = ns.poincare(system, section=section_of(system), n=shown + 1, transient=transient, start=start, **options)
+        section = section_of(system)
+        times = ns.poincare(system, section=section, n=shown + 1, transient=transient, start=start, **options)
         begin, end = (float(times["time"].values[k]) for k in (0, -1))
         run = ns.simulate(system, duration=end - begin, transient=begin, start=start, **options)
     return {"judged": judged, "run": run}
@@ -86,8 +87,8 @@ def _stability(system: ns.System, job: Mapping[str, Any], options: dict[str, Any
         )  # fmt: skip
         return {"multipliers": np.asarray(orbit.floquet_multipliers)}
     found = ns.lyapunov(
-        system, start=list(job["start"]), transient=job["transient"], progress=heard, **options,
-        **({"periods": 2000} if system.period() is not None else {}),
+        system, start=list(job["start"]), transient=job["transient"], progress=heard,
+        periods=2000 if system.period() is not None else None, **options,
     )  # fmt: skip
     return {"exponents": found}
 
