@@ -120,6 +120,8 @@ def server() -> Iterator[Server]:
     one = Server()
     yield one
     one.close()
+    said = "".join(one.said)
+    assert "Traceback" not in said, said
 
 
 @pytest.fixture(scope="session")

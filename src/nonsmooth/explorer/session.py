@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import json
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -478,9 +477,9 @@ class Session:
         self.diagram.here.location = state.values[state.over]
         if (self.diagram.plot.x_range.start, self.diagram.plot.x_range.end) != (state.low, state.high):
             self.diagram.show(x=(state.low, state.high))
-        self._tell("notes", {key: html.unescape(text) for key, text in self._notes.items()})
+        self._tell("notes", self._notes)
+        self._schedule()  # before the page hears that its message has been taken in
         self._tell_ui()
-        self._schedule()
 
 
 def _system(models: Models, known: dict[str, System], name: str) -> System:
