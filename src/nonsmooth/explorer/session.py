@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib.resources import files
@@ -145,8 +146,13 @@ class Session:
     def _begin(self, name: str, value: Any) -> None:
         """The page is there: work can begin."""
         if self.worker is None:
-            self.worker = Worker(lambda answer: self.document.add_next_tick_callback(partial(self._take, answer)))
+            self.worker = Worker(self._hear)
             self.document.add_periodic_callback(self._watch, 500)
+
+    def _hear(self, answer: Answer) -> None:
+        """Hand an answer over, from the thread that listens to the worker's pipe."""
+        with suppress(AttributeError):  # the tab has been closed, and its document taken apart
+            self.document.add_next_tick_callback(partial(self._take, answer))
 
     def _close(self) -> None:
         if self.worker is not None:
