@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import base64
 import json
+import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
@@ -17,6 +19,7 @@ from bokeh.events import RangesUpdate, Tap
 from bokeh.models import TextInput
 from jinja2 import Template
 
+from nonsmooth.explorer.export import KINDS, exported
 from nonsmooth.explorer.figures import CLOUDS, MOST, Diagram, History, Portrait, Section, theme, words_of
 from nonsmooth.explorer.labels import html_of, number, plain_of, symbols_of
 from nonsmooth.explorer.presets import PAPER, first_state, presets_of, slider_range
@@ -36,6 +39,8 @@ _CHEAP = ("orbit", "first look", "section")
 _PATIENCE = 1.0  # seconds after which short work is cancelled like any other
 _DEAF = 5.0  # seconds in which cancelled work must end by itself
 _GIVEN = "given"
+#: To the browser, each one line of JSON; what comes from it is ``act``.
+CHANNELS = ("ui", "readout", "busy", "notes", "file")
 _PANEL = {
     "orbit": "portrait", "first look": "upper", "section": "section", "diagram": "upper", "stability": "readout",
 }  # fmt: skip
@@ -82,12 +87,13 @@ class Session:
         self._crashed: dict[str, int] = {}
         self._running: _Running | None = None
         self._count = 0
+        self._saved = 0
         self._heard = 0  # number of the page's last message
         self._notes: dict[str, str] = {}
         self.results: dict[str, Any] = {}
         self.diagram, self.portrait = Diagram(), Portrait()
         self.history, self.section = History(), Section()
-        self._say = {name: TextInput(name=name) for name in ("ui", "readout", "busy", "notes")}
+        self._say = {name: TextInput(name=name) for name in CHANNELS}
         self._act = TextInput(name="act")
         self.past = Past(self._first(query))
         self._build()
@@ -170,7 +176,7 @@ class Session:
             known: dict[str, Callable[[str, Any], object]] = {
                 "set": self._set, "model": self._model, "preset": self._preset, "end": self._end_step,
                 "undo": lambda *_: self.past.undo(), "redo": lambda *_: self.past.redo(), "look": self._look,
-                "reset": self._reset, "begin": self._begin,
+                "reset": self._reset, "begin": self._begin, "save": self._save,
             }  # fmt: skip
             if action not in known:
                 raise ValueError(f"the page asked for {str(action)[:40]!r}, which does not exist")
@@ -187,11 +193,10 @@ class Session:
 
     def _arranged(self, name: str, state: State) -> State:
         """Another parameter of the diagram takes a range of its own; a range keeps its order."""
-        if name in ("over", "beside"):
-            value = state.values[getattr(state, name)]
-            ends = slider_range(value)
-            low, high = (0.6 * value, 1.4 * value) if value > 0 else ends
-            return replace(state, low=low, high=high) if name == "over" else replace(state, least=low, most=high)
+        if name == "over":
+            value = state.values[state.over]
+            low, high = (0.6 * value, 1.4 * value) if value > 0 else slider_range(value)
+            return replace(state, low=low, high=high)
         if state.low == state.high:
             raise ValueError("the two ends of the range are equal; give two different numbers")
         return replace(state, low=min(state.low, state.high), high=max(state.low, state.high))
@@ -207,6 +212,31 @@ class Session:
             raise ValueError(f"{str(value)[:40]!r} is no figure of this model; there are: {', '.join(known)}")
         self.past.put(known[value])
 
+    def _save(self, name: str, value: Any) -> None:
+        """Make a file of a view in a thread, and hand it to the browser."""
+        view, kind = str(value["view"]), str(value["kind"])
+        results, state = dict(self.results), self.state
+
+        def make() -> None:
+            told: dict[str, Any]
+            try:
+                file, content = exported(view, kind, results, state)
+                told = {"name": file, "content": base64.b64encode(content).decode()}
+            except Exception as error:
+                told = {"wrong": str(error)}
+            with suppress(AttributeError):  # the tab has been closed
+                self.document.add_next_tick_callback(partial(self._hand_over, told))
+
+        threading.Thread(target=make, daemon=True).start()
+
+    def _hand_over(self, told: dict[str, Any]) -> None:
+        self._saved += 1
+        if "wrong" in told:
+            self._notes["page"] = told["wrong"]
+            self._tell("notes", self._notes)
+        else:
+            self._tell("file", {**told, "n": self._saved})
+
     def _reset(self, name: str, value: Any) -> None:
         self.past.put(first_state(self.state.model, self.system))
 
@@ -216,6 +246,8 @@ class Session:
     def _look(self, name: str, value: Any) -> None:
         self.dark, self.large = bool(value["dark"]), bool(value["large"])
         self.document.theme = theme(self.dark, self.large)
+        for one in (self.portrait, self.history, self.section):
+            one.paint(self.dark)
 
     def _tap_diagram(self, event: Any) -> None:
         value, start = self.diagram.nearest(event.x, event.y, self.state)
@@ -262,7 +294,11 @@ class Session:
         }  # fmt: skip
         judged = self.results.get("judged")
         if judged is not None and self._done.get("orbit") == _key(orbit) and not self.system.is_map:
-            found["stability"] = {**orbit, "view": "stability", "period": int(judged["period_number"].values[0])}
+            run = self.results["run"]["time"].values
+            found["stability"] = {
+                **orbit, "view": "stability", "period": int(judged["period_number"].values[0]),
+                "span": float(run[-1] - run[0]),
+            }  # fmt: skip
         if self._done.get("diagram") == _key(found["diagram"]):
             del found["first look"]
         return found
@@ -383,7 +419,7 @@ class Session:
         if state.x not in run["state"].values or state.y not in run["state"].values:
             return
         self.results.pop("stability", None)
-        self.portrait.put(run, state, symbols, system.states, self._zone(), True)
+        self.portrait.put(run, state, symbols, system.states, self._zone(), system.is_map)
         self.history.put(run, state, symbols, system.states)
         self._tell_readout()
 
@@ -472,7 +508,8 @@ class Session:
                 for (name, unit), value in zip(system.states.items(), state.start, strict=True)
             ],
             "plain": {name: plain_of(symbols[name]) for name in system.parameters},
-            "choices": CHOICES, "state": {key: value for key, value in vars(state).items() if key != "values"},
+            "choices": CHOICES, "kinds": KINDS,
+            "state": {key: value for key, value in vars(state).items() if key != "values"},
             "heard": self._heard, "can": self.past.can, "query": to_query(state), "forced": system.period() is not None,
             "legend": [[names[word], CLOUDS[word][0]] for word in words], "dark": self.dark, "large": self.large,
         })  # fmt: skip
