@@ -156,6 +156,12 @@ class Diagram(_Figure):
             "period": periods[:, 0], "status": [str(row) for row in names.reshape(len(values), -1)[:, 0]],
         }  # fmt: skip
 
+    def clear(self) -> None:
+        """Show nothing, as when another model or parameter was chosen."""
+        self.result, self.stage, self._fitted = None, "", None
+        self.image.data = {**self.image.data, "image": [np.zeros((1, 1), np.uint32)], "stage": [""], "of": [""]}
+        self.columns.data = {key: [] for key in self.columns.data}
+
     def redraw(self, state: Any, of: str | None = None) -> None:
         """Draw the points anew, as at another zoom."""
         if self.result is None:

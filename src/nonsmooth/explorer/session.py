@@ -61,6 +61,7 @@ class _Running:
     number: int
     view: str
     key: str
+    of: tuple[str, str]  # the model, and the parameter of the diagram
     since: float
     cancelled: float | None = None
 
@@ -96,6 +97,7 @@ class Session:
         self._say = {name: TextInput(name=name) for name in CHANNELS}
         self._act = TextInput(name="act")
         self.past = Past(self._first(query))
+        self._of = self.state.model, self.state.over  # of what is drawn
         self._build()
         self.worker: Worker | None = None  # a request that opens no page starts no process
         document.on_session_destroyed(lambda context: self._close())
@@ -326,9 +328,10 @@ class Session:
             return
         view = missing[0]
         self._count += 1
-        self._running = _Running(self._count, view, wanted[view][1], now)
+        self._running = _Running(self._count, view, wanted[view][1], (self.state.model, self.state.over), now)
         self.worker.ask(self._count, wanted[view][0])
-        self._tell("busy", {"view": view, "fraction": 0, "long": view not in _CHEAP})
+        starting = not self._done and not self._failed
+        self._tell("busy", {"view": view, "fraction": 0, "long": starting or view not in _CHEAP})
 
     def _watch(self) -> None:
         """End a worker that does not hear that its work is cancelled."""
@@ -389,9 +392,11 @@ class Session:
     def _show(self, running: _Running, found: Mapping[str, Any]) -> None:
         state, system = self.state, self.system
         view = running.view
+        if running.of[0] != state.model:
+            return
         if view in ("first look", "diagram"):
             result = found["diagram"]
-            if state.over not in result.dims or state.shown not in result["state"].values:
+            if running.of[1] != state.over:
                 return
             stage = "judged" if view == "diagram" else "first look"
             self.results["diagram"] = result
@@ -416,8 +421,6 @@ class Session:
     def _show_orbit(self) -> None:
         state, system, symbols = self.state, self.system, symbols_of(self.system)
         run = self.results["run"]
-        if state.x not in run["state"].values or state.y not in run["state"].values:
-            return
         self.results.pop("stability", None)
         self.portrait.put(run, state, symbols, system.states, self._zone(), system.is_map)
         self.history.put(run, state, symbols, system.states)
@@ -426,8 +429,6 @@ class Session:
     def _show_section(self) -> None:
         state, result = self.state, self.results["section"]
         names = [str(name) for name in result["state"].values]
-        if state.x not in names or state.y not in names:
-            return
         points = result["section"].values[:, [names.index(state.x), names.index(state.y)]]
         apart = _distinct(result["section"].values)
         points = points[-len(apart) :][apart] if apart.sum() <= MOST else points
@@ -517,6 +518,15 @@ class Session:
     def _refresh(self) -> None:
         """The page as the state has it, and work for what that lacks."""
         state = self.state
+        if self._of != (state.model, state.over):
+            self.diagram.clear()
+            self.results.pop("diagram", None)
+            if self._of[0] != state.model:
+                self.results.clear()
+                self._done.clear()
+            for view in ("first look", "diagram"):
+                self._done.pop(view, None)
+            self._of = state.model, state.over
         self.diagram.here.location = state.values[state.over]
         if (self.diagram.plot.x_range.start, self.diagram.plot.x_range.end) != (state.low, state.high):
             self.diagram.show(x=(state.low, state.high))
