@@ -174,3 +174,23 @@ def test_a_phase_moves_the_section_point_along_the_orbit(page: Any) -> None:
     run = ns.simulate(ns.models.discontinuous_support(), transient=500, periods=1, samples=[quarter])
     at = int(np.abs(run["time"].values - quarter).argmin())
     np.testing.assert_allclose(points, run["u"].values[at], rtol=1e-3)
+
+
+def test_another_axis_and_another_model_are_drawn_with_their_units(page: Any) -> None:
+    def label(figure: str, axis: str) -> str:
+        return str(page.tab.evaluate(
+            f'Bokeh.documents[0].get_model_by_name("{figure}").{axis}[0].axis_label'
+        ))  # fmt: skip
+
+    page.until_done()
+    assert [label("diagram", axis) for axis in ("below", "left")] == ["ρ (N)", "v (mm/s)"]
+    page.tab.select_option("#shown", "x")
+    page.tab.select_option("#y", "x")
+    page.until_done()
+    assert [label("diagram", "left"), label("portrait", "left")] == ["x (mm)", "x (mm)"]
+    page.tab.select_option("#model", "border_collision")
+    page.until_done()
+    assert page.ui()["state"]["model"] == "border_collision"
+    assert [label("diagram", axis) for axis in ("below", "left")] == ["μ", "x"]
+    assert page.readout()["motion"] == "period 2"
+    assert page.notes() == ""

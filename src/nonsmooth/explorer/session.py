@@ -98,6 +98,7 @@ class Session:
         self._act = TextInput(name="act")
         self.past = Past(self._first(query))
         self._of = self.state.model, self.state.over  # of what is drawn
+        self._axes = self.state.x, self.state.y, self.state.shown
         self._build()
         self.worker: Worker | None = None  # a request that opens no page starts no process
         document.on_session_destroyed(lambda context: self._close())
@@ -404,6 +405,7 @@ class Session:
             self._axes_of_diagram()
             self._tell_ui()
         elif view == "orbit":
+            self.results.pop("stability", None)
             self.results.update(found)
             self._show_orbit()
         elif view == "section":
@@ -421,7 +423,6 @@ class Session:
     def _show_orbit(self) -> None:
         state, system, symbols = self.state, self.system, symbols_of(self.system)
         run = self.results["run"]
-        self.results.pop("stability", None)
         self.portrait.put(run, state, symbols, system.states, self._zone(), system.is_map)
         self.history.put(run, state, symbols, system.states)
         self._tell_readout()
@@ -527,6 +528,15 @@ class Session:
             for view in ("first look", "diagram"):
                 self._done.pop(view, None)
             self._of = state.model, state.over
+        if self._axes != (state.x, state.y, state.shown):
+            self._axes = state.x, state.y, state.shown
+            if self.diagram.result is not None:
+                self.diagram.redraw(state)
+                self._axes_of_diagram()
+            if "run" in self.results:
+                self._show_orbit()
+            if "section" in self.results:
+                self._show_section()
         self.diagram.here.location = state.values[state.over]
         if (self.diagram.plot.x_range.start, self.diagram.plot.x_range.end) != (state.low, state.high):
             self.diagram.show(x=(state.low, state.high))
