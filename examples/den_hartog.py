@@ -34,7 +34,7 @@ def main() -> Axes:
     limit = np.abs(v) / np.sqrt(1 + OMEGA**4 * u**2)  # omega^2 a = F in a^2 = v^2 - (F u)^2
     with ns.plot.journal():
         _, ax = plt.subplots(figsize=(ns.plot.COLUMN, 0.8 * ns.plot.COLUMN))
-        for side, label in ((OMEGA < 1, "sticks twice a period"), (OMEGA > 1, None)):
+        for side, label in ((OMEGA < 1, "sticks"), (OMEGA > 1, None)):
             ax.fill_between(OMEGA[side], limit[side], color="0.92", label=label)
         for friction in FRICTION:
             response = ns.sweep(oscillator.with_parameters(F=friction), "omega", OMEGA, direction=None, progress=False)
