@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nonsmooth.continuation.find import find_orbit
 from nonsmooth.continuation.orbit import Orbit
@@ -22,14 +23,13 @@ from nonsmooth.system.smoothing import BANDS
 
 if TYPE_CHECKING:
     import xarray as xr
-    from numpy.typing import NDArray
 
     from nonsmooth.flow.sections import Poincare, Stroboscopic
     from nonsmooth.system.system import System
 
 __all__ = ["smoothing_report"]
 
-FloatArray = Any if not TYPE_CHECKING else NDArray[np.float64]
+FloatArray = NDArray[np.float64]
 
 
 @by_name

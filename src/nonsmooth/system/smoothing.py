@@ -356,8 +356,8 @@ def _equal_friction(traced: Traced, mode: int, h: int, ends: Mapping[int, int]) 
     (at,) = sp.solve(surface, symbol)
     names = traced.mode_names
     says = (
-        f"{traced.name!r} cannot be smoothed between {names[ends[1]]!r} and {names[ends[-1]]!r}: the friction that holds "
-        f"in {names[mode]!r} is not the kinetic one, and a band has no other; make them equal"
+        f"{traced.name!r} cannot be smoothed between {names[ends[1]]!r} and {names[ends[-1]]!r}: the friction that "
+        f"holds in {names[mode]!r} is not the kinetic one, and a band has no other; make them equal"
     )
     found = []
     for jump in traced.transitions:
@@ -367,7 +367,7 @@ def _equal_friction(traced: Traced, mode: int, h: int, ends: Mapping[int, int]) 
         field = traced.fields[jump.target]
         rate = surface.diff(traced.t) + sum(surface.diff(u) * f for u, f in zip(traced.u, field, strict=True))
         rate, end = (sp.expand(e.subs(symbol, at)) for e in (rate, end))
-        shared = sorted(rate.free_symbols & end.free_symbols & moving, key=str)
+        shared = sorted(rate.free_symbols & end.free_symbols, key=lambda s: (s not in moving, str(s)))
         if not shared:
             continue  # a state beyond the surface
         ratio = sp.cancel(rate.diff(shared[0]) / end.diff(shared[0]))
