@@ -34,7 +34,8 @@ def smoothing_report(result: xr.Dataset, ax: Axes | None = None, *, y: str = "st
         Where to draw; a new one-column figure if None.
     y
         ``"state"``, ``"multiplier"``, ``"exponent"`` or ``"period"``. An orbit that is unstable where the event-driven
-        one is stable, or the other way round, is hollow; a cross at the lower edge is a width without such an orbit.
+        one is stable, or the other way round, is hollow; a cross at the lower edge is a width at which a band
+        has no such orbit.
 
     Raises
     ------
@@ -46,7 +47,7 @@ def smoothing_report(result: xr.Dataset, ax: Axes | None = None, *, y: str = "st
         raise ValueError(f"y = {y!r} is one of {', '.join(_QUANTITIES)}")
     with style.axes(ax) as drawn:
         eta = result["eta"].values
-        lost_already = False
+        lost: set[float] = set()
         for band in result["band"].values:
             one = result.sel(band=band)
             color, mark = _MARKS[str(band)]
@@ -61,13 +62,12 @@ def smoothing_report(result: xr.Dataset, ax: Axes | None = None, *, y: str = "st
             changed = one["stable"].values != bool(one["reference_stable"])
             for which, fill in ((shown & ~changed, color), (shown & changed, "none")):
                 drawn.plot(eta[which], values[which], mark, color=color, markerfacecolor=fill, markersize=3.5)
-            lost = one["status"].values != 0
-            if lost.any():
-                drawn.plot(
-                    eta[lost], np.full(lost.sum(), _LOST), "x", color=color, markersize=4, clip_on=False,
-                    transform=drawn.get_xaxis_transform(), label=None if lost_already else "no such orbit",
-                )  # fmt: skip
-                lost_already = True
+            lost |= set(eta[one["status"].values != 0].tolist())
+        if lost:
+            drawn.plot(
+                sorted(lost), [_LOST] * len(lost), "x", color=style.COLORS["section"], markersize=4,
+                transform=drawn.get_xaxis_transform(), label="no such orbit",
+            )  # fmt: skip
         drawn.set(xscale="log", yscale="log", xlabel=r"half width of the bands, $\eta$", ylabel=_QUANTITIES[y])
         drawn.legend()
     return drawn

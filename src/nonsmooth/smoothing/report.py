@@ -209,9 +209,10 @@ def _near(smooth: System, orbit: Orbit, near: Any, transient: int) -> tuple[Orbi
     """The smoothed system's orbit near a state, with the status of the search."""
     number = orbit.period_number or None
     try:
-        found = find_orbit(
-            smooth, start=near, period_number=number, transient=transient if orbit.stable else 0, progress=False
-        )
+        with np.errstate(all="ignore"):  # a guess that diverges is none
+            found = find_orbit(
+                smooth, start=near, period_number=number, transient=transient if orbit.stable else 0, progress=False
+            )
     except SolveError as error:
         return None, {"status": _code(error), "note": str(error)}
     return found, {"status": codes.OK, "note": ""}
@@ -225,7 +226,7 @@ def _code(error: SolveError) -> int:
 
 
 def _of(orbit: Orbit, n: int) -> dict[str, Any]:
-    """What is compared; multipliers of memory, which only a band has, are the least and left out."""
+    """The compared parts of an orbit; multipliers of memory, which only a band has, are the least and left out."""
     return {
         "section": orbit.u, "maximum": orbit.maximum, "minimum": orbit.minimum, "period": orbit.period,
         "floquet_multipliers": orbit.floquet_multipliers[:n], "stable": orbit.stable,

@@ -348,7 +348,7 @@ def _without_sticking(traced: Traced) -> tuple[Traced, list[tuple[sp.Expr, str]]
 
 
 def _equal_friction(traced: Traced, mode: int, h: int, ends: Mapping[int, int]) -> list[tuple[sp.Expr, str]]:
-    """What must not be negative, with its message, for the friction that holds to be the kinetic one.
+    """Conditions, with their messages, under which the friction that holds is the kinetic one: not negative.
 
     Then the rate of h in the mode behind, on the surface, vanishes just where sticking ends."""
     surface, moving = traced.indicators[h], {traced.t, *traced.u}
