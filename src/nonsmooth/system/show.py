@@ -107,7 +107,8 @@ def _rows(system: System) -> list[tuple[str, str]]:
 def _period(system: System, names: dict[sp.Symbol, str]) -> str:
     period = system.traced.period
     if period is not None:
-        return f"{write_expression(period, names)} = {system.period():.9g}"
+        text, value = write_expression(period, names), f"{system.period():.9g}"
+        return text if text == value else f"{text} = {value}"
     return "none: depends on the time, not periodically" if system.explicit_time else "none (autonomous)"
 
 
