@@ -100,7 +100,7 @@ def _rows(system: System) -> list[tuple[str, str]]:
         lines.append(("outputs", ", ".join(f"{name}{unit(u)}" for name, u in system.outputs.items())))
     lines.append(("period", _period(system, names)))
     if system.is_smoothed:
-        lines.append(("smoothing", f"eta = {system.eta}"))
+        lines.append(("smoothing", f"eta = {system.eta}, {system.band} band"))
     return lines
 
 
