@@ -44,6 +44,10 @@ class Point:
         """The unknowns, the parameters last."""
         return self.solved.X
 
+    def turned(self) -> Point:
+        """The same point looked at the other way along the branch; the bordered determinant turns with the tangent."""
+        return replace(self, tangent=-self.tangent, orientation=-self.orientation)
+
 
 class Curve:
     """Orbits of one signature with one active parameter.

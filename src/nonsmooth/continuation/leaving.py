@@ -7,6 +7,7 @@ from nonsmooth.continuation.change import Change, changed
 from nonsmooth.continuation.events import Event
 from nonsmooth.continuation.grazing import graze
 from nonsmooth.continuation.marches import March
+from nonsmooth.continuation.neighbours import beside
 from nonsmooth.continuation.resuming import common_point, resumed
 from nonsmooth.continuation.switching import is_doubled
 
@@ -62,7 +63,10 @@ def change_of_signature(found: March, curve: Curve, met: list[Event]) -> tuple[C
                 return None
             return fresh, first, ds
     kind, _, point = met[0]
+    beyond = beside(curve, point)
     name = _mark_unexplained(found, curve, kind, point)
+    if beyond is not None:
+        return *beyond, 0.0
     found.ending = "landing" if kind == "landed" else name
     return None
 

@@ -1,0 +1,98 @@
+"""Orbits beside the end of a signature, whatever signature they have.
+
+Beyond a boundary one simulated round tells which transitions happen, in which order: it gives a signature and a first
+guess, Newton's method the orbit, and a simulated round of that orbit whether the signature was the right one; if not,
+the signature that it shows is tried next. So corners, several events at one instant and segments that vanish or appear
+need no rules of their own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.continuation.arclength import Curve, Point
+from nonsmooth.continuation.rounds import Rounds
+from nonsmooth.continuation.shooting import Shooting
+from nonsmooth.continuation.surfaces import look_at_surfaces
+
+__all__ = ["beside"]
+
+FloatArray = NDArray[np.float64]
+ASIDE = (1e-6, 1e-5, 1e-7, 1e-4)  # of the range: how far beyond the boundary orbits are looked for
+NEARER = 0.1  # once more at this part of it: an orbit that the branch goes on with comes nearer
+SHRINKS = 0.5  # by at least this factor (a square root: 0.32)
+NEAR = 0.05  # of the orbit's size
+PERTURBED = 12  # rounds from about the orbit, on each side
+ROUNDS = 6  # signatures tried in a row
+
+
+def beside(curve: Curve, point: Point) -> tuple[Curve, Point] | None:
+    """The orbit with which a branch goes on at ``point``, where its signature ends, on a curve of its own.
+
+    Its tangent leads away from there. None where there is none, or no simulated round shows it."""
+    forward = float(np.sign(point.tangent[-1])) or 1.0
+    for aside in ASIDE:
+        for side in (forward, -forward):
+            found = _at(curve, point, side, aside, returning=side != forward)
+            if found is not None:
+                return found
+    return None
+
+
+def _at(curve: Curve, point: Point, side: float, aside: float, *, returning: bool) -> tuple[Curve, Point] | None:
+    """The orbit at one distance on one side of the parameter."""
+    shooting = curve.shooting
+    values = point.solved.values.copy()
+    here = float(point.X[-1])
+    values[shooting.places[0]] = here + side * aside * curve.width
+    rounds = Rounds(shooting)
+    tried = {shooting.signature.cycle} if returning else set()
+    for X, change in _starts(curve, point, side, aside):
+        guess = rounds.read(shooting, X, values, change)
+        for _ in range(ROUNDS):
+            if guess is None or guess.signature.cycle in tried:
+                break
+            tried.add(guess.signature.cycle)
+            fresh = Shooting(shooting.system, guess.signature, shooting.period_number, shooting.active)
+            X = fresh.join(guess.times, guess.states, guess.period, values[shooting.places])
+            look_at_surfaces(fresh, X)
+            other = Curve(fresh, curve.size, curve.period, curve.width)
+            found = other.at_parameter(X / other.scale, float(values[shooting.places[0]]))
+            if found is None or not _apart(curve, point, found) < NEAR:
+                break
+            guess = rounds.read(fresh, found.X, values)
+            if guess is None or guess.signature.cycle != fresh.signature.cycle:
+                continue  # not an orbit of the system: the signature that its round shows is next
+            if (found.path.violation() >= 0.0).all() and _arrives(curve, point, other, found, here):
+                facing = side * float(found.tangent[-1]) >= 0.0
+                return other, found if facing else found.turned()
+    return None
+
+
+def _starts(curve: Curve, point: Point, side: float, aside: float) -> Iterator[tuple[FloatArray, FloatArray | float]]:
+    """Unknowns and changes of a state: along the branch, at the end of the signature itself, and about it."""
+    slope = float(point.tangent[-1])
+    if abs(slope) > 1e-3:
+        yield point.X + side * aside / slope * point.tangent * curve.scale, 0.0
+    yield point.X, 0.0
+    random = np.random.default_rng(0)
+    for i in range(PERTURBED):
+        yield point.X, aside * 10.0 ** (i % 3) * random.uniform(-1.0, 1.0, curve.shooting.n) * curve.size
+
+
+def _apart(curve: Curve, a: Point, b: Point) -> float:
+    """Largest difference of extremes, in units of the states' sizes, and of the periods."""
+    size = curve.size[: len(a.path.maximum)]
+    extremes = np.concatenate([(a.path.maximum - b.path.maximum) / size, (a.path.minimum - b.path.minimum) / size])
+    period = abs(float(a.solved.times[-1] - b.solved.times[-1])) / curve.period
+    return max(float(np.nanmax(np.abs(extremes), initial=0.0)), period)
+
+
+def _arrives(curve: Curve, point: Point, other: Curve, found: Point, here: float) -> bool:
+    """Return whether the orbits found come to ``point`` as the parameter comes back to it."""
+    value = here + NEARER * (float(found.X[-1]) - here)
+    nearer = other.at_parameter(found.Y, value)
+    return nearer is not None and _apart(curve, point, nearer) <= SHRINKS * _apart(curve, point, found) + 1e-9
