@@ -47,28 +47,32 @@ def _mark_unexplained(found: March, curve: Curve, kind: str, point: Point) -> st
 
 def change_of_signature(found: March, curve: Curve, met: list[Event]) -> tuple[Curve, Point, float] | None:
     """Record a change of signature and begin anew behind it; None where the branch ends."""
-    for kind, _, point in met:
-        for change in changed(curve, point, kind):
-            after = resumed(curve, point, change)
-            if after is None:
-                continue
-            fresh, first, ds = after
-            if change.kind == "grazing":
-                _mark_graze(found, curve, point, change, after)
-            elif change.kind == "corner":
-                found.mark("corner", curve, point, indicator=change.indicator)
-            if change.kind != "section" and is_doubled(fresh, first) and not is_doubled(curve, point):
-                # Beyond the graze at which a doubled orbit is born there is only the shorter one, gone round twice.
-                found.ending = "branching"
-                return None
-            return fresh, first, ds
     kind, _, point = met[0]
+    for event, _, there in met:
+        for change in changed(curve, there, event):
+            if change.kind == "section":
+                return resumed(curve, there, change)
     beyond = beside(curve, point)
-    name = _mark_unexplained(found, curve, kind, point)
-    if beyond is not None:
-        return *beyond, 0.0
-    found.ending = "landing" if kind == "landed" else name
-    return None
+    if beyond is None:
+        name = _mark_unexplained(found, curve, kind, point)
+        found.ending = "landing" if kind == "landed" else name
+        return None
+    fresh, first = beyond
+    explained = [
+        change for event, _, there in met for change in changed(curve, there, event)
+        if change.signature.cycle == fresh.shooting.signature.cycle
+    ]  # fmt: skip
+    if explained and explained[0].kind == "grazing":
+        _mark_graze(found, curve, point, explained[0], (fresh, first, 0.0))
+    elif explained:
+        found.mark("corner", curve, point, indicator=explained[0].indicator)
+    else:
+        _mark_unexplained(found, curve, kind, point)
+    if is_doubled(fresh, first) and not is_doubled(curve, point):
+        # Beyond the graze at which a doubled orbit is born there is only the shorter one, gone round twice.
+        found.ending = "branching"
+        return None
+    return fresh, first, 0.0
 
 
 def _indicator(curve: Curve, point: Point, kind: str) -> int:

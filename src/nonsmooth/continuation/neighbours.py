@@ -8,6 +8,7 @@ need no rules of their own.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 
 import numpy as np
@@ -15,18 +16,21 @@ from numpy.typing import NDArray
 
 from nonsmooth.continuation.arclength import Curve, Point
 from nonsmooth.continuation.rounds import Rounds
+from nonsmooth.continuation.settled import Guess, touching
 from nonsmooth.continuation.shooting import Shooting
 from nonsmooth.continuation.surfaces import look_at_surfaces
 
 __all__ = ["beside"]
 
 FloatArray = NDArray[np.float64]
-ASIDE = (1e-6, 1e-5, 1e-7, 1e-4)  # of the range: how far beyond the boundary orbits are looked for
+ASIDE = (1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4)  # of the range: how far beyond the boundary orbits are looked for
 NEARER = 0.1  # once more at this part of it: an orbit that the branch goes on with comes nearer
 SHRINKS = 0.5  # by at least this factor (a square root: 0.32)
 NEAR = 0.05  # of the orbit's size
 PERTURBED = 12  # rounds from about the orbit, on each side
 ROUNDS = 6  # signatures tried in a row
+STEEP = 1e-3  # of a tangent: its parameter
+AGAIN = 3  # times that Newton's method is begun with one signature
 
 
 def beside(curve: Curve, point: Point) -> tuple[Curve, Point] | None:
@@ -36,26 +40,25 @@ def beside(curve: Curve, point: Point) -> tuple[Curve, Point] | None:
     forward = float(np.sign(point.tangent[-1])) or 1.0
     for aside in ASIDE:
         for side in (forward, -forward):
-            found = _at(curve, point, side, aside, returning=side != forward)
+            found = _at(curve, point, side, aside)
             if found is not None:
                 return found
     return None
 
 
-def _at(curve: Curve, point: Point, side: float, aside: float, *, returning: bool) -> tuple[Curve, Point] | None:
+def _at(curve: Curve, point: Point, side: float, aside: float) -> tuple[Curve, Point] | None:
     """The orbit at one distance on one side of the parameter."""
     shooting = curve.shooting
     values = point.solved.values.copy()
     here = float(point.X[-1])
     values[shooting.places[0]] = here + side * aside * curve.width
     rounds = Rounds(shooting)
-    tried = {shooting.signature.cycle} if returning else set()
-    for X, change in _starts(curve, point, side, aside):
-        guess = rounds.read(shooting, X, values, change)
+    tried = Counter({shooting.signature.cycle: AGAIN})
+    for guess in _guesses(curve, point, rounds, values, side, aside):
         for _ in range(ROUNDS):
-            if guess is None or guess.signature.cycle in tried:
+            if guess is None or tried[guess.signature.cycle] >= AGAIN:
                 break
-            tried.add(guess.signature.cycle)
+            tried[guess.signature.cycle] += 1
             fresh = Shooting(shooting.system, guess.signature, shooting.period_number, shooting.active)
             X = fresh.join(guess.times, guess.states, guess.period, values[shooting.places])
             look_at_surfaces(fresh, X)
@@ -72,15 +75,21 @@ def _at(curve: Curve, point: Point, side: float, aside: float, *, returning: boo
     return None
 
 
-def _starts(curve: Curve, point: Point, side: float, aside: float) -> Iterator[tuple[FloatArray, FloatArray | float]]:
-    """Unknowns and changes of a state: along the branch, at the end of the signature itself, and about it."""
-    slope = float(point.tangent[-1])
-    if abs(slope) > 1e-3:
-        yield point.X + side * aside / slope * point.tangent * curve.scale, 0.0
-    yield point.X, 0.0
+def _guesses(
+    curve: Curve, point: Point, rounds: Rounds, values: FloatArray, side: float, aside: float
+) -> Iterator[Guess | None]:
+    """Rounds along the branch, from the end of the signature itself, and about it; that end without its touches."""
+    shooting, slope = curve.shooting, float(point.tangent[-1])
+    if abs(slope) > STEEP:
+        yield rounds.read(shooting, point.X + side * aside / slope * point.tangent * curve.scale, values)
+    yield rounds.read(shooting, point.X, values)
+    times, states = shooting.split(point.X)
+    end = Guess(shooting.period_number, float(point.solved.times[-1]), shooting.signature, times, states)
+    yield from touching(end, shooting.system)
     random = np.random.default_rng(0)
     for i in range(PERTURBED):
-        yield point.X, aside * 10.0 ** (i % 3) * random.uniform(-1.0, 1.0, curve.shooting.n) * curve.size
+        change = aside * 10.0 ** (i % 3) * random.uniform(-1.0, 1.0, shooting.n) * curve.size
+        yield rounds.read(shooting, point.X, values, change)
 
 
 def _apart(curve: Curve, a: Point, b: Point) -> float:

@@ -5,14 +5,14 @@ The simulation isolates every crossing, so a round that shows an orbit's own sig
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.continuation.anchor import anchored
-from nonsmooth.continuation.settled import fired_row
+from nonsmooth.continuation.settled import Guess, fired_row
 from nonsmooth.continuation.signature import Signature, Visit
 from nonsmooth.flow.engines.engine import State
 from nonsmooth.flow.engines.methods import engine_for
@@ -22,21 +22,12 @@ if TYPE_CHECKING:
     from nonsmooth.continuation.shooting import Shooting
     from nonsmooth.flow.engines.engine import Log
 
-__all__ = ["Round", "Rounds"]
+__all__ = ["Rounds"]
 
 FloatArray = NDArray[np.float64]
 RTOL = 1e-13  # where the flow is not exact
+ROUNDING = 1e-14  # of the period
 LATE = 0.25  # of the period: the largest change of the period of a neighbour
-
-
-@dataclass
-class Round:
-    """A signature with instants and states, as the unknowns of its equations."""
-
-    signature: Signature
-    times: FloatArray  # (m,)
-    states: FloatArray  # (m + 1, n_z)
-    period: float
 
 
 class Rounds:
@@ -50,7 +41,7 @@ class Rounds:
 
     def read(
         self, shooting: Shooting, X: FloatArray, values: FloatArray, change: FloatArray | float = 0.0
-    ) -> Round | None:
+    ) -> Guess | None:
         """The round at ``values`` from the middle of the longest visit of an orbit, its state changed by ``change``.
 
         None where it fails, or does not come back to the mode where it began."""
@@ -77,7 +68,7 @@ class Rounds:
         log = self.engine.record(self.engine.prepare(values[None, :]), state, until, np.asarray(at, dtype=float))
         return log if log.status in (codes.OK, codes.NOT_GUARANTEED) else None
 
-    def _forced(self, values: FloatArray, z: FloatArray, mode: int, begin: float, period: float) -> Round | None:
+    def _forced(self, values: FloatArray, z: FloatArray, mode: int, begin: float, period: float) -> Guess | None:
         log = self._run(values, z, mode, begin, begin + period, [period])
         if log is None:
             return None
@@ -85,30 +76,37 @@ class Rounds:
         last = self.system.traced.transitions[visits[-1].transition].target if visits else mode
         if last != mode:
             return None
-        first = int(np.searchsorted(instants, period))  # of those behind the section
+        first = self._behind(visits, instants, period)
         order = [*range(first, len(visits)), *range(first)]
         turned = np.concatenate([instants[first:] - period, instants[:first]])
-        T = self.flow.period(values)[0]
-        moved = [_in_turn(visits[j], float(t), T, self) for j, t in zip(order, turned, strict=True)]
-        if first < len(visits):
-            at_section = visits[first].mode
-        else:
-            at_section = last
-        if len(turned) and turned[0] == 0.0:  # a transition at the section itself belongs to the round
+        moved = [visits[j] for j in order]
+        at_section = visits[first].mode if first < len(visits) else last
+        for i in range(len(visits) - first):  # begun before the section, over in the next round
+            if moved[i].row == -1:
+                moved[i] = replace(moved[i], turn=moved[i].turn - self.period_number)
+        turned = np.maximum(turned, 0.0)
+        if first < len(visits) and turned[0] < ROUNDING * period:  # a transition at the section itself belongs to the round
             section = np.nan_to_num(log.u_before[first])
             memory = after[first - 1][len(section) :] if first else z[len(section) :]
         else:
             section, memory = np.nan_to_num(log.sample_u[0]), log.sample_memory[0]
         states = np.vstack([np.concatenate([section, memory])[None, :], after[order]])
-        return Round(Signature((*moved, Visit(at_section))), turned, states, period)
+        return Guess(self.period_number, period, Signature((*moved, Visit(at_section))), turned, states)
 
-    def _free(self, values: FloatArray, z: FloatArray, mode: int, begin: float, period: float) -> Round | None:
+    def _behind(self, visits: list[Visit], instants: FloatArray, period: float) -> int:
+        """The first visit that ends at the section or behind it: a phase of 0 is at the section, whatever rounding."""
+        for j, visit in enumerate(visits):
+            if visit.turn >= self.period_number if visit.row == -1 else instants[j] >= period:
+                return j
+        return len(visits)
+
+    def _free(self, values: FloatArray, z: FloatArray, mode: int, begin: float, period: float) -> Guess | None:
         log = self._run(values, z, mode, 0.0, (1.5 + LATE) * period, [])
         if log is None:
             return None
         visits, instants, after = self._visits(values, log, z, 0.0)
         if not visits:
-            return Round(Signature((Visit(mode),)), np.empty(0), z[None, :], period)
+            return Guess(0, period, Signature((Visit(mode),)), np.empty(0), z[None, :])
         again = [
             j for j in range(1, len(visits))
             if visits[j] == visits[0] and abs(instants[j] - instants[0] - period) < LATE * period
@@ -120,7 +118,7 @@ class Rounds:
         signature = Signature((*visits[:j], Visit(mode)))
         states = np.vstack([z[None, :], after[:j]])
         found = anchored(self.flow, values, signature, instants[:j], states, period)
-        return Round(*found, period)
+        return Guess(0, period, *found)
 
     def _visits(
         self, values: FloatArray, log: Log, z: FloatArray, begin: float
@@ -142,11 +140,3 @@ class Rounds:
             memory = log.memory_after[i]
         after = np.concatenate([np.nan_to_num(log.u_after), log.memory_after], axis=1).reshape(len(visits), len(z))
         return visits, np.asarray(log.crossing_time, dtype=float).copy(), after
-
-
-def _in_turn(visit: Visit, t: float, T: float, rounds: Rounds) -> Visit:
-    """A transition at a phase, in the turn that its instant lies in."""
-    if visit.row != -1:
-        return visit
-    turn = visit.turn % rounds.period_number
-    return Visit(visit.mode, visit.transition, -1, turn)

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 __all__ = ["Shooting", "Solved"]
 
 FloatArray = NDArray[np.float64]
+ROUNDING = 1e-16  # of the period
 
 
 @dataclass
@@ -169,7 +170,9 @@ class Shooting:
             T, dT, end = float(X[size - 1]), np.zeros(a), float(X[size - 1])
         times = np.empty(m + 2)
         times[0], times[1:-1], times[-1] = 0.0, t, end
-        segments = self.flow.segments(values, self.modes, times[:-1], times[1:] - times[:-1], z)
+        lengths = np.diff(times)
+        lengths[np.abs(lengths) < ROUNDING * abs(end)] = 0.0  # the step of the next visit is not begun from rounding
+        segments = self.flow.segments(values, self.modes, times[:-1], lengths, z)
         F, J = np.zeros(size), np.zeros((size, size + a))
         jumps = []
         pull = np.matmul(segments.Phi, segments.f_begin[:, :, None])[:, :, 0]
