@@ -11,6 +11,7 @@ from nonsmooth.continuation.events import (
     BESIDE,
     Event,
     at_edge,
+    at_section,
     edge_before_fold,
     first_met,
     passed,
@@ -80,7 +81,7 @@ def _follow(found: March, curve: Curve, point: Point, limits: Limits, first_step
                 continue
         crossed = [kind for kind, was, now in zip(VIOLATIONS, violation, violation_new, strict=True)
                    if now < 0.0 and (was >= 0.0 or not (found.rows or limits.virtual))
-                   and (not limits.virtual or (kind == "short" and _at_section(curve, new)))]  # fmt: skip
+                   and (not limits.virtual or (kind == "short" and at_section(curve, new)))]  # fmt: skip
         met = first_met(curve, point, new, tests, crossed, stop)
         if crossed and not met and reason != "range":
             ds *= 0.25
@@ -115,9 +116,8 @@ def _follow(found: March, curve: Curve, point: Point, limits: Limits, first_step
             after = change_of_signature(found, curve, met)
             if after is None:
                 break
-            curve, point, ds = after
-            before = None
-            ds = ds or 0.1 * limits.largest
+            curve, point = after
+            before, ds = None, 0.1 * limits.largest
             tests = Tests(curve)
             numbers, violation = tests.smooth(point), point.path.violation()
             count = 0
@@ -166,11 +166,6 @@ def _stepped(curve: Curve, point: Point, ds: float, before: Point | None) -> Poi
 def _shrunk(curve: Curve, point: Point) -> bool:
     """Return whether an autonomous orbit has all but shrunk to an equilibrium."""
     return swing(curve, point) < SMALL
-
-
-def _at_section(curve: Curve, point: Point) -> bool:
-    """Return whether the visit that has become shortest begins or ends at the section of a forced orbit."""
-    return curve.shooting.forced and int(point.path.tau.argmin()) in (0, curve.shooting.m)
 
 
 def _apart(passed_by: list[Event], found: March, met: list[Event]) -> list[Event]:

@@ -15,7 +15,7 @@ from nonsmooth.continuation.path import VIOLATIONS
 from nonsmooth.continuation.solve import determinant
 from nonsmooth.continuation.switching import branch_point, is_doubled
 
-__all__ = ["BESIDE", "Event", "at_edge", "edge_before_fold", "first_met", "passed", "smooth_events", "swing"]
+__all__ = ["BESIDE", "Event", "at_edge", "at_section", "edge_before_fold", "first_met", "passed", "smooth_events", "swing"]
 
 FloatArray = NDArray[np.float64]
 Event = tuple[str, float, Point]  # kind, distance from the last point, the orbit there
@@ -74,6 +74,11 @@ def at_edge(curve: Curve, a: Point, b: Point, edge: float) -> Point | None:
     if float(point.tangent @ a.tangent) < 0:
         point.tangent = -point.tangent
     return point
+
+
+def at_section(curve: Curve, point: Point) -> bool:
+    """Return whether the visit that has become shortest begins or ends at the section of a forced orbit."""
+    return curve.shooting.forced and int(point.path.tau.argmin()) in (0, curve.shooting.m)
 
 
 def edge_before_fold(curve: Curve, point: Point, fold: Point, low: float, high: float) -> Point:

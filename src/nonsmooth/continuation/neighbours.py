@@ -17,8 +17,6 @@ from numpy.typing import NDArray
 from nonsmooth.continuation.arclength import Curve, Point
 from nonsmooth.continuation.rounds import Rounds
 from nonsmooth.continuation.settled import Guess, touching
-from nonsmooth.continuation.shooting import Shooting
-from nonsmooth.continuation.surfaces import look_at_surfaces
 
 __all__ = ["beside"]
 
@@ -51,7 +49,7 @@ def _at(curve: Curve, point: Point, side: float, aside: float) -> tuple[Curve, P
     shooting = curve.shooting
     values = point.solved.values.copy()
     here = float(point.X[-1])
-    values[shooting.places[0]] = here + side * aside * curve.width
+    values[shooting.places] = there = np.array([here + side * aside * curve.width])
     rounds = Rounds(shooting)
     tried = Counter({shooting.signature.cycle: AGAIN})
     for guess in _guesses(curve, point, rounds, values, side, aside):
@@ -59,15 +57,12 @@ def _at(curve: Curve, point: Point, side: float, aside: float) -> tuple[Curve, P
             if guess is None or tried[guess.signature.cycle] >= AGAIN:
                 break
             tried[guess.signature.cycle] += 1
-            fresh = Shooting(shooting.system, guess.signature, shooting.period_number, shooting.active)
-            X = fresh.join(guess.times, guess.states, guess.period, values[shooting.places])
-            look_at_surfaces(fresh, X)
-            other = Curve(fresh, curve.size, curve.period, curve.width)
-            found = other.at_parameter(X / other.scale, float(values[shooting.places[0]]))
+            other, X = curve.with_signature(guess.signature, guess.times, guess.states, guess.period, there)
+            found = other.at_parameter(X / other.scale, float(there[0]))
             if found is None or not _apart(curve, point, found) < NEAR:
                 break
-            guess = rounds.read(fresh, found.X, values)
-            if guess is None or guess.signature.cycle != fresh.signature.cycle:
+            guess = rounds.read(other.shooting, found.X, values)
+            if guess is None or guess.signature.cycle != other.shooting.signature.cycle:
                 continue  # not an orbit of the system: the signature that its round shows is next
             if (found.path.violation() >= 0.0).all() and _arrives(curve, point, other, found, here):
                 facing = side * float(found.tangent[-1]) >= 0.0

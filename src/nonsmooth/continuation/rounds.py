@@ -113,7 +113,7 @@ class Rounds:
         ]  # fmt: skip
         if not again:
             return None
-        j = min(again, key=lambda j: float(np.abs((after[j] - after[0])).max()))
+        j = min(again, key=lambda j: float(np.abs(after[j] - after[0]).max()))
         period = float(instants[j] - instants[0])
         signature = Signature((*visits[:j], Visit(mode)))
         states = np.vstack([z[None, :], after[:j]])
