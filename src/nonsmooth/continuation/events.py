@@ -15,7 +15,9 @@ from nonsmooth.continuation.path import VIOLATIONS
 from nonsmooth.continuation.solve import determinant
 from nonsmooth.continuation.switching import branch_point, is_doubled
 
-__all__ = ["BESIDE", "Event", "at_edge", "at_section", "edge_before_fold", "first_met", "passed", "smooth_events", "swing"]
+__all__ = [
+    "BESIDE", "Event", "at_edge", "at_section", "edge_before_fold", "first_met", "passed", "smooth_events", "swing",
+]  # fmt: skip
 
 FloatArray = NDArray[np.float64]
 Event = tuple[str, float, Point]  # kind, distance from the last point, the orbit there
@@ -130,15 +132,17 @@ def smooth_events(
         if not was * now < 0.0:
             continue
         there = locate(curve, a, b, tests.one(kind)) if kind != "branch" else _branch_point(curve, a, b, tests)
-        if there is None and kind != "branch":
+        # Beyond a change of signature nothing is missed.
+        if there is None and kind != "branch" and (reason != "change" or was * after[SMOOTH.index(kind)] < 0.0):
             warnings.warn(
                 f"a {kind.replace('_', '-')} between the parameter's values {float(a.X[-1])!r} and {float(b.X[-1])!r} "
                 "was met but not located, and is not listed",
                 RuntimeWarning,
                 stacklevel=2,
             )
-        # At a change of signature the parameter may turn too: that belongs to the change.
-        if there is None or there[0] > stop - (BESIDE if reason == "change" else 0.0):
+        # At a change of signature the parameter may turn too: that belongs to the change. Where a branch closes its
+        # first point has been looked at.
+        if there is None or there[0] > stop - (BESIDE if reason in ("change", "closed") else 0.0):
             continue
         s, point = there
         if kind == "neimark_sacker" and not _has_pair(point):

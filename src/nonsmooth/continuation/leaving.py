@@ -47,8 +47,9 @@ def _mark(found: March, curve: Curve, met: list[Event], beyond: tuple[Curve, Poi
             if change.signature.cycle == cycle:
                 _mark_graze(found, curve, there, change, beyond)
                 return "grazing"
-    name = "grazing" if known or kind in ("touch", "slow") else "corner"
-    found.mark(name, curve, point, indicator=known[0][0].indicator if known else _indicator(curve, point, kind))
+    own = contacts(curve, point, kind)
+    name = "grazing" if own or kind in ("touch", "slow") else "corner"
+    found.mark(name, curve, point, indicator=own[0].indicator if own else _indicator(curve, point, kind))
     return name
 
 
@@ -71,9 +72,10 @@ def _indicator(curve: Curve, point: Point, kind: str) -> int:
         place = int(path.landed.argmax())
         k, z = int(path.landing[place]), states[place]
     else:
-        place = int({"short": path.tau, "others": -path.others}[kind].argmin()) if kind in ("short", "others") else int(
-            curve.walk.conditional[int((path.own if kind == "own" else path.slope).argmin())]
-        )
+        if kind in ("short", "others"):
+            place = int(path.tau.argmin() if kind == "short" else path.others.argmax())
+        else:
+            place = int(curve.walk.conditional[int((path.own if kind == "own" else path.slope).argmin())])
         k = int(path.other[place]) if kind == "others" else visits[place].transition
         z = point.solved.segments.z[place]
     rows = shooting.system.traced.transitions[k].rows

@@ -6,15 +6,19 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from nonsmooth.continuation.arclength import Curve, Point
 from nonsmooth.continuation.grazing import Graze
+from nonsmooth.continuation.signature import Signature
 from nonsmooth.errors import Interrupted
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "ENDINGS", "INTERRUPTED", "Limits", "March", "Row", "Special", "in_turn", "march_until", "unless_interrupted",
+    "ENDINGS", "INTERRUPTED", "Limits", "March", "Place", "Row", "Special", "in_turn", "march_until", "unless_interrupted",
 ]  # fmt: skip
 
 INTERRUPTED = "Interrupted: what was found until then stands"
@@ -88,6 +92,10 @@ def unless_interrupted(result: xr.Dataset, endings: Sequence[str]) -> xr.Dataset
     )
 
 
+#: Signature and unknowns of an orbit.
+Place = tuple[Signature, NDArray[np.float64]]
+
+
 @dataclass
 class Row:
     """One point of the branch with the curve it lies on; ``virtual`` beyond a boundary that its path should obey."""
@@ -135,5 +143,5 @@ class Limits:
     high: float
     largest: float  # step
     points: int
-    closed: tuple[Curve, Point] | None = None
+    closed: Place | None = None  # where the branch would close
     virtual: bool = False  # go on beyond boundaries with the same signature

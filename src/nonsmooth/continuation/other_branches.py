@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -56,7 +55,8 @@ def switched(start: xr.Dataset, name: str | None, given: Any, asked: Asked) -> x
                 break
     if not begun:
         raise SolveError(f"no other branch was found at this {kind}", status="no_convergence")
-    marches = in_turn(*(partial(march, *point, asked.limits(bounds), asked.first) for point in begun))
+    closed = (ways[0][0].shooting.signature, ways[0][1] * ways[0][0].scale)
+    marches = in_turn(*(partial(march, *point, asked.limits(bounds, closed), asked.first) for point in begun))
     number = begun[0][0].shooting.period_number
     sentences = [sentence(one, bounds, own, (low, high)) for one in marches]
     forward = from_march(marches[0])
@@ -92,8 +92,7 @@ def straight_on(start: xr.Dataset, name: str | None, given: Any, asked: Asked) -
     first = None if found is None else curve.point(found[0], found[1], border)
     if first is None:
         raise SolveError(f"Newton's method did not converge at this {kind}", status="no_convergence")
-    back = replace(first, tangent=-first.tangent, orientation=-first.orientation)
-    marches = in_turn(*(partial(march, curve, one, asked.limits(bounds), asked.first) for one in (back, first)))
+    marches = in_turn(*(partial(march, curve, one, asked.limits(bounds), asked.first) for one in (first.turned(), first)))
     points, special = joined(from_march(marches[0]), [point_record(curve, first)], from_march(marches[1]))
     here = one_row(start, "continue_orbit")
     mark = SpecialRecord(

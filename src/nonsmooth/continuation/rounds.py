@@ -85,7 +85,7 @@ class Rounds:
             if moved[i].row == -1:
                 moved[i] = replace(moved[i], turn=moved[i].turn - self.period_number)
         turned = np.maximum(turned, 0.0)
-        if first < len(visits) and turned[0] < ROUNDING * period:  # a transition at the section itself belongs to the round
+        if first < len(visits) and turned[0] < ROUNDING * period:  # a transition at the section itself
             section = np.nan_to_num(log.u_before[first])
             memory = after[first - 1][len(section) :] if first else z[len(section) :]
         else:
