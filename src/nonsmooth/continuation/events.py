@@ -176,11 +176,10 @@ def _branch_point(curve: Curve, a: Point, b: Point, tests: Tests) -> tuple[float
         return there
     shooting = curve.shooting
     solved = shooting.evaluate(Y * curve.scale)
-    path = curve.walk.along(solved, shooting.split(solved.X)[1])
-    if path is None:
+    path, M = curve.walk.along(solved, shooting.split(solved.X)[1]), solved.monodromy
+    if path is None or not np.isfinite(M).all():
         return there
     # Any direction in the plane of both branches is null here, and the border is singular: keep that of the branch.
-    M = solved.monodromy
     point = replace(there[1], Y=Y, solved=solved, M=M, multipliers=multipliers_of(M), path=path)
     return float(a.tangent @ (Y - a.Y)), point
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from nonsmooth.continuation.arclength import Curve, Point
 from nonsmooth.continuation.change import Change, common_point, contacts, past_the_section
+from nonsmooth.continuation.equilibrium import Equilibria
 from nonsmooth.continuation.events import Event, at_section
 from nonsmooth.continuation.grazing import graze
 from nonsmooth.continuation.marches import March
@@ -23,13 +24,28 @@ def change_of_signature(found: March, curve: Curve, met: list[Event]) -> tuple[C
             return after
     beyond = beside(curve, met[0][2])
     name = _mark(found, curve, met, beyond)
-    if beyond is None:
+    if beyond is None and _is_centre(curve, met):
+        found.ending = found.special[-1].kind = "focus_centre"
+    elif beyond is None:
         found.ending = "landing" if met[0][0] == "landed" else name
     elif is_doubled(*beyond) and not is_doubled(curve, met[0][2]):
         # Beyond the graze at which a doubled orbit is born there is only the shorter one, gone round twice.
         found.ending = "branching"
         return None
     return beyond
+
+
+def _is_centre(curve: Curve, met: list[Event]) -> bool:
+    """Return whether an autonomous orbit has shrunk to a closed one of a linear mode."""
+    if curve.shooting.forced:
+        return False
+    kind, _, point = met[0]
+    free = [change.signature for change in contacts(curve, point, kind) if not change.gained]
+    name = curve.shooting.active[0]
+    return any(
+        not one.crossings and Equilibria(curve.shooting.system, one.visits[0].mode, name, curve.width).linear
+        for one in free
+    )
 
 
 def passed_by(found: March, curve: Curve, kind: str, point: Point) -> None:

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "ENDINGS", "INTERRUPTED", "Limits", "March", "Place", "Row", "Special", "in_turn", "march_until", "unless_interrupted",
+    "ENDINGS", "INTERRUPTED", "Limits", "March", "Place", "Row", "Special", "in_turn", "march_until",
+    "unless_interrupted",
 ]  # fmt: skip
 
 INTERRUPTED = "Interrupted: what was found until then stands"
@@ -30,6 +31,10 @@ ENDINGS = {
     "points": "The largest number of points was reached; continue the branch with continue_orbit(branch).",
     "equilibrium": (
         "The cycle shrinks to an equilibrium, a Hopf bifurcation: continue_equilibrium finds it to the last digit."
+    ),
+    "focus_centre": (
+        "The cycle ends in a focus-centre bifurcation: it only touches the boundary of a mode that is linear, and at "
+        "this value all smaller orbits of that mode are closed."
     ),
     "no_convergence": (
         "Newton's method did not converge, however small the step; the orbit may end in an event that is not known "

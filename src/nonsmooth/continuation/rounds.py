@@ -57,7 +57,7 @@ class Rounds:
         own = np.ones(len(z), dtype=bool)
         own[: len(traced.u)] = [not lacks for lacks in traced.lacking[mode]]
         z = np.where(own, z + change, z)
-        return (self._forced if forced else self._free)(values, z, mode, begin + into, period)
+        return (self._forced if forced else self.free)(values, z, mode, begin + into, period)
 
     def _run(self, values: FloatArray, z: FloatArray, mode: int, begin: float, until: float, at: Any) -> Log | None:
         n = len(self.system.states)
@@ -100,7 +100,8 @@ class Rounds:
                 return j
         return len(visits)
 
-    def _free(self, values: FloatArray, z: FloatArray, mode: int, begin: float, period: float) -> Guess | None:
+    def free(self, values: FloatArray, z: FloatArray, mode: int, begin: float, period: float) -> Guess | None:
+        """A round without forcing, from a state, that takes about ``period``."""
         log = self._run(values, z, mode, 0.0, (1.5 + LATE) * period, [])
         if log is None:
             return None
