@@ -126,7 +126,7 @@ class Curve:
             if length < tolerance or (i > 3 and length < 1e-10):
                 if length > 1e-14:  # the last evaluation serves; its error is the square of this step
                     Y = Y - step
-                    solved.X = Y * self.scale
+                    solved = shooting.moved(solved, Y * self.scale)
                 return solved, Y, i
             Y = Y - step
             last = length

@@ -26,6 +26,7 @@ TURN = 1e-5  # along the branch: a fold nearer to a crossing of branches than th
 EXPLAINS = ("short", "slow", "own", "touch", "others", "landed")
 BESIDE = 1e-6  # along the branch: nearer to a change of signature than this is the change itself
 ABOUT = 1e-2  # along the branch: steps are short beside a crossing of branches, and its first place is rough
+CLOSING = 1e-4  # along the branch: nearer to its first point than this is that point, a crossing of branches maybe
 ROUNDING = 1e-13  # numbers below this are zero, however short the step
 SAME = 1e-9  # of the numbers at both ends: smaller than this at the place of another event is the same event
 POLE = 1e-2  # of a multiplier from 1 or -1: farther off it is no fold, no flip, but a contact of no length
@@ -142,7 +143,7 @@ def smooth_events(
             )
         # At a change of signature the parameter may turn too: that belongs to the change. Where a branch closes its
         # first point has been looked at.
-        if there is None or there[0] > stop - (BESIDE if reason in ("change", "closed") else 0.0):
+        if there is None or there[0] > stop - {"change": BESIDE, "closed": CLOSING}.get(reason, 0.0):
             continue
         s, point = there
         if kind == "neimark_sacker" and not _has_pair(point):
