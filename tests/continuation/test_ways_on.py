@@ -183,7 +183,8 @@ def test_closed_branch_ends_where_it_began(gears: xr.Dataset) -> None:
     assert [str(branch["ended"].attrs["flag_meanings"]).split()[int(i)] for i in branch["ended"].values] == [
         "closed", "closed"]  # fmt: skip
     found = ns.special_points(branch)
-    points = [(str(kind), *np.round(u, 6)) for kind, u in zip(found["kind"].values, found["section"].values, strict=True)]
+    both = zip(found["kind"].values, found["section"].values, strict=True)
+    points = [(str(kind), *np.round(u, 6)) for kind, u in both]
     assert len(points) == len(set(points))
     # All but the two pitchforks come in mirror images, at the same frequency.
     others = found["w"].values[found["kind"].values != "pitchfork"]

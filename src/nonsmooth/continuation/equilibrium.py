@@ -59,7 +59,7 @@ class Equilibria:
 
     @cached_property
     def linear(self) -> bool:
-        """Whether the mode's field is linear in the states: where a pair passes +-i omega all its orbits are closed."""
+        """The mode's field is linear in the states: where a pair passes +-i omega all its orbits are closed."""
         traced = self.system.traced
         fields = [traced.fields[self.mode][i] for i in self.own]
         return all(not f.diff(x).free_symbols & set(traced.u) for f in fields for x in traced.u)
