@@ -20,7 +20,8 @@ from nonsmooth.cli.study import named_model, read_study
 from nonsmooth.cli.verb_options import VERBS, options_of
 
 COMMANDS = (
-    "init", "run", "plan", "show", "models", "identify", "compare", "reproduce", "rig", "schema", "completion",
+    "init", "run", "plan", "show", "explore", "models", "identify", "compare", "reproduce", "rig", "schema",
+    "completion",
 )  # fmt: skip
 
 
