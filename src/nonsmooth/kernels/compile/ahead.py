@@ -45,7 +45,7 @@ def plain_files() -> Iterator[str]:
 
 
 def tasks(shapes: Sequence[str] = SHAPES) -> list[_Task]:
-    """What is compiled, each by one process: the plain files, then what every ``*_module`` function of a stepper makes.
+    """The list of modules to compile, each by one process: the plain files, then those of every ``*_module`` function.
 
     Its arguments are told by their names: ``states`` and ``harmonics`` of a shape, and each of the file's observers and
     methods."""
@@ -75,7 +75,7 @@ def kernels_of(module: ModuleType) -> list[Any]:
 
 
 def _begin(chosen: str, cache: str) -> None:
-    """What a process that compiles is told: nothing of the user's own cache."""
+    """Set a process up to compile: for the level, and with nothing of the user's own cache."""
     os.environ.update(NONSMOOTH_LEVEL=chosen, NONSMOOTH_CACHE_DIR=cache)
 
 
