@@ -4,8 +4,8 @@ Numba makes code for one processor. Ours is made for a level of the architecture
 travel with the package and run on another; what the level costs stands in ``docs/decisions.md``. And Numba keeps all
 code in one engine until the process ends; here each file has its own, which goes with the file's last function.
 
-Leans on private parts of Numba: ``JITCPUCodegen``, ``JITCodeLibrary``, a target context's ``_internal_codegen``, a
-dispatcher's ``add_overload``, ``_make_finalizer`` and ``targetdescr``. Checked with 0.68.
+Leans on private parts of Numba: ``JITCPUCodegen``, a target context's ``_internal_codegen``, a dispatcher's
+``add_overload``, ``_make_finalizer`` and ``targetdescr``. Checked with 0.68.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import numba
-from numba.core.codegen import JITCodeLibrary, JITCPUCodegen, get_host_cpu_features
+from numba.core.codegen import JITCPUCodegen, get_host_cpu_features
 from numba.core.registry import CPUDispatcher, CPUTarget, cpu_target
 
 __all__ = ["AHEAD", "LEVELS", "Function", "level", "made_ahead"]
@@ -72,40 +72,14 @@ def made_ahead(entry: str) -> bytes:
         return b""
 
 
-class _Library(JITCodeLibrary):
-    """The code of one function; what only kernels call is linked into them and becomes machine code there alone."""
-
-    _from_python = True  # there is a way in from Python
-
-    def _finalize_final_module(self) -> None:
-        module = self._shared_module or self._final_module  # from a cache, or just compiled
-        self._from_python = any(found.name.startswith("_ZN7cpython") for found in module.functions)
-        if self._from_python:
-            super()._finalize_final_module()
-        else:
-            self._finalize_dynamic_globals()
-            self._verify_declare_only_symbols()
-            self._finalized = True
-
-    def get_pointer_to_function(self, name: str) -> Any:
-        self._ensure_finalized()
-        return super().get_pointer_to_function(name) if self._from_python else 0
-
-
 class _Codegen(JITCPUCodegen):
     """An engine of its own, for the level."""
-
-    _library_class = _Library
 
     def _get_host_cpu_name(self) -> Any:
         return level() or super()._get_host_cpu_name()
 
     def _get_host_cpu_features(self) -> Any:
         return "" if level() else super()._get_host_cpu_features()
-
-    def set_env(self, name: str, environment: Any) -> None:
-        if self._engine.get_global_value_address(name):
-            super().set_env(name, environment)
 
     def _function_pass_manager(self, **options: Any) -> Any:
         """One for all functions: Numba makes one for each, and llvmlite never frees it (15 kB)."""
