@@ -16,6 +16,7 @@ from nonsmooth.kernels.hybrid.codes import (
     CHATTER,
     DIVERGED,
     NOT_GUARANTEED,
+    NOT_UNIQUE,
     OK,
     PAUSED,
     TOO_MANY_CROSSINGS,
@@ -24,6 +25,7 @@ from nonsmooth.kernels.hybrid.places import (
     BEGUN,
     BURST,
     BURST_LENGTH,
+    DEAD_END,
     FIRED,
     JUMPS,
     MODE,
@@ -69,6 +71,8 @@ def settle(i, form, net, tables, work):
         if t < 0:
             break
         tally[MODE] = take(i, t, -1, form, tables, net, work)
+        if net.transitions[t, 2] == DEAD_END:
+            return NOT_UNIQUE
         visited[tally[MODE]] = 1
     return OK
 
@@ -128,6 +132,9 @@ def transit(i, t, short, form, net, section, goal, seen, tables, work):
         cross(i, t, mode, jumps, form, net, goal, seen, tables, work)
         tally[MODE] = mode
         jumps += 1
+        if net.transitions[t, 2] == DEAD_END:
+            code = NOT_UNIQUE
+            break
         t = next_holding(mode, tables, net, work)
     depart(jumps, seen, work)
     tally[JUMPS] += jumps

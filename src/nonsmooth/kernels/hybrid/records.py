@@ -67,7 +67,7 @@ class Tables(NamedTuple):
 class Net(NamedTuple):
     """The transition table of a linear system."""
 
-    transitions: Any  # (transitions, 3): target, what it changes (0, or see ``run_places.RESET``), is contact
+    transitions: Any  # (transitions, 3): target, what it changes (0, ``places.RESET``, ...), contact or ``DEAD_END``
     rows: Any  # (rows + 2, 3): functional, sign, strict; the last two belong to the section (rising, falling)
     row_start: Any  # (transitions + 1,)
     mode_start: Any  # (modes + 1,)
