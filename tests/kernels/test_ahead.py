@@ -154,7 +154,7 @@ def test_every_kernel_of_the_package_is_compiled_ahead():
 
 
 def test_a_list_for_some_methods():
-    """What other methods need is left out; a module comes behind the one whose kernel it calls."""
+    """Leave out what other methods need; a module comes behind the one whose kernel it calls."""
     from nonsmooth.kernels.compile import ahead
 
     chosen, every = ahead.tasks(["2,1"], ["rkf45"]), ahead.tasks(["2,1"])
