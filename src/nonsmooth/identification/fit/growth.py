@@ -1,0 +1,202 @@
+"""Fits over windows that grow from level to level until one window holds a whole record, or no longer one fits.
+
+Over short windows a sum of squares has one minimum, however chaotic the motion; over long ones the parameters are found
+more accurately. So each level begins where the one before it ended, and a level whose windows are longer than a
+trajectory can be followed is given up (H.G. Bock 1981; H.U. Voss, J. Timmer, J. Kurths, Int. J. Bifurcation and
+Chaos 14 (2004) 1905).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.errors import SolveError
+from nonsmooth.identification.arrow import Unsettled, settle
+from nonsmooth.identification.fit.first_windows import first_windows
+from nonsmooth.identification.fit.windows import Window, Windows
+from nonsmooth.identification.pieces import State
+
+__all__ = ["LEAST", "Grown", "grow"]
+
+FloatArray = NDArray[np.float64]
+LEAST = 1e-13  # eigenvalue of the scaled normal matrix from which a direction counts as determined
+_WORSE = 1.5  # chi^2 per degree of freedom against that of the level before: a longer window does not fit
+_NEAR = 1.0  # standard uncertainties from its minimum, within which a fit that no step improves is taken
+_GOOD, _WHITE = 1.3, 5.0  # residuals over irregularity, and readings that share an error, of a fit that needs no other
+_ROUNDS = 12  # of noise from residuals and residuals from noise
+
+
+@dataclass(frozen=True, eq=False)
+class Grown:
+    """A finished fit.
+
+    Attributes
+    ----------
+    problem : Windows
+        The last windows, with the noise as found.
+    theta, starts : array
+    state : State
+        Residuals there.
+    short : float
+        Distance to the minimum where no step leads on, in standard uncertainties; 0 at a minimum.
+    left : array (p,)
+        That distance in each parameter.
+    rms : float
+        Of the residuals, over the noise that the record's own irregularity shows.
+    """
+
+    problem: Windows
+    theta: FloatArray
+    starts: FloatArray
+    state: State
+    short: float
+    left: FloatArray
+    rms: float
+
+    @property
+    def good(self) -> bool:
+        """Return whether the residuals are what the record's own irregularity leaves, and no more than noise.
+
+        Where a record is sampled so coarsely that its irregularity is the motion itself, the residuals still have to
+        be independent.
+        """
+        tau = [w.correlation(r) for w, r in zip(self.problem.pieces, self.state.residuals, strict=True)]
+        whole = len(self.problem.pieces) == len(self.problem.records)
+        return self.rms <= _GOOD and (whole or float(np.median(tau)) < _WHITE)
+
+
+def grow(
+    problem: Windows, theta: FloatArray, length: float, start: FloatArray | None, free: bool, longest: float,
+    told: Callable[[], None],
+) -> Grown:  # fmt: skip
+    """Fit from a first guess.
+
+    Parameters
+    ----------
+    problem : Windows
+        Without windows; ``noise`` a first estimate.
+    theta : array (p,)
+    length, longest : float
+        Of the first windows, and of the longest ones.
+    start, free
+        See :func:`first_windows`.
+    told : callable
+        Called once a level is done.
+
+    Raises
+    ------
+    SolveError
+        If not even the first windows can be fitted.
+    """
+    pieces = first_windows(problem, theta, length, start, free)
+    if not pieces:
+        raise SolveError("the motion of the first guess ends before any window of the record does: give another guess")
+    now = problem.of(pieces)
+    theta, starts, state = _level(now, theta, now.starts)
+    told()
+    wide = length
+    while len(now.pieces) > len(problem.records) and wide < longest:
+        for factor in (4.0, 2.0):
+            longer = _longer(now, theta, starts, state, min(factor * wide, longest))
+            told()
+            if longer is not None:
+                now, (theta, starts, state), wide = longer[0], longer[1], min(factor * wide, longest)
+                break
+        else:
+            break
+    return _final(now, theta, starts, problem.noise)
+
+
+def _longer(
+    problem: Windows, theta: FloatArray, starts: FloatArray, state: State, length: float
+) -> tuple[Windows, tuple[FloatArray, FloatArray, State]] | None:
+    """The fit over windows joined up to ``length``; None where it does not come to an end, or fits much worse."""
+    joined = _joined(problem, starts, length)
+    if len(joined) == len(problem.pieces):
+        return None
+    trial = problem.of(joined)
+    try:
+        found = _level(trial, theta, trial.starts)
+    except SolveError:
+        return None
+    return None if _reduced(trial, found[2]) > _WORSE * max(_reduced(problem, state), 1.0) else (trial, found)
+
+
+def _level(problem: Windows, theta: FloatArray, starts: FloatArray) -> tuple[FloatArray, FloatArray, State]:
+    if not np.isfinite(np.concatenate(problem.residuals(theta, starts).residuals)).all():
+        raise SolveError("a motion over longer windows does not come to its end")
+    u = problem.unknowns
+    found = settle(
+        problem, theta, starts, 0.0, [True] * len(starts), u.centre, u.precision, 30, True, (u.low, u.high), LEAST
+    )
+    return found[0], found[1], found[2]
+
+
+def _joined(problem: Windows, starts: FloatArray, length: float) -> list[Window]:
+    """Windows joined up to ``length``, each with the start of its first."""
+    groups: list[list[tuple[Window, FloatArray]]] = []
+    for window, start in zip(problem.pieces, starts, strict=True):
+        here = groups[-1][0][0] if groups else None
+        if here is not None and here.record == window.record and window.time[-1] - here.time[0] <= 1.3 * length:
+            groups[-1].append((window, start))
+        else:
+            groups.append([(window, start)])
+    found = []
+    for group in groups:
+        (head, start), last = group[0], group[-1][0].last
+        record = problem.records[head.record]
+        found.append(replace(
+            head, last=last, start=start, time=record.time[head.first:last], values=record.values[head.first:last]
+        ))  # fmt: skip
+    return found
+
+
+def _reduced(problem: Windows, state: State) -> float:
+    """Sum of squared residuals over the noise, per degree of freedom."""
+    rows = [r[: len(w.readings[0])] / problem.noise[w.readings[1]] for w, r in zip(problem.pieces, state.residuals, strict=True)]
+    free = sum(w.n_free for w in problem.pieces) + len(problem.unknowns.names)
+    total = sum(map(len, rows))
+    return float(sum(float(r @ r) for r in rows)) / max(total - free, 0.1 * total)
+
+
+def _final(problem: Windows, theta: FloatArray, starts: FloatArray, irregular: FloatArray) -> Grown:
+    """The fit at its minimum, with the noise of each quantity from its residuals."""
+    u, short, left = problem.unknowns, 0.0, np.zeros(len(theta))
+    for _ in range(_ROUNDS):
+        noise = _noise(problem, problem.residuals(theta, starts))
+        changed = float(np.max(np.abs(noise / problem.noise - 1.0)))
+        problem = replace(problem, noise=noise)
+        try:
+            theta, starts, _, _ = settle(
+                problem, theta, starts, 0.0, [True] * len(starts), u.centre, u.precision, 50, False, (u.low, u.high),
+                LEAST,
+            )  # fmt: skip
+            short, left = 0.0, np.zeros(len(theta))
+        except Unsettled as reason:  # a sum of squares with corners: grazes, rest
+            theta, starts = reason.values, reason.starts
+            short, left = float(np.max(reason.distance)), reason.step
+        if changed < 0.02:
+            break
+    state = problem.residuals(theta, starts)
+    return Grown(problem, theta, starts, state, short, left, float(np.max(_noise(problem, state) / irregular)))
+
+
+def _noise(problem: Windows, state: State) -> FloatArray:
+    """Standard deviation of a reading of each quantity: from its residuals, or as it is known."""
+    free = sum(w.n_free for w in problem.pieces) + len(problem.unknowns.names)
+    total = sum(len(w.readings[0]) for w in problem.pieces)
+    grow = total / max(total - free, 0.1 * total)
+    found = np.empty(len(problem.sensors))
+    for c, sensor in enumerate(problem.sensors.values()):
+        r = np.concatenate([
+            r[: len(w.readings[0])][w.readings[1] == c] for w, r in zip(problem.pieces, state.residuals, strict=True)
+        ])  # fmt: skip
+        if sensor.noise is not None:
+            found[c] = np.hypot(sensor.noise, sensor.floor)
+        else:
+            found[c] = max(float(np.sqrt(np.mean(r**2) * grow)) if len(r) else 0.0, 0.5 * sensor.floor, 1e-300)
+    return found
