@@ -20,30 +20,38 @@ from nonsmooth.identification.fit.windows import Window, Windows
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["first_length", "first_windows"]
+__all__ = ["first_length", "first_windows", "states_from_samples"]
 
 FloatArray = NDArray[np.float64]
 _AROUND = 3  # samples on either side, from which value and slope at a sample are taken
+_SWING = 0.15  # of a quantity's range: what counts as a swing
+_OF_A_SWING = 0.3  # to and fro: the length of the first windows
 WIDE = 3.0  # a start may move by so many times the size of its state
 
 
 def first_length(problem: Windows) -> float:
-    """Length of the first windows: a period of the slowest measured oscillation, and samples enough for a start."""
+    """Length of the first windows: a part of a swing to and fro, and samples enough for a start."""
     found = []
     n = problem.marcher.flow.n
     for record in problem.records:
-        longest = 0.0
-        for c in range(record.values.shape[1]):
-            y = record.values[np.isfinite(record.values[:, c]), c]
-            swings = np.count_nonzero(np.diff(np.signbit(y - np.mean(_ends(y)))))
-            longest = max(longest, 2.0 * record.duration / max(swings, 4))
-        per_sample = record.duration / max(len(record.time) - 1, 1)
-        found.append(max(longest, (3 * n + 6) * per_sample))
+        swings = [_turns(record.values[np.isfinite(record.values[:, c]), c]) for c in range(record.values.shape[1])]
+        longest = _OF_A_SWING * 2.0 * record.duration / max(min(swings), 4)
+        found.append(max(longest, (3 * n + 6) * record.duration / (len(record.time) - 1)))
     return float(np.median(found))
 
 
-def _ends(y: FloatArray) -> FloatArray:
-    return np.quantile(y, [0.05, 0.95])
+def _turns(y: FloatArray) -> int:
+    """How often a quantity turns, by more than a part of its range."""
+    if not len(y):
+        return 0
+    low, high = np.quantile(y, [0.05, 0.95])
+    least, turns, rising, extreme = _SWING * (high - low), 0, True, y[0]
+    for value in y.tolist():
+        if (value > extreme) == rising:
+            extreme = value
+        elif abs(value - extreme) > least:
+            turns, rising, extreme = turns + 1, not rising, value
+    return turns
 
 
 def first_windows(problem: Windows, theta: FloatArray, length: float, start: FloatArray | None, free: bool) -> list[Window]:
@@ -65,7 +73,7 @@ def _of_record(
 ) -> list[Window]:
     n_u, early = len(problem.system.states), _lead(problem, theta, record)
     memory = problem.system.memory_vector()
-    told = _from_samples(problem, theta, record)
+    told = states_from_samples(problem, theta, record, slice(None))
     z = np.concatenate([np.zeros(n_u) if start is None else start, memory])
     values = problem.values(theta, i)
     if values is None:
@@ -127,10 +135,11 @@ def _quiet(time: FloatArray, crossings: FloatArray, length: float) -> int:
     return int(near[np.argmax(np.minimum(before, behind))])
 
 
-def _from_samples(problem: Windows, theta: FloatArray, record: Record) -> FloatArray:
+def states_from_samples(problem: Windows, theta: FloatArray, record: Record, which: slice) -> FloatArray:
     """States (N, n_u) that the samples tell: those measured, and those that are the rate of one; NaN elsewhere."""
+    at = record.time[which]
     system, names = problem.system, list(problem.system.states)
-    told = np.full((len(record.time), len(names)), np.nan)
+    told = np.full((len(at), len(names)), np.nan)
     rates = _rates(system)
     measured = problem.sensor_values(theta)
     for c, (quantity, sensor) in enumerate(measured.items()):
@@ -138,7 +147,7 @@ def _from_samples(problem: Windows, theta: FloatArray, record: Record) -> FloatA
             continue
         k, have = names.index(quantity), np.flatnonzero(np.isfinite(record.values[:, c]))
         t, y = record.time[have], (record.values[have, c] - sensor.offset) / sensor.gain
-        value, slope = _local(t, y, record.time)
+        value, slope = _local(t, y, at)
         told[:, k] = value
         if k in rates and names[rates[k]] not in measured:
             told[:, rates[k]] = slope

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,6 +27,7 @@ __all__ = ["fit", "problem_of"]
 FloatArray = NDArray[np.float64]
 _SPREAD = 0.5  # other first guesses lie within this factor, exp(+-0.5), of the one that was given
 _PHASES = 8  # first guesses of an unknown phase
+_MORE = 3  # guesses that are looked at, for each that is fitted
 
 
 @by_name
@@ -176,12 +178,11 @@ def _best(
     from nonsmooth.identification.fit.growth import grow
 
     length = min(first_length(problem), longest)
-    guesses = _guesses(problem, start, free, length, tries, seed)
     best: Grown | None = None
     why: SolveError | None = None
     levels = 12
-    with progress(levels * len(guesses), "fit", watched) as advance:
-        for guess in guesses:
+    with progress(levels * tries, "fit", watched) as advance:
+        for guess in islice(_guesses(problem, start, free, length, tries, seed), tries):
             left = [levels]
 
             def told(left: list[int] = left) -> None:
@@ -202,7 +203,7 @@ def _best(
     if best is None:
         assert why is not None
         raise SolveError(
-            f"no fit from any of {len(guesses)} first guesses ({why}); start nearer, with system.with_parameters(...) "
+            f"no fit from any of {tries} first guesses ({why}); start nearer, with system.with_parameters(...) "
             "and start=, or give bounds"
         )
     return best
@@ -210,30 +211,46 @@ def _best(
 
 def _guesses(
     problem: Windows, start: FloatArray | None, free: bool, length: float, tries: int, seed: int
-) -> list[FloatArray]:
-    """First guesses, the most promising first: by how far the first windows are from the record before any fit."""
-    from nonsmooth.identification.fit.first_windows import first_windows
-
+) -> Iterator[FloatArray]:
+    """First guesses: the given one, then others, the nearest first: those whose first windows fit best before any step."""
     u = problem.unknowns
+
+    def far(guess: FloatArray) -> FloatArray:
+        return _distances(problem, guess, start, free, length)
+
+    def with_phases(guess: FloatArray) -> FloatArray:
+        """The guess with the phase of each run, of a few, at which its first windows fit best."""
+        if not u.phases:
+            return guess
+        shared = len(u.names) - u.phases
+        phases = np.arange(_PHASES) / _PHASES
+        every = np.array([far(np.append(guess[:shared], np.full(u.phases, phase))) for phase in phases])
+        return np.append(guess[:shared], phases[np.argmin(every, axis=0)])
+
+    yield with_phases(u.guess)
     rng = np.random.default_rng(seed)
-    drawn = [u.guess]
-    for _ in range(3 * (tries - 1)):
+    drawn = []
+    for _ in range(_MORE * (tries - 1)):
         other = u.guess * np.exp(rng.uniform(-_SPREAD, _SPREAD, len(u.guess)))
         bounded = np.isfinite(u.low) & np.isfinite(u.high)
         other[bounded] = rng.uniform(u.low[bounded], u.high[bounded])
-        drawn.append(np.clip(other, u.low, u.high))
-    phases = len(u.names) - u.phases
-    if u.phases:
-        drawn = [
-            np.append(guess[:phases], np.full(u.phases, k / _PHASES)) for guess in drawn[:tries] for k in range(_PHASES)
-        ]
-    far = []
-    for guess in drawn:
-        windows = problem.of(first_windows(problem, guess, length, start, free))
-        state = windows.residuals(guess, windows.starts) if windows.pieces else None
-        rows = [] if state is None else [r[np.isfinite(r)] for r in state.residuals]
-        far.append(float(np.mean(np.concatenate(rows) ** 2)) if sum(map(len, rows)) else np.inf)
-    order = np.argsort(far, kind="stable")
-    if not u.phases and far[0] <= 4.0 * far[order[0]]:  # the guess that was given, unless another one is far better
-        order = np.concatenate([[0], order[order != 0]])
-    return [drawn[i] for i in order[:tries]]
+        drawn.append(with_phases(np.clip(other, u.low, u.high)))
+    order = np.argsort([float(np.sum(far(guess))) for guess in drawn], kind="stable")
+    yield from (drawn[i] for i in order)
+
+
+def _distances(
+    problem: Windows, guess: FloatArray, start: FloatArray | None, free: bool, length: float
+) -> FloatArray:
+    """Mean squared residual of the first windows of each record, before any fit; infinite where none comes to an end."""
+    from nonsmooth.identification.fit.first_windows import first_windows
+
+    total, count = np.zeros(len(problem.records)), np.zeros(len(problem.records))
+    windows = problem.of(first_windows(problem, guess, length, start, free))
+    if windows.pieces:
+        weights = windows.weights(None, 0.0)
+        for w, r, weight in zip(windows.pieces, windows.residuals(guess, windows.starts).residuals, weights, strict=True):
+            if np.isfinite(r).all():
+                total[w.record] += float(np.sum((r * weight) ** 2))
+                count[w.record] += len(r)
+    return np.where(count > 0, total / np.maximum(count, 1), np.inf)

@@ -16,16 +16,14 @@ from numpy.typing import NDArray
 
 from nonsmooth.errors import SolveError
 from nonsmooth.identification.arrow import Unsettled, settle
-from nonsmooth.identification.fit.first_windows import first_windows
+from nonsmooth.identification.fit.first_level import LEAST, level, settle_first
 from nonsmooth.identification.fit.windows import Window, Windows
 from nonsmooth.identification.pieces import State
 
-__all__ = ["LEAST", "Grown", "grow"]
+__all__ = ["Grown", "grow"]
 
 FloatArray = NDArray[np.float64]
-LEAST = 1e-13  # eigenvalue of the scaled normal matrix from which a direction counts as determined
 _WORSE = 1.5  # chi^2 per degree of freedom against that of the level before: a longer window does not fit
-_NEAR = 1.0  # standard uncertainties from its minimum, within which a fit that no step improves is taken
 _GOOD, _WHITE = 1.3, 5.0  # residuals over irregularity, and readings that share an error, of a fit that needs no other
 _ROUNDS = 12  # of noise from residuals and residuals from noise
 
@@ -92,16 +90,12 @@ def grow(
     SolveError
         If not even the first windows can be fitted.
     """
-    pieces = first_windows(problem, theta, length, start, free)
-    if not pieces:
-        raise SolveError("the motion of the first guess ends before any window of the record does: give another guess")
-    now = problem.of(pieces)
-    theta, starts, state = _level(now, theta, now.starts)
+    now, theta, starts, state = settle_first(problem, theta, length, start, free)
     told()
     wide = length
     while len(now.pieces) > len(problem.records) and wide < longest:
         for factor in (4.0, 2.0):
-            longer = _longer(now, theta, starts, state, min(factor * wide, longest))
+            longer = _longer_windows(now, theta, starts, state, min(factor * wide, longest))
             told()
             if longer is not None:
                 now, (theta, starts, state), wide = longer[0], longer[1], min(factor * wide, longest)
@@ -111,7 +105,7 @@ def grow(
     return _final(now, theta, starts, problem.noise)
 
 
-def _longer(
+def _longer_windows(
     problem: Windows, theta: FloatArray, starts: FloatArray, state: State, length: float
 ) -> tuple[Windows, tuple[FloatArray, FloatArray, State]] | None:
     """The fit over windows joined up to ``length``; None where it does not come to an end, or fits much worse."""
@@ -120,20 +114,10 @@ def _longer(
         return None
     trial = problem.of(joined)
     try:
-        found = _level(trial, theta, trial.starts)
+        found = level(trial, theta, trial.starts)
     except SolveError:
         return None
     return None if _reduced(trial, found[2]) > _WORSE * max(_reduced(problem, state), 1.0) else (trial, found)
-
-
-def _level(problem: Windows, theta: FloatArray, starts: FloatArray) -> tuple[FloatArray, FloatArray, State]:
-    if not np.isfinite(np.concatenate(problem.residuals(theta, starts).residuals)).all():
-        raise SolveError("a motion over longer windows does not come to its end")
-    u = problem.unknowns
-    found = settle(
-        problem, theta, starts, 0.0, [True] * len(starts), u.centre, u.precision, 30, True, (u.low, u.high), LEAST
-    )
-    return found[0], found[1], found[2]
 
 
 def _joined(problem: Windows, starts: FloatArray, length: float) -> list[Window]:

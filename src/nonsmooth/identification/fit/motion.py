@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,6 +65,7 @@ class Marcher:
         self.flow = VariationalFlow.of(system, active)
         engine = engine_for(system)
         self.engine: Engine = engine if engine.name == "exact" else engine_for(system, rtol=RTOL)
+        self._tables: tuple[bytes, Any] = b"", None
 
     def run(
         self, values: FloatArray, begin: float, times: FloatArray, z: FloatArray, mode: int, derivatives: bool = False
@@ -77,7 +78,9 @@ class Marcher:
         state.clock[:2] = (begin, 0.0) if period is None else (begin - whole * period, whole)
         state.counters[0] = mode
         # the start itself is a sample too: there the transitions that hold already have been taken
-        log = self.engine.record(self.engine.prepare(values[None, :]), state, times[-1], np.append(begin, times))
+        if self._tables[0] != values.tobytes():  # many windows at the same parameters
+            self._tables = values.tobytes(), self.engine.prepare(values[None, :])
+        log = self.engine.record(self._tables[1], state, times[-1], np.append(begin, times))
         if log.status not in (codes.OK, codes.NOT_GUARANTEED):
             return None
         u = np.hstack([np.nan_to_num(log.sample_u), log.sample_memory])

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from nonsmooth.identification.arrow import inverted, reduced
 from nonsmooth.identification.finding import Estimate, Finding
-from nonsmooth.identification.fit.growth import LEAST, Grown
+from nonsmooth.identification.fit.first_level import LEAST
+from nonsmooth.identification.fit.growth import Grown
 from nonsmooth.identification.fit.residuals import by_place, residual_data
 from nonsmooth.identification.parameter_set import ParameterSet
 from nonsmooth.identification.sandwich import Sandwich, sandwich

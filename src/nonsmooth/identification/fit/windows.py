@@ -136,13 +136,18 @@ class Windows:
     def phase(self, theta: FloatArray, window: Window) -> float:
         return float(theta[window.which[-1]]) if self.unknowns.phases else 0.0
 
+    def shift(self, theta: FloatArray, window: Window) -> float:
+        """The system's time less that of the record, from the phase of the run."""
+        values = self.values(theta, window.record) if self.unknowns.phases else None
+        period = None if values is None else self.system.period_at(values)
+        return 0.0 if period is None else self.phase(theta, window) * period
+
     def motion(self, theta: FloatArray, window: Window, start: FloatArray, derivatives: bool = False) -> Motion | None:
         """The motion of a window at its samples; where delays differ, at the instants of each quantity in turn."""
         values = self.values(theta, window.record)
         if values is None or not np.isfinite(theta).all() or not np.isfinite(start).all():
             return None
-        period = self.system.period_at(values)
-        shift = 0.0 if period is None else self.phase(theta, window) * period
+        shift = self.shift(theta, window)
         instants = self.instants(theta, window)
         if instants[0] < window.begin:  # a delay beyond what its bounds allow
             return None
@@ -229,7 +234,7 @@ class Windows:
                 state.in_parameters.append(np.vstack([table[:, :p], np.zeros((len(free), p))]))
         return state
 
-    def weights(self, state: State, spread: float) -> list[FloatArray]:
+    def weights(self, state: State | None, spread: float) -> list[FloatArray]:
         """One over the standard deviation of each row."""
         return [
             np.concatenate([1.0 / self.noise[w.readings[1]], 1.0 / w.spread[w.free]]) for w in self.pieces
