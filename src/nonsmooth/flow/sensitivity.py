@@ -117,7 +117,8 @@ def settled(
                 continue
             if jump.target == first[0]:
                 found = flow.jump(values, (*chain, k), t, start[1])
-                if np.array_equal(found.z_after, first[1]):
+                # a start within a forcing period is known to the rounding of its time
+                if (np.abs(found.z_after - first[1]) <= 1e-10 * (flow.scale + np.abs(first[1]))).all():
                     return found
             chains.append((*chain, k))
     raise AssertionError("a run begins in a mode that no transitions lead to")

@@ -21,6 +21,7 @@ __all__ = ["Unsettled", "inverted", "reduced", "settle"]
 
 FloatArray = NDArray[np.float64]
 _SETTLED = 1e-3  # of a standard uncertainty
+_RIDGE = 1e-13  # of a start's column: what keeps a start that is known or not seen from being divided by
 _LITTLE = 1e-4  # of the sum of squares: what a rough fit leaves to be gained
 _ACCURACY = 0.05  # of a standard uncertainty: how near the minimum is told where the derivatives' accuracy ends
 
@@ -42,20 +43,30 @@ class Unsettled(SolveError):
 def reduced(
     problem: Fittable, state: State, weights: list[FloatArray], used: Any, p: int, damping: float = 0.0
 ) -> tuple[Any, ...]:
-    """Normal equations without the starts, and what gives the starts' steps back; ``damping`` is that of the starts."""
+    """Normal equations without the starts, and what gives the starts' steps back; ``damping`` is that of the starts.
+
+    By an orthogonal factorization of each piece: squares of a chaotic motion's derivatives lose all digits. For each
+    piece ``(inverse, cross, part)``: a start's step is ``inverse @ (part - cross @ step)``, its covariance at given
+    parameters ``inverse @ inverse.T``.
+    """
     normal, right = np.zeros((p, p)), np.zeros(p)
     back = []
     for i, piece in enumerate(problem.pieces):
-        g, s = state.in_parameters[i] * weights[i][:, None], state.in_start[i] * weights[i][:, None]
-        r = state.residuals[i] * weights[i]
-        square = s.T @ s
-        size = np.sqrt(np.where(np.diag(square) > 0, np.diag(square), 1.0))  # 1: a number of the start that is known
-        block = np.linalg.inv(square / np.outer(size, size) + (1e-12 + damping) * np.eye(len(size)))
-        block /= np.outer(size, size)
-        back.append((block, s.T @ g, s.T @ r))
+        w = weights[i]
+        g, s, r = state.in_parameters[i] * w[:, None], state.in_start[i] * w[:, None], state.residuals[i] * w
+        n, m = s.shape[1], len(piece.which)
+        size = np.linalg.norm(s, axis=0)
+        size[size == 0.0] = 1.0  # a number of the start that is known
+        table = np.zeros((len(r) + n, n + m + 1))
+        table[: len(r)] = np.column_stack([s / size, g, r])
+        table[range(len(r), len(r) + n), range(n)] = np.sqrt(_RIDGE**2 + damping)
+        factor = np.linalg.qr(table, mode="r")
+        inverse = np.linalg.inv(factor[:n, :n]) / size[:, None]
+        back.append((inverse, factor[:n, n : n + m], factor[:n, n + m]))
         if used[i]:
-            normal[np.ix_(piece.which, piece.which)] += g.T @ g - (s.T @ g).T @ block @ (s.T @ g)
-            right[piece.which] += g.T @ r - (s.T @ g).T @ block @ (s.T @ r)
+            left, rest = factor[n:, n : n + m], factor[n:, n + m]
+            normal[np.ix_(piece.which, piece.which)] += left.T @ left
+            right[piece.which] += left.T @ rest
     return normal, right, back
 
 
@@ -126,14 +137,14 @@ def settle(
                 step[free] -= (loose @ (loose.T @ (step[free] * scale[free]))) / scale[free]
             step = np.clip(theta + step, low, high) - theta
             moved = starts.copy()
-            for i, (block, cross, part) in enumerate(back):
-                moved[i] += block @ (part - cross @ step[problem.pieces[i].which])
+            for i, (inverse, cross, part) in enumerate(back):
+                moved[i] += inverse @ (part - cross @ step[problem.pieces[i].which])
             trial = problem.residuals(theta + step, moved)
             found = cost(trial, theta + step)
             if np.isfinite(found) and found <= best * (1 + 1e-12):
                 break
             damping *= 8
-            if damping > 1e8:  # no smaller sum of squares: the derivatives' own accuracy is reached, or nothing fits
+            if damping > (1e4 if least > 0.0 and rough else 1e8):  # no smaller sum of squares: the derivatives' own accuracy is reached, or nothing fits
                 distance, rest = _distance(problem, state, weights, used, theta, centre, prior, low, high, least)
                 if (far := float(np.max(distance))) < _ACCURACY or rough:
                     return theta, starts, state, count
@@ -170,8 +181,9 @@ def _distance(
     covariance[np.ix_(free, free)] = inverted((normal + prior)[np.ix_(free, free)], least)[0]
     step = covariance @ pull
     far = [float(np.max(np.abs(step) / np.sqrt(np.maximum(np.diag(covariance), 1e-300))))]
-    for piece, (block, cross, part), use in zip(problem.pieces, back, used, strict=True):
-        own = np.abs(block @ (part - cross @ step[piece.which])) / np.sqrt(np.maximum(np.diag(block), 1e-300))
+    for piece, (inverse, cross, part), use in zip(problem.pieces, back, used, strict=True):
+        error = np.linalg.norm(inverse, axis=1)
+        own = np.abs(inverse @ (part - cross @ step[piece.which])) / np.maximum(error, 1e-150)
         far.append(float(np.max(own)) if use else 0.0)
     return np.array(far), np.asarray(step)
 

@@ -53,8 +53,8 @@ def sandwich(
             continue
         g, s = state.in_parameters[i] * weights[i][:, None], state.in_start[i] * weights[i][:, None]
         r = state.residuals[i] * weights[i]
-        block, cross, _ = back[i]
-        scores.append((piece, (g - s @ (block @ cross)), r))
+        inverse, cross, _ = back[i]
+        scores.append((piece, (g - s @ (inverse @ cross)), r))
         chi2 += float(r @ r)
         rows.append(len(r))
     freedom = max(sum(rows) - sum(piece.n_free for piece, _, _ in scores) - p, 1)

@@ -26,8 +26,9 @@ FloatArray = NDArray[np.float64]
 LEAST = 1e-13  # eigenvalue of the scaled normal matrix from which a direction counts as determined
 _ROUNDS = 10
 _PART = 1 / 3  # of the residuals: as how large the noise is taken
+_REACH = 4.0  # factor within which parameters stay about their guess at first
 _FAR = 5.0  # mean squared residual of a window over that of most, from which its start is looked for anew
-_DRAWN = 24  # starts drawn for such a window
+_DRAWN = 60  # starts drawn for such a window
 
 
 def settle_first(
@@ -77,11 +78,17 @@ def level(
 
 
 def _soft(problem: Windows, noise: FloatArray) -> Windows:
-    """The problem with this noise, and with the parameters known about their first guess to their own size."""
+    """The problem with this noise; while that is not yet its own, the parameters are known to about their own size."""
+    if (noise <= problem.noise).all():
+        return problem
     u = problem.unknowns
-    size = np.where(u.guess != 0, np.abs(u.guess), np.inf)
-    precision = u.precision + np.diag(np.where((noise > problem.noise).any(), size**-2.0, 0.0))
-    return replace(problem, noise=noise, unknowns=replace(u, precision=precision))
+    size = np.where(u.guess != 0.0, np.abs(u.guess), np.inf)
+    near, far = np.where(size < np.inf, size / _REACH, -np.inf), _REACH * size
+    low = np.maximum(u.low, np.where(u.guess > 0, near, -far))
+    high = np.minimum(u.high, np.where(u.guess < 0, -near, far))
+    return replace(problem, noise=noise, unknowns=replace(
+        u, precision=u.precision + np.diag(size**-2.0), low=low, high=high
+    ))  # fmt: skip
 
 
 def _rows(problem: Windows, state: State) -> list[tuple[Window, FloatArray]]:

@@ -27,6 +27,7 @@ __all__ = ["fit", "problem_of"]
 FloatArray = NDArray[np.float64]
 _SPREAD = 0.5  # other first guesses lie within this factor, exp(+-0.5), of the one that was given
 _PHASES = 8  # first guesses of an unknown phase
+_LONGER = 3.3  # the other length of first windows, in every second try
 _MORE = 3  # guesses that are looked at, for each that is fitted
 
 
@@ -45,7 +46,7 @@ def fit(
     runs: Sequence[str] | None = None,
     time: str = "time",
     window: float | None = None,
-    tries: int = 6,
+    tries: int = 8,
     seed: int = 0,
     progress: Progress = True,
 ) -> ParameterSet:
@@ -182,7 +183,7 @@ def _best(
     why: SolveError | None = None
     levels = 12
     with progress(levels * tries, "fit", watched) as advance:
-        for guess in islice(_guesses(problem, start, free, length, tries, seed), tries):
+        for guess, times in islice(_guesses(problem, start, free, length, tries, seed), tries):
             left = [levels]
 
             def told(left: list[int] = left) -> None:
@@ -191,7 +192,7 @@ def _best(
                 advance(step)
 
             try:
-                found = grow(problem, guess, length, start, free, longest, told)
+                found = grow(problem, guess, min(times * length, longest), start, free, longest, told)
             except SolveError as reason:
                 why = reason
             else:
@@ -211,8 +212,11 @@ def _best(
 
 def _guesses(
     problem: Windows, start: FloatArray | None, free: bool, length: float, tries: int, seed: int
-) -> Iterator[FloatArray]:
-    """First guesses: the given one, then others, the nearest first: those whose first windows fit best before any step."""
+) -> Iterator[tuple[FloatArray, float]]:
+    """First guesses, and how much longer their first windows are: the given guess, then others, the nearest first.
+
+    The nearest are those whose first windows fit best before any step. Longer windows hold what hidden states do.
+    """
     u = problem.unknowns
 
     def far(guess: FloatArray) -> FloatArray:
@@ -227,16 +231,18 @@ def _guesses(
         every = np.array([far(np.append(guess[:shared], np.full(u.phases, phase))) for phase in phases])
         return np.append(guess[:shared], phases[np.argmin(every, axis=0)])
 
-    yield with_phases(u.guess)
+    given = with_phases(u.guess)
+    yield given, 1.0
+    yield given, _LONGER
     rng = np.random.default_rng(seed)
     drawn = []
-    for _ in range(_MORE * (tries - 1)):
+    for _ in range(_MORE * max(tries - 2, 1)):
         other = u.guess * np.exp(rng.uniform(-_SPREAD, _SPREAD, len(u.guess)))
         bounded = np.isfinite(u.low) & np.isfinite(u.high)
         other[bounded] = rng.uniform(u.low[bounded], u.high[bounded])
         drawn.append(with_phases(np.clip(other, u.low, u.high)))
     order = np.argsort([float(np.sum(far(guess))) for guess in drawn], kind="stable")
-    yield from (drawn[i] for i in order)
+    yield from ((drawn[i], _LONGER if k % 2 else 1.0) for k, i in enumerate(order))
 
 
 def _distances(

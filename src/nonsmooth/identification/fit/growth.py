@@ -23,6 +23,8 @@ from nonsmooth.identification.pieces import State
 __all__ = ["Grown", "grow"]
 
 FloatArray = NDArray[np.float64]
+_POOR = 50.0  # chi^2 per degree of freedom of the first windows, from which there is no use in longer ones
+_CHAOS = 1e3  # growth of a start's change within a window, from which neighbouring motions are not followed
 _WORSE = 1.5  # chi^2 per degree of freedom against that of the level before: a longer window does not fit
 _GOOD, _WHITE = 1.3, 5.0  # residuals over irregularity, and readings that share an error, of a fit that needs no other
 _ROUNDS = 12  # of noise from residuals and residuals from noise
@@ -92,8 +94,8 @@ def grow(
     """
     now, theta, starts, state = settle_first(problem, theta, length, start, free)
     told()
-    wide = length
-    while len(now.pieces) > len(problem.records) and wide < longest:
+    wide, poor = length, _reduced(now, state) > _POOR
+    while not poor and len(now.pieces) > len(problem.records) and wide < longest:
         for factor in (4.0, 2.0):
             longer = _longer_windows(now, theta, starts, state, min(factor * wide, longest))
             told()
@@ -102,7 +104,7 @@ def grow(
                 break
         else:
             break
-    return _final(now, theta, starts, problem.noise)
+    return _final(now, theta, starts, problem.noise, 2 if poor else _ROUNDS)
 
 
 def _longer_windows(
@@ -117,7 +119,20 @@ def _longer_windows(
         found = level(trial, theta, trial.starts)
     except SolveError:
         return None
-    return None if _reduced(trial, found[2]) > _WORSE * max(_reduced(problem, state), 1.0) else (trial, found)
+    if _reduced(trial, found[2]) > _WORSE * max(_reduced(problem, state), 1.0) or _spreads(trial, *found[1:]) > _CHAOS:
+        return None
+    return trial, found
+
+
+def _spreads(problem: Windows, starts: FloatArray, state: State) -> float:
+    """By how much a motion answers to its start, at most, both in units of their own size."""
+    found, sizes = 0.0, np.abs(starts).max(axis=0)
+    for window, slopes in zip(problem.pieces, state.in_start, strict=True):
+        rows = np.abs(slopes[: len(window.readings[0])]) * sizes
+        for c in np.unique(window.readings[1]):
+            size = float(np.ptp(window.values[np.isfinite(window.values[:, c]), c])) or 1.0
+            found = max(found, float(np.max(rows[window.readings[1] == c])) / size)
+    return found
 
 
 def _joined(problem: Windows, starts: FloatArray, length: float) -> list[Window]:
@@ -147,10 +162,10 @@ def _reduced(problem: Windows, state: State) -> float:
     return float(sum(float(r @ r) for r in rows)) / max(total - free, 0.1 * total)
 
 
-def _final(problem: Windows, theta: FloatArray, starts: FloatArray, irregular: FloatArray) -> Grown:
+def _final(problem: Windows, theta: FloatArray, starts: FloatArray, irregular: FloatArray, rounds: int) -> Grown:
     """The fit at its minimum, with the noise of each quantity from its residuals."""
     u, short, left = problem.unknowns, 0.0, np.zeros(len(theta))
-    for _ in range(_ROUNDS):
+    for _ in range(rounds):
         noise = _noise(problem, problem.residuals(theta, starts))
         changed = float(np.max(np.abs(noise / problem.noise - 1.0)))
         problem = replace(problem, noise=noise)

@@ -91,15 +91,15 @@ def _starts(grown: Grown, found: Sandwich, back: list[Any]) -> _Starts:
     for i, window in enumerate(problem.pieces):
         if i and problem.pieces[i - 1].record == window.record:
             continue
-        block, cross, _ = back[i]
+        inverse, cross, _ = back[i]
         follows = np.zeros((len(window.start), len(grown.theta)))
-        follows[:, window.which] = -block @ cross
+        follows[:, window.which] = -inverse @ cross
         label = f", {problem.records[window.record].name}" if len(problem.records) > 1 else ""
         values += grown.starts[i][window.free].tolist()
         names += [f"{list(states)[k]}(0){label}" for k in window.free]
         units += [list(states.values())[k] for k in window.free]
         rows.append(follows[window.free])
-        own.append(block[np.ix_(window.free, window.free)] * found.reduced)
+        own.append((inverse @ inverse.T)[np.ix_(window.free, window.free)] * found.reduced)
     inner = np.asarray(block_diag(*own)) if values else np.zeros((0, 0))
     return _Starts(values, names, units, np.vstack(rows), inner)
 
