@@ -23,8 +23,10 @@ def march(fields, events, mode, u, times):
     for _ in range(20_000):
         rows = []
         for g, direction, action in events[mode]:
+
             def zero(t, u, g=g):
                 return g(t, u)
+
             zero.terminal, zero.direction = True, direction
             rows.append((zero, action))
         found = solve_ivp(fields[mode], (t, end + 1e-9), u, "DOP853", rtol=1e-11, atol=1e-12, dense_output=True,
@@ -143,7 +145,11 @@ def _gears(p, start, t):
     def field(sign):
         def f(t, u):
             spring = (u[0] - sign * p["b"]) if sign else 0.0
-            return [u[1], p["F_m"] + p["F_a"] * p["omega"] ** 2 * np.cos(p["omega"] * t) - 2 * p["zeta"] * u[1] - spring]
+            return [
+                u[1],
+                p["F_m"] + p["F_a"] * p["omega"] ** 2 * np.cos(p["omega"] * t) - 2 * p["zeta"] * u[1] - spring,
+            ]
+
         return f
 
     def go(mode):
@@ -186,6 +192,7 @@ def _chua(p, start, t):
         def f(t, u):
             h = p["b"] * u[0] + (p["a"] - p["b"]) * side if side else p["a"] * u[0]
             return [p["alpha"] * (u[1] - h), u[0] - u[1] + u[2], -p["beta"] * u[1]]
+
         return f
 
     def go(mode):
@@ -225,6 +232,7 @@ def _bilinear(p, start, t):
         def f(t, u):
             outer = p["beta"] * (u[0] - side * p["g"]) if side else 0.0
             return [u[1], p["A"] * p["omega"] ** 2 * np.cos(p["omega"] * t) - 2 * p["zeta"] * u[1] - u[0] - outer]
+
         return f
 
     def go(mode):
@@ -242,7 +250,12 @@ def _relay(p, start, t):
 
     def field(r):
         def f(t, u):
-            return [-(2 * xi * w + 1) * u[0] + u[1] + r, -(2 * xi * w + w**2) * u[0] + u[2] - 2 * s * r, -(w**2) * u[0] + r]
+            return [
+                -(2 * xi * w + 1) * u[0] + u[1] + r,
+                -(2 * xi * w + w**2) * u[0] + u[2] - 2 * s * r,
+                -(w**2) * u[0] + r,
+            ]
+
         return f
 
     def meet(t, u):  # the relay slides where both fields lead to the surface: |x2| < 1
@@ -258,7 +271,13 @@ def _relay(p, start, t):
         0: [(lambda t, u: u[1] - 1, 1, lambda t, u: (-1, np.array([1e-14, u[1], u[2]]))),
             (lambda t, u: u[1] + 1, -1, lambda t, u: (1, np.array([-1e-14, u[1], u[2]])))],
     }  # fmt: skip
-    return march({1: field(1), -1: field(-1), 0: slide}, events, -1 if start["x1"] > 0 else 1, [start[k] for k in ("x1", "x2", "x3")], t)[:, :1]
+    return march(
+        {1: field(1), -1: field(-1), 0: slide},
+        events,
+        -1 if start["x1"] > 0 else 1,
+        [start[k] for k in ("x1", "x2", "x3")],
+        t,
+    )[:, :1]
 
 
 CASES = {
@@ -269,7 +288,8 @@ CASES = {
         Case("impact oscillator", ns.models.impact_oscillator,
              {"k": 1.0, "c": 0.1, "omega": 1.3, "d": 0.6, "e": 0.6, "A": 1.0}, ["k", "c", "d", "e"], _impact, _xv,
              {"x": "position"}, 70.0),
-        Case("stick-slip belt", ns.models.stick_slip_belt, {"F": 1.0, "delta": 3.0, "v_b": 0.2}, ["F", "delta", "v_b"], _belt,
+        Case("stick-slip belt", ns.models.stick_slip_belt, {"F": 1.0, "delta": 3.0, "v_b": 0.2},
+             ["F", "delta", "v_b"], _belt,
              lambda rng: {"x": 0.5 + 0.1 * rng.random(), "v": 0.1 - 0.1 * rng.random()}, {"x": "position"}, 60.0),
         Case("gear pair", ns.models.gear_pair, {"zeta": 0.05, "F_m": 0.1, "F_a": 0.4, "b": 1.0, "omega": 0.7},
              ["zeta", "F_m", "F_a", "b"], _gears,
@@ -282,19 +302,26 @@ CASES = {
              {"x": "position"}, 60.0, noise=0.003, resolution=0.003),
         Case("relief valve", ns.models.relief_valve, {"k": 1.25, "delta": 10.0, "beta": 20.0, "r": 0.8, "q": 5.0},
              ["k", "delta", "beta", "r", "q"], _valve,
-             lambda rng: {"y1": 1.0 + 0.5 * rng.random(), "y2": 0.0, "y3": 10.0 + rng.random()}, {"y3": "pressure"}, 25.0),
+             lambda rng: {"y1": 1.0 + 0.5 * rng.random(), "y2": 0.0, "y3": 10.0 + rng.random()},
+             {"y3": "pressure"}, 25.0),
         Case("Chua's circuit", ns.models.chua_circuit, {"alpha": 9.0, "beta": 100 / 7, "a": -1 / 7, "b": 2 / 7},
              ["alpha", "beta", "a", "b"], _chua,
-             lambda rng: {"x": 0.1 + 0.5 * rng.random(), "y": 0.05 * rng.standard_normal(), "z": 0.1 * rng.standard_normal()},
+             lambda rng: {"x": 0.1 + 0.5 * rng.random(), "y": 0.05 * rng.standard_normal(),
+                          "z": 0.1 * rng.standard_normal()},
              {"x": "voltage"}, 40.0),
         Case("dry friction", ns.models.dry_friction_oscillator,
-             {"f_0": 1.0, "omega": 0.4, "f_k": 0.4, "f_s": 0.5, "zeta": 0.05, "v_b": 0.0}, ["f_0", "f_k", "f_s", "zeta"], _friction,
-             lambda rng: {"x": 0.2 * rng.standard_normal(), "v": 0.3 + 0.2 * rng.random()}, {"x": "position"}, 110.0),
+             {"f_0": 1.0, "omega": 0.4, "f_k": 0.4, "f_s": 0.5, "zeta": 0.05, "v_b": 0.0},
+             ["f_0", "f_k", "f_s", "zeta"], _friction,
+             lambda rng: {"x": 0.2 * rng.standard_normal(), "v": 0.3 + 0.2 * rng.random()},
+             {"x": "position"}, 110.0),
         Case("bilinear oscillator", ns.models.bilinear_oscillator,
              {"zeta": 0.05, "beta": 10.0, "g": 1.0, "A": 2.0, "omega": 0.7}, ["zeta", "beta", "g", "A"], _bilinear,
-             lambda rng: {"x": 0.3 * rng.standard_normal(), "v_x": 0.3 * rng.standard_normal()}, {"x": "position"}, 60.0),
-        Case("relay feedback", ns.models.relay_feedback, {"xi": 0.05, "omega": 6.0, "sigma": 1.0}, ["xi", "omega", "sigma"],
-             _relay, lambda rng: {"x1": 0.2 + 0.1 * rng.random(), "x2": 0.1 * rng.standard_normal(), "x3": 0.1 * rng.standard_normal()},
+             lambda rng: {"x": 0.3 * rng.standard_normal(), "v_x": 0.3 * rng.standard_normal()},
+             {"x": "position"}, 60.0),
+        Case("relay feedback", ns.models.relay_feedback, {"xi": 0.05, "omega": 6.0, "sigma": 1.0},
+             ["xi", "omega", "sigma"], _relay,
+             lambda rng: {"x1": 0.2 + 0.1 * rng.random(), "x2": 0.1 * rng.standard_normal(),
+                          "x3": 0.1 * rng.standard_normal()},
              {"x1": "level"}, 20.0),
     )
 }  # fmt: skip

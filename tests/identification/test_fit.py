@@ -7,8 +7,8 @@ from tests.identification.fit_cases import CASES, duffing
 
 import nonsmooth as ns
 from nonsmooth.errors import SolveError
-from nonsmooth.identification.fit.fit import problem_of
 from nonsmooth.identification.fit.first_windows import first_windows
+from nonsmooth.identification.fit.fit import problem_of
 
 M, K, C, RHO, W = 0.838, 8.47, 0.87, 0.3, 5.0
 
@@ -30,7 +30,9 @@ def closed_form(t, phase=0.0, x0=0.02, v0=0.0):
 
 
 def normalized(found, truth):
-    return np.array([(found.estimate(name).value - value) / found.estimate(name).uncertainty for name, value in truth.items()])
+    return np.array(
+        [(found.estimate(name).value - value) / found.estimate(name).uncertainty for name, value in truth.items()]
+    )
 
 
 @pytest.mark.parametrize(
@@ -38,8 +40,10 @@ def normalized(found, truth):
     [
         (ns.models.discontinuous_support, {"x": 0.01, "v": 0.0}, {"x": ns.Sensor(gain=2.0, offset=0.1, delay=0.03)},
          ["k", "k_s", "g", "omega", "x.gain", "x.offset", "x.delay", "phase"]),
-        (ns.models.impact_oscillator, {"x": 0.1, "v": 0.3}, {"x": "x", "v": ns.Sensor(delay=0.05)}, ["k", "c", "d", "e"]),
-        (ns.models.chua_circuit, {"x": 0.3, "y": 0.1, "z": 0.0}, {"y": "y", "diode_force": "f"}, ["alpha", "beta", "a", "b"]),
+        (ns.models.impact_oscillator, {"x": 0.1, "v": 0.3}, {"x": "x", "v": ns.Sensor(delay=0.05)},
+         ["k", "c", "d", "e"]),
+        (ns.models.chua_circuit, {"x": 0.3, "y": 0.1, "z": 0.0}, {"y": "y", "diode_force": "f"},
+         ["alpha", "beta", "a", "b"]),
     ],
     ids=["support", "impacts", "output"],
 )  # fmt: skip
@@ -47,7 +51,10 @@ def test_derivatives_are_those_of_differences(system, start, measured, names):
     made = system()
     length = 4.3 * made.period() if made.period() else 8.0
     t = np.linspace(0.0, length, 90)
-    data = {getattr(one, "channel", "") or (one if isinstance(one, str) else q): (t, np.cos(t)) for q, one in measured.items()}
+    data = {
+        getattr(one, "channel", "") or (one if isinstance(one, str) else q): (t, np.cos(t))
+        for q, one in measured.items()
+    }
     problem = problem_of(made, data, names, measured)
     theta = problem.unknowns.guess.copy()
     if "phase" in names:
@@ -188,6 +195,49 @@ def test_a_model_that_is_not_the_motion_is_said_to_fail_where_it_does():
     assert ns.plot.identification.fit_residuals(found, show="places").has_data()
 
 
+def test_readings_of_which_the_model_has_no_motion_are_counted():
+    case = CASES["impact oscillator"]
+    data, measured, _ = case.recording(0)
+    t, x = data["position"]
+    x = np.where(t > 40.0, 5.0 + 0.01 * np.sin(50 * t), x)  # behind the stop, where nothing moves
+    system = case.system().with_parameters(case.truth)
+    found = ns.fit(system, {"position": (t, x)}, ["k", "c"], measured=measured, tries=1)
+    assert any("readings are not used" in sentence or "over windows of" in sentence for sentence in found.anomalies)
+
+
+@pytest.mark.slow
+def test_coverage_over_ten_systems():
+    seeds, rows, every = 40, [], []
+    for name, case in CASES.items():
+        far, said, silent = [], 0, 0
+        for seed in range(seeds):
+            data, measured, _ = case.recording(seed)
+            try:
+                found = ns.fit(case.guess(seed), data, case.find, measured=measured, progress=False)
+            except SolveError:
+                said += 1
+                continue
+            if found.anomalies:
+                said += 1
+                continue
+            z = normalized(found, {one: case.truth[one] for one in case.find})
+            silent += bool(np.max(np.abs(z)) > 8.0)
+            far.append(z)
+        pooled = np.concatenate(far)
+        every.append(pooled)
+        cover, rms = float(np.mean(np.abs(pooled) < 1.96)), float(np.sqrt(np.mean(pooled**2)))
+        rows.append((name, seeds - said - silent, said, silent, cover, rms))
+        good = seeds - said - silent
+        print(f"{name:22} converged {good:2}, said no {said}, silent {silent}, cover {cover:.3f}, rms {rms:.2f}")
+    pooled = np.concatenate(every)
+    cover, rms = float(np.mean(np.abs(pooled) < 1.96)), float(np.sqrt(np.mean(pooled**2)))
+    print(f"{'all':22} {len(pooled)} intervals, cover {cover:.3f}, rms {rms:.2f}")
+    for name, converged, _, silent, each, _ in rows:
+        assert converged >= 38 and silent == 0, name
+        assert 0.90 <= each <= 0.98, name
+    assert 0.93 <= cover <= 0.97 and 0.85 <= rms <= 1.15
+
+
 @pytest.mark.parametrize("name", ["impact oscillator", "bilinear oscillator"])
 def test_intervals_cover_the_truth_of_another_program(name):
     case, far = CASES[name], []
@@ -229,7 +279,7 @@ def test_mistakes_are_answered_with_what_to_do():
     with pytest.raises(TypeError, match="fit takes a Recording, a Dataset over time, a DataFrame"):
         ns.fit(system, 3.0, ["k"])
     with pytest.raises(ValueError, match="the time must increase"):
-        ns.fit(system, {"x": (t[::-1].tolist() + [0.0], np.ones(len(t) + 1))}, ["k"])
+        ns.fit(system, {"x": ([*t[::-1].tolist(), 0.0], np.ones(len(t) + 1))}, ["k"])
     with pytest.raises(ValueError, match="has no forcing period"):
         ns.fit(ns.models.chua_circuit(), data, ["phase"])
 
@@ -244,7 +294,9 @@ def test_a_fit_that_nothing_starts_says_so():
 def test_a_fit_tells_how_far_it_is_and_is_cancelled():
     t = np.arange(0, 12, 0.03)
     heard = []
-    ns.fit(free().with_parameters(k=9.0), {"x": (t, closed_form(t) + 1e-5 * np.sin(1e4 * t))}, ["k"], progress=heard.append)
+    ns.fit(
+        free().with_parameters(k=9.0), {"x": (t, closed_form(t) + 1e-5 * np.sin(1e4 * t))}, ["k"], progress=heard.append
+    )
     assert heard == sorted(heard) and heard[0] == 0.0 and 0.02 < heard[-1] <= 1.0
     with pytest.raises(KeyboardInterrupt):
         ns.fit(free().with_parameters(k=9.0), {"x": (t, closed_form(t))}, ["k"], progress=lambda done: done < 0.01)

@@ -60,7 +60,7 @@ def reduced(
         table = np.zeros((len(r) + n, n + m + 1))
         table[: len(r)] = np.column_stack([s / size, g, r])
         table[range(len(r), len(r) + n), range(n)] = np.sqrt(_RIDGE**2 + damping)
-        factor = np.linalg.qr(table, mode="r")
+        factor = np.asarray(np.linalg.qr(table, mode="r"))
         inverse = np.linalg.inv(factor[:n, :n]) / size[:, None]
         back.append((inverse, factor[:n, n : n + m], factor[:n, n + m]))
         if used[i]:
@@ -144,7 +144,8 @@ def settle(
             if np.isfinite(found) and found <= best * (1 + 1e-12):
                 break
             damping *= 8
-            if damping > (1e4 if least > 0.0 and rough else 1e8):  # no smaller sum of squares: the derivatives' own accuracy is reached, or nothing fits
+            # no smaller sum of squares: the derivatives' own accuracy is reached, or nothing fits
+            if damping > (1e4 if least > 0.0 and rough else 1e8):
                 distance, rest = _distance(problem, state, weights, used, theta, centre, prior, low, high, least)
                 if (far := float(np.max(distance))) < _ACCURACY or rough:
                     return theta, starts, state, count

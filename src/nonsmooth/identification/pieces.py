@@ -82,7 +82,7 @@ class State:
 
 
 class Fittable(Protocol):
-    """What the iteration and the covariance need of a problem: pieces, each with its start, and their residuals."""
+    """Problem that the iteration and the covariance take: pieces, each with its start, and their residuals."""
 
     @property
     def pieces(self) -> Any:

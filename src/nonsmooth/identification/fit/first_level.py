@@ -3,7 +3,7 @@
 Far from the solution the noise is taken for as large as a part of the residuals, and the parameters for known about
 their guess to their own size: so no step runs away while the residuals are large, and both fade as they fall. A window
 that fits much worse than most has missed a transition, or has one too many, and no small step of its start mends it;
-its start is then looked for anew: from the window before, from the samples, and at random.
+its start is then searched anew: from the window before, from the samples, and at random.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ LEAST = 1e-13  # eigenvalue of the scaled normal matrix from which a direction c
 _ROUNDS = 10
 _PART = 1 / 3  # of the residuals: as how large the noise is taken
 _REACH = 4.0  # factor within which parameters stay about their guess at first
-_FAR = 5.0  # mean squared residual of a window over that of most, from which its start is looked for anew
+_FAR = 5.0  # mean squared residual of a window over that of most, from which its start is searched anew
 _DRAWN = 60  # starts drawn for such a window
 
 
@@ -99,7 +99,9 @@ def _sizes(problem: Windows, state: State) -> FloatArray:
     """Size of the residuals of each quantity, of most windows."""
     found = np.zeros(len(problem.sensors))
     for c in range(len(found)):
-        each = [float(np.mean(r[w.readings[1] == c] ** 2)) for w, r in _rows(problem, state) if (w.readings[1] == c).any()]
+        each = [
+            float(np.mean(r[w.readings[1] == c] ** 2)) for w, r in _rows(problem, state) if (w.readings[1] == c).any()
+        ]
         found[c] = np.sqrt(np.median(each))
     return found
 
@@ -146,10 +148,10 @@ def _others(
     values = problem.values(theta, window.record)
     if i and problem.pieces[i - 1].record == window.record and values is not None:
         before = problem.pieces[i - 1]
+        shift = problem.shift(theta, window)
         motion = problem.marcher.run(
-            values, before.begin + problem.shift(theta, before), np.array([window.begin + problem.shift(theta, window)]),
-            starts[i - 1], before.mode,
-        )  # fmt: skip
+            values, before.begin + shift, np.array([window.begin + shift]), starts[i - 1], before.mode
+        )
         if motion is not None:
             found.append((replace(window, mode=int(motion.mode[0])), motion.z[0]))
     known = np.isfinite(told) & (window.spread > 0)

@@ -41,7 +41,7 @@ def first_length(problem: Windows) -> float:
 
 
 def _turns(y: FloatArray) -> int:
-    """How often a quantity turns, by more than a part of its range."""
+    """Number of turns of a quantity by more than a part of its range."""
     if not len(y):
         return 0
     low, high = np.quantile(y, [0.05, 0.95])
@@ -54,7 +54,9 @@ def _turns(y: FloatArray) -> int:
     return turns
 
 
-def first_windows(problem: Windows, theta: FloatArray, length: float, start: FloatArray | None, free: bool) -> list[Window]:
+def first_windows(
+    problem: Windows, theta: FloatArray, length: float, start: FloatArray | None, free: bool
+) -> list[Window]:
     """Windows of about ``length``, each beginning as far as may be from a transition.
 
     Parameters

@@ -56,9 +56,10 @@ def fit(
 
     .. math:: \sum_{k, c} \frac{[y_{kc} - g_c\, q_c(t_k - d_c;\, z_0, p) - o_c]^2}{\sigma_c^2}
 
-    is minimized over the parameters p, the start z_0 of every window, and what is unknown of the sensors (gain g, offset o,
-    delay d). The derivatives of the motion are exact, through every transition (:func:`nonsmooth.sensitivity`). The
-    windows grow from a period of the motion to the whole record, as far as the motion can be followed.
+    is minimized over the parameters p, the start z_0 of every window, and what is unknown of the sensors (gain g,
+    offset o, delay d). The derivatives of the motion are exact, through every transition, as those of
+    :func:`nonsmooth.sensitivity`. The windows grow from a part of a period to the whole record, as far as the motion
+    can be followed.
 
     Parameters
     ----------
@@ -98,9 +99,10 @@ def fit(
     Returns
     -------
     ParameterSet
-        The parameters; in ``extra`` the unknowns of sensors, phases, starts (``"x(0)"``) and the ``"<quantity>.noise"``.
-        The covariance takes the residuals' own correlation into account; a parameter that the recording does not determine has
-        an infinite uncertainty and says so in ``identifiability``. ``anomalies`` says where the model fails.
+        The parameters; in ``extra`` the unknowns of sensors, phases, starts (``"x(0)"``) and ``"<quantity>.noise"``.
+        The covariance takes the residuals' own correlation into account; a parameter that the recording does not
+        determine has an infinite uncertainty and says so in ``identifiability``. ``anomalies`` says where the model
+        fails.
         ``.residuals`` is a Dataset of the readings, the fit and the residuals over ``sample``, drawn by
         ``ns.plot.identification.fit_residuals``.
 
@@ -196,7 +198,7 @@ def _best(
             except SolveError as reason:
                 why = reason
             else:
-                if best is None or found.rms < best.rms or found.good:
+                if best is None or found.good or found.rank < best.rank:
                     best = found
                 if found.good:
                     return best
@@ -245,17 +247,17 @@ def _guesses(
     yield from ((drawn[i], _LONGER if k % 2 else 1.0) for k, i in enumerate(order))
 
 
-def _distances(
-    problem: Windows, guess: FloatArray, start: FloatArray | None, free: bool, length: float
-) -> FloatArray:
-    """Mean squared residual of the first windows of each record, before any fit; infinite where none comes to an end."""
+def _distances(problem: Windows, guess: FloatArray, start: FloatArray | None, free: bool, length: float) -> FloatArray:
+    """Mean squared residual of the first windows of each record before any fit, infinite where there is none."""
     from nonsmooth.identification.fit.first_windows import first_windows
 
     total, count = np.zeros(len(problem.records)), np.zeros(len(problem.records))
     windows = problem.of(first_windows(problem, guess, length, start, free))
     if windows.pieces:
         weights = windows.weights(None, 0.0)
-        for w, r, weight in zip(windows.pieces, windows.residuals(guess, windows.starts).residuals, weights, strict=True):
+        for w, r, weight in zip(
+            windows.pieces, windows.residuals(guess, windows.starts).residuals, weights, strict=True
+        ):
             if np.isfinite(r).all():
                 total[w.record] += float(np.sum((r * weight) ** 2))
                 count[w.record] += len(r)

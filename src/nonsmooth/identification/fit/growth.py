@@ -25,6 +25,7 @@ __all__ = ["Grown", "grow"]
 FloatArray = NDArray[np.float64]
 _POOR = 50.0  # chi^2 per degree of freedom of the first windows, from which there is no use in longer ones
 _CHAOS = 1e3  # growth of a start's change within a window, from which neighbouring motions are not followed
+_REGULAR = 10.0  # that growth, below which a motion is regular enough to be followed over twice the time
 _WORSE = 1.5  # chi^2 per degree of freedom against that of the level before: a longer window does not fit
 _GOOD, _WHITE = 1.3, 5.0  # residuals over irregularity, and readings that share an error, of a fit that needs no other
 _ROUNDS = 12  # of noise from residuals and residuals from noise
@@ -47,6 +48,8 @@ class Grown:
         That distance in each parameter.
     rms : float
         Of the residuals, over the noise that the record's own irregularity shows.
+    stuck : bool
+        Whether longer windows did not fit though neighbouring motions do not separate fast.
     """
 
     problem: Windows
@@ -56,6 +59,18 @@ class Grown:
     short: float
     left: FloatArray
     rms: float
+    stuck: bool = False
+
+    @property
+    def unused(self) -> int:
+        """Number of readings in parts of the record that could not be simulated."""
+        given = sum(int(np.isfinite(record.values).sum()) for record in self.problem.records)
+        return given - sum(len(window.readings[0]) for window in self.problem.pieces)
+
+    @property
+    def rank(self) -> tuple[bool, bool, float]:
+        """Order of fits, the better one first."""
+        return self.unused > 0, self.stuck, self.rms
 
     @property
     def good(self) -> bool:
@@ -66,7 +81,7 @@ class Grown:
         """
         tau = [w.correlation(r) for w, r in zip(self.problem.pieces, self.state.residuals, strict=True)]
         whole = len(self.problem.pieces) == len(self.problem.records)
-        return self.rms <= _GOOD and (whole or float(np.median(tau)) < _WHITE)
+        return self.rms <= _GOOD and not self.stuck and not self.unused and (whole or float(np.median(tau)) < _WHITE)
 
 
 def grow(
@@ -94,7 +109,7 @@ def grow(
     """
     now, theta, starts, state = settle_first(problem, theta, length, start, free)
     told()
-    wide, poor = length, _reduced(now, state) > _POOR
+    wide, poor, stuck = length, _reduced(now, state) > _POOR, False
     while not poor and len(now.pieces) > len(problem.records) and wide < longest:
         for factor in (4.0, 2.0):
             longer = _longer_windows(now, theta, starts, state, min(factor * wide, longest))
@@ -103,8 +118,10 @@ def grow(
                 now, (theta, starts, state), wide = longer[0], longer[1], min(factor * wide, longest)
                 break
         else:
+            stuck = _spreads(now, starts, state) < _REGULAR
             break
-    return _final(now, theta, starts, problem.noise, 2 if poor else _ROUNDS)
+    final = _final(now, theta, starts, problem.noise, 2 if poor else _ROUNDS)
+    return replace(final, stuck=stuck)
 
 
 def _longer_windows(
@@ -145,9 +162,12 @@ def _joined(problem: Windows, starts: FloatArray, length: float) -> list[Window]
         else:
             groups.append([(window, start)])
     found = []
-    for group in groups:
-        (head, start), last = group[0], group[-1][0].last
+    for k, group in enumerate(groups):
+        head, start = group[0]
         record = problem.records[head.record]
+        behind = groups[k + 1][0][0] if k + 1 < len(groups) else head
+        # samples between, of windows that could not be simulated, come back here
+        last = behind.first if behind.record == head.record and behind is not head else len(record.time)
         found.append(replace(
             head, last=last, start=start, time=record.time[head.first:last], values=record.values[head.first:last]
         ))  # fmt: skip
@@ -156,7 +176,10 @@ def _joined(problem: Windows, starts: FloatArray, length: float) -> list[Window]
 
 def _reduced(problem: Windows, state: State) -> float:
     """Sum of squared residuals over the noise, per degree of freedom."""
-    rows = [r[: len(w.readings[0])] / problem.noise[w.readings[1]] for w, r in zip(problem.pieces, state.residuals, strict=True)]
+    rows = [
+        r[: len(w.readings[0])] / problem.noise[w.readings[1]]
+        for w, r in zip(problem.pieces, state.residuals, strict=True)
+    ]
     free = sum(w.n_free for w in problem.pieces) + len(problem.unknowns.names)
     total = sum(map(len, rows))
     return float(sum(float(r @ r) for r in rows)) / max(total - free, 0.1 * total)

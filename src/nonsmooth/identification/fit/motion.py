@@ -90,7 +90,7 @@ class Marcher:
         return self._derived(plain, values, begin, z, mode) if derivatives else plain
 
     def _derived(self, plain: Motion, values: FloatArray, begin: float, z: FloatArray, mode: int) -> Motion:
-        """The same with derivatives: samples and transitions cut the motion into pieces, whose matrices are multiplied."""
+        """The same with derivatives: products over the pieces between samples and transitions."""
         flow, log, n = self.flow, plain.log, self.flow.n
         size = n + flow.n_active
         first = int(log.sample_mode[0]), np.concatenate([np.nan_to_num(log.sample_u[0]), log.sample_memory[0]])

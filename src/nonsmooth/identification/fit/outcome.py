@@ -1,4 +1,4 @@
-"""A finished fit as a ``ParameterSet``: uncertainties, what is not identifiable, and where in the motion the model fails."""
+"""A finished fit as a ``ParameterSet``: uncertainties, what is not identifiable, and where the model fails."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ FloatArray = NDArray[np.float64]
 _TOGETHER = 0.98  # correlation from which two parameters are said to be known only together
 _POOR = 2.0  # residuals over the record's own irregularity, from which the model is said not to be the motion
 METHOD = (
-    "least squares over windows with free starts, derivatives through every transition (Bock 1981); covariance from the "
-    "scatter of the scores (Newey and West 1987)"
+    "least squares over windows with free starts, derivatives through every transition (Bock 1981); covariance from "
+    "the scatter of the scores (Newey and West 1987)"
 )
 
 
@@ -48,7 +48,8 @@ def outcome(grown: Grown, options: Mapping[str, Any]) -> ParameterSet:
     covariance[:s, :s] = jacobian @ of_theta @ jacobian.T
     covariance[m:s, m:s] += starts.own
     covariance[range(s, s + q), range(s, s + q)] = [one.uncertainty**2 for one in noise.values()]
-    for i in loose:
+    lost = np.flatnonzero(~(np.diag(covariance) >= 0.0))  # of a fit that went so wrong that nothing is left of it
+    for i in sorted({*loose, *lost.tolist()}):
         covariance[i, :], covariance[:, i] = 0.0, 0.0
         covariance[i, i] = np.inf
     values, units = [*theta, *starts.values], [*u.units, *starts.units]
@@ -105,7 +106,7 @@ def _starts(grown: Grown, found: Sandwich, back: list[Any]) -> _Starts:
 
 
 def _noise(grown: Grown, found: Sandwich) -> dict[str, Estimate]:
-    """Standard deviations of the readings that were found, rounding included; their uncertainty from those that are independent."""
+    """Standard deviations of readings, rounding included, where they were found from the residuals."""
     problem = grown.problem
     units = {**problem.system.states, **problem.system.outputs}
     rows = {}
@@ -128,8 +129,10 @@ def _undetermined(directions: FloatArray) -> dict[int, list[int]]:
     return found
 
 
-def _sentences(grown: Grown, covariance: FloatArray, loose: Mapping[int, list[int]], data: xr.Dataset) -> dict[str, str]:
-    """What each unknown rests on, and what the record does not say."""
+def _sentences(
+    grown: Grown, covariance: FloatArray, loose: Mapping[int, list[int]], data: xr.Dataset
+) -> dict[str, str]:
+    """A sentence for each unknown: what it rests on, or that the record does not determine it."""
     u, theta = grown.problem.unknowns, grown.theta
     error = np.sqrt(np.diag(covariance))
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -140,7 +143,7 @@ def _sentences(grown: Grown, covariance: FloatArray, loose: Mapping[int, list[in
         others = [u.names[k] for k in loose.get(i, []) if k != i]
         closest = int(np.argmax(np.abs(correlation[i])))
         if i in loose and others:
-            text = f"not identifiable: the record only tells a combination of it and {', '.join(others)}; give one its value"
+            text = f"not identifiable: only a combination of it and {', '.join(others)} is; give one its value"
         elif i in loose:
             text = "not identifiable: the recorded motion does not depend on it"
         elif theta[i] in (u.low[i], u.high[i]):
@@ -162,12 +165,16 @@ def _notes(grown: Grown, found: Sandwich, data: xr.Dataset) -> list[str]:
         notes = [f"one window for each of {records} records" if records > 1 else "one window over the whole record"]
     else:
         length = float(np.median([window.time[-1] - window.time[0] for window in problem.pieces]))
-        notes = [f"{n} windows of about {length:.4g}, each with its own start: over longer ones the motion is not followed"]
+        notes = [
+            f"{n} windows of about {length:.4g}, each with its own start: over longer ones the motion is not followed"
+        ]
     if found.correlation > 2.0:
         notes.append(f"the residuals correlate over {found.correlation:.3g} readings; the uncertainties account for it")
     places = [row for row in by_place(data) if row[2] >= 5]
     if len(places) > 1:
-        notes.append("rms of the residuals, over all: 1; " + "; ".join(f"{name}: {rms:.2f}" for name, rms, _ in places[:4]))
+        notes.append(
+            "rms of the residuals, over all: 1; " + "; ".join(f"{name}: {rms:.2f}" for name, rms, _ in places[:4])
+        )
     return notes
 
 
@@ -179,9 +186,20 @@ def _anomalies(grown: Grown, data: xr.Dataset) -> list[str]:
             f"the residuals are {grown.rms:.3g} times the record's own irregularity: the model does not describe this "
             f"record, least of all in {name} ({rms:.2f} times the mean); the uncertainties do not hold"
         )
+    if grown.unused:
+        found.append(
+            f"{grown.unused} of {grown.unused + data.sizes['sample']} readings are not used: the model has no motion "
+            "there (it begins beyond a stop, or does not come to an end)"
+        )
+    if grown.stuck:
+        length = float(np.median([window.time[-1] - window.time[0] for window in grown.problem.pieces]))
+        found.append(
+            f"the model follows this record over windows of {length:.3g} only, though neighbouring motions do not "
+            "separate faster: it does not describe the record over longer times, or another first guess does"
+        )
     if grown.short > 0.05:
         found.append(
-            f"the fit stands {grown.short:.2g} standard uncertainties short of its minimum: the sum of squares has corners "
-            "(grazes, rest), where no step leads on; what is left of the way is in the uncertainties"
+            f"the fit stands {grown.short:.2g} standard uncertainties short of its minimum: the sum of squares has "
+            "corners (grazes, rest), where no step leads on; what is left of the way is in the uncertainties"
         )
     return found

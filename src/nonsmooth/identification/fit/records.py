@@ -1,4 +1,4 @@
-"""Recordings of every kind as records: instants, one column for each measured quantity, NaN where there is no sample."""
+"""Recordings of every kind as records: instants, and one column for each measured quantity."""
 
 from __future__ import annotations
 
@@ -98,8 +98,8 @@ def _joined(label: str, columns: list[tuple[FloatArray, FloatArray]], settings: 
         if (np.diff(t) <= 0).any():
             where = int(np.flatnonzero(np.diff(t) <= 0)[0])
             raise ValueError(
-                f"run {label!r}: the time must increase from sample to sample; sample {where + 1} is at {t[where + 1]:.9g}"
-                f" after {t[where]:.9g}: sort the samples, or give each run by itself"
+                f"run {label!r}: the time must increase from sample to sample; sample {where + 1} is at "
+                f"{t[where + 1]:.9g} after {t[where]:.9g}: sort the samples, or give each run by itself"
             )
         values[np.searchsorted(time, t), c] = y
     return Record(label, time, values, settings)
@@ -175,7 +175,9 @@ def _settings(system: System, settings: Any, labels: list[str]) -> dict[str, dic
         return {label: {} for label in labels}
     if isinstance(settings, list | tuple):
         if len(settings) != len(labels):
-            raise ValueError(f"settings lists {len(settings)} runs, the recording has {len(labels)}: {', '.join(labels)}")
+            raise ValueError(
+                f"settings lists {len(settings)} runs, the recording has {len(labels)}: {', '.join(labels)}"
+            )
         settings = dict(zip(labels, settings, strict=True))
     if not isinstance(settings, Mapping):
         raise TypeError(

@@ -23,7 +23,7 @@ _GRAZING = 0.03  # clearance over the largest size of the indicator, below which
 
 
 def residual_data(grown: Grown, options: Mapping[str, Any]) -> xr.Dataset:
-    """Readings, fit and residuals over ``sample``, each with its run, quantity, window, mode and place in the motion."""
+    """Readings, fit and residuals over ``sample``, each with its run, quantity, window, mode and place."""
     import xarray as xr
 
     from nonsmooth.results.labels import labels_of
@@ -41,7 +41,9 @@ def residual_data(grown: Grown, options: Mapping[str, Any]) -> xr.Dataset:
         predicted, _ = problem.readings(theta, window, motion, False)
         k, c = window.readings
         shift = motion.time[0] - problem.instants(theta, window)[0]
-        here = np.minimum(np.searchsorted(motion.time, window.time[k] + shift - problem.delays(theta)[c]), len(motion.time) - 1)
+        here = np.minimum(
+            np.searchsorted(motion.time, window.time[k] + shift - problem.delays(theta)[c]), len(motion.time) - 1
+        )
         columns["time"].append(window.time[k])
         columns["run"].append(np.full(len(k), window.record))
         columns["quantity"].append(c)
@@ -63,7 +65,8 @@ def residual_data(grown: Grown, options: Mapping[str, Any]) -> xr.Dataset:
     data["residual"] = (data["measured"] - data["fitted"]) / data["noise"]
     for name, words in flags.items():
         data[name].attrs = {
-            "flag_values": np.arange(len(words)), "flag_meanings": " ".join(word.replace(" ", "_") for word in words)
+            "flag_values": np.arange(len(words)),
+            "flag_meanings": " ".join(word.replace(" ", "_") for word in words),
         }
     for name in ("measured", "fitted", "noise"):
         data[name].attrs["units"] = unit

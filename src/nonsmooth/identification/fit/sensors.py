@@ -125,7 +125,9 @@ class Readout:
 
     def __init__(self, system: System, name: str, places: Sequence[int]) -> None:
         self.traced, self.places = system.traced, tuple(places)
-        self.state = self.traced.u.index(self.traced.u[list(system.states).index(name)]) if name in system.states else -1
+        self.state = (
+            self.traced.u.index(self.traced.u[list(system.states).index(name)]) if name in system.states else -1
+        )
         self.output = -1 if self.state >= 0 else list(system.outputs).index(name)
 
     def value(self, t: FloatArray, z: FloatArray, mode: Any, p: FloatArray) -> FloatArray:

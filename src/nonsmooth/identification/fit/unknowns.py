@@ -64,7 +64,7 @@ def read_unknowns(
     system: System, sensors: Mapping[str, Sensor], parameters: Any, priors: Any, runs: Sequence[str],
     settings: Sequence[Mapping[str, float]],
 ) -> Unknowns:  # fmt: skip
-    """What is to be found, from the names (and bounds) and the priors that were given.
+    """Read the unknowns of a fit from names, bounds and priors.
 
     Raises
     ------

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -122,7 +122,8 @@ class Windows:
         """The sensors at these values of the unknowns."""
         found = dict(self.sensors)
         for i, (quantity, what) in enumerate(self.unknowns.sensors, start=len(self.unknowns.active)):
-            found[quantity] = replace(found[quantity], **{what: float(theta[i]) or (1e-300 if what == "gain" else 0.0)})
+            value: Any = float(theta[i]) or (1e-300 if what == "gain" else 0.0)
+            found[quantity] = replace(found[quantity], **{what: value})
         return found
 
     def values(self, theta: FloatArray, record: int) -> FloatArray | None:
@@ -163,7 +164,9 @@ class Windows:
             return window.time - delays[0]
         return np.unique((window.time[:, None] - delays).ravel())
 
-    def readings(self, theta: FloatArray, window: Window, motion: Motion, slopes: bool) -> tuple[FloatArray, FloatArray]:
+    def readings(
+        self, theta: FloatArray, window: Window, motion: Motion, slopes: bool
+    ) -> tuple[FloatArray, FloatArray]:
         """Predicted readings (R,), and their derivatives (R, unknowns of the window + n) where asked for."""
         values = self.values(theta, window.record)
         assert values is not None

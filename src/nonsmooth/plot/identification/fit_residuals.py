@@ -64,7 +64,9 @@ def _over_time(data: Any, ax: Axes | None, quantity: str | None, run: str | None
     time, modes, place = part["time"].values, _words(data, "mode"), part["place"].values
     n_modes = len(modes)
     with style.axes(ax, ratio=0.9) as drawn:
-        drawn.plot(time, part["measured"].values, ".", color=MEASURED, markersize=2.5, label="measured", rasterized=True)
+        drawn.plot(
+            time, part["measured"].values, ".", color=MEASURED, markersize=2.5, label="measured", rasterized=True
+        )
         colors = {int(m): style.COLORS[_COLORS[k % len(_COLORS)]] for k, m in enumerate(np.unique(part["mode"].values))}
         for m, color in colors.items():
             inside = (part["mode"].values == m) & np.append(np.diff(part["window"].values) == 0, False)
@@ -75,7 +77,7 @@ def _over_time(data: Any, ax: Axes | None, quantity: str | None, run: str | None
         name_axes(drawn, ("time", ""), (_words(data, "quantity")[q], unit))
         near = place >= n_modes
         residual = part["residual"].values
-        rows = [(time, residual, {"markersize": 2.0})]
+        rows: list[tuple[Any, Any, dict[str, Any]]] = [(time, residual, {"markersize": 2.0})]
         if near.any():
             rows.append((time[near], residual[near], {"color": style.COLORS["second"], "markersize": 3.5}))
         residual_strip(drawn, "standard deviations", *rows)
@@ -95,7 +97,9 @@ def _by_place(data: Any, ax: Axes | None) -> Axes:
             drawn.barh(row, size, xerr=error, color=color, height=0.6, error_kw={"elinewidth": 0.8})
             drawn.text(0.0, row, f" {len(r)}", va="center", fontsize=style.small(drawn), color="white")
         drawn.axvline(1.0, color=style.COLORS["muted"], linewidth=0.7)
-        drawn.set_yticks(range(len(held)), [names[i].replace("->", " \N{RIGHTWARDS ARROW} ").replace("_", " ") for i in held])
+        drawn.set_yticks(
+            range(len(held)), [names[i].replace("->", " \N{RIGHTWARDS ARROW} ").replace("_", " ") for i in held]
+        )
         drawn.invert_yaxis()
         drawn.set_xlabel("rms of the residuals (standard deviations)")
     return drawn
