@@ -63,7 +63,13 @@ def settle_first(
         if not changed and not smaller.any():
             break
     theta, starts, state = level(now, theta, starts, used)
-    return now, theta, starts, state
+    moves = [bool(np.isfinite(r).all()) for r in state.residuals]
+    if all(moves):
+        return now, theta, starts, state
+    kept, starts = now.of([w for w, whole in zip(now.pieces, moves, strict=True) if whole]), starts[moves]
+    if not kept.pieces:
+        raise SolveError("no window of the record can be simulated at the parameters that fit it best")
+    return kept, theta, starts, kept.derivatives(theta, starts)
 
 
 def level(

@@ -72,10 +72,12 @@ def _over_time(data: Any, ax: Axes | None, quantity: str | None, run: str | None
             inside = (part["mode"].values == m) & np.append(np.diff(part["window"].values) == 0, False)
             line = np.where(inside | np.roll(inside, 1), part["fitted"].values, np.nan)
             drawn.plot(time, line, color=color, linewidth=0.9, label=f"fit: {modes[m]}")
+        near = place >= n_modes
+        if near.any():
+            drawn.plot([], [], ".", color=style.COLORS["second"], label="residual at a transition or graze")
         drawn.legend(**ABOVE, ncols=min(3, len(colors) + 1), columnspacing=1.0)
         unit = str(part["measured"].attrs.get("units", ""))
         name_axes(drawn, ("time", ""), (_words(data, "quantity")[q], unit))
-        near = place >= n_modes
         residual = part["residual"].values
         rows: list[tuple[Any, Any, dict[str, Any]]] = [(time, residual, {"markersize": 2.0})]
         if near.any():
