@@ -141,7 +141,8 @@ def fit(
     tried = whole_number(tries, "tries", 1)
     best = _best(problem, begin, bool(free_start), longest, tried, whole_number(seed, "seed", 0), progress)
     options = {"parameters": list(problem.unknowns.names), "window": window, "tries": tries, "seed": seed}
-    return outcome(best, options)
+    given = recording if isinstance(recording, list | tuple) else [recording]
+    return outcome(best, options, synthetic=any(getattr(one, "synthetic", False) for one in given))
 
 
 def problem_of(

@@ -31,7 +31,7 @@ METHOD = (
 )
 
 
-def outcome(grown: Grown, options: Mapping[str, Any]) -> ParameterSet:
+def outcome(grown: Grown, options: Mapping[str, Any], synthetic: bool = False) -> ParameterSet:
     """The parameters, with what is known of how well."""
     problem, theta = grown.problem, grown.theta
     u, used = problem.unknowns, np.ones(len(problem.pieces), dtype=bool)
@@ -60,7 +60,7 @@ def outcome(grown: Grown, options: Mapping[str, Any]) -> ParameterSet:
     a = len(u.active)
     estimates = dict(zip(u.active, rows[:a], strict=True))
     extra = {**dict(zip([*u.names[a:], *starts.names], rows[a:], strict=True)), **noise}
-    data = residual_data(grown, options)
+    data = residual_data(grown, options).assign_attrs(synthetic="yes" if synthetic else "no")
     notes = _notes(grown, found, data)
     finding = Finding(
         "fit", next(iter({**estimates, **extra}.values())), METHOD, data.sizes["sample"],
@@ -69,7 +69,7 @@ def outcome(grown: Grown, options: Mapping[str, Any]) -> ParameterSet:
     return ParameterSet(
         estimates, covariance, extra=extra, findings=[finding],
         identifiability=_sentences(grown, covariance[:m, :m], loose, data), notes=notes,
-        anomalies=_anomalies(grown, data),
+        anomalies=_anomalies(grown, data), synthetic=synthetic,
     )  # fmt: skip
 
 

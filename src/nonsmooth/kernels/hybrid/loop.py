@@ -1,11 +1,11 @@
-"""The hybrid loop: one trajectory through legs and transitions, over a stepper and an observer.
+"""The hybrid loop: one trajectory through segments and transitions, over a stepper and an observer.
 
 The *stepper* knows the flow: ``linear.stepper`` (linear modes with harmonic forcing, any number of states) or
-``series.stepper`` (generated Taylor series, Runge-Kutta-Fehlberg). It prepares a point, marches a leg to its first
-crossing, lands there, takes transitions and says which conditions hold just after. The *observer* (``sections``,
-``record`` or ``growth``) says how far to go and looks at each leg and each transition. Their functions stand in the
+``series.stepper`` (generated Taylor series, Runge-Kutta-Fehlberg). It prepares a point, marches a segment to its first
+crossing, ends it there, takes transitions and says which conditions hold just after. The *observer* (``sections``,
+``record`` or ``growth``) says how far to go and looks at each segment and each transition. Their functions stand in the
 text that is joined with this file. Everything else is here: start rule, transitions of one instant in declared order,
-guards of chatter, the clock.
+limits on chatter, the clock.
 
 All that a run knows beside its arrays stands in ``work.tally`` and ``work.memo``: it may pause and go on.
 """
@@ -16,6 +16,7 @@ from nonsmooth.kernels.hybrid.codes import (
     CHATTER,
     DIVERGED,
     NOT_GUARANTEED,
+    NOT_UNIQUE,
     OK,
     PAUSED,
     TOO_MANY_CROSSINGS,
@@ -24,6 +25,7 @@ from nonsmooth.kernels.hybrid.places import (
     BEGUN,
     BURST,
     BURST_LENGTH,
+    DEAD_END,
     FIRED,
     JUMPS,
     MODE,
@@ -69,6 +71,8 @@ def settle(i, form, net, tables, work):
         if t < 0:
             break
         tally[MODE] = take(i, t, -1, form, tables, net, work)
+        if net.transitions[t, 2] == DEAD_END:
+            return NOT_UNIQUE
         visited[tally[MODE]] = 1
     return OK
 
@@ -95,7 +99,7 @@ def begin(i, form, net, section, motion, tables, work):
 
 @once
 def land(i, step, stop, t, full, form, net, tables, work):
-    """End a leg: clock and state; ``stop`` is the time at which it ends exactly, or -1.
+    """End a segment: clock and state; ``stop`` is the time at which it ends exactly, or -1.
 
     Returns (transition, a period has ended, closely behind a crossing)."""
     memo, T = work.memo, form.period[i]
@@ -128,6 +132,9 @@ def transit(i, t, short, form, net, section, goal, seen, tables, work):
         cross(i, t, mode, jumps, form, net, goal, seen, tables, work)
         tally[MODE] = mode
         jumps += 1
+        if net.transitions[t, 2] == DEAD_END:
+            code = NOT_UNIQUE
+            break
         t = next_holding(mode, tables, net, work)
     depart(jumps, seen, work)
     tally[JUMPS] += jumps

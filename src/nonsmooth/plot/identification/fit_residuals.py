@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.plot import style
-from nonsmooth.plot.comparison import ABOVE, MEASURED
+from nonsmooth.plot.comparison import ABOVE, MEASURED, measured_label
 from nonsmooth.plot.identification.findings import data_of
 from nonsmooth.plot.identification.residuals import residual_strip
 from nonsmooth.plot.labels import name_axes
@@ -65,7 +65,7 @@ def _over_time(data: Any, ax: Axes | None, quantity: str | None, run: str | None
     n_modes = len(modes)
     with style.axes(ax, ratio=0.9) as drawn:
         drawn.plot(
-            time, part["measured"].values, ".", color=MEASURED, markersize=2.5, label="measured", rasterized=True
+            time, part["measured"].values, ".", color=MEASURED, markersize=2.5, label=measured_label(data), rasterized=True
         )
         colors = {int(m): style.COLORS[_COLORS[k % len(_COLORS)]] for k, m in enumerate(np.unique(part["mode"].values))}
         for m, color in colors.items():
