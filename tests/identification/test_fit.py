@@ -137,6 +137,7 @@ def test_a_table_a_dataset_and_a_recording_are_the_same_record():
     given = [frame, frame.set_index("time"), dataset, recording, {"position": (t, x)}, {"time": t, "position": x}]
     found = [ns.fit(free().with_parameters(k=9.0), one, ["k"], measured={"x": "position"}, tries=1) for one in given]
     assert len({one["k"] for one in found}) == 1
+    assert [one.synthetic for one in found] == [False, False, False, True, False, False]
     assert abs(found[0]["k"] - K) < 4 * found[0].uncertainty["k"]
 
 

@@ -65,8 +65,9 @@ def _over_time(data: Any, ax: Axes | None, quantity: str | None, run: str | None
     n_modes = len(modes)
     with style.axes(ax, ratio=0.9) as drawn:
         drawn.plot(
-            time, part["measured"].values, ".", color=MEASURED, markersize=2.5, label=measured_label(data), rasterized=True
-        )
+            time, part["measured"].values, ".", color=MEASURED, markersize=2.5, rasterized=True,
+            label=measured_label(data),
+        )  # fmt: skip
         colors = {int(m): style.COLORS[_COLORS[k % len(_COLORS)]] for k, m in enumerate(np.unique(part["mode"].values))}
         for m, color in colors.items():
             inside = (part["mode"].values == m) & np.append(np.diff(part["window"].values) == 0, False)
