@@ -1,4 +1,4 @@
-"""What is saved from a page makes what it showed: scripts and study files are run, and compared with the data."""
+"""Files saved from a page make what it showed: scripts and study files are run, and compared with the data."""
 
 from __future__ import annotations
 
