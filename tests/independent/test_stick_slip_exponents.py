@@ -70,8 +70,8 @@ def test_spectra_of_chaotic_stick_slip(make: Callable[[], tuple[ns.System, Stick
     found = ns.lyapunov(system, periods=periods, start=BEGIN, progress=False)
     exponents, own = found.exponents.values, float(found.standard_error[0])
     print(
-        f"\n{system.name}: {len(t)} onsets, next ones within {gaps.max():.1e}; exponents {exponents[0]:.5f} +- {own:.5f} "
-        f"and {exponents[1]}, map {expected:.5f} +- {error:.5f}"
+        f"\n{system.name}: {len(t)} onsets, next ones within {gaps.max():.1e}; exponents {exponents[0]:.5f} +- "
+        f"{own:.5f} and {exponents[1]}, map {expected:.5f} +- {error:.5f}"
     )
     assert len(t) > 2000 and gaps.max() < 1e-6
     assert exponents[1] == -np.inf

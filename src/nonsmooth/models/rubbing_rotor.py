@@ -61,9 +61,9 @@ def rubbing_rotor(**parameters: float) -> System:
         ``zeta`` 0.05, ``beta`` 0.04 (stiffness of the shaft over that of the stator), ``R_0`` 1.05 (clearance), ``mu``
         0.2 (friction), ``omega`` 0.2 (speed of rotation); dimensionless. The friction does not change its sign: the
         surface of the disc is taken to be faster than any backward whirl. Above
-        :math:`\mu = 2 \zeta \sqrt{1 + \beta}` a large backward whirl therefore grows without bound (dry whip; a real one
-        ends where the disc rolls on the stator): with the values above runs from near the centre meet it, and end as
-        ``diverged``, from about ``omega`` 0.46 on.
+        :math:`\mu = 2 \zeta \sqrt{1 + \beta}` a large backward whirl therefore grows without bound (dry whip; a real
+        one ends where the disc rolls on the stator): with the values above runs from near the centre meet it, and end
+        as ``diverged``, from about ``omega`` 0.46 on.
 
     Returns
     -------

@@ -41,7 +41,8 @@ def stick_slip_belt(**parameters: float) -> System:
     Parameters
     ----------
     **parameters : float
-        ``F`` 1 (static friction), ``delta`` 3 (decrease of friction), ``v_b`` 0.2 (belt), ``c`` 0 (damping); dimensionless.
+        ``F`` 1 (static friction), ``delta`` 3 (decrease of friction), ``v_b`` 0.2 (belt), ``c`` 0 (damping);
+        dimensionless.
 
     Returns
     -------
