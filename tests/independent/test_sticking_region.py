@@ -49,6 +49,7 @@ def campaign(combinations: list[tuple[float, float, float]], count: int, periods
             targets = np.array([jump.target for jump in system.transitions])[run.crossing_transition.values]
             told["rested"] += "stop_rest" in {system.modes[i] for i in set(targets.tolist())}
             told["runs"], told["impacts"] = told["runs"] + 1, told["impacts"] + len(targets)
+        print(f"sigma {sigma}, w {w}, r {r}: until here {told}", flush=True)
     return told
 
 
@@ -61,7 +62,6 @@ def test_a_few_runs_from_the_sticking_region() -> None:
 def test_ten_thousand_runs_from_the_sticking_region() -> None:
     """1000 periods each: none hangs, none passes the stop, no impact adds energy."""
     told = campaign(COMBINATIONS, 500, PERIODS)
-    print("\n", told)
     assert told["runs"] == 10_000
     assert told["excess"] <= BEYOND and told["gain"] <= BEYOND
     assert told["rested"] == told["runs"]
