@@ -1,5 +1,7 @@
 """Fits of any system: data are closed forms or another program's; derivatives are checked against differences."""
 
+import time
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -258,6 +260,42 @@ def test_a_chaotic_record_is_fitted_over_windows_from_one_voltage():
     assert np.max(np.abs(normalized(found, case.truth))) < 4.0
     assert max(found.uncertainty[n] / abs(case.truth[n]) for n in case.find) < 0.01
     assert "windows" in found.notes[0] and not found.anomalies
+
+
+def test_models_are_ranked_by_what_they_predict():
+    t = np.arange(0, 14, 0.02)
+    x = closed_form(t) + 1e-4 * np.random.default_rng(8).standard_normal(len(t))
+    system = free().with_parameters(k=9.0)
+    ranked = ns.select_model(
+        {
+            "true": (system, ["k", "c"]),
+            "undamped": (system.with_parameters(c=0.0), ["k"]),
+            "with one more": (system, ["k", "c", "m"]),  # known beside rho: a parameter that nothing asks for
+        },
+        {"x": (t, x)}, progress=False,
+    )  # fmt: skip
+    assert ranked.rms.sel(model="true") == pytest.approx(1.0, abs=0.15)  # white noise of known irregularity
+    assert ranked.rms.sel(model="undamped") > 3.0
+    more = ranked.sel(model=["true", "with one more"])
+    assert float(abs(more.squared_error.diff("model").mean())) < 0.05
+    with pytest.raises(ValueError, match="at least two systems"):
+        ns.select_model({"one": (system, ["k"])}, {"x": (t, x)})
+    with pytest.raises(ValueError, match="too short for folds = 50"):
+        ns.select_model({"a": (system, ["k"]), "b": (system, ["c"])}, {"x": (t, x)}, folds=50)
+
+
+def test_five_parameters_of_two_thousand_samples_take_seconds():
+    case = CASES["impact oscillator"]
+    t = np.linspace(0.0, 120.0, 2000)
+    x = case.motion(case.truth, {"x": 0.1, "v": 0.2}, t)[:, 0]
+    x += 5e-3 * np.random.default_rng(9).standard_normal(len(t))
+    guess = case.system().with_parameters({**case.truth, "k": 0.85, "c": 0.12, "d": 0.7, "e": 0.5, "A": 1.15})
+    names = ["k", "c", "d", "e", "A"]
+    ns.fit(guess, {"x": (t[:200], x[:200])}, names, tries=1)  # compiles
+    begun = time.process_time()
+    found = ns.fit(guess, {"x": (t, x)}, names)
+    assert time.process_time() - begun < 5.0
+    assert np.max(np.abs(normalized(found, {name: case.truth[name] for name in names}))) < 4.0
 
 
 def test_mistakes_are_answered_with_what_to_do():
