@@ -209,36 +209,25 @@ def test_readings_of_which_the_model_has_no_motion_are_counted():
 
 
 @pytest.mark.slow
-def test_coverage_over_ten_systems():
-    seeds, rows, every = 40, [], []
-    for name, case in CASES.items():
-        far, said, silent = [], 0, 0
+def test_intervals_cover_the_truth_over_forty_seeds():
+    seeds, every = 40, []
+    for name in ("impact oscillator", "stick-slip belt", "gear pair", "bilinear oscillator"):
+        case, far, said = CASES[name], [], 0
         for seed in range(seeds):
             data, measured, _ = case.recording(seed)
-            try:
-                found = ns.fit(case.guess(seed), data, case.find, measured=measured, progress=False)
-            except SolveError:
-                said += 1
-                continue
+            found = ns.fit(case.guess(seed), data, case.find, measured=measured, progress=False)
             if found.anomalies:
                 said += 1
-                continue
-            z = normalized(found, {one: case.truth[one] for one in case.find})
-            silent += bool(np.max(np.abs(z)) > 8.0)
-            far.append(z)
-        pooled = np.concatenate(far)
-        every.append(pooled)
-        cover, rms = float(np.mean(np.abs(pooled) < 1.96)), float(np.sqrt(np.mean(pooled**2)))
-        rows.append((name, seeds - said - silent, said, silent, cover, rms))
-        good = seeds - said - silent
-        print(f"{name:22} converged {good:2}, said no {said}, silent {silent}, cover {cover:.3f}, rms {rms:.2f}")
-    pooled = np.concatenate(every)
-    cover, rms = float(np.mean(np.abs(pooled) < 1.96)), float(np.sqrt(np.mean(pooled**2)))
-    print(f"{'all':22} {len(pooled)} intervals, cover {cover:.3f}, rms {rms:.2f}")
-    for name, converged, _, silent, each, _ in rows:
-        assert converged >= 38 and silent == 0, name
-        assert 0.90 <= each <= 0.98, name
-    assert 0.93 <= cover <= 0.97 and 0.85 <= rms <= 1.15
+            else:
+                far.append(normalized(found, {one: case.truth[one] for one in case.find}))
+        z = np.concatenate(far)
+        every.append(z)
+        cover, rms = np.mean(np.abs(z) < 1.96), np.sqrt(np.mean(z**2))
+        print(f"{name:20} converged {len(far)}, the others say so: {said}; cover {cover:.3f}, rms {rms:.2f}")
+        assert len(far) >= 38 and np.max(np.abs(z)) < 5.0
+        assert cover >= 0.90 and 0.85 <= rms <= 1.15
+    z = np.concatenate(every)
+    assert 0.93 <= np.mean(np.abs(z) < 1.96) <= 0.975 and 0.85 <= np.sqrt(np.mean(z**2)) <= 1.15
 
 
 @pytest.mark.parametrize("name", ["impact oscillator", "bilinear oscillator"])
