@@ -50,6 +50,7 @@ class Description:
     bands: tuple[TracedBand, ...] = ()
     symmetry: Symmetry | None = None
     explicit_time: bool = False  # depends on the time, and not periodically
+    ranges: tuple[tuple[sp.Expr, str], ...] = ()  # of the parameters: what must not be negative, and what to say
     variants: dict[Any, Any] = field(default_factory=dict, compare=False, repr=False)  # a cache, see variant.py
 
     def with_sliding(self, traced: Traced) -> Traced:
@@ -100,13 +101,15 @@ def describe(
         name, units, {k: v.unit for k, v in known.items()}, {k: unit for k, (_, unit) in remembered.items()}
     )
     derived: Collection[str] = ()
+    ranges: Sequence[tuple[sp.Expr, str]] = ()
     if elements:
-        from nonsmooth.system.assembly import assembled
+        from nonsmooth.system.combinations import assembled
 
         given = {"indicators": indicators, "transitions": transitions, "outputs": outputs}
         now = {symbols.p[key]: parameter.value for key, parameter in known.items()}
         made = assembled(symbols, modes, elements, given, _scale(scale, units, name), now)
         derived = made["indicators"].keys() - (indicators or {}).keys()
+        ranges = made["ranges"]
         modes, indicators, transitions, outputs = (made[k] for k in ("modes", "indicators", "transitions", "outputs"))
     indicators = dict(indicators or {})
     shown = {key: _output(key, given) for key, given in (outputs or {}).items()}
@@ -137,7 +140,7 @@ def describe(
         traced=traced, surfaces=surfaces,
         bands=tuple(trace_band(key, band, traced, symbols, shown, known) for key, band in bands.items()),
         symmetry=None if symmetry is None else trace_symmetry(symmetry, traced, symbols, values),
-        explicit_time=explicit,
+        explicit_time=explicit, ranges=tuple(ranges),
     )  # fmt: skip
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import sympy as sp
@@ -22,6 +23,7 @@ from nonsmooth.system.scalar import Scalar
 from nonsmooth.system.traced import Row
 from nonsmooth.system.tracing import Symbols
 from nonsmooth.system.transition import Surface, Transition
+from nonsmooth.system.variant import variant_of
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
@@ -123,6 +125,8 @@ def _content(d: Description) -> dict[str, Any]:
             "shift": d.symmetry.shift,
             "modes": {t.mode_names[i]: t.mode_names[j] for i, j in enumerate(d.symmetry.modes)},
         }
+    if d.ranges:
+        content["ranges"] = [{"not negative": text(e), "else": sentence} for e, sentence in d.ranges]
     if d.bands:
         content["bands"] = {t.indicator_names[band.indicator]: _band_content(band, d) for band in d.bands}
     return content
@@ -171,7 +175,8 @@ def read_system(text: str) -> System:
             f"{_VERSION}"
         )
     try:
-        system = System(**_Reader(content).arguments())
+        reader = _Reader(content)
+        system = reader.within_ranges(System(**reader.arguments()))
         smoothing = content.get("smoothing")
         return system if smoothing is None else system.smoothed(smoothing["eta"])
     except SystemDefinitionError as error:  # names and units in it may be of any length
@@ -227,6 +232,14 @@ class _Reader:
             "symmetry": symmetry and (self.vector(symmetry["map"]), symmetry["shift"], symmetry["modes"]),
             "bands": {k: self.band(e) for k, e in self.bands.items()},
         }
+
+    def within_ranges(self, system: System) -> System:
+        """The system with what its parameters must fulfil beyond what its equations say."""
+        ranges = [(self.function(e["not negative"])().expression, e["else"]) for e in self.content.get("ranges", [])]
+        if not ranges:
+            return system
+        description = replace(system._description, ranges=tuple(ranges), variants={})
+        return type(system)._make(description, dict(system.values), variant_of(description))
 
     def transition(self, entry: Mapping[str, Any]) -> Transition | Surface:
         if "surface" in entry:

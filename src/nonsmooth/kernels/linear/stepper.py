@@ -74,7 +74,8 @@ def flat(tables, mode, f, w):
 def vanishing(tables, mode, f, w):
     """(k, sign): the first derivative of functional f from the second on that is not zero within rounding at w.
 
-    Of those up to the fourth; (5, 0) where they vanish all."""
+    Of those up to the fourth; (5, 0) where they vanish all. A harmonic's rounding is that of its phase, whatever its
+    value: a force that presses may be nothing else."""
     tay = tables.tay
     for k in range(2, 5):
         total = tay[mode, f, ONE, k]
@@ -82,7 +83,7 @@ def vanishing(tables, mode, f, w):
         for j in range(M):
             if j != ONE:
                 total += tay[mode, f, j, k] * w[j]
-                size += fabs(tay[mode, f, j, k] * w[j])
+                size += fabs(tay[mode, f, j, k]) * (fabs(w[j]) if j < WAVE else 1.0)
         if fabs(total) > 64.0 * EPS * size:
             return k, 1 if total > 0.0 else -1
     return 5, 0
