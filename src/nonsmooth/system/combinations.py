@@ -228,9 +228,7 @@ def assembled(
     counts = [len(part.element.phases) for part in make.parts]
     number = len(base) * int(sp.prod(counts))
     if number > MOST:
-        raise SystemDefinitionError(
-            f"{len(parts)} elements have {number} combinations of phases; at most {MOST} are written out"
-        )
+        return _opened(make, parts, base, given)
     every = product(base, product(*[range(count) for count in counts]))
     pairs = [pair for pair in every if make.may_hold(make.held(pair[1]), pair[0])]
 
@@ -273,6 +271,26 @@ def assembled(
         "indicators": {**(given["indicators"] or {}), **{key: _returns(g) for key, g in make.indicators.items()}},
         "outputs": {**outputs, **{f"{key}_force": (table, "") for key, table in forces.items()}},
         "ranges": make.ranges(next(iter(base))),
+    }  # fmt: skip
+
+
+def _opened(
+    make: Expressions, parts: Mapping[str, Element], base: Mapping[str, tuple[sp.Expr, ...]], given: Mapping[str, Any]
+) -> dict[str, Any]:
+    """The system without its elements, with all that these need as indicators: modes are made when they are visited."""
+    from nonsmooth.system.patterns import Patterns
+
+    if len(base) > 1 or any(given[key] for key in ("transitions", "indicators", "memory", "symmetry", "bands")):
+        raise SystemDefinitionError(
+            f"{len(parts)} elements have more than {MOST} combinations of phases, which are not written out but made when "
+            "they are visited: such a system has one mode and no indicators, transitions, memory, symmetry or bands of its "
+            "own"
+        )
+    patterns = Patterns(make, next(iter(base)))
+    return {
+        "modes": {key: _returns(list(field)) for key, field in base.items()}, "transitions": (),
+        "indicators": {f"row_{i}": _returns(e) for i, e in enumerate(patterns.expressions)},
+        "outputs": given["outputs"], "ranges": make.ranges(patterns.mode), "patterns": patterns,
     }  # fmt: skip
 
 

@@ -13,7 +13,7 @@ def scratch(n_modes, n_indicators, n_outputs, n_rows):
     """Tables and working memory for one thread, in one block."""
     n_f = n_indicators + STATES + n_outputs
     vectors = [np.zeros(M) for _ in range(8)]
-    integers = [np.zeros(n, dtype=np.int64) for n in (n_indicators, 4, n_modes, n_indicators, 1, N_TALLY)]
+    integers = [np.zeros(n, dtype=np.int64) for n in (n_indicators, 4, n_modes, n_indicators, 2, N_TALLY)]
     block = one_block(
         np.zeros((n_modes, NODES + 1, M, STATES)), np.zeros((n_modes, NODES + 1, 2 * HARMONICS + 1)),
         np.zeros((n_modes, n_f, 2 * (M + STATES + 1))), np.zeros((n_modes, n_f, M, DEGREE + 1)),

@@ -169,31 +169,31 @@ def start_on_section(form, section, tables, work):
 
 
 @inline
-def mapped(i, t, r, form, w):
-    """State r behind transition t."""
-    total = form.rb[i, t, r]
+def mapped(i, m, r, form, w):
+    """State r behind the map m."""
+    total = form.rb[i, m, r]
     if STATES >= MANY:
-        total = dot(total, form.ra[i, t, r], 0, w, STATES)
+        total = dot(total, form.ra[i, m, r], 0, w, STATES)
     else:
         for j in range(STATES):
-            total += form.ra[i, t, r, j] * w[j]
+            total += form.ra[i, m, r, j] * w[j]
     for h in range(HARMONICS):
-        total += form.rc[i, t, h, r] * w[WAVE + 2 * h] + form.rs[i, t, h, r] * w[WAVE + 1 + 2 * h]
+        total += form.rc[i, m, h, r] * w[WAVE + 2 * h] + form.rs[i, m, h, r] * w[WAVE + 1 + 2 * h]
     return total
 
 
 @inline
 def apply_map(i, t, form, net, work):
     """The states behind transition t, into w; of many only those that it changes are looked at."""
-    w, wn = work.w, work.wn
+    w, wn, m = work.w, work.wn, net.transitions[t, 3]
     if STATES >= MANY:
-        for q in range(1, net.changed[t, 0] + 1):
-            wn[net.changed[t, q]] = mapped(i, t, net.changed[t, q], form, w)
-        for q in range(1, net.changed[t, 0] + 1):
-            w[net.changed[t, q]] = wn[net.changed[t, q]]
+        for q in range(1, net.changed[m, 0] + 1):
+            wn[net.changed[m, q]] = mapped(i, m, net.changed[m, q], form, w)
+        for q in range(1, net.changed[m, 0] + 1):
+            w[net.changed[m, q]] = wn[net.changed[m, q]]
     else:
         for r in range(STATES):
-            wn[r] = mapped(i, t, r, form, w)
+            wn[r] = mapped(i, m, r, form, w)
         for r in range(STATES):
             w[r] = wn[r]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -47,10 +47,20 @@ class Coulomb(Element):
 
     kinematics: ClassVar[str] = "speed"
     phases: ClassVar[tuple[str, ...]] = ("stick", "forward", "back")
+    laws: ClassVar[tuple[str, ...]] = ("friction", "static", "normal")
+    conditions: ClassVar[tuple[str, ...]] = (
+        "speed", "speed_above", "speed_below", "over", "under", "turned_forward", "turned_back",
+    )  # fmt: skip
     held: ClassVar[tuple[str, ...]] = ("stick",)
 
     def placed(self, q: Any, v: Any, law: Callable[[Law], Any]) -> Any:
         return v - law(self.belt)
+
+    def needs(self, others: Collection[str]) -> list[tuple[str, int | None]]:
+        sides = (1, -1, 0) if self.static is None else (1, -1)
+        own = [("static", None)] if self.static is not None else []
+        pressed = [("normal", None)] if self.normal is not None and self.normal not in others else []
+        return [*(("friction", side) for side in sides), *own, *pressed]
 
     def rate(self, here: Place) -> Any:
         return here.where

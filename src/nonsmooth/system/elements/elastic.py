@@ -39,6 +39,8 @@ class ElasticStop(Element):
 
     kinematics: ClassVar[str] = "gap"
     phases: ClassVar[tuple[str, ...]] = ("open", "contact")
+    laws: ClassVar[tuple[str, ...]] = ("stiffness", "damping")
+    conditions: ClassVar[tuple[str, ...]] = ("gap", "push")
     presses: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
@@ -86,6 +88,8 @@ class Backlash(Element):
 
     kinematics: ClassVar[str] = "displacement"
     phases: ClassVar[tuple[str, ...]] = ("free", "above", "below")
+    laws: ClassVar[tuple[str, ...]] = ("half_width", "stiffness", "damping")
+    conditions: ClassVar[tuple[str, ...]] = ("upper", "lower")
 
     def placed(self, q: Any, v: Any, law: Callable[[Law], Any]) -> Any:
         return q
@@ -126,6 +130,8 @@ class PreloadedSpring(Element):
 
     kinematics: ClassVar[str] = "displacement"
     phases: ClassVar[tuple[str, ...]] = ("above", "below")
+    laws: ClassVar[tuple[str, ...]] = ("preload", "stiffness")
+    conditions: ClassVar[tuple[str, ...]] = ("side",)
 
     def placed(self, q: Any, v: Any, law: Callable[[Law], Any]) -> Any:
         return q

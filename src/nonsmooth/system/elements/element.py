@@ -9,7 +9,7 @@ stands around it is a :class:`nonsmooth.system.assembly.Place`.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
@@ -60,6 +60,8 @@ class Element(ABC):
 
     kinematics: ClassVar[str] = ""  # the field that says where the element is, where ``at`` does not
     phases: ClassVar[tuple[str, ...]] = ()
+    laws: ClassVar[tuple[str, ...]] = ()  # its arguments that are numbers, parameters or functions
+    conditions: ClassVar[tuple[str, ...]] = ()  # names of the conditions on its ways out
     held: ClassVar[tuple[str, ...]] = ()  # the phases in which its force is that of a constraint
     strikes: ClassVar[bool] = False  # its impacts turn speeds at once
     bears: ClassVar[bool] = False  # while it is held it bears its part of an impulse
@@ -92,6 +94,10 @@ class Element(ABC):
     @abstractmethod
     def leaving(self, here: Place) -> list[Leaving]:
         """The ways out of the present phase, in the order in which they are tried."""
+
+    def needs(self, others: Collection[str]) -> list[tuple[str, int | None]]:
+        """Its laws by name, each with the sides of the speed at which it is asked for; ``others`` are the elements."""
+        return [(name, None) for name in self.laws]
 
     def rate(self, here: Place) -> Any:
         """The rate that a constraint of the element holds at zero."""

@@ -60,6 +60,8 @@ class Stop(Element):
 
     kinematics: ClassVar[str] = "gap"
     phases: ClassVar[tuple[str, ...]] = ("open", "rest")
+    laws: ClassVar[tuple[str, ...]] = ("restitution",)
+    conditions: ClassVar[tuple[str, ...]] = ("gap", "closing", "opens", "slow", "off", "beyond")
     held: ClassVar[tuple[str, ...]] = ("rest",)
     strikes: ClassVar[bool] = True
     bears: ClassVar[bool] = True
