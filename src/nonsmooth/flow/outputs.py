@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -23,8 +22,7 @@ def output_values(
     """Outputs (N, n_outputs) at N samples, each by the expression of the sample's mode."""
     if traced.patterns is not None:
         forces = traced.patterns.forces(parameters, time, u, mode)
-        plain = traced.patterns.equations
-        own = output_values(replace(plain, patterns=None), parameters, time, u, memory, np.zeros(len(time), dtype=int))
+        own = output_values(traced.patterns.plain, parameters, time, u, memory, np.zeros(len(time), dtype=int))
         return np.hstack([own, forces])
     result = np.full((len(time), len(traced.output_names)), np.nan)
     for m in np.unique(mode):

@@ -24,9 +24,10 @@ from nonsmooth.system.scalar import Scalar, to_expression
 from nonsmooth.system.tracing import Symbols, call_scalar, call_vector
 from nonsmooth.system.transition import Surface, Transition
 
-__all__ = ["assembled", "element_names"]
+__all__ = ["SPEED", "assembled", "element_names"]
 
 MOST = 256  # modes that are written out
+SPEED = sp.Symbol("speed_", real=True)  # in a law of it
 
 
 class Expressions(Assembler):
@@ -84,6 +85,19 @@ class Expressions(Assembler):
             else:
                 self._laws[key] = self._given(given, what)
         return self._laws[key]
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the states."""
+        return list(self.symbols.u)
+
+    def spoken(self, k: int, name: str) -> sp.Expr:
+        """A law as an expression; one of the speed's magnitude in the symbol ``SPEED``."""
+        given = getattr(self.parts[k].element, name)
+        if callable(given) and _arguments(given) == 2:
+            return call_scalar(given, (Scalar(SPEED), self.symbols.parameters()), name)
+        known = {part.name for part in self.parts}
+        return sp.Integer(0) if isinstance(given, str) and given in known else self.law(k, name)
 
     # Calculus
 
@@ -215,7 +229,7 @@ def assembled(
     """
     parts = element_names(elements)
     for key, mode in modes.items():
-        if isinstance(mode, Mode) and mode.states is not None:
+        if isinstance(mode, Mode) and set(mode.states or symbols.u) != set(symbols.u):
             raise SystemDefinitionError(f"mode {key!r}: a system with elements has all its states in every mode")
     arguments = Scalar(symbols.t), symbols.states(), symbols.parameters()
     base = {

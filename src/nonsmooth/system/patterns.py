@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -243,6 +243,11 @@ class Patterns:
         return replace(traced, patterns=self)
 
     @cached_property
+    def plain(self) -> Traced:
+        """The equations without elements."""
+        return replace(self.equations, indicators=(), indicator_names=())
+
+    @cached_property
     def form(self) -> LinearForm:
         """The matrices of the equations without elements and the rows of all expressions, at parameter points."""
         from nonsmooth.system.linear import linear_form
@@ -278,6 +283,23 @@ class Patterns:
                 self._jumped[key] = len(self.jumps)
                 self.jumps.append(TracedTransition(source, target, conditions, label=" -> ".join(names)))
             return self._jumped[key]
+
+    def described(self) -> dict[str, dict[str, Any]]:
+        """The elements as data: kind, options, and expressions of where they are, what they act on, and their laws."""
+        found = {}
+        for k, part in enumerate(self.make.parts):
+            e, others = part.element, set(self.elements) - {part.name}
+            known = {"at", "on", e.kinematics, "position", "belt", *e.laws}
+            options = {one.name: getattr(e, one.name) for one in fields(e) if one.name not in known}
+            named = {name: getattr(e, name) for name in e.laws if isinstance(getattr(e, name), str)}
+            options |= {name: value for name, value in named.items() if value in others}
+            laws = {name: self.make.spoken(k, name) for name in e.laws if getattr(e, name) is not None}
+            found[part.name] = {
+                "kind": type(e).__name__, "options": options, e.kinematics: part.where,
+                "on": {self.make.names[i]: part.direction[i] for i in self.acts_on[k]},
+                "laws": {name: law for name, law in laws.items() if name not in options},
+            }  # fmt: skip
+        return found
 
     def name(self, pattern: Pattern) -> str:
         """The phases of all elements as one name."""

@@ -405,5 +405,5 @@ class System:
 
         return latex(self)
 
-    def _repr_latex_(self) -> str:
-        return self.to_latex()
+    def _repr_latex_(self) -> str | None:
+        return None if self.traced.patterns is not None else self.to_latex()

@@ -17,8 +17,9 @@ import numpy as np
 from nonsmooth.flow.engines.engine import Chain, FloatArray, IntArray, Log, SectionPlan, State
 from nonsmooth.flow.engines.linear import table_bytes
 from nonsmooth.flow.engines.loop import LoopEngine
+from nonsmooth.kernels.hybrid import codes
 from nonsmooth.kernels.hybrid.places import RESET, WAITS
-from nonsmooth.results.memory import room_for
+from nonsmooth.results.memory import free_memory, room_for
 
 if TYPE_CHECKING:
     from nonsmooth.system.assembly import Pattern
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 
 __all__ = ["PatternEngine"]
 
+MOST = 1024  # patterns for which room is made at first
 SECTION = np.array([(0, 1, 1), (0, -1, 1)], dtype=np.int64)  # the last rows of a transition table
 
 
@@ -62,7 +64,7 @@ class PatternEngine(LoopEngine):
         return linear_module(len(self.scale), len(self.patterns.form.multiples), observer)
 
     def given(self, tables: Any, observer: str) -> tuple[Any, Any, Any]:
-        return tables.form, tables.own, tables.work
+        return tables.form, tables.standing, tables.work
 
     def net_of(self, tables: Any, i: int) -> Any:
         return tables.net
@@ -86,7 +88,7 @@ class PatternEngine(LoopEngine):
             super().chain(here, 0, 1, state, own, plan, transient, keep, one)
             here.leave(state)
             numbers = np.array(here.numbers, dtype=np.int64)
-            if out.status[i] in (0, 6):
+            if out.status[i] in (codes.OK, codes.NOT_GUARANTEED):
                 out.section_mode[i] = numbers[out.section_mode[i]]
 
     def record(self, tables: Points, state: State, until: float, samples: FloatArray) -> Log:
@@ -115,7 +117,7 @@ class PatternTables:
         from nonsmooth.kernels.linear.module import modes_module
 
         patterns = engine.patterns
-        self.patterns, self.scratch = patterns, engine.module(None, "sections").scratch
+        self.patterns, self.scratch = patterns, engine.module(None, "sections").scratch_apart
         self.rows = patterns.rows(tables.linear, i)
         n, width = self.rows.field.shape
         self.harmonics = (width - n - 1) // 2
@@ -247,14 +249,15 @@ class PatternTables:
         """Put the tables of a mode behind those that stand."""
         if len(self.numbers) > self.capacity:
             self._widen(len(conditions), len(outputs))
-        self.stand(self._form(flow, conditions, outputs), self.own, self.work)
         self.form = self._form(flow, conditions, outputs)
+        count = self.stand(self.form, self.own, self.work)
+        self.standing = self.own._replace(info=self.own.info[:count])
 
     def _widen(self, conditions: int, outputs: int) -> None:
-        n = self.rows.n
-        self.capacity = max(8, 2 * self.capacity)
-        functionals = conditions + n + outputs
-        of_one = table_bytes(n, self.harmonics, 1) + 8 * functionals * 11 * self.rows.field.shape[1]
+        """Make room; a table takes memory only where it is written, so that much may be asked for."""
+        n, width = self.rows.field.shape
+        of_one = table_bytes(n, self.harmonics, 1) + 8 * (conditions + n + outputs) * 13 * width
+        self.capacity = 2 * self.capacity or max(8, min(MOST, (free_memory() or 2**32) // (4 * of_one)))
         room_for(
             float(of_one) * self.capacity, f"the tables of {self.capacity} patterns of {n} states",
             "take fewer elements or a shorter run: it visits more patterns than there is memory for",

@@ -7,7 +7,7 @@ A leg is one step of the mode, or its part up to the first crossing, section ret
 from math import cos, fabs, isfinite, sin
 
 from nonsmooth.kernels.compile.cache import device, inline, once
-from nonsmooth.kernels.compile.lanes import dot, sizes
+from nonsmooth.kernels.compile.lanes import dot
 from nonsmooth.kernels.hybrid.places import FIRED, MODE, NO_END, TIME
 from nonsmooth.kernels.hybrid.records import FORM, TABLES, WORK
 from nonsmooth.kernels.linear.search import (
@@ -57,7 +57,11 @@ def rounding(tables, mode, f, at, w):
     """Below this the row fun[mode, f, at:] is zero within rounding at w."""
     total = 0.0
     if STATES >= MANY:
-        total = sizes(total, tables.fun[mode, f], at, w, M)
+        for q in range(1, tables.some[mode, f, 1, 0] + 1):
+            j = tables.some[mode, f, 1, q]
+            total += fabs(tables.fun[mode, f, at + j] * w[j])
+        for j in range(STATES, M):
+            total += fabs(tables.fun[mode, f, at + j] * w[j])
     else:
         for j in range(M):
             total += fabs(tables.fun[mode, f, at + j] * w[j])

@@ -19,7 +19,7 @@ every inner loop has constant bounds. Arrays (M columns of w, functionals = indi
                                    of the states in value and slope
 """
 
-from math import cos, fabs, nan, sin, sqrt
+from math import cos, fabs, isnan, nan, sin, sqrt
 
 from nonsmooth.kernels.compile.cache import device, inline
 from nonsmooth.kernels.compile.lanes import dot
@@ -343,6 +343,8 @@ def build(i, form, tables, work):
                 for h in range(HARMONICS):
                     fun[mode, f, WAVE + 2 * h] = form.oc[i, o, given, h]
                     fun[mode, f, WAVE + 1 + 2 * h] = form.os[i, o, given, h]
+            if isnan(fun[mode, f, ONE]):  # not asked for in this mode
+                continue
             fill_functional(mode, f, tables, rates, work.row)
             if STATES >= MANY:
                 list_columns(mode, f, tables)
