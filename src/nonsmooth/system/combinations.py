@@ -296,9 +296,9 @@ def _opened(
 
     if len(base) > 1 or any(given[key] for key in ("transitions", "indicators", "memory", "symmetry", "bands")):
         raise SystemDefinitionError(
-            f"{len(parts)} elements have more than {MOST} combinations of phases, which are not written out but made when "
-            "they are visited: such a system has one mode and no indicators, transitions, memory, symmetry or bands of its "
-            "own"
+            f"{len(parts)} elements have more than {MOST} combinations of phases, which are not written out but made "
+            "when they are visited: such a system has one mode and no indicators, transitions, memory, symmetry or bands "
+            "of its own"
         )
     patterns = Patterns(make, next(iter(base)))
     return {

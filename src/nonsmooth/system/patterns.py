@@ -76,9 +76,9 @@ class Row:
         if a is not None:
             return Row(other.values * a, self.one)
         raise SystemDefinitionError(
-            "a product of two quantities that depend on states or time is not affine: elements with such a law (friction "
-            "that depends on the speed under a normal force that varies) combine as long as all combinations of phases "
-            "can be written out"
+            "a product of two quantities that depend on states or time is not affine: elements with such a law "
+            "(friction that depends on the speed under a normal force that varies) combine as long as all combinations "
+            "of phases can be written out"
         )
 
     __rmul__ = __mul__
@@ -255,8 +255,8 @@ class Patterns:
         form = linear_form(self.equations)
         if form is None or not form.affine_indicators:
             raise SystemDefinitionError(
-                f"{self.equations.name!r}: its {len(self.elements)} elements have more combinations of phases than can be "
-                "written out, and a mode can be made when it is first visited only where everything is affine in the "
+                f"{self.equations.name!r}: its {len(self.elements)} elements have more combinations of phases than can "
+                "be written out, and a mode can be made when it is first visited only where everything is affine in the "
                 "states with harmonics in time; take fewer elements or write the nonlinear ones as modes"
             )
         return form
@@ -307,7 +307,7 @@ class Patterns:
         return "_".join(f"{name}_{element.phases[k]}" for (name, element), k in phases)
 
     def seen(self) -> Traced:
-        """The equations as far as they are known: names and transitions of the patterns visited, without expressions."""
+        """The equations as far as they are known: names and transitions of the patterns visited, no expressions."""
         traced, modes = self.equations, list(self.visited)
         names = (*traced.output_names, *self.outputs)
         unknown = sp.nan

@@ -254,9 +254,9 @@ class System:
         """Raise SystemDefinitionError where the modes are made when they are first visited."""
         if self._variant.traced.patterns is not None:
             raise SystemDefinitionError(
-                f"{self.name!r} has more combinations of its elements' phases than are written out; a mode is made when a "
-                f"run first visits it, for simulate, poincare, sweep and frequency_response. Not so for {verb}: take "
-                "fewer elements for it"
+                f"{self.name!r} has more combinations of its elements' phases than are written out; a mode is made when "
+                "a run first visits it, for simulate, poincare, sweep and frequency_response. Not so for "
+                f"{verb}: take fewer elements for it"
             )
 
     # Numbers

@@ -107,8 +107,8 @@ def _of_patterns(system: System, method: str, options: bool) -> Engine:
 
     if method not in ("auto", "exact") or options:
         raise ValueError(
-            f"{system.name!r} has so many elements that a pattern of their phases is made when it is first visited; that "
-            "is done by the exact flow alone: leave out method, rtol, atol, step, order and locate"
+            f"{system.name!r} has so many elements that a pattern of their phases is made when it is first visited; "
+            "that is done by the exact flow alone: leave out method, rtol, atol, step, order and locate"
         )
     traced = system.traced
     assert traced.patterns is not None

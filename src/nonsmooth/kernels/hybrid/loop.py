@@ -7,8 +7,8 @@ crossing, lands there, takes transitions and says which conditions hold just aft
 text that is joined with this file. Everything else is here: start rule, transitions of one instant in declared order,
 guards of chatter, the clock.
 
-All that a run knows beside its arrays stands in ``work.tally`` and ``work.memo``: it may pause and go on. It pauses also
-before a transition into a mode whose tables do not stand yet (its target is -1): the next call goes on with it.
+All that a run knows beside its arrays stands in ``work.tally`` and ``work.memo``: it may pause and go on. It pauses
+also before a transition into a mode whose tables do not stand yet (its target is -1): the next call goes on with it.
 """
 
 from nonsmooth.kernels.compile.cache import inline, once
@@ -58,8 +58,8 @@ def next_holding(mode, tables, net, work):
 def settle(i, form, net, tables, work):
     """Start rule: transitions that hold already are taken, each mode at most once; so is an impact that begins there.
 
-    Returns a status: BEYOND_STOP where one with a reset holds and the start does not lie on its surface; PAUSED where one
-    waits for the tables of its mode."""
+    Returns a status: BEYOND_STOP where one with a reset holds and the start does not lie on its surface; PAUSED where
+    one waits for the tables of its mode."""
     tally, visited = work.tally, work.visited
     for k in range(visited.shape[0]):
         visited[k] = 0

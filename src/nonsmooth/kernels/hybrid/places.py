@@ -5,8 +5,8 @@ BEGUN, MODE, JUMPS, BURST = 0, 1, 2, 3  # transitions within one return, period 
 RETURNS, PASSES, TRIES = 4, 5, 6  # of the section; steps since the last pass
 SAMPLES, CROSSINGS, TOUCHES = 7, 8, 9  # logged
 FIRED = 10  # the functional (indicator) that has crossed, or -1
-# a transition (plus one) that waits for the tables of its mode, and of its instant: the transitions taken before it, the
-# mode before the first, the first; whether they are closely behind others, and what the observer saw on the leg
+# a transition (plus one) that waits for the tables of its mode, and of its instant: the transitions taken before it,
+# the mode before the first, the first; whether they are closely behind others, and what the observer saw on the leg
 WAITS, TAKEN, SOURCE, FIRST, CLOSELY, NOTED = 11, 12, 13, 14, 15, 16
 N_TALLY = 17
 

@@ -31,7 +31,8 @@ def linear_module(states: int, harmonics: int, observer: str = "sections", memor
 @cache
 def modes_module(states: int, harmonics: int) -> ModuleType:
     """The module with ``stand``, which adds modes to the tables of those numbers of states and harmonics."""
-    text = with_numbers(joined(("linear.tables", "linear.modes")), {"STATES": states, "HARMONICS": harmonics, "MEMORY": 0})
+    numbers = {"STATES": states, "HARMONICS": harmonics, "MEMORY": 0}
+    text = with_numbers(joined(("linear.tables", "linear.modes")), numbers)
     return load_module(text, f"linear_modes_{states}_{harmonics}")
 
 

@@ -14,7 +14,8 @@ def log_touches(step, form, net, seen, tables, work):
     wn, scr, points = work.wn, work.scr, work.points
     mode, base = work.tally[MODE], work.memo[DONE]
     spacing, n = tables.info[mode, 1], work.tally[TOUCHES]
-    for node in range(1, NODES if seen.spare > 0 else 0, 2):  # pieces of two spacings, with their polynomial in the middle
+    nodes = NODES if seen.spare > 0 else 0
+    for node in range(1, nodes, 2):  # pieces of two spacings, with their polynomial in the middle
         if (node - 1) * spacing >= step:
             break
         to_node(tables, mode, node, work.w, wn)

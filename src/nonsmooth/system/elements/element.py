@@ -118,7 +118,7 @@ class Element(ABC):
 
     @abstractmethod
     def placed(self, q: Any, v: Any, law: Callable[[Law], Any]) -> Any:
-        """The place of the element in terms of a coordinate ``q`` and its speed ``v`` (:func:`nonsmooth.mechanical`)."""
+        """The place of the element, by a coordinate ``q`` and its speed ``v`` (:func:`nonsmooth.mechanical`)."""
 
 
 def check_side(element: Any) -> None:
