@@ -5,8 +5,6 @@ The elements have more than 10^11 combinations of phases; a mode is made when th
 
 from __future__ import annotations
 
-import time
-from statistics import median
 from typing import Any
 
 import numpy as np

@@ -72,8 +72,8 @@ def terms(text: str, allowed: tuple[str, ...] = ()) -> Iterator[str]:
                 yield f"{found[0]!r} (... {around} ...): {term}"
 
 
-def of_source(path: Path) -> Iterator[str]:
-    """The complaints about a Python file: its docstrings, and the sentences in its strings."""
+def of_source(path: Path, words_too: bool = True) -> Iterator[str]:
+    """The complaints about a Python file: its docstrings, and (``words_too``) the sentences in its strings."""
     allowed = ALLOWED.get(path.name, ())
     documented = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
@@ -81,7 +81,7 @@ def of_source(path: Path) -> Iterator[str]:
             place = f"{path.relative_to(ROOT)}:{getattr(node, 'lineno', 1)}"
             if complaint := beginning(text):
                 yield f"{place}: the docstring {complaint}"
-        if isinstance(node, ast.Constant) and isinstance(node.value, str) and " " in node.value.strip():
+        if words_too and isinstance(node, ast.Constant) and isinstance(node.value, str) and " " in node.value.strip():
             for complaint in terms(node.value, allowed):
                 yield f"{path.relative_to(ROOT)}:{node.lineno}: {complaint}"
 
@@ -97,6 +97,9 @@ def complaints() -> Iterator[str]:
     for path in sorted(sources.rglob("*.py")):
         if path.relative_to(sources).parts[0] not in NOT_COVERED_YET:
             yield from of_source(path)
+    for folder in ("benchmarks", "docs", "examples", "tests"):
+        for path in sorted((ROOT / folder).rglob("*.py")):
+            yield from of_source(path, words_too=folder != "tests")  # the words are data there
     for path in [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").rglob("*.md"))]:
         text = path.read_text(encoding="utf-8")
         if unmerged(text):

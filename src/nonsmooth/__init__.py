@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from nonsmooth.errors import SystemDefinitionError as SystemDefinitionError
     from nonsmooth.experiment.load import load_recording as load_recording
     from nonsmooth.experiment.recording import Recording as Recording
+    from nonsmooth.explorer.serve import explore as explore
     from nonsmooth.flow.poincare import poincare as poincare
     from nonsmooth.flow.sections import Poincare as Poincare
     from nonsmooth.flow.sections import Stroboscopic as Stroboscopic
@@ -48,6 +49,7 @@ if TYPE_CHECKING:
     from nonsmooth.identification.parameter_set import ParameterSet as ParameterSet
     from nonsmooth.results.store import load as load
     from nonsmooth.results.store import save as save
+    from nonsmooth.smoothing.report import smoothing_report as smoothing_report
     from nonsmooth.system.maps import Branch as Branch
     from nonsmooth.system.maps import Map as Map
     from nonsmooth.system.mechanical import mechanical as mechanical
@@ -91,11 +93,13 @@ _WHERE = {
     "continue_equilibrium": "continuation.continue_equilibrium",
     "special_points": "continuation.special",
     "manifolds": "continuation.manifolds",
+    "smoothing_report": "smoothing.report",
     "load_recording": "experiment.load",
     "Recording": "experiment.recording",
     "identify": "identification.chain",
     "ParameterSet": "identification.parameter_set",
     "compare": "identification.compare.compare",
+    "explore": "explorer.serve",
     "save": "results.store",
     "load": "results.store",
     "SystemDefinitionError": "errors",

@@ -20,7 +20,8 @@ from nonsmooth.cli.study import named_model, read_study
 from nonsmooth.cli.verb_options import VERBS, options_of
 
 COMMANDS = (
-    "init", "run", "plan", "show", "models", "identify", "compare", "reproduce", "rig", "schema", "completion",
+    "init", "run", "plan", "show", "explore", "models", "identify", "compare", "reproduce", "rig", "schema",
+    "completion",
 )  # fmt: skip
 
 
@@ -141,14 +142,34 @@ def test_no_value_of_any_key_ends_in_a_traceback(
         (("schema", "--out", "."), r"\.: Is a directory"),
         (("compare", "odd.toml"), r"\[measured\]: session = 3 must be a text"),
         (("run", "a" * 5000), "File name too long"),
+        (("run", "odd.nc"), r"odd\.nc: is a saved result and no study file; `nonsmooth show odd\.nc`"),
+        (("show", "odd.toml"), r"odd\.toml: is a study file and no result; `nonsmooth run odd\.toml`"),
     ],
 )
 def test_odd_arguments_are_one_message(arguments: tuple[str | bytes, ...], message: str, tmp_path: Path) -> None:
     (tmp_path / "wrong.py").write_text("raise BaseException('x')\n")
+    (tmp_path / "odd.nc").touch()
     (tmp_path / "odd.toml").write_text('[system]\nmodel = "a"\n[measured]\nsession = 3\nprocedure = 4\n')
     done = process(*arguments, cwd=tmp_path)
     assert done.returncode == 2 and not done.stdout
     assert re.match(rf"nonsmooth: .*{message}", done.stderr) and "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("rnu",), "`rnu` is not a command of `nonsmooth`; nearest: run; all: compare, "),
+        (("init", "impact_oscillator", "--verb", "swep"), "`swep` is not a verb of `nonsmooth init`; nearest: sweep; "),
+        (("completion", "tcsh"), "`tcsh` is not a shell of `nonsmooth completion`; "),
+    ],
+)
+def test_a_misspelt_word_is_told_the_nearest(
+    arguments: tuple[str, ...], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        run(*arguments)
+    out, err = capsys.readouterr()
+    assert not out and message in err and len(err) < 600
 
 
 # A first study file
@@ -159,10 +180,16 @@ NONE = ("square_root_map", "basins")
 POSSIBLE = [(model, verb) for model in models.names() for verb in VERBS if (model, verb) != NONE]
 
 
+once = cache(named_model)  # a model is traced once, not for each line of each file
+
+
 @pytest.mark.parametrize(("model", "verb"), POSSIBLE)
-def test_a_first_study_file_reads_with_each_of_its_comments_taken_out(model: str, verb: str, tmp_path: Path) -> None:
+def test_a_first_study_file_reads_with_each_of_its_comments_taken_out(
+    model: str, verb: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("nonsmooth.cli.study.named_model", once)
     path = tmp_path / "study.toml"
-    text = study_text(named_model(model), model, verb, "study")
+    text = study_text(once(model), model, verb, "study")
     lines = text.splitlines()
     settings = [i for i, line in enumerate(lines) if re.match(r"# \w+ = (?!A )", line)]
     assert {lines[i].split()[1] for i in settings} | set(re.findall(r"^(\w+) = ", text, re.M)) >= set(options_of(verb))
@@ -224,7 +251,7 @@ def test_the_schema_takes_every_study_of_the_documentation_and_of_init() -> None
     assert len(studies) >= 6
     assert [sorted(set(study) & set(VERBS)) for study in wrong] == [["sweep"], ["simulate", "sweep"]]  # under "Errors"
     for model, verb in POSSIBLE:
-        judge.validate(tomllib.loads(study_text(named_model(model), model, verb, "study")))
+        judge.validate(tomllib.loads(study_text(once(model), model, verb, "study")))
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from time import process_time
 from typing import Any
 
 import numpy as np
@@ -130,6 +131,36 @@ def test_a_start_on_a_repelling_surface_is_refused() -> None:
     assert len(ns.simulate(system, duration=1.0, start={"x": 1.0}).crossing_time) <= 1  # crossing is no question
 
 
+def test_resets_that_land_beyond_each_others_stops_end_at_once_with_a_sentence() -> None:
+    """Each wall throws the ball behind the other one: an endless chain at one instant."""
+    walls = [
+        ns.Transition("fly", "fly", when="right > 0", reset=lambda t, u, p: (u.x - 3, -u.v)),
+        ns.Transition("fly", "fly", when="left > 0", reset=lambda t, u, p: (u.x + 3, -u.v)),
+    ]
+    system = ns.System(
+        states=["x", "v"], parameters={"a": 1.0}, modes={"fly": lambda t, u, p: (u.v, -p.a * u.x)},
+        indicators={"right": lambda t, u, p: u.x - 1, "left": lambda t, u, p: -u.x - 1}, transitions=walls,
+    )  # fmt: skip
+    ns.simulate(system, duration=0.1)  # compiled
+    begin = process_time()
+    with pytest.raises(ns.SolveError, match="without end") as caught:
+        ns.simulate(system, duration=10.0, start={"v": 2.0})
+    assert process_time() - begin < 1
+    assert caught.value.time == pytest.approx(np.pi / 6, abs=1e-12)  # 2 sin t = 1
+
+
+def test_a_reset_that_lands_beyond_another_stop_takes_its_impact_at_the_same_instant() -> None:
+    right = ns.Transition("fly", "fly", when="right > 0", reset=lambda t, u, p: (u.x - 3, -u.v))
+    left = ns.Transition("fly", "fly", when="left > 0", reset=lambda t, u, p: (-0.5 + 0 * u.x, -u.v / 2))
+    system = ns.System(
+        states=["x", "v"], parameters={"a": 1.0}, modes={"fly": lambda t, u, p: (u.v, -p.a * u.x)},
+        indicators={"right": lambda t, u, p: u.x - 1, "left": lambda t, u, p: -u.x - 1}, transitions=[right, left],
+    )  # fmt: skip
+    run = ns.simulate(system, duration=0.6, start={"v": 2.0}, samples=2)
+    assert run.crossing_time.values == pytest.approx([np.pi / 6] * 2, abs=1e-12)
+    assert run.u_after.values == pytest.approx(np.array([[-2, -(3**0.5)], [-0.5, 3**0.5 / 2]]), abs=1e-12)
+
+
 def test_sliding_into_a_two_fold_ends_with_a_sentence() -> None:
     """In the time scaled by y - x the sliding flow is x' = y, y' = -3 y - 2 x: a node that attracts x < 0 < y."""
     system = ns.System(
@@ -139,8 +170,22 @@ def test_sliding_into_a_two_fold_ends_with_a_sentence() -> None:
     )  # fmt: skip
     with pytest.raises(ns.SolveError, match="Sliding in mode 'h_sliding' .* two-fold.* not unique") as caught:
         ns.simulate(system, duration=5.0, start=[-0.5, 0.5, 0.0])
-    assert caught.value.status == "chatter"
+    assert caught.value.status == "not_unique"
     assert np.abs(list(caught.value.state.values())).max() < 1e-8
+
+
+def test_a_two_fold_has_its_own_status_in_sweeps() -> None:
+    """The same with x' = a y on the surface: a node that attracts x < 0 < y too."""
+    system = ns.System(
+        states=["x", "y", "z"], parameters={"a": 1.0, "w": 1.0},
+        modes={"below": lambda t, u, p: (0 * t, 2, u.y), "above": lambda t, u, p: (p.a, -3, u.x)},
+        indicators={"h": lambda t, u, p: u.z}, transitions=[ns.Surface("h", below="below", above="above")],
+        period=lambda p: 2 * np.pi / p.w,
+    )  # fmt: skip
+    begin = {"x": -0.5, "y": 0.5, "z": 0.0}
+    found = ns.sweep(system, "a", [0.9, 1.0], start=begin, direction=None, transient=5, keep=20, progress=False)
+    names = dict(zip(found.status.flag_values.tolist(), found.status.flag_meanings.split(), strict=True))
+    assert [names[int(code)] for code in found.status.values.ravel()] == ["not_unique"] * 2
 
 
 @pytest.mark.parametrize("f", [0.05, 0.1, 0.3])

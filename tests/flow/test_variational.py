@@ -204,7 +204,7 @@ def test_the_test_sees_a_broken_saltation_matrix(how: str) -> None:
 
 
 def test_the_trace_identity_does_not_see_it() -> None:
-    """Where the surface holds positions only, det S = 1 for the right matrix, for a wrong sign, and for none."""
+    """If the surface holds positions only, det S = 1 for the right matrix, for a wrong sign, and for none."""
     for case, _, _ in compared("bilinear")[0]:
         for matrix in (saltation, *(pair[0] for pair in BROKEN.values())):
             determinants = [np.linalg.slogdet(matrix(jump))[1] for jump in case.variation.jumps]
@@ -395,6 +395,19 @@ def scaled_differences(system, state, duration, active):
 
         found.append(differenced(changed, size))
     return np.stack([one for one, _ in found], axis=1), [error for _, error in found]
+
+
+@pytest.mark.parametrize("name", ["P", "end", "parameter", "trace_defect"])
+def test_a_parameter_may_have_the_name_of_a_variable_of_the_result(name: str) -> None:
+    """x'' = -P x from x = 1: x(t) = cos(sqrt(P) t), and its derivative in P is -t sin(sqrt(P) t) / (2 sqrt(P))."""
+    system = ns.System(
+        states=["x", "v"], parameters={name: 2.0}, modes={"only": lambda t, u, p: (u.v, -getattr(p, name) * u.x)}
+    )
+    found = ns.sensitivity(system, duration=1.5, start={"x": 1.0}, parameters=[name])
+    assert found.P.values[0, 0] == pytest.approx(-1.5 * np.sin(1.5 * 2**0.5) / (2 * 2**0.5), rel=1e-12)
+    assert ns.system_of(found).values[name] == 2.0
+    spectrum = ns.lyapunov(system.with_parameters({name: 3.0}), duration=20.0, start={"x": 1.0}, progress=False)
+    assert ns.system_of(spectrum).values[name] == 3.0
 
 
 def test_errors_at_the_door() -> None:

@@ -250,7 +250,7 @@ def test_unwritable_user_folder_falls_back_to_a_private_one(tmp_path, monkeypatc
 @pytest.mark.skipif(sys.platform == "win32", reason="permissions of POSIX")
 @pytest.mark.parametrize("part", ["", "compiled"])
 def test_a_folder_that_others_may_write_is_refused(tmp_path, monkeypatch, part):
-    """What stands there is executed. A folder that was chosen: an error; the user's own: a private one in its place."""
+    """Its files are executed. A folder that was chosen: an error; the user's own: a private one in its place."""
     from nonsmooth.kernels.compile.folder import cache_folder, usable_folder
 
     open_to_all = tmp_path / "nonsmooth"

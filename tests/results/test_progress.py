@@ -69,16 +69,24 @@ def test_an_exception_ends_the_bar_and_passes(monkeypatch: pytest.MonkeyPatch) -
     assert terminal.getvalue().split("\r")[-1] == ""
 
 
-def test_a_notebook_shows_progress_though_it_is_no_terminal(
+def test_a_notebook_shows_one_output_that_is_empty_in_the_end(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     kernel = SimpleNamespace(get_ipython=lambda: SimpleNamespace(config={"IPKernelApp": {}}))
+    shown: list[str] = []
+
+    def display(data: dict[str, str], raw: bool, display_id: bool) -> SimpleNamespace:
+        assert raw and display_id and not shown
+        return SimpleNamespace(update=lambda data, raw: shown.append(data["text/plain"]))
+
     monkeypatch.setitem(sys.modules, "IPython", kernel)
+    monkeypatch.setitem(sys.modules, "IPython.display", SimpleNamespace(display=display))
     with progress(10, "sweep") as advance:
-        advance(1)
+        time.sleep(0.15)
+        advance(3)
         say("a line")
-    shown = capsys.readouterr().err
-    assert "sweep" in shown and "0/10" in shown and "a line\n" in shown
+    assert "sweep" in shown[0] and "0/10" in shown[0] and any("3/10" in text for text in shown) and shown[-1] == ""
+    assert capsys.readouterr() == ("", "a line\n")
 
 
 def test_compiling_is_mentioned_once_for_all_kernels_of_some_seconds(
@@ -94,7 +102,7 @@ def test_compiling_is_mentioned_once_for_all_kernels_of_some_seconds(
 
 
 def first_words(code: str, environment: dict[str, str]) -> tuple[str, float]:
-    """What a process writes first on a terminal, and the seconds of a processor until then; it is ended there."""
+    """Return what a process writes first on a terminal, and a processor's seconds until then; it is ended there."""
     import pty
 
     child, terminal = pty.fork()

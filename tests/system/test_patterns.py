@@ -58,7 +58,7 @@ def test_a_run_is_that_of_the_combinations_written_out(
 def test_section_points_and_sweeps_are_the_same(both: tuple[ns.System, ns.System]) -> None:
     """At sections of time and of a contact; carried states; extremes of states and forces; a response curve."""
     starts = [{"q1": 0.3}, {"q2": -0.4, "v_q1": 1.0}]
-    for section in (None, ns.Poincare("wall_gap", direction="falling")):
+    for section in (None, ns.Poincare("wall_gap", rising=False)):
         a, b = (ns.poincare(system, n=20, start=starts, section=section) for system in both)
         assert np.allclose(a["section"], b["section"], rtol=0, atol=1e-12)
         modes = [np.array(system.modes)[r["mode"].values] for system, r in zip(both, (a, b), strict=True)]

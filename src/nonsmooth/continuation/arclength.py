@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.continuation.anchor import plane_across
+from nonsmooth.continuation.anchor import anchor_at, plane_across
 from nonsmooth.continuation.multipliers import multipliers_of
 from nonsmooth.continuation.path import Walk
+from nonsmooth.continuation.shooting import Shooting
 from nonsmooth.continuation.solve import determinant, solve
+from nonsmooth.continuation.surfaces import look_at_surfaces
 
 if TYPE_CHECKING:
     from nonsmooth.continuation.path import Path
-    from nonsmooth.continuation.shooting import Shooting, Solved
+    from nonsmooth.continuation.shooting import Solved
+    from nonsmooth.continuation.signature import Signature
 
 __all__ = ["Curve", "Point", "chordal", "passes_through"]
 
@@ -43,6 +46,10 @@ class Point:
     def X(self) -> FloatArray:
         """The unknowns, the parameters last."""
         return self.solved.X
+
+    def turned(self) -> Point:
+        """The same point looked at the other way along the branch; the bordered determinant turns with the tangent."""
+        return replace(self, tangent=-self.tangent, orientation=-self.orientation)
 
 
 class Curve:
@@ -73,6 +80,17 @@ class Curve:
         self.rows = rows
         self.n = shooting.size + 1
         self._matrix = np.zeros((self.n, self.n))
+
+    def with_signature(
+        self, signature: Signature, times: FloatArray, states: FloatArray, period: float, parameters: Any
+    ) -> tuple[Curve, FloatArray]:
+        """The curve of another signature in the same units, and the unknowns there from instants and states."""
+        old = self.shooting
+        fresh = Shooting(old.system, signature, old.period_number, old.active)
+        X = fresh.join(times, states, period, parameters)
+        anchor_at(fresh, fresh.parameters(X), states[0], self.size)
+        look_at_surfaces(fresh, X)
+        return Curve(fresh, self.size, self.period, self.width), X
 
     def _bordered(self, solved: Solved, border: FloatArray) -> FloatArray:
         matrix = self._matrix
@@ -108,7 +126,7 @@ class Curve:
             if length < tolerance or (i > 3 and length < 1e-10):
                 if length > 1e-14:  # the last evaluation serves; its error is the square of this step
                     Y = Y - step
-                    solved.X = Y * self.scale
+                    solved = shooting.moved(solved, Y * self.scale)
                 return solved, Y, i
             Y = Y - step
             last = length

@@ -11,6 +11,7 @@ from nonsmooth.continuation.events import (
     BESIDE,
     Event,
     at_edge,
+    at_section,
     edge_before_fold,
     first_met,
     passed,
@@ -18,7 +19,7 @@ from nonsmooth.continuation.events import (
     swing,
 )
 from nonsmooth.continuation.leaving import change_of_signature, passed_by
-from nonsmooth.continuation.marches import Limits, March, march_until
+from nonsmooth.continuation.marches import Limits, March, Place, march_until
 from nonsmooth.continuation.path import VIOLATIONS
 from nonsmooth.errors import SystemDefinitionError
 
@@ -45,8 +46,8 @@ def _follow(found: March, curve: Curve, point: Point, limits: Limits, first_step
     tests = Tests(curve)
     numbers, violation = tests.smooth(point), point.path.violation()
     before: Point | None = None
-    count = 0
-    circle, again = None, 8  # a point that is met again if the branch goes round (Brent's method)
+    circle: Place | None = None
+    again = 8  # a point that is met again if the branch goes round (Brent's method)
     while len(found.rows) < limits.points:
         new = _stepped(curve, point, ds, before)
         if new is None:
@@ -80,7 +81,7 @@ def _follow(found: March, curve: Curve, point: Point, limits: Limits, first_step
                 continue
         crossed = [kind for kind, was, now in zip(VIOLATIONS, violation, violation_new, strict=True)
                    if now < 0.0 and (was >= 0.0 or not (found.rows or limits.virtual))
-                   and (not limits.virtual or (kind == "short" and _at_section(curve, new)))]  # fmt: skip
+                   and (not limits.virtual or (kind == "short" and at_section(curve, new)))]  # fmt: skip
         met = first_met(curve, point, new, tests, crossed, stop)
         if crossed and not met and reason != "range":
             ds *= 0.25
@@ -91,6 +92,9 @@ def _follow(found: March, curve: Curve, point: Point, limits: Limits, first_step
         if met:
             stop, stop_point, reason = met[0][1], met[0][2], "change"
             numbers_new = tests.smooth(stop_point)
+        back = came_back(limits.closed, curve, point, new) if len(found.rows) > 2 else None
+        if back is not None and back <= stop:
+            stop, stop_point, reason = back, curve.between(point, new, back) or new, "closed"
         events = smooth_events(curve, point, new, tests, numbers, numbers_new, stop, reason)
         if limits.virtual:
             beyond = passed(curve, point, new, tests, violation, violation_new, stop)
@@ -107,35 +111,29 @@ def _follow(found: March, curve: Curve, point: Point, limits: Limits, first_step
                 found.ending = "equilibrium" if kind == "hopf" else "branching"
                 found.special[-1].kind = "hopf" if kind == "hopf" else "flip"
                 return
-        if reason == "range":
+        if reason in ("range", "closed"):
             found.add(curve, stop_point)
-            found.ending = "range"
+            found.ending = reason
             break
         if reason == "change":
             after = change_of_signature(found, curve, met)
             if after is None:
                 break
-            curve, point, ds = after
-            before = None
-            ds = ds or 0.1 * limits.largest
+            curve, point = after
+            before, ds = None, 0.1 * limits.largest
             tests = Tests(curve)
             numbers, violation = tests.smooth(point), point.path.violation()
-            count = 0
             found.add(curve, point)
             continue
         found.add(curve, new)
-        count += 1
         if _shrunk(curve, new):
             found.ending = "equilibrium"
             break
-        if limits.virtual and (found.rows[-1].virtual and circle and _closed(circle, curve, point, new)):
+        if found.rows[-1].virtual and came_back(circle, curve, point, new) is not None:
             found.ending = "circle"
             break
         if len(found.rows) >= 2 * again:
-            circle, again = (curve, new), len(found.rows)
-        if limits.closed is not None and count > 2 and _closed(limits.closed, curve, point, new):
-            found.ending = "closed"
-            break
+            circle, again = (curve.shooting.signature, new.X), len(found.rows)
         easy = 2.0 if new.iterations <= 3 else 1.3
         bend = 1.0 - cosine
         if bend > 0.3 * (1.0 - COSINE):
@@ -168,11 +166,6 @@ def _shrunk(curve: Curve, point: Point) -> bool:
     return swing(curve, point) < SMALL
 
 
-def _at_section(curve: Curve, point: Point) -> bool:
-    """Return whether the visit that has become shortest begins or ends at the section of a forced orbit."""
-    return curve.shooting.forced and int(point.path.tau.argmin()) in (0, curve.shooting.m)
-
-
 def _apart(passed_by: list[Event], found: March, met: list[Event]) -> list[Event]:
     """Boundaries passed that are not where the march begins, nor what turns the section."""
     begun = 0.0 if found.rows else BESIDE
@@ -180,12 +173,12 @@ def _apart(passed_by: list[Event], found: March, met: list[Event]) -> list[Event
     return [event for event in passed_by if event[1] > begun and all(abs(event[1] - s) > BESIDE for s in taken)]
 
 
-def _closed(begin: tuple[Curve, Point], curve: Curve, a: Point, b: Point) -> bool:
-    """Return whether the branch has come back to its first point on the step from a to b."""
-    curve0, first = begin
-    if curve0.shooting.signature != curve.shooting.signature or len(first.Y) != len(b.Y):
-        return False
-    return passes_through(first.X / curve.scale, a.Y, b.Y) and float(np.abs(b.Y - a.Y).max()) < 0.2
+def came_back(place: Place | None, curve: Curve, a: Point, b: Point) -> float | None:
+    """Distance along the step from a to b at which the branch comes back to a place; None where it does not."""
+    if place is None or place[0] != curve.shooting.signature or float(np.abs(b.Y - a.Y).max()) >= 0.2:
+        return None
+    Y = place[1] / curve.scale
+    return float(a.tangent @ (Y - a.Y)) if passes_through(Y, a.Y, b.Y) else None
 
 
 def _reason(curve: Curve, point: Point) -> str:

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.continuation.change import changed
+from nonsmooth.continuation.change import contacts
 from nonsmooth.continuation.grazing import both_sides
 from nonsmooth.continuation.multipliers import product_of_pairs, without_own
 from nonsmooth.continuation.normal_form import flip_coefficient, torus_coefficient
@@ -135,7 +135,7 @@ def _pair(place: Point, forced: bool) -> tuple[int, int]:
 def _with_contact(locus: Locus, place: Point) -> dict[str, float]:
     """det(I -+ M+); where M+ is unbounded (a rigid impact), its leading coefficient."""
     as_curve: Any = locus  # what is asked of a curve here is its shooting and its walk
-    for change in changed(as_curve, place, "touch"):
+    for change in contacts(as_curve, place, "touch"):
         M, far, near = both_sides(locus.shooting, place.solved, change)
         if not (np.isfinite(far).all() and np.isfinite(near).all()):
             continue

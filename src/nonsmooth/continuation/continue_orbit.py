@@ -134,7 +134,7 @@ def _from_orbit(orbit: Orbit, name: str | None, given: Any, asked: Asked) -> xr.
 def _both_ways(curve: Curve, first: Point, bounds: tuple[float, float], asked: Asked) -> tuple[March, March]:
     """Marches with rising and with falling parameter; a closed branch needs only one."""
     up, down = in_turn(
-        lambda: march(curve, first, asked.limits(bounds, (curve, first)), asked.first),
+        lambda: march(curve, first, asked.limits(bounds, (curve.shooting.signature, first.X)), asked.first),
         lambda: march(curve, _facing(first, -1.0), asked.limits(bounds), asked.first),
     )
     return up, down
@@ -160,13 +160,8 @@ def _at_the_start(curve: Curve, first: Point, down: March, up: March) -> list[st
 
 def _facing(point: Point, sign: float) -> Point:
     """The same point with its tangent towards rising (1) or falling (-1) values."""
-    from dataclasses import replace
-
     towards = float(point.tangent[-1])
-    if (towards or 1.0) * sign > 0:
-        return point
-    # The bordered determinant turns with the tangent.
-    return replace(point, tangent=-point.tangent, orientation=-point.orientation)
+    return point if (towards or 1.0) * sign > 0 else point.turned()
 
 
 def _near(curve: Curve, X: FloatArray) -> Point | None:
@@ -205,7 +200,9 @@ def _go_on(start: xr.Dataset, name: str | None, given: Any, asked: Asked) -> xr.
         if begin is None:
             endings[side], sentences[side] = "no_convergence", ENDINGS["no_convergence"]
             continue
-        begun[side] = partial(march, curve, begin, asked.limits(bounds), asked.first)
+        other = record.points[-1 if side == 0 else 0]
+        closed = (other.signature, other.X) if len(record.points) > 1 else None
+        begun[side] = partial(march, curve, begin, asked.limits(bounds, closed), asked.first)
     for side, more in zip(begun, in_turn(*begun.values()), strict=True):
         ends[side] = from_march(more)
         sentences[side] = sentence(more, bounds, name, (low, high))

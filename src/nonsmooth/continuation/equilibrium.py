@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -55,6 +56,13 @@ class Equilibria:
         self.own = self.field.own
         self.n, self.n_u = len(self.own), len(system.traced.u)
         self.scale = np.append(system.scale_vector()[self.own], width)
+
+    @cached_property
+    def linear(self) -> bool:
+        """The mode's field is linear in the states: where a pair passes +-i omega all its orbits are closed."""
+        traced = self.system.traced
+        fields = [traced.fields[self.mode][i] for i in self.own]
+        return all(not f.diff(x).free_symbols & set(traced.u) for f in fields for x in traced.u)
 
     def whole(self, x: FloatArray) -> FloatArray:
         """All states from those of the mode."""

@@ -81,7 +81,9 @@ def _follow(
             if kind == "range":
                 found.ending, ended = "range", True
                 break
-            found.special.append(("boundary_equilibrium" if kind == "boundary" else kind, len(found.rests) - 1))
+            hopf = "focus_centre" if curve.linear else "hopf"
+            name = {"boundary": "boundary_equilibrium", "hopf": hopf}.get(kind, kind)
+            found.special.append((name, len(found.rests) - 1))
             if kind == "boundary":
                 beyond = _beyond(curve, place)
                 if beyond is None:

@@ -15,7 +15,9 @@ from nonsmooth.continuation.path import VIOLATIONS
 from nonsmooth.continuation.solve import determinant
 from nonsmooth.continuation.switching import branch_point, is_doubled
 
-__all__ = ["BESIDE", "Event", "at_edge", "edge_before_fold", "first_met", "passed", "smooth_events", "swing"]
+__all__ = [
+    "BESIDE", "Event", "at_edge", "at_section", "edge_before_fold", "first_met", "passed", "smooth_events", "swing",
+]  # fmt: skip
 
 FloatArray = NDArray[np.float64]
 Event = tuple[str, float, Point]  # kind, distance from the last point, the orbit there
@@ -24,6 +26,7 @@ TURN = 1e-5  # along the branch: a fold nearer to a crossing of branches than th
 EXPLAINS = ("short", "slow", "own", "touch", "others", "landed")
 BESIDE = 1e-6  # along the branch: nearer to a change of signature than this is the change itself
 ABOUT = 1e-2  # along the branch: steps are short beside a crossing of branches, and its first place is rough
+CLOSING = 1e-4  # along the branch: nearer to its first point than this is that point, a crossing of branches maybe
 ROUNDING = 1e-13  # numbers below this are zero, however short the step
 SAME = 1e-9  # of the numbers at both ends: smaller than this at the place of another event is the same event
 POLE = 1e-2  # of a multiplier from 1 or -1: farther off it is no fold, no flip, but a contact of no length
@@ -76,6 +79,11 @@ def at_edge(curve: Curve, a: Point, b: Point, edge: float) -> Point | None:
     return point
 
 
+def at_section(curve: Curve, point: Point) -> bool:
+    """Return whether the visit that has become shortest begins or ends at the section of a forced orbit."""
+    return curve.shooting.forced and int(point.path.tau.argmin()) in (0, curve.shooting.m)
+
+
 def edge_before_fold(curve: Curve, point: Point, fold: Point, low: float, high: float) -> Point:
     """Return where the branch leaves the range before it turns; the fold where they are too near to tell apart."""
     edge = low if float(fold.X[-1]) < low else high
@@ -125,15 +133,17 @@ def smooth_events(
         if not was * now < 0.0:
             continue
         there = locate(curve, a, b, tests.one(kind)) if kind != "branch" else _branch_point(curve, a, b, tests)
-        if there is None and kind != "branch":
+        # Beyond a change of signature nothing is missed.
+        if there is None and kind != "branch" and (reason != "change" or was * after[SMOOTH.index(kind)] < 0.0):
             warnings.warn(
                 f"a {kind.replace('_', '-')} between the parameter's values {float(a.X[-1])!r} and {float(b.X[-1])!r} "
                 "was met but not located, and is not listed",
                 RuntimeWarning,
                 stacklevel=2,
             )
-        # At a change of signature the parameter may turn too: that belongs to the change.
-        if there is None or there[0] > stop - (BESIDE if reason == "change" else 0.0):
+        # At a change of signature the parameter may turn too: that belongs to the change. Where a branch closes its
+        # first point has been looked at.
+        if there is None or there[0] > stop - {"change": BESIDE, "closed": CLOSING}.get(reason, 0.0):
             continue
         s, point = there
         if kind == "neimark_sacker" and not _has_pair(point):
@@ -167,11 +177,10 @@ def _branch_point(curve: Curve, a: Point, b: Point, tests: Tests) -> tuple[float
         return there
     shooting = curve.shooting
     solved = shooting.evaluate(Y * curve.scale)
-    path = curve.walk.along(solved, shooting.split(solved.X)[1])
-    if path is None:
+    path, M = curve.walk.along(solved, shooting.split(solved.X)[1]), solved.monodromy
+    if path is None or not np.isfinite(M).all():
         return there
     # Any direction in the plane of both branches is null here, and the border is singular: keep that of the branch.
-    M = solved.monodromy
     point = replace(there[1], Y=Y, solved=solved, M=M, multipliers=multipliers_of(M), path=path)
     return float(a.tangent @ (Y - a.Y)), point
 

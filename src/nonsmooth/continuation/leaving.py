@@ -3,78 +3,100 @@
 from __future__ import annotations
 
 from nonsmooth.continuation.arclength import Curve, Point
-from nonsmooth.continuation.change import Change, changed
-from nonsmooth.continuation.events import Event
+from nonsmooth.continuation.change import Change, common_point, contacts, past_the_section
+from nonsmooth.continuation.equilibrium import Equilibria
+from nonsmooth.continuation.events import Event, at_section
 from nonsmooth.continuation.grazing import graze
 from nonsmooth.continuation.marches import March
-from nonsmooth.continuation.resuming import common_point, resumed
+from nonsmooth.continuation.neighbours import beside
 from nonsmooth.continuation.switching import is_doubled
 
 __all__ = ["change_of_signature", "passed_by"]
 
 
+def change_of_signature(found: March, curve: Curve, met: list[Event]) -> tuple[Curve, Point] | None:
+    """Record a change of signature and begin anew behind it; None where the branch ends."""
+    for kind, _, point in met:
+        if kind == "short" and at_section(curve, point):
+            after = past_the_section(curve, point)
+            if after is None:
+                found.ending = "no_convergence"
+            return after
+    beyond = beside(curve, met[0][2])
+    name = _mark(found, curve, met, beyond)
+    if beyond is None and _is_centre(curve, met):
+        found.ending = found.special[-1].kind = "focus_centre"
+    elif beyond is None:
+        found.ending = "landing" if met[0][0] == "landed" else name
+    elif is_doubled(*beyond) and not is_doubled(curve, met[0][2]):
+        # Beyond the graze at which a doubled orbit is born there is only the shorter one, gone round twice.
+        found.ending = "branching"
+        return None
+    return beyond
+
+
+def _is_centre(curve: Curve, met: list[Event]) -> bool:
+    """Return whether an autonomous orbit has shrunk to a closed one of a linear mode."""
+    if curve.shooting.forced:
+        return False
+    kind, _, point = met[0]
+    free = [change.signature for change in contacts(curve, point, kind) if not change.gained]
+    name = curve.shooting.active[0]
+    return any(
+        not one.crossings and Equilibria(curve.shooting.system, one.visits[0].mode, name, curve.width).linear
+        for one in free
+    )
+
+
 def passed_by(found: March, curve: Curve, kind: str, point: Point) -> None:
     """Record a boundary that a virtual branch passes with its signature."""
-    for change in changed(curve, point, kind):
-        after = resumed(curve, point, change)
-        if after is None:
-            continue
-        if change.kind == "grazing":
-            _mark_graze(found, curve, point, change, after)
-            return
-    _mark_unexplained(found, curve, kind, point)
+    _mark(found, curve, [(kind, 0.0, point)], beside(curve, point))
 
 
-def _mark_graze(found: March, curve: Curve, point: Point, change: Change, after: tuple[Curve, Point, float]) -> None:
+def _mark(found: March, curve: Curve, met: list[Event], beyond: tuple[Curve, Point] | None) -> str:
+    """Record the end of a signature, by the contact that begins or ends there where one does; its name."""
+    kind, _, point = met[0]
+    known = [(change, there) for event, _, there in met for change in contacts(curve, there, event)]
+    if beyond is not None:
+        cycle = beyond[0].shooting.signature.cycle
+        for change, there in known:
+            if change.signature.cycle == cycle:
+                _mark_graze(found, curve, there, change, beyond)
+                return "grazing"
+    own = contacts(curve, point, kind)
+    name = "grazing" if own or kind in ("touch", "slow") else "corner"
+    found.mark(name, curve, point, indicator=own[0].indicator if own else _indicator(curve, point, kind))
+    return name
+
+
+def _mark_graze(found: March, curve: Curve, point: Point, change: Change, after: tuple[Curve, Point]) -> None:
     """Record a graze: the orbit without the contact, whichever side the branch came from."""
-    fresh, first, _ = after
+    fresh, first = after
     judged = graze(curve, point, first, change)
     free = (curve, point) if change.gained else (fresh, common_point(curve, point, change) or first)
     found.mark("grazing", *free, indicator=change.indicator, graze=judged)
 
 
-def _mark_unexplained(found: March, curve: Curve, kind: str, point: Point) -> str:
-    """Record a boundary beyond which no orbit of another signature is known; its name."""
-    name = "grazing" if kind in ("touch", "slow", "short") else "corner"
-    if kind == "short" and 0 < (i := int(point.path.tau.argmin())) < curve.shooting.m:
-        visits = curve.shooting.signature.visits
-        name = "grazing" if visits[i - 1].mode == visits[i + 1].mode else "corner"
-    known = [change.indicator for change in changed(curve, point, kind)]
-    found.mark(name, curve, point, indicator=known[0] if known else _indicator(curve, point, kind))
-    return name
-
-
-def change_of_signature(found: March, curve: Curve, met: list[Event]) -> tuple[Curve, Point, float] | None:
-    """Record a change of signature and begin anew behind it; None where the branch ends."""
-    for kind, _, point in met:
-        for change in changed(curve, point, kind):
-            after = resumed(curve, point, change)
-            if after is None:
-                continue
-            fresh, first, ds = after
-            if change.kind == "grazing":
-                _mark_graze(found, curve, point, change, after)
-            elif change.kind == "corner":
-                found.mark("corner", curve, point, indicator=change.indicator)
-            if change.kind != "section" and is_doubled(fresh, first) and not is_doubled(curve, point):
-                # Beyond the graze at which a doubled orbit is born there is only the shorter one, gone round twice.
-                found.ending = "branching"
-                return None
-            return fresh, first, ds
-    kind, _, point = met[0]
-    name = _mark_unexplained(found, curve, kind, point)
-    found.ending = "landing" if kind == "landed" else name
-    return None
-
-
 def _indicator(curve: Curve, point: Point, kind: str) -> int:
-    """The indicator that an unexplained event is about (-1: not known)."""
+    """The indicator of the surface that an event is about: of the row that is nearest to zero (-1: of none)."""
+    path, visits, shooting = point.path, curve.shooting.signature.visits, curve.shooting
     if kind == "touch":
-        visit, k = point.path.touched
-        return int(curve.walk.net.rows[point.path.which[visit, k], 0])
+        place, k = path.touched
+        return int(curve.walk.net.rows[path.which[place, k], 0])
+    times, states = shooting.split(point.X)
     if kind == "landed":
-        k = int(point.path.landing[int(point.path.landed.argmax())])
-        net = curve.walk.net
-        rows = net.rows[net.row_start[k] : net.row_start[k + 1], 0]
-        return int(rows[0]) if len(rows) == 1 else -1
-    return -1
+        place = int(path.landed.argmax())
+        k, z = int(path.landing[place]), states[place]
+    else:
+        if kind in ("short", "others"):
+            place = int(path.tau.argmin() if kind == "short" else path.others.argmax())
+        else:
+            place = int(curve.walk.conditional[int((path.own if kind == "own" else path.slope).argmin())])
+        k = int(path.other[place]) if kind == "others" else visits[place].transition
+        z = point.solved.segments.z[place]
+    rows = shooting.system.traced.transitions[k].rows
+    skipped = visits[place].row if kind == "own" else -1
+    t = float(times[min(place, len(times) - 1)])
+    near = [(abs(shooting.flow.jump(point.solved.values, k, t, z, r).h), row.indicator)
+            for r, row in enumerate(rows) if r != skipped]  # fmt: skip
+    return min(near)[1] if near else -1

@@ -6,15 +6,20 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from nonsmooth.continuation.arclength import Curve, Point
 from nonsmooth.continuation.grazing import Graze
+from nonsmooth.continuation.signature import Signature
 from nonsmooth.errors import Interrupted
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "ENDINGS", "INTERRUPTED", "Limits", "March", "Row", "Special", "in_turn", "march_until", "unless_interrupted",
+    "ENDINGS", "INTERRUPTED", "Limits", "March", "Place", "Row", "Special", "in_turn", "march_until",
+    "unless_interrupted",
 ]  # fmt: skip
 
 INTERRUPTED = "Interrupted: what was found until then stands"
@@ -26,6 +31,10 @@ ENDINGS = {
     "points": "The largest number of points was reached; continue the branch with continue_orbit(branch).",
     "equilibrium": (
         "The cycle shrinks to an equilibrium, a Hopf bifurcation: continue_equilibrium finds it to the last digit."
+    ),
+    "focus_centre": (
+        "The cycle ends in a focus-centre bifurcation: it only touches the boundary of a mode that is linear, and at "
+        "this value all smaller orbits of that mode are closed."
     ),
     "no_convergence": (
         "Newton's method did not converge, however small the step; the orbit may end in an event that is not known "
@@ -88,6 +97,10 @@ def unless_interrupted(result: xr.Dataset, endings: Sequence[str]) -> xr.Dataset
     )
 
 
+#: Signature and unknowns of an orbit.
+Place = tuple[Signature, NDArray[np.float64]]
+
+
 @dataclass
 class Row:
     """One point of the branch with the curve it lies on; ``virtual`` beyond a boundary that its path should obey."""
@@ -135,5 +148,5 @@ class Limits:
     high: float
     largest: float  # step
     points: int
-    closed: tuple[Curve, Point] | None = None
+    closed: Place | None = None  # where the branch would close
     virtual: bool = False  # go on beyond boundaries with the same signature

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +12,7 @@ from nonsmooth.continuation.arclength import Curve, Point
 from nonsmooth.continuation.begin import Asked, limits, resumed_at, sentence
 from nonsmooth.continuation.branch import march
 from nonsmooth.continuation.files import branch_dataset
-from nonsmooth.continuation.marches import in_turn
+from nonsmooth.continuation.marches import March, in_turn
 from nonsmooth.continuation.multipliers import multipliers_of
 from nonsmooth.continuation.physical import allowed_range
 from nonsmooth.continuation.reading import hopf_row, one_row, special_row
@@ -56,7 +55,8 @@ def switched(start: xr.Dataset, name: str | None, given: Any, asked: Asked) -> x
                 break
     if not begun:
         raise SolveError(f"no other branch was found at this {kind}", status="no_convergence")
-    marches = in_turn(*(partial(march, *point, asked.limits(bounds), asked.first) for point in begun))
+    closed = (ways[0][0].shooting.signature, ways[0][1] * ways[0][0].scale)
+    marches = in_turn(*(partial(march, *point, asked.limits(bounds, closed), asked.first) for point in begun))
     number = begun[0][0].shooting.period_number
     sentences = [sentence(one, bounds, own, (low, high)) for one in marches]
     forward = from_march(marches[0])
@@ -92,8 +92,8 @@ def straight_on(start: xr.Dataset, name: str | None, given: Any, asked: Asked) -
     first = None if found is None else curve.point(found[0], found[1], border)
     if first is None:
         raise SolveError(f"Newton's method did not converge at this {kind}", status="no_convergence")
-    back = replace(first, tangent=-first.tangent, orientation=-first.orientation)
-    marches = in_turn(*(partial(march, curve, one, asked.limits(bounds), asked.first) for one in (back, first)))
+    both = (first.turned(), first)
+    marches = in_turn(*(partial(march, curve, one, asked.limits(bounds), asked.first) for one in both))
     points, special = joined(from_march(marches[0]), [point_record(curve, first)], from_march(marches[1]))
     here = one_row(start, "continue_orbit")
     mark = SpecialRecord(
@@ -109,25 +109,30 @@ def straight_on(start: xr.Dataset, name: str | None, given: Any, asked: Asked) -
 
 
 def born(start: xr.Dataset, name: str | None, given: Any, asked: Asked) -> xr.Dataset:
-    """The cycles that emanate from a Hopf point."""
-    from nonsmooth.continuation.born import first_cycle
+    """The cycles that emanate from a Hopf point, or from a focus-centre."""
+    from nonsmooth.continuation.born import cycle_about_a_centre, first_cycle
 
     start = one_row(start, "continue_orbit")
     kind = str(start["kind"].values)
-    if kind != "hopf":
-        raise ValueError(f"no cycle emanates from a {kind}: that happens at a hopf point")
+    if kind not in ("hopf", "focus_centre"):
+        raise ValueError(f"no cycle emanates from a {kind}: that happens at a hopf point or a focus_centre")
     system, own, value, mode, u, before = hopf_row(start)
     _check_parameter(name, own)
     low, high = limits(system, own, before if given is None else given, value)
     bounds = allowed_range(system, own, low, high)
-    begun = first_cycle(system, own, value, mode, u, high - low)
+    begun = (first_cycle if kind == "hopf" else cycle_about_a_centre)(system, own, value, mode, u, high - low)
     if begun is None:
-        raise SolveError("no cycle was found at this Hopf point", status="no_convergence")
+        raise SolveError(f"no cycle was found at this {kind}", status="no_convergence")
     curve, first = begun
+    # The first cycle of a Hopf point is small; about a centre the one that touches the boundary is followed back to.
+    back = March(ending="branching")
+    if kind == "focus_centre":
+        back = march(curve, first.turned(), asked.limits(bounds), asked.first)
     found = march(curve, first, asked.limits(bounds), asked.first)
-    sentences = ("The branch begins at the Hopf point.", sentence(found, bounds, own, (low, high)))
-    points, special = joined(([], []), [point_record(curve, first)], from_march(found))
-    record = BranchRecord(own, (low, high), 0, points, special, ("branching", found.ending), sentences)
+    words = "The branch begins at the Hopf point." if kind == "hopf" else sentence(back, bounds, own, (low, high))
+    points, special = joined(from_march(back), [point_record(curve, first)], from_march(found))
+    sentences = (words, sentence(found, bounds, own, (low, high)))
+    record = BranchRecord(own, (low, high), 0, points, special, (back.ending, found.ending), sentences)
     return branch_dataset(system, record, asked.options(own, (low, high), **{"from": kind}))
 
 

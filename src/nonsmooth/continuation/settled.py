@@ -37,8 +37,8 @@ class Guess:
     signature: Signature
     times: FloatArray  # of its crossings
     states: FloatArray  # (m + 1, n_z): at the section and after the crossings
-    gap: float
-    size: FloatArray  # (n_u,) half the range of each state
+    gap: float = 0.0
+    size: FloatArray = field(default_factory=lambda: np.empty(0))  # (n_u,) half the range of each state
     gaps: FloatArray = field(default_factory=lambda: np.empty(0))  # after 1, 2 ... forcing periods
     kicks: FloatArray | None = None  # (m,) change of state in each crossing, scaled; None: not known
 

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 __all__ = ["Shooting", "Solved"]
 
 FloatArray = NDArray[np.float64]
+ROUNDING = 1e-16  # of the period
 
 
 @dataclass
@@ -157,6 +158,15 @@ class Shooting:
             return float(X[self.size - 1])
         return self.period_number * self.flow.period(self.parameters(X))[0]
 
+    def instants(self, X: FloatArray) -> FloatArray:
+        """0, the instants of the transitions, and the end of the round (m + 2,)."""
+        return np.concatenate([[0.0], X[self.t_at], [self.period(X)]])
+
+    def moved(self, solved: Solved, X: FloatArray) -> Solved:
+        """A solved orbit after a last step so small that its derivatives stay."""
+        solved.X, solved.times, solved.values = X, self.instants(X), self.parameters(X)
+        return solved
+
     def evaluate(self, X: FloatArray) -> Solved:
         """Residual and Jacobian at X."""
         n, m, a, size = self.n, self.m, self.n_active, self.size
@@ -167,9 +177,10 @@ class Shooting:
             end = self.period_number * T
         else:
             T, dT, end = float(X[size - 1]), np.zeros(a), float(X[size - 1])
-        times = np.empty(m + 2)
-        times[0], times[1:-1], times[-1] = 0.0, t, end
-        segments = self.flow.segments(values, self.modes, times[:-1], times[1:] - times[:-1], z)
+        times = self.instants(X)
+        lengths = np.diff(times)
+        lengths[np.abs(lengths) < ROUNDING * abs(end)] = 0.0  # the step of the next visit is not begun from rounding
+        segments = self.flow.segments(values, self.modes, times[:-1], lengths, z)
         F, J = np.zeros(size), np.zeros((size, size + a))
         jumps = []
         pull = np.matmul(segments.Phi, segments.f_begin[:, :, None])[:, :, 0]

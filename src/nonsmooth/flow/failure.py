@@ -32,23 +32,19 @@ def solve_error(code: int, because: str = "", **where: Any) -> SolveError:
 
 def _not_unique(system: System, jump: TracedTransition) -> str:
     """A sentence where sliding ended without a unique way on; else nothing."""
-    from nonsmooth.system.sliding import NOT_UNIQUE
-
     modes, declared = system.modes, len(system.declared.mode_names)
-    names = [modes[i] for i in (jump.source, jump.target) if modes[i].endswith(NOT_UNIQUE)]
-    if not names and min(jump.source, jump.target) >= declared:
+    if system.traced.ends(jump):
+        return (
+            f"Sliding in mode {modes[jump.source]!r} reached a point where the surface stops attracting from both "
+            "sides at once (a two-fold): motion from there is not unique. Change the model there, or start elsewhere."
+        )
+    if min(jump.source, jump.target) >= declared:
         return (
             f"Both {modes[jump.source]!r} and {modes[jump.target]!r} slide to where a second surface attracts too, and "
             "the vector fields beside these surfaces do not determine one field on both (it depends on the order in "
             "which they are combined). Write the motion on both surfaces as a mode of its own."
         )
-    if not names:
-        return ""
-    return (
-        f"Sliding in mode {names[0].removesuffix(NOT_UNIQUE)!r} reached a point where the surface stops attracting "
-        "from both sides at once (a two-fold): motion from there is not unique. Change the model there, or start "
-        "elsewhere."
-    )
+    return ""
 
 
 def wrong_way(system: System, log: Log) -> str:
@@ -57,7 +53,7 @@ def wrong_way(system: System, log: Log) -> str:
 
     An impact turns the rate of its indicator round. With the wrong sign it does not, and follows itself without end.
     """
-    if log.status not in (codes.CHATTER, codes.TOO_MANY_CROSSINGS) or not len(log.crossing_time):
+    if log.status not in (codes.CHATTER, codes.TOO_MANY_CROSSINGS, codes.NOT_UNIQUE) or not len(log.crossing_time):
         return ""
     t, jump = system.traced, system.transitions[int(log.crossing_transition[-1])]
     if system.surfaces and (lost := _not_unique(system, jump)):

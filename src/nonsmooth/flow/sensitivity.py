@@ -175,7 +175,8 @@ def sensitivity(
 
     Notes
     -----
-    Transitions taken at the same instant stand as one crossing, with the last one's number.
+    Transitions taken at the same instant stand as one crossing, with the last one's number. A parameter that has the
+    name of a variable above (``P``, ``end``) is no coordinate of the result; `system_of` gives its value.
     """
     check_system(system, "sensitivity")
     names = (parameters,) if isinstance(parameters, str) else tuple(parameters)

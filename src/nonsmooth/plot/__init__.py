@@ -28,6 +28,7 @@ from nonsmooth.plot.orbit import orbit
 from nonsmooth.plot.phase_portrait import phase_portrait
 from nonsmooth.plot.regions import regions
 from nonsmooth.plot.section import section
+from nonsmooth.plot.smoothing_report import smoothing_report
 from nonsmooth.plot.style import COLORS, COLUMN, PAGE, journal, save_figure
 from nonsmooth.plot.time_history import time_history
 
@@ -58,6 +59,7 @@ __all__ = [
     "regions",
     "save_figure",
     "section",
+    "smoothing_report",
     "time_history",
 ]
 

@@ -62,10 +62,21 @@ def journal() -> Iterator[None]:
     >>> with ns.plot.journal():
     ...     figure, ax = plt.subplots()
     """
+    with _set(_settings()):
+        yield
+
+
+@contextmanager
+def _set(settings: Any) -> Iterator[None]:
+    """Set these and no others: a notebook's first figure makes Matplotlib interactive, and ``rc_context`` undoes it."""
     import matplotlib as mpl
 
-    with mpl.rc_context(_settings()):
+    before: Any = {key: mpl.rcParams[key] for key in settings}
+    mpl.rcParams.update(settings)
+    try:
         yield
+    finally:
+        mpl.rcParams.update(before)
 
 
 @contextmanager
@@ -100,7 +111,7 @@ def _own_legend(ax: Axes) -> Iterator[None]:
     now: Any = mpl.rcParams
     plain: Any = mpl.rcParamsDefault
     free: Any = {key: value for key, value in wanted.items() if now[key] == plain[key]}
-    with mpl.rc_context(free):
+    with _set(free):
         yield
 
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import sys
 import threading
 import time
-import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from shutil import get_terminal_size
@@ -45,13 +45,9 @@ def progress(total: int, label: str, enabled: Progress = True, done: int = 0) ->
     if not enabled or total <= 0 or not is_watched():
         yield _count_nothing
         return
-    # A bar that is redrawn by its own steps needs no thread that looks after it.
-    kind = type("Bar", (_tqdm(),), {"monitor_interval": 0})
-    with kind(
-        total=total, desc=label, initial=done, leave=False, miniters=1, file=sys.stderr,
-        # a terminal may say that it has no columns and no rows
-        ncols=None if _in_notebook() else get_terminal_size().columns, nrows=20,
-        bar_format="{desc}: {percentage:3.0f}%|{bar}| {n_fmt}/{total_fmt} [{elapsed}<{remaining}]",
+    with _bar_type()(
+        total=total, desc=label, initial=done, leave=False, miniters=1,
+        bar_format="{desc}: {percentage:3.0f}%|{bar}| {n_fmt}/{total_fmt} [{elapsed}<{remaining}]", **_place(),
     ) as bar:  # fmt: skip
 
         def advance(n: int = 1) -> None:
@@ -79,7 +75,9 @@ def say(text: str, enabled: Progress = True) -> None:
     """A line on stderr, above the bars, where somebody watches; an unwritable stderr is passed over."""
     if enabled is True and is_watched():
         with suppress(OSError, ValueError):
-            _tqdm().write(text, file=sys.stderr)
+            from tqdm import tqdm
+
+            tqdm.write(text, file=sys.stderr)
             sys.stderr.flush()
 
 
@@ -96,11 +94,33 @@ def _in_notebook() -> bool:
     return "IPKernelApp" in getattr(shell, "config", ())
 
 
-def _tqdm() -> Any:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # a notebook without ipywidgets has bars of text
-        from tqdm.auto import tqdm
-    return tqdm
+def _bar_type() -> Any:
+    from tqdm import tqdm
+
+    # A bar that is redrawn by its own steps needs no thread that looks after it.
+    own: dict[str, Any] = {"monitor_interval": 0}
+    if _in_notebook():
+        own |= {"status_printer": staticmethod(_output_of_a_cell), "moveto": _nothing}
+    return type("Bar", (tqdm,), own)
+
+
+def _place() -> dict[str, Any]:
+    if _in_notebook():
+        return {"file": io.StringIO()}  # for what a terminal needs besides
+    # a terminal may say that it has no columns and no rows
+    return {"file": sys.stderr, "ncols": get_terminal_size().columns, "nrows": 20}
+
+
+def _output_of_a_cell(file: Any) -> Callable[[str], None]:
+    """One output that is written anew, and empty in the end: text with carriage returns would leave blank lines."""
+    from IPython.display import display
+
+    shown = display({"text/plain": ""}, raw=True, display_id=True)
+
+    def show(text: str) -> None:
+        shown.update({"text/plain": text}, raw=True)
+
+    return show
 
 
 def _say_compiling(name: str) -> None:
@@ -119,7 +139,7 @@ def _count_nothing(n: int = 1) -> None:
     pass
 
 
-def _nothing() -> None:
+def _nothing(*_: object) -> None:
     pass
 
 

@@ -73,6 +73,12 @@ STATUSES: tuple[Status, ...] = (
         "The work was stopped before this point was computed.",
         "Run it again; finished points are whole.",
     ),
+    Status(
+        codes.NOT_UNIQUE, "not_unique",
+        "Sliding reached a point where its surface stops attracting from both sides at once (a two-fold): motion from "
+        "there is not unique.",
+        "Change the model there, or start elsewhere.",
+    ),
 )  # fmt: skip
 
 #: What a run can rest at; "undecided": an equilibrium whose eigenvalues do not say whether it is stable.

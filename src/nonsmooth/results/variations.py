@@ -49,7 +49,7 @@ def derivatives_of_run(
         "state": ("state", names, {"long_name": "state, then memory"}),
         "initial_state": ("initial_state", names, {"long_name": "state at the start, then memory"}),
         "parameter": ("parameter", np.array(list(parameters), dtype=str)),
-        **parameter_coords(d),
+        **parameter_coords(d, without=[*variables, "parameter", "initial_state"]),
     }
     return with_short_record(xr.Dataset(variables, coords, dict(attrs)))
 
@@ -81,7 +81,7 @@ def spectrum(
     }  # fmt: skip
     coords: dict[str, Any] = {
         "exponent": ("exponent", np.arange(1, table.shape[-1] + 1), {"long_name": "number of the exponent"}),
-        **parameter_coords(d, without=parameter or ""),
+        **parameter_coords(d, without=[*variables, "batch", parameter or ""]),
     }
     if parameter is None:
         return with_short_record(xr.Dataset(variables, coords, dict(attrs))).isel(point=0)

@@ -297,8 +297,8 @@ def _opened(
     if len(base) > 1 or any(given[key] for key in ("transitions", "indicators", "memory", "symmetry", "bands")):
         raise SystemDefinitionError(
             f"{len(parts)} elements have more than {MOST} combinations of phases, which are not written out but made "
-            "when they are visited: such a system has one mode and no indicators, transitions, memory, symmetry or bands "
-            "of its own"
+            "when they are visited: such a system has one mode and no indicators, transitions, memory, symmetry or "
+            "bands of its own"
         )
     patterns = Patterns(make, next(iter(base)))
     return {

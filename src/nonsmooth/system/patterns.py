@@ -256,8 +256,8 @@ class Patterns:
         if form is None or not form.affine_indicators:
             raise SystemDefinitionError(
                 f"{self.equations.name!r}: its {len(self.elements)} elements have more combinations of phases than can "
-                "be written out, and a mode can be made when it is first visited only where everything is affine in the "
-                "states with harmonics in time; take fewer elements or write the nonlinear ones as modes"
+                "be written out, and a mode can be made when it is first visited only where everything is affine in "
+                "the states with harmonics in time; take fewer elements or write the nonlinear ones as modes"
             )
         return form
 

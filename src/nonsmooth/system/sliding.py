@@ -16,8 +16,8 @@ Sliding ends where L_+ h rises or L_- h falls through zero, never by the quotien
 vanish together; a return to the surface therefore also needs the rate of h in its own mode, whose sign is known there.
 A state beyond the surface (a start, a reset) changes sides without sliding.
 
-Where L_- h - L_+ h vanishes in sliding (a two-fold) both fields turn away at once and motion is not unique: it goes to
-and fro between two modes at one instant, and the run ends as chatter.
+Where L_- h - L_+ h vanishes in sliding (a two-fold) both fields turn away at once and motion is not unique: a
+transition leads to a mode whose name ends in ``NOT_UNIQUE``, and there the run ends with that status.
 
 Two surfaces that both pairs of modes share give sliding along both: the same construction, with sliding modes in the
 places of the two modes.
@@ -37,16 +37,15 @@ from numpy.typing import NDArray
 from nonsmooth.errors import SystemDefinitionError, shortened
 from nonsmooth.system.equations import TracedSurface
 from nonsmooth.system.scalar import as_written
-from nonsmooth.system.traced import Row, Traced, TracedTransition
+from nonsmooth.system.traced import NOT_UNIQUE, Row, Traced, TracedTransition
 
-__all__ = ["NOT_UNIQUE", "repelled", "slide"]
+__all__ = ["repelled", "slide"]
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
 FloatArray = NDArray[np.float64]
 BEYOND = 10**9  # a state farther from the surface than the indicator's scale over this is not on it
-NOT_UNIQUE = "_not_unique"  # ends the name of the mode in which motion has no unique way on
 ON_SURFACE = 1e-12  # of the indicator's size: a start so near lies on the surface
 SEEDS = 3  # random points at which the orders of two surfaces are compared
 
@@ -320,7 +319,6 @@ class _Builder:
             least = self.size(pair) * self.kappa / BEYOND
             gone = Row(self.indicator(attraction - least, f"{name} attraction between {self._names(mode)}"), -1)
             self.jump(slid, self.undetermined(slid), gone)
-            self.jump(self.undetermined(slid), slid, gone)
 
     def _names(self, mode: Mapping[int, int]) -> str:
         return f"{self.modes[mode[-1]]} and {self.modes[mode[1]]}"

@@ -14,7 +14,9 @@ if TYPE_CHECKING:
 
     from nonsmooth.system.patterns import Patterns
 
-__all__ = ["Row", "Traced", "TracedTransition"]
+__all__ = ["NOT_UNIQUE", "Row", "Traced", "TracedTransition"]
+
+NOT_UNIQUE = "_not_unique"  # ends the name of a derived mode from which motion has no unique way on
 
 
 @dataclass(frozen=True)
@@ -85,6 +87,10 @@ class Traced:
 
         assert jump.at is not None
         return write_expression(jump.at, dict(zip(self.p, self.parameter_names, strict=True)))
+
+    def ends(self, jump: TracedTransition) -> bool:
+        """Return whether motion is not unique behind a transition, so that a run ends there."""
+        return self.mode_names[jump.target].endswith(NOT_UNIQUE)
 
     def keeps(self, jump: TracedTransition) -> bool:
         """Return whether a transition leaves every state of its source as it is; states that it lacks may begin."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from nonsmooth.flow.engines.engine import Chain, FloatArray, Log, SectionPlan, State
 from nonsmooth.kernels.hybrid import codes
-from nonsmooth.kernels.hybrid.places import BEGUN, CROSSINGS, PATIENCE, RESET, TOUCHES
+from nonsmooth.kernels.hybrid.places import BEGUN, CROSSINGS, DEAD_END, PATIENCE, RESET, TOUCHES
 from nonsmooth.kernels.hybrid.stopping import flag
 from nonsmooth.system.phases import phases, varying_phases
 
@@ -211,7 +211,11 @@ def pack_net(traced: Traced) -> Any:
 
     integer = np.int64
     transitions = np.array(
-        [(t.target, _change(traced, t), t.contact, j) for j, t in enumerate(traced.transitions)], dtype=integer,
+        [
+            (t.target, _change(traced, t), DEAD_END if traced.ends(t) else t.contact, j)
+            for j, t in enumerate(traced.transitions)
+        ],
+        dtype=integer,
     ).reshape(-1, 4)  # fmt: skip
     rows = [(r.indicator, r.sign, r.strict) for t in traced.transitions for r in t.rows]
     row_start = np.cumsum([0] + [len(t.rows) for t in traced.transitions], dtype=integer)

@@ -17,6 +17,7 @@ from nonsmooth.kernels.hybrid.codes import (
     CHATTER,
     DIVERGED,
     NOT_GUARANTEED,
+    NOT_UNIQUE,
     OK,
     PAUSED,
     TOO_MANY_CROSSINGS,
@@ -26,6 +27,7 @@ from nonsmooth.kernels.hybrid.places import (
     BURST,
     BURST_LENGTH,
     CLOSELY,
+    DEAD_END,
     FIRED,
     FIRST,
     JUMPS,
@@ -81,6 +83,8 @@ def settle(i, form, net, tables, work):
         if t < 0:
             break
         tally[MODE] = take(i, t, -1, form, tables, net, work)
+        if net.transitions[t, 2] == DEAD_END:
+            return NOT_UNIQUE
         visited[tally[MODE]] = 1
     return OK
 
@@ -147,6 +151,9 @@ def transit(i, t, short, form, net, section, goal, seen, tables, work):
         cross(i, t, mode, jumps, form, net, goal, seen, tables, work)
         tally[MODE] = mode
         jumps += 1
+        if net.transitions[t, 2] == DEAD_END:
+            code = NOT_UNIQUE
+            break
         t = next_holding(mode, tables, net, work)
     tally[TAKEN] = 0
     depart(jumps, seen, work)

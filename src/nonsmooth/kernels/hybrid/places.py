@@ -22,4 +22,5 @@ SHORT = 1e-11
 PATIENCE = 1_000_000  # steps of a run between two looks whether somebody wants to stop it
 NO_END = 1e300  # a time that is never reached
 
-RESET = 1  # of ``Net.transitions``: the states change (2: memory alone)
+RESET = 1  # of ``Net.transitions``, place 1: the states change (2: memory alone)
+DEAD_END = 2  # of place 2: behind it motion is not unique, and the run ends (1: a contact begins)

@@ -67,8 +67,8 @@ class Tables(NamedTuple):
 class Net(NamedTuple):
     """The net of transitions of a linear system."""
 
-    transitions: Any  # (transitions, 4): target (-1: its tables do not stand yet), what it changes (0, or see
-    # ``places.RESET``), is contact, its map among those of the form
+    transitions: Any  # (transitions, 4): target (-1: its tables do not stand yet), what it changes (0,
+    # ``places.RESET``, ...), contact or ``DEAD_END``, its map among those of the form
     rows: Any  # (rows + 2, 3): functional, sign, strict; the last two belong to the section (rising, falling)
     row_start: Any  # (transitions + 1,)
     mode_start: Any  # (modes + 1,)
