@@ -104,6 +104,8 @@ def test_what_cannot_be_done_with_patterns_is_refused(both: tuple[ns.System, ns.
             verb(made)
     with pytest.raises(ValueError, match="by the exact flow alone"):
         ns.simulate(made, periods=1, method="taylor")
+    with pytest.raises(ValueError, match="by the processor"):
+        ns.sweep(made, "w", [0.5, 0.6], direction=None, device="cuda", progress=False)
     stribeck = ns.mechanical(
         1.0, 0.0, 1.0, elements=[Coulomb(at="q", friction=lambda v, p: 0.1 / (1 + v)), Stop(at="q", position=1.0)]
     )
