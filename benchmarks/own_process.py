@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 HERE = Path(__file__).parent
-SCRIPTS = HERE.parent / "tests" / "analysis"  # those that run under Numba's simulator
+SCRIPTS = HERE.parent / "tests" / "diagrams"  # those that run under Numba's simulator
 
 
 def printed(*arguments: str, given: str = "", **environment: str) -> str:

@@ -67,7 +67,11 @@ class Page:
 
     def until(self, what: str, timeout: float = PATIENCE) -> Any:
         """Wait until a JavaScript expression is true."""
-        return self.tab.wait_for_function(what, timeout=1000 * timeout)
+        try:
+            return self.tab.wait_for_function(what, timeout=1000 * timeout)
+        except Exception as error:
+            told = self.tab.evaluate("({...document.documentElement.dataset})")
+            raise AssertionError(f"{what}: {told}, {self.readout()}, {self.notes()!r}, {self.ui()}") from error
 
     def until_done(self) -> None:
         """Wait until everything that was asked for is shown."""

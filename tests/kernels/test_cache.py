@@ -310,6 +310,35 @@ def test_one_signature_only(tmp_path, monkeypatch):
         assert len(module.f.signatures) == 1
 
 
+LAYERS = """
+from nonsmooth.kernels.compile.cache import kernel, once
+
+
+@once
+def twice(a):
+    return 2.0 * a
+
+
+@kernel("float64(float64)")
+def layered(a):
+    return twice(a) + twice(a + 1.0)
+"""
+
+
+def test_a_compile_copies_no_names_of_what_it_inlines(tmp_path, monkeypatch):
+    from numba.core import ir
+
+    from nonsmooth.kernels.compile import cache
+
+    def copied(self, memo):
+        raise AssertionError("names are copied")
+
+    monkeypatch.setenv("NONSMOOTH_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(ir.VarMap, "__deepcopy__", copied, raising=False)
+    assert cache.load_module(LAYERS, "layers").layered(2.0) == 2.0 * 2.0 + 2.0 * 3.0
+    assert not hasattr(ir.Scope, "__deepcopy__")  # Numba is left as it was
+
+
 def test_failed_module_is_not_kept(tmp_path, monkeypatch):
     from nonsmooth.kernels.compile import cache
 

@@ -16,8 +16,14 @@
     }
     select.value = chosen;
   }
-  /* Text in a field that somebody is writing in stays. */
-  const put = (input, value) => { if (document.activeElement !== input || input.dataset.sent) input.value = value; delete input.dataset.sent; };
+  /* A field is sent when its text is complete; until then the server's values leave it alone. */
+  function field(input, commit) {
+    const done = () => { if (input.dataset.open) { delete input.dataset.open; commit(input.value); } };
+    input.addEventListener("input", () => { input.dataset.open = "yes"; });
+    input.addEventListener("change", done);
+    input.addEventListener("keydown", event => { if (event.key === "Enter") done(); });
+  }
+  const put = (input, value) => { if (!input.dataset.open && input.value !== String(value)) input.value = value; };
 
   function row(name, label, unit, slider) {
     const box = document.createElement("div");
@@ -25,9 +31,9 @@
     box.dataset.name = name;
     box.innerHTML = `<div class="name"><b>${label}</b><span class="unit"></span><input inputmode="decimal"></div>`;
     box.querySelector(".unit").textContent = unit;
-    const field = box.querySelector("input");
-    field.setAttribute("aria-label", name + (unit ? " in " + unit : ""));
-    field.id = "v-" + name;
+    const text = box.querySelector("input");
+    text.setAttribute("aria-label", name + (unit ? " in " + unit : ""));
+    text.id = "v-" + name;
     if (slider) {
       const range = document.createElement("input");
       range.type = "range";
@@ -48,11 +54,11 @@
       built = key;
       $("parameters").replaceChildren(...ui.parameters.map(one => {
         const box = row("p." + one.name, one.html, one.unit, true);
-        const [field, range] = box.querySelectorAll("input");
-        field.addEventListener("change", () => { field.dataset.sent = 1; act("set", "p." + one.name, field.value); act("end"); });
+        const [text, range] = box.querySelectorAll("input");
+        field(text, value => { act("set", "p." + one.name, value); act("end"); });
         range.addEventListener("input", () => {
           held = range;
-          field.value = short(range.value);
+          text.value = short(range.value);
           act("set", "p." + one.name, Number(range.value));
         });
         range.addEventListener("change", () => { held = null; act("end"); });
@@ -60,21 +66,18 @@
       }));
       $("starts").replaceChildren(...ui.states.map(one => {
         const box = row("start." + one.name, one.html, one.unit, false);
-        box.querySelector("input").addEventListener("change", () => {
-          const fields = [...$("starts").querySelectorAll("input")];
-          fields.forEach(field => field.dataset.sent = 1);
-          act("set", "start", fields.map(field => field.value));
-        });
+        field(box.querySelector("input"), () =>
+          act("set", "start", [...$("starts").querySelectorAll("input")].map(one => one.value)));
         return box;
       }));
     }
     for (const one of ui.parameters) {
-      const field = $("v-p." + one.name), range = $("s-p." + one.name);
+      const text = $("v-p." + one.name), range = $("s-p." + one.name);
       range.closest(".parameter").classList.toggle("over", one.name === ui.state.over);
       if (held === range) continue;
       range.min = one.low; range.max = one.high; range.step = (one.high - one.low) / 1000;
       range.value = one.value;
-      put(field, short(one.value));
+      put(text, short(one.value));
     }
     ui.states.forEach(one => put($("v-start." + one.name), short(one.value)));
   }
@@ -149,8 +152,10 @@
       model.properties.value.change.connect(told);
       told();
     }
-    for (const one of document.querySelectorAll("[data-set]"))
-      one.addEventListener("change", () => { one.dataset.sent = 1; act("set", one.dataset.set, one.value); act("end"); });
+    for (const one of document.querySelectorAll("[data-set]")) {
+      const commit = () => { act("set", one.dataset.set, one.value); act("end"); };
+      if (one.tagName === "SELECT") one.addEventListener("change", commit); else field(one, commit);
+    }
     $("model").addEventListener("change", () => act("model", "", $("model").value));
     $("preset").addEventListener("change", () => { if ($("preset").value) act("preset", "", $("preset").value); });
     $("phase-slider").addEventListener("input", () => { held = $("phase-slider"); act("set", "phase", Number(held.value)); });

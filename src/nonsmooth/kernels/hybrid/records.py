@@ -53,7 +53,7 @@ class Form(NamedTuple):
 
 
 class Tables(NamedTuple):
-    """What ``linear_tables.build`` makes of one point of a ``Form``; shapes are there."""
+    """The result of ``linear.tables.build`` for one point of a ``Form``; shapes are there."""
 
     prop: Any
     rot: Any
@@ -65,7 +65,7 @@ class Tables(NamedTuple):
 
 
 class Net(NamedTuple):
-    """The net of transitions of a linear system."""
+    """The transition table of a linear system."""
 
     transitions: Any  # (transitions, 4): target (-1: its tables do not stand yet), what it changes (0,
     # ``places.RESET``, ...), contact or ``DEAD_END``, its map among those of the form
@@ -193,7 +193,7 @@ class Goal(NamedTuple):
 
 
 class Kept(NamedTuple):
-    """What is kept of P points of a sweep (see ``flow.engine.Chain``)."""
+    """The kept values of P points of a sweep (see ``flow.engine.Chain``)."""
 
     section: Any  # (P, keep, n)
     maximum: Any  # (P, n)
@@ -247,7 +247,7 @@ class Growth(NamedTuple):
 
 
 class Flow(NamedTuple):
-    """What runs a linear system to a stroboscopic section."""
+    """Arguments of the runs of a linear system to a stroboscopic section."""
 
     form: Any
     net: Any
