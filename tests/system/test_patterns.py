@@ -96,8 +96,8 @@ def test_its_text_is_read_back_whatever_it_has_visited(both: tuple[ns.System, ns
 def test_what_cannot_be_done_with_patterns_is_refused(both: tuple[ns.System, ns.System]) -> None:
     made = both[1]
     verbs: list[Any] = [
-        ns.find_orbit, ns.lyapunov, ns.sensitivity, lambda s: ns.basins(s, {}), lambda s: s.smoothed(0.1), lambda s: s.derivatives,
-        lambda s: s.to_latex(), lambda s: ns.simulate(s, periods=1, ramps={"w": (0.5, 0.6)}),
+        ns.find_orbit, ns.lyapunov, ns.sensitivity, lambda s: ns.basins(s, {}), lambda s: s.smoothed(0.1),
+        lambda s: s.derivatives, lambda s: s.to_latex(), lambda s: ns.simulate(s, periods=1, ramps={"w": (0.5, 0.6)}),
     ]  # fmt: skip
     for verb in verbs:
         with pytest.raises(ns.SystemDefinitionError, match="for simulate, poincare, sweep and frequency_response"):

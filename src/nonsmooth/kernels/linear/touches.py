@@ -9,8 +9,8 @@ from nonsmooth.kernels.linear.tables import NODES, OWN
 
 @once
 def log_touches(step, form, net, seen, tables, work):
-    """Append the local maxima of the mode's armed rows that stay <= 0 within (0, step) of a segment; none where there is
-    no room for those of one (``spare``)."""
+    """Append the local maxima of the mode's armed rows that stay <= 0 within (0, step) of a segment; none where there
+    is no room for those of one (``spare``)."""
     wn, scr, points = work.wn, work.scr, work.points
     mode, base = work.tally[MODE], work.memo[DONE]
     spacing, n = tables.info[mode, 1], work.tally[TOUCHES]
