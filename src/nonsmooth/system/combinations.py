@@ -303,7 +303,7 @@ def _opened(
     patterns = Patterns(make, next(iter(base)))
     return {
         "modes": {key: _returns(list(field)) for key, field in base.items()}, "transitions": (),
-        "indicators": {f"row_{i}": _returns(e) for i, e in enumerate(patterns.expressions)},
+        "indicators": {key: _returns(e) for key, e in zip(patterns.labels, patterns.expressions, strict=True)},
         "outputs": given["outputs"], "ranges": make.ranges(patterns.mode), "patterns": patterns,
     }  # fmt: skip
 

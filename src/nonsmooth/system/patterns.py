@@ -222,6 +222,16 @@ class Patterns:
         self.at[key] = len(self.expressions)
         self.expressions.append(sp.sympify(expression))
 
+    @property
+    def labels(self) -> list[str]:
+        """A name for each of the expressions, for messages."""
+        sides = {None: "", 1: "_forward", -1: "_back", 0: "_still"}
+        names, parts = self.make.names, self.make.parts
+        return [
+            f"{parts[k].name}_{what}" + (f"_{names[i]}" if what == "on" and i is not None else sides[i])
+            for k, what, i in self.at
+        ]  # fmt: skip
+
     @cached_property
     def elements(self) -> dict[str, Any]:
         """The elements by name."""
