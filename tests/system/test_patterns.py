@@ -116,32 +116,3 @@ def test_what_cannot_be_done_with_patterns_is_refused(both: tuple[ns.System, ns.
             states=["x", "v"], parameters={}, modes={"a": lambda t, u, p: (u.v, -u.x)},
             indicators={"middle": lambda t, u, p: u.x}, elements=[Stop(gap=lambda t, u, p: 1 - u.x, on={"v": -1.0})],
         )  # fmt: skip
-
-
-@pytest.mark.slow
-def test_six_masses_with_six_elements(monkeypatch: pytest.MonkeyPatch) -> None:
-    """144 combinations written out, and those that are visited."""
-
-    def row() -> ns.System:
-        stiffness = 2 * np.eye(6) - np.eye(6, k=1) - np.eye(6, k=-1)
-        return ns.mechanical(
-            np.diag([1.0, 1.5, 1.0, 0.5, 1.0, 2.0]), 0.1 * np.eye(6), stiffness, parameters={"w": 0.6, "e": 0.3},
-            forcing={"q1": lambda t, p: np.cos(p.w * t)},
-            elements={
-                "wall2": Stop(at="q2", position=0.1, restitution="e"),
-                "wall5": Stop(at={"q5": 1, "q4": -1}, position=0.2, restitution=0.5),
-                "soft3": ElasticStop(at="q3", position=-0.3, side=-1, stiffness=3.0, damping=0.1),
-                "soft6": ElasticStop(at="q6", position=0.1, stiffness=5.0, pulls=True),
-                "rub1": Coulomb(at="q1", friction=0.1, static=0.15), "rub4": Coulomb(at="q4", friction=0.05),
-            },
-        )  # fmt: skip
-
-    written = row()
-    monkeypatch.setattr(combinations, "MOST", 100)
-    made = row()
-    a, b = (ns.simulate(system, periods=20, samples=101) for system in (written, made))
-    sequences = [[system.modes[i] for i in run["mode"].values] for system, run in ((written, a), (made, b))]
-    assert sequences[0] == sequences[1] and len(set(sequences[0])) > 20
-    assert np.allclose(a["u"], b["u"], rtol=0, atol=1e-12)
-    for name in ("wall2", "wall5", "soft3", "soft6", "rub1", "rub4"):
-        assert np.allclose(a[f"{name}_force"], b[f"{name}_force"], rtol=0, atol=1e-11)
