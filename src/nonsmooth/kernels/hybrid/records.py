@@ -193,7 +193,7 @@ class Goal(NamedTuple):
 
 
 class Kept(NamedTuple):
-    """The kept values of P points of a sweep (see ``flow.engine.Chain``)."""
+    """The kept values of P points of a sweep (see ``flow.engines.engine.Chain``)."""
 
     section: Any  # (P, keep, n)
     maximum: Any  # (P, n)
