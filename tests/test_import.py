@@ -9,8 +9,6 @@ import uuid
 
 import pytest
 
-HEAVY = ("sympy", "numba", "xarray", "scipy.integrate", "matplotlib")
-
 NEW_SYSTEM = """
 import numpy as np
 import nonsmooth as ns
@@ -62,17 +60,15 @@ def best(code: str, of: int = 3) -> float:
     return min(times)
 
 
-def test_an_import_loads_nothing_heavy() -> None:
-    code = f"import sys, nonsmooth; print([name for name in {HEAVY!r} if name in sys.modules])"
-    assert run(code) == "[]"
-
-
-def test_an_import_takes_less_than_a_tenth_of_a_second() -> None:
-    assert best("import nonsmooth") < 0.1
-
-
-def test_help_takes_less_than_three_tenths_of_a_second() -> None:
-    assert best("from nonsmooth.cli.main import main; main([])") < 0.3
+@pytest.mark.parametrize("first", ["import nonsmooth", "from nonsmooth.cli.main import main; main([])"])
+def test_an_import_and_the_help_load_nothing_but_python_itself(first: str) -> None:
+    """Their times, 0.03 and 0.06 s of a processor, are measured by ``benchmarks/latency.py``."""
+    code = (
+        "import sys, contextlib, io; before = set(sys.modules)\n"
+        f"with contextlib.redirect_stdout(io.StringIO()): exec({first!r})\n"
+        "print(*{name.partition('.')[0] for name in set(sys.modules) - before} - sys.stdlib_module_names)"
+    )
+    assert run(code) == "nonsmooth"
 
 
 def test_every_name_of_the_front_door_is_there() -> None:

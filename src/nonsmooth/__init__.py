@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from nonsmooth.identification.parameter_set import ParameterSet as ParameterSet
     from nonsmooth.results.store import load as load
     from nonsmooth.results.store import save as save
+    from nonsmooth.smoothing.report import smoothing_report as smoothing_report
     from nonsmooth.system.maps import Branch as Branch
     from nonsmooth.system.maps import Map as Map
     from nonsmooth.system.mechanical import mechanical as mechanical
@@ -93,6 +94,7 @@ _WHERE = {
     "continue_equilibrium": "continuation.continue_equilibrium",
     "special_points": "continuation.special",
     "manifolds": "continuation.manifolds",
+    "smoothing_report": "smoothing.report",
     "load_recording": "experiment.load",
     "Recording": "experiment.recording",
     "identify": "identification.chain",

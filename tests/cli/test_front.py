@@ -141,14 +141,34 @@ def test_no_value_of_any_key_ends_in_a_traceback(
         (("schema", "--out", "."), r"\.: Is a directory"),
         (("compare", "odd.toml"), r"\[measured\]: session = 3 must be a text"),
         (("run", "a" * 5000), "File name too long"),
+        (("run", "odd.nc"), r"odd\.nc: is a saved result and no study file; `nonsmooth show odd\.nc`"),
+        (("show", "odd.toml"), r"odd\.toml: is a study file and no result; `nonsmooth run odd\.toml`"),
     ],
 )
 def test_odd_arguments_are_one_message(arguments: tuple[str | bytes, ...], message: str, tmp_path: Path) -> None:
     (tmp_path / "wrong.py").write_text("raise BaseException('x')\n")
+    (tmp_path / "odd.nc").touch()
     (tmp_path / "odd.toml").write_text('[system]\nmodel = "a"\n[measured]\nsession = 3\nprocedure = 4\n')
     done = process(*arguments, cwd=tmp_path)
     assert done.returncode == 2 and not done.stdout
     assert re.match(rf"nonsmooth: .*{message}", done.stderr) and "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("rnu",), "`rnu` is not a command of `nonsmooth`; nearest: run; all: compare, "),
+        (("init", "impact_oscillator", "--verb", "swep"), "`swep` is not a verb of `nonsmooth init`; nearest: sweep; "),
+        (("completion", "tcsh"), "`tcsh` is not a shell of `nonsmooth completion`; "),
+    ],
+)
+def test_a_misspelt_word_is_told_the_nearest(
+    arguments: tuple[str, ...], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        run(*arguments)
+    out, err = capsys.readouterr()
+    assert not out and message in err and len(err) < 600
 
 
 # A first study file

@@ -115,6 +115,21 @@ def test_a_result_of_another_verb_is_refused(figure: str) -> None:
         getattr(plot, figure)(xr.Dataset({"u2": 1.0}))
 
 
+@pytest.mark.parametrize("backwards", [False, True])
+def test_lines_of_a_branch_change_at_its_special_points(branch: xr.Dataset, backwards: bool) -> None:
+    """Unstable between the two flips and between the two folds, whichever end comes first."""
+    if backwards:
+        last = branch.sizes["point"] - 1
+        branch = branch.isel(point=slice(None, None, -1)).assign(special_point=last - branch["special_point"])
+    ax = plot.branch(branch)
+    drawn = {line.get_linestyle(): np.asarray(line.get_xdata(), dtype=float) for line in ax.get_lines()[:2]}
+    parts = np.split(drawn["--"], np.flatnonzero(np.isnan(drawn["--"])))
+    kinds, values = branch["special_kind"].values, branch["special_value"].values
+    wanted = sorted(tuple(sorted(values[kinds == kind])) for kind in ("flip", "fold"))
+    assert sorted((np.nanmin(part), np.nanmax(part)) for part in parts) == wanted
+    assert len(np.flatnonzero(np.isnan(drawn["-"]))) == 2  # three stable parts
+
+
 def test_a_branch_of_equilibria() -> None:
     """x^2 = a: the fold at the origin is marked, one arm is stable; an equilibrium is its own maximum."""
     system = ns.System(states=["x"], parameters={"a": 1.0}, modes={"one": lambda t, u, p: p.a - u.x * u.x})

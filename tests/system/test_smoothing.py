@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
+import nonsmooth as ns
 from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.models import discontinuous_support, impact_oscillator
 from nonsmooth.system.system import System
@@ -320,3 +321,93 @@ def test_contact_force_is_the_difference_of_the_fields(smoothed):
     for mode in range(4):
         difference = m * (traced.fields[mode][1] - EQ_7A)
         assert sp.simplify(traced.outputs[0][mode] - difference) == 0
+
+
+def rubbing(**element):
+    return ns.mechanical(
+        1.0, 0.0, 0.0, parameters={"f": 0.1, "mu": 0.2, "mu_s": 0.2}, forcing={"q": lambda t, p: p.f},
+        elements={"floor": ns.elements.Coulomb(at="q", **{"friction": "mu", **element})},
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("band", "creep"), [("linear", 0.5), ("tanh", np.arctanh(0.5)), ("arctan", 1.0)])
+def test_a_smoothed_block_creeps_where_it_would_stick(band, creep):
+    """A force of half the friction is balanced at 2 q - 1 = 1/2."""
+    system = rubbing().smoothed(1e-3, band)
+    run = ns.simulate(system, duration=1.0, start={"v_q": 1e-3})
+    assert run.u.values[-1, 1] == pytest.approx(1e-3 * creep, rel=1e-9)
+    assert run.floor_force.values[-1] == pytest.approx(-0.1, rel=1e-9)
+    assert "stick" not in " ".join(system.modes)
+    assert (system.band, rubbing().band) == (band, None)
+
+
+def test_a_tanh_band_ends_where_it_is_one_to_rounding():
+    system = rubbing().smoothed(1e-3, "tanh")
+    traced = system.traced
+    values = {**dict(zip(traced.p, system.parameter_vector(), strict=True)), traced.u[1]: 0.019}
+    inside, outside = (float(traced.fields[mode][1].subs(values)) for mode in (2, 0))
+    assert system.modes == ("floor_forward", "floor_back", "floor_speed_band")
+    assert inside == pytest.approx(outside, abs=1e-16)
+    assert any("19*eta" in name for name in traced.indicator_names)
+
+
+def test_static_friction_above_the_kinetic_one_has_no_band():
+    equal = rubbing(static="mu_s").smoothed(1e-3)
+    with pytest.raises(SystemDefinitionError, match="the friction that holds in 'floor_stick' is not the kinetic one"):
+        equal.with_parameters(mu_s=0.3)
+    with pytest.raises(SystemDefinitionError, match="is not the kinetic one"):
+        rubbing(static=0.3, friction=0.2).smoothed(1e-3)
+
+
+def test_arctan_weights_sum_to_one_where_three_regions_meet():
+    """Fields 1 in the middle, 2 right and 3 left of it, at x = 1 and x = -1."""
+    system = System(
+        states=["x"], parameters={"d": 1.0},
+        modes={"middle": lambda t, u, p: (1,), "right": lambda t, u, p: (2,), "left": lambda t, u, p: (3,)},
+        indicators={"r": lambda t, u, p: u.x - p.d, "l": lambda t, u, p: u.x + p.d},
+        transitions=[
+            Transition("middle", "right", when="r > 0"), Transition("right", "middle", when="r < 0"),
+            Transition("middle", "left", when="l < 0"), Transition("left", "middle", when="l > 0"),
+        ],
+    ).smoothed(0.1, "arctan")  # fmt: skip
+    traced = system.traced
+    field = sp.lambdify([traced.u[0], traced.p], traced.fields[0][0])
+    for place in (-2.0, -1.0, 0.3, 1.0, 2.0):
+        q, r = 0.5 + np.arctan((place - 1) / 0.1) / np.pi, 0.5 + np.arctan((-place - 1) / 0.1) / np.pi
+        weights = np.array([(1 - q) * (1 - r), q, r])
+        expected = weights @ [1, 2, 3] / weights.sum()
+        assert field(place, system.parameter_vector()) == pytest.approx(expected, rel=1e-13)
+    assert len(set(traced.fields)) == 1
+
+
+def test_bands_that_cross_are_for_arctan_alone():
+    two = ns.mechanical(
+        1.0, 0.1, 1.0, parameters={"k": 5.0, "mu": 0.2},
+        elements={
+            "floor": ns.elements.Coulomb(at="q", friction="mu"),
+            "wall": ns.elements.ElasticStop(at="q", position=1.0, stiffness="k"),
+        },
+    )  # fmt: skip
+    with pytest.raises(SystemDefinitionError, match='vanish together; bands may do so with band="arctan"'):
+        two.smoothed(1e-3)
+    smooth = two.smoothed(1e-3, "arctan")
+    traced = smooth.traced
+    t, (q, v), (k, mu, eta) = traced.t, traced.u, traced.p
+    pressed = k * (q - 1) * (sp.Rational(1, 2) + sp.atan((q - 1) / eta) / sp.pi)
+    force = -0.1 * v - q - 2 * mu * sp.atan(v / eta) / sp.pi - pressed
+    values = {t: 0.3, q: 1.01, v: -0.002, k: 5.0, mu: 0.2, eta: 1e-3}
+    assert float(traced.fields[0][1].subs(values)) == pytest.approx(float(force.subs(values)), rel=1e-12)
+
+
+def test_the_shape_of_a_band_is_part_of_a_system():
+    support = discontinuous_support()
+    systems = [support.smoothed(ETA, band) for band in ("linear", "tanh", "arctan")]
+    assert [System.from_text(system.to_text()).band for system in systems] == ["linear", "tanh", "arctan"]
+    assert len({system.content_hash() for system in systems}) == 3
+    assert "tanh band" in str(systems[1])
+    assert systems[1].with_parameters(g=0.1).band == "tanh" and systems[1].smoothed(1e-6).band == "linear"
+
+
+def test_unknown_bands_are_refused():
+    with pytest.raises(ValueError, match="band is one of linear, tanh, arctan, not 'cubic'"):
+        rubbing().smoothed(1e-3, "cubic")

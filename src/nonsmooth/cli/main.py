@@ -17,6 +17,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from nonsmooth.cli import compare, completion, identify, init, models, plan, reproduce, rig, run, schema, show
 from nonsmooth.cli.terminal import printable
 from nonsmooth.errors import SolveError, shortened
+from nonsmooth.system.names import unknown
 
 __all__ = ["main", "parser"]
 
@@ -120,6 +121,11 @@ class _Format(argparse.HelpFormatter):
 class _Parser(argparse.ArgumentParser):
     def __init__(self, **settings: Any) -> None:
         super().__init__(**{"formatter_class": _Format, **settings})
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        if action.choices is not None and value not in action.choices:
+            what = "command" if isinstance(action, argparse._SubParsersAction) else action.dest
+            raise argparse.ArgumentError(None, unknown(value, f"a {what}", f"`{self.prog}`", list(action.choices)))
 
     def _print_message(self, message: str, file: Any = None) -> None:
         (file or sys.stderr).write(message)  # the library passes over a closed pipe

@@ -38,6 +38,8 @@ def _run(options: argparse.Namespace) -> int:
     if (options.file / "run").is_dir():  # a store of chunks, finished or not
         print(progress_of(options.file))
         return 0
+    if options.file.suffix == ".toml":
+        raise ValueError(f"{options.file}: is a study file and no result; `nonsmooth run {options.file}` runs it")
     if options.file.suffix not in (".nc", ".zarr"):  # what an instrument wrote
         from nonsmooth.experiment.load import load_recording
 

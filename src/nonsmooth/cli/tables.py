@@ -20,6 +20,8 @@ def read_tables(path: Path, allowed: Iterable[str], what: str = "study file") ->
     ValueError
         No such file, not TOML, an unknown table, or something that is no table; the message names the file.
     """
+    if path.suffix in (".nc", ".zarr") and path.exists():
+        raise ValueError(f"{path}: is a saved result and no {what}; `nonsmooth show {path}` shows it")
     try:
         document = tomllib.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:

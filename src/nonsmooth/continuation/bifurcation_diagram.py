@@ -170,6 +170,8 @@ def bifurcation_diagram(
             except SolveError:
                 continue
             complete = _switched(found, len(found.branches) - 1, depth, max_period, search, more)
+    if not found.branches and not complete:
+        raise SolveError(f"the budget of {seconds:g} s was spent before a branch was found", status="budget")
     if not found.branches:
         raise SolveError(
             f"no periodic orbit was found over {parameter} = {low!r} ... {high!r}: the sweeps show none up to period "

@@ -9,6 +9,7 @@ from nonsmooth.plot import identification
 from nonsmooth.plot.basin_fractions import basin_fractions
 from nonsmooth.plot.basins import basins
 from nonsmooth.plot.bifurcation import bifurcation
+from nonsmooth.plot.bifurcation_diagram import bifurcation_diagram
 from nonsmooth.plot.branch import branch
 from nonsmooth.plot.chart import chart
 from nonsmooth.plot.comparison_diagram import comparison_diagram
@@ -28,6 +29,7 @@ from nonsmooth.plot.orbit import orbit
 from nonsmooth.plot.phase_portrait import phase_portrait
 from nonsmooth.plot.regions import regions
 from nonsmooth.plot.section import section
+from nonsmooth.plot.smoothing_report import smoothing_report
 from nonsmooth.plot.style import COLORS, COLUMN, PAGE, journal, save_figure
 from nonsmooth.plot.time_history import time_history
 
@@ -38,6 +40,7 @@ __all__ = [
     "basin_fractions",
     "basins",
     "bifurcation",
+    "bifurcation_diagram",
     "branch",
     "chart",
     "comparison_diagram",
@@ -58,6 +61,7 @@ __all__ = [
     "regions",
     "save_figure",
     "section",
+    "smoothing_report",
     "time_history",
 ]
 

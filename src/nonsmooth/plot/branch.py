@@ -96,14 +96,7 @@ def draw_branch(
     values = result[_parameter(result)].values
     ordinates = _ordinates(result, name, quantity)
     shade = color or style.COLORS["first"]
-    stable = result["stable"].values.astype(bool)
-    virtual = _virtual(result)
-    for wanted, line in (
-        (stable & ~virtual, "-"), (~stable & ~virtual, "--"), (virtual, ":"),
-    ):  # fmt: skip
-        chosen = _with_neighbours(wanted, virtual if line != ":" else np.zeros_like(virtual))
-        if not chosen.any():
-            continue
+    for line, at in _lines(result):
         under = behind and line == "-"
         looks: dict[str, Any] = {"linewidth": width, "zorder": 3}
         if under:
@@ -112,8 +105,8 @@ def draw_branch(
         for row in ordinates:
             known = ax.get_legend_handles_labels()[1]
             ax.plot(
-                values, np.where(chosen, row, np.nan), line, color=shade, label=None if words in known else words,
-                **looks,
+                _with_breaks(values, at), _with_breaks(row, at), line, color=shade,
+                label=None if words in known else words, **looks,
             )  # fmt: skip
     if special:
         _mark(ax, result, ordinates)
@@ -168,8 +161,27 @@ def _virtual(result: xr.Dataset) -> NDArray[np.bool_]:
     return np.asarray(result["virtual"].values, dtype=bool)
 
 
-def _with_neighbours(chosen: NDArray[np.bool_], barred: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """The chosen points and the next one, so that the line has no gap where the stability changes."""
-    grown = chosen.copy()
-    grown[1:] |= chosen[:-1] & ~barred[1:]
-    return grown
+def _lines(result: xr.Dataset) -> list[tuple[str, NDArray[np.intp]]]:
+    """The style of each kind of line, and the points that it joins (-1: a break).
+
+    A segment that begins at a special point, where stability changes, is of the kind of its end.
+    """
+    kind = np.where(result["stable"].values.astype(bool), 0, 1)
+    kind[_virtual(result)] = 2
+    first, last = kind[:-1].copy(), kind[1:]
+    if result.sizes.get("special", 0):
+        at = result["special_point"].values.astype(int)
+        at = at[at < len(first)]
+        first[at] = last[at]
+    segments = np.where(last == 2, 2, first)
+    found = []
+    for number, line in enumerate(_STATES):
+        here = np.flatnonzero(segments == number)
+        runs = [run for run in np.split(here, np.flatnonzero(np.diff(here) > 1) + 1) if run.size]
+        if runs:
+            found.append((line, np.concatenate([[*run, run[-1] + 1, -1] for run in runs])[:-1]))
+    return found
+
+
+def _with_breaks(values: NDArray[np.float64], at: NDArray[np.intp]) -> NDArray[np.float64]:
+    return np.where(at < 0, np.nan, values[at])

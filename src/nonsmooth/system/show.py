@@ -100,14 +100,15 @@ def _rows(system: System) -> list[tuple[str, str]]:
         lines.append(("outputs", ", ".join(f"{name}{unit(u)}" for name, u in system.outputs.items())))
     lines.append(("period", _period(system, names)))
     if system.is_smoothed:
-        lines.append(("smoothing", f"eta = {system.eta}"))
+        lines.append(("smoothing", f"eta = {system.eta}, {system.band} band"))
     return lines
 
 
 def _period(system: System, names: dict[sp.Symbol, str]) -> str:
     period = system.traced.period
     if period is not None:
-        return f"{write_expression(period, names)} = {system.period():.9g}"
+        text, value = write_expression(period, names), f"{system.period():.9g}"
+        return text if text == value else f"{text} = {value}"
     return "none: depends on the time, not periodically" if system.explicit_time else "none (autonomous)"
 
 

@@ -9,6 +9,13 @@ field there is (1-q) f_P + q f_Q, or the one the model prescribes (`Band`). The 
 are a true partition; a tie of two rows belongs to the first (with c_s = 0 in the paper's system the
 two rows are equal everywhere, hence the non-strict rows). The band's half width is a parameter of the
 derived system, so that a change of it compiles nothing.
+
+That is the linear band. With q = (1 + tanh(g_r / eta)) / 2 the band is `REACH` half widths wide, where q is 0 or 1 to
+rounding. With q = 1/2 + arctan(g_r / eta) / pi it has no end: one field, the mean of all weighted with products of the
+q, holds in every mode, and the declared transitions only say on which side the state is.
+
+Dry friction has a band too: a mode that sticks to the surface between two others is left out, and its friction is that
+of the two fields in the band.
 """
 
 from __future__ import annotations
@@ -23,7 +30,11 @@ from nonsmooth.system.description import Description
 from nonsmooth.system.equations import TracedBand
 from nonsmooth.system.traced import Row, Traced, TracedTransition
 
-__all__ = ["Smoothed", "smooth", "smoothed_indicators"]
+__all__ = ["BANDS", "Smoothed", "smooth", "smoothed_indicators"]
+
+BANDS = ("linear", "tanh", "arctan")
+REACH = 19  # half widths beyond which tanh is 1 to rounding
+LEVEL = 1e-9  # of 1: by how much a static friction may differ from the kinetic one, given as another number
 
 
 @dataclass(frozen=True)
@@ -49,9 +60,8 @@ def _label(traced: Traced, a: int, b: int) -> str:
     return f"{traced.mode_names[a]!r} and {traced.mode_names[b]!r}"
 
 
-def _pairs(description: Description) -> list[_Pair]:
+def _pairs(traced: Traced) -> list[_Pair]:
     """Group the transitions into pairs of modes, or say which pair cannot be smoothed."""
-    traced = description.traced
     remaining = list(traced.transitions)
     if not remaining:
         raise SystemDefinitionError(f"{traced.name!r} has no transitions: there is nothing to smooth")
@@ -63,7 +73,10 @@ def _pairs(description: Description) -> list[_Pair]:
         what = f"{traced.name!r} cannot be smoothed between {_label(traced, a, b)}"
         for jump in both:
             if jump.reset is not None:
-                raise SystemDefinitionError(f"{what}: {jump.label} has a reset, and a jump has no band")
+                raise SystemDefinitionError(
+                    f"{what}: {jump.label} has a reset, and a jump has no band; give a rigid stop a stiffness "
+                    "(ns.elements.ElasticStop)"
+                )
             if jump.at is not None:
                 raise SystemDefinitionError(f"{what}: {jump.label} happens at a given time, not at an indicator")
             if jump.writes:
@@ -95,15 +108,16 @@ def _oriented(outer: int, inner: int, jumps: Sequence[TracedTransition]) -> _Pai
 
 def smoothed_indicators(description: Description) -> tuple[str, ...]:
     """Names of the indicators that get a band, in order of their use."""
-    names = description.traced.indicator_names
-    return tuple(dict.fromkeys(names[row.indicator] for pair in _pairs(description) for row in pair.rows))
+    traced, _ = _without_sticking(description.traced)
+    names = traced.indicator_names
+    return tuple(dict.fromkeys(names[row.indicator] for pair in _pairs(traced) for row in pair.rows))
 
 
 class _Builder:
     """Collects what is added to the sharp system."""
 
-    def __init__(self, description: Description, names: Mapping[str, sp.Symbol]) -> None:
-        self.description, self.traced, self.eta_of = description, description.traced, names
+    def __init__(self, description: Description, names: Mapping[str, sp.Symbol], shape: str) -> None:
+        self.description, self.traced, self.eta_of, self.shape = description, description.traced, names, shape
         self.modes = list(self.traced.mode_names)
         self.fields = list(self.traced.fields)
         self.outputs = [list(row) for row in self.traced.outputs]
@@ -112,9 +126,19 @@ class _Builder:
         self.memory: list[tuple[str, str]] = []
         self.m = list(self.traced.m)
         self.jumps: list[TracedTransition] = []
+        self.reach = REACH if shape == "tanh" else 1
 
     def eta(self, row: Row) -> sp.Symbol:
         return self.eta_of[self.traced.indicator_names[row.indicator]]
+
+    def share(self, row: Row) -> sp.Expr:
+        """The share q of the field behind a row, at a distance from it."""
+        margin, eta = self.margin(row), self.eta(row)
+        if self.shape == "tanh":
+            return (1 + sp.tanh(margin / eta)) / 2
+        if self.shape == "arctan":
+            return sp.Rational(1, 2) + sp.atan(margin / eta) / sp.pi
+        return (margin + eta) / (2 * eta)
 
     def margin(self, row: Row) -> sp.Expr:
         return row.sign * self.traced.indicators[row.indicator]
@@ -128,10 +152,10 @@ class _Builder:
 
     def beyond(self, row: Row, side: int, upward: int) -> Row:
         """The row ``upward * (g - side * eta) > 0``."""
-        eta = self.eta(row)
+        eta, times = self.eta(row), f"{self.reach}*" if self.reach > 1 else ""
         name = self.traced.indicator_names[row.indicator]
-        shift = -side * row.sign  # g - side eta = sign * (h - side * sign * eta)
-        label = f"{name} {'+' if shift > 0 else '-'} {str(eta)[2:]}"
+        shift = -side * row.sign * self.reach  # g - side eta = sign * (h - side * sign * eta)
+        label = f"{name} {'+' if shift > 0 else '-'} {times}{str(eta)[2:]}"
         return Row(self.indicator(self.traced.indicators[row.indicator] + shift * eta, label), row.sign * upward)
 
     def least(self, pair: _Pair, r: int) -> tuple[Row, ...]:
@@ -157,11 +181,9 @@ class _Builder:
         label = f"{name}_band"
         if label in self.modes:
             label = f"{name}_band_{self.modes[pair.outer]}_{self.modes[pair.inner]}"
-        eta = self.eta(row)
-        q = (self.margin(row) + eta) / (2 * eta)
-        own: TracedBand | None = next(
-            (band for band in self.description.bands if band.indicator == row.indicator), None
-        )
+        eta, q = self.eta(row), self.share(row)
+        given = self.description.bands if self.shape == "linear" else ()
+        own: TracedBand | None = next((band for band in given if band.indicator == row.indicator), None)
         writes = []
         if own is None:
             mixed = zip(self.traced.fields[pair.outer], self.traced.fields[pair.inner], strict=True)
@@ -206,13 +228,37 @@ class _Builder:
             self.jump(pair.outer, bands[r][0], (self.beyond(row, -1, 1), *least[r]), bands[r][1])
             self.jump(pair.inner, bands[r][0], (self.beyond(row, 1, -1), *least[r]), bands[r][1])
 
+    def mix(self, pairs: Sequence[_Pair]) -> None:
+        """Give every mode the mean of all fields, weighted with the product of what each pair says of its mode.
+
+        The weights sum to 1 where the regions are those of one pair or of pairs that cross; else they are divided by
+        their sum."""
+        known = [sp.Dummy() for _ in pairs]
+        weights = [
+            sp.Mul(*[q if mode == pair.inner else 1 - q for q, pair in zip(known, pairs, strict=True)
+                     if mode in (pair.inner, pair.outer)])
+            for mode in range(len(self.modes))
+        ]  # fmt: skip
+        shares = {q: sp.Mul(*[self.share(row) for row in pair.rows]) for q, pair in zip(known, pairs, strict=True)}
+        total = sp.expand(sum(weights)).subs(shares)
+        first, others = 0, [weight.subs(shares) / total for weight in weights[1:]]
+
+        def mean(entries: Sequence[sp.Expr]) -> sp.Expr:
+            rest = [w * sp.expand(e - entries[first]) for w, e in zip(others, entries[1:], strict=True)]
+            return entries[first] + sp.Add(*rest)
+
+        field = tuple(mean(entries) for entries in zip(*self.fields, strict=True))
+        self.fields = [field] * len(self.modes)
+        self.outputs = [[mean(row)] * len(self.modes) for row in self.outputs]
+        self.jumps = list(self.traced.transitions)
+
     def _repeats(self, pair: _Pair, r: int) -> bool:
         """Return whether an earlier row is the same function of the state."""
         row = pair.rows[r]
         return any(sp.expand(self.margin(row) - self.margin(earlier)) == 0 for earlier in pair.rows[:r])
 
 
-def smooth(description: Description, single: bool) -> Smoothed:
+def smooth(description: Description, single: bool, shape: str = "linear") -> Smoothed:
     """Derive the smoothed system.
 
     Parameters
@@ -220,13 +266,14 @@ def smooth(description: Description, single: bool) -> Smoothed:
     description : Description
     single : bool
         One half width ``eta`` for all indicators; else one for each, ``eta_<indicator>``.
+    shape : str
+        One of `BANDS`.
 
     Raises
     ------
     SystemDefinitionError
         Transitions with a reset, at a time, without a way back, or bands that overlap: the pair is named.
     """
-    pairs = _pairs(description)
     wanted = smoothed_indicators(description)
     etas = (("eta", None),) if single else tuple((f"eta_{name}", name) for name in wanted)
     taken = {*description.parameters, *description.states, *description.memory}
@@ -238,11 +285,18 @@ def smooth(description: Description, single: bool) -> Smoothed:
             )
     symbols = {name: sp.Symbol(f"p_{name}", real=True) for name, _ in etas}
     of = {name: symbols["eta" if single else f"eta_{name}"] for name in wanted}
-    build = _Builder(description, of)
-    apart = [*_check_apart(build, pairs), *_check_surfaces(description)]
-    for pair in pairs:
-        build.add(pair)
-    old = description.traced
+    old, apart = _without_sticking(description.traced)
+    apart += _check_surfaces(description)
+    pairs = _pairs(old)
+    build = _Builder(replace(description, traced=old), of, shape)
+    if shape == "arctan":
+        if alone := [name for i, name in enumerate(old.mode_names) if all(i not in (p.outer, p.inner) for p in pairs)]:
+            raise SystemDefinitionError(f"{old.name!r} cannot be smoothed: no transition leads to or from {alone[0]!r}")
+        build.mix(pairs)
+    else:
+        apart += _check_apart(build, pairs)
+        for pair in pairs:
+            build.add(pair)
     n_bands = len(build.modes) - len(old.mode_names)
     traced = replace(
         old,
@@ -254,6 +308,76 @@ def smooth(description: Description, single: bool) -> Smoothed:
         transitions=tuple(build.jumps), outputs=tuple(tuple(row) for row in build.outputs),
     )  # fmt: skip
     return Smoothed(traced, etas, tuple(build.memory), tuple(apart))
+
+
+def _without_sticking(traced: Traced) -> tuple[Traced, list[tuple[sp.Expr, str]]]:
+    """The system without the modes that stick to a surface, and (expression, message) that must not be negative.
+
+    A mode sticks to h = 0 between P and Q where a transition from P when h rises and one from Q when h falls lead to
+    it. There P and Q change into each other then, whatever else is asked for today."""
+    rising: dict[tuple[int, int], dict[int, int]] = {}  # (mode, indicator) -> sign of the row -> source
+    for jump in traced.transitions:
+        if jump.reset is not None and jump.source != jump.target:
+            for row in jump.rows:
+                rising.setdefault((jump.target, row.indicator), {}).setdefault(row.sign, jump.source)
+    sticks = {key: found for key, found in rising.items() if len(found) == 2 and found[1] != found[-1]}
+    dropped = sorted({mode for mode, _ in sticks})
+    if not dropped:
+        return traced, []
+    apart = [needed for (mode, h), ends in sticks.items() for needed in _equal_friction(traced, mode, h, ends)]
+    between = {frozenset(ends.values()): h for (_, h), ends in sticks.items() if not set(ends.values()) & set(dropped)}
+    kept = [mode for mode in range(len(traced.mode_names)) if mode not in dropped]
+    jumps: dict[tuple[int, int, tuple[Row, ...]], TracedTransition] = {}
+    for jump in traced.transitions:
+        if jump.source in dropped or jump.target in dropped:
+            continue
+        rows, h = jump.rows, between.get(frozenset((jump.source, jump.target)))
+        if h is not None and jump.reset is None:
+            rows = tuple(row for row in rows if row.indicator == h)
+            if not rows:
+                continue
+        source, target = kept.index(jump.source), kept.index(jump.target)
+        jumps.setdefault((source, target, rows), replace(
+            jump, source=source, target=target, rows=rows, contact=source == 0 or jump.reset is not None,
+        ))  # fmt: skip
+    return replace(
+        traced, mode_names=tuple(traced.mode_names[i] for i in kept), fields=tuple(traced.fields[i] for i in kept),
+        lacking=tuple(traced.lacking[i] for i in kept), transitions=tuple(jumps.values()),
+        outputs=tuple(tuple(row[i] for i in kept) for row in traced.outputs),
+    ), apart  # fmt: skip
+
+
+def _equal_friction(traced: Traced, mode: int, h: int, ends: Mapping[int, int]) -> list[tuple[sp.Expr, str]]:
+    """Conditions, with their messages, under which the friction that holds is the kinetic one: not negative.
+
+    Then the rate of h in the mode behind, on the surface, vanishes just where sticking ends."""
+    surface, moving = traced.indicators[h], {traced.t, *traced.u}
+    symbol = next(u for u in traced.u if surface.diff(u) != 0)
+    (at,) = sp.solve(surface, symbol)
+    names = traced.mode_names
+    says = (
+        f"{traced.name!r} cannot be smoothed between {names[ends[1]]!r} and {names[ends[-1]]!r}: the friction that "
+        f"holds in {names[mode]!r} is not the kinetic one, and a band has no other; make them equal"
+    )
+    found = []
+    for jump in traced.transitions:
+        if jump.source != mode or jump.target not in ends.values() or len(jump.rows) != 1:
+            continue
+        end = traced.indicators[jump.rows[0].indicator]
+        field = traced.fields[jump.target]
+        rate = surface.diff(traced.t) + sum(surface.diff(u) * f for u, f in zip(traced.u, field, strict=True))
+        rate, end = (sp.expand(e.subs(symbol, at)) for e in (rate, end))
+        shared = sorted(rate.free_symbols & end.free_symbols, key=lambda s: (s not in moving, str(s)))
+        if not shared:
+            continue  # a state beyond the surface
+        ratio = sp.cancel(rate.diff(shared[0]) / end.diff(shared[0]))
+        excess = sp.simplify(rate - ratio * end)
+        if excess == 0:
+            continue
+        if excess.free_symbols & moving or (excess.is_number and abs(excess) > LEVEL):
+            raise SystemDefinitionError(says)
+        found.append((LEVEL - sp.Abs(excess), says))
+    return found
 
 
 def _check_surfaces(description: Description) -> list[tuple[sp.Expr, str]]:
@@ -291,10 +415,12 @@ def _check_apart(build: _Builder, pairs: Sequence[_Pair]) -> list[tuple[sp.Expr,
                         raise SystemDefinitionError(
                             f"{build.traced.name!r} cannot be smoothed: {what} overlap where the indicators "
                             f"{build.traced.indicator_names[a.indicator]!r} and "
-                            f"{build.traced.indicator_names[b.indicator]!r} vanish together"
+                            f"{build.traced.indicator_names[b.indicator]!r} vanish together; bands may do so with "
+                            'band="arctan"'
                         )
-                    room = sp.Abs(distance) - build.eta(a) - sp.Abs(ratio) * build.eta(b)
-                    found.append((room, f"{what} overlap; make eta smaller than half their distance"))
+                    room = sp.Abs(distance) - build.reach * (build.eta(a) + sp.Abs(ratio) * build.eta(b))
+                    half = f"{1 / (2 * build.reach):.2g} of" if build.reach > 1 else "half"
+                    found.append((room, f"{what} overlap; make eta smaller than {half} their distance"))
     return found
 
 

@@ -231,6 +231,11 @@ class System:
         return {str(indicator): self._values[key] for key, indicator in self._variant.etas}
 
     @property
+    def band(self) -> str | None:
+        """Shape of the bands: "linear", "tanh" or "arctan"; None where nothing is smoothed."""
+        return self._variant.band
+
+    @property
     def depends_on_time(self) -> bool:
         """Return whether the time occurs in the equations, or transitions happen at phases of a period."""
         return self.traced.period is not None or self._description.explicit_time
@@ -308,20 +313,34 @@ class System:
         new = changed_values(self._variant, self._values, self.name, given, values)
         return self._make(self._description, new, self._variant)
 
-    def smoothed(self, eta: float | Mapping[str, float] | None) -> Self:
-        """Return the system with its switches smoothed over bands (Savi et al. 2007, Eqs. 6-10).
+    def smoothed(self, eta: float | Mapping[str, float] | None, band: str = "linear") -> Self:
+        r"""Return the system with its switches smoothed over bands (Savi et al. 2007, Eqs. 6-10).
+
+        Between the fields on both sides of an indicator g the smoothed one is :math:`(1 - q) f_- + q f_+`, with
+
+        .. math:: q = \tfrac12 (1 + g / \eta) \ (|g| < \eta), \qquad \tfrac12 (1 + \tanh (g / \eta)), \qquad
+            \tfrac12 + \tfrac1\pi \arctan (g / \eta)
+
+        A surface that slides (dry friction, a relay) is smoothed without its sliding mode.
 
         Parameters
         ----------
         eta : float, mapping of indicator to float, or None
             Half width of the bands, in the indicators' units; None takes the smoothing away.
+        band : {"linear", "tanh", "arctan"}
+            Shape of q. Fields of one's own (``bands=``) belong to the linear one.
 
         Raises
         ------
         SystemDefinitionError
-            Transitions with a reset or at a time, hysteresis, or bands that overlap: the pair is named.
+            Transitions with a reset (impacts) or at a time, hysteresis, static friction above the kinetic one, or bands
+            that overlap: the pair is named.
+
+        See Also
+        --------
+        nonsmooth.smoothing_report : what a band does to an orbit.
         """
-        new, variant = smoothed_values(self._description, self._values, eta)
+        new, variant = smoothed_values(self._description, self._values, eta, band)
         return self._make(self._description, new, variant)
 
     # Text

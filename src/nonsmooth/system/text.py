@@ -41,9 +41,9 @@ def write_system(system: System, values: bool = True) -> str:
     description, eta = system._description, system.eta
     bands = sorted(eta) if isinstance(eta, Mapping) else [] if eta is None else ["all"]
     # Every result holds this text: what copies share is put together once.
-    key = ("text", values, eta is None, *bands)
+    key = ("text", values, system.band, *bands)
     if key not in description.variants:
-        description.variants[key] = _pieces(description, eta, values)
+        description.variants[key] = _pieces(description, eta, system.band, values)
     pieces = description.variants[key]
     if not values:
         return "".join(pieces)
@@ -56,7 +56,9 @@ def write_system(system: System, values: bool = True) -> str:
     return "".join(text)
 
 
-def _pieces(description: Description, eta: float | Mapping[str, float] | None, values: bool) -> list[str]:
+def _pieces(
+    description: Description, eta: float | Mapping[str, float] | None, band: str | None, values: bool
+) -> list[str]:
     """The text between the values of the parameters, and of the widths of the bands after them."""
     content = _content(description)
     if values:
@@ -65,6 +67,8 @@ def _pieces(description: Description, eta: float | Mapping[str, float] | None, v
         kind = sorted(eta) if isinstance(eta, Mapping) else "all"
         gaps = dict.fromkeys(eta, _GAP) if isinstance(eta, Mapping) else _GAP
         content["smoothing"] = {"eta": gaps} if values else {"bands": kind}
+        if band != "linear":
+            content["smoothing"]["band"] = band
     return json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False).split(json.dumps(_GAP))
 
 
@@ -173,7 +177,7 @@ def read_system(text: str) -> System:
     try:
         system = System(**_Reader(content).arguments())
         smoothing = content.get("smoothing")
-        return system if smoothing is None else system.smoothed(smoothing["eta"])
+        return system if smoothing is None else system.smoothed(smoothing["eta"], smoothing.get("band", "linear"))
     except SystemDefinitionError as error:  # names and units in it may be of any length
         raise SystemDefinitionError(shortened(error, quoted=False, most=_SAID)) from error
     except (KeyError, TypeError, AttributeError, ValueError, ArithmeticError) as error:

@@ -65,14 +65,18 @@ def parameter_rows(variant: Variant, values: Mapping[str, float], name: str, col
 
 
 def smoothed_values(
-    description: Description, values: Mapping[str, float], eta: Any
+    description: Description, values: Mapping[str, float], eta: Any, band: str
 ) -> tuple[dict[str, float], Variant]:
-    """The variant for these half widths, and its values; None takes the smoothing away."""
+    """The variant for these half widths and this band, and its values; None takes the smoothing away."""
+    from nonsmooth.system.smoothing import BANDS
+
+    if band not in BANDS:
+        raise ValueError(f"band is one of {', '.join(BANDS)}, not {shortened(band)}")
     plain = {key: values[key] for key in description.parameters}
     if eta is None:
         return plain, variant_of(description, SHARP)
     if isinstance(eta, Mapping):
-        variant = variant_of(description, ETA_PER_INDICATOR)
+        variant = variant_of(description, ETA_PER_INDICATOR, band)
         wanted = [str(indicator) for _, indicator in variant.etas]
         for key in eta:
             if key not in wanted:
@@ -81,7 +85,7 @@ def smoothed_values(
             raise ValueError(f"eta: no width for {', '.join(missing)}; give {{{', '.join(wanted)}}} or one number")
         widths = {key: eta[str(indicator)] for key, indicator in variant.etas}
     else:
-        variant = variant_of(description, ONE_ETA)
+        variant = variant_of(description, ONE_ETA, band)
         widths = {"eta": eta}
     new = plain | {key: _positive(finite_number(width, key), key) for key, width in widths.items()}
     variant.domain.check(new)

@@ -19,8 +19,8 @@ SHARP, ONE_ETA, ETA_PER_INDICATOR = "sharp", "one eta", "eta per indicator"
 class Variant:
     """A traced system, its derivatives, and what its parameters must fulfil; shared by all copies."""
 
-    def __init__(self, description: Description, kind: str) -> None:
-        self.kind = kind
+    def __init__(self, description: Description, kind: str, band: str | None) -> None:
+        self.kind, self.band = kind, band
         self.etas: tuple[tuple[str, str | None], ...] = ()
         self.memory: dict[str, tuple[float, str]] = dict(description.memory)
         extra: tuple[Any, ...] = ()
@@ -30,7 +30,7 @@ class Variant:
         else:
             from nonsmooth.system.smoothing import smooth
 
-            smoothed = smooth(description, single=kind == ONE_ETA)
+            smoothed = smooth(description, kind == ONE_ETA, band or "linear")
             self.traced, self.etas, extra = smoothed.traced, smoothed.etas, smoothed.apart
             self.memory |= {name: (0.0, unit) for name, unit in smoothed.memory}
         self.units: Mapping[str, str] = {
@@ -66,9 +66,9 @@ def _static_ratios(description: Description) -> Iterator[tuple[Any, str]]:
             yield surface.static - 1, "`static` of surface {} ({} | {}) must be 1 or more".format(*names)
 
 
-def variant_of(description: Description, kind: str = SHARP) -> Variant:
+def variant_of(description: Description, kind: str = SHARP, band: str | None = None) -> Variant:
     """Return the variant, made once for each description."""
-    found = description.variants.get(kind)
+    found = description.variants.get((kind, band))
     if found is None:
-        found = description.variants[kind] = Variant(description, kind)
+        found = description.variants[kind, band] = Variant(description, kind, band)
     return found

@@ -1,0 +1,260 @@
+"""``smoothing_report``: how an orbit, its multipliers and exponents change with the width of the bands."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.continuation.find import find_orbit
+from nonsmooth.continuation.orbit import Orbit
+from nonsmooth.diagrams.lyapunov import lyapunov
+from nonsmooth.errors import SolveError
+from nonsmooth.flow.arguments import check_system, whole_number
+from nonsmooth.flow.starts import plain_start
+from nonsmooth.kernels.hybrid import codes
+from nonsmooth.results.progress import Progress
+from nonsmooth.smoothing.attractors import Box, Found, attractors_of, matched
+from nonsmooth.system.names import by_name
+from nonsmooth.system.parameter import finite_number
+from nonsmooth.system.smoothing import BANDS
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from nonsmooth.flow.sections import Poincare, Stroboscopic
+    from nonsmooth.system.system import System
+
+__all__ = ["smoothing_report"]
+
+FloatArray = NDArray[np.float64]
+
+
+@by_name
+def smoothing_report(
+    system: System,
+    etas: Any,
+    *,
+    band: str | Sequence[str] = "linear",
+    orbit: Orbit | None = None,
+    start: Any = None,
+    transient: int = 20,
+    periods: int | None = None,
+    duration: float | None = None,
+    n_starts: int = 0,
+    box: Mapping[str, tuple[float, float]] | None = None,
+    section: Stroboscopic | Poincare | None = None,
+    seed: int = 0,
+    progress: Progress = True,
+) -> xr.Dataset:
+    r"""Differences between smoothed systems and the event-driven one, over the half width of the bands.
+
+    At each width the periodic orbit near the event-driven one is found by Newton's method, from that of the width
+    before. With the scales s of the states,
+
+    .. math:: d_u = \max_i |\Delta u_i| / s_i, \qquad d_\mu = \max_k |\Delta \mu_k|, \qquad
+        \text{order} = \frac{\ln d(\eta_j) - \ln d(\eta_{j-1})}{\ln \eta_j - \ln \eta_{j-1}}
+
+    Parameters
+    ----------
+    system : System
+        Not smoothed. Dry friction and relays are smoothed without their sliding modes; rigid impacts have no band
+        (see :meth:`nonsmooth.System.smoothed`).
+    etas : array (E,)
+        Half widths, in the unit of the indicators.
+    band : {"linear", "tanh", "arctan"}, or several
+        Shapes of the bands.
+    orbit : Orbit, optional
+        The event-driven orbit, of ``find_orbit``, stable or not; found from ``start`` where not given. Where the motion
+        from there is not periodic only exponents and attractors are compared.
+    start : optional
+        As in :func:`nonsmooth.simulate`.
+    transient : int
+        Periods (autonomous systems: rounds) that a smoothed system runs before Newton's method; none from an unstable
+        orbit.
+    periods, duration : int, float, optional
+        Length of the runs that give Lyapunov exponents, as in :func:`nonsmooth.lyapunov`. Not given, those of the
+        orbit, ln\|mu\| / T; 1000 periods where there is none.
+    n_starts : int
+        Random starts for the search of attractors at each width; 0 for no search. An autonomous system needs a
+        ``section`` for it.
+    box, section, seed : optional
+        Of these starts, as in :func:`nonsmooth.basin_fractions`; by default the orbit's extremes, twice as far apart.
+    progress : bool, or function
+        A bar over the widths.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over ``band`` and ``eta`` (rising): ``state_difference`` d_u, of the states at phase 0 of the forcing (of an
+        autonomous system of the largest and least values); ``multiplier_difference`` d_mu; ``exponent_difference``, of
+        the exponents that are finite without a band; ``period_difference``, relative; with the order of each
+        (``state_order``, ...) against the next smaller width. The orbits themselves: ``section``, ``maximum``,
+        ``minimum``, ``period``, ``floquet_multipliers``, ``stable``, ``exponents``; those without a band are called
+        ``reference_section`` and so on. ``status``, and in ``note`` the reason where there is no such orbit.
+        With ``n_starts``: ``n_attractors``, ``missing`` (attractors of the event-driven system without a counterpart),
+        ``spurious`` (the other way round) and ``reference_n_attractors``. Counterparts have the same period number and
+        extremes that differ by less than a tenth of the largest attractor's.
+
+    Raises
+    ------
+    ValueError, TypeError
+        Arguments that do not fit; an eta at which the bands overlap.
+    SystemDefinitionError
+        A system that has no smoothed counterpart, with the reason.
+    SolveError
+        The search of the event-driven orbit failed, other than because the motion is not periodic.
+
+    See Also
+    --------
+    nonsmooth.System.smoothed : the smoothed system itself.
+    nonsmooth.plot.smoothing_report : its figure.
+
+    Examples
+    --------
+    >>> import nonsmooth as ns
+    >>> friction = ns.models.dry_friction_oscillator(omega=0.4, zeta=0.05)
+    >>> report = ns.smoothing_report(friction, [1e-4, 1e-3], progress=False)
+    >>> float(report.multiplier_order.sel(band="linear", eta=1e-3).round(2))
+    1.0
+    """
+    from nonsmooth.results.labels import labels_of
+    from nonsmooth.results.progress import progress as bar
+    from nonsmooth.results.provenance import provenance
+    from nonsmooth.results.smoothing import report
+
+    check_system(system, "smoothing_report")
+    if system.is_smoothed:
+        raise ValueError("smoothing_report compares with the event-driven system: give it without smoothed(...)")
+    widths, bands = _widths(etas), _bands(band)
+    n_starts, transient = whole_number(n_starts, "n_starts", 0), whole_number(transient, "transient", 0)
+    if orbit is not None and orbit.system != system:
+        raise ValueError("the orbit belongs to another system, or to other values of its parameters")
+    for shape in bands:  # overlapping bands are refused before anything is computed
+        system.smoothed(widths[-1], shape)
+    orbit = orbit or _reference(system, start)
+    length = {"periods": periods, "duration": duration}
+    if orbit is None and periods is None and duration is None:
+        length["periods"] = 1000
+    begin = start if orbit is None else orbit.u
+    exponents = _exponents(system, orbit, begin, length)
+    search: Box | None = None
+    own: list[Found] = []
+    if n_starts:
+        search = Box(n_starts, dict(box) if box else _box(system, orbit), section, seed)
+        own = attractors_of(system, search, *_any_parameter(system))
+    rows: dict[tuple[int, int], dict[str, Any]] = {}
+    with bar(len(bands) * len(widths), "smoothing report", progress) as advance:
+        for i, shape in enumerate(bands):
+            near = begin
+            for j, eta in enumerate(widths):
+                smooth = system.smoothed(float(eta), shape)
+                row: dict[str, Any] = {"status": codes.OK, "note": ""}
+                found = None
+                if orbit is not None:
+                    found, row = _near(smooth, orbit, near, transient)
+                    near = near if found is None else found.u
+                try:
+                    row["exponents"] = _exponents(smooth, found, near, length)[: len(system.states)]
+                except SolveError as error:
+                    row |= {"status": _code(error), "note": str(error)}
+                if search is not None:
+                    others = attractors_of(smooth, search, "eta", float(eta))
+                    row["n_attractors"], row["missing"], row["spurious"] = len(others), *matched(own, others)
+                rows[i, j] = row | ({} if found is None else _of(found, len(system.states)))
+                advance()
+    options = {
+        "etas": widths, "band": bands, "orbit": None if orbit is None else orbit.u, "transient": transient,
+        "start": plain_start(system, start), "n_starts": n_starts, "box": box and dict(box), "section": section,
+        "seed": seed, **length,
+    }  # fmt: skip
+    labels = labels_of(system)
+    reference = ({} if orbit is None else _of(orbit, len(system.states))) | {"exponents": exponents}
+    if search is not None:
+        reference["n_attractors"] = len(own)
+    return report(
+        labels, provenance(labels, "smoothing_report", options, method="events", seed=seed), bands, widths, reference,
+        rows, scale=system.scale_vector(), forced=system.period() is not None,
+    )  # fmt: skip
+
+
+def _widths(etas: Any) -> FloatArray:
+    """The half widths, rising."""
+    given = [finite_number(eta, "etas") for eta in np.atleast_1d(np.asarray(etas, dtype=object)).tolist()]
+    if not given or min(given) <= 0 or len(set(given)) != len(given):
+        raise ValueError(f"etas are half widths of bands: positive numbers, each there once; not {given}")
+    return np.sort(np.array(given))
+
+
+def _bands(band: str | Sequence[str]) -> list[str]:
+    wanted = [band] if isinstance(band, str) else list(band)
+    if not wanted or len(set(wanted)) != len(wanted) or not set(wanted) <= set(BANDS):
+        raise ValueError(f"band is one or several of {', '.join(BANDS)}, not {band!r}")
+    return wanted
+
+
+def _reference(system: System, start: Any) -> Orbit | None:
+    """The event-driven orbit, or None where the motion is not periodic."""
+    try:
+        return find_orbit(system, start=start, progress=False)
+    except SolveError as error:
+        if error.status == "not_periodic":
+            return None
+        raise
+
+
+def _near(smooth: System, orbit: Orbit, near: Any, transient: int) -> tuple[Orbit | None, dict[str, Any]]:
+    """The smoothed system's orbit near a state, with the status of the search."""
+    number = orbit.period_number or None
+    try:
+        with np.errstate(all="ignore"):  # a guess that diverges is none
+            found = find_orbit(
+                smooth, start=near, period_number=number, transient=transient if orbit.stable else 0, progress=False
+            )
+    except SolveError as error:
+        return None, {"status": _code(error), "note": str(error)}
+    return found, {"status": codes.OK, "note": ""}
+
+
+def _code(error: SolveError) -> int:
+    """The code of an error's status; of those that only a search has, that of a search without a result."""
+    from nonsmooth.results.statuses import STATUSES
+
+    return next((status.code for status in STATUSES if status.name == error.status), codes.NO_CONVERGENCE)
+
+
+def _of(orbit: Orbit, n: int) -> dict[str, Any]:
+    """The compared parts of an orbit; multipliers of memory, which only a band has, are the least and left out."""
+    return {
+        "section": orbit.u, "maximum": orbit.maximum, "minimum": orbit.minimum, "period": orbit.period,
+        "floquet_multipliers": orbit.floquet_multipliers[:n], "stable": orbit.stable,
+    }  # fmt: skip
+
+
+def _exponents(system: System, orbit: Orbit | None, start: Any, length: Mapping[str, Any]) -> FloatArray:
+    """Exponents of long runs where a length was asked for, else of the orbit; NaN where there is none."""
+    n = len(system.states)
+    if length["periods"] is not None or length["duration"] is not None:
+        return lyapunov(system, start=start, progress=False, **length).exponents.values[:n]
+    if orbit is None:
+        return np.full(n, np.nan)
+    with np.errstate(divide="ignore"):
+        return np.log(np.abs(orbit.floquet_multipliers[:n])) / orbit.period
+
+
+def _box(system: System, orbit: Orbit | None) -> dict[str, tuple[float, float]]:
+    """Extremes of the orbit, twice as far apart."""
+    if orbit is None:
+        raise ValueError("n_starts without an orbit: give box=, the lowest and highest value of each state at a start")
+    middle, half = (orbit.maximum + orbit.minimum) / 2, orbit.maximum - orbit.minimum
+    both = zip(system.states, (middle - half).tolist(), (middle + half).tolist(), strict=True)
+    return {name: (low, high) for name, low, high in both if low < high}
+
+
+def _any_parameter(system: System) -> tuple[str, float]:
+    """A parameter to call sweeps with that vary nothing."""
+    if not system.values:
+        raise ValueError(f"{system.name!r} has no parameter: n_starts needs one, which stays as it is")
+    return next(iter(system.values.items()))
