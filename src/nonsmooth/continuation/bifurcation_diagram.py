@@ -99,7 +99,7 @@ def bifurcation_diagram(
 ) -> xr.Dataset:
     """Compute the branches of periodic orbits over a range of a parameter, stable and unstable, with special points.
 
-    The parameter is swept up and down; the orbit behind each periodic stretch of the sweeps is found and followed both
+    The parameter is swept up and down; the orbit behind each periodic interval of the sweeps is found and followed both
     ways, unless it lies on a branch that is known. At flips, pitchforks and branch points the other branch is followed
     too, and from its special points again, ``depth`` times.
 
@@ -178,7 +178,10 @@ def bifurcation_diagram(
             f"{max_period}, or Newton's method converged to none of them. Give another start, range or transient",
             status="not_periodic",
         )
-    options = {"parameter": parameter, "range": (low, high), "n": n, "transient": transient, "depth": depth, "max_period": max_period, **more}
+    options = {
+        "parameter": parameter, "range": (low, high), "n": n, "transient": transient, "depth": depth,
+        "max_period": max_period, **more,
+    }  # fmt: skip
     return _dataset(system, found, swept, options, complete)
 
 
@@ -193,16 +196,16 @@ def _swept(system: System, name: str, values: FloatArray, start: Any, transient:
 
 
 def _periodic(swept: xr.Dataset, name: str) -> list[tuple[float, int, FloatArray]]:
-    """Values, period numbers and last section points of the sweeps: the middle of each stretch, then its quarters."""
+    """Values, period numbers and last section points of the sweeps: the middle of each interval, then its quarters."""
     numbers = swept["period_number"].transpose("direction", name).values
     last = swept["section"].transpose("direction", name, "iterate", "state").values[:, :, -1]
     values, found = swept[name].values, []
     for one, states in zip(numbers, last, strict=True):
         ends = np.flatnonzero(np.diff(one)) + 1
-        for stretch in np.split(np.arange(len(one)), ends):
-            if one[stretch[0]] > 0:
+        for interval in np.split(np.arange(len(one)), ends):
+            if one[interval[0]] > 0:
                 for rank, part in enumerate((0.5, 0.25, 0.75, 0.0, 1.0)):
-                    i = stretch[round(part * (len(stretch) - 1))]
+                    i = interval[round(part * (len(interval) - 1))]
                     found.append((rank, int(one[i]), float(values[i]), states[i]))
     found.sort(key=lambda one: (one[0], one[1]))
     return [(value, number, u) for _, number, value, u in found]

@@ -64,5 +64,5 @@ def _one(result: xr.Dataset, k: int) -> xr.Dataset:
     points = np.flatnonzero(result["branch"].values == k)
     marks = np.flatnonzero(result["special_branch"].values == k)
     number = max(int(result["period_number"][k]), 1)
-    one = result.isel(point=points, special=marks, **{"return": slice(0, number)})
+    one = result.isel({"point": points, "special": marks, "return": slice(0, number)})
     return one.assign(special_point=one["special_point"] - points[0])

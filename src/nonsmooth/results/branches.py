@@ -104,7 +104,7 @@ def diagram(
 ) -> xr.Dataset:
     """The result of ``bifurcation_diagram``: branches one after the other over ``point``, and the sweeps.
 
-    ``returns`` (point, period number, state) are all section points of each branch; ``parents`` the branches they leave.
+    ``returns`` (point, period number, state): all section points of each branch; ``parents`` the branches they leave.
     """
     texts: dict[str, int] = {}
     layouts: dict[str, int] = {}
@@ -152,8 +152,8 @@ def diagram(
     result = result.assign({
         "period_number": ("branch_id", [int(one["period_number"]) for one in branches], {"long_name": "period number"}),
         "parent": ("branch_id", np.array(parents), {"long_name": "branch that it leaves (-1: found in a sweep)"}),
-        "ended": (("branch_id", "end"), np.array([one["ended"].values for one in branches]), branches[0]["ended"].attrs),
-        "ended_because": (("branch_id", "end"), strings_of(branches), branches[0]["ended_because"].attrs),
+        "ended": (("branch_id", "end"), [one["ended"].values for one in branches], branches[0]["ended"].attrs),
+        "ended_because": (("branch_id", "end"), _sentences(branches), branches[0]["ended_because"].attrs),
         "swept_value": ("sample", swept[parameter].values, dict(swept[parameter].attrs)),
         "swept_section": (
             ("direction", "sample", "iterate", "state"), column["section"].transpose(..., "iterate", "state").values,
@@ -165,12 +165,11 @@ def diagram(
         "complete": ((), np.int8(complete), {"long_name": "all branches were followed within the budget"}),
     })  # fmt: skip
     result = result.assign_coords(direction=swept["direction"].variable)
-    kept = [json.loads(table) for table in layouts]
-    result.attrs = dict(attrs) | {"parameter": parameter, "layouts": json.dumps(kept)}
+    result.attrs = dict(attrs) | {"parameter": parameter, "layouts": f"[{', '.join(layouts)}]"}
     return with_short_record(result)
 
 
-def strings_of(branches: Sequence[xr.Dataset]) -> NDArray[np.str_]:
+def _sentences(branches: Sequence[xr.Dataset]) -> NDArray[np.str_]:
     """Endings in words of several branches (branch, end)."""
     return strings(str(text) for one in branches for text in one["ended_because"].values).reshape(-1, 2)
 
