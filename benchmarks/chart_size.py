@@ -1,4 +1,4 @@
-"""How a chart grows with its number of points: time over three decades, two threads over one, memory.
+"""Growth of a chart with its number of points: time over three decades, two threads over one, memory.
 
     python benchmarks/chart_size.py                    times and threads, as in `make bench`
     python benchmarks/chart_size.py --picture FILE     the picture of time against points alone

@@ -39,7 +39,7 @@ def resting() -> ns.System:
 
 
 class Rules:
-    """What happens at an event, for both peers: fields ``free`` (with a friction force) or ``held``."""
+    """Return the state after an event, for both peers: fields ``free`` (with a friction force) or ``held``."""
 
     def __init__(self, omega: float, mu: float, gap: float) -> None:
         self.omega, self.mu, self.gap = omega, mu, gap
@@ -48,13 +48,13 @@ class Rules:
         return FORCE * float(np.cos(self.omega * t)) - u[0] - 2 * ZETA * u[1]
 
     def halt(self, t: float, u: Array) -> tuple[bool, float]:
-        """Whether it sticks where the speed has become zero, and the friction force."""
+        """Return True where it sticks when the speed has become zero, and the friction force."""
         u[1] = 0.0
         push = self.push(t, u)
         return abs(push) < self.mu, -self.mu if push > 0 else self.mu
 
     def strike(self, t: float, u: Array) -> bool:
-        """Whether it rests behind an impact."""
+        """Return True where it rests behind an impact."""
         rests = u[1] < SLOW and self.push(t, u) > 0
         u[0], u[1] = self.gap, 0.0 if rests else -E * u[1]
         return rests

@@ -51,7 +51,7 @@ def counted() -> dict[str, Any]:
 
 
 def compiled() -> list[str]:
-    """What the compiler makes of every kernel, for the argument types of a simulated run."""
+    """Return what the compiler makes of every kernel, for the argument types of a simulated run."""
     from nonsmooth.kernels.cuda.ptx import resources_of
 
     simulated = printed(str(SCRIPTS / "gpu_script.py"), NUMBA_ENABLE_CUDASIM="1")
@@ -87,7 +87,7 @@ def peak() -> tuple[str, float]:
 
 
 def settlers(side: int, plane: str, **options: Any) -> tuple[Any, Any, Any, Any]:
-    """The processor's and the GPU's settler of a chart, its points, and its starts."""
+    """The processor's and the GPU's attractor mapper of a chart, its points, and its starts."""
     parameters, ranges = PLANES[plane]
     system = ns.models.discontinuous_support(**parameters)
     grid = {name: np.linspace(*ends, side) for name, ends in ranges.items()}

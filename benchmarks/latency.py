@@ -65,7 +65,7 @@ DUFFING = {"first result": NONLINEAR.format(force="x - 0.4 * x**3"), "orbit with
 
 
 def seconds(steps: dict[str, str], folder: str) -> Steps:
-    """How long each step takes in a new process, with imports first and the whole process last."""
+    """Return the seconds of each step in a new process, with imports first and the whole process last."""
     parts = {"import": IMPORT, **steps}
     text = [
         "import json, os, warnings", "from time import perf_counter", "os.environ['MPLBACKEND'] = 'Agg'",
@@ -84,7 +84,7 @@ def seconds(steps: dict[str, str], folder: str) -> Steps:
 
 
 def newcomer(folder: str) -> Steps:
-    """How long the README's first lines take on a terminal, to the first byte shown and to the figure."""
+    """Return the seconds of the README's first lines on a terminal, to the first byte shown and to the figure."""
     import pty
 
     readme = (HERE.parent / "README.md").read_text(encoding="utf-8")

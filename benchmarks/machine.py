@@ -1,4 +1,4 @@
-"""What a reader needs to know about the machine and the versions; nothing that names the machine."""
+"""Facts that a reader needs about the machine and the versions; nothing that names the machine."""
 
 from __future__ import annotations
 

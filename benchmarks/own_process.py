@@ -1,4 +1,4 @@
-"""What a program prints in a process of its own, with this one's paths: counts without compilation, runs simulated."""
+"""Output of a program in a process of its own, with this one's paths: counts without compilation, runs simulated."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import sys
 from pathlib import Path
 
 HERE = Path(__file__).parent
-SCRIPTS = HERE.parent / "tests" / "analysis"  # those that run under Numba's simulator
+SCRIPTS = HERE.parent / "tests" / "diagrams"  # those that run under Numba's simulator
 
 
 def printed(*arguments: str, given: str = "", **environment: str) -> str:
-    """What ``python *arguments`` prints, with further environment variables; an error where it fails."""
+    """Return what ``python *arguments`` prints, with further environment variables; an error where it fails."""
     paths = os.pathsep.join([*sys.path, str(HERE), str(SCRIPTS)])
     return subprocess.run(
         [sys.executable, *arguments], input=given, capture_output=True, text=True, check=True,

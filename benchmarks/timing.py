@@ -39,7 +39,7 @@ def per_unit(times: Times, counts: Mapping[str, int]) -> Times:
 
 
 def ratio(times: Times, a: str, b: str) -> float:
-    """How many times longer `a` takes than `b`."""
+    """Return the time that `a` takes over that of `b`."""
     return median(x / y for x, y in zip(times[a], times[b], strict=True))
 
 

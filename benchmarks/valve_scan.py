@@ -4,7 +4,7 @@ Ours is the public `sweep` over the inflow q from 0.2 to 10 with the maxima of t
 same start, one thread. It is paid for judging, too (return distances, probes of contraction, longer transients where a
 point has not settled); the rate counts the published 1056 returns of each point that came to its end and nothing else.
 heyoka marches the same inflows from the same start until it has met as many maxima, and judges nothing. At inflows
-beyond the Hopf bifurcation the valve comes to rest and there are no 1056 maxima: the sweep ends such a point with a
+beyond the Hopf bifurcation the valve stands still and there are no 1056 maxima: the sweep ends such a point with a
 status, and heyoka leaves it out.
 """
 
@@ -74,7 +74,7 @@ def run(effort: float) -> tuple[list[str], list[Verdict]]:
         f"| heyoka | {found['returns']} | {min(times['heyoka']):.3f} | {max(peers):.3g} | {median(peers):.3g} |",
         f"| odeint, SIMD, i7-4820K (published) | | | {PUBLISHED:.2g} | |",
         "",
-        f"{len(values) - ended} of {len(values)} inflows end with a status (the valve comes to rest, or chatters).",
+        f"{len(values) - ended} of {len(values)} inflows end with a status (an equilibrium, or chatter).",
         "",
     ]
     return lines, [("valve scan, returns/s and core", "at least 8e4", f"{rate:.3g}", rate >= 8e4)]

@@ -23,14 +23,14 @@ from nonsmooth.results.statuses import by_name
 FIRST = (
     "flow/test_planar.py",  # record, for 3, 0 and 1 harmonics
     "flow/test_series.py",  # march
-    "analysis/test_chart_known_answers.py",  # settle_many
+    "diagrams/test_chart_known_answers.py",  # settle_many
     "flow/test_variational.py",  # march_legs, many models
-    "analysis/test_lyapunov.py",  # spectrum without a harmonic
+    "diagrams/test_lyapunov.py",  # spectrum without a harmonic
     "experiment/rig/test_virtual_rig.py",  # the models of the rig
-    "analysis/test_correlation_dimension.py",  # spectrum
+    "diagrams/test_correlation_dimension.py",  # spectrum
     "flow/test_poincare.py",  # chain without a harmonic
-    "analysis/test_sweep.py",  # chain
-    "analysis/test_gpu.py",
+    "diagrams/test_sweep.py",  # chain
+    "diagrams/test_gpu.py",
     "continuation/test_codimension_two.py",
     "flow/test_simulate.py",
     "system/test_jet.py",

@@ -19,7 +19,7 @@ SOURCES = HERE.parent / "src"
 
 
 def passes(tests: list[str], sources: Path) -> bool:
-    """Whether the tests pass with the package from ``sources``."""
+    """Return True where the tests pass with the package from ``sources``."""
     done = subprocess.run(
         [sys.executable, "-m", "pytest", "-x", "-q", "-n", "0", "-p", "no:cacheprovider", *tests],
         cwd=HERE.parent, env={**os.environ, "PYTHONPATH": str(sources)}, capture_output=True, text=True,

@@ -1,4 +1,4 @@
-"""What users get wrong: every message names the culprit and the remedy, in Python and on the command line."""
+"""Mistakes of users: every message names the culprit and the remedy, in Python and on the command line."""
 
 from __future__ import annotations
 

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from nonsmooth.errors import SystemDefinitionError as SystemDefinitionError
     from nonsmooth.experiment.load import load_recording as load_recording
     from nonsmooth.experiment.recording import Recording as Recording
+    from nonsmooth.explorer.serve import explore as explore
     from nonsmooth.flow.poincare import poincare as poincare
     from nonsmooth.flow.sections import Poincare as Poincare
     from nonsmooth.flow.sections import Stroboscopic as Stroboscopic
@@ -100,6 +101,7 @@ _WHERE = {
     "identify": "identification.chain",
     "ParameterSet": "identification.parameter_set",
     "compare": "identification.compare.compare",
+    "explore": "explorer.serve",
     "save": "results.store",
     "load": "results.store",
     "SystemDefinitionError": "errors",

@@ -39,7 +39,7 @@ def disk(tmp_path: Path) -> Iterator[Path]:
 
 @pytest.mark.parametrize("threads", [1, 3])
 def test_a_full_disk(disk: Path, threads: int) -> None:
-    """What was finished before the disk was full is whole, and is not computed again once there is room."""
+    """Work that was finished before the disk was full is whole, and is not computed again once there is room."""
     path = disk / "squares.zarr"
     with pytest.raises(DataFileError, match=r"squares\.zarr: the disk is full .* run it again to go on"):
         run(LARGE, store=path, threads=threads, **QUIET)

@@ -88,7 +88,7 @@ def test_chunks_of_zeros_are_files_too_however_many_threads_write(tmp_path: Path
 
 
 def test_altered_facts_and_descriptions(tmp_path: Path) -> None:
-    """What a store says of itself is checked like its numbers: refused, or computed again."""
+    """The description that a store gives of itself is checked like its numbers: refused, or computed again."""
     work, path = Squares(), tmp_path / "squares.zarr"
     run(work, store=path, **QUIET)
     whole = {file: file.read_bytes() for file in path.rglob("*") if file.is_file()}

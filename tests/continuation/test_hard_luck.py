@@ -1,4 +1,4 @@
-"""What cannot succeed ends with a status and a sentence: no traceback from Newton, no silent half branch."""
+"""A search that cannot succeed ends with a status and a sentence: no traceback from Newton, no silent half branch."""
 
 from __future__ import annotations
 

@@ -77,7 +77,7 @@ def clutch(**parameters: float) -> ns.System:
 
 
 def test_corner_of_a_condition() -> None:
-    """Where the mass comes to x = 1 with just the speed c, the other row of the condition becomes the last to hold.
+    """If the mass comes to x = 1 with just the speed c, the other row of the condition becomes the last to hold.
 
     Without contact the amplitude is A / sqrt(1 + 0.4^2), and c = 0.5 is met near 1.2."""
     branches = [ns.continue_orbit(ns.find_orbit(clutch(A=A)), "A", (1.12, 2.2)) for A in (1.15, 1.5)]

@@ -36,7 +36,8 @@ def test_a_notebook_is_that_of_its_page(page: Path) -> None:
 @pytest.mark.parametrize("page", make.PAGES[1:], ids=lambda page: page.stem)  # the first is typed by test_newcomer
 def test_a_notebook_runs_with_short_outputs(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("MPLBACKEND")  # so that figures appear below their cells
-    monkeypatch.setenv("IPYTHONDIR", str(tmp_path))
+    for folder in ("IPYTHONDIR", "JUPYTER_RUNTIME_DIR"):
+        monkeypatch.setenv(folder, str(tmp_path))
     notebook = nbformat.read(page.with_suffix(".ipynb"), 4)
     ExecutePreprocessor(timeout=300).preprocess(notebook, {"metadata": {"path": str(tmp_path)}})
     checker = doctest.OutputChecker()

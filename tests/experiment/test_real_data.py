@@ -1,4 +1,4 @@
-"""What can be told from files of real instruments, and what cannot (environment variable NONSMOOTH_DATA)."""
+"""Files of real instruments: what they determine, and what not (environment variable NONSMOOTH_DATA)."""
 
 from __future__ import annotations
 

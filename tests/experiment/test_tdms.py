@@ -75,7 +75,7 @@ def test_bad_files_say_where(data: bytes, message: str) -> None:
 
 
 def test_fewer_values_than_announced() -> None:
-    """What the library would print is a remark; what is not there takes no memory."""
+    """A line that the library would print is a remark; samples that are not there take no memory."""
     recording = parse_recording(segment([numbers("/'g'/'x'", 2**40, wf_increment=1.0)], [1.0]), "x.tdms")
     assert recording.channel("x").values.tolist() == [1.0]
     assert any("not a multiple of the chunk size" in w for w in recording.warnings)

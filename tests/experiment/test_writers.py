@@ -1,4 +1,4 @@
-"""What our writers write is read back: ``.cap`` bit for bit, CSV to the digits written."""
+"""Files of our writers are read back: ``.cap`` bit for bit, CSV to the digits written."""
 
 from __future__ import annotations
 

@@ -204,7 +204,7 @@ def test_the_test_sees_a_broken_saltation_matrix(how: str) -> None:
 
 
 def test_the_trace_identity_does_not_see_it() -> None:
-    """Where the surface holds positions only, det S = 1 for the right matrix, for a wrong sign, and for none."""
+    """If the surface holds positions only, det S = 1 for the right matrix, for a wrong sign, and for none."""
     for case, _, _ in compared("bilinear")[0]:
         for matrix in (saltation, *(pair[0] for pair in BROKEN.values())):
             determinants = [np.linalg.slogdet(matrix(jump))[1] for jump in case.variation.jumps]

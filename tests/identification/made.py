@@ -14,7 +14,7 @@ W, B, F, KAPPA, GAMMA, GAP, PLACE = 4.5, 1.04, 0.0, 1440.0, 0.70, 0.0018, 3e-5
 
 
 def counted(x):
-    """What an encoder of 1440 counts on a wheel of 78.9 mm makes of a position (m)."""
+    """Return what an encoder of 1440 counts on a wheel of 78.9 mm makes of a position (m)."""
     return COUNT * np.rint(np.asarray(x) / COUNT)
 
 

@@ -93,7 +93,7 @@ def apparatus(name: str, factor: float) -> Callable[[Made], None]:
 
 
 def channel(name: str, change: Callable[[Any], Any], *procedures: str) -> Callable[[Made], None]:
-    """What a channel of these procedures reads, changed."""
+    """Change the readings of a channel of these procedures."""
 
     def changed(made: Made) -> None:
         for procedure in procedures:

@@ -134,7 +134,7 @@ def test_pieces_that_graze_are_left_out():
 
 
 def told(values, errors, readings):
-    """What `counted_gap` looks at: a gap per run, independent of each other."""
+    """Values that `counted_gap` compares: a gap per run, independent of each other."""
     runs = tuple(SimpleNamespace(name=f"Run #{i + 1}", settings={"gap": r}) for i, r in enumerate(readings))
     return SimpleNamespace(
         runs=runs, values=np.array(values), covariance=np.diag(np.square(errors)), place=lambda run, which: run

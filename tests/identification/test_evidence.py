@@ -1,4 +1,4 @@
-"""What ``gather`` refuses: each message names the run and the channel, and says what to do."""
+"""Refusals of ``gather``: each message names the run and the channel, and says what to do."""
 
 import numpy as np
 import pytest

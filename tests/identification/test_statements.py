@@ -1,4 +1,4 @@
-"""What goes into a model and what is said of it: the set for a model, required parameters, report, coverage tables."""
+"""Values of a model and statements about them: the set for a model, required parameters, report, coverage tables."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What happens without located crossings: a fixed-step Fehlberg method that switches fields by sign inside its stages.
+"""Reference without located crossings: a fixed-step Fehlberg method that switches fields by sign inside its stages.
 
 Also the truth for the nonlinear switched case, from heyoka with terminal events.
 """

@@ -31,7 +31,7 @@ FIGURES = (
 
 @dataclass
 class Agreement:
-    """How far apart the two runs of one parameter set are."""
+    """Return the distance of the two runs of one parameter set."""
 
     figure: int
     parameters: dict[str, float]

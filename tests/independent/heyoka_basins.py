@@ -1,4 +1,4 @@
-"""Where starts end, by brute force with heyoka: a truth for basins that shares no code with `nonsmooth`.
+"""Attractors that starts reach, by brute force with heyoka: a truth for basins that shares no code with `nonsmooth`.
 
 The paper's oscillator with its support switched by a runtime parameter at terminal events, and the Duffing oscillator.
 A run is followed over a long transient; its last section points give its period, or that it has none.

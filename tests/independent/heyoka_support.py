@@ -53,7 +53,7 @@ class Crossing:
 
 @dataclass
 class Run:
-    """What one run saw. ``states[i]`` is the state after i forcing periods, ``modes`` 0 free, 1 contact."""
+    """Record of one run. ``states[i]`` is the state after i forcing periods, ``modes`` 0 free, 1 contact."""
 
     states: NDArray[np.float64]
     modes: NDArray[np.int64]

@@ -115,7 +115,7 @@ class RigidStop:
 
 
 def _bisect(f: Callable[[Array], Array], low: Array, high: Array) -> Array:
-    """Where f goes from positive to negative, elementwise."""
+    """Return the places at which f goes from positive to negative, elementwise."""
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         positive = f(middle) > 0

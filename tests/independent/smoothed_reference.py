@@ -26,7 +26,7 @@ def region(p: Mapping[str, float], eta: float, x: float, v: float) -> str:
 
 
 def support_force(p: Mapping[str, float], eta: float, where: str, v_a: float, x: float, v: float) -> float:
-    """What the support adds to m x'' (Eqs. 7-8)."""
+    """Return what the support adds to m x'' (Eqs. 7-8)."""
     depth = x - p["g"]
     if where == CONTACT:
         return -p["k_s"] * depth - p["c_s"] * v

@@ -1,4 +1,4 @@
-"""What a sweep reports of a settled orbit - extremes, crossings, clearance - against heyoka and closed forms."""
+"""Extremes, crossings and clearance that a sweep reports of an attractor, against heyoka and closed forms."""
 
 from __future__ import annotations
 

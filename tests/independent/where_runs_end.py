@@ -1,4 +1,4 @@
-"""Where brute-force runs end, and how many of them end where a result of ``basins`` says."""
+"""Ends of brute-force runs, and how many of them end where a result of ``basins`` says."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ RETURN = 1e-6  # a return closer than this part of the motion's size closes a cy
 
 @dataclass(frozen=True)
 class End:
-    """Where a run ended: its period number (0: none up to 24) and its last section points."""
+    """End of a run: its period number (0: none up to 24) and its last section points."""
 
     period_number: int
     points: NDArray[np.float64]

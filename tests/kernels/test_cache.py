@@ -250,7 +250,7 @@ def test_unwritable_user_folder_falls_back_to_a_private_one(tmp_path, monkeypatc
 @pytest.mark.skipif(sys.platform == "win32", reason="permissions of POSIX")
 @pytest.mark.parametrize("part", ["", "compiled"])
 def test_a_folder_that_others_may_write_is_refused(tmp_path, monkeypatch, part):
-    """What stands there is executed. A folder that was chosen: an error; the user's own: a private one in its place."""
+    """Its files are executed. A folder that was chosen: an error; the user's own: a private one in its place."""
     from nonsmooth.kernels.compile.folder import cache_folder, usable_folder
 
     open_to_all = tmp_path / "nonsmooth"
@@ -308,6 +308,35 @@ def test_one_signature_only(tmp_path, monkeypatch):
         with pytest.raises(TypeError, match="No matching definition"):
             module.f(0, 0.5, [1.0, "text"])
         assert len(module.f.signatures) == 1
+
+
+LAYERS = """
+from nonsmooth.kernels.compile.cache import kernel, once
+
+
+@once
+def twice(a):
+    return 2.0 * a
+
+
+@kernel("float64(float64)")
+def layered(a):
+    return twice(a) + twice(a + 1.0)
+"""
+
+
+def test_a_compile_copies_no_names_of_what_it_inlines(tmp_path, monkeypatch):
+    from numba.core import ir
+
+    from nonsmooth.kernels.compile import cache
+
+    def copied(self, memo):
+        raise AssertionError("names are copied")
+
+    monkeypatch.setenv("NONSMOOTH_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(ir.VarMap, "__deepcopy__", copied, raising=False)
+    assert cache.load_module(LAYERS, "layers").layered(2.0) == 2.0 * 2.0 + 2.0 * 3.0
+    assert not hasattr(ir.Scope, "__deepcopy__")  # Numba is left as it was
 
 
 def test_failed_module_is_not_kept(tmp_path, monkeypatch):

@@ -29,7 +29,7 @@ SWAPPED = {"linear.stepper", "linear.extremes", "linear.touches", "series.genera
 
 @cache
 def names(file: str) -> dict[str, str]:
-    """Where each name of a kernel file comes from."""
+    """Return the origin of each name of a kernel file."""
     found: dict[str, str] = {}
     for node in ast.parse((FOLDER / f"{file.replace('.', '/')}.py").read_text(encoding="utf-8")).body:
         if isinstance(node, ast.FunctionDef | ast.ClassDef):

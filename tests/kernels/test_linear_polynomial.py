@@ -1,4 +1,4 @@
-"""What the exact flow's search is certain of on a piece, against quartics whose fourth derivative is the bound."""
+"""Certainty of the exact flow's search on a segment, against quartics whose fourth derivative is the bound."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ def drawn(high: float, **options: Any) -> Any:
 
 
 def numbers(ax: Any) -> tuple[np.ndarray, np.ndarray]:
-    """What stands at the ticks of the ordinate, with the power of ten at the end of the axis, and where they stand."""
+    """Return the labels at the ordinate's ticks, with the power of ten at the end of the axis, and their places."""
     ax.figure.canvas.draw()
     ticks = [tick for tick in ax.yaxis.get_major_ticks() if tick.label1.get_text()]
     words = [tick.label1.get_text().replace("\N{MINUS SIGN}", "-") for tick in ticks]

@@ -30,7 +30,7 @@ def other_byte(data: bytearray, at: int, rng: Rng) -> None:
 
 
 def other_letter(data: bytearray, at: int, rng: Rng) -> None:
-    """Where there is text it stays text: a digit for a digit, a letter for a letter."""
+    """Text stays text: a digit for a digit, a letter for a letter."""
     byte = data[at]
     for first, last in (b"09", b"az", b"AZ"):
         if first <= byte <= last:

@@ -1,4 +1,4 @@
-"""What results read off a system."""
+"""Labels that results read off a system."""
 
 from __future__ import annotations
 

@@ -102,7 +102,7 @@ def test_compiling_is_mentioned_once_for_all_kernels_of_some_seconds(
 
 
 def first_words(code: str, environment: dict[str, str]) -> tuple[str, float]:
-    """What a process writes first on a terminal, and the seconds of a processor until then; it is ended there."""
+    """Return what a process writes first on a terminal, and a processor's seconds until then; it is ended there."""
     import pty
 
     child, terminal = pty.fork()

@@ -1,4 +1,4 @@
-"""Which dims a result has, and that no array ends up under another's label."""
+"""Dims of results, and that no array ends up under another's label."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the package zarr is not installed: everything but stores works, and those name the extra before any work."""
+"""Without the package zarr everything but stores works, and those name the extra before any work."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ def test_what_the_measurement_has_forked_ends_with_it(tmp_path: Path, monkeypatc
 
 
 def _runs(process: int) -> bool:
-    """Whether a process runs; one that has ended may wait for whoever collects it."""
+    """Return True while a process runs; one that has ended may wait for whoever collects it."""
     try:
         os.kill(process, 0)
     except ProcessLookupError:

@@ -41,7 +41,7 @@ def legend_of(canvas: Any) -> list[str]:
 
 
 def inside(ax: Any, artist: Any) -> bool:
-    """Whether some of an artist lies within its axes."""
+    """Return True where some of an artist lies within its axes."""
     if isinstance(artist, Collection) or not hasattr(artist, "get_xydata"):
         return bool(artist.get_visible())
     at = artist.get_transform().transform(np.asarray(artist.get_xydata(), dtype=float))

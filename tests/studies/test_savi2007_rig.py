@@ -1,4 +1,4 @@
-"""How the report reads the virtual rig's records: against responses and numbers that were made up by hand."""
+"""Numbers that the report reads off the virtual rig's records, against responses and numbers made up by hand."""
 
 from __future__ import annotations
 

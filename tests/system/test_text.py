@@ -74,7 +74,7 @@ def test_the_hash_of_the_equations_does_not_see_values():
 
 
 def test_copies_are_written_with_their_own_values():
-    """What copies share is put together once; numbers and widths of bands are those of the copy."""
+    """Parts that copies share are put together once; numbers and widths of bands are those of the copy."""
     etas = ({}, {"eta": 1e-5}, {"eta": 2e-5}, {"eta": {"penetration": 1e-5, "separation": 3e-5}})
     for eta in (*etas, *etas):
         for given in ({"rho": 0.1 + 0.2, "g": -0.0}, {"rho": 1e300}, {}):

@@ -1,4 +1,4 @@
-"""What the tracing makes of a function is what the function computes on numbers."""
+"""Expressions traced from a function give what the function computes on numbers."""
 
 from types import SimpleNamespace
 

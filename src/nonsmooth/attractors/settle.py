@@ -122,6 +122,11 @@ class Attractors:
             result_status(int(jobs.status[0])), int(jobs.spent[0]),
         )  # fmt: skip
 
+    def pass_by(self, i: int, state: State, out: Chain) -> Verdict:
+        """Run point i on from ``state`` through one transient and the kept returns, without judging them."""
+        self._run(i, state, self.plan, self.transient, self.keep, out)
+        return Verdict(0, np.nan, np.nan, result_status(int(out.status[i])), self.transient + self.keep)
+
     def _run(self, i: int, state: State, plan: SectionPlan, transient: int, keep: int, out: Chain) -> None:
         self.engine.chain(self.tables, i, i + 1, state, None, plan, transient, keep, out)
 

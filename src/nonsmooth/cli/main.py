@@ -14,14 +14,14 @@ from typing import Any
 # fits), and beside our own threads for a core. Must stand before NumPy is loaded.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from nonsmooth.cli import compare, completion, identify, init, models, plan, reproduce, rig, run, schema, show
+from nonsmooth.cli import compare, completion, explore, identify, init, models, plan, reproduce, rig, run, schema, show
 from nonsmooth.cli.terminal import printable
 from nonsmooth.errors import SolveError, shortened
 from nonsmooth.system.names import unknown
 
 __all__ = ["main", "parser"]
 
-_COMMANDS = (init, run, plan, show, models, identify, compare, reproduce, rig, schema, completion)
+_COMMANDS = (init, run, plan, show, explore, models, identify, compare, reproduce, rig, schema, completion)
 #: What a user can have caused and mend; anything else is a fault of the package.
 _USER_ERRORS = (ValueError, TypeError, OSError, MemoryError, SolveError, ImportError)
 DONE, FAULT, WRONG_INPUT, ANOMALIES, INTERRUPTED, PIPE_CLOSED = 0, 1, 2, 3, 130, 141

@@ -45,6 +45,7 @@ def sweep(
     transient: int = 500,
     keep: int = 100,
     max_period: int | None = None,
+    judge: bool = True,
     density: bool | Mapping[str, Any] = False,
     bins: int = 400,
     method: str = "auto",
@@ -76,6 +77,9 @@ def sweep(
         transients; what is not settled then has the status ``slow``.
     max_period : int, optional
         Longest period number searched, less than ``keep``; the smaller of 16 and ``keep`` - 1 where not given.
+    judge : bool
+        False: record what follows one transient, settled or not, and leave out ``period_number`` and ``residual``. A
+        first look, in half the time.
     density : bool or mapping
         Store a histogram of each state's section points instead of the points. A mapping gives ranges,
         ``{"x": (lowest, highest)}``; where none is given it is that of a coarse sweep and a twentieth more either side.
@@ -126,6 +130,10 @@ def sweep(
     section, plan = section_plan(system, section)
     engine = engine_on(device, engine_for(system, method, rtol, atol, **expert), plan)
     gpu = on_gpu(device, "sweep", engine, plan, carried=direction is not None)
+    if not isinstance(judge, bool):
+        raise TypeError(f"judge = {judge!r}: give True or False")
+    if not judge and (gpu or density is not False):
+        raise ValueError('judge=False records section points on the processor: leave out density and device="cuda"')
     if gpu and density is not False:
         raise ValueError('section points are counted on the processor: leave out density, or device="cuda"')
     threads = workers_of(device, threads)
@@ -160,7 +168,7 @@ def sweep(
     options = {
         "parameter": parameter, "values": values, "direction": direction, "start": plain_start(system, start),
         "section": section, "transient": transient, "keep": keep, "max_period": max_period,
-        **({} if density is False else {"density": density, "bins": bins}),
+        **({} if judge else {"judge": False}), **({} if density is False else {"density": density, "bins": bins}),
         "method": method, "rtol": rtol, "atol": atol, **({"device": device} if gpu else {}), **expert,
     }  # fmt: skip
     squeeze = (() if direction == "both" else ("direction",)) + (("start",) if is_one_start(start) else ())
@@ -169,12 +177,15 @@ def sweep(
     def march(slot: tuple[int, int], order: Sequence[int], report: Report) -> None:
         d, k = slot
         state: State | None = None
-        for i, row, judge, chain in slots[slot].places(order):
+        for i, row, rules, chain in slots[slot].places(order):
             if report.stop.is_set():
                 return
             if state is None or directions[d] == "none":
                 state = State(starts[k].copy(), memory.copy())
-            verdict = judge.settle(row, state, chain, lambda: State(starts[k].copy(), memory.copy()))
+            if judge:
+                verdict = rules.settle(row, state, chain, lambda: State(starts[k].copy(), memory.copy()))
+            else:
+                verdict = rules.pass_by(row, state, chain)
             slots[slot].keep(i, row, verdict, chain)
             report.advance(1)
 
@@ -185,7 +196,7 @@ def sweep(
     largest = largest_of(starts, slots.values())
     warn_if_coarse(system, engine, largest)
     warn_if_small(system, largest)
-    return _dataset(system, engine.name, parameter, numbers, directions, starts, slots, options, squeeze)
+    return _dataset(system, engine.name, parameter, numbers, directions, starts, slots, options, squeeze, judge)
 
 
 def _directions(direction: Any) -> tuple[str, ...]:
@@ -204,6 +215,7 @@ def _dataset(
     slots: Mapping[tuple[int, int], Slot],
     options: Mapping[str, Any],
     squeeze: Iterable[str],
+    judge: bool,
 ) -> xr.Dataset:
     from nonsmooth.results.labels import labels_of
     from nonsmooth.results.provenance import provenance
@@ -235,6 +247,8 @@ def _dataset(
     }
     if not system.outputs or arrays["output_maximum"].shape[-1] != len(system.outputs):
         del arrays["output_maximum"], arrays["output_minimum"]
+    if not judge:
+        del arrays["period_number"], arrays["residual"]
     counted = next(iter(slots.values())).counted
     if counted is not None:
         del arrays["section"]

@@ -1,4 +1,4 @@
-"""What the rig writes: a session that reads back, the truth beside it, everything labelled synthetic."""
+"""Files that the rig writes: a session that reads back, the truth beside it, everything labelled synthetic."""
 
 from __future__ import annotations
 

@@ -179,7 +179,7 @@ def test_what_a_session_lacks_is_named(session: object) -> None:
 
 
 def test_a_long_record_is_smoothed_as_a_short_one(session: object, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What the middle of the record tells serves the whole: the motion stays within a fraction of its own errors."""
+    """The middle of the record serves the whole: the motion stays within a fraction of its own errors."""
     item = session.recordings("section")[1]
     whole = measured_motion(item.recording, item.run, distance_per_turn=TRAVEL)
     monkeypatch.setattr(module, "LONG", 10.0)

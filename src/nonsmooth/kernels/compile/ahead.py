@@ -23,6 +23,7 @@ from types import ModuleType
 from typing import Any
 
 from nonsmooth.kernels.compile.target import AHEAD, level
+from nonsmooth.kernels.series.places import METHODS
 
 __all__ = ["compile_ahead", "kernels_of", "plain_files", "tasks"]
 
@@ -44,21 +45,25 @@ def plain_files() -> Iterator[str]:
                 yield ".".join(["nonsmooth", *path.relative_to(_ROOT).with_suffix("").parts])
 
 
-def tasks(shapes: Sequence[str] = SHAPES) -> list[_Task]:
-    """What is compiled, each by one process: the plain files, then what every ``*_module`` function of a stepper makes.
+def tasks(shapes: Sequence[str] = SHAPES, methods: Sequence[str] | None = None) -> list[_Task]:
+    """The list of modules to compile, each by one process: those of every ``*_module`` function, and the plain files.
 
     Its arguments are told by their names: ``states`` and ``harmonics`` of a shape, and each of the file's observers and
-    methods."""
-    found: list[_Task] = [(name, "", ()) for name in plain_files()]
-    for stepper in ("series", "linear"):
+    methods, or of the ``methods`` given. The longest come first, and a module behind those whose kernels it calls: two
+    processes then do not compile these twice."""
+    found: list[_Task] = []
+    for stepper in ("linear", "series"):
         file = importlib.import_module(f"nonsmooth.kernels.{stepper}.module")
         for name in (name for name in file.__all__ if name.endswith("_module")):
             for states, harmonics in (map(int, shape.split(",")) for shape in shapes):
                 choices: dict[str, Any] = {"states": [states], "harmonics": [harmonics]}
                 choices |= {one: getattr(file, f"{one.upper()}S", []) for one in ("observer", "method")}
+                if methods is not None:
+                    choices["method"] = methods
                 names = signature(getattr(file, name)).parameters
                 given = product(*(choices.get(one, [names[one].default]) for one in names))
                 found += [(file.__name__, name, arguments) for arguments in given]
+    found += [(name, "", ()) for name in plain_files()]
     return list(dict.fromkeys(found))
 
 
@@ -75,7 +80,7 @@ def kernels_of(module: ModuleType) -> list[Any]:
 
 
 def _begin(chosen: str, cache: str) -> None:
-    """What a process that compiles is told: nothing of the user's own cache."""
+    """Set a process up to compile: for the level, and with nothing of the user's own cache."""
     os.environ.update(NONSMOOTH_LEVEL=chosen, NONSMOOTH_CACHE_DIR=cache)
 
 
@@ -86,10 +91,10 @@ def _compile(task: _Task) -> list[str]:
     return [compiled(kernel).entry() for kernel in kernels_of(_module(task))]
 
 
-def compile_ahead(into: Path, chosen: str, work: Sequence[_Task]) -> int:
+def compile_ahead(into: Path, chosen: str, work: Sequence[_Task], *, whole: bool = True) -> int:
     """Fill ``into / chosen`` for a level of this processor, with all processors; returns the number of kernels.
 
-    What stands there and fits is kept, what does not fit is removed."""
+    What stands there and fits is kept; what does not belong to the work is removed where that is the whole of it."""
     folder = into / chosen
     folder.mkdir(parents=True, exist_ok=True)
     processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
@@ -106,7 +111,7 @@ def compile_ahead(into: Path, chosen: str, work: Sequence[_Task]) -> int:
                 shutil.copyfile(source, unfinished)
                 os.replace(unfinished, folder / name)
     for path in folder.iterdir():
-        if path.name not in wanted:
+        if whole and path.name not in wanted:
             path.unlink()
     return len(wanted)
 
@@ -115,10 +120,14 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m nonsmooth.kernels.compile.ahead", description=__doc__)
     parser.add_argument("levels", nargs="*", help="levels of the architecture; without one, this processor's highest")
     parser.add_argument("--shapes", nargs="+", default=SHAPES, metavar="STATES,HARMONICS", help="of the exact flow")
+    parser.add_argument(
+        "--methods", nargs="+", choices=tuple(METHODS), help="of the series; without it, all of them are compiled"
+    )
     parser.add_argument("--into", type=Path, default=AHEAD, help="another folder than the package's own")
     options = parser.parse_args()
     for chosen in filter(None, options.levels or [level()]):
-        number = compile_ahead(options.into, chosen, tasks(options.shapes))
+        work = tasks(options.shapes, options.methods)
+        number = compile_ahead(options.into, chosen, work, whole=options.methods is None)
         print(f"{number} kernels compiled for {chosen} in {options.into / chosen}")
     return 0
 

@@ -7,9 +7,9 @@ and the level of the architecture (``target``), so nothing is ever stale, entrie
 need no lock. An entry is code: it begins with a hash of its content, and one that another user may write is not read
 (``folder``). What no model changes has come with the package where it could be made ahead (``ahead``).
 
-What leans on private parts of Numba (a dispatcher's ``_cache`` and ``_compile_for_args``, ``CompileResult._reduce``)
-stands in this file and in ``target``; ``tests/kernels/test_cache.py`` covers it. Checked with Numba 0.62 and 0.68,
-calls that compile with 0.68.
+What leans on private parts of Numba (a dispatcher's ``_cache`` and ``_compile_for_args``, ``CompileResult._reduce``,
+the copies of ``ir.Scope`` and ``ir.Loc``) stands in this file and in ``target``; ``tests/kernels/test_cache.py`` covers
+it. Checked with Numba 0.62 and 0.68, calls that compile with 0.68.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ from weakref import WeakValueDictionary
 
 import llvmlite
 import numba
+from numba.core import ir
 from numba.core.caching import _Cache
 from numba.core.compiler import CompileResult
 from numba.core.compiler_lock import global_compiler_lock
@@ -281,19 +282,27 @@ def _compile_once(dispatcher: Any, signature: Any) -> None:
     # Numba's own lock: a compile in another thread may hold it and ask for this function.
     with global_compiler_lock:
         if not dispatcher.signatures:
-            with _collector_at_rest():
+            with _cheaply():
                 dispatcher.compile(signature)
             dispatcher.disable_compile()
 
 
 @contextlib.contextmanager
-def _collector_at_rest() -> Iterator[None]:
-    """A compile makes millions of objects and hardly a cycle: looking for these takes a sixth of its time."""
-    running = gc.isenabled()
+def _cheaply() -> Iterator[None]:
+    """Leave out what costs a compile half of its time and changes nothing.
+
+    A compile makes millions of objects and hardly a cycle, so the collector rests. And with each block of a function
+    that becomes part of its caller (:func:`once`), Numba's ``InlineWorker`` copies all names of the function and the
+    places they stand at: they are shared instead, since the function's own text is thrown away."""
+    running, outermost = gc.isenabled(), not hasattr(ir.Scope, "__deepcopy__")
     gc.disable()
+    for kind in (ir.Scope, ir.Loc) if outermost else ():
+        kind.__deepcopy__ = lambda self, memo: self
     try:
         yield
     finally:
+        for kind in (ir.Scope, ir.Loc) if outermost else ():
+            del kind.__deepcopy__
         if running:
             gc.enable()
 

@@ -1,4 +1,4 @@
-"""Where compiled code is kept on disk: a folder that nobody else may write, whole files only; unused ones are removed.
+"""The folder of compiled code on disk: nobody else may write it, files are whole, and unused ones are removed.
 
 What stands there is executed. So a folder, or a file in it, that belongs to another user or that others may write is
 not used, and new ones are made for the user alone.
@@ -99,7 +99,7 @@ def _writable(folder: Path) -> bool:
 
 
 def _private(folder: Path) -> bool:
-    """Whether only this user (and root) may write the folder and those of ours in it."""
+    """Return whether only this user (and root) may write the folder and those of ours in it."""
     return all(_own(path.stat()) for path in (folder / part for part in PARTS) if path.exists())
 
 

@@ -24,7 +24,7 @@ _DISABLED = bool(numba.config.DISABLE_JIT)
 
 
 def addresses(*functions: Any) -> Any:
-    """What stands for compiled functions (each with one signature) in a call of a kernel: an array of int64.
+    """Return what stands for compiled functions (each with one signature) in a call of a kernel: an array of int64.
 
     With ``NUMBA_DISABLE_JIT=1`` the functions themselves."""
     if _DISABLED:

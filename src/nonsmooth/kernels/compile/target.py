@@ -1,4 +1,4 @@
-"""What our code is made for, and the engines that hold it: a level of the processor's architecture, an engine per file.
+"""The target of our code, a level of the processor's architecture, and the engines that hold it, one per file.
 
 Numba makes code for one processor. Ours is made for a level of the architecture, so that it can be made on one machine,
 travel with the package and run on another; what the level costs stands in ``docs/decisions.md``. And Numba keeps all
@@ -110,7 +110,7 @@ class _Target(CPUTarget):
 
 
 class Function(CPUDispatcher):
-    """What ``numba.njit`` makes of a function, in the engine of the file it stands in."""
+    """A function as ``numba.njit`` compiles it, but in the engine of the file it stands in."""
 
     def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
         names = function.__globals__

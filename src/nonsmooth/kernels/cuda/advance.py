@@ -15,7 +15,7 @@ from nonsmooth.kernels.linear.many import go
 
 @device
 def row_of(buffers, row):
-    """What ``chain`` writes for one trajectory, from the buffers of all."""
+    """The arrays that ``chain`` writes for one trajectory, from the buffers of all."""
     section, maximum, minimum, i_max, i_min, o_max, o_min, crossings, contacts, elapsed, times, modes, status = buffers
     return Kept(
         section[row : row + 1], maximum[row : row + 1], minimum[row : row + 1], i_max[row : row + 1],
@@ -30,11 +30,11 @@ def advance(jobs, rows, point, net, place, counts, plans, way, phase, limit, out
     """Thread k: march the state of job j = jobs[k] under parameter row rows[j] by transient[j] section returns, then
     keep[j] more into row j of ``out``. (One number for all jobs where these arrays are short.)
 
-    ``place``: states, clocks, counters of all; ``counts``: transient, keep; ``plans``: plan, after; ``way``: legs and
-    apart. With more legs the tables serve again, under the plan ``after``: ``apart`` = 0, for one more return, into row
-    j of ``other``; else for as many returns of the states j + apart, j + 2 apart, ..., the last of each into that row
-    of ``other``. A state is left at its last return; statuses stand in the buffers, and legs are left out behind one
-    that failed."""
+    ``place``: states, clocks, counters of all; ``counts``: transient, keep; ``plans``: plan, after; ``way``: ``legs``
+    and ``apart``. With more ``legs`` the tables serve again, under the plan ``after``: ``apart`` = 0, for one more
+    return, into row j of ``other``; else for as many returns of the states j + apart, j + 2 apart, ..., the last of
+    each into that row of ``other``. A state is left at its last return; statuses stand in the buffers, and what comes
+    behind one that failed is left out."""
     k = cuda.grid(1)
     if k >= jobs.shape[0]:
         return

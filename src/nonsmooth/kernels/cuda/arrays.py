@@ -1,4 +1,4 @@
-"""What a thread works with on a GPU: its parameter row and its scratch memory, in arrays of constant shape.
+"""The arrays of a thread on a GPU: its parameter row and its scratch memory, in arrays of constant shape.
 
 This file is text of a generated module (``cuda.module``), behind the planar files of the CPU. ``packed`` holds the
 parameter rows as columns, so that neighbouring threads read neighbouring numbers; what a thread works with lies in its

@@ -15,7 +15,7 @@ from nonsmooth.kernels.linear.many import follow_pair
 
 @local
 def single():
-    """What ``chain`` leaves behind, for one return of one trajectory."""
+    """Room for the results of ``chain``, for one return of one trajectory."""
     section = cuda.local.array((1, 1, 2), float64)
     top = cuda.local.array((1, 2), float64)
     bottom = cuda.local.array((1, 2), float64)

@@ -53,7 +53,7 @@ def ptx_of_module(module: ModuleType, entry: str, signature: str, capability: tu
 
 
 def resources_of(ptx: str, registers: int | None = None) -> dict[str, Any]:
-    """What ``ptxas`` says of a kernel: registers, bytes of stack, of spills, and of machine code; empty without it."""
+    """Figures of ``ptxas`` for a kernel: registers, bytes of stack, of spills, of machine code; empty without it."""
     program = shutil.which("ptxas", path=f"{Path(sysconfig.get_path('purelib')) / 'nvidia' / 'cu13' / 'bin'}")
     program = program or shutil.which("ptxas")
     found = re.search(r"\.target (sm_\w+)", ptx)

@@ -1,4 +1,4 @@
-"""What is decided about jobs on a GPU between their runs, one job per thread: text of a generated module.
+"""Decisions about jobs on a GPU between their runs, one job per thread: text of a generated module.
 
 It is the processor's text (``settle``, ``judge``, ``exponent``); the runs in between are launches of ``advance``. Job j
 has row j in every array; a launch gets the list of the jobs that it concerns.
@@ -71,7 +71,7 @@ def contract(jobs, p, tolerance, sizes, section, run, codes, mu):
 
 @entry
 def decide(jobs, given, known, codes, codes_after, section, top, bottom, mu, u):
-    """What is wanted of each job next; ``given`` and ``known`` are ``Rules`` and ``Jobs``."""
+    """Set what each job is to do next; ``given`` and ``known`` are ``Rules`` and ``Jobs``."""
     k = cuda.grid(1)
     if k >= jobs.shape[0]:
         return

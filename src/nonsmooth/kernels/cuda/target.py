@@ -1,4 +1,4 @@
-"""What the kernel texts import on a GPU in place of ``cache``: the same markers, another compiler.
+"""The module that kernel texts import on a GPU in place of ``cache``: the same markers, another compiler.
 
 A generated module for CUDA is the CPU's text with this header (``cuda.module``): ``device``, ``inline`` and
 ``kernel`` mark functions that only other device functions call, ``entry`` what the host launches with one thread per

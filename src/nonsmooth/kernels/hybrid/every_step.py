@@ -1,4 +1,4 @@
-"""What observers have in common that see every step and look for no section."""
+"""Functions that the observers of every step share: none of them has a section."""
 
 from nonsmooth.kernels.compile.cache import once
 
@@ -17,5 +17,5 @@ def hurry(i, form, net, section, goal, seen, tables, work, patience):
 
 @once
 def arrive(i, code, source, t, sense, state, form, section, goal, seen, tables, work):
-    """No section is looked for."""
+    """There is no section."""
     return code

@@ -1,6 +1,6 @@
 """Observer of small changes along a trajectory of the exact flow: what Lyapunov exponents are.
 
-A leg multiplies the frame by exp(A tau), from the tables of the leg itself; transitions by their saltation
+A segment multiplies the frame by exp(A tau), from the tables of the segment itself; transitions by their saltation
 (``frame.saltation``). The frame is made orthonormal again after each, and what is divided out is multiplied up.
 """
 
@@ -33,7 +33,7 @@ def open_window(i, form, section, seen, tables, work):
 
 @once
 def reached(goal, work):
-    """Whether the run is over."""
+    """Return whether the run is over."""
     return work.tally[RETURNS] >= goal.keep
 
 
@@ -51,7 +51,7 @@ def remaining(section, goal, work):
 
 @once
 def observe(i, step, stop, triggered, form, net, section, goal, seen, tables, work):
-    """Carry the frame over the leg: X = exp(A tau), from the nearest node and the Taylor rows of the states."""
+    """Carry the frame over the segment: X = exp(A tau), from the nearest node and the Taylor rows of the states."""
     prop, tay, X, scale = tables.prop, tables.tay, seen.step, seen.scale
     mode, n_i = work.tally[MODE], work.zero.shape[0]
     spacing, full = tables.info[mode, 1], step == tables.info[mode, 0]
@@ -78,7 +78,7 @@ def observe(i, step, stop, triggered, form, net, section, goal, seen, tables, wo
 
 @once
 def mark(i, wrapped, ended, crossed, step, form, goal, seen, work):
-    """The time at the end of a leg, on the clock of the forcing: sums of steps would drift away from it."""
+    """The time at the end of a segment, on the clock of the forcing: sums of steps would drift away from it."""
     tally, memo, T = work.tally, work.memo, form.period[i]
     if ended:
         tally[RETURNS] += 1

@@ -1,11 +1,11 @@
-"""The hybrid loop: one trajectory through legs and transitions, over a stepper and an observer.
+"""The hybrid loop: one trajectory through segments and transitions, over a stepper and an observer.
 
 The *stepper* knows the flow: ``linear.stepper`` (linear modes with harmonic forcing, any number of states) or
-``series.stepper`` (generated Taylor series, Runge-Kutta-Fehlberg). It prepares a point, marches a leg to its first
-crossing, lands there, takes transitions and says which conditions hold just after. The *observer* (``sections``,
-``record`` or ``growth``) says how far to go and looks at each leg and each transition. Their functions stand in the
+``series.stepper`` (generated Taylor series, Runge-Kutta-Fehlberg). It prepares a point, marches a segment to its first
+crossing, ends it there, takes transitions and says which conditions hold just after. The *observer* (``sections``,
+``record`` or ``growth``) says how far to go and looks at each segment and each transition. Their functions stand in the
 text that is joined with this file. Everything else is here: start rule, transitions of one instant in declared order,
-guards of chatter, the clock.
+limits on chatter, the clock.
 
 All that a run knows beside its arrays stands in ``work.tally`` and ``work.memo``: it may pause and go on.
 """
@@ -99,7 +99,7 @@ def begin(i, form, net, section, motion, tables, work):
 
 @once
 def land(i, step, stop, t, full, form, net, tables, work):
-    """End a leg: clock and state; ``stop`` is the time at which it ends exactly, or -1.
+    """End a segment: clock and state; ``stop`` is the time at which it ends exactly, or -1.
 
     Returns (transition, a period has ended, closely behind a crossing)."""
     memo, T = work.memo, form.period[i]

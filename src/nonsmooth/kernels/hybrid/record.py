@@ -29,7 +29,7 @@ def open_window(i, form, section, seen, tables, work):
 
 @once
 def reached(goal, work):
-    """Whether the run is over."""
+    """Return whether the run is over."""
     return not work.memo[DONE] < goal.until
 
 
@@ -54,7 +54,7 @@ def watched(section, goal, work):
 
 @once
 def next_is_edge(section, goal, work):
-    """No section is looked for."""
+    """There is no section."""
     return False
 
 
@@ -71,7 +71,7 @@ def write_sample(n, u, form, seen, work):
 
 @once
 def observe(i, step, stop, triggered, form, net, section, goal, seen, tables, work):
-    """Samples and touches on the leg."""
+    """Samples and touches on the segment."""
     tally, base = work.tally, work.memo[DONE]
     n = tally[SAMPLES]
     while n < seen.samples.shape[0] and seen.samples[n] - base < step:
@@ -85,7 +85,7 @@ def observe(i, step, stop, triggered, form, net, section, goal, seen, tables, wo
 
 @once
 def mark(i, wrapped, ended, crossed, step, form, goal, seen, work):
-    """The time at the end of a leg."""
+    """The time at the end of a segment."""
     if wrapped or (not form.period[i] < NO_END and not crossed):
         work.tally[JUMPS] = 0
     work.memo[DONE] = goal.until if ended else base_of(i, form, work)

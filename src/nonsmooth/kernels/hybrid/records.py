@@ -53,7 +53,7 @@ class Form(NamedTuple):
 
 
 class Tables(NamedTuple):
-    """What ``linear_tables.build`` makes of one point of a ``Form``; shapes are there."""
+    """The result of ``linear.tables.build`` for one point of a ``Form``; shapes are there."""
 
     prop: Any
     rot: Any
@@ -65,7 +65,7 @@ class Tables(NamedTuple):
 
 
 class Net(NamedTuple):
-    """The net of transitions of a linear system."""
+    """The transition table of a linear system."""
 
     transitions: Any  # (transitions, 3): target, what it changes (0, ``places.RESET``, ...), contact or ``DEAD_END``
     rows: Any  # (rows + 2, 3): functional, sign, strict; the last two belong to the section (rising, falling)
@@ -192,7 +192,7 @@ class Goal(NamedTuple):
 
 
 class Kept(NamedTuple):
-    """What is kept of P points of a sweep (see ``flow.engine.Chain``)."""
+    """The kept values of P points of a sweep (see ``flow.engine.Chain``)."""
 
     section: Any  # (P, keep, n)
     maximum: Any  # (P, n)
@@ -246,7 +246,7 @@ class Growth(NamedTuple):
 
 
 class Flow(NamedTuple):
-    """What runs a linear system to a stroboscopic section."""
+    """Arguments of the runs of a linear system to a stroboscopic section."""
 
     form: Any
     net: Any

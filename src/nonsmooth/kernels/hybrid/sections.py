@@ -72,7 +72,7 @@ def open_window(i, form, section, seen, tables, work):
 
 @once
 def reached(goal, work):
-    """Whether the run is over."""
+    """Return whether the run is over."""
     return work.tally[RETURNS] >= goal.transient + goal.keep
 
 
@@ -90,19 +90,19 @@ def remaining(section, goal, work):
 
 @once
 def may_stride(i, form, net, section, seen):
-    """Whether whole steps may be made at a stride."""
+    """Return whether whole steps may be made at a stride."""
     return steps_at_a_stride(i, form, net, section)
 
 
 @once
 def watched(section, goal, work):
-    """Whether extremes on the leg are wanted."""
+    """Return whether extremes on the segment are wanted."""
     return section.extremes != 0 and work.tally[RETURNS] >= goal.transient
 
 
 @once
 def next_is_edge(section, goal, work):
-    """Whether the next pass of the section opens or closes the kept window."""
+    """Return whether the next pass of the section opens or closes the kept window."""
     if (work.tally[PASSES] + 1) % section.every != 0:
         return False
     returns = work.tally[RETURNS] + 1
@@ -145,7 +145,7 @@ def keep_point(i, k, u, mode, time, seen, work):
 
 @once
 def observe(i, step, stop, triggered, form, net, section, goal, seen, tables, work):
-    """Returns at a phase of the forcing on the leg, and extremes of its part in the kept window.
+    """Returns at a phase of the forcing on the segment, and extremes of its part in the kept window.
 
     CLOSED: the last return, where the run ends. LATE: a transition at the section's own phase comes first; a run that
     ends here goes on behind it."""
@@ -185,7 +185,7 @@ def observe(i, step, stop, triggered, form, net, section, goal, seen, tables, wo
 
 @once
 def mark(i, wrapped, ended, crossed, step, form, goal, seen, work):
-    """Count a leg."""
+    """Count a segment."""
     work.memo[WAITED] += step
     work.tally[TRIES] += 1
 
@@ -211,7 +211,7 @@ def depart(jumps, seen, work):
 
 @once
 def arrive(i, code, source, t, sense, state, form, section, goal, seen, tables, work):
-    """Returns at the end of a leg: on a surface, or behind a transition at the section's phase. Gives the status."""
+    """Returns at the end of a segment: on a surface, or behind a transition at the section's phase. Gives a status."""
     tally, memo, T = work.tally, work.memo, form.period[i]
     mode = tally[MODE]
     if sense != 0:

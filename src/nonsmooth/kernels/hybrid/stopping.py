@@ -1,4 +1,4 @@
-"""Whether the work of a thread is still wanted: a flag that its kernels look at between two pauses.
+"""Tell whether the work of a thread is still wanted: a flag that its kernels look at between two pauses.
 
 Ctrl-C reaches the main thread only, and a kernel that runs in another one hears nothing of it.
 """

@@ -63,7 +63,7 @@ def find_returns(points, size, longest, returns):
 
 @device
 def shrinks(points, size, longest):
-    """Whether for some p every one of the last returns is small and less than that p before."""
+    """Return whether for some p every one of the last returns is small and less than that p before."""
     keep = points.shape[0]
     for p in range(1, longest + 1):
         n = min(keep - p, STRETCH + p)
@@ -105,7 +105,7 @@ def candidate(points, size, max_period, tolerance, returns):
 
 @device
 def certain(p, mu, residual, returns):
-    """Whether the period number p stands with the multiplier mu: it contracts, and no shorter period is as near."""
+    """Return whether the period number p stands with the multiplier mu: it contracts, and no shorter one is as near."""
     if not mu < 1.0 - MARGIN:
         return False
     away = residual / (1.0 - mu)

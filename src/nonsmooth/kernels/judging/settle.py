@@ -27,7 +27,7 @@ PERTURBATION = 1e-3  # what perturbs a state on an unstable orbit, in units of t
 
 
 class Rules(NamedTuple):
-    """What is the same for all jobs."""
+    """Settings that all jobs share."""
 
     transient: Any
     keep: Any

@@ -47,7 +47,7 @@ def locate_maximum(tables, work, mode, f, sign, a, b, best):
 
 @inline
 def exceeds(tables, mode, f, w, w1, lowest, highest):
-    """Whether functional f may leave [lowest, highest] on the step from w to w1: (below, above)."""
+    """Return whether functional f may leave [lowest, highest] on the step from w to w1: (below, above)."""
     g0 = value_of(tables, mode, f, w)
     g1 = value_of(tables, mode, f, w1)
     h = tables.info[mode, 0]
@@ -75,7 +75,7 @@ def extremes_of(f, kept, n_i):
 
 @once
 def widen(i, a, b, form, tables, work, kept):
-    """Extend the extremes of point i by the piece [a, b] of a leg."""
+    """Extend the extremes of point i by the piece [a, b] of a segment."""
     n_i, mode = work.zero.shape[0], work.tally[MODE]
     for f in range(tables.fun.shape[1]):
         if f < n_i and work.twin[f] >= 0:

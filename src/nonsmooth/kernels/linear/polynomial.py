@@ -117,7 +117,7 @@ def next_upward(scr, row, lo, hi, points):
 
 @inline
 def classify(g0, s0, g1, s1, h, bound):
-    """What is certain about the sign of g on a piece of length h: NEVER > 0, ALWAYS > 0, upward ONCE, or OPEN."""
+    """The certain answer about the sign of g on a piece of length h: NEVER > 0, ALWAYS > 0, upward ONCE, or OPEN."""
     b1 = g0 + h * s0 * THIRD
     b2 = g1 - h * s1 * THIRD
     c1 = g0 + 3.0 * b1

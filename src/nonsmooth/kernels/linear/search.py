@@ -256,7 +256,7 @@ def finest(tables, work, mode, rows, lo, hi, node, up):
 
 @inline
 def returns_at_once(tables, work, mode, rows, lo, hi):
-    """Whether a condition that begins on its surface comes back to it within one node spacing, as in chatter."""
+    """Return whether a condition that begins on its surface comes back to it within one node spacing, as in chatter."""
     w, zero, spacing = work.w, work.zero, tables.info[mode, 1]
     soon = False
     for r in range(lo, hi):

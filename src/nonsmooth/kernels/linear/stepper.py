@@ -1,6 +1,6 @@
-"""The stepper of the exact flow: legs of linear modes with harmonic forcing, landing, jumps and after-limits.
+"""The stepper of the exact flow: segments of linear modes with harmonic forcing, landing, jumps and after-limits.
 
-A leg is one step of the mode, or its part up to the first crossing, section return or stop. ``work.w`` holds
+A segment is one step of the mode, or its part up to the first crossing, section return or stop. ``work.w`` holds
 (u_1, ..., u_n, 1, cos k_1 w t, sin k_1 w t, ...); times count from the start of the forcing period.
 """
 
@@ -66,7 +66,7 @@ def rounding(tables, mode, f, at, w):
 
 @inline
 def flat(tables, mode, f, w):
-    """Whether the slope of functional f is zero within rounding at w."""
+    """Return whether the slope of functional f is zero within rounding at w."""
     return fabs(slope_of(tables, mode, f, w)) <= rounding(tables, mode, f, M, w)
 
 
@@ -120,7 +120,7 @@ def sign_after(tables, work, mode, f):
 
 @inline
 def holds(t, mode, tables, net, work):
-    """Whether all rows of transition t hold just after the present instant."""
+    """Return whether all rows of transition t hold just after the present instant."""
     rows = net.rows
     lo = net.row_start[t]
     hi = net.row_start[t + 1]
@@ -135,7 +135,7 @@ def holds(t, mode, tables, net, work):
 
 @once
 def lies_beyond(t, form, net, work):
-    """Whether no indicator of transition t is zero at the present instant."""
+    """Return whether no indicator of transition t is zero at the present instant."""
     beyond = True
     for r in range(net.row_start[t], net.row_start[t + 1]):
         beyond = beyond and work.zero[net.rows[r, 0]] == 0
@@ -157,7 +157,7 @@ def prepare(i, form, motion, tables, work):
 
 @inline
 def look(i, form, tables, work, mode):
-    """What holds just after the present instant is judged from here on."""
+    """Prepare to judge the conditions just after the present instant."""
     mark_zeros(tables, work, mode)
 
 
@@ -239,7 +239,7 @@ def next_stop(i, form, net, section, goal, work):
 
 @once
 def clear_step(tables, net, work, mode):
-    """Whether no transition can fire on the whole step from w to w1: each has a row that certainly stays <= 0."""
+    """Return whether no transition can fire on the step from w to w1: each has a row that certainly stays <= 0."""
     w, w1, zero, rows = work.w, work.w1, work.zero, net.rows
     clear = True
     for k in range(net.mode_start[mode], net.mode_start[mode + 1]):
@@ -303,7 +303,7 @@ def stride(tables, net, work, mode, s, whole, target, period, returns, most, pat
 
 @once
 def steps_at_a_stride(i, form, net, section):
-    """Whether whole steps may be made at a stride: nothing but a crossing can end one."""
+    """Return whether whole steps may be made at a stride: nothing but a crossing can end one."""
     strides = section.indicator < 0 and form.period[i] < NO_END
     for k in range(net.at.shape[0]):
         strides = strides and net.at[k] < 0.0
@@ -315,8 +315,8 @@ def leg(i, form, net, section, goal, tables, work, r_max, ready, clear):
     """March one step of the mode, or less: to r_max, or to the first crossing or section return.
 
     w1 stands at the end of the whole step (``ready``: it does so already; ``clear``: and nothing happens on it),
-    ``end`` at the leg's end where that is shorter (the third number returned tells). Returns (time marched, transition
-    or -1, whole step or not, section direction or 0).
+    ``end`` at the segment's end where that is shorter (the third number returned tells). Returns (time marched,
+    transition or -1, whole step or not, section direction or 0).
     """
     w, w1, end, there, found, rows = work.w, work.w1, work.end, work.there, work.found, net.rows
     mode = work.tally[MODE]
@@ -370,7 +370,7 @@ def time_scale(i, since, form, tables, work):
 
 @once
 def arrive_at(t, since, full, wrapped, form, net, tables, work):
-    """State and phase at the end of a leg. Returns its transition."""
+    """State and phase at the end of a segment. Returns its transition."""
     w, w1, end, zero = work.w, work.w1, work.end, work.zero
     for j in range(M):
         w[j] = w1[j] if full else end[j]
@@ -400,7 +400,7 @@ def touch_section(section, work):
 
 @once
 def note_side(t, sense, section, tables, work):
-    """The sign of the section's functional where the next leg begins."""
+    """The sign of the section's functional where the next segment begins."""
     mode = work.tally[MODE]
     if t >= 0:
         work.found[SIDE] = sign_after(tables, work, mode, section.indicator)
@@ -414,13 +414,13 @@ def note_side(t, sense, section, tables, work):
 
 @once
 def at_rest(form, section, tables, work):
-    """Rest is not looked for: a return is waited for as long as is said."""
+    """No state of rest ends a run: a return is waited for as long as is said."""
     return False
 
 
 @once
 def state_at(tau, form, tables, work, out):
-    """The state at any instant of the leg."""
+    """The state at any instant of the segment."""
     dense(tables, work, work.tally[MODE], tau, out)
 
 

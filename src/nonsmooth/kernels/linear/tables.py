@@ -276,8 +276,8 @@ def fill_functional(mode, f, tables, rates, row):
 
 @device
 def list_columns(mode, f, tables):
-    """Which columns of a functional's Taylor rows are not zero, and which states of its value and slope: few where a
-    state moves with few others."""
+    """List the columns of a functional's Taylor rows, and the states of its value and slope, that are not zero: few
+    where a state moves with few others."""
     every, few = 0, 0
     for j in range(M):
         moved = False

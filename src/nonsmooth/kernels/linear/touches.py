@@ -1,4 +1,4 @@
-"""Touches on a leg of the exact flow."""
+"""Touches on a segment of the exact flow."""
 
 from nonsmooth.kernels.compile.cache import once
 from nonsmooth.kernels.hybrid.places import DONE, MODE, TOUCHES
@@ -9,7 +9,7 @@ from nonsmooth.kernels.linear.tables import NODES, OWN
 
 @once
 def log_touches(step, form, net, seen, tables, work):
-    """Append the local maxima of the mode's armed rows that stay <= 0 within (0, step) of a leg."""
+    """Append the local maxima of the mode's armed rows that stay <= 0 within (0, step) of a segment."""
     wn, scr, points = work.wn, work.scr, work.points
     mode, base = work.tally[MODE], work.memo[DONE]
     spacing, n = tables.info[mode, 1], work.tally[TOUCHES]

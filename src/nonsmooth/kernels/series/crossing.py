@@ -43,7 +43,7 @@ def snap(C, m, n, n_indicators, h, scale, measured, side):
 
 @inline
 def rows_hold(k, net, side):
-    """Whether all rows of transition k hold by the signs ``side``."""
+    """Return whether all rows of transition k hold by the signs ``side``."""
     for r in range(net.row_start[k], net.row_start[k + 1]):
         s = net.rows[r, 1] * side[net.rows[r, 0]]
         if s < 0 or (s == 0 and net.rows[r, 2] == 1):
@@ -60,7 +60,7 @@ def _error(C, row, m, powers, tail, slack, scale):
 
 @device
 def _others_hold(r0, lo, hi, x, m, n, rows, work):
-    """Whether the other rows hold where row r0 crosses; one that vanishes there is judged by what it does next."""
+    """Return whether the other rows hold where row r0 crosses; one that vanishes there is judged by what follows."""
     C, powers, scale, a, d = work.C, work.powers, work.scale, work.a, work.d
     i0 = rows[r0, 0]
     m0 = load(C, n + i0, float(rows[r0, 1]), m, powers, a)
@@ -93,7 +93,7 @@ def _others_hold(r0, lo, hi, x, m, n, rows, work):
 
 @device
 def _fires(lo, hi, m, n, rows, tail, slack, work):
-    """Where the conjunction of rows lo..hi-1 first becomes true on the step, and the row that makes it so."""
+    """Find where the conjunction of rows lo..hi-1 first becomes true on the step, and the row that makes it so."""
     C, powers, scale, a, found = work.C, work.powers, work.scale, work.a, work.found
     cursor, begun = 0.0, False
     for _ in range(64):

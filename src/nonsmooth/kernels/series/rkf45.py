@@ -108,7 +108,7 @@ def _certain(J0, J1, row, sign, h, error):
 
 @once
 def quiet(mode, n, h, slack, net, section, work):
-    """Whether nothing can happen on the step, seen from the jets at its two ends alone (most steps)."""
+    """Return whether nothing can happen on the step, seen from the jets at its two ends alone (most steps)."""
     rows, J0, J1, side, side_next, scale = net.rows, work.J0, work.J1, work.side, work.side_next, work.scale
     for j in range(net.mode_start[mode], net.mode_start[mode + 1]):
         k = net.mode_list[j]

@@ -1,9 +1,9 @@
-"""The stepper of the series methods: legs on polynomials in the local time, landing, jumps and after-limits.
+"""The stepper of the series methods: segments on polynomials in the local time, landing, jumps and after-limits.
 
 Every step is a polynomial for each row (states, indicators, outputs): the Taylor jet itself, or the quintic of a
 Runge-Kutta-Fehlberg step. Crossings, sections, extremes, touches and samples are read off it. A step ends exactly at
-stops: the phase of a section, the end of a period, time-triggered transitions, the end of the run. A leg is a step, or
-its part up to a pass of a section on a surface: behind it the same polynomial goes on.
+stops: the phase of a section, the end of a period, time-triggered transitions, the end of the run. A segment is a step,
+or its part up to a pass of a section on a surface: behind it the same polynomial goes on.
 """
 
 from math import fabs, inf, sqrt
@@ -97,13 +97,13 @@ def start_on_section(form, section, tables, work):
 
 @inline
 def holds(t, mode, tables, net, work):
-    """Whether all rows of transition t hold just after the present instant."""
+    """Return whether all rows of transition t hold just after the present instant."""
     return rows_hold(t, net, work.side)
 
 
 @once
 def lies_beyond(t, form, net, work):
-    """Whether no indicator of transition t is zero at the present instant."""
+    """Return whether no indicator of transition t is zero at the present instant."""
     J = work.J0 if METHOD == place.RKF45 else work.C
     beyond = True
     for r in range(net.row_start[t], net.row_start[t + 1]):
@@ -141,7 +141,7 @@ def take(i, t, fired, form, tables, net, work):
 
 @once
 def met(t, fired, form, net, section, work):
-    """Whether a transition at this instant is also a pass of the section: its indicator was zero before the jump.
+    """Return whether a transition at this instant also passes the section: its indicator was zero before the jump.
 
     The direction may be that of the arrival or, where the indicator stays zero, of the departure (an impact does
     both)."""
@@ -186,13 +186,13 @@ def next_stop(i, form, net, section, goal, work):
 
 @once
 def steps_at_a_stride(i, form, net, section):
-    """Every step is a leg."""
+    """Every step is a segment."""
     return False
 
 
 @once
 def stride(tables, net, work, mode, s, whole, target, period, returns, most, patience):
-    """Every step is a leg."""
+    """Every step is a segment."""
     return s, whole, returns, False, patience
 
 
@@ -405,7 +405,7 @@ def time_scale(i, since, form, tables, work):
 
 @once
 def arrive_at(t, since, full, wrapped, form, net, tables, work):
-    """State and signs at the end of a leg. Returns its transition, where that is judged there only."""
+    """State and signs at the end of a segment. Returns its transition, where that is judged there only."""
     tally, rkf, n = work.tally, METHOD == place.RKF45, work.w.shape[0]
     copied(work.end, work.w)
     if tally[place.OPEN_STEP] == 1:
@@ -453,18 +453,18 @@ def arrive_at(t, since, full, wrapped, form, net, tables, work):
 
 @once
 def touch_section(section, work):
-    """Signs are kept by the leg."""
+    """Signs are kept by the segment."""
 
 
 @once
 def note_side(t, sense, section, tables, work):
-    """Signs are kept by the leg."""
+    """Signs are kept by the segment."""
 
 
 @once
 def at_rest(form, section, tables, work):
-    """Whether a state without forcing has come to rest, so that no section is met again: ``AT_REST`` steps in a row,
-    and no return among them, have left it where it was within a hundred tolerances."""
+    """Return whether a state without forcing no longer moves, so that no section is met again: ``AT_REST`` steps in a
+    row, and no return among them, have left it where it was within a hundred tolerances."""
     tally, mode = work.tally, work.tally[MODE]
     if form.period[0] < NO_END:
         return False
@@ -482,7 +482,7 @@ def at_rest(form, section, tables, work):
 
 @once
 def state_at(tau, form, tables, work, out):
-    """The state at any instant of the leg."""
+    """The state at any instant of the segment."""
     degree = 5 if METHOD == place.RKF45 else form.order
     if tau >= work.memo[place.PART]:
         for j in range(work.w.shape[0]):
@@ -536,5 +536,5 @@ def may_pause(work):
 
 @once
 def doubtful(work):
-    """Whether a graze was left undecided."""
+    """Return whether a graze was left undecided."""
     return work.tally[place.DOUBTFUL] == 1

@@ -1,7 +1,7 @@
-"""How far the polynomial of a Taylor step can be trusted: it is compared with the equations themselves.
+"""The length on which the polynomial of a Taylor step can be trusted: it is compared with the equations themselves.
 
 p solves u' = f(t, u) on the step as far as p'(tau) = f(t + tau, p(tau)). The difference is taken at the end of the step
-and wherever a guard (the argument of a function that may hide something, see ``flow.layers``) vanishes or is
+and wherever the argument of a function that may hide something (see ``flow.engines.layers``) vanishes or is
 stationary, and held against the tolerance; rows of indicators are held against their own values. Where they disagree
 the polynomial knows nothing of what it meets there, and the step is to end before.
 """
@@ -87,7 +87,7 @@ def remainder_of(a, m, cursor, d):
 
 @device
 def misfits(form, work, tau, length):
-    """Whether field or indicators at the local time tau differ from the polynomials by more than the tolerance.
+    """Return whether field or indicators at the local time tau differ from the polynomials by more than the tolerance.
 
     A difference of the slopes counts as if it lasted for ``length``. One that is not larger than what rounding of the
     state and the time does to the equations does not count."""

@@ -1,4 +1,4 @@
-"""What is observed while a step's polynomials are at hand: extremes and touches."""
+"""Observations made while a step's polynomials are at hand: extremes and touches."""
 
 import nonsmooth.kernels.series.places as place
 from nonsmooth.kernels.compile.cache import inline, once

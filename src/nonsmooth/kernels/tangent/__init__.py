@@ -1,1 +1,1 @@
-"""Frames carried along trajectories: saltation, legs of an orbit, spectra."""
+"""Frames carried along trajectories: saltation, segments of an orbit, spectra."""

@@ -1,7 +1,7 @@
 """Smooth motion in one mode with its first variations, and what a transition does to them.
 
-A leg is marched by Taylor series. On every step the matrix X of the step begins afresh: the identity in the columns of
-the states, zero in those of the memory and of the active parameters; its series follows from those of the Jacobians'
+A segment is marched by Taylor series. On every step the matrix X of the step begins afresh: the identity in the columns
+of the states, zero in those of the memory and of the active parameters; its series follows from those of the Jacobians'
 entries, X_(k+1) = (sum_j A_j X_(k-j) + B_k) / (k + 1). So its error can be judged without units, and the steps'
 matrices are multiplied up.
 
@@ -59,7 +59,7 @@ class Steps(NamedTuple):
 
 
 class Ends(NamedTuple):
-    """Ends and derivatives of m legs."""
+    """Ends and derivatives of m segments."""
 
     z: Any  # (m, n)
     Phi: Any  # (m, n, n)
@@ -71,7 +71,7 @@ class Ends(NamedTuple):
 
 
 class Crossing(NamedTuple):
-    """What the transitions of one instant do to small changes."""
+    """The effect of the transitions of one instant on small changes."""
 
     step: Any  # (N, N) saltation matrix of all of them
     reset: Any  # (N, N) derivative of the last one's map
@@ -219,7 +219,7 @@ def put(z, n, u, q):
 
 @kernel(types.void(EQUATIONS, _i1, _f1, _f1, _f2, _f1, ENDS, STEPS))
 def march_legs(equations, modes, t0, tau, z0, values, ends, work):
-    """Legs one after the other: state at the end, dz/dz0, dz/dp, the field at both ends, integral of div f, status."""
+    """Segments one after the other: state at the end, dz/dz0, dz/dp, field at both ends, integral of div f, status."""
     jet, field = jet_at(equations.functions[0]), field_at(equations.functions[1])
     total, u, q = work.total, work.u, work.q
     n_u, n = u.shape[0], z0.shape[1]

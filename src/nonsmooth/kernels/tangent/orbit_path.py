@@ -1,4 +1,4 @@
-"""What happens along the visits of a periodic orbit between their ends: extremes, and how near each condition came.
+"""Extremes within the segments of a periodic orbit, and how near each condition came.
 
 A visit is followed in its own mode with every transition ignored, so that an orbit can be followed a little way
 beyond a stop. For each transition out of the mode the margin is the least of its signed indicators: it fires where the
@@ -94,7 +94,7 @@ class Visits(NamedTuple):
 
 
 class Margins(NamedTuple):
-    """What is found of m visits and all transitions."""
+    """Results for m segments and all transitions."""
 
     inner: Any  # (m, transitions) largest local maximum of the margin inside the visit (-inf: none)
     place: Any  # its time

@@ -50,7 +50,7 @@ class Pieces(NamedTuple):
 
 
 class Pace(NamedTuple):
-    """How exactly a frame is marched."""
+    """Accuracy with which a frame is carried on."""
 
     order: Any
     log_tolerance: Any  # of the last two terms of a series, relative

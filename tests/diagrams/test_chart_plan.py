@@ -1,4 +1,4 @@
-"""What a chart would take on a GPU: the arithmetic, with a chart whose cost is known; no GPU and no simulator."""
+"""Plan of a chart on a GPU: the arithmetic, with a chart whose cost is known; no GPU and no simulator."""
 
 from __future__ import annotations
 

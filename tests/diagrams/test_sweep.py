@@ -380,3 +380,19 @@ def test_a_sweep_is_saved_and_loaded_whole(suffix: str, tmp_path: Path, logistic
     options["section"] = ns.Stroboscopic(options["section"]["phase"])
     recomputed = ns.sweep(system, **options)
     assert np.array_equal(recomputed["section"].values, swept["section"].values, equal_nan=True)
+
+
+def test_without_judgement_the_points_are_those_of_poincare_and_no_period_is_claimed() -> None:
+    system = ns.models.discontinuous_support()
+    values = [0.27, 0.3, 0.45]
+    looked = ns.sweep(system, "rho", values, direction=None, transient=60, keep=20, judge=False, **QUIET)
+    for value in values:
+        alone = ns.poincare(system.with_parameters(rho=value), transient=60, n=20)
+        np.testing.assert_allclose(looked["section"].sel(rho=value), alone["section"], atol=1e-12)
+    assert not {"period_number", "residual"} & set(looked.variables)
+    assert words(looked["status"]) == ["ok"] * 3
+    assert ns.plot.bifurcation(looked)
+    with pytest.raises(ValueError, match="leave out density"):
+        ns.sweep(system, "rho", values, density=True, judge=False)
+    with pytest.raises(TypeError, match="judge = 0"):
+        ns.sweep(system, "rho", values, judge=0)  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""What charts, basins and shares refuse at the door, before memory or time is spent."""
+"""Charts, basins and shares reject wrong input before memory or time is spent."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the scripts for Numba's simulator share: a verb on both devices, and the types of launched kernels."""
+"""Parts that the scripts for Numba's simulator share: a verb on both devices, and the types of launched kernels."""
 
 from __future__ import annotations
 

@@ -1,0 +1,52 @@
+"""``nonsmooth explore [MODEL]``: a page in the browser, in which the diagrams of a system follow its parameters."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+__all__ = ["add"]
+
+
+def add(commands: Any) -> None:
+    """Declare the sub-command."""
+    parser = commands.add_parser(
+        "explore",
+        help="explore a model in the browser",
+        description="Open a page on this machine in which bifurcation diagram, phase portrait, time history and "
+        "section follow the parameters of a model. Needs the package bokeh. Only who has the address that is printed "
+        "can open it.",
+        epilog="examples:\n"
+        "  nonsmooth explore                                   # the paper's oscillator\n"
+        "  nonsmooth explore impact_oscillator\n"
+        "  nonsmooth explore my_oscillator.py:oscillator\n"
+        '  nonsmooth explore "http://127.0.0.1:5180/?model=..."  # a view that somebody shared',
+    )
+    parser.add_argument(
+        "model", nargs="?", metavar="MODEL",
+        help='a name of `nonsmooth models`, "file.py:object", or the address of a view',
+    )  # fmt: skip
+    parser.add_argument("--port", type=int, help="port on 127.0.0.1 (default: 5180, or any that is free)")
+    parser.add_argument("--no-browser", action="store_true", help="print the address, open no browser")
+    parser.set_defaults(run=_run)
+
+
+def _run(options: argparse.Namespace) -> int:
+    from nonsmooth.cli.study import load_model, named_model
+    from nonsmooth.explorer.serve import explore
+
+    system, query = None, ""
+    given = options.model
+    if given is None:
+        pass
+    elif given.startswith(("http://", "https://")):
+        query = urlsplit(given).query
+    elif ":" in given:
+        system = load_model(given, Path())
+    else:
+        named_model(given)
+        query = f"model={given}"
+    explore(system, query=query, port=options.port, browser=not options.no_browser)
+    return 0

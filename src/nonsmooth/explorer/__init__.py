@@ -1,0 +1,1 @@
+"""The explorer: a local web page in which the diagrams of a system follow its parameters."""

@@ -1,0 +1,71 @@
+"""Symbols and units in plain text, for axes and controls that have no formulas."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from nonsmooth.plot.units import power_for
+from nonsmooth.system.parameter import latex_name
+
+if TYPE_CHECKING:
+    from nonsmooth.system.system import System
+
+__all__ = ["axis_label", "html_of", "number", "plain_of", "power_of", "symbols_of"]
+
+_GREEK: Mapping[str, str] = {
+    "alpha": "α", "beta": "β", "gamma": "γ", "delta": "δ", "epsilon": "ε", "zeta": "ζ", "eta": "η", "theta": "θ",
+    "kappa": "κ", "lambda": "λ", "mu": "μ", "nu": "ν", "xi": "ξ", "pi": "π", "rho": "ρ", "sigma": "σ", "tau": "τ",
+    "phi": "φ", "varphi": "φ", "chi": "χ", "psi": "ψ", "omega": "ω", "Gamma": "Γ", "Delta": "Δ", "Theta": "Θ",
+    "Lambda": "Λ", "Xi": "Ξ", "Pi": "Π", "Sigma": "Σ", "Phi": "Φ", "Psi": "Ψ", "Omega": "Ω",
+}  # fmt: skip
+_BELOW = dict(zip("0123456789aehijklmnoprstuvx", "₀₁₂₃₄₅₆₇₈₉ₐₑₕᵢⱼₖₗₘₙₒₚᵣₛₜᵤᵥₓ", strict=True))
+_PREFIXES = {0: "", -3: "m", -6: "µ", -9: "n"}
+
+
+def symbols_of(system: System) -> dict[str, str]:
+    """LaTeX of every parameter and state, by name."""
+    return {name: p.symbol or latex_name(name) for name, p in system.parameters.items()} | {
+        name: latex_name(name) for name in system.states
+    }
+
+
+def plain_of(latex: str) -> str:
+    """``k_{s}`` as ``kₛ``: Unicode has a few letters as subscripts; with others the underscore stays."""
+    stem, below = _parts(latex)
+    if not below:
+        return stem
+    small = "".join(_BELOW.get(letter, "") for letter in below)
+    return stem + (small if len(small) == len(below) else f"_{below}")
+
+
+def html_of(latex: str) -> str:
+    """``k_{s}`` as ``<i>k</i><sub>s</sub>``; the letters are those of an identifier or of our own table."""
+    stem, below = (re.sub(r"[<>&]", "", part) for part in _parts(latex))
+    return f"<i>{stem}</i>" + (f"<sub>{below}</sub>" if below else "")
+
+
+def _parts(latex: str) -> tuple[str, str]:
+    text = re.sub(r"\\mathrm\{([^{}]*)\}", r"\1", latex)
+    text = re.sub(r"\\([A-Za-z]+)", lambda found: _GREEK.get(found[1], found[1]), text).replace("\\", "")
+    stem, _, below = text.partition("_")
+    return stem.strip("{}"), below.strip("{}").replace("{", "").replace("}", "")
+
+
+def power_of(unit: str, *values: float) -> int:
+    """The power of ten of the prefix in which values are read easily: see ``nonsmooth.plot.units``."""
+    return power_for(unit, max((abs(value) for value in values), default=0.0))
+
+
+def axis_label(latex: str, unit: str, power: int = 0) -> str:
+    """``ρ (N)``; the symbol alone of what has no unit."""
+    text = plain_of(latex)
+    return text if unit in ("", "1") else f"{text} ({_PREFIXES[power]}{unit})"
+
+
+def number(value: float, unit: str = "", digits: int = 4) -> str:
+    """A value with its unit, in the prefix that suits it: ``−4.5 mm``."""
+    power = power_of(unit, value)
+    text = f"{value / 10.0**power:.{digits}g}".replace("-", "\N{MINUS SIGN}")
+    return text if unit in ("", "1") else f"{text} {_PREFIXES[power]}{unit}"

@@ -1,0 +1,103 @@
+"""First views: the figures of the paper, and a sensible view of any other model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from nonsmooth.explorer.state import State
+from nonsmooth.studies.savi2007 import printed
+
+if TYPE_CHECKING:
+    from nonsmooth.system.system import System
+
+__all__ = ["PAPER", "first_state", "presets_of", "slider_range"]
+
+PAPER = "discontinuous_support"
+_GAP = {**printed.FIGURE_13, "over": "g", "low": -0.0015, "high": 0.002, "shown": "v"}
+_AMPLITUDE = {**printed.FIGURE_11, "over": "rho", "low": 0.2, "high": 0.5, "shown": "v"}
+_FREQUENCY = {**printed.FIGURE_17, "over": "omega", "low": 8.4, "high": 10.4, "shown": "v"}
+#: Figures of the paper: parameters and fields of the state.
+_FIGURES: Mapping[str, Mapping[str, Any]] = {
+    "Fig. 9": {
+        **printed.FIGURE_9, "omega": 4.8, "over": "omega", "low": 3.0, "high": 7.0, "shown": "x", "upper": "response",
+    },
+    "Fig. 10": {
+        **printed.FIGURE_10, "omega": 4.5, "over": "omega", "low": 2.4, "high": 7.4, "shown": "x", "upper": "response",
+    },
+    "Fig. 11": {**_AMPLITUDE, "rho": 0.45},
+    **{f"Fig. 12 {'abcd'[i]}": {**_AMPLITUDE, "rho": rho} for i, rho in enumerate(printed.FIGURE_12)},
+    "Fig. 13": {**_GAP, "g": 0.0009},
+    **{f"Fig. 14 {'abcd'[i]}": {**_GAP, "g": g} for i, g in enumerate(printed.FIGURE_14)},
+    "Fig. 15": {**_GAP, "g": 0.0018},
+    "Fig. 17": {**_FREQUENCY, "omega": 9.55},
+    **{f"Fig. 18 {'abc'[i]}": {**_FREQUENCY, "omega": omega} for i, omega in enumerate(printed.FIGURE_18)},
+}  # fmt: skip
+#: What is varied first, where a model has it.
+_USUAL = ("rho", "omega", "A", "g", "alpha", "mu", "r", "q", "v_b", "V_in", "gamma")
+
+
+def presets_of(state: State) -> dict[str, State]:
+    """Named states of a model: the figures of the paper for its oscillator."""
+    if state.model != PAPER:
+        return {}
+    base = first_of_paper(state)
+    found = {}
+    for name, given in _FIGURES.items():
+        values = {key: value for key, value in given.items() if key in base.values}
+        rest = {key: value for key, value in given.items() if key not in base.values}
+        found[name] = replace(base, values={**base.values, **values}, **rest)
+    return found
+
+
+def first_of_paper(state: State) -> State:
+    """The paper's oscillator at Table 1, whatever the page shows now."""
+    from nonsmooth import models
+
+    return first_state(PAPER, models.discontinuous_support())
+
+
+def first_state(model: str, system: System) -> State:
+    """A view of a system at its own parameters, over the parameter that is usually varied."""
+    names, states = list(system.parameters), list(system.states)
+    values = {name: float(system.values[name]) for name in names}
+    over = next((name for name in _USUAL if name in values), names[0])
+    beside = next((name for name in (*_USUAL, *names) if name in values and name != over), over)
+    if model == PAPER:
+        low, high, beside = 0.2, 0.5, "omega"
+    else:
+        low, high = _around(values[over])
+    y = states[_velocity(states)]
+    least, most = (3.0, 7.0) if model == PAPER else _around(values[beside])
+    start = tuple(0.0 if system.period() is not None else 0.1 * s for s in system.scale_vector())
+    return State(
+        model=model, values=values, over=over, low=low, high=high, start=start, x=states[0], y=y,
+        shown=y if model == PAPER else states[0], beside=beside, least=least, most=most,
+    )  # fmt: skip
+
+
+def _velocity(states: list[str]) -> int:
+    """The second axis of the phase plane: the velocity of the first state where its name says so."""
+    for name in (f"v_{states[0]}", states[0].replace("x", "v", 1), "v"):
+        if name in states[1:]:
+            return states.index(name)
+    return min(1, len(states) - 1)
+
+
+def _around(value: float) -> tuple[float, float]:
+    return tuple(sorted((0.6 * value, 1.4 * value))) if value else (-1.0, 1.0)  # type: ignore[return-value]
+
+
+def slider_range(value: float, also: tuple[float, ...] = ()) -> tuple[float, float]:
+    """Ends of a slider for a parameter that had this value first: from a twentieth of it to three times it.
+
+    A negative one (a pressed gap) goes to as much on the other side. ``also``: values that must lie within.
+    """
+    if value > 0:
+        ends = (0.05 * value, 3.0 * value)
+    elif value < 0:
+        ends = (2.0 * value, -2.0 * value)
+    else:
+        ends = (0.0, 1.0)
+    return min(*ends, *also), max(*ends, *also)

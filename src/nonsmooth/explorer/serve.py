@@ -1,0 +1,107 @@
+"""``explore``: serve the page on this machine alone, and open it in the browser."""
+
+from __future__ import annotations
+
+import socket
+import sys
+import webbrowser
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from nonsmooth.errors import not_installed
+
+if TYPE_CHECKING:
+    from nonsmooth.system.system import System
+
+__all__ = ["PORT", "explore"]
+
+PORT = 5180
+
+
+def explore(
+    system: System | None = None,
+    *,
+    query: str = "",
+    port: int | None = None,
+    browser: bool = True,
+    told: Callable[[str], object] | None = None,
+) -> None:
+    """Open the explorer in the browser, and serve it until Ctrl-C.
+
+    Parameters
+    ----------
+    system : System, optional
+        What the page begins with; the paper's oscillator where not given. The models of ``nonsmooth.models`` can be
+        chosen in the page.
+    query : str, optional
+        A view to begin with: the part of a page's address behind the question mark.
+    port : int, optional
+        Port on 127.0.0.1: 5180 where not given, or any free one where that is taken.
+    browser : bool
+        Open a browser; the address is printed in any case.
+    told : function, optional
+        Hears the address once the page can be opened.
+
+    Raises
+    ------
+    ImportError
+        The package bokeh is missing.
+    ValueError
+        A port that is taken, or a query that does not fit the system.
+    """
+    try:
+        import bokeh  # noqa: F401
+    except ImportError as error:
+        raise ImportError(f"the explorer needs {not_installed('bokeh', 'explorer')}") from error
+    from bokeh.application import Application
+    from bokeh.application.handlers.function import FunctionHandler
+    from bokeh.server.server import Server
+
+    from nonsmooth.explorer.access import Access
+    from nonsmooth.explorer.session import Session, models_of
+
+    models = models_of(system)
+    Session.check(models, query)
+    access, number = Access(), _free(port)
+    application = Application(FunctionHandler(partial(_open, models, query)))
+    server: Any = Server(
+        application, port=number, address="127.0.0.1", auth_provider=access, index=None,
+        allow_websocket_origin=[f"127.0.0.1:{number}", f"localhost:{number}"],
+        websocket_max_message_size=256 * 1024 * 1024, keep_alive_milliseconds=10_000,
+        unused_session_lifetime_milliseconds=5_000, check_unused_sessions_milliseconds=2_000,
+        session_token_expiration=3600,
+    )  # fmt: skip
+    access.listen_at(number)
+    server.start()
+    address = f"http://127.0.0.1:{number}/?token={access.token}"
+    print(f"nonsmooth explorer: {address}\nCtrl-C ends it", file=sys.stderr, flush=True)
+    if told is not None:
+        told(address)
+    if browser:
+        server.io_loop.add_callback(webbrowser.open, address)
+    try:
+        server.io_loop.start()
+    finally:
+        server.stop()
+
+
+def _open(models: Mapping[str, Any], query: str, document: Any) -> None:
+    from nonsmooth.explorer.session import Session
+
+    Session(document, models, query)
+
+
+def _free(port: int | None) -> int:
+    """The port asked for; else the usual one, so that a view's address can be shared, or any that is free."""
+    for number in (PORT, 0) if port is None else (port,):
+        with socket.socket() as one:
+            one.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            try:
+                one.bind(("127.0.0.1", number))
+            except OSError as error:
+                if port is None and number:
+                    continue
+                raise ValueError(f"port {port} cannot be used ({error.strerror}); give another with --port") from error
+            return int(one.getsockname()[1])
+    raise AssertionError

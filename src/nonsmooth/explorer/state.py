@@ -1,0 +1,221 @@
+"""State of a page: plain values that one line of a URL can hold, and nothing that could be executed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any
+from urllib.parse import parse_qsl, urlencode
+
+__all__ = ["CHOICES", "History", "State", "from_query", "to_query"]
+
+#: Fields that hold one of these words, with what a person reads for it.
+CHOICES: dict[str, dict[str, str]] = {
+    "direction": {
+        "both": "up and down", "up": "up", "down": "down", "rest": "each from rest", "many": "8 starts each",
+    },
+    "method": {"auto": "exact or Taylor", "smoothed": "smoothed switch", "rkf45": "RKF45"},
+    "upper": {"diagram": "Bifurcation", "response": "Response", "chart": "Chart", "basins": "Basins"},
+    "lower": {"history": "Time", "spectrum": "Spectrum"},
+}  # fmt: skip
+#: Whole numbers, with their limits.
+_WHOLE = {"transient": (0, 100_000), "keep": (4, 2000), "columns": (10, 4000)}
+
+
+@dataclass(frozen=True)
+class State:
+    """The contents of a page.
+
+    Attributes
+    ----------
+    model : str
+    values : mapping
+        Every parameter of the model.
+    over, low, high
+        The parameter of the diagram and its range.
+    beside, least, most
+        The second parameter of the chart and its range.
+    start : tuple of float
+        Initial state of the orbit.
+    x, y : str
+        States of the phase plane.
+    shown : str
+        State of the diagram's ordinate.
+    phase : float
+        Of the section, in forcing periods.
+    """
+
+    model: str
+    values: Mapping[str, float]
+    over: str
+    low: float
+    high: float
+    start: tuple[float, ...]
+    x: str
+    y: str
+    shown: str
+    beside: str = ""
+    least: float = 0.0
+    most: float = 1.0
+    phase: float = 0.0
+    eta: float = 1e-5
+    direction: str = "both"
+    method: str = "auto"
+    upper: str = "diagram"
+    lower: str = "history"
+    transient: int = 300
+    keep: int = 100
+    columns: int = 600
+
+    def with_value(self, name: str, value: float) -> State:
+        """The same with another value of a parameter."""
+        return replace(self, values={**self.values, name: value})
+
+    def but(self, field: str, value: Any) -> State:
+        """The same with another value of a field."""
+        given: dict[str, Any] = {field: value}
+        return replace(self, **given)
+
+
+def to_query(state: State) -> str:
+    """The state as the query of a URL; a parameter stands under its name with ``p.`` before it."""
+    pairs: list[tuple[str, str]] = []
+    for field in fields(state):
+        value = getattr(state, field.name)
+        if field.name == "values":
+            pairs += [(f"p.{name}", repr(float(number))) for name, number in value.items()]
+        elif field.name == "start":
+            pairs.append(("start", " ".join(repr(float(number)) for number in value)))
+        elif field.default != value:
+            pairs.append((field.name, repr(value) if isinstance(value, float) else str(value)))
+    return urlencode(pairs)
+
+
+def from_query(query: str | Sequence[tuple[str, str]], default: State, states: Sequence[str]) -> State:
+    """The state that a query describes; what it leaves out is that of ``default``, a state of the same model.
+
+    Raises
+    ------
+    ValueError
+        Names that the model does not have, and text that is no number.
+    """
+    pairs = parse_qsl(query) if isinstance(query, str) else query
+    for name, text in pairs:
+        default = changed(default, name, text, states)
+    return default
+
+
+def changed(state: State, name: str, value: Any, states: Sequence[str]) -> State:
+    """The state after one field, or a parameter ``p.NAME``, has been given a value in text or as a number.
+
+    Raises
+    ------
+    ValueError
+        A field, a parameter or a value that does not exist; the message says what is allowed.
+    """
+    if name == "model":
+        return state
+    if name.startswith("p."):
+        parameter = name[2:]
+        if parameter not in state.values:
+            raise ValueError(f"{parameter!r} is no parameter; there are: {', '.join(state.values)}")
+        return state.with_value(parameter, number_of(value, parameter))
+    if name in ("over", "beside"):
+        return state.but(name, _one_of(value, list(state.values), name))
+    if name in ("x", "y", "shown"):
+        return state.but(name, _one_of(value, states, name))
+    if name in CHOICES:
+        return state.but(name, _one_of(value, list(CHOICES[name]), name))
+    if name in _WHOLE:
+        least, most = _WHOLE[name]
+        number = number_of(value, name)
+        if number != int(number) or not least <= number <= most:
+            raise ValueError(f"{name} = {value}: give a whole number from {least} to {most}")
+        return state.but(name, int(number))
+    if name == "start":
+        parts = value.split() if isinstance(value, str) else list(value)
+        if len(parts) != len(states):
+            raise ValueError(f"start: give {len(states)} numbers, of {', '.join(states)}")
+        return replace(state, start=tuple(number_of(part, "start") for part in parts))
+    if name == "phase":
+        return replace(state, phase=number_of(value, name) % 1.0)
+    if name == "eta":
+        eta = number_of(value, name)
+        if eta <= 0:
+            raise ValueError(f"eta = {eta:g}: half the width of the band must be greater than 0")
+        return replace(state, eta=eta)
+    if name in ("low", "high", "least", "most"):
+        return state.but(name, number_of(value, name))
+    raise ValueError(f"{name!r} is nothing that a view holds")
+
+
+def number_of(value: Any, name: str) -> float:
+    """A finite number from what a browser sent.
+
+    Raises
+    ------
+    ValueError
+        Anything else.
+    """
+    try:
+        number = math.nan if isinstance(value, bool) else float(value)
+    except (TypeError, ValueError, OverflowError):
+        number = math.nan
+    if not math.isfinite(number):
+        raise ValueError(f"{name}: {str(value)[:40]!r} is no number; write it as 0.45 or 4.5e-1")
+    return number
+
+
+def _one_of(value: Any, allowed: Sequence[str], name: str) -> str:
+    if value not in allowed:
+        raise ValueError(f"{name} = {str(value)[:40]!r}; allowed: {', '.join(allowed)}")
+    return str(value)
+
+
+class History:
+    """States that can be gone back to. Changes of one field in a row, as by a slider, are one step."""
+
+    LONGEST = 200
+
+    def __init__(self, state: State) -> None:
+        self.state = state
+        self._back: list[State] = []
+        self._forth: list[State] = []
+        self._field: str | None = None
+
+    def put(self, state: State, field: str | None = None) -> None:
+        """Go on to a state; ``field`` names what a slider moves."""
+        if state == self.state:
+            return
+        if field is None or field != self._field:
+            self._back.append(self.state)
+            del self._back[: -self.LONGEST]
+        self._field = field
+        self._forth.clear()
+        self.state = state
+
+    def undo(self) -> bool:
+        """Go one step back, where there is one."""
+        return self._move(self._back, self._forth)
+
+    def redo(self) -> bool:
+        """Go one step forward again, where there is one."""
+        return self._move(self._forth, self._back)
+
+    @property
+    def can(self) -> tuple[bool, bool]:
+        """Availability of a step back, and of one forward."""
+        return bool(self._back), bool(self._forth)
+
+    def end_step(self) -> None:
+        """A slider was let go: its next move is a step of its own."""
+        self._field = None
+
+    def _move(self, source: list[State], target: list[State]) -> bool:
+        if not source:
+            return False
+        target.append(self.state)
+        self.state = source.pop()
+        self._field = None
+        return True

@@ -1,6 +1,0 @@
-"""The closed forms beside these tests are imported by their plain name, under any pytest import mode."""
-
-import sys
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).parent))

@@ -1,0 +1,6 @@
+"""The scripts and systems beside these tests are imported by their plain name, under any pytest import mode."""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))

@@ -1,0 +1,171 @@
+"""A running explorer and a browser that looks at it; without a browser these tests are skipped."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import shutil
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+FEW = "columns=61&transient=100&keep=40"  # so that nothing takes long where many columns do not matter
+ROOT = Path(__file__).parents[2]
+PATIENCE = 120.0  # seconds; a cold cache compiles in them
+
+
+class Server:
+    """``nonsmooth explore`` in a process of its own."""
+
+    def __init__(self, *arguments: str) -> None:
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "nonsmooth", "explore", *arguments, "--no-browser", "--port", "0"],
+            stderr=subprocess.PIPE, text=True,
+        )  # fmt: skip
+        self.said: list[str] = []
+        assert self.process.stderr is not None
+        for line in self.process.stderr:
+            self.said.append(line)
+            if "http://" in line:
+                break
+        else:
+            pytest.fail("".join(self.said))
+        self.address = self.said[-1].split()[-1]
+        self.origin, _, rest = self.address.partition("/?")
+        self.token = rest.removeprefix("token=")
+        threading.Thread(target=lambda: self.said.extend(self.process.stderr or []), daemon=True).start()
+
+    def workers(self) -> list[int]:
+        """Process numbers of the workers."""
+        path = Path(f"/proc/{self.process.pid}/task")
+        return [int(pid) for task in path.iterdir() for pid in (task / "children").read_text().split()]
+
+    def close(self) -> None:
+        self.process.terminate()
+        self.process.wait(30)
+
+
+class Page:
+    """One tab, with words for what a person does and sees."""
+
+    def __init__(self, tab: Any) -> None:
+        self.tab = tab
+        self.faults: list[str] = []
+        tab.on("pageerror", lambda error: self.faults.append(str(error)))
+        tab.on("console", lambda line: self.faults.append(line.text) if line.type == "error" else None)
+
+    def open(self, address: str) -> None:
+        self.tab.goto(address)
+        self.tab.wait_for_selector("html[data-ready]")
+
+    def until(self, what: str, timeout: float = PATIENCE) -> Any:
+        """Wait until a JavaScript expression is true."""
+        try:
+            return self.tab.wait_for_function(what, timeout=1000 * timeout)
+        except Exception as error:
+            told = self.tab.evaluate("({...document.documentElement.dataset})")
+            raise AssertionError(f"{what}: {told}, {self.readout()}, {self.notes()!r}, {self.ui()}") from error
+
+    def until_done(self) -> None:
+        """Wait until everything that was asked for is shown."""
+        self.until("(() => { const told = document.documentElement.dataset;"
+                   " return told.sent === told.heard && told.busy === ''; })()")  # fmt: skip
+
+    def readout(self) -> dict[str, str]:
+        return dict(json.loads(self.tab.evaluate('Bokeh.documents[0].get_model_by_name("readout").value')))
+
+    def ui(self) -> dict[str, Any]:
+        return dict(json.loads(self.tab.evaluate('Bokeh.documents[0].get_model_by_name("ui").value')))
+
+    def value(self, name: str) -> float:
+        return float(next(one["value"] for one in self.ui()["parameters"] if one["name"] == name))
+
+    def write(self, field: str, text: str) -> None:
+        self.tab.fill(f'[id="{field}"]', text)
+        self.tab.press(f'[id="{field}"]', "Enter")
+
+    def place(self, figure: str, x: float, y: float) -> tuple[float, float]:
+        """Screen coordinates of a point of a figure."""
+        found = self.tab.evaluate(
+            """([name, x, y]) => {
+                const model = Bokeh.documents[0].get_model_by_name(name);
+                const view = Bokeh.index.find_one_by_id(model.id), box = view.canvas_view.el.getBoundingClientRect();
+                return [box.x + view.frame.x_scale.compute(x), box.y + view.frame.y_scale.compute(y)];
+            }""",
+            [figure, x, y],
+        )
+        return float(found[0]), float(found[1])
+
+    def notes(self) -> str:
+        return str(self.tab.evaluate(
+            '[...document.querySelectorAll(".note:not([hidden]), .wrong")].map(one => one.textContent).join(" ").trim()'
+        ))  # fmt: skip
+
+
+def browser_program() -> str | None:
+    spec = importlib.util.spec_from_file_location("make_screenshots", ROOT / "docs" / "make_screenshots.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, module.BROWSERS)), None)
+
+
+@pytest.fixture(scope="session")
+def server() -> Iterator[Server]:
+    pytest.importorskip("bokeh", reason="the explorer needs bokeh")
+    one = Server()
+    yield one
+    one.close()
+    said = "".join(one.said)
+    assert "Traceback" not in said, said
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Any]:
+    playwright = pytest.importorskip("playwright.sync_api", reason="browser tests need the package playwright")
+    program = browser_program()
+    if program is None:
+        pytest.skip("no Chromium found: install it, or name it in the environment variable CHROMIUM")
+    with playwright.sync_playwright() as running:
+        one = running.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        yield one
+        one.close()
+
+
+@pytest.fixture
+def new_page(browser: Any) -> Iterator[Callable[..., Page]]:
+    """Open tabs, and see that none of them had an error."""
+    pages: list[Page] = []
+
+    def make(width: int = 1280, height: int = 800) -> Page:
+        tab = browser.new_context(viewport={"width": width, "height": height}, accept_downloads=True).new_page()
+        tab.set_default_timeout(30_000)
+        pages.append(Page(tab))
+        return pages[-1]
+
+    yield make
+    for page in pages:
+        page.tab.context.close()
+        assert page.faults == []
+
+
+@pytest.fixture
+def page(server: Server, new_page: Callable[..., Page]) -> Page:
+    one = new_page()
+    one.open(f"{server.address}&{FEW}")
+    return one
+
+
+def wait_until(fact: Callable[[], object], seconds: float = PATIENCE) -> None:
+    end = time.monotonic() + seconds
+    while not fact():
+        assert time.monotonic() < end, "it did not happen"
+        time.sleep(0.05)

@@ -1,0 +1,99 @@
+"""The state of a page: what a URL holds, what is refused, what can be undone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import nonsmooth as ns
+from nonsmooth.explorer.labels import axis_label, html_of, number, plain_of
+from nonsmooth.explorer.presets import first_state, presets_of, slider_range
+from nonsmooth.explorer.raster import drawn
+from nonsmooth.explorer.state import CHOICES, History, State, changed, from_query, to_query
+
+SYSTEM = ns.models.discontinuous_support()
+STATES = list(SYSTEM.states)
+FIRST = first_state("discontinuous_support", SYSTEM)
+
+numbers = st.floats(allow_nan=False, allow_infinity=False)
+
+
+@given(rho=numbers, low=numbers, start=st.tuples(numbers, numbers), direction=st.sampled_from([*CHOICES["direction"]]))
+def test_a_query_brings_every_field_back(rho: float, low: float, start: tuple[float, float], direction: str) -> None:
+    state = replace(FIRST.with_value("rho", rho), low=low, start=start, direction=direction, columns=77)
+    assert from_query(to_query(state), FIRST, STATES) == state
+
+
+@pytest.mark.parametrize(
+    ("query", "said"),
+    [
+        ("p.rho=__import__('os')", "is no number"), ("p.rho=nan", "is no number"), ("p.rho=1e999", "is no number"),
+        ("p.gap=1", "is no parameter; there are: m, k"), ("over=x", "allowed: m, k"), ("shown=rho", "allowed: x, v"),
+        ("start=1", "give 2 numbers"), ("columns=1e9", "from 10 to 4000"), ("eta=0", "greater than 0"),
+        ("direction=sideways", "allowed: both, up"), ("class=1", "nothing that a view holds"),
+    ],
+)  # fmt: skip
+def test_what_does_not_fit_is_refused(query: str, said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        from_query(query, FIRST, STATES)
+
+
+def test_undo_goes_back_by_steps_of_a_person_not_of_a_slider() -> None:
+    past = History(FIRST)
+    for value in (0.3, 0.31, 0.32):
+        past.put(FIRST.with_value("rho", value), "p.rho")
+    past.end_step()
+    past.put(past.state.with_value("rho", 0.4), "p.rho")
+    assert past.undo()
+    assert past.state.values["rho"] == 0.32
+    assert past.undo()
+    assert past.state == FIRST
+    assert not past.undo()
+    assert past.redo()
+    assert past.redo()
+    assert not past.redo()
+    assert past.state.values["rho"] == 0.4
+
+
+def test_every_model_has_a_first_view_and_the_paper_all_its_figures() -> None:
+    for name in ns.models.names():
+        system = getattr(ns.models, name)()
+        state = first_state(name, system)
+        assert from_query(to_query(state), state, list(system.states)) == state
+        assert state.low < state.high
+        assert {state.x, state.y, state.shown} <= set(system.states)
+        for parameter, value in state.values.items():
+            low, high = slider_range(value)
+            assert low <= value <= high, parameter
+    assert {name.split()[1] for name in presets_of(FIRST)} == {"9", "10", "11", "12", "13", "14", "15", "17", "18"}
+    figure = presets_of(FIRST)["Fig. 13"]
+    assert (figure.values["omega"], figure.values["rho"], figure.over) == (11.15, 0.33, "g")
+
+
+def test_fields_come_as_numbers_too() -> None:
+    assert changed(FIRST, "phase", 1.25, STATES).phase == 0.25
+    assert isinstance(changed(FIRST, "columns", 100.0, STATES), State)
+
+
+def test_symbols_and_units_as_text() -> None:
+    assert [plain_of(r"\rho"), plain_of("k_{s}"), plain_of(r"V_{\mathrm{in}}")] == ["ρ", "kₛ", "Vᵢₙ"]
+    assert html_of("k_{s}") == "<i>k</i><sub>s</sub>"
+    assert axis_label("x", "m", -3) == "x (mm)"
+    assert axis_label(r"\zeta", "") == "ζ"
+    assert number(-0.0045, "m") == "−4.5 mm"
+
+
+def test_an_image_has_a_pixel_per_column_and_shows_density() -> None:
+    points = np.array([[0.05, 0.05, 0.05, np.nan], [0.95, 5.0, -5.0, 0.55]])
+    image = drawn([(points, "#0072B2", 1)], 0.0, 1.0, 10)
+    assert image.shape == (10, 2)
+    at = {(int(r), int(c)) for r, c in zip(*np.nonzero(image), strict=True)}
+    assert at == {(0, 0), (9, 1), (5, 1)}
+    assert image[0, 0] >> 24 == 255 > image[9, 1] >> 24  # three points, one point
+    assert image[0, 0] & 0xFFFFFF == 0xB27200  # bytes R, G, B, A
+    over = drawn([(points, "#0072B2", 1), (points, "#D55E00", 1)], 0.0, 1.0, 10)
+    assert over[0, 0] & 0xFFFFFF == 0x005ED5

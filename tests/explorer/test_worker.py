@@ -1,0 +1,75 @@
+"""The process that computes: it answers, hears that its work is not wanted, and says when it ends."""
+
+from __future__ import annotations
+
+import queue
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+import nonsmooth as ns
+from nonsmooth.explorer.presets import first_state
+from nonsmooth.explorer.worker import Answer, Worker
+
+SYSTEM = ns.models.discontinuous_support()
+
+
+@pytest.fixture(scope="module")
+def answers() -> queue.Queue[Answer]:
+    return queue.Queue()
+
+
+@pytest.fixture(scope="module")
+def worker(answers: queue.Queue[Answer]) -> Iterator[Worker]:
+    one = Worker(answers.put)
+    yield one
+    one.close()
+
+
+def job(view: str, **options: Any) -> dict[str, Any]:
+    state = first_state("discontinuous_support", SYSTEM)
+    return {
+        "view": view, "text": SYSTEM.to_text(), "values": dict(state.values), "method": "auto", "eta": 0.0,
+        "transient": 100, "keep": 20, "start": [0.0, 0.0], "begin": [0.0, 0.0], "over": "rho", "low": 0.2, "high": 0.5,
+        "columns": 11, "direction": "both", **options,
+    }  # fmt: skip
+
+
+def last_of(answers: queue.Queue[Answer], number: int) -> Answer:
+    while True:
+        answer = answers.get(timeout=120)
+        if answer[1] == number and answer[0] != "progress":
+            return answer
+
+
+def test_a_view_is_what_the_verb_returns(worker: Worker, answers: queue.Queue[Answer]) -> None:
+    worker.ask(1, job("diagram"))
+    kind, _, (found, warned) = last_of(answers, 1)
+    assert (kind, warned) == ("done", [])
+    alone = ns.sweep(SYSTEM, "rho", found["diagram"]["rho"].values, direction="both", start=[0.0, 0.0], transient=100,
+                     keep=20, progress=False)  # fmt: skip
+    assert found["diagram"].drop_attrs().identical(alone.drop_attrs())
+
+
+def test_work_that_is_not_wanted_ends(worker: Worker, answers: queue.Queue[Answer]) -> None:
+    worker.ask(2, job("diagram", columns=200_000))  # an hour
+    while answers.get(timeout=120)[:2] != ("progress", 2):
+        pass
+    worker.cancel(2)
+    assert last_of(answers, 2)[0] == "cancelled"
+
+
+def test_an_error_is_a_sentence(worker: Worker, answers: queue.Queue[Answer]) -> None:
+    worker.ask(3, job("first look", over="gap"))
+    kind, _, said = last_of(answers, 3)
+    assert kind == "error"
+    assert "`gap` is not a parameter" in said
+
+
+def test_one_that_ends_says_so_and_can_be_started_again(worker: Worker, answers: queue.Queue[Answer]) -> None:
+    worker.end()
+    assert answers.get(timeout=60)[0] == "ended"
+    worker.start()
+    worker.ask(4, job("orbit"))
+    assert last_of(answers, 4)[0] == "done"
