@@ -1,4 +1,4 @@
-"""A campaign: branches of random systems with stops, sticks, corners and several events at once go on, or end rightly."""
+"""A campaign: branches of random systems with sticks, corners and several events at once go on, or end rightly."""
 
 from __future__ import annotations
 
@@ -36,7 +36,8 @@ def gear(rng: np.random.Generator) -> Drawn:
 
 
 def buck(rng: np.random.Generator) -> Drawn:
-    return ways.buck(rng.uniform(16.0, 24.0)).with_parameters(a=rng.uniform(6.0, 9.0)), "V", (14.0, 40.0), [12.0, 0.5, 0.0]
+    system = ways.buck(rng.uniform(16.0, 24.0)).with_parameters(a=rng.uniform(6.0, 9.0))
+    return system, "V", (14.0, 40.0), [12.0, 0.5, 0.0]
 
 
 def support(rng: np.random.Generator) -> Drawn:
