@@ -6,6 +6,7 @@ The simulation isolates every crossing, so a round that shows an orbit's own sig
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from nonsmooth.kernels.hybrid import codes
 
 if TYPE_CHECKING:
     from nonsmooth.continuation.shooting import Shooting
-    from nonsmooth.flow.engines.engine import Log
+    from nonsmooth.flow.engines.engine import Engine, Log
 
 __all__ = ["Rounds"]
 
@@ -53,11 +54,21 @@ class Rounds:
         return (self._forced if shooting.forced else self.free)(values, z, mode, begin, period)
 
     def shows(self, shooting: Shooting, X: FloatArray, values: FloatArray) -> bool:
-        """Return whether the round of an orbit takes the transitions of its signature; True where it fails."""
+        """Return whether the round of an orbit takes the transitions of its signature; True where it fails.
+
+        What the exact flow denies the series are asked too."""
         i, begin, z, period = self._middle(shooting, X, values)
         taken = [visit.transition for visit in shooting.signature.crossings]
-        log = self._run(values, z, int(shooting.modes[i]), begin, begin + period, [])
-        return log is None or log.crossing_transition.tolist() == taken[i:] + taken[:i]
+        for engine in (lambda: self.engine, lambda: self.second):
+            log = self._run(values, z, int(shooting.modes[i]), begin, begin + period, [], engine())
+            if log is None or log.crossing_transition.tolist() == taken[i:] + taken[:i]:
+                return True
+        return False
+
+    @cached_property
+    def second(self) -> Engine:
+        """The engine that is asked where the first one denies a signature."""
+        return self.engine if self.engine.name != "exact" else engine_for(self.system, "taylor", rtol=RTOL)
 
     def _middle(
         self, shooting: Shooting, X: FloatArray, values: FloatArray
@@ -73,13 +84,17 @@ class Rounds:
         z = self.flow.segments(values, shooting.modes[i : i + 1], [begin], [into], states[i][None, :]).z[0]
         return i, begin + into, z, period
 
-    def _run(self, values: FloatArray, z: FloatArray, mode: int, begin: float, until: float, at: Any) -> Log | None:
+    def _run(
+        self, values: FloatArray, z: FloatArray, mode: int, begin: float, until: float, at: Any,
+        engine: Engine | None = None,
+    ) -> Log | None:  # fmt: skip
         n = len(self.system.states)
         state = State(z[:n].copy(), z[n:].copy())
         state.counters[0], state.settled = mode, True
         T = self.flow.period(values)[0]
         state.clock[:] = (begin % T, begin // T, T) if np.isfinite(T) else (begin, 0.0, 0.0)
-        log = self.engine.record(self.engine.prepare(values[None, :]), state, until, np.asarray(at, dtype=float))
+        engine = engine or self.engine
+        log = engine.record(engine.prepare(values[None, :]), state, until, np.asarray(at, dtype=float))
         return log if log.status in (codes.OK, codes.NOT_GUARANTEED) else None
 
     def _forced(self, values: FloatArray, z: FloatArray, mode: int, begin: float, period: float) -> Guess | None:
