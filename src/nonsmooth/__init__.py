@@ -47,6 +47,8 @@ if TYPE_CHECKING:
     from nonsmooth.flow.starts import random_starts as random_starts
     from nonsmooth.identification.chain import identify as identify
     from nonsmooth.identification.compare.compare import compare as compare
+    from nonsmooth.identification.fit.fit import fit as fit
+    from nonsmooth.identification.fit.sensors import Sensor as Sensor
     from nonsmooth.identification.parameter_set import ParameterSet as ParameterSet
     from nonsmooth.results.store import load as load
     from nonsmooth.results.store import save as save
@@ -98,6 +100,8 @@ _WHERE = {
     "smoothing_report": "smoothing.report",
     "load_recording": "experiment.load",
     "Recording": "experiment.recording",
+    "fit": "identification.fit.fit",
+    "Sensor": "identification.fit.sensors",
     "identify": "identification.chain",
     "ParameterSet": "identification.parameter_set",
     "compare": "identification.compare.compare",

@@ -2,9 +2,8 @@
 
 A page is run from top to bottom in one folder, with one set of names. Blocks of ``python`` are executed; a block of
 ``toml`` whose first line is ``# NAME.toml``, or a ``{code-block}`` with a caption, is written to a file of that name;
-lines of ``sh`` that begin with ``nonsmooth`` are run (``reproduce`` excepted, which has tests of its own). A block of
-``text`` directly below is what they must print, or the error they must raise, wrapped at will; ``...`` stands for
-anything.
+lines of ``sh`` that begin with ``nonsmooth`` are run, but for `ELSEWHERE`. A block of ``text`` directly below is what
+they must print, or the error they must raise, wrapped at will; ``...`` stands for anything.
 """
 
 from __future__ import annotations
@@ -17,6 +16,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+#: Commands that have tests of their own; the second one serves a page until it is stopped.
+ELSEWHERE = ("reproduce", "explore")
 _BLOCK = re.compile(r"^```(python|toml|sh|text)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 _FILE = re.compile(r"^```\{code-block\} \w+\n:caption: (\S+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 
@@ -78,6 +79,6 @@ def _shell(code: str) -> str:
     with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed):
         for line in code.splitlines():
             words = line.split("#")[0].split()
-            if words[:1] == ["nonsmooth"] and words[1:2] != ["reproduce"]:
+            if words[:1] == ["nonsmooth"] and words[1] not in ELSEWHERE:
                 main(words[1:])
     return printed.getvalue()

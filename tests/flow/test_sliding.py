@@ -149,6 +149,20 @@ def test_resets_that_land_beyond_each_others_stops_end_at_once_with_a_sentence()
     assert caught.value.time == pytest.approx(np.pi / 6, abs=1e-12)  # 2 sin t = 1
 
 
+def test_friction_under_the_force_of_a_rigid_contact_is_refused() -> None:
+    """Such a motion need not exist or be unique: a rod that slides on a floor (Painleve 1895)."""
+    begin = process_time()
+    with pytest.raises(ns.SystemDefinitionError, match=r"need not exist or be unique \(Painleve\)"):
+        ns.mechanical(
+            [[1.0, 0.0], [0.0, 1.0]], 0.0 * np.eye(2), np.eye(2), coordinates=["x", "y"],
+            elements={
+                "floor": ns.elements.Stop(at="y", side=-1, position=0.0),
+                "rub": ns.elements.Coulomb(at="x", friction=0.5, normal="floor"),
+            },
+        )  # fmt: skip
+    assert process_time() - begin < 1
+
+
 def test_a_reset_that_lands_beyond_another_stop_takes_its_impact_at_the_same_instant() -> None:
     right = ns.Transition("fly", "fly", when="right > 0", reset=lambda t, u, p: (u.x - 3, -u.v))
     left = ns.Transition("fly", "fly", when="left > 0", reset=lambda t, u, p: (-0.5 + 0 * u.x, -u.v / 2))

@@ -110,3 +110,20 @@ def test_the_rotor_whirls_on_the_circle_of_full_annular_rub() -> None:
     free = ns.simulate(system.with_parameters(omega=0.12), periods=1, transient=150, start={"x": 0.5})
     whirl = 0.12**2 / np.hypot(beta - 0.12**2, 2 * zeta * 0.12)
     assert np.hypot(*free.u.values[:, :2].T) == pytest.approx(whirl, abs=1e-8)
+
+
+def test_dry_whip_of_the_rotor_grows_at_the_rate_of_its_linear_limit() -> None:
+    """z'' + 2 zeta z' + (1 + beta + i mu) z = 0 far out: unstable where mu > 2 zeta sqrt(1 + beta)."""
+    threshold = 0.1 * np.sqrt(1.04)
+    for mu in (0.2, 0.98 * threshold):
+        fastest = max(np.roots([1, 0.1, 1.04 + 1j * mu]), key=lambda s: s.real)
+        assert (fastest.real > 0) is (mu > threshold) and fastest.imag < 0
+        v = 1e5 * fastest
+        system = ns.models.rubbing_rotor(omega=0.5, mu=mu)
+        run = ns.simulate(system, duration=20.0, start=[1e5, 0.0, v.real, v.imag], samples=2)
+        growth = np.log(np.hypot(*run.u.values[-1, :2]) / 1e5) / 20
+        assert growth == pytest.approx(fastest.real, abs=1e-5)
+    with pytest.raises(ns.SolveError, match="grew beyond"):
+        ns.simulate(ns.models.rubbing_rotor(omega=0.5), periods=300, start={"x": 0.5})
+    run = ns.simulate(ns.models.rubbing_rotor(omega=0.5, mu=0.1), periods=300, start={"x": 0.5})
+    assert np.hypot(*run.u.values[-1, :2]) < 3

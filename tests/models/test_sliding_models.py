@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import nonsmooth as ns
@@ -48,6 +49,54 @@ def test_the_belt_s_published_limit_cycle() -> None:
     assert run.crossing_time.values[0] == pytest.approx(2.5, abs=1e-12)  # (F - 0.5) / v_b
     assert run.u_after.values[:2, 0] == pytest.approx([1.0, -0.54100635], abs=5e-9)
     assert np.diff(run.crossing_time.values)[0] == pytest.approx(4.296, abs=5e-7)
+
+
+def test_on_a_moving_support_the_mass_sticks_and_slips_in_closed_form() -> None:
+    """x = f_k + a cos t + v_b sin t with a = f_s - f_k, until x = f_k - a moves with the support again."""
+    v, a = 0.4, 0.3
+    system = ns.models.dry_friction_oscillator(f_0=0.0, f_k=0.2, f_s=0.5, v_b=v)
+    run = ns.simulate(system, duration=40.0, start={"v": v}, samples=2)
+    labels = np.array([system.transitions[i].label for i in run.crossing_transition.values])
+    off, on = np.flatnonzero(labels == "stick -> backward"), np.flatnonzero(labels == "backward -> stick")
+    assert len(off) > 3
+    assert run.u_after.values[off] == pytest.approx(np.tile([0.5, v], (len(off), 1)), abs=1e-12)
+    assert run.u_after.values[on[1:]] == pytest.approx(np.tile([0.2 - a, v], (len(on) - 1, 1)), abs=1e-12)
+    times = run.crossing_time.values
+    slips = times[on[on > off[0]]] - times[off[: len(on[on > off[0]])]]
+    assert slips == pytest.approx(np.pi + 2 * np.arctan(v / a), abs=1e-12)
+    assert times[off[1]] - times[off[0]] == pytest.approx(slips[0] + 2 * a / v, abs=1e-12)
+
+
+def test_a_belt_too_fast_ends_the_cycle_at_a_discontinuous_fold() -> None:
+    """By SciPy: the speed of the belt at which the slip that begins at x = F - c v_b just comes up to it again."""
+    c = 0.3
+
+    def sticks_again(v_b: float) -> bool:
+        def field(t: float, u: np.ndarray) -> list[float]:
+            return [u[1], 1 / (1 + 3 * (v_b - u[1])) - u[0] - c * u[1]]
+
+        def top(t: float, u: np.ndarray) -> float:
+            return field(t, u)[1]
+
+        def met(t: float, u: np.ndarray) -> float:
+            return u[1] - v_b
+
+        top.terminal, top.direction, met.terminal, met.direction = True, -1, True, 1  # type: ignore[attr-defined]
+        run = solve_ivp(
+            field, (0, 30), [1 - c * v_b, v_b - 1e-9], events=[top, met], rtol=1e-12, atol=1e-13, method="DOP853"
+        )
+        return len(run.t_events[1]) > 0
+
+    low, high = 0.8, 1.2
+    assert sticks_again(low) and not sticks_again(high)
+    while high - low > 1e-9:
+        middle = (low + high) / 2
+        low, high = (middle, high) if sticks_again(middle) else (low, middle)
+    start = {"x": 0.6, "v": low}
+    orbit = ns.find_orbit(ns.models.stick_slip_belt(c=c, v_b=low - 1e-6), start=start)
+    assert orbit.stable and "stick" in str(orbit)
+    with pytest.raises(ns.SolveError, match="stable equilibrium"):
+        ns.find_orbit(ns.models.stick_slip_belt(c=c, v_b=low + 1e-3), start=start)
 
 
 def test_the_belt_s_exponents() -> None:

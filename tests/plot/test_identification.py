@@ -172,7 +172,35 @@ def many() -> xr.Dataset:
     )  # fmt: skip
 
 
+def fitted_motion() -> xr.Dataset:
+    t, column = np.linspace(0, 10, 200), np.zeros(200, dtype=int)
+    hit = np.abs(t - 4) < 0.1
+    data = xr.Dataset(
+        {
+            "measured": ("sample", np.sin(t), {"units": "m"}), "fitted": ("sample", np.sin(t)),
+            "residual": ("sample", np.cos(40 * t)), "window": ("sample", column), "run": ("sample", column),
+            "quantity": ("sample", column), "mode": ("sample", (t > 4).astype(int)),
+            "place": ("sample", np.where(hit, 2, t > 4)),
+        },
+        {"time": ("sample", t)}, SYNTHETIC,
+    )  # fmt: skip
+    for name, flags in {"run": "run", "quantity": "x", "mode": "free contact", "place": "free contact hit"}.items():
+        data[name].attrs["flag_meanings"] = flags
+    return data
+
+
+def test_a_fit_is_drawn_over_time_and_by_place() -> None:
+    over = words(identification.fit_residuals(fitted_motion()))
+    assert "fit: contact" in over and "at a transition or graze" in over
+    bars = identification.fit_residuals(fitted_motion(), show="places")
+    assert [label.get_text() for label in bars.get_yticklabels()] == ["free", "contact", "hit"]
+    assert bars.patches[0].get_width() == pytest.approx(np.sqrt(0.5), rel=0.1)  # rms of a cosine
+    with pytest.raises(ValueError, match="allowed: 'time', 'places'"):
+        identification.fit_residuals(fitted_motion(), show="phase")
+
+
 PICTURES = {
+    "fit_residuals": fitted_motion,
     "force_displacement": spring, "impulse_response": decay, "impulse_history": decay, "amplitude_fit": amplitudes,
     "free_decay": peaks, "drop_decay": peaks, "calibration": line, "grazing": touch, "multiple_shooting": shots,
     "profile": flat, "coverage": many, "half_power": band, "nyquist": circle,

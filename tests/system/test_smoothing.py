@@ -411,3 +411,13 @@ def test_the_shape_of_a_band_is_part_of_a_system():
 def test_unknown_bands_are_refused():
     with pytest.raises(ValueError, match="band is one of linear, tanh, arctan, not 'cubic'"):
         rubbing().smoothed(1e-3, "cubic")
+
+
+def test_a_preloaded_spring_rests_in_its_band():
+    """P - k s on one side, -P - k s on the other: within the band a spring of the stiffness P / eta + k."""
+    spring = ns.mechanical(
+        1.0, 0.2, 0.0, parameters={"P": 1.0, "k": 1.0, "f": 0.3}, forcing={"q": lambda t, p: p.f},
+        elements={"spring": ns.elements.PreloadedSpring(at="q", preload="P", stiffness="k")},
+    )  # fmt: skip
+    run = ns.simulate(spring.smoothed(1e-3), duration=400.0, start={"q": 0.5}, samples=2)
+    assert run.u.values[-1] == pytest.approx([0.3 / 1001, 0.0], abs=1e-9)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from nonsmooth.system.system import System
 
-__all__ = ["Variation", "sensitivity", "variation"]
+__all__ = ["Variation", "apart", "sensitivity", "settled", "variation"]
 
 RTOL = 1e-15  # where the flow is not exact
 
@@ -45,26 +45,9 @@ class Variation:
 
     def __init__(self, flow: VariationalFlow, values: FloatArray, log: Log, start: tuple[int, FloatArray],
                  t_begin: float, t_end: float) -> None:  # fmt: skip
-        traced, n_u = flow.traced, flow.n_u
         first = int(log.sample_mode[0]), np.concatenate([np.nan_to_num(log.sample_u[0]), log.sample_memory[0]])
         self.start = settled(flow, values, start, first, t_begin)
-        self.modes, starts, self.times = [first[0]], [first[1]], [t_begin]
-        self.transitions: list[tuple[int, ...]] = []
-        before: list[FloatArray] = []
-        memory = first[1][n_u:]
-        for i, t in enumerate(log.crossing_time):
-            k = int(log.crossing_transition[i])
-            after = np.concatenate([np.nan_to_num(log.u_after[i]), log.memory_after[i]])
-            if self.transitions and t == self.times[-1]:  # a chain at one instant
-                self.transitions[-1] += (k,)
-                self.modes[-1], starts[-1] = traced.transitions[k].target, after
-            else:
-                self.transitions.append((k,))
-                before.append(np.concatenate([np.nan_to_num(log.u_before[i]), memory]))
-                self.modes.append(traced.transitions[k].target)
-                starts.append(after)
-                self.times.append(float(t))
-            memory = log.memory_after[i]
+        self.modes, starts, self.times, self.transitions, before = apart(flow, log, first, t_begin)
         taus = np.diff([*self.times, t_end])
         self.segments: Segments = flow.segments(values, self.modes, self.times, taus, starts)
         self.jumps: list[Jump] = [
@@ -92,6 +75,32 @@ class Variation:
         return at_start + sum(jump.log_determinant for jump in self.jumps)
 
 
+def apart(
+    flow: VariationalFlow, log: Log, first: tuple[int, FloatArray], t_begin: float
+) -> tuple[list[int], list[FloatArray], list[float], list[tuple[int, ...]], list[FloatArray]]:
+    """Segments of a run that begins in ``first`` = (mode, z): their modes, starts and times; the transitions between
+    them, those at one instant as one, and the state before each."""
+    n_u, targets = flow.n_u, [jump.target for jump in flow.traced.transitions]
+    modes, starts, times = [first[0]], [first[1]], [t_begin]
+    transitions: list[tuple[int, ...]] = []
+    before: list[FloatArray] = []
+    memory = first[1][n_u:]
+    for i, t in enumerate(log.crossing_time):
+        k = int(log.crossing_transition[i])
+        after = np.concatenate([np.nan_to_num(log.u_after[i]), log.memory_after[i]])
+        if transitions and t == times[-1]:  # a chain at one instant
+            transitions[-1] += (k,)
+            modes[-1], starts[-1] = targets[k], after
+        else:
+            transitions.append((k,))
+            before.append(np.concatenate([np.nan_to_num(log.u_before[i]), memory]))
+            modes.append(targets[k])
+            starts.append(after)
+            times.append(float(t))
+        memory = log.memory_after[i]
+    return modes, starts, times, transitions, before
+
+
 def settled(
     flow: VariationalFlow, values: FloatArray, start: tuple[int, FloatArray], first: tuple[int, FloatArray], t: float
 ) -> Jump | None:
@@ -108,7 +117,8 @@ def settled(
                 continue
             if jump.target == first[0]:
                 found = flow.jump(values, (*chain, k), t, start[1])
-                if np.array_equal(found.z_after, first[1]):
+                # a start within a forcing period is known to the rounding of its time
+                if (np.abs(found.z_after - first[1]) <= 1e-10 * (flow.scale + np.abs(first[1]))).all():
                     return found
             chains.append((*chain, k))
     raise AssertionError("a run begins in a mode that no transitions lead to")

@@ -15,12 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.errors import SolveError
-from nonsmooth.identification.pieces import Problem, State
+from nonsmooth.identification.pieces import Fittable, State
 
-__all__ = ["Unsettled", "reduced", "settle"]
+__all__ = ["Unsettled", "inverted", "reduced", "settle"]
 
 FloatArray = NDArray[np.float64]
 _SETTLED = 1e-3  # of a standard uncertainty
+_RIDGE = 1e-13  # of a start's column: what keeps a start that is known or not seen from being divided by
 _LITTLE = 1e-4  # of the sum of squares: what a rough fit leaves to be gained
 _ACCURACY = 0.05  # of a standard uncertainty: how near the minimum is told where the derivatives' accuracy ends
 
@@ -40,39 +41,71 @@ class Unsettled(SolveError):
 
 
 def reduced(
-    problem: Problem, state: State, weights: list[FloatArray], used: Any, p: int, damping: float = 0.0
+    problem: Fittable, state: State, weights: list[FloatArray], used: Any, p: int, damping: float = 0.0
 ) -> tuple[Any, ...]:
-    """Normal equations without the starts, and what gives the starts' steps back; ``damping`` is that of the starts."""
+    """Normal equations without the starts, and what gives the starts' steps back; ``damping`` is that of the starts.
+
+    By an orthogonal factorization of each piece: squares of a chaotic motion's derivatives lose all digits. For each
+    piece ``(inverse, cross, part)``: a start's step is ``inverse @ (part - cross @ step)``, its covariance at given
+    parameters ``inverse @ inverse.T``.
+    """
     normal, right = np.zeros((p, p)), np.zeros(p)
     back = []
     for i, piece in enumerate(problem.pieces):
-        g, s = state.in_parameters[i] * weights[i][:, None], state.in_start[i] * weights[i][:, None]
-        r = state.residuals[i] * weights[i]
-        square = s.T @ s
-        block = np.linalg.inv(square + 1e-12 * np.trace(square) * np.eye(2) + damping * np.diag(np.diag(square)))
-        back.append((block, s.T @ g, s.T @ r))
+        w = weights[i]
+        g, s, r = state.in_parameters[i] * w[:, None], state.in_start[i] * w[:, None], state.residuals[i] * w
+        n, m = s.shape[1], len(piece.which)
+        size = np.linalg.norm(s, axis=0)
+        size[size == 0.0] = 1.0  # a number of the start that is known
+        table = np.zeros((len(r) + n, n + m + 1))
+        table[: len(r)] = np.column_stack([s / size, g, r])
+        table[range(len(r), len(r) + n), range(n)] = np.sqrt(_RIDGE**2 + damping)
+        factor = np.asarray(np.linalg.qr(table, mode="r"))
+        inverse = np.linalg.inv(factor[:n, :n]) / size[:, None]
+        back.append((inverse, factor[:n, n : n + m], factor[:n, n + m]))
         if used[i]:
-            normal[np.ix_(piece.which, piece.which)] += g.T @ g - (s.T @ g).T @ block @ (s.T @ g)
-            right[piece.which] += g.T @ r - (s.T @ g).T @ block @ (s.T @ r)
+            left, rest = factor[n:, n : n + m], factor[n:, n + m]
+            normal[np.ix_(piece.which, piece.which)] += left.T @ left
+            right[piece.which] += left.T @ rest
     return normal, right, back
 
 
+def inverted(matrix: FloatArray, least: float = 0.0) -> tuple[FloatArray, FloatArray]:
+    """Inverse of a normal matrix in units of its own diagonal, and directions (columns) that it does not determine.
+
+    Eigenvalues below ``least`` make such a direction; it is left out of the inverse. With 0 there is none.
+    """
+    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    shrunk = matrix / np.outer(scale, scale)
+    if least <= 0.0:
+        return np.linalg.inv(shrunk) / np.outer(scale, scale), np.zeros((len(scale), 0))
+    shrunk[np.diag(matrix) <= 0.0] = 0.0  # what nothing depends on is a direction of its own
+    values, vectors = np.linalg.eigh(shrunk)
+    known = values > least
+    inverse = (vectors[:, known] / values[known]) @ vectors[:, known].T / np.outer(scale, scale)
+    return inverse, vectors[:, ~known]
+
+
 def settle(
-    problem: Problem, theta: FloatArray, starts: FloatArray, spread: float, used: Any, centre: FloatArray,
-    prior: FloatArray, iterations: int, rough: bool = False,
+    problem: Fittable, theta: FloatArray, starts: FloatArray, spread: float, used: Any, centre: FloatArray,
+    prior: FloatArray, iterations: int, rough: bool = False, bounds: tuple[FloatArray, FloatArray] | None = None,
+    least: float = 0.0,
 ) -> tuple[FloatArray, FloatArray, State, int]:  # fmt: skip
     """Levenberg and Marquardt's iteration: parameters, starts, the state there, and how many steps it took.
 
     With ``rough`` it ends where it makes little way, or has taken all its iterations: a start for another fit.
+    ``bounds`` are the least and the largest parameters; directions of which `inverted` says that they are not
+    determined, at ``least``, are left as they are.
 
     Raises
     ------
     SolveError
-        If it does not settle (`Unsettled`), within the iterations or at all, or a direction of the parameters is not
-        determined.
+        If it does not settle (`Unsettled`), within the iterations or at all, or (where ``least`` is 0) a direction of
+        the parameters is not determined.
     """
     damping = 1e-4
     p = len(theta)
+    low, high = bounds or (np.full(p, -np.inf), np.full(p, np.inf))
     state = problem.derivatives(theta, starts)
     weights = problem.weights(state, spread)
 
@@ -93,19 +126,27 @@ def settle(
                     f"the motion of this fit over {len(problem.pieces)} pieces grows without bound: its records "
                     "are not of the motion that they are taken for"
                 )
-            if np.linalg.cond(shrunk) > 1e13:
+            if least <= 0.0 and np.linalg.cond(shrunk) > 1e13:
                 raise SolveError("the records do not determine all parameters of this fit; give one its value")
-            step = np.linalg.solve(shrunk + damping * np.eye(p), pull / scale) / scale
+            free = _free(theta, pull, low, high)
+            step = np.zeros(p)
+            damped = shrunk[np.ix_(free, free)] + damping * np.eye(len(free))
+            step[free] = np.linalg.solve(damped, pull[free] / scale[free]) / scale[free]
+            if least > 0.0:
+                _, loose = inverted(full[np.ix_(free, free)], least)
+                step[free] -= (loose @ (loose.T @ (step[free] * scale[free]))) / scale[free]
+            step = np.clip(theta + step, low, high) - theta
             moved = starts.copy()
-            for i, (block, cross, part) in enumerate(back):
-                moved[i] += block @ (part - cross @ step[problem.pieces[i].which])
+            for i, (inverse, cross, part) in enumerate(back):
+                moved[i] += inverse @ (part - cross @ step[problem.pieces[i].which])
             trial = problem.residuals(theta + step, moved)
             found = cost(trial, theta + step)
             if np.isfinite(found) and found <= best * (1 + 1e-12):
                 break
             damping *= 8
-            if damping > 1e8:  # no smaller sum of squares: the derivatives' own accuracy is reached, or nothing fits
-                distance, rest = _distance(problem, state, weights, used, theta, centre, prior)
+            # no smaller sum of squares: the derivatives' own accuracy is reached, or nothing fits
+            if damping > (1e4 if least > 0.0 and rough else 1e8):
+                distance, rest = _distance(problem, state, weights, used, theta, centre, prior, low, high, least)
                 if (far := float(np.max(distance))) < _ACCURACY or rough:
                     return theta, starts, state, count
                 raise Unsettled(
@@ -116,7 +157,7 @@ def settle(
         theta, starts, gain, best = theta + step, moved, best - found, found
         state = problem.derivatives(theta, starts)
         # by the undamped step: a damped one is short wherever it is taken
-        distance, rest = _distance(problem, state, weights, used, theta, centre, prior)
+        distance, rest = _distance(problem, state, weights, used, theta, centre, prior, low, high, least)
         far = float(np.max(distance))
         if far < _SETTLED or (far < _ACCURACY and gain < 1e-7 * best) or (rough and gain < _LITTLE * best):
             return theta, starts, state, count
@@ -130,15 +171,24 @@ def settle(
 
 
 def _distance(
-    problem: Problem, state: State, weights: list[FloatArray], used: Any, theta: FloatArray, centre: FloatArray,
-    prior: FloatArray,
+    problem: Fittable, state: State, weights: list[FloatArray], used: Any, theta: FloatArray, centre: FloatArray,
+    prior: FloatArray, low: FloatArray, high: FloatArray, least: float,
 ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
     """Undamped steps in standard uncertainties: the largest of the parameters, then of each start; the parameters'."""
     normal, right, back = reduced(problem, state, weights, used, len(theta))
-    covariance = np.linalg.inv(normal + prior)
-    step = covariance @ (right - prior @ (theta - centre))
+    pull = right - prior @ (theta - centre)
+    free = _free(theta, pull, low, high)
+    covariance = np.zeros_like(normal)
+    covariance[np.ix_(free, free)] = inverted((normal + prior)[np.ix_(free, free)], least)[0]
+    step = covariance @ pull
     far = [float(np.max(np.abs(step) / np.sqrt(np.maximum(np.diag(covariance), 1e-300))))]
-    for piece, (block, cross, part), use in zip(problem.pieces, back, used, strict=True):
-        own = np.abs(block @ (part - cross @ step[piece.which])) / np.sqrt(np.diag(block))
+    for piece, (inverse, cross, part), use in zip(problem.pieces, back, used, strict=True):
+        error = np.linalg.norm(inverse, axis=1)
+        own = np.abs(inverse @ (part - cross @ step[piece.which])) / np.maximum(error, 1e-150)
         far.append(float(np.max(own)) if use else 0.0)
     return np.array(far), np.asarray(step)
+
+
+def _free(theta: FloatArray, pull: FloatArray, low: FloatArray, high: FloatArray) -> Any:
+    """Places of the parameters that are not held at a bound, against which the data push them."""
+    return np.flatnonzero(~(((theta <= low) & (pull < 0)) | ((theta >= high) & (pull > 0))))

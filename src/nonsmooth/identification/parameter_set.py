@@ -105,6 +105,20 @@ class ParameterSet(Mapping[str, float]):
         """Covariance of the parameters and of what is in ``extra``."""
         return self._labelled([*self.estimates, *self.extra], self._covariance)
 
+    @property
+    def residuals(self) -> xr.Dataset:
+        """Readings, fit and residuals over ``sample``, of a set that :func:`nonsmooth.fit` found.
+
+        Raises
+        ------
+        ValueError
+            If it was not made by a fit in this session: residuals are not kept in files.
+        """
+        for finding in self.findings:
+            if finding.name == "fit" and finding.data is not None:
+                return finding.data
+        raise ValueError("this set holds no residuals: they are those of a fit, ns.fit(...), made in this session")
+
     @staticmethod
     def _labelled(names: list[str], matrix: NDArray[np.float64]) -> xr.DataArray:
         import xarray as xr

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Build", "Piece", "Problem", "State", "start_state"]
+from nonsmooth.identification.uncertainty import correlation_times
+
+__all__ = ["Build", "Fittable", "Piece", "Problem", "State", "start_state"]
 
 FloatArray = NDArray[np.float64]
 #: From the parameters of a piece to the vectors ``oscillator``, ``drive``, ``contact`` of `motion.march`.
@@ -50,6 +52,16 @@ class Piece:
     origin: float = 0.0
     coarse: FloatArray | None = None
 
+    n_free = 2  # numbers of its start
+
+    def by_instant(self, rows: FloatArray) -> FloatArray:
+        """Sums of rows over the readings of each instant: there is one."""
+        return rows
+
+    def correlation(self, r: FloatArray) -> float:
+        """Samples that share one independent error."""
+        return correlation_times(r)
+
 
 def start_state(time: FloatArray, x: FloatArray, n: int = 7) -> FloatArray:
     """Position and velocity at the first sample, from a parabola through the first few."""
@@ -67,6 +79,23 @@ class State:
     residuals: list[FloatArray]
     in_parameters: list[FloatArray]
     in_start: list[FloatArray]
+
+
+class Fittable(Protocol):
+    """Problem that the iteration and the covariance take: pieces, each with its start, and their residuals."""
+
+    @property
+    def pieces(self) -> Any:
+        """Each with ``which``, ``n_free``, ``by_instant`` and ``correlation``, as a :class:`Piece`."""
+
+    def residuals(self, theta: FloatArray, starts: FloatArray) -> State:
+        """Residuals of all pieces."""
+
+    def derivatives(self, theta: FloatArray, starts: FloatArray) -> State:
+        """The same with derivatives in the parameters of each piece and in its start."""
+
+    def weights(self, state: State, spread: float) -> list[FloatArray]:
+        """One over each residual's standard deviation."""
 
 
 @dataclass(frozen=True, eq=False)

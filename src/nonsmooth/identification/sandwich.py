@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.identification.arrow import reduced
-from nonsmooth.identification.pieces import Piece, Problem, State
-from nonsmooth.identification.uncertainty import correlation_times
+from nonsmooth.identification.arrow import inverted, reduced
+from nonsmooth.identification.pieces import Fittable, State
 
 __all__ = ["Sandwich", "sandwich"]
 
@@ -27,19 +26,22 @@ class Sandwich(NamedTuple):
 
 
 def sandwich(
-    problem: Problem, theta: FloatArray, starts: FloatArray, spread: float, used: NDArray[np.bool_], prior: FloatArray
-) -> Sandwich:
+    problem: Fittable, theta: FloatArray, starts: FloatArray, spread: float, used: NDArray[np.bool_], prior: FloatArray,
+    least: float = 0.0,
+) -> Sandwich:  # fmt: skip
     """Covariance of the parameters, never smaller along any of them than that of white residuals of the same size.
 
     Parameters
     ----------
-    theta, starts : array (p,), (n_pieces, 2)
+    theta, starts : array (p,), (n_pieces, n)
         The best fit.
     spread : float
         Standard deviation of a reading's instant (s).
     used : array of bool (n_pieces,)
     prior : array (p, p)
         Precision of what was known before.
+    least : float
+        See :func:`nonsmooth.identification.arrow.inverted`.
     """
     p = len(theta)
     state = problem.derivatives(theta, starts)
@@ -51,15 +53,15 @@ def sandwich(
             continue
         g, s = state.in_parameters[i] * weights[i][:, None], state.in_start[i] * weights[i][:, None]
         r = state.residuals[i] * weights[i]
-        block, cross, _ = back[i]
-        scores.append((piece, (g - s @ (block @ cross)), r))
+        inverse, cross, _ = back[i]
+        scores.append((piece, (g - s @ (inverse @ cross)), r))
         chi2 += float(r @ r)
         rows.append(len(r))
-    freedom = max(sum(rows) - 2 * len(rows) - p, 1)
+    freedom = max(sum(rows) - sum(piece.n_free for piece, _, _ in scores) - p, 1)
     size = chi2 / freedom
-    tau = float(np.median([correlation_times(r) for _, _, r in scores]))
+    tau = float(np.median([piece.correlation(r) for piece, _, r in scores]))
     meat = _meat(scores, p)
-    inverse = np.linalg.inv(normal + prior)
+    inverse, _ = inverted(normal + prior, least)
     data = normal * size
     # what the scatter of the scores shows, and never less than white residuals of their size
     raised = np.maximum(1.0, np.sqrt(np.maximum(np.diag(data), 1e-300) / np.maximum(np.diag(meat), 1e-300)))
@@ -68,13 +70,13 @@ def sandwich(
     return Sandwich(state, covariance, size, tau)
 
 
-def _meat(scores: Sequence[tuple[Piece, FloatArray, FloatArray]], p: int) -> FloatArray:
+def _meat(scores: Sequence[tuple[Any, FloatArray, FloatArray]], p: int) -> FloatArray:
     """Sum of products of scores up to a lag of a few correlation times, Bartlett's weights, within pieces."""
     meat = np.zeros((p, p))
     for piece, g, r in scores:
-        score = g * r[:, None]
+        score = piece.by_instant(g * r[:, None])
         here = score.T @ score
-        lags = min(len(r) - 1, int(np.ceil(4 * correlation_times(r))) + 2)
+        lags = min(len(score) - 1, int(np.ceil(4 * piece.correlation(r))) + 2)
         for k in range(1, lags + 1):
             cross = score[k:].T @ score[:-k]
             here += (1.0 - k / (lags + 1)) * (cross + cross.T)

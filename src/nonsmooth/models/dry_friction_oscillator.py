@@ -3,6 +3,9 @@ r"""A harmonically forced mass on a spring with dry friction, on a support that 
 Den Hartog (1931) gave the amplitude of the forced vibration without stops in closed form. With r the forcing frequency
 over the natural one, :math:`V = 1 / (1 - r^2)` and :math:`U = \sin(\pi / r) / (r (1 + \cos(\pi / r)))`, it is
 :math:`\sqrt{V^2 - (f_k U / f_0)^2}` times the static deflection (no viscous damping, no belt).
+
+On a support that moves (Andreaus and Casini 2001) without forcing and damping it sticks from :math:`2 f_k - f_s` to
+:math:`f_s` and slips back for :math:`\pi + 2 \arctan(v_b / (f_s - f_k))`.
 """
 
 from __future__ import annotations
@@ -61,7 +64,8 @@ def dry_friction_oscillator(**parameters: float) -> System:
     References
     ----------
     J. P. Den Hartog, Forced vibrations with combined Coulomb and viscous friction, *Transactions of the ASME* 53 (1931)
-    107-115.
+    107-115; U. Andreaus, P. Casini, Dynamics of friction oscillators excited by a moving base and/or driving force,
+    *Journal of Sound and Vibration* 245 (2001) 685-699.
     """
     from nonsmooth.system.system import System
 

@@ -2,7 +2,9 @@ r"""A Jeffcott rotor that rubs its stator: Jiang & Ulbrich, Nonlinear Dynamics 2
 
 An unbalanced disc on a shaft meets an elastic ring at the clearance R_0, with Coulomb friction. Known in closed form:
 the disc that does not rub whirls on a circle of radius omega^2 / sqrt((beta - omega^2)^2 + (2 zeta omega)^2); in full
-annular rub the radius R solves (R (1 + beta - omega^2) - R_0)^2 + (2 zeta omega R + mu (R - R_0))^2 = omega^4.
+annular rub the radius R solves (R (1 + beta - omega^2) - R_0)^2 + (2 zeta omega R + mu (R - R_0))^2 = omega^4. Far out
+the motion obeys z'' + 2 zeta z' + (1 + beta + i mu) z = 0: backward whirl grows without bound (dry whip) where
+mu > 2 zeta sqrt(1 + beta), 0.102 at the default values.
 """
 
 from __future__ import annotations
@@ -58,7 +60,10 @@ def rubbing_rotor(**parameters: float) -> System:
     **parameters : float
         ``zeta`` 0.05, ``beta`` 0.04 (stiffness of the shaft over that of the stator), ``R_0`` 1.05 (clearance), ``mu``
         0.2 (friction), ``omega`` 0.2 (speed of rotation); dimensionless. The friction does not change its sign: the
-        surface of the disc is taken to be faster than any backward whirl.
+        surface of the disc is taken to be faster than any backward whirl. Above
+        :math:`\mu = 2 \zeta \sqrt{1 + \beta}` a large backward whirl therefore grows without bound (dry whip; a real
+        one ends where the disc rolls on the stator): with the values above runs from near the centre meet it, and end
+        as ``diverged``, from about ``omega`` 0.46 on.
 
     Returns
     -------

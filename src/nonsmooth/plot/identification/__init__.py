@@ -4,6 +4,7 @@ from nonsmooth.plot.identification.amplitude_dependent import backbone, forced_r
 from nonsmooth.plot.identification.amplitude_fit import amplitude_fit
 from nonsmooth.plot.identification.calibration import calibration
 from nonsmooth.plot.identification.decays import drop_decay, free_decay
+from nonsmooth.plot.identification.fit_residuals import fit_residuals
 from nonsmooth.plot.identification.force_displacement import force_displacement
 from nonsmooth.plot.identification.gap import grazing, multiple_shooting
 from nonsmooth.plot.identification.half_power import half_power
@@ -19,6 +20,7 @@ __all__ = [
     "calibration",
     "coverage",
     "drop_decay",
+    "fit_residuals",
     "force_displacement",
     "forced_responses",
     "free_decay",

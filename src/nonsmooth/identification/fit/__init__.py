@@ -1,0 +1,6 @@
+"""Parameters of any system from recordings: multiple shooting with exact derivatives through transitions."""
+
+from nonsmooth.identification.fit.fit import fit
+from nonsmooth.identification.fit.sensors import Sensor
+
+__all__ = ["Sensor", "fit"]

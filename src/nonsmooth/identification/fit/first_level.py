@@ -1,0 +1,169 @@
+"""The fit over the first, short windows: from a guess that may be far off to where longer windows take over.
+
+Far from the solution the noise is taken for as large as a part of the residuals, and the parameters for known about
+their guess to their own size: so no step runs away while the residuals are large, and both fade as they fall. A window
+that fits much worse than most has missed a transition, or has one too many, and no small step of its start mends it;
+its start is then searched anew: from the window before, from the samples, and at random.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.errors import SolveError
+from nonsmooth.identification.arrow import settle
+from nonsmooth.identification.fit.first_windows import first_windows, states_from_samples
+from nonsmooth.identification.fit.windows import Window, Windows
+from nonsmooth.identification.pieces import State
+
+__all__ = ["LEAST", "level", "settle_first"]
+
+FloatArray = NDArray[np.float64]
+LEAST = 1e-13  # eigenvalue of the scaled normal matrix from which a direction counts as determined
+_ROUNDS = 10
+_PART = 1 / 3  # of the residuals: as how large the noise is taken
+_REACH = 4.0  # factor within which parameters stay about their guess at first
+_FAR = 5.0  # mean squared residual of a window over that of most, from which its start is searched anew
+_DRAWN = 60  # starts drawn for such a window
+
+
+def settle_first(
+    problem: Windows, theta: FloatArray, length: float, start: FloatArray | None, free: bool
+) -> tuple[Windows, FloatArray, FloatArray, State]:
+    """Windows, unknowns, starts and residuals of the fit over windows of this length.
+
+    Raises
+    ------
+    SolveError
+        If no window of the record can be simulated.
+    """
+    pieces = first_windows(problem, theta, length, start, free)
+    if not pieces:
+        raise SolveError("the motion of the first guess ends before any window of the record does")
+    now, starts = problem.of(pieces), problem.of(pieces).starts
+    rng = np.random.default_rng(len(pieces))
+    state = now.residuals(theta, starts)
+    used = np.ones(len(pieces), dtype=bool)
+    for _ in range(_ROUNDS):
+        noise = np.maximum(problem.noise, _PART * _sizes(now, state))
+        theta, starts, state = level(_soft(now, noise), theta, starts, used)
+        each = _each(now, state)
+        bad = each > _FAR * max(float(np.median(each)), 1.0)
+        changed = not np.array_equal(bad, ~used)
+        if np.mean(bad) <= 0.5 and _mend(now, theta, starts, each, np.flatnonzero(bad), rng):
+            state, changed = now.residuals(theta, starts), True
+            each = _each(now, state)
+            bad = each > _FAR * max(float(np.median(each)), 1.0)
+        used = ~bad
+        smaller = (_PART * _sizes(now, state) < 0.8 * noise) & (noise > problem.noise)
+        if not changed and not smaller.any():
+            break
+    theta, starts, state = level(now, theta, starts, used)
+    moves = [bool(np.isfinite(r).all()) for r in state.residuals]
+    if all(moves):
+        return now, theta, starts, state
+    kept, starts = now.of([w for w, whole in zip(now.pieces, moves, strict=True) if whole]), starts[moves]
+    if not kept.pieces:
+        raise SolveError("no window of the record can be simulated at the parameters that fit it best")
+    return kept, theta, starts, kept.derivatives(theta, starts)
+
+
+def level(
+    problem: Windows, theta: FloatArray, starts: FloatArray, used: Any = None
+) -> tuple[FloatArray, FloatArray, State]:
+    if not np.isfinite(np.concatenate(problem.residuals(theta, starts).residuals)).all():
+        raise SolveError("a motion over longer windows does not come to its end")
+    u = problem.unknowns
+    used = np.ones(len(starts), dtype=bool) if used is None else used
+    found = settle(problem, theta, starts, 0.0, used, u.centre, u.precision, 30, True, (u.low, u.high), LEAST)
+    return found[0], found[1], found[2]
+
+
+def _soft(problem: Windows, noise: FloatArray) -> Windows:
+    """The problem with this noise; while that is not yet its own, the parameters are known to about their own size."""
+    if (noise <= problem.noise).all():
+        return problem
+    u = problem.unknowns
+    size = np.where(u.guess != 0.0, np.abs(u.guess), np.inf)
+    near, far = np.where(size < np.inf, size / _REACH, -np.inf), _REACH * size
+    low = np.maximum(u.low, np.where(u.guess > 0, near, -far))
+    high = np.minimum(u.high, np.where(u.guess < 0, -near, far))
+    return replace(problem, noise=noise, unknowns=replace(
+        u, precision=u.precision + np.diag(size**-2.0), low=low, high=high
+    ))  # fmt: skip
+
+
+def _rows(problem: Windows, state: State) -> list[tuple[Window, FloatArray]]:
+    return [(w, r[: len(w.readings[0])]) for w, r in zip(problem.pieces, state.residuals, strict=True)]
+
+
+def _sizes(problem: Windows, state: State) -> FloatArray:
+    """Size of the residuals of each quantity, of most windows."""
+    found = np.zeros(len(problem.sensors))
+    for c in range(len(found)):
+        each = [
+            float(np.mean(r[w.readings[1] == c] ** 2)) for w, r in _rows(problem, state) if (w.readings[1] == c).any()
+        ]
+        found[c] = np.sqrt(np.median(each))
+    return found
+
+
+def _each(problem: Windows, state: State) -> FloatArray:
+    """Mean squared residual over the noise, of each window."""
+    return np.array([float(np.mean((r / problem.noise[w.readings[1]]) ** 2)) for w, r in _rows(problem, state)])
+
+
+def _mend(
+    problem: Windows, theta: FloatArray, starts: FloatArray, each: FloatArray, bad: Any, rng: np.random.Generator
+) -> bool:
+    """Look for other starts (and modes) of the bad windows, in place; returns whether one was found."""
+    found = False
+    fixed = replace(problem.unknowns, low=theta, high=theta, centre=theta)
+    for i in bad:
+        best, cost = None, 0.7 * each[i]
+        trials = []
+        for window, start in _others(problem, theta, starts, int(i), rng):
+            one = replace(problem, pieces=[window], unknowns=fixed)
+            trials.append((float(_each(one, one.residuals(theta, start[None, :]))[0]), window, start))
+        for _, window, start in sorted(trials, key=lambda row: row[0])[:3]:
+            one = replace(problem, pieces=[replace(window, start=start)], unknowns=fixed)
+            try:
+                _, moved, state = level(one, theta, start[None, :])
+            except SolveError:
+                continue
+            if (now := float(_each(one, state)[0])) < cost:
+                best, cost = (one.pieces[0], moved[0]), now
+        if best is not None:
+            problem.pieces[i], starts[i], found = best[0], best[1], True
+    return found
+
+
+def _others(
+    problem: Windows, theta: FloatArray, starts: FloatArray, i: int, rng: np.random.Generator
+) -> list[tuple[Window, FloatArray]]:
+    """Other starts of a window: as the window before it ends, as the samples tell, and drawn about these."""
+    window = problem.pieces[i]
+    record = problem.records[window.record]
+    told = states_from_samples(problem, theta, record, slice(window.first, window.first + 1))[0]
+    told = np.append(told, np.full(len(window.start) - len(told), np.nan))
+    found = [(window, starts[i])]
+    values = problem.values(theta, window.record)
+    if i and problem.pieces[i - 1].record == window.record and values is not None:
+        before = problem.pieces[i - 1]
+        shift = problem.shift(theta, window)
+        motion = problem.marcher.run(
+            values, before.begin + shift, np.array([window.begin + shift]), starts[i - 1], before.mode
+        )
+        if motion is not None:
+            found.append((replace(window, mode=int(motion.mode[0])), motion.z[0]))
+    known = np.isfinite(told) & (window.spread > 0)
+    found += [(w, np.where(known, told, z)) for w, z in found]
+    for k in range(_DRAWN):
+        w, z = found[k % len(found)]
+        reach = np.where(known, 0.03, 0.2) * window.spread * rng.standard_normal(len(z))
+        found.append((w, z + reach))
+    return found

@@ -1,0 +1,179 @@
+"""The first windows of a record and their starts: measured states from the samples, hidden ones from a simulation.
+
+The system is simulated window by window at the first guess. At the beginning of each window the states that are
+measured, and those whose rate a measured one has, are set to the record; the others, the memory and the mode go on
+from the window before. So the simulation follows the record, and hidden states follow the simulation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.identification.fit.records import Record
+from nonsmooth.identification.fit.windows import Window, Windows
+
+if TYPE_CHECKING:
+    from nonsmooth.system.system import System
+
+__all__ = ["first_length", "first_windows", "states_from_samples"]
+
+FloatArray = NDArray[np.float64]
+_AROUND = 3  # samples on either side, from which value and slope at a sample are taken
+_SWING = 0.15  # of a quantity's range: what counts as a swing
+_OF_A_SWING = 0.3  # to and fro: the length of the first windows
+WIDE = 3.0  # a start may move by so many times the size of its state
+
+
+def first_length(problem: Windows) -> float:
+    """Length of the first windows: a part of a swing to and fro, and samples enough for a start."""
+    found = []
+    n = problem.marcher.flow.n
+    for record in problem.records:
+        swings = [_turns(record.values[np.isfinite(record.values[:, c]), c]) for c in range(record.values.shape[1])]
+        longest = _OF_A_SWING * 2.0 * record.duration / max(min(swings), 4)
+        found.append(max(longest, (3 * n + 6) * record.duration / (len(record.time) - 1)))
+    return float(np.median(found))
+
+
+def _turns(y: FloatArray) -> int:
+    """Number of turns of a quantity by more than a part of its range."""
+    if not len(y):
+        return 0
+    low, high = np.quantile(y, [0.05, 0.95])
+    least, turns, rising, extreme = _SWING * (high - low), 0, True, y[0]
+    for value in y.tolist():
+        if (value > extreme) == rising:
+            extreme = value
+        elif abs(value - extreme) > least:
+            turns, rising, extreme = turns + 1, not rising, value
+    return turns
+
+
+def first_windows(
+    problem: Windows, theta: FloatArray, length: float, start: FloatArray | None, free: bool
+) -> list[Window]:
+    """Windows of about ``length``, each beginning as far as may be from a transition.
+
+    Parameters
+    ----------
+    start : array (n,), optional
+        First guess of the states at the beginning of each record, or their values where not ``free``.
+    """
+    found: list[Window] = []
+    for i, record in enumerate(problem.records):
+        found += _of_record(problem, theta, i, record, length, start, free)
+    return found
+
+
+def _of_record(
+    problem: Windows, theta: FloatArray, i: int, record: Record, length: float, start: FloatArray | None, free: bool
+) -> list[Window]:
+    n_u, early = len(problem.system.states), _lead(problem, theta, record)
+    memory = problem.system.memory_vector()
+    told = states_from_samples(problem, theta, record, slice(None))
+    z = np.concatenate([np.zeros(n_u) if start is None else start, memory])
+    values = problem.values(theta, i)
+    if values is None:
+        return []
+    period = problem.system.period_at(values)
+    which = problem.unknowns.of_run(i)
+    shift = 0.0 if period is None or not problem.unknowns.phases else float(theta[which[-1]]) * period
+    sizes = np.max(np.abs(np.nan_to_num(told)), axis=0)
+    time, mode, first, windows = record.time, 0, 0, []
+    while first < len(time) - 1:
+        rest = time[-1] - time[first]
+        until = time[-1] if rest < 1.75 * length else time[first] + 1.25 * length
+        end = int(np.searchsorted(time, until, "right"))
+        known = np.append(np.isfinite(told[first]), np.zeros(len(memory), dtype=bool))
+        set_ = np.where(known, np.append(np.nan_to_num(told[first]), memory), z)
+        begin = float(time[first]) - early
+        for candidate in [z] if first == 0 and start is not None else [set_, z]:  # beyond a stop: as it was going
+            motion = problem.marcher.run(values, begin + shift, time[first:end] - early + shift, candidate, mode)
+            if motion is not None:
+                break
+        if motion is None:  # the samples of this window come back when windows are joined
+            first, mode = max(end - 1, first + 1), 0
+            continue
+        sizes = np.maximum(sizes, np.abs(motion.z[:, :n_u]).max(axis=0))
+        last = end if end == len(time) else first + _quiet(motion.time, motion.log.crossing_time, length)
+        spread = np.zeros(len(z)) if first == 0 and not free else np.append(np.ones(n_u), np.zeros(len(memory)))
+        windows.append(
+            Window(i, first, last, begin, candidate, spread, mode, which, time[first:last], record.values[first:last])
+        )
+        if last == len(time):
+            break
+        z, mode = motion.z[last - first].copy(), int(motion.mode[last - first])
+        first = last
+    wide = WIDE * np.append(np.where(sizes > 0, sizes, problem.system.scale_vector()), np.ones(len(memory)))
+    return [replace(window, spread=window.spread * wide) for window in windows]
+
+
+def _lead(problem: Windows, theta: FloatArray, record: Record) -> float:
+    """Time by which a window begins before its first sample: the longest delay that the fit may try."""
+    lead = float(max(problem.delays(theta).max(), 0.0))
+    for k, (_, what) in enumerate(problem.unknowns.sensors, start=len(problem.unknowns.active)):
+        if what == "delay":
+            most = float(problem.unknowns.high[k])
+            lead = max(lead, most if np.isfinite(most) else lead + 10 * float(np.median(np.diff(record.time))))
+    return lead
+
+
+def _quiet(time: FloatArray, crossings: FloatArray, length: float) -> int:
+    """The sample about ``length`` after the first that is farthest from any transition."""
+    near = np.flatnonzero(time - time[0] >= 0.75 * length)
+    near = near[near < len(time) - 1]
+    if not len(near):
+        return len(time) - 1
+    if not len(crossings):
+        return int(near[len(near) // 2])
+    at = np.searchsorted(crossings, time[near])
+    before = np.where(at > 0, time[near] - crossings[np.maximum(at - 1, 0)], np.inf)
+    behind = np.where(at < len(crossings), crossings[np.minimum(at, len(crossings) - 1)] - time[near], np.inf)
+    return int(near[np.argmax(np.minimum(before, behind))])
+
+
+def states_from_samples(problem: Windows, theta: FloatArray, record: Record, which: slice) -> FloatArray:
+    """States (N, n_u) that the samples tell: those measured, and those that are the rate of one; NaN elsewhere."""
+    at = record.time[which]
+    system, names = problem.system, list(problem.system.states)
+    told = np.full((len(at), len(names)), np.nan)
+    rates = _rates(system)
+    measured = problem.sensor_values(theta)
+    for c, (quantity, sensor) in enumerate(measured.items()):
+        if quantity not in names:
+            continue
+        k, have = names.index(quantity), np.flatnonzero(np.isfinite(record.values[:, c]))
+        t, y = record.time[have], (record.values[have, c] - sensor.offset) / sensor.gain
+        value, slope = _local(t, y, at)
+        told[:, k] = value
+        if k in rates and names[rates[k]] not in measured:
+            told[:, rates[k]] = slope
+    return told
+
+
+def _rates(system: System) -> Mapping[int, int]:
+    """States whose rate is another state in every mode that has them: position -> velocity."""
+    traced, found = system.traced, {}
+    for i in range(len(traced.u)):
+        fields = {field[i] for field, lacking in zip(traced.fields, traced.lacking, strict=True) if not lacking[i]}
+        fields.discard(0)
+        if len(fields) == 1 and (rate := next(iter(fields))) in traced.u:
+            found[i] = traced.u.index(rate)
+    return found
+
+
+def _local(t: FloatArray, y: FloatArray, at: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Value and slope at each instant, of the parabola through the nearest samples."""
+    width = min(2 * _AROUND + 1, len(t))
+    first = np.clip(np.searchsorted(t, at) - _AROUND, 0, len(t) - width)
+    rows = first[:, None] + np.arange(width)
+    s = t[rows] - at[:, None]
+    size = np.maximum(np.abs(s).max(axis=1), 1e-300)
+    table = np.stack([np.ones_like(s), s / size[:, None], (s / size[:, None]) ** 2], axis=2)
+    found = np.linalg.pinv(table) @ y[rows][:, :, None]
+    return found[:, 0, 0], found[:, 1, 0] / size

@@ -1,0 +1,265 @@
+"""``fit``: the parameters of any system from recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import islice
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.errors import SolveError
+from nonsmooth.flow.arguments import check_system, real_number, whole_number, yes_or_no
+from nonsmooth.flow.starts import is_one_start, start_states
+from nonsmooth.identification.blas import one_blas_thread
+from nonsmooth.results.progress import Progress, progress
+from nonsmooth.system.names import by_name
+
+if TYPE_CHECKING:
+    from nonsmooth.identification.fit.growth import Grown
+    from nonsmooth.identification.fit.windows import Windows
+    from nonsmooth.identification.parameter_set import ParameterSet
+    from nonsmooth.system.system import System
+
+__all__ = ["fit", "problem_of"]
+
+FloatArray = NDArray[np.float64]
+_SPREAD = 0.5  # other first guesses lie within this factor, exp(+-0.5), of the one that was given
+_PHASES = 8  # first guesses of an unknown phase
+_LONGER = 3.3  # the other length of first windows, in every second try
+_MORE = 3  # guesses that are looked at, for each that is fitted
+
+
+@by_name
+@one_blas_thread()
+def fit(
+    system: System,
+    recording: Any,
+    parameters: Any,
+    *,
+    measured: Any = None,
+    start: Any = None,
+    free_start: bool = True,
+    priors: Any = None,
+    settings: Any = None,
+    runs: Sequence[str] | None = None,
+    time: str = "time",
+    window: float | None = None,
+    tries: int = 8,
+    seed: int = 0,
+    progress: Progress = True,
+) -> ParameterSet:
+    r"""Parameters of a system from recorded motions, with their standard uncertainties.
+
+    The weighted sum of squares
+
+    .. math:: \sum_{k, c} \frac{[y_{kc} - g_c\, q_c(t_k - d_c;\, z_0, p) - o_c]^2}{\sigma_c^2}
+
+    is minimized over the parameters p, the start z_0 of every window, and what is unknown of the sensors (gain g,
+    offset o, delay d). The derivatives of the motion are exact, through every transition, as those of
+    :func:`nonsmooth.sensitivity`. The windows grow from a part of a period to the whole record, as far as the motion
+    can be followed.
+
+    Parameters
+    ----------
+    system : System
+        The model; the values of its parameters are the first guess.
+    recording : Recording, Dataset, DataFrame, mapping or list of these
+        A ``DataFrame`` with a column ``time`` (or time as its index), a ``Dataset`` over ``time``, ``{"x": (t, y)}``,
+        ``{"time": t, "x": y}``, or several runs. Samples that are NaN are missing; channels may have clocks of their
+        own. Times are those of the model: the forcing begins at t = 0, unless the phase is unknown.
+    parameters : sequence of str, or mapping of str to (low, high)
+        What is to be found: parameters of the system, ``"<quantity>.gain"``, ``".offset"`` and ``".delay"`` of sensors,
+        ``"phase"`` (of the forcing at t = 0, in periods, for each run). A mapping gives bounds (None: none).
+    measured : mapping of str to str or Sensor, optional
+        ``{"x": "position channel"}``: which channel shows which state or output of the system, or with which
+        :class:`nonsmooth.Sensor`. Channels named as states or outputs where not given.
+    start : mapping or sequence of floats, optional
+        First guess of the states at the first sample; measured states need none.
+    free_start : bool
+        False: the motion begins exactly at ``start``.
+    priors : mapping of str to (value, standard uncertainty), or ParameterSet, optional
+        What is known before of the unknowns.
+    settings : mapping or sequence, optional
+        Parameters that were set in each run, ``{run: {"omega": 3.0}}``, or in all.
+    runs : sequence of str, optional
+        Runs of a ``Recording``; all where not given.
+    time : str
+        Name of the column or coordinate that holds the time.
+    window : float, optional
+        The longest window, in units of time, for motions that the model can be followed along only so far.
+    tries : int
+        First guesses to try, the given one and others around it (or within the bounds), while none fits.
+    seed : int
+        Of the other first guesses.
+    progress : bool or callable
+        See :func:`nonsmooth.sweep`.
+
+    Returns
+    -------
+    ParameterSet
+        The parameters; in ``extra`` the unknowns of sensors, phases, starts (``"x(0)"``) and ``"<quantity>.noise"``.
+        The covariance takes the residuals' own correlation into account; a parameter that the recording does not
+        determine has an infinite uncertainty and says so in ``identifiability``. ``anomalies`` says where the model
+        fails.
+        ``.residuals`` is a Dataset of the readings, the fit and the residuals over ``sample``, drawn by
+        ``ns.plot.identification.fit_residuals``.
+
+    Raises
+    ------
+    ValueError, TypeError
+        Arguments that do not fit.
+    SolveError
+        No first guess from which the windows of the record can be simulated or fitted.
+
+    References
+    ----------
+    H.G. Bock, in Springer Ser. Chem. Phys. 18 (1981) 102-125; W.K. Newey, K.D. West, Econometrica 55 (1987) 703-708.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import nonsmooth as ns
+    >>> system = ns.models.discontinuous_support()
+    >>> run = ns.simulate(system, periods=6, start={"x": 0.01}, samples=400)
+    >>> found = ns.fit(system.with_parameters(k=9.0), run, ["k", "c"], measured=["x"])
+    >>> round(found["k"], 6) == system.values["k"]
+    True
+    """
+    from nonsmooth.identification.fit.outcome import outcome
+
+    problem = problem_of(system, recording, parameters, measured, priors, settings, runs, time)
+    if start is not None and not is_one_start(start):
+        raise ValueError("fit takes one first guess of the start, for all runs; settings= differ from run to run")
+    begin = None if start is None else start_states(system, start)[0]
+    if not yes_or_no(free_start, "free_start") and begin is None:
+        raise ValueError("free_start=False says that the start is known: give start=, the states at the first sample")
+    longest = np.inf if window is None else real_number(window, "window")
+    if not longest > 0:
+        raise ValueError(f"window = {window!r}: the longest window is a positive time; leave it out for none")
+    tried = whole_number(tries, "tries", 1)
+    best = _best(problem, begin, bool(free_start), longest, tried, whole_number(seed, "seed", 0), progress)
+    options = {"parameters": list(problem.unknowns.names), "window": window, "tries": tries, "seed": seed}
+    given = recording if isinstance(recording, list | tuple) else [recording]
+    return outcome(best, options, synthetic=any(getattr(one, "synthetic", False) for one in given))
+
+
+def problem_of(
+    system: System, recording: Any, parameters: Any, measured: Any = None, priors: Any = None, settings: Any = None,
+    runs: Any = None, time: str = "time",
+) -> Windows:  # fmt: skip
+    """The problem, without windows; the noise is the records' own irregularity."""
+    check_system(system, "fit")
+    from nonsmooth.identification.fit.motion import Marcher
+    from nonsmooth.identification.fit.records import read_records
+    from nonsmooth.identification.fit.unknowns import read_unknowns
+    from nonsmooth.identification.fit.windows import Windows
+
+    if system.is_map:
+        raise ValueError(f"{system.name!r} is a map, whose time is a count: fit takes systems with vector fields")
+    sensors, records = read_records(system, recording, measured, runs=runs, time=time, settings=settings)
+    labels = [record.name for record in records]
+    unknowns = read_unknowns(system, sensors, parameters, priors, labels, [record.settings for record in records])
+    irregular = np.array([
+        max(np.sqrt(np.mean([_irregularity(record.values[:, c]) ** 2 for record in records])), sensor.floor, 1e-300)
+        for c, sensor in enumerate(sensors.values())
+    ])  # fmt: skip
+    return Windows(system, Marcher(system, unknowns.active), records, sensors, unknowns, irregular)
+
+
+def _irregularity(y: FloatArray) -> float:
+    """Standard deviation of white noise that explains the third differences; a motion adds to it."""
+    third = np.diff(y[np.isfinite(y)], 3)
+    return float(np.sqrt(np.median(third**2) / (20.0 * 0.4549))) if len(third) else 0.0
+
+
+def _best(
+    problem: Windows, start: FloatArray | None, free: bool, longest: float, tries: int, seed: int, watched: Progress
+) -> Grown:
+    """The fit from the first guess that leads to one, else the best of all."""
+    from nonsmooth.identification.fit.first_windows import first_length
+    from nonsmooth.identification.fit.growth import grow
+
+    length = min(first_length(problem), longest)
+    best: Grown | None = None
+    why: SolveError | None = None
+    levels = 12
+    with progress(levels * tries, "fit", watched) as advance:
+        for guess, times in islice(_guesses(problem, start, free, length, tries, seed), tries):
+            left = [levels]
+
+            def told(left: list[int] = left) -> None:
+                step = min(left[0], 1)
+                left[0] -= step
+                advance(step)
+
+            try:
+                found = grow(problem, guess, min(times * length, longest), start, free, longest, told)
+            except SolveError as reason:
+                why = reason
+            else:
+                if best is None or found.good or found.rank < best.rank:
+                    best = found
+                if found.good:
+                    return best
+            advance(left[0])
+    if best is None:
+        assert why is not None
+        raise SolveError(
+            f"no fit from any of {tries} first guesses ({why}); start nearer, with system.with_parameters(...) "
+            "and start=, or give bounds"
+        )
+    return best
+
+
+def _guesses(
+    problem: Windows, start: FloatArray | None, free: bool, length: float, tries: int, seed: int
+) -> Iterator[tuple[FloatArray, float]]:
+    """First guesses, and how much longer their first windows are: the given guess, then others, the nearest first.
+
+    The nearest are those whose first windows fit best before any step. Longer windows hold what hidden states do.
+    """
+    u = problem.unknowns
+
+    def far(guess: FloatArray) -> FloatArray:
+        return _distances(problem, guess, start, free, length)
+
+    def with_phases(guess: FloatArray) -> FloatArray:
+        """The guess with the phase of each run, of a few, at which its first windows fit best."""
+        if not u.phases:
+            return guess
+        shared = len(u.names) - u.phases
+        phases = np.arange(_PHASES) / _PHASES
+        every = np.array([far(np.append(guess[:shared], np.full(u.phases, phase))) for phase in phases])
+        return np.append(guess[:shared], phases[np.argmin(every, axis=0)])
+
+    given = with_phases(u.guess)
+    yield given, 1.0
+    yield given, _LONGER
+    rng = np.random.default_rng(seed)
+    drawn = []
+    for _ in range(_MORE * max(tries - 2, 1)):
+        other = u.guess * np.exp(rng.uniform(-_SPREAD, _SPREAD, len(u.guess)))
+        bounded = np.isfinite(u.low) & np.isfinite(u.high)
+        other[bounded] = rng.uniform(u.low[bounded], u.high[bounded])
+        drawn.append(with_phases(np.clip(other, u.low, u.high)))
+    order = np.argsort([float(np.sum(far(guess))) for guess in drawn], kind="stable")
+    yield from ((drawn[i], _LONGER if k % 2 else 1.0) for k, i in enumerate(order))
+
+
+def _distances(problem: Windows, guess: FloatArray, start: FloatArray | None, free: bool, length: float) -> FloatArray:
+    """Mean squared residual of the first windows of each record before any fit, infinite where there is none."""
+    from nonsmooth.identification.fit.first_windows import first_windows
+
+    total, count = np.zeros(len(problem.records)), np.zeros(len(problem.records))
+    windows = problem.of(first_windows(problem, guess, length, start, free))
+    if windows.pieces:
+        weights = windows.weights(None, 0.0)
+        for w, r, weight in zip(
+            windows.pieces, windows.residuals(guess, windows.starts).residuals, weights, strict=True
+        ):
+            if np.isfinite(r).all():
+                total[w.record] += float(np.sum((r * weight) ** 2))
+                count[w.record] += len(r)
+    return np.where(count > 0, total / np.maximum(count, 1), np.inf)

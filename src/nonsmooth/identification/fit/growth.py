@@ -1,0 +1,224 @@
+"""Fits over windows that grow from level to level until one window holds a whole record, or no longer one fits.
+
+Over short windows a sum of squares has one minimum, however chaotic the motion; over long ones the parameters are found
+more accurately. So each level begins where the one before it ended, and a level whose windows are longer than a
+trajectory can be followed is given up (H.G. Bock 1981; H.U. Voss, J. Timmer, J. Kurths, Int. J. Bifurcation and
+Chaos 14 (2004) 1905).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.errors import SolveError
+from nonsmooth.identification.arrow import Unsettled, settle
+from nonsmooth.identification.fit.first_level import LEAST, level, settle_first
+from nonsmooth.identification.fit.windows import Window, Windows
+from nonsmooth.identification.pieces import State
+
+__all__ = ["Grown", "grow"]
+
+FloatArray = NDArray[np.float64]
+_POOR = 50.0  # chi^2 per degree of freedom of the first windows, from which there is no use in longer ones
+_CHAOS = 1e3  # growth of a start's change within a window, from which neighbouring motions are not followed
+_REGULAR = 10.0  # that growth, below which a motion is regular enough to be followed over twice the time
+_WORSE = 1.5  # chi^2 per degree of freedom against that of the level before: a longer window does not fit
+_GOOD, _WHITE = 1.3, 5.0  # residuals over irregularity, and readings that share an error, of a fit that needs no other
+_ROUNDS = 12  # of noise from residuals and residuals from noise
+
+
+@dataclass(frozen=True, eq=False)
+class Grown:
+    """A finished fit.
+
+    Attributes
+    ----------
+    problem : Windows
+        The last windows, with the noise as found.
+    theta, starts : array
+    state : State
+        Residuals there.
+    short : float
+        Distance to the minimum where no step leads on, in standard uncertainties; 0 at a minimum.
+    left : array (p,)
+        That distance in each parameter.
+    rms : float
+        Of the residuals, over the noise that the record's own irregularity shows.
+    stuck : bool
+        Whether longer windows did not fit though neighbouring motions do not separate fast.
+    """
+
+    problem: Windows
+    theta: FloatArray
+    starts: FloatArray
+    state: State
+    short: float
+    left: FloatArray
+    rms: float
+    stuck: bool = False
+
+    @property
+    def unused(self) -> int:
+        """Number of readings in parts of the record that could not be simulated."""
+        given = sum(int(np.isfinite(record.values).sum()) for record in self.problem.records)
+        return given - sum(len(window.readings[0]) for window in self.problem.pieces)
+
+    @property
+    def rank(self) -> tuple[bool, bool, float]:
+        """Order of fits, the better one first."""
+        return self.unused > 0, self.stuck, self.rms
+
+    @property
+    def good(self) -> bool:
+        """Return whether the residuals are what the record's own irregularity leaves, and no more than noise.
+
+        Where a record is sampled so coarsely that its irregularity is the motion itself, the residuals still have to
+        be independent.
+        """
+        tau = [w.correlation(r) for w, r in zip(self.problem.pieces, self.state.residuals, strict=True)]
+        whole = len(self.problem.pieces) == len(self.problem.records)
+        return self.rms <= _GOOD and not self.stuck and not self.unused and (whole or float(np.median(tau)) < _WHITE)
+
+
+def grow(
+    problem: Windows, theta: FloatArray, length: float, start: FloatArray | None, free: bool, longest: float,
+    told: Callable[[], None],
+) -> Grown:  # fmt: skip
+    """Fit from a first guess.
+
+    Parameters
+    ----------
+    problem : Windows
+        Without windows; ``noise`` a first estimate.
+    theta : array (p,)
+    length, longest : float
+        Of the first windows, and of the longest ones.
+    start, free
+        See :func:`first_windows`.
+    told : callable
+        Called once a level is done.
+
+    Raises
+    ------
+    SolveError
+        If not even the first windows can be fitted.
+    """
+    now, theta, starts, state = settle_first(problem, theta, length, start, free)
+    told()
+    wide, poor, stuck = length, _reduced(now, state) > _POOR, False
+    while not poor and len(now.pieces) > len(problem.records) and wide < longest:
+        for factor in (4.0, 2.0):
+            longer = _longer_windows(now, theta, starts, state, min(factor * wide, longest))
+            told()
+            if longer is not None:
+                now, (theta, starts, state), wide = longer[0], longer[1], min(factor * wide, longest)
+                break
+        else:
+            stuck = _spreads(now, starts, state) < _REGULAR
+            break
+    final = _final(now, theta, starts, problem.noise, 2 if poor else _ROUNDS)
+    return replace(final, stuck=stuck)
+
+
+def _longer_windows(
+    problem: Windows, theta: FloatArray, starts: FloatArray, state: State, length: float
+) -> tuple[Windows, tuple[FloatArray, FloatArray, State]] | None:
+    """The fit over windows joined up to ``length``; None where it does not come to an end, or fits much worse."""
+    joined = _joined(problem, starts, length)
+    if len(joined) == len(problem.pieces):
+        return None
+    trial = problem.of(joined)
+    try:
+        found = level(trial, theta, trial.starts)
+    except SolveError:
+        return None
+    if _reduced(trial, found[2]) > _WORSE * max(_reduced(problem, state), 1.0) or _spreads(trial, *found[1:]) > _CHAOS:
+        return None
+    return trial, found
+
+
+def _spreads(problem: Windows, starts: FloatArray, state: State) -> float:
+    """By how much a motion answers to its start, at most, both in units of their own size."""
+    found, sizes = 0.0, np.abs(starts).max(axis=0)
+    for window, slopes in zip(problem.pieces, state.in_start, strict=True):
+        rows = np.abs(slopes[: len(window.readings[0])]) * sizes
+        for c in np.unique(window.readings[1]):
+            size = float(np.ptp(window.values[np.isfinite(window.values[:, c]), c])) or 1.0
+            found = max(found, float(np.max(rows[window.readings[1] == c])) / size)
+    return found
+
+
+def _joined(problem: Windows, starts: FloatArray, length: float) -> list[Window]:
+    """Windows joined up to ``length``, each with the start of its first."""
+    groups: list[list[tuple[Window, FloatArray]]] = []
+    for window, start in zip(problem.pieces, starts, strict=True):
+        here = groups[-1][0][0] if groups else None
+        if here is not None and here.record == window.record and window.time[-1] - here.time[0] <= 1.3 * length:
+            groups[-1].append((window, start))
+        else:
+            groups.append([(window, start)])
+    found = []
+    for k, group in enumerate(groups):
+        head, start = group[0]
+        record = problem.records[head.record]
+        behind = groups[k + 1][0][0] if k + 1 < len(groups) else head
+        # samples between, of windows that could not be simulated, come back here
+        last = behind.first if behind.record == head.record and behind is not head else len(record.time)
+        found.append(replace(
+            head, last=last, start=start, time=record.time[head.first:last], values=record.values[head.first:last]
+        ))  # fmt: skip
+    return found
+
+
+def _reduced(problem: Windows, state: State) -> float:
+    """Sum of squared residuals over the noise, per degree of freedom."""
+    rows = [
+        r[: len(w.readings[0])] / problem.noise[w.readings[1]]
+        for w, r in zip(problem.pieces, state.residuals, strict=True)
+    ]
+    free = sum(w.n_free for w in problem.pieces) + len(problem.unknowns.names)
+    total = sum(map(len, rows))
+    return float(sum(float(r @ r) for r in rows)) / max(total - free, 0.1 * total)
+
+
+def _final(problem: Windows, theta: FloatArray, starts: FloatArray, irregular: FloatArray, rounds: int) -> Grown:
+    """The fit at its minimum, with the noise of each quantity from its residuals."""
+    u, short, left = problem.unknowns, 0.0, np.zeros(len(theta))
+    for _ in range(rounds):
+        noise = _noise(problem, problem.residuals(theta, starts))
+        changed = float(np.max(np.abs(noise / problem.noise - 1.0)))
+        problem = replace(problem, noise=noise)
+        try:
+            theta, starts, _, _ = settle(
+                problem, theta, starts, 0.0, [True] * len(starts), u.centre, u.precision, 50, False, (u.low, u.high),
+                LEAST,
+            )  # fmt: skip
+            short, left = 0.0, np.zeros(len(theta))
+        except Unsettled as reason:  # a sum of squares with corners: grazes, rest
+            theta, starts = reason.values, reason.starts
+            short, left = float(np.max(reason.distance)), reason.step
+        if changed < 0.02:
+            break
+    state = problem.residuals(theta, starts)
+    return Grown(problem, theta, starts, state, short, left, float(np.max(_noise(problem, state) / irregular)))
+
+
+def _noise(problem: Windows, state: State) -> FloatArray:
+    """Standard deviation of a reading of each quantity: from its residuals, or as it is known."""
+    free = sum(w.n_free for w in problem.pieces) + len(problem.unknowns.names)
+    total = sum(len(w.readings[0]) for w in problem.pieces)
+    grow = total / max(total - free, 0.1 * total)
+    found = np.empty(len(problem.sensors))
+    for c, sensor in enumerate(problem.sensors.values()):
+        r = np.concatenate([
+            r[: len(w.readings[0])][w.readings[1] == c] for w, r in zip(problem.pieces, state.residuals, strict=True)
+        ])  # fmt: skip
+        if sensor.noise is not None:
+            found[c] = np.hypot(sensor.noise, sensor.floor)
+        else:
+            found[c] = max(float(np.sqrt(np.mean(r**2) * grow)) if len(r) else 0.0, 0.5 * sensor.floor, 1e-300)
+    return found

@@ -1,0 +1,133 @@
+"""The motion of a window of a record at its samples, with derivatives in its start, in parameters and in its phase."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.flow.engines.engine import Engine, Log, State
+from nonsmooth.flow.engines.methods import engine_for
+from nonsmooth.flow.sensitivity import apart, settled
+from nonsmooth.flow.variational import VariationalFlow
+from nonsmooth.kernels.hybrid import codes
+
+if TYPE_CHECKING:
+    from nonsmooth.system.system import System
+
+__all__ = ["Marcher", "Motion"]
+
+FloatArray = NDArray[np.float64]
+RTOL = 1e-11  # where the flow is not exact: below any noise, and below what a step of a fit changes
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """States at the samples; with derivatives where they were asked for.
+
+    Attributes
+    ----------
+    time : array (N,)
+        The system's time: that of the record, and what the phase adds.
+    z : array (N, n)
+        States and memory.
+    mode, segment : array (N,) of int
+        The mode, and how many transitions came before.
+    log : Log
+    rate : array (N, n), D : array (N, n, n + n_active), of_time : array (N, n)
+        dz/dt; derivatives in the start z and in the active parameters; in the time of the whole window.
+    """
+
+    time: FloatArray
+    z: FloatArray
+    mode: NDArray[np.int64]
+    segment: NDArray[np.int64]
+    log: Log
+    rate: FloatArray | None = None
+    D: FloatArray | None = None
+    of_time: FloatArray | None = None
+
+
+class Marcher:
+    """Marches windows of one system.
+
+    Parameters
+    ----------
+    system : System
+    active : tuple of str
+        The parameters in which to differentiate.
+    """
+
+    def __init__(self, system: System, active: tuple[str, ...]) -> None:
+        self.system, self.traced = system, system.traced
+        self.flow = VariationalFlow.of(system, active)
+        engine = engine_for(system)
+        self.engine: Engine = engine if engine.name == "exact" else engine_for(system, rtol=RTOL)
+        self._tables: tuple[bytes, Any] = b"", None
+
+    def run(
+        self, values: FloatArray, begin: float, times: FloatArray, z: FloatArray, mode: int, derivatives: bool = False
+    ) -> Motion | None:
+        """March from (begin, z, mode) to the samples; None where the run does not come to its end."""
+        period = self.system.period_at(values)
+        n_u = len(self.traced.u)
+        whole = 0.0 if period is None else float(np.floor(begin / period))
+        state = State(z[:n_u].copy(), z[n_u:].copy())
+        state.clock[:2] = (begin, 0.0) if period is None else (begin - whole * period, whole)
+        state.counters[0] = mode
+        # the start itself is a sample too: there the transitions that hold already have been taken
+        if self._tables[0] != values.tobytes():  # many windows at the same parameters
+            self._tables = values.tobytes(), self.engine.prepare(values[None, :])
+        log = self.engine.record(self._tables[1], state, times[-1], np.append(begin, times))
+        if log.status not in (codes.OK, codes.NOT_GUARANTEED):
+            return None
+        u = np.hstack([np.nan_to_num(log.sample_u), log.sample_memory])
+        if not np.isfinite(u).all():
+            return None
+        plain = Motion(times, u[1:], log.sample_mode[1:], log.sample_segment[1:], log)
+        return self._derived(plain, values, begin, z, mode) if derivatives else plain
+
+    def _derived(self, plain: Motion, values: FloatArray, begin: float, z: FloatArray, mode: int) -> Motion:
+        """The same with derivatives: products over the pieces between samples and transitions."""
+        flow, log, n = self.flow, plain.log, self.flow.n
+        size = n + flow.n_active
+        first = int(log.sample_mode[0]), np.concatenate([np.nan_to_num(log.sample_u[0]), log.sample_memory[0]])
+        start = settled(flow, values, (mode, z), first, begin)
+        modes, starts, times, transitions, before = apart(flow, log, first, begin)
+        ends = np.searchsorted(plain.time, times[1:], "left")  # a sample at a crossing is the limit after it
+        cuts = [0, *ends.tolist(), len(plain.time)]
+        t0, t1, z0, of_mode, is_sample = [], [], [], [], []
+        for j, mode_j in enumerate(modes):
+            here = slice(cuts[j], cuts[j + 1])
+            inner = plain.time[here]
+            last = [times[j + 1]] if j + 1 < len(times) else []
+            t0.append(np.concatenate([[times[j]], inner])[: len(inner) + len(last)])
+            t1.append(np.concatenate([inner, last]))
+            z0.append(np.vstack([starts[j][None, :], plain.z[here]])[: len(inner) + len(last)])
+            of_mode.append(np.full(len(inner) + len(last), mode_j))
+            is_sample.append(np.concatenate([np.ones(len(inner), dtype=bool), np.zeros(len(last), dtype=bool)]))
+        t, sample = np.concatenate(t0), np.concatenate(is_sample)
+        legs = flow.segments(values, np.concatenate(of_mode), t, np.concatenate(t1) - t, np.vstack(z0))
+        steps = np.zeros((len(t), size, size))
+        steps[:, :n, :n], steps[:, :n, n:] = legs.Phi, legs.P
+        steps[:, range(n, size), range(n, size)] = 1.0
+        total = np.eye(size)
+        jumps = iter(zip(transitions, times[1:], before, strict=True))
+        D = np.empty((len(plain.time), n, size))
+        k = 0
+        for leg, to_sample in enumerate(sample.tolist()):
+            total = steps[leg] @ total
+            if to_sample:
+                D[k] = total[:n]
+                k += 1
+            else:
+                chain, at, state = next(jumps)
+                total = flow.jump(values, chain, at, state).S @ total
+        rate = legs.f_end[sample]
+        of_time = rate - D[:, :, :n] @ legs.f_begin[0]
+        if start is not None:  # transitions that are taken at once, whenever the window begins
+            of_time += D[:, :, :n] @ start.R_t
+            D = D @ start.R
+        return Motion(plain.time, plain.z, plain.mode, plain.segment, log, rate, D, of_time)

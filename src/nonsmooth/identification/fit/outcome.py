@@ -1,0 +1,205 @@
+"""A finished fit as a ``ParameterSet``: uncertainties, what is not identifiable, and where the model fails."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.identification.arrow import inverted, reduced
+from nonsmooth.identification.finding import Estimate, Finding
+from nonsmooth.identification.fit.first_level import LEAST
+from nonsmooth.identification.fit.growth import Grown
+from nonsmooth.identification.fit.residuals import by_place, residual_data
+from nonsmooth.identification.parameter_set import ParameterSet
+from nonsmooth.identification.sandwich import Sandwich, sandwich
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["outcome"]
+
+FloatArray = NDArray[np.float64]
+_TOGETHER = 0.98  # correlation from which two parameters are said to be known only together
+_POOR = 2.0  # residuals over the record's own irregularity, from which the model is said not to be the motion
+METHOD = (
+    "least squares over windows with free starts, derivatives through every transition (Bock 1981); covariance from "
+    "the scatter of the scores (Newey and West 1987)"
+)
+
+
+def outcome(grown: Grown, options: Mapping[str, Any], synthetic: bool = False) -> ParameterSet:
+    """The parameters, with what is known of how well."""
+    problem, theta = grown.problem, grown.theta
+    u, used = problem.unknowns, np.ones(len(problem.pieces), dtype=bool)
+    found = sandwich(problem, theta, grown.starts, 0.0, used, u.precision, LEAST)
+    weights = problem.weights(found.state, 0.0)
+    normal, _, back = reduced(problem, found.state, weights, used, len(theta))
+    loose = _undetermined(inverted(normal + u.precision, LEAST)[1])
+    starts = _starts(grown, found, back)
+    noise = _noise(grown, found)
+    jacobian = np.vstack([np.eye(len(theta)), starts.jacobian])
+    of_theta = found.covariance + np.outer(grown.left, grown.left)
+    m, s, q = len(theta), len(jacobian), len(noise)
+    covariance = np.zeros((s + q, s + q))
+    covariance[:s, :s] = jacobian @ of_theta @ jacobian.T
+    covariance[m:s, m:s] += starts.own
+    covariance[range(s, s + q), range(s, s + q)] = [one.uncertainty**2 for one in noise.values()]
+    lost = np.flatnonzero(~(np.diag(covariance) >= 0.0))  # of a fit that went so wrong that nothing is left of it
+    for i in sorted({*loose, *lost.tolist()}):
+        covariance[i, :], covariance[:, i] = 0.0, 0.0
+        covariance[i, i] = np.inf
+    values, units = [*theta, *starts.values], [*u.units, *starts.units]
+    rows = [
+        Estimate(float(v), float(np.sqrt(covariance[i, i])), unit)
+        for i, (v, unit) in enumerate(zip(values, units, strict=True))
+    ]
+    a = len(u.active)
+    estimates = dict(zip(u.active, rows[:a], strict=True))
+    extra = {**dict(zip([*u.names[a:], *starts.names], rows[a:], strict=True)), **noise}
+    data = residual_data(grown, options).assign_attrs(synthetic="yes" if synthetic else "no")
+    notes = _notes(grown, found, data)
+    finding = Finding(
+        "fit", next(iter({**estimates, **extra}.values())), METHOD, data.sizes["sample"],
+        tuple(record.name for record in problem.records), tuple(notes), data=data, plot="fit_residuals",
+    )  # fmt: skip
+    return ParameterSet(
+        estimates, covariance, extra=extra, findings=[finding],
+        identifiability=_sentences(grown, covariance[:m, :m], loose, data), notes=notes,
+        anomalies=_anomalies(grown, data), synthetic=synthetic,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _Starts:
+    """Free starts of the records: how they follow the unknowns, and what their own readings leave open."""
+
+    values: list[float]
+    names: list[str]
+    units: list[str]
+    jacobian: FloatArray
+    own: FloatArray
+
+
+def _starts(grown: Grown, found: Sandwich, back: list[Any]) -> _Starts:
+    from scipy.linalg import block_diag
+
+    problem, states = grown.problem, grown.problem.system.states
+    values, names, units, rows, own = [], [], [], [np.zeros((0, len(grown.theta)))], []
+    for i, window in enumerate(problem.pieces):
+        if i and problem.pieces[i - 1].record == window.record:
+            continue
+        inverse, cross, _ = back[i]
+        follows = np.zeros((len(window.start), len(grown.theta)))
+        follows[:, window.which] = -inverse @ cross
+        label = f", {problem.records[window.record].name}" if len(problem.records) > 1 else ""
+        values += grown.starts[i][window.free].tolist()
+        names += [f"{list(states)[k]}(0){label}" for k in window.free]
+        units += [list(states.values())[k] for k in window.free]
+        rows.append(follows[window.free])
+        own.append((inverse @ inverse.T)[np.ix_(window.free, window.free)] * found.reduced)
+    inner = np.asarray(block_diag(*own)) if values else np.zeros((0, 0))
+    return _Starts(values, names, units, np.vstack(rows), inner)
+
+
+def _noise(grown: Grown, found: Sandwich) -> dict[str, Estimate]:
+    """Standard deviations of readings, rounding included, where they were found from the residuals."""
+    problem = grown.problem
+    units = {**problem.system.states, **problem.system.outputs}
+    rows = {}
+    for c, (name, sensor) in enumerate(problem.sensors.items()):
+        n = sum(int(np.sum(window.readings[1] == c)) for window in problem.pieces)
+        if sensor.noise is None and n:
+            size = float(problem.noise[c])
+            unit = units[name] if sensor.gain == 1 else ""
+            rows[f"{name}.noise"] = Estimate(size, size * float(np.sqrt(found.correlation / (2.0 * n))), unit)
+    return rows
+
+
+def _undetermined(directions: FloatArray) -> dict[int, list[int]]:
+    """Places of unknowns that the records leave open, each with those that it may be traded for."""
+    found: dict[int, list[int]] = {}
+    for direction in directions.T:
+        together = [int(i) for i in np.flatnonzero(np.abs(direction) > 1e-3 * np.max(np.abs(direction)))]
+        for i in together:
+            found[i] = sorted({*found.get(i, []), *together})
+    return found
+
+
+def _sentences(
+    grown: Grown, covariance: FloatArray, loose: Mapping[int, list[int]], data: xr.Dataset
+) -> dict[str, str]:
+    """A sentence for each unknown: what it rests on, or that the record does not determine it."""
+    u, theta = grown.problem.unknowns, grown.theta
+    error = np.sqrt(np.diag(covariance))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        correlation = np.nan_to_num(covariance / np.outer(error, error))
+    np.fill_diagonal(correlation, 0.0)
+    rows = {}
+    for i, name in enumerate(u.names):
+        others = [u.names[k] for k in loose.get(i, []) if k != i]
+        closest = int(np.argmax(np.abs(correlation[i])))
+        if i in loose and others:
+            text = f"not identifiable: only a combination of it and {', '.join(others)} is; give one its value"
+        elif i in loose:
+            text = "not identifiable: the recorded motion does not depend on it"
+        elif theta[i] in (u.low[i], u.high[i]):
+            text = "at its bound: the record draws it beyond, so its uncertainty does not hold"
+        elif error[i] > abs(theta[i]) and name in u.active:
+            text = "hardly identifiable: its uncertainty is larger than its value"
+        elif abs(correlation[i, closest]) > _TOGETHER:
+            text = f"known mainly together with {u.names[closest]} (correlation {correlation[i, closest]:.4f})"
+        else:
+            text = f"{data.sizes['sample']} readings of {', '.join(grown.problem.sensors)}"
+        rows[name] = text
+    return rows
+
+
+def _notes(grown: Grown, found: Sandwich, data: xr.Dataset) -> list[str]:
+    problem = grown.problem
+    n, records = len(problem.pieces), len(problem.records)
+    if n == records:
+        notes = [f"one window for each of {records} records" if records > 1 else "one window over the whole record"]
+    else:
+        length = float(np.median([window.time[-1] - window.time[0] for window in problem.pieces]))
+        notes = [
+            f"{n} windows of about {length:.4g}, each with its own start: over longer ones the motion is not followed"
+        ]
+    if found.correlation > 2.0:
+        notes.append(f"the residuals correlate over {found.correlation:.3g} readings; the uncertainties account for it")
+    places = [row for row in by_place(data) if row[2] >= 5]
+    if len(places) > 1:
+        notes.append(
+            "rms of the residuals, over all: 1; " + "; ".join(f"{name}: {rms:.2f}" for name, rms, _ in places[:4])
+        )
+    return notes
+
+
+def _anomalies(grown: Grown, data: xr.Dataset) -> list[str]:
+    found = []
+    if grown.rms > _POOR:
+        name, rms, _ = next(row for row in by_place(data) if row[2] >= min(5, data.sizes["sample"]))
+        found.append(
+            f"the residuals are {grown.rms:.3g} times the record's own irregularity: the model does not describe this "
+            f"record, least of all in {name} ({rms:.2f} times the mean); the uncertainties do not hold"
+        )
+    if grown.unused:
+        found.append(
+            f"{grown.unused} of {grown.unused + data.sizes['sample']} readings are not used: the model has no motion "
+            "there (it begins beyond a stop, or does not come to an end)"
+        )
+    if grown.stuck:
+        length = float(np.median([window.time[-1] - window.time[0] for window in grown.problem.pieces]))
+        found.append(
+            f"the model follows this record over windows of {length:.3g} only, though neighbouring motions do not "
+            "separate faster: it does not describe the record over longer times, or another first guess does"
+        )
+    if grown.short > 0.05:
+        found.append(
+            f"the fit stands {grown.short:.2g} standard uncertainties short of its minimum: the sum of squares has "
+            "corners (grazes, rest), where no step leads on; what is left of the way is in the uncertainties"
+        )
+    return found

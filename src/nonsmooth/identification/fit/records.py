@@ -1,0 +1,198 @@
+"""Recordings of every kind as records: instants, and one column for each measured quantity."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.errors import shortened
+from nonsmooth.experiment.recording import Recording
+from nonsmooth.flow.arguments import float_array, real_number
+from nonsmooth.identification.fit.sensors import Sensor, read_sensors
+from nonsmooth.system.names import unknown
+
+if TYPE_CHECKING:
+    from nonsmooth.system.system import System
+
+__all__ = ["Record", "read_records"]
+
+FloatArray = NDArray[np.float64]
+FORMS = (
+    "a Recording, a Dataset over time, a DataFrame with a column of time (or time as its index), a mapping of channel "
+    "to (t, y), or a list of these"
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """One run: samples of all measured quantities and the parameters that were set in it.
+
+    Attributes
+    ----------
+    name : str
+    time : array (N,)
+        Instants at which at least one quantity was sampled, increasing.
+    values : array (N, c)
+        Readings; NaN where there is none.
+    settings : mapping of str to float
+    """
+
+    name: str
+    time: FloatArray
+    values: FloatArray
+    settings: Mapping[str, float]
+
+    @property
+    def duration(self) -> float:
+        return float(self.time[-1] - self.time[0])
+
+
+def read_records(
+    system: System, recording: Any, measured: Any, *, runs: Sequence[str] | None = None, time: str = "time",
+    settings: Any = None,
+) -> tuple[dict[str, Sensor], list[Record]]:  # fmt: skip
+    """The sensors and the records of a recording.
+
+    Raises
+    ------
+    ValueError, TypeError
+        Something that is no recording, channels that do not exist, times that do not increase, too few samples.
+    """
+    given = list(recording) if isinstance(recording, list | tuple) else [recording]
+    if not given:
+        raise ValueError(f"the list of recordings is empty; give {FORMS}")
+    tables: dict[str, dict[str, tuple[FloatArray, FloatArray]]] = {}
+    for i, one in enumerate(given):
+        found = _tables(system, one, runs, time)
+        for name, table in found.items():
+            label = name if len(given) == 1 else f"{i}" if len(found) == 1 else f"{i} {name}"
+            tables[label] = table
+    channels = list(dict.fromkeys(name for table in tables.values() for name in table))
+    sensors = read_sensors(system, measured, channels)
+    per_run = _settings(system, settings, list(tables))
+    records = []
+    for label, table in tables.items():
+        columns = []
+        for quantity, sensor in sensors.items():
+            if sensor.channel not in table:
+                raise ValueError(
+                    f"measured[{quantity!r}]: {unknown(sensor.channel, 'a channel', f'run {label!r}', list(table))}"
+                )
+            columns.append(table[sensor.channel])
+        records.append(_joined(label, columns, per_run[label]))
+    return sensors, records
+
+
+def _joined(label: str, columns: list[tuple[FloatArray, FloatArray]], settings: Mapping[str, float]) -> Record:
+    """Channels on the union of their clocks."""
+    kept = [(t[ok], y[ok]) for t, y in columns for ok in [np.isfinite(t) & np.isfinite(y)]]
+    time = np.unique(np.concatenate([t for t, _ in kept]))
+    if len(time) < 8:
+        raise ValueError(f"run {label!r} has {len(time)} samples; a fit needs at least 8: give a longer record")
+    values = np.full((len(time), len(kept)), np.nan)
+    for c, (t, y) in enumerate(kept):
+        if (np.diff(t) <= 0).any():
+            where = int(np.flatnonzero(np.diff(t) <= 0)[0])
+            raise ValueError(
+                f"run {label!r}: the time must increase from sample to sample; sample {where + 1} is at "
+                f"{t[where + 1]:.9g} after {t[where]:.9g}: sort the samples, or give each run by itself"
+            )
+        values[np.searchsorted(time, t), c] = y
+    return Record(label, time, values, settings)
+
+
+def _tables(
+    system: System, one: Any, runs: Sequence[str] | None, time: str
+) -> dict[str, dict[str, tuple[FloatArray, FloatArray]]]:
+    """Channels of each run as (t, y)."""
+    if isinstance(one, Recording):
+        wanted = one.runs if runs is None else [runs] if isinstance(runs, str) else runs
+        found: dict[str, dict[str, tuple[FloatArray, FloatArray]]] = {}
+        for run in wanted:
+            if run not in one.runs:
+                raise ValueError(f"runs: {unknown(run, 'a run', 'this recording', list(one.runs))}")
+            found[run] = {}
+            for leaf in one.tree.children[run].children.values():
+                for name, array in leaf.to_dataset().data_vars.items():
+                    found[run][str(name)] = _pair(array[array.dims[0]].values, array.values, str(name))
+        return found
+    if runs is not None:
+        raise ValueError("runs= chooses runs of a Recording; what is given here is one run, so leave it out")
+    if hasattr(one, "data_vars"):
+        return {"run": _of_dataset(system, one, time)}
+    if hasattr(one, "columns") and hasattr(one, "index"):
+        by = time if time in one.columns else None
+        t = one[by].to_numpy() if by is not None else one.index.to_numpy()
+        return {"run": {str(c): _pair(t, one[c].to_numpy(), str(c)) for c in one.columns if c != by}}
+    if isinstance(one, Mapping):
+        if time in one:
+            return {"run": {str(k): _pair(one[time], y, str(k)) for k, y in one.items() if k != time}}
+        made = {}
+        for name, pair in one.items():
+            if not isinstance(pair, list | tuple) or len(pair) != 2:
+                raise TypeError(
+                    f"channel {name!r} must be a pair (t, y), not {shortened(pair)}; or give the instants of all "
+                    f"channels once, under {time!r}"
+                )
+            made[str(name)] = _pair(pair[0], pair[1], str(name))
+        return {"run": made}
+    raise TypeError(f"fit takes {FORMS}, not {shortened(one)}")
+
+
+def _of_dataset(system: System, one: Any, time: str) -> dict[str, tuple[FloatArray, FloatArray]]:
+    """Channels of a Dataset; of a result of ``simulate`` its states and outputs, each instant once."""
+    if time not in one.coords:
+        raise ValueError(f"the Dataset has no coordinate {time!r}; it has {', '.join(map(str, one.coords)) or 'none'}")
+    t = np.asarray(one[time].values)
+    last = np.append(np.diff(t) > 0, True) if len(t) and t.dtype.kind == "f" else np.ones(len(t), dtype=bool)
+    found = {}
+    if "u" in one and one["u"].dims == (time, "state"):  # both limits of a crossing stand there: the second is kept
+        for k, name in enumerate(one["state"].values):
+            found[str(name)] = _pair(t[last], one["u"].values[last, k], str(name))
+    for name, array in one.data_vars.items():
+        if array.dims == (time,) and array.dtype.kind in "fiu":
+            found[str(name)] = _pair(t[last], array.values[last], str(name))
+    return found
+
+
+def _pair(t: Any, y: Any, name: str) -> tuple[FloatArray, FloatArray]:
+    both = float_array(t, f"the time of channel {name!r}"), float_array(y, f"channel {name!r}")
+    if both[0].ndim != 1 or both[0].shape != both[1].shape:
+        raise ValueError(
+            f"channel {name!r} must be as many numbers as its time, in one row; got shapes {both[1].shape} and "
+            f"{both[0].shape}"
+        )
+    return both
+
+
+def _settings(system: System, settings: Any, labels: list[str]) -> dict[str, dict[str, float]]:
+    """Parameters that were set, by run: one mapping for all runs, or ``{run: mapping}``, or a list in their order."""
+    if settings is None:
+        return {label: {} for label in labels}
+    if isinstance(settings, list | tuple):
+        if len(settings) != len(labels):
+            raise ValueError(
+                f"settings lists {len(settings)} runs, the recording has {len(labels)}: {', '.join(labels)}"
+            )
+        settings = dict(zip(labels, settings, strict=True))
+    if not isinstance(settings, Mapping):
+        raise TypeError(
+            f"settings = {shortened(settings)}: allowed are a mapping of parameter to value, a mapping of run to such "
+            "a mapping, and a list of them"
+        )
+    if not all(isinstance(one, Mapping) for one in settings.values()):
+        settings = dict.fromkeys(labels, settings)
+    units = {key: parameter.unit for key, parameter in system.parameters.items()}
+    for label, own in settings.items():
+        if label not in labels:
+            raise ValueError(f"settings: {unknown(label, 'a run', 'this recording', labels)}")
+        for name in own:
+            if name not in system.values:
+                raise ValueError(f"settings: {unknown(name, 'a parameter', repr(system.name), units)}")
+    return {
+        label: {name: real_number(value, name) for name, value in settings.get(label, {}).items()} for label in labels
+    }

@@ -1,0 +1,126 @@
+"""Residuals of a fit with the place in the motion of each: its mode, a transition, a graze."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.identification.fit.growth import Grown
+from nonsmooth.identification.fit.motion import Motion
+from nonsmooth.system.system import System
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["by_place", "residual_data"]
+
+FloatArray = NDArray[np.float64]
+_NEAR = 1.5  # sampling steps from a transition or a graze
+_GRAZING = 0.03  # clearance over the largest size of the indicator, below which a touch is a graze
+
+
+def residual_data(grown: Grown, options: Mapping[str, Any]) -> xr.Dataset:
+    """Readings, fit and residuals over ``sample``, each with its run, quantity, window, mode and place."""
+    import xarray as xr
+
+    from nonsmooth.results.labels import labels_of
+    from nonsmooth.results.provenance import provenance
+
+    problem, theta = grown.problem, grown.theta
+    system = _nominal(grown)
+    labels, marks = _places(system)
+    columns: dict[str, list[Any]] = {
+        name: [] for name in ("time", "run", "quantity", "window", "mode", "place", "measured", "fitted", "noise")
+    }
+    for i, (window, start) in enumerate(zip(problem.pieces, grown.starts, strict=True)):
+        motion = problem.motion(theta, window, start)
+        assert motion is not None
+        predicted, _ = problem.readings(theta, window, motion, False)
+        k, c = window.readings
+        shift = motion.time[0] - problem.instants(theta, window)[0]
+        here = np.minimum(
+            np.searchsorted(motion.time, window.time[k] + shift - problem.delays(theta)[c]), len(motion.time) - 1
+        )
+        columns["time"].append(window.time[k])
+        columns["run"].append(np.full(len(k), window.record))
+        columns["quantity"].append(c)
+        columns["window"].append(np.full(len(k), i))
+        columns["mode"].append(motion.mode[here])
+        columns["place"].append(_of_samples(system, motion, marks)[here])
+        columns["measured"].append(window.values[k, c])
+        columns["fitted"].append(predicted)
+        columns["noise"].append(problem.noise[c])
+    table = {name: np.concatenate(parts) for name, parts in columns.items()}
+    quantities = list(problem.sensors)
+    units = {**system.states, **system.outputs}
+    unit = " ".join(units[q] for q in quantities) if len(quantities) == 1 else "that of the quantity"
+    flags = {
+        "run": [record.name for record in problem.records], "quantity": quantities, "mode": list(system.modes),
+        "place": labels,
+    }  # fmt: skip
+    data = xr.Dataset({name: ("sample", values) for name, values in table.items()})
+    data["residual"] = (data["measured"] - data["fitted"]) / data["noise"]
+    for name, words in flags.items():
+        data[name].attrs = {
+            "flag_values": np.arange(len(words)),
+            "flag_meanings": " ".join(word.replace(" ", "_") for word in words),
+        }
+    for name in ("measured", "fitted", "noise"):
+        data[name].attrs["units"] = unit
+    data["residual"].attrs = {"long_name": "residual over its standard deviation", "units": "1"}
+    data = data.set_coords("time")
+    return data.assign_attrs(provenance(labels_of(system), "fit", dict(options), method=problem.marcher.engine.name))
+
+
+def by_place(data: xr.Dataset) -> list[tuple[str, float, int]]:
+    """Places of the motion with the rms of the normalized residuals there and their number, the worst first."""
+    names = data["place"].attrs["flag_meanings"].split()
+    r, place = data["residual"].values, data["place"].values
+    rows = [(names[i], float(np.sqrt(np.mean(r[place == i] ** 2))), int(np.sum(place == i))) for i in np.unique(place)]
+    return sorted(rows, key=lambda row: -row[1])
+
+
+def _nominal(grown: Grown) -> System:
+    found = dict(zip(grown.problem.unknowns.active, map(float, grown.theta), strict=False))
+    return grown.problem.system.with_parameters(found)
+
+
+def _places(system: System) -> tuple[list[str], dict[tuple[str, int], int]]:
+    """Names of the places, and the place of each mode, transition and touched indicator."""
+    names: list[str] = []
+    marks: dict[tuple[str, int], int] = {}
+    for m, mode in enumerate(system.modes):
+        marks["mode", m] = len(names)
+        names.append(mode)
+    for k, jump in enumerate(system.transitions):
+        label = f"{system.modes[jump.source]}->{system.modes[jump.target]}"
+        if label not in names:
+            names.append(label)
+        marks["transition", k] = names.index(label)
+    for i, indicator in enumerate(system.indicators):
+        marks["graze", i] = len(names)
+        names.append(f"graze of {indicator}")
+    return names, marks
+
+
+def _of_samples(system: System, motion: Motion, marks: Mapping[tuple[str, int], int]) -> NDArray[np.int64]:
+    """The place of each sample of a motion: the nearest transition, a graze, else its mode."""
+    from sympy import lambdify
+
+    found = np.array([marks["mode", int(m)] for m in motion.mode], dtype=np.int64)
+    if len(motion.time) < 2:
+        return found
+    near = _NEAR * float(np.median(np.diff(motion.time)))
+    log, traced = motion.log, system.traced
+    values = system.parameter_vector()
+    for i in np.unique(log.touch_indicator):
+        function = lambdify([traced.t, *traced.u, *traced.m, *traced.p], traced.indicators[i], modules="numpy")
+        size = np.max(np.abs(function(motion.time, *motion.z.T, *values)))
+        for t in log.touch_time[(log.touch_indicator == i) & (log.touch_clearance < _GRAZING * size)]:
+            found[np.abs(motion.time - t) <= near] = marks["graze", int(i)]
+    for t, k in zip(log.crossing_time, log.crossing_transition, strict=True):
+        found[np.abs(motion.time - t) <= near] = marks["transition", int(k)]
+    return found

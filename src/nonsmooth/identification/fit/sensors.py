@@ -1,0 +1,168 @@
+"""``Sensor``: from a state or an output of a system to the numbers of a channel, and its derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.flow.arguments import real_number
+from nonsmooth.system.names import unknown
+
+if TYPE_CHECKING:
+    from nonsmooth.system.system import System
+    from nonsmooth.system.traced import Traced
+
+__all__ = ["OF_A_SENSOR", "Readout", "Sensor", "read_sensors"]
+
+FloatArray = NDArray[np.float64]
+#: What a fit may find of a sensor, as ``"x.offset"``.
+OF_A_SENSOR = ("gain", "offset", "delay")
+
+
+@dataclass(frozen=True)
+class Sensor:
+    r"""A sensor between a state or an output of a system and a channel of a recording.
+
+    .. math:: y(t) = \text{gain} \cdot q(t - \text{delay}) + \text{offset} + \text{noise}
+
+    Parameters
+    ----------
+    channel : str, optional
+        Channel of the recording; the name of the measured quantity where not given.
+    gain, offset, delay : float
+        First guesses where :func:`nonsmooth.fit` is asked for ``"<quantity>.gain"``, ``.offset`` or ``.delay``, and
+        known values elsewhere. The delay is in units of time.
+    resolution : float
+        Distance of two readings that can be told apart (a count of an encoder): the residuals have a variance of at
+        least resolution² / 12.
+    noise : float, optional
+        Standard deviation of a reading, without that of the resolution, where it is known; found from the residuals
+        where not given.
+
+    Examples
+    --------
+    >>> import nonsmooth as ns
+    >>> ns.Sensor("Position", gain=1e-3, resolution=5e-5).gain
+    0.001
+    """
+
+    channel: str = ""
+    gain: float = 1.0
+    offset: float = 0.0
+    delay: float = 0.0
+    resolution: float = 0.0
+    noise: float | None = None
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.channel, str):
+            raise TypeError(f"channel = {self.channel!r}: a sensor's channel is given by its name")
+        for name in ("gain", "offset", "delay", "resolution"):
+            object.__setattr__(self, name, real_number(getattr(self, name), name))
+        if self.gain == 0:
+            raise ValueError("gain = 0: a sensor with this gain shows nothing; give how the channel grows with it")
+        if self.resolution < 0:
+            raise ValueError(f"resolution = {self.resolution}: the distance of two readings is zero or more")
+        if self.noise is not None and not real_number(self.noise, "noise") > 0:
+            raise ValueError(f"noise = {self.noise}: a standard deviation is positive; leave it out where unknown")
+
+    @property
+    def floor(self) -> float:
+        """Least standard deviation of a reading: that of rounding."""
+        return self.resolution / float(np.sqrt(12.0))
+
+
+def read_sensors(system: System, measured: Any, channels: Sequence[str]) -> dict[str, Sensor]:
+    """The measured quantities with their sensors.
+
+    Raises
+    ------
+    ValueError, TypeError
+        A name that is no state and no output; nothing measured.
+    """
+    known = {**system.states, **system.outputs}
+    if measured is None:
+        found = {name: Sensor(name) for name in known if name in channels}
+        if not found:
+            raise ValueError(
+                f"no channel is named as a state or an output of {system.name!r} ({', '.join(known)}); the recording "
+                f"has {', '.join(channels) or 'none'}: say which measures what, measured={{"
+                f"{next(iter(known))!r}: {next(iter(channels), 'channel')!r}}}"
+            )
+        return found
+    if isinstance(measured, str):
+        measured = [measured]
+    if not isinstance(measured, Mapping):
+        measured = {name: name for name in measured}
+    sensors = {}
+    for name, given in measured.items():
+        if name not in known:
+            raise ValueError(unknown(name, "a state or an output", repr(system.name), known))
+        sensor = Sensor(given) if isinstance(given, str) else given
+        if not isinstance(sensor, Sensor):
+            raise TypeError(f"measured[{name!r}] = {given!r}: allowed are the name of a channel and ns.Sensor(...)")
+        sensors[str(name)] = sensor if sensor.channel else replace(sensor, channel=str(name))
+    if not sensors:
+        raise ValueError(f"measured names nothing; allowed: {', '.join(known)}")
+    return sensors
+
+
+class Readout:
+    """A state or an output of a system along a motion, with its derivatives.
+
+    Parameters
+    ----------
+    system : System
+    name : str
+        A state or an output.
+    places : sequence of int
+        Places of the active parameters among the system's.
+    """
+
+    def __init__(self, system: System, name: str, places: Sequence[int]) -> None:
+        self.traced, self.places = system.traced, tuple(places)
+        self.state = (
+            self.traced.u.index(self.traced.u[list(system.states).index(name)]) if name in system.states else -1
+        )
+        self.output = -1 if self.state >= 0 else list(system.outputs).index(name)
+
+    def value(self, t: FloatArray, z: FloatArray, mode: Any, p: FloatArray) -> FloatArray:
+        """Values (N,) at N samples."""
+        if self.state >= 0:
+            return z[:, self.state]
+        return self._evaluate(t, z, mode, p, 0)[:, 0]
+
+    def slopes(self, t: FloatArray, z: FloatArray, mode: Any, p: FloatArray) -> FloatArray:
+        """Derivatives (N, n + n_active + 1) in z = (u, memory), the active parameters and the time."""
+        if self.state >= 0:
+            out = np.zeros((len(t), z.shape[1] + len(self.places) + 1))
+            out[:, self.state] = 1.0
+            return out
+        return self._evaluate(t, z, mode, p, 1)
+
+    def _evaluate(self, t: FloatArray, z: FloatArray, mode: Any, p: FloatArray, which: int) -> FloatArray:
+        out = np.zeros((len(t), 1 if which == 0 else z.shape[1] + len(self.places) + 1))
+        for m in np.unique(mode):
+            here = np.flatnonzero(mode == m)
+            functions = _output(self.traced, self.output, int(m), self.places)[which]
+            columns = (t[here], *z[here].T, *p)
+            for k, function in enumerate(functions):
+                out[here, k] = function(*columns)
+        return out
+
+
+@lru_cache(maxsize=128)
+def _output(
+    traced: Traced, output: int, mode: int, places: tuple[int, ...]
+) -> tuple[tuple[Callable[..., Any], ...], tuple[Callable[..., Any], ...]]:
+    """An output in one mode and its derivatives, of time, states, memory and parameters."""
+    from sympy import lambdify
+
+    expression, arguments = traced.outputs[output][mode], [traced.t, *traced.u, *traced.m, *traced.p]
+    symbols = [*traced.u, *traced.m, *(traced.p[i] for i in places), traced.t]
+    made = [lambdify(arguments, one, modules="numpy") for one in (expression, *(expression.diff(s) for s in symbols))]
+    return (made[0],), tuple(made[1:])

@@ -1,0 +1,244 @@
+"""Windows of records, each with its own free start, as a problem for the iteration of ``arrow.settle``.
+
+The rows of a window are its readings in the order of time, then one for each state of its start: how far the start has
+moved from where it was set, in units of a spread so wide that it only matters for what the window does not determine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.identification.fit.motion import Marcher, Motion
+from nonsmooth.identification.fit.records import Record
+from nonsmooth.identification.fit.sensors import Readout, Sensor
+from nonsmooth.identification.fit.unknowns import Unknowns
+from nonsmooth.identification.pieces import State
+from nonsmooth.identification.uncertainty import correlation_times
+
+if TYPE_CHECKING:
+    from nonsmooth.system.system import System
+
+__all__ = ["Window", "Windows"]
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Window:
+    """A window of a record.
+
+    Attributes
+    ----------
+    record : int
+    first, last : int
+        Its samples: ``first <= k < last``.
+    begin : float
+        Time of its start on the record's clock: that of its first sample, less the longest delay.
+    start : array (n,)
+        States and memory at its start.
+    spread : array (n,)
+        How far each of them may move; 0: not at all.
+    mode : int
+    which : array of int
+        Places of its unknowns.
+    time, values : array (N,), (N, c)
+        Its samples.
+    """
+
+    record: int
+    first: int
+    last: int
+    begin: float
+    start: FloatArray
+    spread: FloatArray
+    mode: int
+    which: NDArray[np.intp]
+    time: FloatArray
+    values: FloatArray
+
+    @cached_property
+    def readings(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Sample and quantity of each reading, in the order of time."""
+        k, c = np.nonzero(np.isfinite(self.values))
+        return k, c
+
+    @cached_property
+    def free(self) -> NDArray[np.intp]:
+        """States of the start that are not known."""
+        return np.flatnonzero(self.spread > 0)
+
+    @property
+    def n_free(self) -> int:
+        return len(self.free)
+
+    def by_instant(self, rows: FloatArray) -> FloatArray:
+        """Sums of rows over the readings of each instant; the rows of the start are left out."""
+        k, _ = self.readings
+        begins = np.flatnonzero(np.diff(k, prepend=-1))
+        return np.asarray(np.add.reduceat(rows[: len(k)], begins, axis=0))
+
+    def correlation(self, r: FloatArray) -> float:
+        """Samples that share one independent error: of the quantity for which they are the most."""
+        _, c = self.readings
+        return max(correlation_times(r[: len(c)][c == one]) for one in np.unique(c))
+
+
+@dataclass(frozen=True, eq=False)
+class Windows:
+    """Windows of all records with the system, its sensors and the unknowns.
+
+    ``noise``: standard deviation of a reading of each quantity, rounding included.
+    """
+
+    system: System
+    marcher: Marcher
+    records: list[Record]
+    sensors: Mapping[str, Sensor]
+    unknowns: Unknowns
+    noise: FloatArray
+    pieces: list[Window] = field(default_factory=list)
+
+    def of(self, pieces: list[Window]) -> Windows:
+        """The same problem with other windows."""
+        return replace(self, pieces=pieces)
+
+    @cached_property
+    def readouts(self) -> list[Readout]:
+        return [Readout(self.system, name, self.marcher.flow.places) for name in self.sensors]
+
+    @cached_property
+    def starts(self) -> FloatArray:
+        """Starts of the windows as they are set (windows, n)."""
+        return np.array([window.start for window in self.pieces])
+
+    def sensor_values(self, theta: FloatArray) -> dict[str, Sensor]:
+        """The sensors at these values of the unknowns."""
+        found = dict(self.sensors)
+        for i, (quantity, what) in enumerate(self.unknowns.sensors, start=len(self.unknowns.active)):
+            value: Any = float(theta[i]) or (1e-300 if what == "gain" else 0.0)
+            found[quantity] = replace(found[quantity], **{what: value})
+        return found
+
+    def values(self, theta: FloatArray, record: int) -> FloatArray | None:
+        """The system's parameters in a record; None where its equations do not allow them."""
+        own = dict(zip(self.unknowns.active, map(float, theta), strict=False))
+        try:
+            return self.system.with_parameters({**self.records[record].settings, **own}).parameter_vector()
+        except (SystemDefinitionError, ValueError):
+            return None
+
+    def phase(self, theta: FloatArray, window: Window) -> float:
+        return float(theta[window.which[-1]]) if self.unknowns.phases else 0.0
+
+    def shift(self, theta: FloatArray, window: Window) -> float:
+        """The system's time less that of the record, from the phase of the run."""
+        values = self.values(theta, window.record) if self.unknowns.phases else None
+        period = None if values is None else self.system.period_at(values)
+        return 0.0 if period is None else self.phase(theta, window) * period
+
+    def motion(self, theta: FloatArray, window: Window, start: FloatArray, derivatives: bool = False) -> Motion | None:
+        """The motion of a window at its samples; where delays differ, at the instants of each quantity in turn."""
+        values = self.values(theta, window.record)
+        if values is None or not np.isfinite(theta).all() or not np.isfinite(start).all():
+            return None
+        shift = self.shift(theta, window)
+        instants = self.instants(theta, window)
+        if instants[0] < window.begin:  # a delay beyond what its bounds allow
+            return None
+        return self.marcher.run(values, window.begin + shift, instants + shift, start, window.mode, derivatives)
+
+    def delays(self, theta: FloatArray) -> FloatArray:
+        return np.array([sensor.delay for sensor in self.sensor_values(theta).values()])
+
+    def instants(self, theta: FloatArray, window: Window) -> FloatArray:
+        """Times on the record's clock at which the motion is needed."""
+        delays = np.unique(self.delays(theta))
+        if len(delays) == 1:
+            return window.time - delays[0]
+        return np.unique((window.time[:, None] - delays).ravel())
+
+    def readings(
+        self, theta: FloatArray, window: Window, motion: Motion, slopes: bool
+    ) -> tuple[FloatArray, FloatArray]:
+        """Predicted readings (R,), and their derivatives (R, unknowns of the window + n) where asked for."""
+        values = self.values(theta, window.record)
+        assert values is not None
+        sensors, u = self.sensor_values(theta), self.unknowns
+        k, c = window.readings
+        n, a, p = self.marcher.flow.n, len(u.active), len(window.which)
+        period, of_period = self.marcher.flow.period(values)
+        phase = self.phase(theta, window)
+        predicted, table = np.empty(len(k)), np.zeros((len(k) if slopes else 0, p + n))
+        offset = 0.0 if not np.isfinite(period) else phase * period
+        for j, (name, sensor) in enumerate(sensors.items()):
+            rows = np.flatnonzero(c == j)
+            at = np.searchsorted(motion.time, window.time[k[rows]] - sensor.delay + offset - 1e-12 * abs(offset))
+            at = np.minimum(at, len(motion.time) - 1)
+            t, z, mode = motion.time[at], motion.z[at], motion.mode[at]
+            readout = self.readouts[j]
+            raw = readout.value(t, z, mode, values)
+            predicted[rows] = sensor.gain * raw + sensor.offset
+            if not slopes:
+                continue
+            assert motion.D is not None and motion.rate is not None and motion.of_time is not None
+            slope = readout.slopes(t, z, mode, values)
+            in_z, in_p, in_t = slope[:, :n], slope[:, n : n + a], slope[:, -1]
+            of_all = np.einsum("ri,rij->rj", in_z, motion.D[at])
+            of_shift = np.einsum("ri,ri->r", in_z, motion.of_time[at]) + in_t
+            table[rows, p:] = sensor.gain * of_all[:, :n]
+            table[rows, :a] = sensor.gain * (of_all[:, n:] + in_p)
+            for i, (quantity, what) in enumerate(u.sensors, start=a):
+                if quantity == name and what == "delay":
+                    table[rows, i] = -sensor.gain * (np.einsum("ri,ri->r", in_z, motion.rate[at]) + in_t)
+                elif quantity == name:
+                    table[rows, i] = raw if what == "gain" else 1.0
+            if u.phases:
+                table[rows, :a] += sensor.gain * phase * of_shift[:, None] * of_period
+                table[rows, p - 1] = sensor.gain * period * of_shift
+        return predicted, table
+
+    def residuals(self, theta: FloatArray, starts: FloatArray) -> State:
+        """Residuals of all windows; not finite where a motion does not come to its end."""
+        return self._state(theta, starts, False)
+
+    def derivatives(self, theta: FloatArray, starts: FloatArray) -> State:
+        """The same with derivatives."""
+        return self._state(theta, starts, True)
+
+    def _state(self, theta: FloatArray, starts: FloatArray, slopes: bool) -> State:
+        state = State([], [], [], [])
+        for window, start in zip(self.pieces, starts, strict=True):
+            motion = self.motion(theta, window, start, slopes)
+            k, c = window.readings
+            free, p = window.free, len(window.which)
+            pulled = (window.start - start)[free]
+            if motion is None:
+                state.fitted.append(np.full((len(k), 1), np.nan))
+                state.residuals.append(np.full(len(k) + len(free), np.inf))
+                state.in_parameters.append(np.zeros((len(k) + len(free), p)))
+                state.in_start.append(np.zeros((len(k) + len(free), len(start))))
+                continue
+            predicted, table = self.readings(theta, window, motion, slopes)
+            state.fitted.append(predicted[:, None])
+            state.residuals.append(np.concatenate([window.values[k, c] - predicted, pulled]))
+            if slopes:
+                table[~np.isfinite(table).all(axis=1)] = 0.0  # behind a graze, where there are no derivatives
+                inner = np.zeros((len(k) + len(free), len(start)))
+                inner[: len(k), free] = table[:, p:][:, free]
+                inner[range(len(k), len(k) + len(free)), free] = 1.0
+                state.in_start.append(inner)
+                state.in_parameters.append(np.vstack([table[:, :p], np.zeros((len(free), p))]))
+        return state
+
+    def weights(self, state: State | None, spread: float) -> list[FloatArray]:
+        """One over the standard deviation of each row."""
+        return [
+            np.concatenate([1.0 / self.noise[w.readings[1]], 1.0 / w.spread[w.free]]) for w in self.pieces
+        ]  # fmt: skip

@@ -1,0 +1,303 @@
+"""Fits of any system: data are closed forms or another program's; derivatives are checked against differences."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from tests.identification.fit_cases import CASES, duffing
+
+import nonsmooth as ns
+from nonsmooth.errors import SolveError
+from nonsmooth.identification.fit.first_windows import first_windows
+from nonsmooth.identification.fit.fit import problem_of
+
+M, K, C, RHO, W = 0.838, 8.47, 0.87, 0.3, 5.0
+
+
+def free():
+    """The oscillator of the first paper with its support far away: linear, so that its motion is a closed form."""
+    return ns.models.discontinuous_support(g=1.0, rho=RHO, omega=W, m=M, k=K, c=C)
+
+
+def closed_form(t, phase=0.0, x0=0.02, v0=0.0):
+    """x of m x'' + c x' + 2 k x = rho cos(omega t + 2 pi phase) from (x0, v0)."""
+    turn = 2j * np.pi * phase
+    response = RHO / (2 * K - M * W**2 + 1j * W * C)
+    decay, wd = C / (2 * M), np.sqrt(2 * K / M - (C / (2 * M)) ** 2)
+    a = x0 - (response * np.exp(turn)).real
+    b = (v0 - (1j * W * response * np.exp(turn)).real + decay * a) / wd
+    steady = (response * np.exp(1j * W * t + turn)).real
+    return steady + np.exp(-decay * t) * (a * np.cos(wd * t) + b * np.sin(wd * t))
+
+
+def normalized(found, truth):
+    return np.array(
+        [(found.estimate(name).value - value) / found.estimate(name).uncertainty for name, value in truth.items()]
+    )
+
+
+@pytest.mark.parametrize(
+    ("system", "start", "measured", "names"),
+    [
+        (ns.models.discontinuous_support, {"x": 0.01, "v": 0.0}, {"x": ns.Sensor(gain=2.0, offset=0.1, delay=0.03)},
+         ["k", "k_s", "g", "omega", "x.gain", "x.offset", "x.delay", "phase"]),
+        (ns.models.impact_oscillator, {"x": 0.1, "v": 0.3}, {"x": "x", "v": ns.Sensor(delay=0.05)},
+         ["k", "c", "d", "e"]),
+        (ns.models.chua_circuit, {"x": 0.3, "y": 0.1, "z": 0.0}, {"y": "y", "diode_force": "f"},
+         ["alpha", "beta", "a", "b"]),
+    ],
+    ids=["support", "impacts", "output"],
+)  # fmt: skip
+def test_derivatives_are_those_of_differences(system, start, measured, names):
+    made = system()
+    length = 4.3 * made.period() if made.period() else 8.0
+    t = np.linspace(0.0, length, 90)
+    data = {
+        getattr(one, "channel", "") or (one if isinstance(one, str) else q): (t, np.cos(t))
+        for q, one in measured.items()
+    }
+    problem = problem_of(made, data, names, measured)
+    theta = problem.unknowns.guess.copy()
+    if "phase" in names:
+        theta[-1] = 0.3
+    begin = np.array([start[name] for name in made.states])
+    problem = problem.of(first_windows(problem, theta, np.inf, begin, True))
+    (window,), starts = problem.pieces, problem.starts
+    assert window.last == len(t)  # one window
+    state = problem.derivatives(theta, starts)
+    n = len(window.readings[0])
+
+    def readings(theta, starts):
+        return -problem.residuals(theta, starts).residuals[0][:n]
+
+    def fourth(f, h):  # of four points: its error is far below that of two
+        return (8 * (f(h) - f(-h)) - (f(2 * h) - f(-2 * h))) / (12 * h)
+
+    for k in range(len(theta)):
+        unit = np.eye(len(theta))[k]
+        found = fourth(lambda h, unit=unit: readings(theta + h * unit, starts), 1e-5 * max(abs(theta[k]), 0.1))
+        assert np.abs(found - state.in_parameters[0][:n, k]).max() < 1e-6 * max(np.abs(found).max(), 1e-3), names[k]
+    for k in range(starts.shape[1]):
+        unit = np.eye(starts.shape[1])[None, k]
+        found = fourth(lambda h, unit=unit: readings(theta, starts + h * unit), 1e-5)
+        assert np.abs(found - state.in_start[0][:n, k]).max() < 1e-6 * np.abs(found).max(), k
+
+
+def test_sensors_and_phase_are_found_from_a_closed_form():
+    rng, t = np.random.default_rng(0), np.arange(0, 20, 0.02)
+    truth = {"k": K, "c": C, "y.offset": 0.004, "y.delay": 0.013, "phase": 0.7, "x(0)": 0.02, "v(0)": 0.0}
+    y = closed_form(t - 0.013, phase=0.7) + 0.004 + 1e-4 * rng.standard_normal(len(t))
+    # the start is where the window begins, before the first sample by the longest delay: compare the others
+    system = free().with_parameters(k=11.0, c=0.6)
+    data = {"encoder": (t, y)}
+    found = ns.fit(system, data, {"k": None, "c": (0.0, None), "x.offset": None, "phase": None},
+                   measured={"x": ns.Sensor("encoder", delay=0.013)})  # fmt: skip
+    assert np.all(np.abs(normalized(found, {"k": K, "c": C, "x.offset": 0.004})) < 3.5)
+    phase = found.estimate("phase")
+    assert abs((phase.value - truth["phase"] + 0.5) % 1.0 - 0.5) < 3.5 * phase.uncertainty
+    assert found.estimate("x.noise").value == pytest.approx(1e-4, rel=0.1)
+    assert found.uncertainty["k"] < 1e-3 * K and not found.anomalies
+
+
+def test_a_delay_and_a_gain_are_found_beside_a_sensor_that_is_known():
+    rng, t = np.random.default_rng(1), np.arange(0, 20, 0.02)
+    x = closed_form(t) + 1e-4 * rng.standard_normal(len(t))
+    late = 250.0 * closed_form(np.maximum(t - 0.031, 0.0)) + 0.02 * rng.standard_normal(len(t))
+    system = free()
+    made = ns.System.from_text(system.to_text())
+    assert made == system
+    both = {"x": (t, x), "v": (t[5:], np.gradient(late, t)[5:])}
+    found = ns.fit(system.with_parameters(k=9.0), both, ["k", "v.gain", "v.delay"],
+                   measured={"x": "x", "v": ns.Sensor("v", gain=200.0, delay=0.02, noise=5.0)})  # fmt: skip
+    assert abs(found["k"] - K) < 4 * found.uncertainty["k"]
+    assert found.estimate("v.gain").value == pytest.approx(250.0, rel=0.02)
+    assert found.estimate("v.delay").value == pytest.approx(0.031, abs=0.002)
+
+
+def test_missing_samples_and_clocks_of_their_own():
+    rng, t = np.random.default_rng(2), np.arange(0, 15, 0.02)
+    x = closed_form(t) + 1e-4 * rng.standard_normal(len(t))
+    x[rng.random(len(t)) < 0.3] = np.nan
+    x[200:320] = np.nan
+    slow = np.arange(0.005, 15, 0.13)
+    v = (closed_form(slow + 1e-6) - closed_form(slow - 1e-6)) / 2e-6 + 1e-3 * rng.standard_normal(len(slow))
+    found = ns.fit(free().with_parameters(k=11.0, c=1.1), {"x": (t, x), "v": (slow, v)}, ["k", "c"])
+    assert np.all(np.abs(normalized(found, {"k": K, "c": C})) < 3.5)
+    assert found.residuals.sizes["sample"] == np.isfinite(x).sum() + len(slow)
+    assert found.estimate("v.noise").value == pytest.approx(1e-3, rel=0.25)
+
+
+def test_a_table_a_dataset_and_a_recording_are_the_same_record():
+    import pandas as pd
+
+    rng, t = np.random.default_rng(3), np.arange(0, 12, 0.03)
+    x = closed_form(t) + 1e-4 * rng.standard_normal(len(t))
+    dataset = xr.Dataset({"position": ("time", x, {"units": "m"})}, {"time": t})
+    recording = ns.Recording.from_runs({"Run #1": {"position": dataset}}, synthetic=True)
+    frame = pd.DataFrame({"time": t, "position": x})
+    given = [frame, frame.set_index("time"), dataset, recording, {"position": (t, x)}, {"time": t, "position": x}]
+    found = [ns.fit(free().with_parameters(k=9.0), one, ["k"], measured={"x": "position"}, tries=1) for one in given]
+    assert len({one["k"] for one in found}) == 1
+    assert [one.synthetic for one in found] == [False, False, False, True, False, False]
+    assert abs(found[0]["k"] - K) < 4 * found[0].uncertainty["k"]
+
+
+def test_several_runs_share_the_parameters_and_keep_their_settings():
+    rng, t = np.random.default_rng(4), np.arange(0, 12, 0.03)
+    system = ns.models.impact_oscillator()
+    case = CASES["impact oscillator"]
+    runs = []
+    for w in (1.1, 1.3):
+        truth = {**case.truth, "omega": w}
+        x = case.motion(truth, {"x": 0.0, "v": 0.1 * w}, t)[:, 0]
+        runs.append({"x": (t, x + 3e-3 * rng.standard_normal(len(t)))})
+    truth = {name: case.truth[name] for name in ("k", "d", "e")}
+    guess = system.with_parameters({**case.truth, "k": 0.8, "d": 0.75, "e": 0.45})
+    found = ns.fit(guess, runs, list(truth), settings=[{"omega": 1.1}, {"omega": 1.3}])
+    assert np.all(np.abs(normalized(found, truth)) < 3.5)
+    assert {"x(0), 0", "x(0), 1"} <= set(found.extra)
+    alone = ns.fit(guess, runs[0], list(truth), settings={"omega": 1.1})
+    assert found.uncertainty["k"] < alone.uncertainty["k"]
+
+
+def test_what_a_record_does_not_determine_is_named():
+    t = np.arange(0, 12, 0.03)
+    x = closed_form(t) + 1e-4 * np.random.default_rng(5).standard_normal(len(t))
+    # a forced motion is the same for m, k, c and rho times any number; the support is never met
+    found = ns.fit(free().with_parameters(k=9.0), {"x": (t, x)}, ["m", "k", "c", "rho", "k_s"], tries=1)
+    for name in ("m", "k", "c", "rho"):
+        assert "not identifiable" in found.identifiability[name] and "combination" in found.identifiability[name]
+        assert found.uncertainty[name] == np.inf
+    assert "does not depend on it" in found.identifiability["k_s"]
+    assert found["k_s"] == free().values["k_s"]
+    assert found["k"] / found["m"] == pytest.approx(K / M, rel=2e-3)  # what it does determine
+
+
+def test_priors_and_bounds():
+    t = np.arange(0, 12, 0.03)
+    x = closed_form(t) + 1e-4 * np.random.default_rng(6).standard_normal(len(t))
+    system = free().with_parameters(k=9.0)
+    plain = ns.fit(system, {"x": (t, x)}, ["k"])
+    u = plain.uncertainty["k"]
+    # the mean of two values by the inverse squares of their uncertainties
+    held = ns.fit(system, {"x": (t, x)}, ["k"], priors={"k": (plain["k"] + 4 * u, u)})
+    assert held["k"] == pytest.approx(plain["k"] + 2 * u, abs=0.1 * u)
+    assert held.uncertainty["k"] == pytest.approx(u / np.sqrt(2), rel=0.05)
+    bound = ns.fit(system, {"x": (t, x)}, {"k": (8.6, 12.0)}, tries=1)
+    assert bound["k"] == 8.6 and "at its bound" in bound.identifiability["k"]
+
+
+def test_a_model_that_is_not_the_motion_is_said_to_fail_where_it_does():
+    case = CASES["impact oscillator"]
+    data, measured, _ = case.recording(0)
+    # without the stop: nothing in the model answers for the impacts
+    system = case.system().with_parameters({**case.truth, "d": 50.0})
+    found = ns.fit(system, data, ["k", "c"], measured=measured, tries=1)
+    assert any("does not describe this record" in sentence for sentence in found.anomalies)
+    assert ns.plot.identification.fit_residuals(found, show="places").has_data()
+
+
+def test_readings_of_which_the_model_has_no_motion_are_counted():
+    case = CASES["impact oscillator"]
+    data, measured, _ = case.recording(0)
+    t, x = data["position"]
+    x = np.where(t > 40.0, 5.0 + 0.01 * np.sin(50 * t), x)  # behind the stop, where nothing moves
+    system = case.system().with_parameters(case.truth)
+    found = ns.fit(system, {"position": (t, x)}, ["k", "c"], measured=measured, tries=1)
+    assert any("readings are not used" in sentence or "over windows of" in sentence for sentence in found.anomalies)
+
+
+@pytest.mark.slow
+def test_coverage_over_ten_systems():
+    seeds, rows, every = 40, [], []
+    for name, case in CASES.items():
+        far, said, silent = [], 0, 0
+        for seed in range(seeds):
+            data, measured, _ = case.recording(seed)
+            try:
+                found = ns.fit(case.guess(seed), data, case.find, measured=measured, progress=False)
+            except SolveError:
+                said += 1
+                continue
+            if found.anomalies:
+                said += 1
+                continue
+            z = normalized(found, {one: case.truth[one] for one in case.find})
+            silent += bool(np.max(np.abs(z)) > 8.0)
+            far.append(z)
+        pooled = np.concatenate(far)
+        every.append(pooled)
+        cover, rms = float(np.mean(np.abs(pooled) < 1.96)), float(np.sqrt(np.mean(pooled**2)))
+        rows.append((name, seeds - said - silent, said, silent, cover, rms))
+        good = seeds - said - silent
+        print(f"{name:22} converged {good:2}, said no {said}, silent {silent}, cover {cover:.3f}, rms {rms:.2f}")
+    pooled = np.concatenate(every)
+    cover, rms = float(np.mean(np.abs(pooled) < 1.96)), float(np.sqrt(np.mean(pooled**2)))
+    print(f"{'all':22} {len(pooled)} intervals, cover {cover:.3f}, rms {rms:.2f}")
+    for name, converged, _, silent, each, _ in rows:
+        assert converged >= 38 and silent == 0, name
+        assert 0.90 <= each <= 0.98, name
+    assert 0.93 <= cover <= 0.97 and 0.85 <= rms <= 1.15
+
+
+@pytest.mark.parametrize("name", ["impact oscillator", "bilinear oscillator"])
+def test_intervals_cover_the_truth_of_another_program(name):
+    case, far = CASES[name], []
+    for seed in range(3):
+        data, measured, _ = case.recording(seed)
+        found = ns.fit(case.guess(seed), data, case.find, measured=measured)
+        assert not found.anomalies
+        far.append(normalized(found, {one: case.truth[one] for one in case.find}))
+    assert np.max(np.abs(far)) < 4.0
+    assert 0.4 < np.sqrt(np.mean(np.square(far))) < 1.7  # of twelve: 0.6 to 1.4 in 95 of 100
+
+
+def test_a_chaotic_record_is_fitted_over_windows_from_one_voltage():
+    case = CASES["Chua's circuit"]
+    data, measured, _ = case.recording(0)
+    found = ns.fit(case.guess(0), data, case.find, measured=measured)
+    assert np.max(np.abs(normalized(found, case.truth))) < 4.0
+    assert max(found.uncertainty[n] / abs(case.truth[n]) for n in case.find) < 0.01
+    assert "windows" in found.notes[0] and not found.anomalies
+
+
+def test_mistakes_are_answered_with_what_to_do():
+    system, t = free(), np.arange(0, 5, 0.05)
+    data = {"x": (t, closed_form(t))}
+    for arguments, sentence in (
+        ({"parameters": ["kk"]}, "`kk` is not an unknown of this fit of 'discontinuous support'; nearest: k"),
+        ({"parameters": []}, "names nothing to be found"),
+        ({"parameters": ["k", "k"]}, "name each once"),
+        ({"parameters": ["k"], "measured": {"y": "x"}}, "is not a state or an output"),
+        ({"parameters": ["k"], "measured": {"x": "z"}}, "`z` is not a channel of run 'run'; all: x"),
+        ({"parameters": {"k": (9.0, 12.0)}}, "lies outside its bounds"),
+        ({"parameters": ["k"], "settings": {"k": 8.0}}, "leave one out"),
+        ({"parameters": ["k"], "priors": {"c": (1.0, 0.1)}}, "is not an unknown of this fit"),
+        ({"parameters": ["k"], "window": -1.0}, "positive time"),
+        ({"parameters": ["k"], "free_start": False}, "give start="),
+    ):  # fmt: skip
+        with pytest.raises(ValueError, match=sentence.replace("(", r"\(")):
+            ns.fit(system, data, **arguments)
+    with pytest.raises(TypeError, match="fit takes a Recording, a Dataset over time, a DataFrame"):
+        ns.fit(system, 3.0, ["k"])
+    with pytest.raises(ValueError, match="the time must increase"):
+        ns.fit(system, {"x": ([*t[::-1].tolist(), 0.0], np.ones(len(t) + 1))}, ["k"])
+    with pytest.raises(ValueError, match="has no forcing period"):
+        ns.fit(ns.models.chua_circuit(), data, ["phase"])
+
+
+def test_a_fit_that_nothing_starts_says_so():
+    system = duffing()  # every window of this record begins beyond the stop
+    t = np.linspace(0, 10, 200)
+    with pytest.raises(SolveError, match=r"no fit from any of 1 first guesses .* start nearer"):
+        ns.fit(system.with_parameters(g=-5.0), {"x": (t, np.cos(t))}, ["a"], tries=1, start={"x": 1.0})
+
+
+def test_a_fit_tells_how_far_it_is_and_is_cancelled():
+    t = np.arange(0, 12, 0.03)
+    heard = []
+    ns.fit(
+        free().with_parameters(k=9.0), {"x": (t, closed_form(t) + 1e-5 * np.sin(1e4 * t))}, ["k"], progress=heard.append
+    )
+    assert heard == sorted(heard) and heard[0] == 0.0 and 0.02 < heard[-1] <= 1.0
+    with pytest.raises(KeyboardInterrupt):
+        ns.fit(free().with_parameters(k=9.0), {"x": (t, closed_form(t))}, ["k"], progress=lambda done: done < 0.01)
