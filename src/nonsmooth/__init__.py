@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from nonsmooth import plot as plot
     from nonsmooth.attractors.basin_fractions import basin_fractions as basin_fractions
     from nonsmooth.attractors.basins import basins as basins
+    from nonsmooth.continuation.bifurcation_diagram import bifurcation_diagram as bifurcation_diagram
     from nonsmooth.continuation.continue_curve import continue_curve as continue_curve
     from nonsmooth.continuation.continue_equilibrium import continue_equilibrium as continue_equilibrium
     from nonsmooth.continuation.continue_orbit import continue_orbit as continue_orbit
@@ -89,6 +90,7 @@ _WHERE = {
     "basins": "attractors.basins",
     "basin_fractions": "attractors.basin_fractions",
     "chart": "diagrams.chart",
+    "bifurcation_diagram": "continuation.bifurcation_diagram",
     "find_orbit": "continuation.find",
     "Orbit": "continuation.orbit",
     "continue_orbit": "continuation.continue_orbit",

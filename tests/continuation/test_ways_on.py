@@ -232,3 +232,40 @@ def test_focus_centre_and_its_large_cycle() -> None:
     orbit = ns.find_orbit(chua(float(near["alpha"])), start={"x": 1.6, "y": 0.05, "z": -1.6})
     assert float(near["period"]) == pytest.approx(orbit.period, abs=1e-9)
     assert near["maximum"].values == pytest.approx(orbit.maximum, abs=1e-9)
+
+
+def ripple(c: float) -> ns.System:
+    """x = g(t) + c with g = (s^3 - 3 e^2 s)(2 + cos t), s = sin t: two extremes within 0.02 rad of each zero of s."""
+
+    def field(on: float) -> Any:
+        def slopes(t: Any, u: Any, p: Any) -> Any:
+            s, k = np.sin(t), np.cos(t)
+            wave, slope = s**3 - 3 * p.e**2 * s, (3 * s * s - 3 * p.e**2) * k
+            return slope * (2 + k) - wave * s + wave * (2 + k) + p.c - u.x, on - u.y
+
+        return slopes
+
+    return ns.System(
+        name="ripple", states=["x", "y"], parameters={"c": c, "e": 0.01}, modes={"low": field(0.0), "high": field(1.0)},
+        indicators={"h": lambda t, u, p: u.x}, period=2 * np.pi,
+        transitions=[ns.Transition("low", "high", when="h > 0"), ns.Transition("high", "low", when="h < 0")],
+    )  # fmt: skip
+
+
+def test_touches_between_two_samples_of_a_step() -> None:
+    """The four extremes of g are grazes, each at the c that takes it to zero; sampled slopes show none of them."""
+
+    def g(t: float) -> float:
+        s = np.sin(t)
+        return float((s**3 - 3e-4 * s) * (2 + np.cos(t)))
+
+    grazes = [-g(brentq(lambda t: (g(t + 1e-7) - g(t - 1e-7)) / 2e-7, t - 5e-3, t + 5e-3, xtol=1e-15))
+              for t in (-0.01, 0.01, np.pi - 0.01, np.pi + 0.01)]  # fmt: skip
+    branch = ns.continue_orbit(ns.find_orbit(ripple(-2e-5)), "c", (-2.5e-5, 2.5e-5))
+    whole(branch, "c", -2.5e-5, 2.5e-5)
+    special = ns.special_points(branch)
+    assert set(special["kind"].values) == {"grazing"} and set(special["touched"].values) == {"h"}
+    assert special["c"].values == pytest.approx(sorted(grazes), abs=1e-13)
+    for c, crossings in ((-1e-5, 2), (-4e-6, 4), (0.0, 6), (4e-6, 4), (1e-5, 2)):
+        near = branch.isel(point=int(np.abs(branch["c"].values - c).argmin()))
+        assert int(near["crossings_per_period"]) == crossings

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,6 +16,7 @@ from nonsmooth.continuation.events import (
     at_section,
     edge_before_fold,
     first_met,
+    first_unseen,
     passed,
     smooth_events,
     swing,
@@ -21,6 +24,7 @@ from nonsmooth.continuation.events import (
 from nonsmooth.continuation.leaving import change_of_signature, passed_by
 from nonsmooth.continuation.marches import Limits, March, Place, march_until
 from nonsmooth.continuation.path import VIOLATIONS
+from nonsmooth.continuation.rounds import Rounds
 from nonsmooth.errors import SystemDefinitionError
 
 __all__ = ["march"]
@@ -43,7 +47,7 @@ def _follow(found: March, curve: Curve, point: Point, limits: Limits, first_step
     ds = first_step
     if curve.shooting.reference is not None:
         point = curve.anchored_anew(point)
-    tests = Tests(curve)
+    tests, rounds, watched = Tests(curve), Rounds(curve.shooting), not limits.virtual
     numbers, violation = tests.smooth(point), point.path.violation()
     before: Point | None = None
     circle: Place | None = None
@@ -59,7 +63,7 @@ def _follow(found: March, curve: Curve, point: Point, limits: Limits, first_step
         cosine = float(new.tangent @ point.tangent)
         spread = chordal(new.multipliers, point.multipliers)
         if ds > 1e-6 and (cosine < COSINE or spread > SPREAD):
-            ds *= max(0.2, min(0.7, 0.7 * SPREAD / spread))
+            ds *= max(0.2, min(0.7, 0.7 * SPREAD / max(spread, 1e-12)))
             continue
         numbers_new, violation_new = tests.smooth(new), new.path.violation()
         # What was met on this step, in the order in which it was met
@@ -92,6 +96,12 @@ def _follow(found: March, curve: Curve, point: Point, limits: Limits, first_step
         if met:
             stop, stop_point, reason = met[0][1], met[0][2], "change"
             numbers_new = tests.smooth(stop_point)
+        elif watched and not reason and not rounds.shows(curve.shooting, new.X, new.solved.values):
+            there = first_unseen(curve, rounds, point, new)
+            if there is not None:
+                met = [("unseen", *there)]
+                stop, stop_point, reason = *there, "change"
+                numbers_new = tests.smooth(stop_point)
         back = came_back(limits.closed, curve, point, new) if len(found.rows) > 2 else None
         if back is not None and back <= stop:
             stop, stop_point, reason = back, curve.between(point, new, back) or new, "closed"
@@ -117,11 +127,19 @@ def _follow(found: March, curve: Curve, point: Point, limits: Limits, first_step
             break
         if reason == "change":
             after = change_of_signature(found, curve, met)
+            if after is None and met[0][0] == "unseen":
+                warnings.warn(
+                    f"a simulation of the orbit at {curve.shooting.active[0]} = {float(stop_point.X[-1])!r} takes "
+                    "other transitions than the branch: its points from here on are not confirmed",
+                    RuntimeWarning, stacklevel=2,
+                )  # fmt: skip
+                watched = False
+                continue
             if after is None:
                 break
             curve, point = after
             before, ds = None, 0.1 * limits.largest
-            tests = Tests(curve)
+            tests, rounds, watched = Tests(curve), Rounds(curve.shooting), not limits.virtual
             numbers, violation = tests.smooth(point), point.path.violation()
             found.add(curve, point)
             continue

@@ -12,16 +12,19 @@ from nonsmooth.continuation.arclength import Curve, Point
 from nonsmooth.continuation.detection import SMOOTH, Tests, locate
 from nonsmooth.continuation.multipliers import multipliers_of
 from nonsmooth.continuation.path import VIOLATIONS
+from nonsmooth.continuation.rounds import Rounds
 from nonsmooth.continuation.solve import determinant
 from nonsmooth.continuation.switching import branch_point, is_doubled
 
 __all__ = [
-    "BESIDE", "Event", "at_edge", "at_section", "edge_before_fold", "first_met", "passed", "smooth_events", "swing",
+    "BESIDE", "Event", "at_edge", "at_section", "edge_before_fold", "first_met", "first_unseen", "passed",
+    "smooth_events", "swing",
 ]  # fmt: skip
 
 FloatArray = NDArray[np.float64]
 Event = tuple[str, float, Point]  # kind, distance from the last point, the orbit there
 NOTHING = 2e-2  # of the first orbit's size: a fold there is the cycle's birth
+UNSEEN = 1e-10  # along the branch: as near as an event is located that only simulations show
 TURN = 1e-5  # along the branch: a fold nearer to a crossing of branches than this is that crossing
 EXPLAINS = ("short", "slow", "own", "touch", "others", "landed")
 BESIDE = 1e-6  # along the branch: nearer to a change of signature than this is the change itself
@@ -58,6 +61,23 @@ def first_met(curve: Curve, a: Point, b: Point, tests: Tests, crossed: list[str]
     first = min(s for _, s, _ in located)
     together = [event for event in located if event[1] <= first + BESIDE]
     return sorted(together, key=lambda event: EXPLAINS.index(event[0]))
+
+
+def first_unseen(curve: Curve, rounds: Rounds, a: Point, b: Point) -> tuple[float, Point] | None:
+    """The first place on the step from a to b where a simulated round takes other transitions than the signature.
+
+    Margins are looked at in parts of a step: of two extremes within a part none shows. A simulation isolates them."""
+    low, high, there = 0.0, float(a.tangent @ (b.Y - a.Y)), b
+    while high - low > UNSEEN:
+        middle = 0.5 * (low + high)
+        point = curve.between(a, b, middle)
+        if point is None:
+            return None
+        if rounds.shows(curve.shooting, point.X, point.solved.values):
+            low = middle
+        else:
+            high, there = middle, point
+    return high, there
 
 
 def swing(curve: Curve, point: Point) -> float:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 from nonsmooth.continuation.arclength import Curve, Point
 from nonsmooth.continuation.change import Change, common_point, contacts, past_the_section
 from nonsmooth.continuation.equilibrium import Equilibria
@@ -23,6 +25,8 @@ def change_of_signature(found: March, curve: Curve, met: list[Event]) -> tuple[C
                 found.ending = "no_convergence"
             return after
     beyond = beside(curve, met[0][2])
+    if beyond is None and met[0][0] == "unseen":
+        return None
     name = _mark(found, curve, met, beyond)
     if beyond is None and _is_centre(curve, met):
         found.ending = found.special[-1].kind = "focus_centre"
@@ -64,8 +68,12 @@ def _mark(found: March, curve: Curve, met: list[Event], beyond: tuple[Curve, Poi
                 _mark_graze(found, curve, there, change, beyond)
                 return "grazing"
     own = contacts(curve, point, kind)
-    name = "grazing" if own or kind in ("touch", "slow") else "corner"
-    found.mark(name, curve, point, indicator=own[0].indicator if own else _indicator(curve, point, kind))
+    name = "grazing" if own or kind in ("touch", "slow", "unseen") else "corner"
+    if kind == "unseen" and beyond is not None:
+        indicator = _gained(curve, beyond[0])
+    else:
+        indicator = own[0].indicator if own else _indicator(curve, point, kind)
+    found.mark(name, curve, point, indicator=indicator)
     return name
 
 
@@ -75,6 +83,15 @@ def _mark_graze(found: March, curve: Curve, point: Point, change: Change, after:
     judged = graze(curve, point, first, change)
     free = (curve, point) if change.gained else (fresh, common_point(curve, point, change) or first)
     found.mark("grazing", *free, indicator=change.indicator, graze=judged)
+
+
+def _gained(curve: Curve, fresh: Curve) -> int:
+    """The indicator of the first transition that another signature has more often (-1: none)."""
+    more = Counter((v.transition, v.row) for v in fresh.shooting.signature.crossings)
+    more.subtract((v.transition, v.row) for v in curve.shooting.signature.crossings)
+    transitions = curve.shooting.system.traced.transitions
+    rows = [transitions[k].rows[row].indicator for (k, row), n in more.items() if n > 0 and row >= 0]
+    return rows[0] if rows else -1
 
 
 def _indicator(curve: Curve, point: Point, kind: str) -> int:

@@ -61,12 +61,12 @@ def _at(curve: Curve, point: Point, side: float, aside: float) -> tuple[Curve, P
             found = other.at_parameter(X / other.scale, float(there[0]))
             if found is None or not _apart(curve, point, found) < NEAR:
                 break
-            guess = rounds.read(other.shooting, found.X, values)
-            if guess is None or guess.signature.cycle != other.shooting.signature.cycle:
-                continue  # not an orbit of the system: the signature that its round shows is next
-            if (found.path.violation() >= 0.0).all() and _arrives(curve, point, other, found, here):
+            if (found.path.violation() >= 0.0).all() and rounds.shows(other.shooting, found.X, values):
+                if not _arrives(curve, point, other, found, here):
+                    break
                 facing = side * float(found.tangent[-1]) >= 0.0
                 return other, found if facing else found.turned()
+            guess = rounds.read(other.shooting, found.X, values)  # no orbit of the system: what its round shows is next
     return None
 
 

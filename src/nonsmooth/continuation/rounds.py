@@ -6,6 +6,7 @@ The simulation isolates every crossing, so a round that shows an orbit's own sig
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from nonsmooth.kernels.hybrid import codes
 
 if TYPE_CHECKING:
     from nonsmooth.continuation.shooting import Shooting
-    from nonsmooth.flow.engines.engine import Log
+    from nonsmooth.flow.engines.engine import Engine, Log
 
 __all__ = ["Rounds"]
 
@@ -45,27 +46,55 @@ class Rounds:
         """The round at ``values`` from the middle of the longest visit of an orbit, its state changed by ``change``.
 
         None where it fails, or does not come back to the mode where it began."""
+        i, begin, z, period = self._middle(shooting, X, values)
+        mode = int(shooting.modes[i])
+        own = np.ones(len(z), dtype=bool)
+        own[: len(self.system.states)] = [not lacks for lacks in self.system.traced.lacking[mode]]
+        z = np.where(own, z + change, z)
+        return (self._forced if shooting.forced else self.free)(values, z, mode, begin, period)
+
+    def shows(self, shooting: Shooting, X: FloatArray, values: FloatArray) -> bool:
+        """Return whether the round of an orbit takes the transitions of its signature; True where it fails.
+
+        What the exact flow denies the series are asked too."""
+        i, begin, z, period = self._middle(shooting, X, values)
+        taken = [visit.transition for visit in shooting.signature.crossings]
+        for engine in (lambda: self.engine, lambda: self.second):
+            log = self._run(values, z, int(shooting.modes[i]), begin, begin + period, [], engine())
+            if log is None or log.crossing_transition.tolist() == taken[i:] + taken[:i]:
+                return True
+        return False
+
+    @cached_property
+    def second(self) -> Engine:
+        """The engine that is asked where the first one denies a signature."""
+        return self.engine if self.engine.name != "exact" else engine_for(self.system, "taylor", rtol=RTOL)
+
+    def _middle(
+        self, shooting: Shooting, X: FloatArray, values: FloatArray
+    ) -> tuple[int, float, FloatArray, float]:
+        """The longest visit of an orbit, time and state in its middle, and the period."""
         times, states = shooting.split(X)
-        traced, forced = self.system.traced, shooting.forced
-        T = self.flow.period(values)[0]
-        period = self.period_number * T if forced else float(X[shooting.size - 1])
+        forced = shooting.forced
+        period = self.period_number * self.flow.period(values)[0] if forced else float(X[shooting.size - 1])
         ends = np.concatenate([[0.0], times, [period]])
         i = int(np.diff(ends).argmax()) if forced else 0  # without forcing the section lies within a visit
-        mode, begin = int(shooting.modes[i]), float(ends[i])
+        begin = float(ends[i])
         into = 0.5 * float(ends[i + 1] - begin) if forced else 0.0
-        z = self.flow.segments(values, [mode], [begin], [into], states[i][None, :]).z[0]
-        own = np.ones(len(z), dtype=bool)
-        own[: len(traced.u)] = [not lacks for lacks in traced.lacking[mode]]
-        z = np.where(own, z + change, z)
-        return (self._forced if forced else self.free)(values, z, mode, begin + into, period)
+        z = self.flow.segments(values, shooting.modes[i : i + 1], [begin], [into], states[i][None, :]).z[0]
+        return i, begin + into, z, period
 
-    def _run(self, values: FloatArray, z: FloatArray, mode: int, begin: float, until: float, at: Any) -> Log | None:
+    def _run(
+        self, values: FloatArray, z: FloatArray, mode: int, begin: float, until: float, at: Any,
+        engine: Engine | None = None,
+    ) -> Log | None:  # fmt: skip
         n = len(self.system.states)
         state = State(z[:n].copy(), z[n:].copy())
         state.counters[0], state.settled = mode, True
         T = self.flow.period(values)[0]
         state.clock[:] = (begin % T, begin // T, T) if np.isfinite(T) else (begin, 0.0, 0.0)
-        log = self.engine.record(self.engine.prepare(values[None, :]), state, until, np.asarray(at, dtype=float))
+        engine = engine or self.engine
+        log = engine.record(engine.prepare(values[None, :]), state, until, np.asarray(at, dtype=float))
         return log if log.status in (codes.OK, codes.NOT_GUARANTEED) else None
 
     def _forced(self, values: FloatArray, z: FloatArray, mode: int, begin: float, period: float) -> Guess | None:

@@ -59,7 +59,10 @@ def special_points(branch: Any) -> xr.Dataset:
     # The touched indicator is a word of each row, beside the dim of the clearances.
     marks["touched"] = marks.pop("indicator")
     table = table.assign({stem: variable.variable for stem, variable in marks.items()})
-    table["period_number"] = branch["period_number"]
+    if "special_period_number" in branch:  # branches of a bifurcation diagram
+        table["period_number"], table["branch"] = (branch[f"special_{k}"].variable for k in ("period_number", "branch"))
+    else:
+        table["period_number"] = branch["period_number"]
     table.attrs = dict(branch.attrs)
     return table[["kind", name, *[key for key in table.data_vars if key not in ("kind", name)]]]
 

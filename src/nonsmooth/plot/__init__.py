@@ -9,6 +9,7 @@ from nonsmooth.plot import identification
 from nonsmooth.plot.basin_fractions import basin_fractions
 from nonsmooth.plot.basins import basins
 from nonsmooth.plot.bifurcation import bifurcation
+from nonsmooth.plot.bifurcation_diagram import bifurcation_diagram
 from nonsmooth.plot.branch import branch
 from nonsmooth.plot.chart import chart
 from nonsmooth.plot.comparison_diagram import comparison_diagram
@@ -39,6 +40,7 @@ __all__ = [
     "basin_fractions",
     "basins",
     "bifurcation",
+    "bifurcation_diagram",
     "branch",
     "chart",
     "comparison_diagram",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -14,7 +15,7 @@ from nonsmooth.results.provenance import with_short_record
 from nonsmooth.results.schema import floats, parameter_coords, quantity_attributes, state_coords, strings, varied
 from nonsmooth.results.statuses import flag_attributes, status_attributes
 
-__all__ = ["branch", "curve", "equilibria"]
+__all__ = ["branch", "curve", "diagram", "equilibria"]
 
 #: Dims and long names of what a branch holds for every point, and for every special point.
 _BRANCH_ARRAYS: dict[str, tuple[tuple[str, ...], str]] = {
@@ -90,6 +91,87 @@ def branch(
     coords["indicator"] = ("indicator", strings(d.indicators), {"long_name": "indicator"})
     variables |= _ends(endings, ended, sentences)
     return with_short_record(xr.Dataset(variables, coords, dict(attrs)))
+
+
+def diagram(
+    attrs: Mapping[str, Any],
+    parameter: str,
+    branches: Sequence[xr.Dataset],
+    returns: Sequence[NDArray[np.float64]],
+    parents: Sequence[int],
+    swept: xr.Dataset,
+    complete: bool,
+) -> xr.Dataset:
+    """The result of ``bifurcation_diagram``: branches one after the other over ``point``, and the sweeps.
+
+    ``returns`` (point, period number, state): all section points of each branch; ``parents`` the branches they leave.
+    """
+    texts: dict[str, int] = {}
+    layouts: dict[str, int] = {}
+    width = max(one.sizes["unknown"] for one in branches)
+    longest = max(points.shape[1] for points in returns)
+    parts, offset = [], 0
+    for k, (one, points) in enumerate(zip(branches, returns, strict=True)):
+        own = str(one["signature"].attrs["flag_meanings"]).split()
+        ids = np.array([texts.setdefault(text, len(texts)) for text in own], dtype=np.int32)
+        tables = [json.dumps(table) for table in json.loads(one.attrs["layouts"])]
+        kept = np.array([layouts.setdefault(table, len(layouts)) for table in tables], dtype=np.int32)
+        number = int(one["period_number"])
+        room = {"unknown": (0, width - one.sizes["unknown"])}
+        part = one[[*_BRANCH_ARRAYS, "status", *(stem for stem, _, _ in _MARKS.values()), "special_value"]]
+        part = part.pad(room, constant_values=np.nan)
+        part["signature"] = ("point", ids[one["signature"].values])
+        part["layout"] = ("point", kept[one["layout"].values])
+        part["special_point"] = ("special", one["special_point"].values + offset)
+        part["branch"] = ("point", np.full(one.sizes["point"], k))
+        part["special_branch"] = ("special", np.full(one.sizes["special"], k))
+        part["special_period_number"] = ("special", np.full(one.sizes["special"], number))
+        all_returns = np.full((len(points), longest, points.shape[2]), np.nan)
+        all_returns[:, : points.shape[1]] = points
+        part["returns"] = (("point", "return", "state"), all_returns)
+        parts.append(part)
+        offset += one.sizes["point"]
+    lines = [part.drop_dims("special") for part in parts]
+    marks = [part[[name for name in part if "special" in part[name].dims]] for part in parts]
+    result = xr.merge([
+        xr.concat(lines, "point", data_vars="minimal", coords="minimal", compat="override"),
+        xr.concat(marks, "special", data_vars="minimal", coords="minimal", compat="override").drop_vars(
+            parameter, errors="ignore"
+        ),
+    ], compat="override")  # fmt: skip
+    for name in result.variables:
+        if name in branches[0].variables:
+            result[name].attrs = dict(branches[0][name].attrs)
+    result["signature"].attrs |= flag_attributes(list(texts), dtype=np.int32)
+    for name, words in (
+        ("branch", "branch"), ("special_branch", "branch of the special point"), ("returns", "section points"),
+        ("special_period_number", "period number of the special point's orbit"),
+    ):  # fmt: skip
+        result[name].attrs["long_name"] = words
+    column = {name: swept[name].transpose("direction", parameter, ...) for name in ("section", "period_number")}
+    result = result.assign({
+        "period_number": ("branch_id", [int(one["period_number"]) for one in branches], {"long_name": "period number"}),
+        "parent": ("branch_id", np.array(parents), {"long_name": "branch that it leaves (-1: found in a sweep)"}),
+        "ended": (("branch_id", "end"), [one["ended"].values for one in branches], branches[0]["ended"].attrs),
+        "ended_because": (("branch_id", "end"), _sentences(branches), branches[0]["ended_because"].attrs),
+        "swept_value": ("sample", swept[parameter].values, dict(swept[parameter].attrs)),
+        "swept_section": (
+            ("direction", "sample", "iterate", "state"), column["section"].transpose(..., "iterate", "state").values,
+            {"long_name": "section points of the sweeps"},
+        ),
+        "swept_period_number": (
+            ("direction", "sample"), column["period_number"].values, {"long_name": "period number of the sweeps"}
+        ),
+        "complete": ((), np.int8(complete), {"long_name": "all branches were followed within the budget"}),
+    })  # fmt: skip
+    result = result.assign_coords(direction=swept["direction"].variable)
+    result.attrs = dict(attrs) | {"parameter": parameter, "layouts": f"[{', '.join(layouts)}]"}
+    return with_short_record(result)
+
+
+def _sentences(branches: Sequence[xr.Dataset]) -> NDArray[np.str_]:
+    """Endings in words of several branches (branch, end)."""
+    return strings(str(text) for one in branches for text in one["ended_because"].values).reshape(-1, 2)
 
 
 def curve(

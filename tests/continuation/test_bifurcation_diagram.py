@@ -1,0 +1,102 @@
+"""Whole diagrams in one call: the special points of the paper's figures, the branches and what they leave."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+import closed_form_support as closed
+import numpy as np
+import pytest
+import reference_values as known
+
+import nonsmooth as ns
+
+support = ns.models.discontinuous_support
+#: Parameters, range, kinds of special points with their numbers on branches of period 1, and closed or known values.
+FIGURES: dict[str, tuple[dict[str, float], str, tuple[float, float], dict[str, int], list[float]]] = {
+    "9": ({"rho": 0.14, "g": 0.02}, "omega", (3.0, 7.0), {"fold": 2, "flip": 2, "grazing": 2},
+          [known.FOLDS["figure 9 upper"], known.FOLDS["figure 9 rising"], known.FLIPS_NEAR_GRAZING["figure 9 lower"]]),
+    "10": ({"rho": 0.16, "g": 0.0145}, "omega", (2.4, 7.4), {"fold": 4, "grazing": 2},
+           [known.FOLDS[f"figure 10 {word}"] for word in ("upper", "small", "rising")]),
+    "11": ({"omega": 3.69, "g": -0.0045}, "rho", (0.2, 0.5), {"flip": 1}, []),
+    "13": ({"omega": 11.15, "rho": 0.33}, "g", (-0.0015, 0.002), {"flip": 1}, []),
+    "17": ({"rho": 0.23, "g": 0.0036}, "omega", (8.4, 10.4), {"flip": 2, "grazing": 1},
+           [known.FLIPS_NEAR_GRAZING["figure 17"]]),
+}  # fmt: skip
+
+
+def truth(row: Any, name: str) -> float:
+    """The same fold or flip from the closed form of one contact in a round, begun at ours."""
+    X = row["unknowns"].values
+    X = X[~np.isnan(X)]
+    p = {key: float(row[key]) for key in ("g", "rho", "omega")}
+    n, contact = int(row["period_number"]), int(row["mode"]) == 1
+    return closed.special(str(row["kind"].values), p, name, n, X[:2], X[2:-1:3], contact)
+
+
+@pytest.mark.parametrize("figure", FIGURES)
+def test_figures_of_the_paper(figure: str) -> None:
+    parameters, name, limits, kinds, values = FIGURES[figure]
+    diagram = ns.bifurcation_diagram(support(**parameters), name, limits, progress=False)
+    table = ns.special_points(diagram)
+    assert int(diagram["complete"]) == 1
+    first = table.isel(special=np.flatnonzero(table["branch"].values == 0))
+    assert int(diagram["period_number"][0]) == 1 and int(diagram["parent"][0]) == -1
+    assert {kind: int((first["kind"] == kind).sum()) for kind in np.unique(first["kind"])} == kinds
+    for value in values:
+        assert np.abs(first[name].values - value).min() < 2e-9
+    if name == "omega":
+        exact = [w for w in known.grazing_frequencies(parameters["rho"], parameters["g"]) if limits[0] < w < limits[1]]
+        grazes = first[name].values[first["kind"].values == "grazing"]
+        assert sorted(grazes) == pytest.approx(exact, abs=1e-10)
+    # Folds and flips in closed form; each flip is left once, by its doubled branch.
+    for i in np.flatnonzero(np.isin(first["kind"].values, ["fold", "flip"])):
+        row = first.isel(special=i)
+        assert float(row[name]) == pytest.approx(truth(row, name), abs=1e-10)
+        if str(row["kind"].values) == "flip":
+            same = (table["period_number"] == 2) & (np.abs(table[name] - row[name]) < 1e-9)
+            assert int(same.sum()) == 1
+    doubled = diagram["period_number"].values
+    for k in np.flatnonzero(diagram["parent"].values >= 0):
+        assert doubled[k] == 2 * doubled[int(diagram["parent"][k])]
+    # Every section point of an orbit of period n is one of a return.
+    assert np.isfinite(diagram["returns"].values[diagram["branch"].values == 0][:, 0]).all()
+    begun = time.process_time()  # all is compiled now
+    ns.bifurcation_diagram(support(**parameters), name, limits, progress=False)
+    took = time.process_time() - begun
+    print(f"\nfigure {figure}: {took:.2f} s of processor time, periods {doubled.tolist()}")
+    assert took < 5.0
+
+
+def test_cascade_down_to_period_eight(tmp_path: Path) -> None:
+    """Fig. 13: periods 1, 2, 4, 8 one from the other; the diagram is saved, read, drawn and gone on from."""
+    diagram = ns.bifurcation_diagram(support(omega=11.15, rho=0.33), "g", (-0.0015, 0.002), progress=False)
+    assert diagram["period_number"].values.tolist() == [1, 2, 4, 8]
+    assert diagram["parent"].values.tolist() == [-1, 0, 1, 2]
+    table = ns.special_points(diagram)
+    flips = np.unique(table["g"].values[table["kind"].values == "flip"].round(12))
+    ratios = np.diff(flips)[:-1] / np.diff(flips)[1:]
+    assert ratios == pytest.approx(4.669, rel=0.25)
+    # All returns of an orbit of period 4, by simulation.
+    at = int(np.flatnonzero(diagram["branch"].values == 2)[5])
+    point = diagram.isel(point=at)
+    system = support(omega=11.15, rho=0.33, g=float(point["g"]))
+    run = ns.poincare(system, n=4, start=point["section"].values)
+    assert np.roll(run["section"].values, 1, axis=0)[:1] == pytest.approx(point["returns"].values[:1], abs=1e-9)
+    assert run["section"].values[:3] == pytest.approx(point["returns"].values[1:4], abs=1e-9)
+    ns.save(diagram, tmp_path / "diagram.nc")
+    again = ns.load(tmp_path / "diagram.nc")
+    row = ns.special_points(again).isel(special=0)
+    assert int(ns.continue_orbit(row)["period_number"]) == 2
+    ax = ns.plot.bifurcation_diagram(again, y="v")
+    words = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert words == ["sweeps", "stable branch", "unstable branch", "flip"]
+
+
+def test_what_is_refused() -> None:
+    with pytest.raises(ValueError, match="has no forcing: follow its equilibria"):
+        ns.bifurcation_diagram(ns.models.relief_valve(q=9.0), "q", (5.0, 10.0))
+    with pytest.raises(ns.SolveError, match=r"the budget of 1e-09 s was spent before"):
+        ns.bifurcation_diagram(support(rho=0.14, g=0.02), "omega", (3.0, 7.0), budget=1e-9, n=5, progress=False)
