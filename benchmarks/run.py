@@ -26,6 +26,7 @@ import lyapunov
 import lyapunov_nonlinear
 import machine
 import oscillator
+import patterns
 import rigid_stops
 import valve
 import valve_scan
@@ -39,7 +40,7 @@ def main() -> int:
     effort = 0.1 if options.quick else 1.0
     text, verdicts = ["# Benchmarks", "", *(f"- {fact}" for fact in machine.facts() if fact), ""], []
     parts = (
-        oscillator, chain, rigid_stops, friction, valve, valve_scan, diagram, chart, chart_size, lyapunov,
+        oscillator, chain, rigid_stops, patterns, friction, valve, valve_scan, diagram, chart, chart_size, lyapunov,
         lyapunov_nonlinear, branch,
     )  # fmt: skip
     for part in parts:

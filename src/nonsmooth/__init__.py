@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from nonsmooth.identification.chain import identify as identify
     from nonsmooth.identification.compare.compare import compare as compare
     from nonsmooth.identification.fit.fit import fit as fit
+    from nonsmooth.identification.fit.select import select_model as select_model
     from nonsmooth.identification.fit.sensors import Sensor as Sensor
     from nonsmooth.identification.parameter_set import ParameterSet as ParameterSet
     from nonsmooth.results.store import load as load
@@ -100,6 +101,7 @@ _WHERE = {
     "Recording": "experiment.recording",
     "fit": "identification.fit.fit",
     "Sensor": "identification.fit.sensors",
+    "select_model": "identification.fit.select",
     "identify": "identification.chain",
     "ParameterSet": "identification.parameter_set",
     "compare": "identification.compare.compare",

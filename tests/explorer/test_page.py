@@ -7,6 +7,7 @@ import signal
 import statistics
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -147,3 +148,49 @@ def test_two_tabs_do_not_disturb_each_other(page: Any, server: Any, new_page: Ca
     page.until_done()
     other.until_done()
     assert (page.readout()["motion"], other.readout()["motion"]) == ("period 4", "period 1")
+
+
+def test_a_view_is_saved_as_a_figure_and_as_the_script_that_makes_it(page: Any) -> None:
+    page.until_done()
+    page.tab.select_option("#save-view", "section")
+    found = {}
+    for kind in ("pdf", "py"):
+        page.tab.select_option("#save-kind", kind)
+        with page.tab.expect_download() as download:
+            page.tab.click("#save")
+        found[download.value.suggested_filename] = Path(download.value.path()).read_bytes()
+    assert found["discontinuous_support_section.pdf"].startswith(b"%PDF")
+    assert b"result = ns.poincare(system, section=ns.Stroboscopic()" in found["discontinuous_support_section.py"]
+
+
+def test_a_phase_moves_the_section_point_along_the_orbit(page: Any) -> None:
+    page.until_done()
+    page.write("phase", "0.25")
+    page.until_done()
+    points = page.tab.evaluate(
+        '["x", "y"].map(key => Bokeh.documents[0].get_model_by_name("section points").data[key][0])'
+    )
+    quarter = 500.25 * 2 * np.pi / 3.69
+    run = ns.simulate(ns.models.discontinuous_support(), transient=500, periods=1, samples=[quarter])
+    at = int(np.abs(run["time"].values - quarter).argmin())
+    np.testing.assert_allclose(points, run["u"].values[at], rtol=1e-3)
+
+
+def test_another_axis_and_another_model_are_drawn_with_their_units(page: Any) -> None:
+    def label(figure: str, axis: str) -> str:
+        return str(page.tab.evaluate(
+            f'Bokeh.documents[0].get_model_by_name("{figure}").{axis}[0].axis_label'
+        ))  # fmt: skip
+
+    page.until_done()
+    assert [label("diagram", axis) for axis in ("below", "left")] == ["ρ (N)", "v (mm/s)"]
+    page.tab.select_option("#shown", "x")
+    page.tab.select_option("#y", "x")
+    page.until_done()
+    assert [label("diagram", "left"), label("portrait", "left")] == ["x (mm)", "x (mm)"]
+    page.tab.select_option("#model", "border_collision")
+    page.until_done()
+    assert page.ui()["state"]["model"] == "border_collision"
+    assert [label("diagram", axis) for axis in ("below", "left")] == ["μ", "x"]
+    assert page.readout()["motion"] == "period 2"
+    assert page.notes() == ""

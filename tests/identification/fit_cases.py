@@ -7,7 +7,7 @@ Each case has the system, the true parameters, which of them a fit is to find, a
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -60,8 +60,6 @@ class Case:
     noise: float = 0.01  # of the reading's standard deviation
     resolution: float = 0.01
     jitter: float = 0.02  # of the step
-    transient: float = 0.0
-    options: dict[str, Any] = field(default_factory=dict)
 
     def recording(self, seed: int):
         """Readings by seed, with the sensors that a user would state."""
@@ -139,9 +137,6 @@ def _belt(p, start, t):
 
 
 def _gears(p, start, t):
-    def force(q):
-        return q - p["b"] if q > p["b"] else q + p["b"] if q < -p["b"] else 0.0
-
     def field(sign):
         def f(t, u):
             spring = (u[0] - sign * p["b"]) if sign else 0.0

@@ -1,5 +1,7 @@
 """Fits of any system: data are closed forms or another program's; derivatives are checked against differences."""
 
+import time
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -203,40 +205,29 @@ def test_readings_of_which_the_model_has_no_motion_are_counted():
     x = np.where(t > 40.0, 5.0 + 0.01 * np.sin(50 * t), x)  # behind the stop, where nothing moves
     system = case.system().with_parameters(case.truth)
     found = ns.fit(system, {"position": (t, x)}, ["k", "c"], measured=measured, tries=1)
-    assert any("readings are not used" in sentence or "over windows of" in sentence for sentence in found.anomalies)
+    assert any("readings are not used" in sentence for sentence in found.anomalies)
 
 
 @pytest.mark.slow
-def test_coverage_over_ten_systems():
-    seeds, rows, every = 40, [], []
-    for name, case in CASES.items():
-        far, said, silent = [], 0, 0
+def test_intervals_cover_the_truth_over_forty_seeds():
+    seeds, every = 40, []
+    for name in ("impact oscillator", "stick-slip belt", "gear pair", "bilinear oscillator"):
+        case, far, said = CASES[name], [], 0
         for seed in range(seeds):
             data, measured, _ = case.recording(seed)
-            try:
-                found = ns.fit(case.guess(seed), data, case.find, measured=measured, progress=False)
-            except SolveError:
-                said += 1
-                continue
+            found = ns.fit(case.guess(seed), data, case.find, measured=measured, progress=False)
             if found.anomalies:
                 said += 1
-                continue
-            z = normalized(found, {one: case.truth[one] for one in case.find})
-            silent += bool(np.max(np.abs(z)) > 8.0)
-            far.append(z)
-        pooled = np.concatenate(far)
-        every.append(pooled)
-        cover, rms = float(np.mean(np.abs(pooled) < 1.96)), float(np.sqrt(np.mean(pooled**2)))
-        rows.append((name, seeds - said - silent, said, silent, cover, rms))
-        good = seeds - said - silent
-        print(f"{name:22} converged {good:2}, said no {said}, silent {silent}, cover {cover:.3f}, rms {rms:.2f}")
-    pooled = np.concatenate(every)
-    cover, rms = float(np.mean(np.abs(pooled) < 1.96)), float(np.sqrt(np.mean(pooled**2)))
-    print(f"{'all':22} {len(pooled)} intervals, cover {cover:.3f}, rms {rms:.2f}")
-    for name, converged, _, silent, each, _ in rows:
-        assert converged >= 38 and silent == 0, name
-        assert 0.90 <= each <= 0.98, name
-    assert 0.93 <= cover <= 0.97 and 0.85 <= rms <= 1.15
+            else:
+                far.append(normalized(found, {one: case.truth[one] for one in case.find}))
+        z = np.concatenate(far)
+        every.append(z)
+        cover, rms = np.mean(np.abs(z) < 1.96), np.sqrt(np.mean(z**2))
+        print(f"{name:20} converged {len(far)}, the others say so: {said}; cover {cover:.3f}, rms {rms:.2f}")
+        assert len(far) >= 38 and np.max(np.abs(z)) < 5.0
+        assert cover >= 0.90 and 0.85 <= rms <= 1.15
+    z = np.concatenate(every)
+    assert 0.93 <= np.mean(np.abs(z) < 1.96) <= 0.975 and 0.85 <= np.sqrt(np.mean(z**2)) <= 1.15
 
 
 @pytest.mark.parametrize("name", ["impact oscillator", "bilinear oscillator"])
@@ -258,6 +249,42 @@ def test_a_chaotic_record_is_fitted_over_windows_from_one_voltage():
     assert np.max(np.abs(normalized(found, case.truth))) < 4.0
     assert max(found.uncertainty[n] / abs(case.truth[n]) for n in case.find) < 0.01
     assert "windows" in found.notes[0] and not found.anomalies
+
+
+def test_models_are_ranked_by_what_they_predict():
+    t = np.arange(0, 14, 0.02)
+    x = closed_form(t) + 1e-4 * np.random.default_rng(8).standard_normal(len(t))
+    system = free().with_parameters(k=9.0)
+    ranked = ns.select_model(
+        {
+            "true": (system, ["k", "c"]),
+            "undamped": (system.with_parameters(c=0.0), ["k"]),
+            "with one more": (system, ["k", "c", "m"]),  # known beside rho: a parameter that nothing asks for
+        },
+        {"x": (t, x)}, progress=False,
+    )  # fmt: skip
+    assert ranked.rms.sel(model="true") == pytest.approx(1.0, abs=0.15)  # white noise of known irregularity
+    assert ranked.rms.sel(model="undamped") > 3.0
+    more = ranked.sel(model=["true", "with one more"])
+    assert float(abs(more.squared_error.diff("model").mean())) < 0.05
+    with pytest.raises(ValueError, match="at least two systems"):
+        ns.select_model({"one": (system, ["k"])}, {"x": (t, x)})
+    with pytest.raises(ValueError, match="too short for folds = 50"):
+        ns.select_model({"a": (system, ["k"]), "b": (system, ["c"])}, {"x": (t, x)}, folds=50)
+
+
+def test_five_parameters_of_two_thousand_samples_take_seconds():
+    case = CASES["impact oscillator"]
+    t = np.linspace(0.0, 120.0, 2000)
+    x = case.motion(case.truth, {"x": 0.1, "v": 0.2}, t)[:, 0]
+    x += 5e-3 * np.random.default_rng(9).standard_normal(len(t))
+    guess = case.system().with_parameters({**case.truth, "k": 0.85, "c": 0.12, "d": 0.7, "e": 0.5, "A": 1.15})
+    names = ["k", "c", "d", "e", "A"]
+    ns.fit(guess, {"x": (t[:200], x[:200])}, names, tries=1)  # compiles
+    begun = time.process_time()
+    found = ns.fit(guess, {"x": (t, x)}, names)
+    assert time.process_time() - begun < 5.0
+    assert np.max(np.abs(normalized(found, {name: case.truth[name] for name in names}))) < 4.0
 
 
 def test_mistakes_are_answered_with_what_to_do():

@@ -8,6 +8,7 @@ from scipy.integrate import solve_ivp
 
 import nonsmooth as ns
 from nonsmooth.elements import Coulomb, Stop
+from nonsmooth.system import combinations
 
 END = 25.0
 
@@ -119,6 +120,12 @@ def agrees(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(5))
 def test_friction_and_impacts_with_rest(seed: int) -> None:
+    agrees(seed)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_same_with_modes_that_are_made_when_they_are_visited(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(combinations, "MOST", 0)
     agrees(seed)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -265,6 +266,58 @@ def test_the_text_of_a_system_with_elements_is_read_back() -> None:
     assert again.modes == ("stop_open", "stop_rest")
 
 
+def test_a_contact_written_by_hand_lifts_off_where_its_force_vanishes() -> None:
+    """At x = 0, where the force is a harmonic alone and all else is zero; no margin helps the decision."""
+
+    def flight(t: Any, u: Any, p: Any) -> Any:
+        return u.v, np.cos(p.w * t) - u.x - p.c * u.v
+
+    plastic = ns.System(
+        states=["x", "v"], parameters={"w": 0.3, "c": 0.1},
+        modes={"flight": flight, "contact": ns.Mode(lambda t, u, p: (0 * u.x,), states=["x"])},
+        indicators={"stop": lambda t, u, p: u.x, "pressing": lambda t, u, p: np.cos(p.w * t) - u.x},
+        transitions=[
+            ns.Transition("flight", "contact", when="stop > 0", reset=lambda t, u, p: (0.0,)),
+            ns.Transition("contact", "flight", when="pressing < 0", reset=lambda t, u, p: (0.0, 0.0)),
+        ],
+    )  # fmt: skip
+    found = ns.sweep(plastic, "w", np.linspace(0.15, 2.5, 41), start={"x": -0.5}, progress=False)
+    assert (found["status"] == 0).all()
+    run = ns.simulate(plastic, periods=1, start={"x": -0.5})
+    off = run["crossing_time"].values[run["crossing_transition"].values == 1][0]
+    assert off == pytest.approx(np.pi / 0.6, rel=1e-14)
+
+
+def test_a_restitution_that_is_a_parameter_stays_between_0_and_1() -> None:
+    """At the door, when it is changed, in a sweep, and in a system that was read from text."""
+    for system in (shaken(), ns.System.from_text(shaken().to_text())):
+        with pytest.raises(ns.SystemDefinitionError, match=r"e = 1\.5: restitution of element 'stop' lies"):
+            system.with_parameters(e=1.5)
+        with pytest.raises(ns.SystemDefinitionError, match="e = -0.5: restitution"):
+            ns.sweep(system, "e", [0.5, -0.5], progress=False)
+
+
+def test_a_law_of_the_speed_may_be_any_callable() -> None:
+    """Friction c v given with its coefficient bound before is a damper: v = exp(-c t)."""
+
+    def law(c: float, v: Any, p: Any) -> Any:
+        return c * v
+
+    sled = ns.mechanical(1.0, 0.0, 0.0, elements=[Coulomb(at="q", friction=partial(law, 0.5), static=0.1)])
+    run = ns.simulate(sled, duration=2.0, start={"v_q": 1.0}, samples=2)
+    assert run["u"].values[-1, 1] == pytest.approx(np.exp(-1.0), rel=1e-13)
+
+
+def test_indicators_are_called_after_the_element_whose_they_are() -> None:
+    """Also where two elements meet at the same place."""
+    both = ns.mechanical(
+        1.0, 0.0, 1.0,
+        elements={"soft": ElasticStop(at="q", position=0.1, stiffness=1.0), "wall": Stop(at="q", position=0.1)},
+    )  # fmt: skip
+    jump = next(t for t in both.transitions if t.source != t.target and "rest" in both.modes[t.target])
+    assert {both.indicators[row.indicator].split("_")[0] for row in jump.rows} == {"wall"}
+
+
 def test_what_is_refused_says_what_to_write() -> None:
     with pytest.raises(ns.SystemDefinitionError, match=r"give gap= .* and on="):
         Stop(restitution=0.5)
@@ -276,12 +329,15 @@ def test_what_is_refused_says_what_to_write() -> None:
         ns.mechanical(1.0, 0.0, 1.0, elements=[Coulomb(at="x", friction=0.1)])
     with pytest.raises(ns.SystemDefinitionError, match="shape"):
         ns.mechanical(np.eye(2), np.eye(3), np.eye(2))
+    for mass in (np.zeros((2, 2)), -np.eye(2), [[1.0, 2.0], [2.0, 1.0]]):
+        with pytest.raises(ns.SystemDefinitionError, match="positive definite"):
+            ns.mechanical(mass, np.eye(2), np.eye(2))
+    with pytest.raises(ns.SystemDefinitionError, match="not symmetric"):
+        ns.mechanical([[1.0, 0.1], [0.2, 1.0]], np.eye(2), np.eye(2))
     with pytest.raises(ns.SystemDefinitionError, match="inverted"):
-        ns.mechanical(np.zeros((2, 2)), np.eye(2), np.eye(2))
+        ns.mechanical(lambda p: [[p.m, p.m], [p.m, p.m]], np.eye(2), np.eye(2), parameters={"m": 1.0})
     with pytest.raises(ns.SystemDefinitionError, match="at= is for ns.mechanical"):
         ns.System(states=["x"], parameters={}, modes={"a": lambda t, u, p: (-u.x,)}, elements=[Stop(at="x")])
-    with pytest.raises(ns.SystemDefinitionError, match="combinations"):
-        ns.mechanical(np.eye(9), 0 * np.eye(9), np.eye(9), elements=[Stop(at=f"q{i}") for i in range(1, 10)])
 
 
 def test_multipliers_through_stick_and_rest() -> None:

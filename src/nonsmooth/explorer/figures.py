@@ -156,6 +156,12 @@ class Diagram(_Figure):
             "period": periods[:, 0], "status": [str(row) for row in names.reshape(len(values), -1)[:, 0]],
         }  # fmt: skip
 
+    def clear(self) -> None:
+        """Show nothing, as when another model or parameter was chosen."""
+        self.result, self.stage, self._fitted = None, "", None
+        self.image.data = {**self.image.data, "image": [np.zeros((1, 1), np.uint32)], "stage": [""], "of": [""]}
+        self.columns.data = {key: [] for key in self.columns.data}
+
     def redraw(self, state: Any, of: str | None = None) -> None:
         """Draw the points anew, as at another zoom."""
         if self.result is None:
@@ -230,6 +236,10 @@ class _Curves(_Figure):
             for k, source in enumerate(self.sources)
         ]
 
+    def paint(self, dark: bool) -> None:
+        """Take the colours that are told apart on a light or a dark ground."""
+        self.lines[0].glyph.line_color = COLORS["pale" if dark else "first"]
+
     def _put(self, run: Any, xs: Any, ys: Any) -> None:
         mode, *cut = with_gaps(run, run["mode"].values.astype(float), xs, ys)
         pieces = pieces_by_mode(np.nan_to_num(mode, nan=-1).astype(int), *cut)
@@ -252,15 +262,17 @@ class Portrait(_Curves):
             "x", "y", source=self.points, size=7, fill_color=COLORS["zone"], line_color="#1B1F24", line_width=1.0
         )
 
-    def put(self, run: Any, state: Any, symbols: Any, units: Any, zone: float | None, keep: bool) -> None:
-        """Draw a trajectory; ``keep`` leaves the axes where they are, as long as they show it."""
+    def put(self, run: Any, state: Any, symbols: Any, units: Any, zone: float | None, is_map: bool) -> None:
+        """Draw a trajectory; the axes stay where they are as long as they show it well."""
         xs, ys = (column(run, "u", name).values for name in (state.x, state.y))
         self._put(run, xs, ys)
+        for line in self.lines:  # of a map the iterates alone
+            line.visible = not is_map
         for axis, values, name in ((self.x, xs, state.x), (self.y, ys, state.y)):
             ends = extent(values)
             own = axis.range.start, axis.range.end
             fits = own[0] <= ends[0] + 0.05 * (ends[1] - ends[0]) and ends[1] - 0.05 * (ends[1] - ends[0]) <= own[1]
-            if not (keep and fits and ends[1] - ends[0] > 0.5 * (own[1] - own[0])):
+            if not (fits and ends[1] - ends[0] > 0.5 * (own[1] - own[0])):
                 axis.range.update(start=ends[0], end=ends[1], reset_start=ends[0], reset_end=ends[1])
             axis.name(symbols[name], units[name])
         self.zone.update(left=zone, visible=zone is not None)
@@ -300,6 +312,10 @@ class Section(_Figure):
         self.dots = self.plot.scatter(
             "x", "y", source=self.points, size=4, line_color=None, fill_color=COLORS["first"], fill_alpha=0.75
         )
+
+    def paint(self, dark: bool) -> None:
+        """Take the colour that shows on a light or a dark ground."""
+        self.dots.glyph.fill_color = COLORS["pale" if dark else "first"]
 
     def put(self, points: Any, run: Any, state: Any, symbols: Any, units: Any) -> None:
         """Draw points (n, 2): a few as large dots on the whole orbit, so that they move in it with the phase."""

@@ -89,6 +89,7 @@
     fill($("preset"), [["", "choose …"], ...ui.presets.map(one => [one, one])], "");
     $("preset-label").hidden = !ui.presets.length;
     for (const name of ["method", "direction"]) fill($(name), Object.entries(ui.choices[name]), ui.state[name]);
+    fill($("save-kind"), Object.entries(ui.kinds), $("save-kind").value || "pdf");
     fill($("over"), Object.entries(ui.plain), ui.state.over);
     for (const name of ["x", "y", "shown"]) fill($(name), ui.states.map(one => [one.name, one.plain]), ui.state[name]);
     for (const name of ["low", "high", "phase", "eta"]) put($(name), short(ui.state[name]));
@@ -136,6 +137,15 @@
     if (rest.length && !told.page) { $("page-note").hidden = false; $("page-note").textContent = told[rest[0]]; }
   }
 
+  function file(told) {
+    const bytes = Uint8Array.from(atob(told.content), letter => letter.charCodeAt(0));
+    const link = document.createElement("a");
+    link.href = URL.createObjectURL(new Blob([bytes]));
+    link.download = told.name;
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+  }
+
   function look(dark, large) {
     try { localStorage.setItem("nonsmooth-look", JSON.stringify({dark, large})); } catch { /* private windows */ }
     act("look", "", {dark, large});
@@ -146,7 +156,7 @@
     const channel = doc && doc.get_model_by_name("act");
     if (!channel) return setTimeout(connect, 30);
     send = text => { channel.value = text; };
-    for (const [name, hear] of Object.entries({ui: render, readout, busy, notes})) {
+    for (const [name, hear] of Object.entries({ui: render, readout, busy, notes, file})) {
       const model = doc.get_model_by_name(name);
       const told = () => { if (model.value) hear(JSON.parse(model.value)); };
       model.properties.value.change.connect(told);
@@ -165,6 +175,7 @@
         playing = setInterval(() => act("set", "phase", Math.round((last.state.phase + 0.01) * 1e6 % 1e6) / 1e6), 80);
       $("play").textContent = playing ? "❚❚" : "▶";
     });
+    $("save").addEventListener("click", () => act("save", "", {view: $("save-view").value, kind: $("save-kind").value}));
     for (const name of ["undo", "redo", "reset"]) $(name).addEventListener("click", () => act(name));
     $("dark").addEventListener("click", () => look(!last.dark, last.large));
     $("large").addEventListener("click", () => look(last.dark, !last.large));

@@ -21,10 +21,10 @@ _FREQUENCY = {**printed.FIGURE_17, "over": "omega", "low": 8.4, "high": 10.4, "s
 #: Figures of the paper: parameters and fields of the state.
 _FIGURES: Mapping[str, Mapping[str, Any]] = {
     "Fig. 9": {
-        **printed.FIGURE_9, "omega": 4.8, "over": "omega", "low": 3.0, "high": 7.0, "shown": "x", "upper": "response",
+        **printed.FIGURE_9, "omega": 4.8, "over": "omega", "low": 3.0, "high": 7.0, "shown": "x",
     },
     "Fig. 10": {
-        **printed.FIGURE_10, "omega": 4.5, "over": "omega", "low": 2.4, "high": 7.4, "shown": "x", "upper": "response",
+        **printed.FIGURE_10, "omega": 4.5, "over": "omega", "low": 2.4, "high": 7.4, "shown": "x",
     },
     "Fig. 11": {**_AMPLITUDE, "rho": 0.45},
     **{f"Fig. 12 {'abcd'[i]}": {**_AMPLITUDE, "rho": rho} for i, rho in enumerate(printed.FIGURE_12)},
@@ -63,17 +63,12 @@ def first_state(model: str, system: System) -> State:
     names, states = list(system.parameters), list(system.states)
     values = {name: float(system.values[name]) for name in names}
     over = next((name for name in _USUAL if name in values), names[0])
-    beside = next((name for name in (*_USUAL, *names) if name in values and name != over), over)
-    if model == PAPER:
-        low, high, beside = 0.2, 0.5, "omega"
-    else:
-        low, high = _around(values[over])
+    low, high = (0.2, 0.5) if model == PAPER else _around(values[over])
     y = states[_velocity(states)]
-    least, most = (3.0, 7.0) if model == PAPER else _around(values[beside])
     start = tuple(0.0 if system.period() is not None else 0.1 * s for s in system.scale_vector())
     return State(
         model=model, values=values, over=over, low=low, high=high, start=start, x=states[0], y=y,
-        shown=y if model == PAPER else states[0], beside=beside, least=least, most=most,
+        shown=y if model == PAPER else states[0],
     )  # fmt: skip
 
 

@@ -54,10 +54,12 @@ def explore(
         import bokeh  # noqa: F401
     except ImportError as error:
         raise ImportError(f"the explorer needs {not_installed('bokeh', 'explorer')}") from error
+    import matplotlib as mpl
     from bokeh.application import Application
     from bokeh.application.handlers.function import FunctionHandler
     from bokeh.server.server import Server
 
+    mpl.use("Agg")  # figures are made for files, in threads
     from nonsmooth.explorer.access import Access
     from nonsmooth.explorer.session import Session, models_of
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import base64
 import json
+import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
@@ -17,6 +19,7 @@ from bokeh.events import RangesUpdate, Tap
 from bokeh.models import TextInput
 from jinja2 import Template
 
+from nonsmooth.explorer.export import KINDS, exported
 from nonsmooth.explorer.figures import CLOUDS, MOST, Diagram, History, Portrait, Section, theme, words_of
 from nonsmooth.explorer.labels import html_of, number, plain_of, symbols_of
 from nonsmooth.explorer.presets import PAPER, first_state, presets_of, slider_range
@@ -36,6 +39,8 @@ _CHEAP = ("orbit", "first look", "section")
 _PATIENCE = 1.0  # seconds after which short work is cancelled like any other
 _DEAF = 5.0  # seconds in which cancelled work must end by itself
 _GIVEN = "given"
+#: To the browser, each one line of JSON; what comes from it is ``act``.
+CHANNELS = ("ui", "readout", "busy", "notes", "file")
 _PANEL = {
     "orbit": "portrait", "first look": "upper", "section": "section", "diagram": "upper", "stability": "readout",
 }  # fmt: skip
@@ -56,6 +61,7 @@ class _Running:
     number: int
     view: str
     key: str
+    of: tuple[str, str]  # the model, and the parameter of the diagram
     since: float
     cancelled: float | None = None
 
@@ -82,14 +88,17 @@ class Session:
         self._crashed: dict[str, int] = {}
         self._running: _Running | None = None
         self._count = 0
+        self._saved = 0
         self._heard = 0  # number of the page's last message
         self._notes: dict[str, str] = {}
         self.results: dict[str, Any] = {}
         self.diagram, self.portrait = Diagram(), Portrait()
         self.history, self.section = History(), Section()
-        self._say = {name: TextInput(name=name) for name in ("ui", "readout", "busy", "notes")}
+        self._say = {name: TextInput(name=name) for name in CHANNELS}
         self._act = TextInput(name="act")
         self.past = Past(self._first(query))
+        self._of = self.state.model, self.state.over  # of what is drawn
+        self._axes = self.state.x, self.state.y, self.state.shown
         self._build()
         self.worker: Worker | None = None  # a request that opens no page starts no process
         document.on_session_destroyed(lambda context: self._close())
@@ -170,7 +179,7 @@ class Session:
             known: dict[str, Callable[[str, Any], object]] = {
                 "set": self._set, "model": self._model, "preset": self._preset, "end": self._end_step,
                 "undo": lambda *_: self.past.undo(), "redo": lambda *_: self.past.redo(), "look": self._look,
-                "reset": self._reset, "begin": self._begin,
+                "reset": self._reset, "begin": self._begin, "save": self._save,
             }  # fmt: skip
             if action not in known:
                 raise ValueError(f"the page asked for {str(action)[:40]!r}, which does not exist")
@@ -187,11 +196,10 @@ class Session:
 
     def _arranged(self, name: str, state: State) -> State:
         """Another parameter of the diagram takes a range of its own; a range keeps its order."""
-        if name in ("over", "beside"):
-            value = state.values[getattr(state, name)]
-            ends = slider_range(value)
-            low, high = (0.6 * value, 1.4 * value) if value > 0 else ends
-            return replace(state, low=low, high=high) if name == "over" else replace(state, least=low, most=high)
+        if name == "over":
+            value = state.values[state.over]
+            low, high = (0.6 * value, 1.4 * value) if value > 0 else slider_range(value)
+            return replace(state, low=low, high=high)
         if state.low == state.high:
             raise ValueError("the two ends of the range are equal; give two different numbers")
         return replace(state, low=min(state.low, state.high), high=max(state.low, state.high))
@@ -207,6 +215,31 @@ class Session:
             raise ValueError(f"{str(value)[:40]!r} is no figure of this model; there are: {', '.join(known)}")
         self.past.put(known[value])
 
+    def _save(self, name: str, value: Any) -> None:
+        """Make a file of a view in a thread, and hand it to the browser."""
+        view, kind = str(value["view"]), str(value["kind"])
+        results, state = dict(self.results), self.state
+
+        def make() -> None:
+            told: dict[str, Any]
+            try:
+                file, content = exported(view, kind, results, state)
+                told = {"name": file, "content": base64.b64encode(content).decode()}
+            except Exception as error:
+                told = {"wrong": str(error)}
+            with suppress(AttributeError):  # the tab has been closed
+                self.document.add_next_tick_callback(partial(self._hand_over, told))
+
+        threading.Thread(target=make, daemon=True).start()
+
+    def _hand_over(self, told: dict[str, Any]) -> None:
+        self._saved += 1
+        if "wrong" in told:
+            self._notes["page"] = told["wrong"]
+            self._tell("notes", self._notes)
+        else:
+            self._tell("file", {**told, "n": self._saved})
+
     def _reset(self, name: str, value: Any) -> None:
         self.past.put(first_state(self.state.model, self.system))
 
@@ -216,6 +249,8 @@ class Session:
     def _look(self, name: str, value: Any) -> None:
         self.dark, self.large = bool(value["dark"]), bool(value["large"])
         self.document.theme = theme(self.dark, self.large)
+        for one in (self.portrait, self.history, self.section):
+            one.paint(self.dark)
 
     def _tap_diagram(self, event: Any) -> None:
         value, start = self.diagram.nearest(event.x, event.y, self.state)
@@ -262,7 +297,11 @@ class Session:
         }  # fmt: skip
         judged = self.results.get("judged")
         if judged is not None and self._done.get("orbit") == _key(orbit) and not self.system.is_map:
-            found["stability"] = {**orbit, "view": "stability", "period": int(judged["period_number"].values[0])}
+            run = self.results["run"]["time"].values
+            found["stability"] = {
+                **orbit, "view": "stability", "period": int(judged["period_number"].values[0]),
+                "span": float(run[-1] - run[0]),
+            }  # fmt: skip
         if self._done.get("diagram") == _key(found["diagram"]):
             del found["first look"]
         return found
@@ -290,9 +329,10 @@ class Session:
             return
         view = missing[0]
         self._count += 1
-        self._running = _Running(self._count, view, wanted[view][1], now)
+        self._running = _Running(self._count, view, wanted[view][1], (self.state.model, self.state.over), now)
         self.worker.ask(self._count, wanted[view][0])
-        self._tell("busy", {"view": view, "fraction": 0, "long": view not in _CHEAP})
+        starting = not self._done and not self._failed
+        self._tell("busy", {"view": view, "fraction": 0, "long": starting or view not in _CHEAP})
 
     def _watch(self) -> None:
         """End a worker that does not hear that its work is cancelled."""
@@ -353,9 +393,11 @@ class Session:
     def _show(self, running: _Running, found: Mapping[str, Any]) -> None:
         state, system = self.state, self.system
         view = running.view
+        if running.of[0] != state.model:
+            return
         if view in ("first look", "diagram"):
             result = found["diagram"]
-            if state.over not in result.dims or state.shown not in result["state"].values:
+            if running.of[1] != state.over:
                 return
             stage = "judged" if view == "diagram" else "first look"
             self.results["diagram"] = result
@@ -363,6 +405,7 @@ class Session:
             self._axes_of_diagram()
             self._tell_ui()
         elif view == "orbit":
+            self.results.pop("stability", None)
             self.results.update(found)
             self._show_orbit()
         elif view == "section":
@@ -380,18 +423,13 @@ class Session:
     def _show_orbit(self) -> None:
         state, system, symbols = self.state, self.system, symbols_of(self.system)
         run = self.results["run"]
-        if state.x not in run["state"].values or state.y not in run["state"].values:
-            return
-        self.results.pop("stability", None)
-        self.portrait.put(run, state, symbols, system.states, self._zone(), True)
+        self.portrait.put(run, state, symbols, system.states, self._zone(), system.is_map)
         self.history.put(run, state, symbols, system.states)
         self._tell_readout()
 
     def _show_section(self) -> None:
         state, result = self.state, self.results["section"]
         names = [str(name) for name in result["state"].values]
-        if state.x not in names or state.y not in names:
-            return
         points = result["section"].values[:, [names.index(state.x), names.index(state.y)]]
         apart = _distinct(result["section"].values)
         points = points[-len(apart) :][apart] if apart.sum() <= MOST else points
@@ -472,7 +510,8 @@ class Session:
                 for (name, unit), value in zip(system.states.items(), state.start, strict=True)
             ],
             "plain": {name: plain_of(symbols[name]) for name in system.parameters},
-            "choices": CHOICES, "state": {key: value for key, value in vars(state).items() if key != "values"},
+            "choices": CHOICES, "kinds": KINDS,
+            "state": {key: value for key, value in vars(state).items() if key != "values"},
             "heard": self._heard, "can": self.past.can, "query": to_query(state), "forced": system.period() is not None,
             "legend": [[names[word], CLOUDS[word][0]] for word in words], "dark": self.dark, "large": self.large,
         })  # fmt: skip
@@ -480,6 +519,24 @@ class Session:
     def _refresh(self) -> None:
         """The page as the state has it, and work for what that lacks."""
         state = self.state
+        if self._of != (state.model, state.over):
+            self.diagram.clear()
+            self.results.pop("diagram", None)
+            if self._of[0] != state.model:
+                self.results.clear()
+                self._done.clear()
+            for view in ("first look", "diagram"):
+                self._done.pop(view, None)
+            self._of = state.model, state.over
+        if self._axes != (state.x, state.y, state.shown):
+            self._axes = state.x, state.y, state.shown
+            if self.diagram.result is not None:
+                self.diagram.redraw(state)
+                self._axes_of_diagram()
+            if "run" in self.results:
+                self._show_orbit()
+            if "section" in self.results:
+                self._show_section()
         self.diagram.here.location = state.values[state.over]
         if (self.diagram.plot.x_range.start, self.diagram.plot.x_range.end) != (state.low, state.high):
             self.diagram.show(x=(state.low, state.high))

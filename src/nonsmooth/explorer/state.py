@@ -16,8 +16,6 @@ CHOICES: dict[str, dict[str, str]] = {
         "both": "up and down", "up": "up", "down": "down", "rest": "each from rest", "many": "8 starts each",
     },
     "method": {"auto": "exact or Taylor", "smoothed": "smoothed switch", "rkf45": "RKF45"},
-    "upper": {"diagram": "Bifurcation", "response": "Response", "chart": "Chart", "basins": "Basins"},
-    "lower": {"history": "Time", "spectrum": "Spectrum"},
 }  # fmt: skip
 #: Whole numbers, with their limits.
 _WHOLE = {"transient": (0, 100_000), "keep": (4, 2000), "columns": (10, 4000)}
@@ -34,8 +32,6 @@ class State:
         Every parameter of the model.
     over, low, high
         The parameter of the diagram and its range.
-    beside, least, most
-        The second parameter of the chart and its range.
     start : tuple of float
         Initial state of the orbit.
     x, y : str
@@ -55,15 +51,10 @@ class State:
     x: str
     y: str
     shown: str
-    beside: str = ""
-    least: float = 0.0
-    most: float = 1.0
     phase: float = 0.0
     eta: float = 1e-5
     direction: str = "both"
     method: str = "auto"
-    upper: str = "diagram"
-    lower: str = "history"
     transient: int = 300
     keep: int = 100
     columns: int = 600
@@ -121,8 +112,8 @@ def changed(state: State, name: str, value: Any, states: Sequence[str]) -> State
         if parameter not in state.values:
             raise ValueError(f"{parameter!r} is no parameter; there are: {', '.join(state.values)}")
         return state.with_value(parameter, number_of(value, parameter))
-    if name in ("over", "beside"):
-        return state.but(name, _one_of(value, list(state.values), name))
+    if name == "over":
+        return replace(state, over=_one_of(value, list(state.values), name))
     if name in ("x", "y", "shown"):
         return state.but(name, _one_of(value, states, name))
     if name in CHOICES:
@@ -145,7 +136,7 @@ def changed(state: State, name: str, value: Any, states: Sequence[str]) -> State
         if eta <= 0:
             raise ValueError(f"eta = {eta:g}: half the width of the band must be greater than 0")
         return replace(state, eta=eta)
-    if name in ("low", "high", "least", "most"):
+    if name in ("low", "high"):
         return state.but(name, number_of(value, name))
     raise ValueError(f"{name!r} is nothing that a view holds")
 

@@ -19,6 +19,7 @@ _CHAOTIC = 40  # periods drawn of an orbit without a period
 _LONGEST = 12  # periods drawn of one that has a long one
 _POINTS = 3000  # of a section
 _STARTS = 8
+_MEASURED = 1000  # periods over which exponents are measured
 
 
 def compute(job: Mapping[str, Any], heard: Heard) -> dict[str, Any]:
@@ -86,9 +87,11 @@ def _stability(system: ns.System, job: Mapping[str, Any], options: dict[str, Any
             transient=job["transient"], budget=10.0, progress=heard,
         )  # fmt: skip
         return {"multipliers": np.asarray(orbit.floquet_multipliers)}
+    forced = system.period() is not None
     found = ns.lyapunov(
-        system, start=list(job["start"]), transient=job["transient"], progress=heard,
-        periods=2000 if system.period() is not None else None, **options,
+        system, start=list(job["start"]), transient=job["transient"] if forced else job["span"], progress=heard,
+        periods=_MEASURED if forced else None, duration=None if forced else _MEASURED / _CHAOTIC * job["span"],
+        **options,
     )  # fmt: skip
     return {"exponents": found}
 

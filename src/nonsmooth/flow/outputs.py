@@ -20,6 +20,10 @@ def output_values(
     traced: Traced, parameters: FloatArray, time: FloatArray, u: FloatArray, memory: FloatArray, mode: Any
 ) -> FloatArray:
     """Outputs (N, n_outputs) at N samples, each by the expression of the sample's mode."""
+    if traced.patterns is not None:
+        forces = traced.patterns.forces(parameters, time, u, mode)
+        own = output_values(traced.patterns.plain, parameters, time, u, memory, np.zeros(len(time), dtype=int))
+        return np.hstack([own, forces])
     result = np.full((len(time), len(traced.output_names)), np.nan)
     for m in np.unique(mode):
         here = np.flatnonzero(mode == m)

@@ -97,6 +97,7 @@ def simulate(
     if ramps:
         from nonsmooth.flow.ramps import with_ramps
 
+        system.refuse_patterns("ramps")
         if method == "exact":
             raise ValueError('method="exact" needs constant parameters; with ramps use "taylor" or "rkf45"')
         traced = with_ramps(system, ramps, t_begin, t_end)
@@ -117,6 +118,8 @@ def simulate(
         "ramps": None if not ramps else {k: v if not callable(v) else str(v) for k, v in ramps.items()},
         "method": method, "rtol": rtol, "atol": atol, **expert,
     }  # fmt: skip
+    if traced.patterns is not None:
+        traced = system.traced  # with the patterns that the run has visited
     found = _dataset(system, traced, engine.name, options, log, instants, period)
     note = "" if ramps else _resting(system, begun, log, state)
     return found.assign_attrs(note=note) if note else found
@@ -124,6 +127,8 @@ def simulate(
 
 def _resting(system: System, begun: FloatArray, log: Log, state: State) -> str:
     """The equilibrium at which a run begins and stays, in a sentence; a warning too where it is unstable."""
+    if system.traced.patterns is not None:
+        return ""
     still = ROUNDING * (system.scale_vector() + begun)
     few = log.sample_u[:: max(1, len(log.sample_u) // 64)]  # most runs are seen to move by these
     for u in (begun * np.sign(state.u), few, log.sample_u, log.u_before, log.u_after):

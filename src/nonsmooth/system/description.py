@@ -50,6 +50,7 @@ class Description:
     bands: tuple[TracedBand, ...] = ()
     symmetry: Symmetry | None = None
     explicit_time: bool = False  # depends on the time, and not periodically
+    ranges: tuple[tuple[sp.Expr, str], ...] = ()  # of the parameters: what must not be negative, and what to say
     variants: dict[Any, Any] = field(default_factory=dict, compare=False, repr=False)  # a cache, see variant.py
 
     def with_sliding(self, traced: Traced) -> Traced:
@@ -100,13 +101,19 @@ def describe(
         name, units, {k: v.unit for k, v in known.items()}, {k: unit for k, (_, unit) in remembered.items()}
     )
     derived: Collection[str] = ()
+    ranges: Sequence[tuple[sp.Expr, str]] = ()
+    patterns: Any = None
     if elements:
-        from nonsmooth.system.assembly import assembled
+        from nonsmooth.system.combinations import assembled
 
-        given = {"indicators": indicators, "transitions": transitions, "outputs": outputs}
+        given = {
+            "indicators": indicators, "transitions": transitions, "outputs": outputs, "memory": memory,
+            "symmetry": symmetry, "bands": bands,
+        }  # fmt: skip
         now = {symbols.p[key]: parameter.value for key, parameter in known.items()}
         made = assembled(symbols, modes, elements, given, _scale(scale, units, name), now)
         derived = made["indicators"].keys() - (indicators or {}).keys()
+        ranges, patterns = made["ranges"], made.get("patterns")
         modes, indicators, transitions, outputs = (made[k] for k in ("modes", "indicators", "transitions", "outputs"))
     indicators = dict(indicators or {})
     shown = {key: _output(key, given) for key, given in (outputs or {}).items()}
@@ -131,13 +138,17 @@ def describe(
     traced, explicit = _with_period(traced, symbols, values, period)
     if symmetry is not None:
         Domain(traced).check({key: parameter.value for key, parameter in known.items()})
+    if patterns is not None:
+        traced = patterns.bind(traced)
+    units_out = {key: unit for key, (_, unit) in shown.items()}
     return Description(
         name=name, states=units, parameters=known, memory=remembered,
-        scale=_scale(scale, units, name), outputs={key: unit for key, (_, unit) in shown.items()},
+        scale=_scale(scale, units, name),
+        outputs=units_out if patterns is None else {**units_out, **dict.fromkeys(patterns.outputs, "")},
         traced=traced, surfaces=surfaces,
         bands=tuple(trace_band(key, band, traced, symbols, shown, known) for key, band in bands.items()),
         symmetry=None if symmetry is None else trace_symmetry(symmetry, traced, symbols, values),
-        explicit_time=explicit,
+        explicit_time=explicit, ranges=tuple(ranges),
     )  # fmt: skip
 
 

@@ -10,8 +10,8 @@ import numpy as np
 import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError, shortened
-from nonsmooth.system.assembly import element_names
-from nonsmooth.system.elements import Coulomb, ElasticStop, Element, Stop
+from nonsmooth.system.combinations import element_names
+from nonsmooth.system.elements import Element
 from nonsmooth.system.names import by_name, unknown
 from nonsmooth.system.scalar import Scalar, to_expression
 from nonsmooth.system.system import System
@@ -67,7 +67,8 @@ def mechanical(
     Raises
     ------
     SystemDefinitionError
-        Matrices that do not fit together or a mass matrix that cannot be inverted; whatever else does not fit.
+        Matrices that do not fit together; a mass matrix that cannot be inverted or, of numbers, is not symmetric and
+        positive definite; whatever else does not fit.
 
     Examples
     --------
@@ -89,12 +90,14 @@ def mechanical(
         if key not in names:
             raise SystemDefinitionError(f"forcing: {unknown(key, 'a coordinate', repr(name), names)}")
 
+    found: list[tuple[sp.Matrix, sp.Matrix, sp.Matrix]] = []
+
     def matrices(p: Any) -> tuple[sp.Matrix, sp.Matrix, sp.Matrix]:
-        mass, damping, stiffness = (_matrix(one, p, size, what) for one, what in ((M, "M"), (C, "C"), (K, "K")))
-        try:
-            return mass.inv(), damping, stiffness
-        except (ValueError, sp.matrices.exceptions.NonInvertibleMatrixError) as error:
-            raise SystemDefinitionError(f"{name!r}: the mass matrix cannot be inverted: {error}") from error
+        """Inverse mass, damping, stiffness; the symbols in them are the same at every call."""
+        if not found:
+            mass, damping, stiffness = (_matrix(one, p, size, what) for one, what in ((M, "M"), (C, "C"), (K, "K")))
+            found.append((_inverse(mass, name), damping, stiffness))
+        return found[0]
 
     def field(t: Any, u: Any, p: Any) -> list[Any]:
         inverse, damping, stiffness = matrices(p)
@@ -106,49 +109,65 @@ def mechanical(
         ride = sp.Integer(0) if base is None else to_expression(base(t, p))
         return [*v, *[Scalar(sp.Add(*[inverse[i, j] * loads[j] for j in range(size)]) - ride) for i in range(size)]]
 
-    def placed(label: str, element: Any) -> Any:
-        if not isinstance(element, Element) or element.at is None:
-            return element
-        weights = {element.at: 1.0} if isinstance(element.at, str) else dict(element.at)
-        for key in weights:
-            if key not in names:
-                raise SystemDefinitionError(f"element {label!r}: {unknown(key, 'a coordinate', repr(name), names)}")
-        sign = -element.side if isinstance(element, Stop | ElasticStop) else 1
-
-        def place(u: Any) -> Any:
-            return sum(weight * u[names.index(key)] for key, weight in weights.items())
-
-        def speed(u: Any) -> Any:
-            return sum(weight * u[size + names.index(key)] for key, weight in weights.items())
-
-        def acts(i: int) -> Callable[..., Any]:
-            def into(t: Any, u: Any, p: Any) -> Any:
-                inverse, _, _ = matrices(p)
-                shares = [to_expression(w) * inverse[i, names.index(k)] for k, w in weights.items()]
-                return Scalar(sign * sp.Add(*shares))
-
-            return into
-
-        on = {key: acts(i) for i, key in enumerate(speeds)}
-        if isinstance(element, Stop | ElasticStop):
-            own = {"gap": lambda t, u, p: -sign * (_law(element.position, t, u, p) - place(u))}
-        elif isinstance(element, Coulomb):
-            own = {"speed": lambda t, u, p: speed(u) - _law(element.belt, t, u, p)}
-        else:
-            own = {"displacement": lambda t, u, p: place(u)}
-        return replace(element, at=None, on=on, **own)
-
     units = coordinates if isinstance(coordinates, Mapping) else dict.fromkeys(names, "")
     states = {**units, **{v: f"{units[q]}/s" if units[q] else "" for q, v in zip(names, speeds, strict=True)}}
-    parts = {key: placed(key, element) for key, element in element_names(elements or {}).items()}
+    parts = {
+        key: _placed(key, element, names, lambda p: matrices(p)[0], name)
+        for key, element in element_names(elements or {}).items()
+    }
     return System(
         name=name, states=states, parameters=given, modes={"all": field}, outputs=outputs, scale=scale,
         symmetry=symmetry, period=period, elements=parts or None,
     )  # fmt: skip
 
 
+def _placed(label: str, element: Any, names: list[str], inverse: Callable[[Any], sp.Matrix], system: str) -> Any:
+    """The element with its place and its direction as functions of the states."""
+    if not isinstance(element, Element) or element.at is None:
+        return element
+    weights = {element.at: 1.0} if isinstance(element.at, str) else dict(element.at)
+    for key in weights:
+        if key not in names:
+            raise SystemDefinitionError(f"element {label!r}: {unknown(key, 'a coordinate', repr(system), names)}")
+    places = {names.index(key): to_expression(weight) for key, weight in weights.items()}
+
+    def along(entries: Any) -> Any:
+        return sum(Scalar(weight) * entries[i] for i, weight in places.items())
+
+    def own(t: Any, u: Any, p: Any) -> Any:
+        return element.placed(along(u[: len(names)]), along(u[len(names) :]), lambda given: _law(given, t, u, p))
+
+    def acts(i: int) -> Callable[..., Any]:
+        def into(t: Any, u: Any, p: Any) -> Any:
+            mass = inverse(p)
+            return Scalar(element.into * sp.Add(*[weight * mass[i, j] for j, weight in places.items()]))
+
+        return into
+
+    on = {f"v_{key}": acts(i) for i, key in enumerate(names)}
+    return replace(element, at=None, on=on, **{element.kinematics: own})
+
+
 def _law(given: Any, t: Any, u: Any, p: Any) -> Any:
     return p[given] if isinstance(given, str) else given(t, u, p) if callable(given) else given
+
+
+def _inverse(mass: sp.Matrix, system: str) -> sp.Matrix:
+    """The inverse of a mass matrix; one of numbers must be symmetric and positive definite."""
+    if not mass.free_symbols:
+        numbers = np.array(mass.tolist(), dtype=float)
+        least = np.linalg.eigvalsh(0.5 * (numbers + numbers.T)).min()
+        if not np.allclose(numbers, numbers.T, rtol=1e-12, atol=0.0):
+            raise SystemDefinitionError(f"{system!r}: the mass matrix is not symmetric; write M so that M = M^T")
+        if not least > 1e-14 * np.abs(numbers).max():
+            raise SystemDefinitionError(
+                f"{system!r}: the mass matrix is not positive definite, its least eigenvalue is {least:.3g}: a motion "
+                f"with a mass of zero or less; leave out coordinates without a mass"
+            )
+    try:
+        return mass.inv()
+    except (ValueError, sp.matrices.exceptions.NonInvertibleMatrixError) as error:
+        raise SystemDefinitionError(f"{system!r}: the mass matrix cannot be inverted: {error}") from error
 
 
 def _size(M: Any) -> int:

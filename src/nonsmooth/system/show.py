@@ -64,7 +64,8 @@ def page(system: System) -> str:
 
 def _rows(system: System) -> list[tuple[str, str]]:
     """Headings and texts: states, parameters, equations by mode, indicators, transitions, period."""
-    traced = system.traced
+    patterns = system.traced.patterns
+    traced = system.traced if patterns is None else patterns.plain
     names = _plain(traced)
     lines: list[tuple[str, str]] = []
 
@@ -92,10 +93,14 @@ def _rows(system: System) -> list[tuple[str, str]]:
         lines.append((f"surface {traced.indicator_names[surface.indicator]}", text))
     either_side = {frozenset((surface.below, surface.above)) for surface in system.surfaces}
     head = "transitions"
-    for jump in system.declared.transitions:
+    for jump in system.declared.transitions if patterns is None else ():
         if frozenset((jump.source, jump.target)) not in either_side:
             lines.append((head, _jump(jump, traced, names)))
             head = ""
+    if patterns is not None:
+        kinds = ", ".join(f"{name} ({type(element).__name__})" for name, element in patterns.elements.items())
+        lines.append(("elements", kinds))
+        lines.append(("patterns", f"{len(patterns.visited)} visited so far"))
     if system.outputs:
         lines.append(("outputs", ", ".join(f"{name}{unit(u)}" for name, u in system.outputs.items())))
     lines.append(("period", _period(system, names)))
@@ -114,6 +119,7 @@ def _period(system: System, names: dict[sp.Symbol, str]) -> str:
 
 def latex(system: System) -> str:
     """Return the equations as an ``align*`` environment: fields by mode, indicators, transitions."""
+    system.refuse_patterns("to_latex")
     traced, parameters = system.traced, system.parameters
     names = {traced.t: "t"}
     names |= {s: latex_name(name) for s, name in zip(traced.u, traced.state_names, strict=True)}

@@ -199,13 +199,16 @@ class System:
 
     @property
     def traced(self) -> Traced:
-        """The equations as expressions; those of the smoothed system where it is smoothed."""
-        return self._variant.traced
+        """The equations as expressions; those of the smoothed system where it is smoothed.
+
+        Where modes are made when they are first visited, the names of those visited so far."""
+        traced = self._variant.traced
+        return traced if traced.patterns is None else traced.patterns.seen()
 
     @property
     def declared(self) -> Traced:
         """The equations as expressions, without the sliding modes that are derived from them."""
-        return self.traced if self.is_smoothed else self._description.traced
+        return self.traced if self.is_smoothed or self.traced.patterns is not None else self._description.traced
 
     def with_sliding(self, declared: Traced) -> Traced:
         """Return what became of the declared equations with the sliding modes that belong to them."""
@@ -214,6 +217,7 @@ class System:
     @property
     def derivatives(self) -> Derivatives:
         """Exact derivatives of the equations, shared by all copies."""
+        self.refuse_patterns("what needs derivatives of the equations")
         return self._variant.derivatives
 
     @property
@@ -250,6 +254,15 @@ class System:
         """Return whether the states change by transitions alone and the period is 1, as those of a `Map` do."""
         fields = self.traced.fields
         return self.traced.period == 1 and all(entry == 0 for field in fields for entry in field)
+
+    def refuse_patterns(self, verb: str) -> None:
+        """Raise SystemDefinitionError where the modes are made when they are first visited."""
+        if self._variant.traced.patterns is not None:
+            raise SystemDefinitionError(
+                f"{self.name!r} has more combinations of its elements' phases than are written out; a mode is made "
+                "when a run first visits it, for simulate, poincare, sweep and frequency_response. Not so for "
+                f"{verb}: take fewer elements for it"
+            )
 
     # Numbers
 
@@ -340,6 +353,7 @@ class System:
         --------
         nonsmooth.smoothing_report : what a band does to an orbit.
         """
+        self.refuse_patterns("smoothed")
         new, variant = smoothed_values(self._description, self._values, eta, band)
         return self._make(self._description, new, variant)
 
@@ -410,5 +424,5 @@ class System:
 
         return latex(self)
 
-    def _repr_latex_(self) -> str:
-        return self.to_latex()
+    def _repr_latex_(self) -> str | None:
+        return None if self.traced.patterns is not None else self.to_latex()

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import sympy as sp
@@ -22,6 +23,7 @@ from nonsmooth.system.scalar import Scalar
 from nonsmooth.system.traced import Row
 from nonsmooth.system.tracing import Symbols
 from nonsmooth.system.transition import Surface, Transition
+from nonsmooth.system.variant import variant_of
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
@@ -103,6 +105,7 @@ def _content(d: Description) -> dict[str, Any]:
     modes = {}
     for mode, field, lacking in zip(t.mode_names, t.fields, t.lacking, strict=True):
         modes[mode] = {s: text(e) for s, e, gone in zip(t.state_names, field, lacking, strict=True) if not gone}
+    known = {} if t.patterns is None else t.patterns.described()
     content: dict[str, Any] = {
         "format": _FORMAT,
         "version": _VERSION,
@@ -112,7 +115,7 @@ def _content(d: Description) -> dict[str, Any]:
         "parameters": {k: {"unit": v.unit, "symbol": v.symbol} for k, v in d.parameters.items()},
         "memory": {k: {"value": value, "unit": unit} for k, (value, unit) in d.memory.items()},
         "modes": modes,
-        "indicators": {k: text(e) for k, e in zip(t.indicator_names, t.indicators, strict=True)},
+        "indicators": {} if known else {k: text(e) for k, e in zip(t.indicator_names, t.indicators, strict=True)},
         "transitions": transitions,
         "outputs": {
             k: {"unit": d.outputs[k], "modes": {m: text(e) for m, e in zip(t.mode_names, row, strict=True)}}
@@ -127,9 +130,25 @@ def _content(d: Description) -> dict[str, Any]:
             "shift": d.symmetry.shift,
             "modes": {t.mode_names[i]: t.mode_names[j] for i, j in enumerate(d.symmetry.modes)},
         }
+    if known:
+        from nonsmooth.system.combinations import SPEED
+
+        names = {**names, SPEED: "speed"}
+        content["elements"] = {k: _element_content(one, text) for k, one in known.items()}
+    if d.ranges and not known:
+        content["ranges"] = [{"not negative": text(e), "else": sentence} for e, sentence in d.ranges]
     if d.bands:
         content["bands"] = {t.indicator_names[band.indicator]: _band_content(band, d) for band in d.bands}
     return content
+
+
+def _element_content(element: Mapping[str, Any], text: Callable[[sp.Expr], str]) -> dict[str, Any]:
+    """Return an element with its expressions as text."""
+    return {
+        key: text(e) if isinstance(e, sp.Expr) else {k: text(v) if isinstance(v, sp.Expr) else v for k, v in e.items()}
+        if isinstance(e, Mapping) else e
+        for key, e in element.items()
+    }  # fmt: skip
 
 
 def _surface_content(surface: TracedSurface, d: Description) -> dict[str, Any]:
@@ -175,7 +194,8 @@ def read_system(text: str) -> System:
             f"{_VERSION}"
         )
     try:
-        system = System(**_Reader(content).arguments())
+        reader = _Reader(content)
+        system = reader.within_ranges(System(**reader.arguments()))
         smoothing = content.get("smoothing")
         return system if smoothing is None else system.smoothed(smoothing["eta"], smoothing.get("band", "linear"))
     except SystemDefinitionError as error:  # names and units in it may be of any length
@@ -230,7 +250,35 @@ class _Reader:
             "period": self.function(c["period"]) if "period" in c else None,
             "symmetry": symmetry and (self.vector(symmetry["map"]), symmetry["shift"], symmetry["modes"]),
             "bands": {k: self.band(e) for k, e in self.bands.items()},
+            "elements": {k: self.element(e) for k, e in c.get("elements", {}).items()} or None,
         }
+
+    def element(self, entry: Mapping[str, Any]) -> Any:
+        from nonsmooth.system import elements
+        from nonsmooth.system.combinations import SPEED
+
+        if entry["kind"] not in elements.__all__ or entry["kind"] == "Element":
+            raise SystemDefinitionError(f"there is no element {shortened(entry['kind'])}")
+        kind = getattr(elements, entry["kind"])
+
+        def law(text: str) -> Callable[..., Any]:
+            expression = self.function(text, {"speed": SPEED})().expression
+            if SPEED not in expression.free_symbols:
+                return lambda t, u, p: Scalar(expression)
+            return lambda v, p: Scalar(expression.subs(SPEED, v.expression))
+
+        return kind(
+            **entry["options"], **{key: law(text) for key, text in entry["laws"].items()},
+            **{kind.kinematics: law(entry[kind.kinematics])}, on={key: law(text) for key, text in entry["on"].items()},
+        )  # fmt: skip
+
+    def within_ranges(self, system: System) -> System:
+        """The system with what its parameters must fulfil beyond what its equations say."""
+        ranges = [(self.function(e["not negative"])().expression, e["else"]) for e in self.content.get("ranges", [])]
+        if not ranges:
+            return system
+        description = replace(system._description, ranges=tuple(ranges), variants={})
+        return type(system)._make(description, dict(system.values), variant_of(description))
 
     def transition(self, entry: Mapping[str, Any]) -> Transition | Surface:
         if "surface" in entry:

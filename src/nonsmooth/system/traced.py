@@ -6,11 +6,13 @@ derivatives, the code generator, the smoothed switch and the text form.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from sympy import Expr, Symbol
+
+    from nonsmooth.system.patterns import Patterns
 
 __all__ = ["NOT_UNIQUE", "Row", "Traced", "TracedTransition"]
 
@@ -75,6 +77,7 @@ class Traced:
     transitions: tuple[TracedTransition, ...]
     outputs: tuple[tuple[Expr, ...], ...]
     period: Expr | None
+    patterns: Patterns | None = field(default=None, compare=False, repr=False)  # modes are made when they are visited
 
     def phase_text(self, jump: TracedTransition) -> str:
         """The phase of a transition as it was written."""

@@ -37,7 +37,7 @@ class Variant:
             **{name: parameter.unit for name, parameter in description.parameters.items()},
             **{name: "" for name, _ in self.etas},
         }
-        self.domain = Domain(self.traced, extra)
+        self.domain = Domain(self.traced, (*description.ranges, *extra))
 
     @cached_property
     def period(self) -> Callable[..., float] | None:

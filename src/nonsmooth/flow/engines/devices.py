@@ -10,6 +10,7 @@ from nonsmooth.errors import not_installed
 from nonsmooth.flow.engines.engine import Engine, SectionPlan
 from nonsmooth.flow.engines.linear import LinearEngine, PlanarEngine
 from nonsmooth.flow.engines.loop import LoopEngine
+from nonsmooth.flow.engines.patterns import PatternEngine
 from nonsmooth.flow.engines.series import SeriesEngine
 
 __all__ = ["BATCH", "DEVICES", "batch_size", "check_device", "engine_on", "gpu_name", "on_gpu", "workers_of"]
@@ -78,6 +79,8 @@ def engine_on(device: Any, engine: Engine, plan: SectionPlan | None) -> Engine:
 
     The planar kernels of a GPU know two states and stroboscopic sections only: else the same flow goes there by the
     series kernels."""
+    if device == "cuda" and isinstance(engine, PatternEngine):
+        raise ValueError('modes that are made when they are visited are made by the processor: leave out device="cuda"')
     if device != "cuda" or not isinstance(engine, LinearEngine):
         return engine
     if isinstance(engine, PlanarEngine) and (plan is None or plan.indicator < 0):

@@ -48,6 +48,9 @@ class LoopEngine(ABC):
     def touches_of_a_leg(self) -> int:
         """Number of touches that one segment may add to a log, at most."""
 
+    def go_on(self, tables: Any) -> None:  # noqa: B027 - most engines have nothing to do
+        """Give a run that has paused what it waits for."""
+
     @cached_property
     def phases(self) -> Callable[[Any], FloatArray] | None:
         """``Net.at`` as a function of the parameters; None where no phase depends on them."""
@@ -81,16 +84,15 @@ class LoopEngine(ABC):
             plan.indicator, plan.rising, plan.mode, int(plan.after), plan.every, int(plan.extremes),
             float(plan.phase) if plan.indicator < 0 else -1.0, min(float(plan.t_max), 1e300),
         )  # fmt: skip
-        model, own, work = self.given(tables, "sections")
-        rest = (
-            np.zeros((0, 0)) if starts is None else _with_memory(starts, state.memory), model,
-            with_section(self.net_of(tables, first), plan.indicator), section, self._goal(transient, keep, 0.0, 0.0),
-            self._motion(state, carry and state.settled), out.record(), own, work,
-        )  # fmt: skip
-        kernel = self.module(tables, "sections").chain
-        work.tally[BEGUN] = 0
+        begun = np.zeros((0, 0)) if starts is None else _with_memory(starts, state.memory)
+        goal, motion = self._goal(transient, keep, 0.0, 0.0), self._motion(state, carry and state.settled)
+        kernel, kept = self.module(tables, "sections").chain, out.record()
+        self.given(tables, "sections")[2].tally[BEGUN] = 0
         while first < last:  # Ctrl-C comes in between
-            first = kernel(first, last, *rest)
+            model, own, work = self.given(tables, "sections")
+            net = with_section(self.net_of(tables, first), plan.indicator)
+            first = kernel(first, last, begun, model, net, section, goal, motion, kept, own, work)
+            self.go_on(tables)
             _end_if_not_wanted()
         if carry:
             state.settled = True
@@ -102,9 +104,7 @@ class LoopEngine(ABC):
         from nonsmooth.kernels.hybrid import records
 
         n, n_u, n_m = len(samples), len(self.scale), len(self.traced.m)
-        model, own, work = self.given(tables, "record")
-        net, goal = self.net_of(tables, 0), self._goal(0, 0, until, 0.0)
-        rest = model, net, nowhere(), goal, self._motion(state, state.settled)
+        goal, motion = self._goal(0, 0, until, 0.0), self._motion(state, state.settled)
         sampled = (
             np.ascontiguousarray(samples, dtype=float), np.full((n, n_u), np.nan), np.full((n, n_m), np.nan),
             np.full(n, -1, dtype=np.int64), np.zeros(n, dtype=np.int64),
@@ -112,9 +112,12 @@ class LoopEngine(ABC):
         crossings, touches = _crossings(1024, n_u, n_m), _touches(1024, n_u)
         kernel = self.module(tables, "record").record
         spare, code = self.touches_of_a_leg(), codes.LOG_FULL
-        work.tally[BEGUN] = 0
+        self.given(tables, "record")[2].tally[BEGUN] = 0
         while code in (codes.LOG_FULL, codes.PAUSED):
-            code = kernel(*rest, records.Log(*(*sampled, *crossings, *touches, spare)), own, work)
+            model, own, work = self.given(tables, "record")
+            log = records.Log(*(*sampled, *crossings, *touches, spare))
+            code = kernel(model, self.net_of(tables, 0), nowhere(), goal, motion, log, own, work)
+            self.go_on(tables)
             _end_if_not_wanted()
             if code == codes.LOG_FULL:
                 crossings = _longer(crossings, _crossings(2 * len(crossings[0]), n_u, n_m))
@@ -208,9 +211,12 @@ def pack_net(traced: Traced) -> Any:
 
     integer = np.int64
     transitions = np.array(
-        [(t.target, _change(traced, t), DEAD_END if traced.ends(t) else t.contact) for t in traced.transitions],
+        [
+            (t.target, _change(traced, t), DEAD_END if traced.ends(t) else t.contact, j)
+            for j, t in enumerate(traced.transitions)
+        ],
         dtype=integer,
-    ).reshape(-1, 3)  # fmt: skip
+    ).reshape(-1, 4)  # fmt: skip
     rows = [(r.indicator, r.sign, r.strict) for t in traced.transitions for r in t.rows]
     row_start = np.cumsum([0] + [len(t.rows) for t in traced.transitions], dtype=integer)
     leaving = [

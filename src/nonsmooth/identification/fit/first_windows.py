@@ -102,9 +102,9 @@ def _of_record(
         sizes = np.maximum(sizes, np.abs(motion.z[:, :n_u]).max(axis=0))
         last = end if end == len(time) else first + _quiet(motion.time, motion.log.crossing_time, length)
         spread = np.zeros(len(z)) if first == 0 and not free else np.append(np.ones(n_u), np.zeros(len(memory)))
-        windows.append(
-            Window(i, first, last, begin, candidate, spread, mode, which, time[first:last], record.values[first:last])
-        )
+        if np.isfinite(record.values[first:last]).any():  # a gap is bridged where windows are joined
+            t, y = time[first:last], record.values[first:last]
+            windows.append(Window(i, first, last, begin, candidate, spread, mode, which, t, y))
         if last == len(time):
             break
         z, mode = motion.z[last - first].copy(), int(motion.mode[last - first])

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from nonsmooth.identification.parameter_set import ParameterSet
     from nonsmooth.system.system import System
 
-__all__ = ["fit", "problem_of"]
+__all__ = ["best_of", "fit", "problem_of"]
 
 FloatArray = NDArray[np.float64]
 _SPREAD = 0.5  # other first guesses lie within this factor, exp(+-0.5), of the one that was given
@@ -139,7 +139,7 @@ def fit(
     if not longest > 0:
         raise ValueError(f"window = {window!r}: the longest window is a positive time; leave it out for none")
     tried = whole_number(tries, "tries", 1)
-    best = _best(problem, begin, bool(free_start), longest, tried, whole_number(seed, "seed", 0), progress)
+    best = best_of(problem, begin, bool(free_start), longest, tried, whole_number(seed, "seed", 0), progress)
     options = {"parameters": list(problem.unknowns.names), "window": window, "tries": tries, "seed": seed}
     given = recording if isinstance(recording, list | tuple) else [recording]
     return outcome(best, options, synthetic=any(getattr(one, "synthetic", False) for one in given))
@@ -174,7 +174,7 @@ def _irregularity(y: FloatArray) -> float:
     return float(np.sqrt(np.median(third**2) / (20.0 * 0.4549))) if len(third) else 0.0
 
 
-def _best(
+def best_of(
     problem: Windows, start: FloatArray | None, free: bool, longest: float, tries: int, seed: int, watched: Progress
 ) -> Grown:
     """The fit from the first guess that leads to one, else the best of all."""

@@ -27,17 +27,22 @@ AHEAD = Path(__file__).parents[1] / "ahead"  # a folder for each level; what the
 
 _V2 = "cx16 popcnt sahf sse3 sse4.1 sse4.2 ssse3"
 _V3 = f"{_V2} avx avx2 bmi bmi2 f16c fma lzcnt movbe xsave"
+_V4 = f"{_V3} avx512f avx512bw avx512cd avx512dq avx512vl"
 #: Machine -> level -> what a processor must have for it, as LLVM calls it; the highest level first.
 LEVELS: dict[str, dict[str, str]] = {
-    "x86_64": {"x86-64-v3": _V3},  # v4 is slower: docs/decisions.md
+    "x86_64": {"x86-64-v4": _V4, "x86-64-v3": _V3},
     "aarch64": {"generic": "neon"},
 }
+#: Levels for modes of so many states only: their long vectors slow down the short loops of few (docs/decisions.md).
+FEWEST_STATES = {"x86-64-v4": 64}
 _SAME = {"amd64": "x86_64", "arm64": "aarch64"}
 
 
 @cache
-def level() -> str:
+def level(states: int = 0) -> str:
     """The level that code is made for: that of the code that came with the package, else this processor's highest.
+
+    Modules that have a number of states as a constant may have a level of their own (``FEWEST_STATES``).
 
     ``NONSMOOTH_LEVEL`` chooses another. Empty where the processor has none of ``LEVELS``, or where ``NUMBA_CPU_NAME``
     and the like say what code is made for: then it is made as Numba makes it.
@@ -53,12 +58,12 @@ def level() -> str:
     there = set(get_host_cpu_features().split(","))
     possible = [
         name for name, needed in LEVELS.get(_SAME.get(machine, machine), {}).items()
-        if there.issuperset(f"+{feature}" for feature in needed.split())
+        if there.issuperset(f"+{feature}" for feature in needed.split()) and states >= FEWEST_STATES.get(name, 0)
     ]  # fmt: skip
     chosen = os.environ.get("NONSMOOTH_LEVEL", "")
     if chosen and chosen not in possible:
         raise ValueError(f"NONSMOOTH_LEVEL={chosen}: this processor has {', '.join(possible) or 'no level'}; unset it")
-    with_code = [name for name in possible if (AHEAD / name).is_dir()]
+    with_code = [name for name in possible if name in FEWEST_STATES or (AHEAD / name).is_dir()]
     return chosen or [*with_code, *possible, ""][0]
 
 
@@ -73,13 +78,17 @@ def made_ahead(entry: str) -> bytes:
 
 
 class _Codegen(JITCPUCodegen):
-    """An engine of its own, for the level."""
+    """An engine of its own, for the level of its number of states."""
+
+    def __init__(self, name: str, states: int = 0) -> None:
+        self._level = level(states)
+        super().__init__(name)
 
     def _get_host_cpu_name(self) -> Any:
-        return level() or super()._get_host_cpu_name()
+        return self._level or super()._get_host_cpu_name()
 
     def _get_host_cpu_features(self) -> Any:
-        return "" if level() else super()._get_host_cpu_features()
+        return "" if self._level else super()._get_host_cpu_features()
 
     def _function_pass_manager(self, **options: Any) -> Any:
         """One for all functions: Numba makes one for each, and llvmlite never frees it (15 kB)."""
@@ -96,9 +105,9 @@ def _function_passes() -> tuple[Any, Any]:
 class _Target(CPUTarget):
     """Numba's own target with another engine."""
 
-    def __init__(self) -> None:
+    def __init__(self, states: int) -> None:
         super().__init__("cpu")
-        self._context = cpu_target.target_context.subtarget(_internal_codegen=_Codegen("nonsmooth"))
+        self._context = cpu_target.target_context.subtarget(_internal_codegen=_Codegen("nonsmooth", states))
 
     @property
     def target_context(self) -> Any:
@@ -115,7 +124,7 @@ class Function(CPUDispatcher):
     def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
         names = function.__globals__
         if "_target" not in names:
-            names["_target"] = _Target()
+            names["_target"] = _Target(names.get("STATES", 0))  # of the exact flow
         self.targetdescr = names["_target"]
         super().__init__(py_func=function, targetoptions={"nopython": True, "boundscheck": None, **options})
 

@@ -120,10 +120,10 @@ def arrays_of_thread(packed, multiples, i):
     found = cuda.local.array(4, int64)
     visited = cuda.local.array(N_MODES, int64)
     twin = cuda.local.array(N_INDICATORS, int64)
-    built = cuda.local.array(1, int64)
+    built = cuda.local.array(2, int64)
     tally = cuda.local.array(N_TALLY, int64)
     memo = cuda.local.array(N_MEMO, float64)
-    built[0] = 0
+    built[0], built[1] = 0, 0
     tally[0] = 0
     lacking = cuda.local.array((1, 1), int64)
     lacking[0, 0] = 0

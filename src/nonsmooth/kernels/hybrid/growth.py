@@ -133,11 +133,12 @@ def cross(i, t, mode, jumps, form, net, goal, seen, tables, work):
         for c in range(STATES):
             R[r, c] = 1.0 if r == c else 0.0
         if net.transitions[t, 1] != 0:
+            m = net.transitions[t, 3]
             for c in range(STATES):
-                R[r, c] = form.ra[i, t, r, c]
+                R[r, c] = form.ra[i, m, r, c]
             for h in range(HARMONICS):
                 f[2, r] += work.rates[h] * (
-                    form.rs[i, t, h, r] * before[WAVE + 2 * h] - form.rc[i, t, h, r] * before[WAVE + 1 + 2 * h]
+                    form.rs[i, m, h, r] * before[WAVE + 2 * h] - form.rc[i, m, h, r] * before[WAVE + 1 + 2 * h]
                 )
     saltation(R, f[2], f[0], f[1], seen.t_z, STATES, seen.step, seen.matrix)
 

@@ -7,7 +7,8 @@ crossing, ends it there, takes transitions and says which conditions hold just a
 text that is joined with this file. Everything else is here: start rule, transitions of one instant in declared order,
 limits on chatter, the clock.
 
-All that a run knows beside its arrays stands in ``work.tally`` and ``work.memo``: it may pause and go on.
+All that a run knows beside its arrays stands in ``work.tally`` and ``work.memo``: it may pause and go on. It pauses
+also before a transition into a mode whose tables do not stand yet (its target is -1): the next call goes on with it.
 """
 
 from nonsmooth.kernels.compile.cache import inline, once
@@ -25,17 +26,24 @@ from nonsmooth.kernels.hybrid.places import (
     BEGUN,
     BURST,
     BURST_LENGTH,
+    CLOSELY,
     DEAD_END,
     FIRED,
+    FIRST,
     JUMPS,
     MODE,
+    MOST_AT_ONCE,
     MOST_CROSSINGS,
     NO_END,
+    NOTED,
     PERIODS,
     RESET,
     SHORT,
     SINCE,
+    SOURCE,
+    TAKEN,
     TIME,
+    WAITS,
 )
 
 
@@ -52,7 +60,8 @@ def next_holding(mode, tables, net, work):
 def settle(i, form, net, tables, work):
     """Start rule: transitions that hold already are taken, each mode at most once; so is an impact that begins there.
 
-    Returns a status: BEYOND_STOP where one with a reset holds and the start does not lie on its surface."""
+    Returns a status: BEYOND_STOP where one with a reset holds and the start does not lie on its surface; PAUSED where
+    one waits for the tables of its mode."""
     tally, visited = work.tally, work.visited
     for k in range(visited.shape[0]):
         visited[k] = 0
@@ -65,6 +74,9 @@ def settle(i, form, net, tables, work):
                 impact = net.transitions[one, 1] == RESET
                 if impact and lies_beyond(one, form, net, work):
                     return BEYOND_STOP
+                if net.transitions[one, 0] < 0:
+                    tally[WAITS] = one + 1
+                    return PAUSED
                 if visited[net.transitions[one, 0]] == 0 or (impact and net.transitions[one, 0] == mode):
                     t = one
                     break
@@ -92,6 +104,8 @@ def begin(i, form, net, section, motion, tables, work):
     code = OK
     if motion.counters[1] != 1:
         code = settle(i, form, net, tables, work)
+    if code == PAUSED:  # it begins anew when the mode stands
+        tally[BEGUN] = 0
     if section.indicator >= 0:  # a start on the section is no return
         start_on_section(form, section, tables, work)
     return code
@@ -118,16 +132,21 @@ def land(i, step, stop, t, full, form, net, tables, work):
 
 @once
 def transit(i, t, short, form, net, section, goal, seen, tables, work):
-    """Transition t and those that hold just after it, at the same instant. Returns (status, section direction)."""
+    """Transition t and those that hold just after it, at the same instant. Returns (status, section direction).
+
+    PAUSED: the next of them waits for the tables of its mode; called again, it goes on there."""
     tally = work.tally
-    mode, code = tally[MODE], OK
-    source, fired, first = mode, tally[FIRED], t
-    approach(mode, fired, seen, tables, work)
-    jumps = 0
+    mode, code, fired, jumps = tally[MODE], OK, tally[FIRED], tally[TAKEN]
+    if jumps == 0:
+        tally[SOURCE], tally[FIRST] = mode, t
+        approach(mode, fired, seen, tables, work)
     while t >= 0:
-        if jumps > net.mode_start.shape[0] + 1:  # as many as modes, and three
+        if jumps > min(net.mode_start.shape[0] + 1, MOST_AT_ONCE):  # as many as modes, and three
             code = CHATTER
             break
+        if net.transitions[t, 0] < 0:
+            tally[WAITS], tally[TAKEN], tally[CLOSELY] = t + 1, jumps, 1 if short else 0
+            return PAUSED, 0
         mode = take(i, t, fired if jumps == 0 else -1, form, tables, net, work)
         cross(i, t, mode, jumps, form, net, goal, seen, tables, work)
         tally[MODE] = mode
@@ -136,6 +155,7 @@ def transit(i, t, short, form, net, section, goal, seen, tables, work):
             code = NOT_UNIQUE
             break
         t = next_holding(mode, tables, net, work)
+    tally[TAKEN] = 0
     depart(jumps, seen, work)
     tally[JUMPS] += jumps
     tally[BURST] = tally[BURST] + 1 if short else 0
@@ -145,8 +165,8 @@ def transit(i, t, short, form, net, section, goal, seen, tables, work):
         code = TOO_MANY_CROSSINGS
     sense = 0  # where the section lies on the surface just crossed
     if section.indicator >= 0 and fired >= 0:
-        if section.mode < 0 or section.mode == (mode if section.after != 0 else source):
-            sense = met(first, fired, form, net, section, work)
+        if section.mode < 0 or section.mode == (mode if section.after != 0 else tally[SOURCE]):
+            sense = met(tally[FIRST], fired, form, net, section, work)
     return code, sense
 
 
@@ -162,44 +182,49 @@ def march(i, form, net, section, goal, motion, seen, tables, work):
         open_window(i, form, section, seen, tables, work)
     patience = goal.patience
     strides = may_stride(i, form, net, section, seen)
-    while code == OK and not reached(goal, work):
+    while code == OK and (tally[WAITS] > 0 or not reached(goal, work)):
         patience -= 1
         code = PAUSED if patience < 0 and may_pause(work) else room(seen, work)
         if code != OK:
             break
-        ready, clear = False, False
-        if strides:
-            ready, clear, patience = hurry(i, form, net, section, goal, seen, tables, work, patience)
-        stop, timed = NO_END, -1
-        if not strides:
-            stop, timed = next_stop(i, form, net, section, goal, work)
-        wait, rest = stop - memo[TIME], remaining(section, goal, work)
-        step, t, full, sense = leg(i, form, net, section, goal, tables, work, min(wait, rest), ready, clear)
-        if not step >= 0.0:
-            code = DIVERGED
-            break
-        # a step that ends before the stop may still end there when it is added to the clock
-        stopped = t < 0 and sense == 0 and (step >= wait or memo[TIME] + step >= stop)
-        if stopped and timed >= 0:
-            t = timed
-        state = observe(i, step, stop if stopped else -1.0, t >= 0 and t == timed, form, net, section, goal, seen,
-                        tables, work)  # fmt: skip
-        if state == CLOSED:
-            break
-        source = tally[MODE]
-        ended = step >= rest and t < 0
-        t, wrapped, short = land(i, step, stop if stopped else -1.0, t, full, form, net, tables, work)
-        mark(i, wrapped, ended, t >= 0, step, form, goal, seen, work)
-        if section.indicator >= 0:
-            for j in range(w.shape[0]):
-                work.before[j] = w[j]
+        t, short, sense, state = tally[WAITS] - 1, tally[CLOSELY] != 0, 0, tally[NOTED]
+        tally[WAITS] = 0
+        if t < 0:
+            ready, clear = False, False
+            if strides:
+                ready, clear, patience = hurry(i, form, net, section, goal, seen, tables, work, patience)
+            stop, timed = NO_END, -1
+            if not strides:
+                stop, timed = next_stop(i, form, net, section, goal, work)
+            wait, rest = stop - memo[TIME], remaining(section, goal, work)
+            step, t, full, sense = leg(i, form, net, section, goal, tables, work, min(wait, rest), ready, clear)
+            if not step >= 0.0:
+                code = DIVERGED
+                break
+            # a step that ends before the stop may still end there when it is added to the clock
+            stopped = t < 0 and sense == 0 and (step >= wait or memo[TIME] + step >= stop)
+            if stopped and timed >= 0:
+                t = timed
+            state = observe(i, step, stop if stopped else -1.0, t >= 0 and t == timed, form, net, section, goal, seen,
+                            tables, work)  # fmt: skip
+            if state == CLOSED:
+                break
+            tally[SOURCE], tally[NOTED] = tally[MODE], state
+            ended = step >= rest and t < 0
+            t, wrapped, short = land(i, step, stop if stopped else -1.0, t, full, form, net, tables, work)
+            mark(i, wrapped, ended, t >= 0, step, form, goal, seen, work)
+            if section.indicator >= 0:
+                for j in range(w.shape[0]):
+                    work.before[j] = w[j]
         if t >= 0:
             code, sense = transit(i, t, short, form, net, section, goal, seen, tables, work)
+            if code == PAUSED:
+                break
         elif sense != 0:
             touch_section(section, work)
         if not bounded(work, goal.limit):
             code = DIVERGED
-        code = arrive(i, code, source, t, sense, state, form, section, goal, seen, tables, work)
+        code = arrive(i, code, tally[SOURCE], t, sense, state, form, section, goal, seen, tables, work)
     return NOT_GUARANTEED if code == OK and doubtful(work) else code
 
 

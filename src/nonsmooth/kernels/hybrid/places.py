@@ -5,13 +5,17 @@ BEGUN, MODE, JUMPS, BURST = 0, 1, 2, 3  # transitions within one return, period 
 RETURNS, PASSES, TRIES = 4, 5, 6  # of the section; steps since the last pass
 SAMPLES, CROSSINGS, TOUCHES = 7, 8, 9  # logged
 FIRED = 10  # the functional (indicator) that has crossed, or -1
-N_TALLY = 11
+# a transition (plus one) that waits for the tables of its mode, and of its instant: the transitions taken before it,
+# the mode before the first, the first; whether they are closely behind others, and what the observer saw on the leg
+WAITS, TAKEN, SOURCE, FIRST, CLOSELY, NOTED = 11, 12, 13, 14, 15, 16
+N_TALLY = 17
 
 # times
 TIME, PERIODS, SINCE, WAITED, DONE = 0, 1, 2, 3, 4  # in the period, since a crossing, since a pass, since the start
 N_MEMO = 5
 
 MOST_CROSSINGS = 1000  # within one section return, period or unit of time
+MOST_AT_ONCE = 60  # at one instant: a log has room for 64 more when a step begins
 MOST_STEPS = 2_000_000  # on the way to the next return
 BURST_LENGTH = 50  # crossings in a row at intervals below SHORT of the stepper's time scale end a run as chatter
 SHORT = 1e-11

@@ -45,9 +45,9 @@ class Form(NamedTuple):
     ob: Any  # (P, outputs, modes)
     oc: Any  # (P, outputs, modes, harmonics)
     os: Any
-    ra: Any  # (P, transitions, n, n)
-    rb: Any  # (P, transitions, n)
-    rc: Any  # (P, transitions, harmonics, n)
+    ra: Any  # (P, maps, n, n)
+    rb: Any  # (P, maps, n)
+    rc: Any  # (P, maps, harmonics, n)
     rs: Any
     lacking: Any  # (modes, n) 1: memory, or a state that the mode does not have
 
@@ -67,13 +67,14 @@ class Tables(NamedTuple):
 class Net(NamedTuple):
     """The transition table of a linear system."""
 
-    transitions: Any  # (transitions, 3): target, what it changes (0, ``places.RESET``, ...), contact or ``DEAD_END``
+    transitions: Any  # (transitions, 4): target (-1: its tables do not stand yet), what it changes (0,
+    # ``places.RESET``, ...), contact or ``DEAD_END``, its map among those of the form
     rows: Any  # (rows + 2, 3): functional, sign, strict; the last two belong to the section (rising, falling)
     row_start: Any  # (transitions + 1,)
     mode_start: Any  # (modes + 1,)
     mode_list: Any  # outgoing transitions of each mode in declared order
     at: Any  # (transitions,) phase of a transition at a time, or -1
-    changed: Any  # (transitions, n + 1) how many states a transition changes, and which
+    changed: Any  # (maps, n + 1) how many states a map changes, and which
 
 
 class Work(NamedTuple):
@@ -95,7 +96,7 @@ class Work(NamedTuple):
     found: Any  # (4,) see ``linear.search``
     visited: Any  # (modes,) by the start rule
     twin: Any  # (indicators,) the state that an indicator is but for a constant, or -1
-    built: Any  # (1,) the point for which the tables stand there already, plus one
+    built: Any  # (2,) the point for which the tables stand there already, plus one; the modes that stand before them
     tally: Any  # counts of the run, at the places of ``hybrid.places``
     memo: Any  # and times
 
@@ -192,7 +193,7 @@ class Goal(NamedTuple):
 
 
 class Kept(NamedTuple):
-    """The kept values of P points of a sweep (see ``flow.engine.Chain``)."""
+    """The kept values of P points of a sweep (see ``flow.engines.engine.Chain``)."""
 
     section: Any  # (P, keep, n)
     maximum: Any  # (P, n)

@@ -11,15 +11,30 @@ from nonsmooth.kernels.linear.tables import DEGREE, HARMONICS, MANY, NODES, STAT
 
 def scratch(n_modes, n_indicators, n_outputs, n_rows):
     """Tables and working memory for one thread, in one block."""
-    n_f = n_indicators + STATES + n_outputs
-    vectors = [np.zeros(M) for _ in range(8)]
-    integers = [np.zeros(n, dtype=np.int64) for n in (n_indicators, 4, n_modes, n_indicators, 1, N_TALLY)]
-    block = one_block(
+    tables = _tables(n_modes, n_indicators + STATES + n_outputs)
+    block = one_block(*tables, *_work(n_modes, n_indicators, n_rows))
+    return Tables(*block[: len(tables)]), Work(*block[len(tables) :])
+
+
+def scratch_apart(n_modes, n_indicators, n_outputs, n_rows):
+    """The same with each table by itself, which takes memory only where it is written."""
+    tables = _tables(n_modes, n_indicators + STATES + n_outputs)
+    return Tables(*tables), Work(*one_block(*_work(n_modes, n_indicators, n_rows)))
+
+
+def _tables(n_modes, n_f):
+    return (
         np.zeros((n_modes, NODES + 1, M, STATES)), np.zeros((n_modes, NODES + 1, 2 * HARMONICS + 1)),
         np.zeros((n_modes, n_f, 2 * (M + STATES + 1))), np.zeros((n_modes, n_f, M, DEGREE + 1)),
         np.zeros((n_modes, STATES, M)), np.zeros((n_modes, 2 + STATES)),
         np.zeros((n_modes, n_f, 2, M + 1) if STATES >= MANY else (1, 1, 1, 1), dtype=np.int64),
+    )  # fmt: skip
+
+
+def _work(n_modes, n_indicators, n_rows):
+    vectors = [np.zeros(M) for _ in range(8)]
+    integers = [np.zeros(n, dtype=np.int64) for n in (n_indicators, 4, n_modes, n_indicators, 2, N_TALLY)]
+    return (
         *vectors, np.zeros((max(TERMS, STATES) + 1, M)), np.zeros((n_rows + STATES + 1, WIDTH)), np.zeros(4),
         np.zeros(HARMONICS), *integers, np.zeros(N_MEMO),
     )  # fmt: skip
-    return Tables(*block[:7]), Work(*block[7:])

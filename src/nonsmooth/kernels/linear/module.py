@@ -9,7 +9,7 @@ from types import ModuleType
 from nonsmooth.kernels.compile.assembly import joined, with_numbers
 from nonsmooth.kernels.compile.cache import load_module
 
-__all__ = ["STEPPER", "linear_module", "settle_module"]
+__all__ = ["STEPPER", "linear_module", "modes_module", "settle_module"]
 
 STEPPER = ("linear.tables", "linear.polynomial", "linear.search", "linear.stepper", "linear.layout", "hybrid.loop")
 OBSERVERS = {
@@ -26,6 +26,14 @@ def linear_module(states: int, harmonics: int, observer: str = "sections", memor
     text = joined((*STEPPER, *OBSERVERS[observer]))
     text = with_numbers(text, {"STATES": states, "HARMONICS": harmonics, "MEMORY": memory})
     return load_module(text, f"linear_{observer}_{states}_{harmonics}" + (f"_{memory}" if memory else ""))
+
+
+@cache
+def modes_module(states: int, harmonics: int) -> ModuleType:
+    """The module with ``stand``, which adds modes to the tables of those numbers of states and harmonics."""
+    numbers = {"STATES": states, "HARMONICS": harmonics, "MEMORY": 0}
+    text = with_numbers(joined(("linear.tables", "linear.modes")), numbers)
+    return load_module(text, f"linear_modes_{states}_{harmonics}")
 
 
 @cache

@@ -345,6 +345,8 @@ def search(tables, work, mode, rows, lo, hi, held, r_max):
                     if not ((node - 1e-6) * spacing <= tau <= (last + 1e-6) * spacing):
                         tau = -1.0
                         break
+                    if tau > r_max:  # none of the rows matters that cross still later
+                        return -1.0
                     found[FUNCTIONAL] = f
                     dense(tables, work, mode, tau, end)
                     behind = -1
@@ -362,6 +364,8 @@ def search(tables, work, mode, rows, lo, hi, held, r_max):
             tau = finest(tables, work, mode, rows, lo, hi, node, up)
             if tau >= 0.0:
                 tau += node * spacing
+                if tau > r_max:
+                    return -1.0
                 dense(tables, work, mode, tau, end)
                 return tau
             up = found[HELD] != 0

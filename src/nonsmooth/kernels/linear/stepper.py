@@ -7,7 +7,7 @@ A segment is one step of the mode, or its part up to the first crossing, section
 from math import cos, fabs, isfinite, sin
 
 from nonsmooth.kernels.compile.cache import device, inline, once
-from nonsmooth.kernels.compile.lanes import dot, sizes
+from nonsmooth.kernels.compile.lanes import dot
 from nonsmooth.kernels.hybrid.places import FIRED, MODE, NO_END, TIME
 from nonsmooth.kernels.hybrid.records import FORM, TABLES, WORK
 from nonsmooth.kernels.linear.search import (
@@ -57,7 +57,11 @@ def rounding(tables, mode, f, at, w):
     """Below this the row fun[mode, f, at:] is zero within rounding at w."""
     total = 0.0
     if STATES >= MANY:
-        total = sizes(total, tables.fun[mode, f], at, w, M)
+        for q in range(1, tables.some[mode, f, 1, 0] + 1):
+            j = tables.some[mode, f, 1, q]
+            total += fabs(tables.fun[mode, f, at + j] * w[j])
+        for j in range(STATES, M):
+            total += fabs(tables.fun[mode, f, at + j] * w[j])
     else:
         for j in range(M):
             total += fabs(tables.fun[mode, f, at + j] * w[j])
@@ -74,7 +78,8 @@ def flat(tables, mode, f, w):
 def vanishing(tables, mode, f, w):
     """(k, sign): the first derivative of functional f from the second on that is not zero within rounding at w.
 
-    Of those up to the fourth; (5, 0) where they vanish all."""
+    Of those up to the fourth; (5, 0) where they vanish all. A harmonic's rounding is that of its phase, whatever its
+    value: a force that presses may be nothing else."""
     tay = tables.tay
     for k in range(2, 5):
         total = tay[mode, f, ONE, k]
@@ -82,7 +87,7 @@ def vanishing(tables, mode, f, w):
         for j in range(M):
             if j != ONE:
                 total += tay[mode, f, j, k] * w[j]
-                size += fabs(tay[mode, f, j, k] * w[j])
+                size += fabs(tay[mode, f, j, k]) * (fabs(w[j]) if j < WAVE else 1.0)
         if fabs(total) > 64.0 * EPS * size:
             return k, 1 if total > 0.0 else -1
     return 5, 0
@@ -168,31 +173,31 @@ def start_on_section(form, section, tables, work):
 
 
 @inline
-def mapped(i, t, r, form, w):
-    """State r behind transition t."""
-    total = form.rb[i, t, r]
+def mapped(i, m, r, form, w):
+    """State r behind the map m."""
+    total = form.rb[i, m, r]
     if STATES >= MANY:
-        total = dot(total, form.ra[i, t, r], 0, w, STATES)
+        total = dot(total, form.ra[i, m, r], 0, w, STATES)
     else:
         for j in range(STATES):
-            total += form.ra[i, t, r, j] * w[j]
+            total += form.ra[i, m, r, j] * w[j]
     for h in range(HARMONICS):
-        total += form.rc[i, t, h, r] * w[WAVE + 2 * h] + form.rs[i, t, h, r] * w[WAVE + 1 + 2 * h]
+        total += form.rc[i, m, h, r] * w[WAVE + 2 * h] + form.rs[i, m, h, r] * w[WAVE + 1 + 2 * h]
     return total
 
 
 @inline
 def apply_map(i, t, form, net, work):
     """The states behind transition t, into w; of many only those that it changes are looked at."""
-    w, wn = work.w, work.wn
+    w, wn, m = work.w, work.wn, net.transitions[t, 3]
     if STATES >= MANY:
-        for q in range(1, net.changed[t, 0] + 1):
-            wn[net.changed[t, q]] = mapped(i, t, net.changed[t, q], form, w)
-        for q in range(1, net.changed[t, 0] + 1):
-            w[net.changed[t, q]] = wn[net.changed[t, q]]
+        for q in range(1, net.changed[m, 0] + 1):
+            wn[net.changed[m, q]] = mapped(i, m, net.changed[m, q], form, w)
+        for q in range(1, net.changed[m, 0] + 1):
+            w[net.changed[m, q]] = wn[net.changed[m, q]]
     else:
         for r in range(STATES):
-            wn[r] = mapped(i, t, r, form, w)
+            wn[r] = mapped(i, m, r, form, w)
         for r in range(STATES):
             w[r] = wn[r]
 

@@ -19,7 +19,7 @@ every inner loop has constant bounds. Arrays (M columns of w, functionals = indi
                                    of the states in value and slope
 """
 
-from math import cos, fabs, nan, sin, sqrt
+from math import cos, fabs, isnan, nan, sin, sqrt
 
 from nonsmooth.kernels.compile.cache import device, inline
 from nonsmooth.kernels.compile.lanes import dot
@@ -144,17 +144,19 @@ def times_generator(row, k, field, mode, rates, scale):
 
 
 @device
-def fill_mode(i, mode, form, tables, rates, row):
-    """The states' rows of M; step, node spacing and equilibrium (the origin where the matrix is singular)."""
+def fill_mode(i, given, mode, form, tables, rates, row):
+    """The states' rows of M; step, node spacing and equilibrium (the origin where the matrix is singular).
+
+    ``given`` is the mode's place in ``form``."""
     field, info, period = tables.field, tables.info, form.period[i]
     for r in range(STATES):
         for j in range(STATES):
-            field[mode, r, j] = form.A[i, mode, r, j]
-        field[mode, r, ONE] = form.b[i, mode, r]
+            field[mode, r, j] = form.A[i, given, r, j]
+        field[mode, r, ONE] = form.b[i, given, r]
         for h in range(HARMONICS):
-            field[mode, r, WAVE + 2 * h] = form.c[i, mode, h, r]
-            field[mode, r, WAVE + 1 + 2 * h] = form.s[i, mode, h, r]
-    rate = fastest_rate(form.A[i, mode], row)
+            field[mode, r, WAVE + 2 * h] = form.c[i, given, h, r]
+            field[mode, r, WAVE + 1 + 2 * h] = form.s[i, given, h, r]
+    rate = fastest_rate(form.A[i, given], row)
     for h in range(HARMONICS):
         rate = max(rate, rates[h])
     if rate > 0.0:
@@ -167,7 +169,7 @@ def fill_mode(i, mode, form, tables, rates, row):
         step = min(step, 0.3 * period)
     info[mode, 0] = step
     info[mode, 1] = step / NODES
-    find_equilibrium(form.A[i, mode], form.b[i, mode], row, info[mode])
+    find_equilibrium(form.A[i, given], form.b[i, given], row, info[mode])
 
 
 @device
@@ -308,14 +310,18 @@ def hide_lacking(form, tables, work):
 
 @device
 def build(i, form, tables, work):
-    """Fill the tables for parameter point ``i``, where they do not stand there already."""
+    """Fill the tables for parameter point ``i``, where they do not stand there already.
+
+    The modes of ``form`` go behind the first ``work.built[1]``, which stand."""
     if work.built[0] == i + 1:
         return
+    first = work.built[1]
     n_i, fun, rates = form.ia.shape[1], tables.fun, work.rates
     for h in range(HARMONICS):
         rates[h] = form.multiples[h] * form.omega[i]
-    for mode in range(form.A.shape[1]):
-        fill_mode(i, mode, form, tables, rates, work.row)
+    for given in range(form.A.shape[1]):
+        mode = first + given
+        fill_mode(i, given, mode, form, tables, rates, work.row)
         fill_propagators(mode, tables.field, rates, tables.info[mode, 1], tables.prop, tables.rot, work.row)
         for f in range(fun.shape[1]):
             for j in range(M):
@@ -332,11 +338,13 @@ def build(i, form, tables, work):
             else:
                 o = f - n_i - STATES
                 for j in range(STATES):
-                    fun[mode, f, j] = form.oa[i, o, mode, j]
-                fun[mode, f, ONE] = form.ob[i, o, mode]
+                    fun[mode, f, j] = form.oa[i, o, given, j]
+                fun[mode, f, ONE] = form.ob[i, o, given]
                 for h in range(HARMONICS):
-                    fun[mode, f, WAVE + 2 * h] = form.oc[i, o, mode, h]
-                    fun[mode, f, WAVE + 1 + 2 * h] = form.os[i, o, mode, h]
+                    fun[mode, f, WAVE + 2 * h] = form.oc[i, o, given, h]
+                    fun[mode, f, WAVE + 1 + 2 * h] = form.os[i, o, given, h]
+            if isnan(fun[mode, f, ONE]):  # not asked for in this mode
+                continue
             fill_functional(mode, f, tables, rates, work.row)
             if STATES >= MANY:
                 list_columns(mode, f, tables)

@@ -9,19 +9,23 @@ from nonsmooth.kernels.linear.tables import NODES, OWN
 
 @once
 def log_touches(step, form, net, seen, tables, work):
-    """Append the local maxima of the mode's armed rows that stay <= 0 within (0, step) of a segment."""
+    """Append the local maxima of the mode's armed rows that stay <= 0 within (0, step) of a segment; none where there
+    is no room for those of one (``spare``)."""
     wn, scr, points = work.wn, work.scr, work.points
     mode, base = work.tally[MODE], work.memo[DONE]
     spacing, n = tables.info[mode, 1], work.tally[TOUCHES]
-    for j in range(net.mode_start[mode], net.mode_start[mode + 1]):
-        t = net.mode_list[j]
-        for r in range(net.row_start[t], net.row_start[t + 1]):
-            f = net.rows[r, 0]
-            sign = float(net.rows[r, 1])
-            for node in range(1, NODES, 2):  # pieces of two spacings, with their polynomial in the middle
-                if (node - 1) * spacing >= step or n + 1 >= seen.touch_time.shape[0]:
+    nodes = NODES if seen.spare > 0 else 0
+    for node in range(1, nodes, 2):  # pieces of two spacings, with their polynomial in the middle
+        if (node - 1) * spacing >= step:
+            break
+        to_node(tables, mode, node, work.w, wn)
+        for j in range(net.mode_start[mode], net.mode_start[mode + 1]):
+            t = net.mode_list[j]
+            for r in range(net.row_start[t], net.row_start[t + 1]):
+                if n + 1 >= seen.touch_time.shape[0]:
                     break
-                to_node(tables, mode, node, work.w, wn)
+                f = net.rows[r, 0]
+                sign = float(net.rows[r, 1])
                 compose(tables, mode, f, wn, scr, 0)
                 count = critical_points(scr, 0, -spacing, spacing, points)
                 for k in range(count):

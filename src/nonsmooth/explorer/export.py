@@ -1,0 +1,157 @@
+"""Files of what a page shows: figures by ``nonsmooth.plot``, data, and the script or study file that makes them.
+
+Scripts are written from the record that a result carries, not from the page: what they compute is what was shown.
+"""
+
+from __future__ import annotations
+
+import inspect
+import json
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import nonsmooth as ns
+from nonsmooth.results.provenance import read_provenance
+
+__all__ = ["KINDS", "VIEWS", "exported"]
+
+#: Views that can be saved: the result that each shows, and the function of ``nonsmooth.plot`` that draws it.
+VIEWS = {
+    "diagram": ("diagram", "bifurcation"), "portrait": ("run", "phase_portrait"), "history": ("run", "time_history"),
+    "section": ("section", "section"),
+}  # fmt: skip
+KINDS = {"pdf": "PDF", "png": "PNG", "svg": "SVG", "nc": "NetCDF", "py": "Python script", "toml": "study file"}
+
+
+def exported(view: str, kind: str, results: Mapping[str, Any], state: Any) -> tuple[str, bytes]:
+    """The name and the bytes of a file.
+
+    Raises
+    ------
+    ValueError
+        A view that is not computed yet, a kind that does not exist, and a study file of a system that has no name.
+    """
+    if view not in VIEWS or kind not in KINDS:
+        raise ValueError(f"{view!r} cannot be saved as {kind!r}; views: {', '.join(VIEWS)}; kinds: {', '.join(KINDS)}")
+    key, plot = VIEWS[view]
+    result = results.get(key)
+    if result is None or (view == "diagram" and "period_number" not in result):
+        raise ValueError(f"the {view} is not computed yet; wait for it and save it then")
+    axes = {
+        "diagram": {"y": state.shown}, "portrait": {"x": state.x, "y": state.y}, "history": {"y": state.x},
+        "section": {"x": state.x, "y": state.y},
+    }[view]  # fmt: skip
+    stem = f"{state.model}_{view}"
+    if kind == "py":
+        return f"{stem}.py", python_of(result, plot, axes, state.model, stem).encode()
+    if kind == "toml":
+        return f"{stem}.toml", study_of(result, axes, state.model, stem).encode()
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / f"{stem}.{kind}"
+        if kind == "nc":
+            ns.save(result, path)
+        else:
+            import matplotlib.pyplot as plt
+
+            ax = getattr(ns.plot, plot)(result, **axes)
+            ns.plot.save_figure(ax, path)
+            plt.close(ax.figure)
+        return path.name, path.read_bytes()
+
+
+def python_of(result: Any, plot: str, axes: Mapping[str, str], model: str, stem: str) -> str:
+    """A script that computes a result, saves it and draws its figure."""
+    record, system = read_provenance(result), ns.system_of(result)
+    options = _options(record, result)
+    positional = []
+    for name in ("parameter", "values"):
+        if name in options:
+            positional.append(_python(options.pop(name)))
+    arguments = ", ".join(["system", *positional, *(f"{name}={_python(value)}" for name, value in options.items())])
+    marks = ", ".join(f"{name}={value!r}" for name, value in axes.items())
+    band = f".smoothed({system.eta!r})" if system.is_smoothed else ""
+    if model in ns.models.names():
+        values = ", ".join(f"{name}={value!r}" for name, value in _values(system, record).items())
+        made = f"ns.models.{model}().with_parameters({values}){band}"
+    else:
+        values = ", ".join(f"{name!r}: {value!r}" for name, value in _values(system, record).items())
+        made = f"ns.System.from_text(TEXT).with_parameters({{{values}}})"
+    text = "" if model in ns.models.names() else f"TEXT = {record['system']['text']!r}\n\n"
+    return (
+        f'"""{record["verb"]} of {json.dumps(system.name)[1:-1]}, as the explorer showed it."""\n\n'
+        "import numpy as np\n\nimport nonsmooth as ns\n\n"
+        f"{text}system = {made}\nresult = ns.{record['verb']}({arguments})\n"
+        f'ns.save(result, "{stem}.nc")\nns.plot.save_figure(ns.plot.{plot}(result, {marks}), "{stem}.pdf")\n'
+    )
+
+
+def study_of(result: Any, axes: Mapping[str, str], model: str, stem: str) -> str:
+    """A study file for ``nonsmooth run``."""
+    if model not in ns.models.names():
+        raise ValueError("a study file names a model of nonsmooth.models or a file; save the Python script instead")
+    record, system = read_provenance(result), ns.system_of(result)
+    lines = ["[system]", f'model = "{model}"', f"parameters = {_toml(_values(system, record))}"]
+    if system.is_smoothed:
+        lines.append(f"smoothed = {_toml(system.eta)}")
+    lines += ["", f"[{record['verb']}]"]
+    lines += [f"{name} = {_toml(value, name)}" for name, value in _options(record, result).items()]
+    shown = {name: value for name, value in axes.items() if record["verb"] != "simulate" or axes.keys() >= {"x", "y"}}
+    lines += ["", "[output]", f'data = "{stem}.nc"', f'figure = "{stem}.pdf"']
+    lines += [f'{name} = "{value}"' for name, value in shown.items()]
+    return "\n".join(lines) + "\n"
+
+
+def _values(system: Any, record: Mapping[str, Any]) -> dict[str, float]:
+    """The parameters that the verb was given."""
+    return {
+        name: float(record["system"]["parameters"][name] or system.values[name]) for name in system.parameters
+        if name != "eta" or not system.is_smoothed
+    }  # fmt: skip
+
+
+def _options(record: Mapping[str, Any], result: Any) -> dict[str, Any]:
+    """The options of the verb that are not at their defaults; values of a parameter as an array."""
+    defaults = inspect.signature(getattr(ns, record["verb"])).parameters
+    found = {
+        name: value for name, value in record["options"].items()
+        if name not in defaults or value != defaults[name].default
+    }  # fmt: skip
+    if "values" in found:
+        found["values"] = result[found["parameter"]].values
+    return found
+
+
+def _even(values: Any) -> tuple[float, float, int] | None:
+    """Ends and number of equidistant values; None where they are not."""
+    ends = float(values[0]), float(values[-1]), len(values)
+    return ends if np.array_equal(np.linspace(*ends), values) else None
+
+
+def _python(value: Any) -> str:
+    if isinstance(value, np.ndarray):
+        ends = _even(value)
+        return repr(value.tolist()) if ends is None else f"np.linspace({ends[0]!r}, {ends[1]!r}, {ends[2]})"
+    if isinstance(value, Mapping) and "type" in value:
+        kind = getattr(ns, value["type"])
+        known = inspect.signature(kind).parameters
+        given = [f"{k}={v!r}" for k, v in value.items() if k in known and v != known[k].default]
+        return f"ns.{value['type']}({', '.join(given)})"
+    return repr(value)
+
+
+def _toml(value: Any, name: str = "") -> str:
+    if isinstance(value, np.ndarray):
+        ends = _even(value)
+        return _toml(value.tolist()) if ends is None else f"{{ from = {ends[0]!r}, to = {ends[1]!r}, n = {ends[2]} }}"
+    if isinstance(value, Mapping):
+        pairs = {k: v for k, v in value.items() if k != "type" and v is not None}
+        return "{ " + ", ".join(f"{k} = {_toml(v)}" for k, v in pairs.items()) + " }"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    if value is None and name == "direction":
+        return '"none"'
+    return json.dumps(value)

@@ -1,0 +1,169 @@
+"""``select_model``: systems ranked by how well each predicts parts of a recording that it was not fitted to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.errors import SolveError
+from nonsmooth.flow.arguments import check_system, whole_number
+from nonsmooth.identification.blas import one_blas_thread
+from nonsmooth.results.progress import Progress
+from nonsmooth.results.progress import progress as watched
+from nonsmooth.system.names import by_name
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from nonsmooth.identification.fit.growth import Grown
+    from nonsmooth.identification.fit.windows import Windows
+
+__all__ = ["select_model"]
+
+FloatArray = NDArray[np.float64]
+_BLOCK = 2.0  # first windows: the length of a part that is held out
+
+
+@by_name
+@one_blas_thread()
+def select_model(
+    models: Mapping[str, Any],
+    recording: Any,
+    *,
+    measured: Any = None,
+    settings: Any = None,
+    runs: Sequence[str] | None = None,
+    time: str = "time",
+    folds: int = 5,
+    tries: int = 4,
+    seed: int = 0,
+    progress: Progress = True,
+) -> xr.Dataset:
+    r"""Errors with which systems predict parts of a recording that they were not fitted to.
+
+    The recording is cut into short blocks, and every ``folds``-th of them is held out in turn. Each system is fitted to
+    the rest (:func:`nonsmooth.fit`), and its motion is compared with the readings that were held out. So a model with
+    more parameters is not better for that alone.
+
+    Parameters
+    ----------
+    models : mapping of str to (System, parameters)
+        The systems to compare, each with what is to be found of it, as :func:`nonsmooth.fit` takes it.
+    recording, measured, settings, runs, time
+        See :func:`nonsmooth.fit`; the measured states or outputs are those of every system.
+    folds : int
+        How many times a part is held out.
+    tries, seed, progress
+        See :func:`nonsmooth.fit`.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``squared_error(model, fold)``: mean squared error of the prediction, over the variance that the record's own
+        irregularity shows (1: as good as its noise allows). A reading of which a model has no motion counts as if its
+        mean were predicted. ``rms(model)``; ``difference(model)``: mean excess of ``squared_error`` over that of the
+        best model, with its standard error over the folds, ``difference_error``. The attribute ``best`` names the model
+        with the least error.
+
+    Raises
+    ------
+    ValueError, TypeError
+        Arguments that do not fit.
+
+    Notes
+    -----
+    A difference below twice its error does not tell two models apart; take the simpler one.
+
+    References
+    ----------
+    P. Burman, E. Chow, D. Nolan, Biometrika 81 (1994) 351-358 (cross-validation of dependent data).
+    """
+    import xarray as xr
+
+    from nonsmooth.identification.fit.fit import problem_of
+
+    if not isinstance(models, Mapping) or len(models) < 2:
+        raise ValueError(
+            "models must name at least two systems, each with what is to be found of it: "
+            '{"viscous": (system, ["k", "c"]), "dry": (other, ["k", "f"])}'
+        )
+    n = whole_number(folds, "folds", 2)
+    problems = {}
+    for name, pair in models.items():
+        if not isinstance(pair, list | tuple) or len(pair) != 2:
+            raise TypeError(f"models[{name!r}] must be a pair (system, parameters), not {type(pair).__name__}")
+        check_system(pair[0], "select_model")
+        problems[str(name)] = problem_of(pair[0], recording, pair[1], measured, None, settings, runs, time)
+    held = _held_out(next(iter(problems.values())), n)
+    found = np.empty((len(problems), n))
+    with watched(len(problems) * n, "models", progress) as advance:
+        for i, problem in enumerate(problems.values()):
+            for fold in range(n):
+                found[i, fold] = _error(problem, [part == fold for part in held], tries, seed)
+                advance()
+    best = int(np.argmin(found.mean(axis=1)))
+    excess = found - found[best]
+    return xr.Dataset(
+        {
+            "squared_error": (("model", "fold"), found, {"units": "1"}),
+            "rms": ("model", np.sqrt(found.mean(axis=1)), {"units": "1"}),
+            "difference": ("model", excess.mean(axis=1), {"units": "1"}),
+            "difference_error": ("model", excess.std(axis=1, ddof=1) / np.sqrt(n), {"units": "1"}),
+        },
+        {"model": list(problems), "fold": np.arange(n)},
+        {"best": list(problems)[best]},
+    )
+
+
+def _held_out(problem: Windows, folds: int) -> list[NDArray[np.int64]]:
+    """The fold in which each instant of each record is held out; -1: never, at the record's beginning."""
+    from nonsmooth.identification.fit.first_windows import first_length
+
+    length, block, found = _BLOCK * first_length(problem), 0, []
+    for record in problem.records:
+        number = np.floor((record.time - record.time[0]) / length).astype(np.int64)
+        found.append(np.where(number == 0, -1, (number - 1 + block) % folds))
+        block += int(number[-1])
+    if any(not (part == fold).any() for fold in range(folds) for part in [np.concatenate(found)]):
+        raise ValueError(
+            f"the recording is too short for folds = {folds}: it holds {block} blocks of {length:.3g}; ask for "
+            "fewer folds"
+        )
+    return found
+
+
+def _error(problem: Windows, held: list[NDArray[np.bool_]], tries: int, seed: int) -> float:
+    """Mean squared error at the readings held out, over the noise."""
+    from nonsmooth.identification.fit.fit import best_of
+
+    records = [
+        replace(record, values=np.where(part[:, None], np.nan, record.values))
+        for record, part in zip(problem.records, held, strict=True)
+    ]
+    far = [
+        (record.values - np.nanmean(record.values, axis=0)) / problem.noise for record in problem.records
+    ]  # where there is no prediction
+    try:
+        grown = best_of(replace(problem, records=records), None, True, np.inf, tries, seed, False)
+    except SolveError:
+        pass
+    else:
+        _predict(problem, grown, far)
+    rows = [part[out][np.isfinite(part[out])] for part, out in zip(far, held, strict=True)]
+    return float(np.mean(np.concatenate(rows) ** 2))
+
+
+def _predict(problem: Windows, grown: Grown, far: list[FloatArray]) -> None:
+    """Errors over the noise of all readings of which the fit has a motion, in place."""
+    fitted = grown.problem
+    for window, start in zip(fitted.pieces, grown.starts, strict=True):
+        whole = replace(window, values=problem.records[window.record].values[window.first : window.last])
+        motion = fitted.motion(grown.theta, whole, start)
+        if motion is not None:
+            predicted, _ = fitted.readings(grown.theta, whole, motion, False)
+            k, c = whole.readings
+            far[window.record][window.first + k, c] = (whole.values[k, c] - predicted) / problem.noise[c]

@@ -1,0 +1,87 @@
+"""Files saved from a page make what it showed: scripts and study files are run, and compared with the data."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+from nonsmooth.cli import main as cli
+from nonsmooth.explorer.export import KINDS, exported
+from nonsmooth.explorer.presets import first_state
+
+SYSTEM = ns.models.discontinuous_support(rho=0.26)
+STATE = first_state("discontinuous_support", SYSTEM)
+SHORT: dict[str, Any] = {"transient": 60, "start": [0.0, 0.0]}
+
+
+@pytest.fixture(scope="module")
+def results() -> dict[str, Any]:
+    return {
+        "diagram": ns.sweep(
+            SYSTEM, "rho", np.linspace(0.25, 0.3, 7), direction="both", keep=20, section=ns.Stroboscopic(0.0),
+            progress=False, **SHORT,
+        ),
+        "run": ns.simulate(SYSTEM, periods=8, **SHORT),
+        "section": ns.poincare(SYSTEM, section=ns.Stroboscopic(0.25), n=12, **SHORT),
+    }  # fmt: skip
+
+
+def write(folder: Path, view: str, kind: str, results: Any, state: Any = STATE) -> Path:
+    name, content = exported(view, kind, results, state)
+    (folder / name).write_bytes(content)
+    return folder / name
+
+
+def same(path: Path, shown: Any) -> None:
+    made = ns.load(path)
+    assert made.drop_attrs().identical(shown.drop_attrs())
+
+
+@pytest.mark.parametrize(("view", "key"), [("diagram", "diagram"), ("portrait", "run"), ("section", "section")])
+def test_the_script_and_the_study_file_make_what_was_shown(
+    view: str, key: str, results: dict[str, Any], tmp_path: Path
+) -> None:
+    script = write(tmp_path, view, "py", results)
+    subprocess.run([sys.executable, script.name], cwd=tmp_path, check=True)
+    data = script.with_suffix(".nc")
+    same(data, results[key])
+    data.unlink()
+    script.with_suffix(".pdf").unlink()
+    study = write(tmp_path, view, "toml", results)
+    assert cli.main(["run", str(study), "--quiet"]) == 0
+    same(data, results[key])
+    assert script.with_suffix(".pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_a_system_of_ones_own_and_a_smoothed_one_are_written_whole(results: dict[str, Any], tmp_path: Path) -> None:
+    run = ns.simulate(SYSTEM.smoothed(1e-4), periods=1, start=[0.0, 0.0])
+    own = replace(STATE, model="given")
+    for state in (STATE, own):
+        script = write(tmp_path, "history", "py", {"run": run}, state)
+        subprocess.run([sys.executable, script.name], cwd=tmp_path, check=True)
+        same(script.with_suffix(".nc"), run)
+    with pytest.raises(ValueError, match="save the Python script"):
+        exported("history", "toml", {"run": run}, own)
+
+
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind not in ("py", "toml")])
+def test_figures_and_data(kind: str, results: dict[str, Any], tmp_path: Path) -> None:
+    begins = {"pdf": b"%PDF", "png": b"\x89PNG", "svg": b"<?xml", "nc": b"\x89HDF"}[kind]
+    path = write(tmp_path, "history", kind, results)
+    assert path.read_bytes().startswith(begins)
+    if kind == "nc":
+        same(path, results["run"])
+
+
+def test_a_first_look_is_not_saved(results: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match="not computed yet"):
+        exported("diagram", "pdf", {"diagram": results["diagram"].drop_vars("period_number")}, STATE)
+    with pytest.raises(ValueError, match="cannot be saved as 'exe'"):
+        exported("diagram", "exe", results, STATE)

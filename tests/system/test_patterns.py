@@ -1,0 +1,118 @@
+"""Patterns of phases that are made when they are visited: the same motion as with all combinations written out."""
+
+from __future__ import annotations
+
+import pickle
+from typing import Any
+
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+from nonsmooth.elements import Coulomb, ElasticStop, Stop
+from nonsmooth.system import combinations
+
+LAW = {"w": 0.3, "mu": 0.3}  # impacts, rest, slip and stick in each period
+
+
+def pair() -> ns.System:
+    """Two masses that rub, hit a wall and press against each other; four states and one harmonic."""
+    stiffness = np.array([[2.0, -1.0], [-1.0, 2.0]])
+    return ns.mechanical(
+        np.eye(2), 0.05 * stiffness, stiffness, parameters={"F": 1.0, "w": 0.7, "mu": 0.1, "e": 0.6, "k": 5.0},
+        forcing={"q1": lambda t, p: p.F * np.cos(p.w * t)}, outputs={"power": lambda t, u, p: p.k * u.q1},
+        elements={
+            "rub": Coulomb(at="q1", friction="mu", static=lambda t, u, p: 1.3 * p.mu),
+            "wall": Stop(at="q2", position=0.4, restitution="e"),
+            "soft": ElasticStop(at={"q1": 1, "q2": -1}, position=0.5, stiffness="k", damping=0.1),
+        },
+    )  # fmt: skip
+
+
+@pytest.fixture
+def both(monkeypatch: pytest.MonkeyPatch) -> tuple[ns.System, ns.System]:
+    """All twelve combinations written out; the same as patterns that are made when they are visited."""
+    written = pair()
+    monkeypatch.setattr(combinations, "MOST", 0)
+    return written, pair()
+
+
+@pytest.mark.parametrize("law", [{}, {"w": 1.1, "F": 2.0}, LAW])
+def test_a_run_is_that_of_the_combinations_written_out(
+    both: tuple[ns.System, ns.System], law: dict[str, float]
+) -> None:
+    written, made = (system.with_parameters(law) for system in both)
+    a, b = (ns.simulate(system, periods=20, samples=201) for system in (written, made))
+    sequences = [[system.modes[i] for i in run["mode"].values] for system, run in ((written, a), (made, b))]
+    assert sequences[0] == sequences[1]
+    assert np.allclose(a["crossing_time"], b["crossing_time"], rtol=0, atol=1e-12)
+    assert np.allclose(a["u"], b["u"], rtol=0, atol=1e-12)
+    for name in ("power", "rub_force", "wall_force", "soft_force"):
+        assert np.allclose(a[name], b[name], rtol=0, atol=1e-11)
+    jumps = [[s.transitions[t].label for t in r["crossing_transition"].values] for s, r in ((written, a), (made, b))]
+    assert jumps[0] == jumps[1]
+    assert len(made.modes) < len(written.modes)
+    assert {name.split("_")[1] for name in made.modes} == {"stick", "forward", "back"}
+
+
+def test_section_points_and_sweeps_are_the_same(both: tuple[ns.System, ns.System]) -> None:
+    """At sections of time and of a contact; carried states; extremes of states and forces; a response curve."""
+    starts = [{"q1": 0.3}, {"q2": -0.4, "v_q1": 1.0}]
+    for section in (None, ns.Poincare("wall_gap", rising=False)):
+        a, b = (ns.poincare(system, n=20, start=starts, section=section) for system in both)
+        assert np.allclose(a["section"], b["section"], rtol=0, atol=1e-12)
+        modes = [np.array(system.modes)[r["mode"].values] for system, r in zip(both, (a, b), strict=True)]
+        assert (modes[0] == modes[1]).all()
+    values = np.linspace(0.3, 1.2, 7)
+    a, b = (ns.frequency_response(s, values, parameter="w", direction="both", progress=False) for s in both)
+    assert (a["period_number"] == b["period_number"]).all() and (a["status"] == b["status"]).all()
+    for name in ("section", "maximum", "minimum", "amplitude", "contacts_per_period", "wall_force_maximum",
+                 "rub_force_minimum", "power_maximum"):  # fmt: skip
+        assert np.allclose(a[name], b[name], rtol=0, atol=1e-10), name
+
+
+def test_a_run_goes_on_from_another_one(both: tuple[ns.System, ns.System]) -> None:
+    made = both[1].with_parameters(LAW)
+    whole = ns.simulate(made, periods=4, samples=5)
+    rest = ns.simulate(made, periods=2, samples=3, start=ns.simulate(made, periods=2, samples=3))
+    assert np.allclose(rest["u"].values[-1], whole["u"].values[-1], rtol=0, atol=1e-12)
+    assert made.modes[int(rest["mode"][-1])] == made.modes[int(whole["mode"][-1])]
+
+
+def test_its_text_is_read_back_whatever_it_has_visited(both: tuple[ns.System, ns.System]) -> None:
+    made = both[1]
+    before = made.to_text()
+    ns.simulate(made, periods=2)
+    assert made.to_text() == before
+    for again in (ns.System.from_text(before), pickle.loads(pickle.dumps(made))):
+        assert again == made and len(again.modes) == 1
+        runs = [ns.simulate(system, periods=2, samples=9) for system in (made, again)]
+        assert np.allclose(*(run["u"].values for run in runs), rtol=0, atol=1e-14)
+        with pytest.raises(ns.SystemDefinitionError, match="lies between 0 and 1"):
+            again.with_parameters(e=-0.1)
+    assert "wall (Stop)" in repr(made) and "visited so far" in repr(made)
+
+
+def test_what_cannot_be_done_with_patterns_is_refused(both: tuple[ns.System, ns.System]) -> None:
+    made = both[1]
+    verbs: list[Any] = [
+        ns.find_orbit, ns.lyapunov, ns.sensitivity, lambda s: ns.basins(s, {}), lambda s: s.smoothed(0.1),
+        lambda s: s.derivatives, lambda s: s.to_latex(), lambda s: ns.simulate(s, periods=1, ramps={"w": (0.5, 0.6)}),
+    ]  # fmt: skip
+    for verb in verbs:
+        with pytest.raises(ns.SystemDefinitionError, match="for simulate, poincare, sweep and frequency_response"):
+            verb(made)
+    with pytest.raises(ValueError, match="by the exact flow alone"):
+        ns.simulate(made, periods=1, method="taylor")
+    with pytest.raises(ValueError, match="by the processor"):
+        ns.sweep(made, "w", [0.5, 0.6], direction=None, device="cuda", progress=False)
+    stribeck = ns.mechanical(
+        1.0, 0.0, 1.0, elements=[Coulomb(at="q", friction=lambda v, p: 0.1 / (1 + v)), Stop(at="q", position=1.0)]
+    )
+    with pytest.raises(ns.SystemDefinitionError, match="everything is affine"):
+        ns.simulate(stribeck, duration=1.0)
+    with pytest.raises(ns.SystemDefinitionError, match="one mode and no indicators"):
+        ns.System(
+            states=["x", "v"], parameters={}, modes={"a": lambda t, u, p: (u.v, -u.x)},
+            indicators={"middle": lambda t, u, p: u.x}, elements=[Stop(gap=lambda t, u, p: 1 - u.x, on={"v": -1.0})],
+        )  # fmt: skip
