@@ -35,7 +35,7 @@ def gate() -> ns.System:
 
 
 def expected(phi: float, c: float, k: float, duration: float) -> np.ndarray | None:
-    alpha, beta = np.arcsin(c), np.arccos(k)
+    alpha, beta = np.arcsin(c), np.arccos(min(k, 1.0))
     begin, end = max(alpha, beta), np.pi - alpha
     if abs(begin - end) < UNDECIDED:
         return None
@@ -92,6 +92,28 @@ def test_a_root_finder_that_has_not_converged_has_found_nothing(gate: ns.System)
     )  # fmt: skip
     up = np.arcsin(c)
     np.testing.assert_allclose(run.crossing_time.values, [up - phi + 2 * np.pi, 3 * np.pi - up - phi], rtol=1e-11)
+
+
+def test_conditions_that_become_true_together(gate: ns.System) -> None:
+    """A gap and the force of a spring without a damper are the same function, but for rounding where k is not 1."""
+    both = ns.System(
+        states=["x", "v"], parameters={"c": 0.9, "k": 1210.0}, modes=dict.fromkeys("ab", lambda t, u, p: (u.v, -u.x)),
+        indicators={"over": lambda t, u, p: u.x - p.c, "push": lambda t, u, p: p.k * (u.x - p.c)},
+        transitions=[
+            ns.Transition("a", "b", when="over > 0 and push > 0"),
+            ns.Transition("b", "a", when="over < 0 and push < 0"),
+        ],
+    )
+    rng = np.random.default_rng(5)
+    for k in [1.0] * 300 + [*10.0 ** rng.uniform(-1.0, 3.0, 300)]:
+        c = 1.0 - 10.0 ** rng.uniform(-6.0, -3.0)
+        phi = rng.uniform(-np.pi, 0.0)
+        run = ns.simulate(
+            both.with_parameters(c=c, k=k), duration=2 * np.pi * TURNS - 0.3, samples=2,
+            start={"x": float(np.sin(phi)), "v": float(np.cos(phi))}, method="exact",
+        )  # fmt: skip
+        truth = expected(phi, c, 2.0, 2 * np.pi * TURNS - 0.3)
+        np.testing.assert_allclose(run.crossing_time.values, truth, rtol=0, atol=1e-10, err_msg=f"{c!r} {phi!r}")
 
 
 @pytest.mark.slow

@@ -29,6 +29,7 @@ from nonsmooth.kernels.linear.polynomial import (
 )  # fmt: skip
 from nonsmooth.kernels.linear.tables import DEGREE, HARMONICS, MANY, NODES, ONE, STATES, WAVE, M
 
+EPS = 2.3e-16
 WIDTH = DEGREE + 1
 FEW = 8  # states of a condition that are summed one by one
 # Places in ``work.found``: the functional that crossed last; the node whose w stands in ``work.wn``, with the Taylor
@@ -88,6 +89,22 @@ def bound_at(tables, mode, f, w):
     for j in range(STATES - 1, -1, -1):
         total += fun[mode, f, 2 * M + j] * fabs(w[j] - info[mode, 2 + j])
     return total
+
+
+@inline
+def rounding(tables, mode, f, at, w):
+    """Below this the row fun[mode, f, at:] is zero within rounding at w."""
+    total = 0.0
+    if STATES >= MANY:
+        for q in range(1, tables.some[mode, f, 1, 0] + 1):
+            j = tables.some[mode, f, 1, q]
+            total += fabs(tables.fun[mode, f, at + j] * w[j])
+        for j in range(STATES, M):
+            total += fabs(tables.fun[mode, f, at + j] * w[j])
+    else:
+        for j in range(M):
+            total += fabs(tables.fun[mode, f, at + j] * w[j])
+    return 16.0 * EPS * total
 
 
 @inline
@@ -200,6 +217,15 @@ def refine(tables, work, mode, f, sign, zero, guess):
 
 
 @device
+def rises_with(tables, work, mode, f, row, tau):
+    """Return whether the functional in a row of scr is zero at tau within rounding and rises.
+
+    Where conditions become true together rounding says of each that it does so just behind the other."""
+    near = fabs(horner(work.scr, row, tau)) <= rounding(tables, mode, f, 0, work.wn)
+    return near and slope_at(work.scr, row, tau) > 0.0
+
+
+@device
 def finest(tables, work, mode, rows, lo, hi, node, up):
     """First instant within one node spacing at which all rows lo..hi become positive, on their polynomials; -1: none.
 
@@ -240,6 +266,8 @@ def finest(tables, work, mode, rows, lo, hi, node, up):
         for r in range(lo, hi):
             row = r - lo
             if current != -2 - r and (r == current or horner(scr, row, tau) > 0.0):
+                continue
+            if current >= lo and rises_with(tables, work, mode, rows[r, 0], row, tau):
                 continue
             found[HELD] = 0
             tau = next_upward(scr, row, tau, spacing, points)

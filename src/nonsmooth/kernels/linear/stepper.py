@@ -11,6 +11,7 @@ from nonsmooth.kernels.compile.lanes import dot
 from nonsmooth.kernels.hybrid.places import FIRED, MODE, NO_END, TIME
 from nonsmooth.kernels.hybrid.records import FORM, TABLES, WORK
 from nonsmooth.kernels.linear.search import (
+    EPS,
     FUNCTIONAL,
     NEVER,
     NODE,
@@ -18,6 +19,7 @@ from nonsmooth.kernels.linear.search import (
     bound_at,
     classify,
     dense,
+    rounding,
     search,
     slope_of,
     to_node,
@@ -26,7 +28,6 @@ from nonsmooth.kernels.linear.search import (
 )
 from nonsmooth.kernels.linear.tables import HARMONICS, MANY, MEMORY, NODES, ONE, OWN, STATES, WAVE, M, build
 
-EPS = 2.3e-16
 STEPPER = FORM, TABLES, WORK  # the types of this stepper's records: model, tables, work
 
 
@@ -50,22 +51,6 @@ def wrap_phase(tables, work, mode, s):
         c, s_ = turn(rates[h] * local, rot[mode, node, 2 * h], rot[mode, node, 2 * h + 1])
         w[WAVE + 2 * h] = c
         w[WAVE + 1 + 2 * h] = s_
-
-
-@inline
-def rounding(tables, mode, f, at, w):
-    """Below this the row fun[mode, f, at:] is zero within rounding at w."""
-    total = 0.0
-    if STATES >= MANY:
-        for q in range(1, tables.some[mode, f, 1, 0] + 1):
-            j = tables.some[mode, f, 1, q]
-            total += fabs(tables.fun[mode, f, at + j] * w[j])
-        for j in range(STATES, M):
-            total += fabs(tables.fun[mode, f, at + j] * w[j])
-    else:
-        for j in range(M):
-            total += fabs(tables.fun[mode, f, at + j] * w[j])
-    return 16.0 * EPS * total
 
 
 @inline
