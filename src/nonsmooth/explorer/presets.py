@@ -81,7 +81,7 @@ def _velocity(states: list[str]) -> int:
 
 
 def _around(value: float) -> tuple[float, float]:
-    return tuple(sorted((0.6 * value, 1.4 * value))) if value else (-1.0, 1.0)  # type: ignore[return-value]
+    return (value - 0.4 * abs(value), value + 0.4 * abs(value)) if value else (-1.0, 1.0)
 
 
 def slider_range(value: float, also: tuple[float, ...] = ()) -> tuple[float, float]:

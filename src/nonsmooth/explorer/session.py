@@ -5,46 +5,37 @@ from __future__ import annotations
 import base64
 import json
 import threading
-import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qsl
 
-import numpy as np
 from bokeh.events import RangesUpdate, Tap
 from bokeh.models import TextInput
 from jinja2 import Template
 
-from nonsmooth.explorer.export import KINDS, exported
-from nonsmooth.explorer.figures import CLOUDS, MOST, Diagram, History, Portrait, Section, theme, words_of
-from nonsmooth.explorer.labels import html_of, number, plain_of, symbols_of
+from nonsmooth.explorer.controls import GIVEN, controls
+from nonsmooth.explorer.export import exported
+from nonsmooth.explorer.figures import MOST, Diagram, History, Portrait, Section, theme
+from nonsmooth.explorer.labels import symbols_of
 from nonsmooth.explorer.presets import PAPER, first_state, presets_of, slider_range
-from nonsmooth.explorer.state import CHOICES, State, changed, from_query, to_query
+from nonsmooth.explorer.readout import distinct, readout
+from nonsmooth.explorer.requests import key_of, requests_of, stability_request
+from nonsmooth.explorer.schedule import Asked, Schedule
 from nonsmooth.explorer.state import History as Past
-from nonsmooth.explorer.worker import Answer, Worker
+from nonsmooth.explorer.state import State, changed, from_query
+from nonsmooth.explorer.worker import Answer
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
 __all__ = ["Session", "models_of"]
 
-#: Views in the order in which they are computed.
-ORDER = ("orbit", "first look", "section", "diagram", "stability")
-#: Short work: a newer request of the same view waits for it, so that a drawing follows a hand that moves.
-_CHEAP = ("orbit", "first look", "section")
-_PATIENCE = 1.0  # seconds after which short work is cancelled like any other
-_DEAF = 5.0  # seconds in which cancelled work must end by itself
-_GIVEN = "given"
 #: To the browser, each one line of JSON; what comes from it is ``act``.
 CHANNELS = ("ui", "readout", "busy", "notes", "file")
-_PANEL = {
-    "orbit": "portrait", "first look": "upper", "section": "section", "diagram": "upper", "stability": "readout",
-}  # fmt: skip
-
 Models = Mapping[str, Callable[[], "System"]]
 
 
@@ -53,17 +44,7 @@ def models_of(system: System | None) -> Models:
     from nonsmooth import models
 
     found: dict[str, Callable[[], System]] = {name: getattr(models, name) for name in models.names()}
-    return found if system is None else {_GIVEN: lambda: system, **found}
-
-
-@dataclass
-class _Running:
-    number: int
-    view: str
-    key: str
-    of: tuple[str, str]  # the model, and the parameter of the diagram
-    since: float
-    cancelled: float | None = None
+    return found if system is None else {GIVEN: lambda: system, **found}
 
 
 class Session:
@@ -83,24 +64,19 @@ class Session:
         self.dark = self.large = False
         self._systems: dict[str, System] = {}
         self._texts: dict[str, str] = {}
-        self._done: dict[str, str] = {}
-        self._failed: dict[str, str] = {}
-        self._crashed: dict[str, int] = {}
-        self._running: _Running | None = None
-        self._count = 0
         self._saved = 0
         self._heard = 0  # number of the page's last message
-        self._notes: dict[str, str] = {}
+        self.notes: dict[str, str] = {}
         self.results: dict[str, Any] = {}
         self.diagram, self.portrait = Diagram(), Portrait()
         self.history, self.section = History(), Section()
         self._say = {name: TextInput(name=name) for name in CHANNELS}
         self._act = TextInput(name="act")
         self.past = Past(self._first(query))
-        self._of = self.state.model, self.state.over  # of what is drawn
+        self._of = self.subject  # of what is drawn
         self._axes = self.state.x, self.state.y, self.state.shown
         self._build()
-        self.worker: Worker | None = None  # a request that opens no page starts no process
+        self.work = Schedule(self)
         document.on_session_destroyed(lambda context: self._close())
         self._refresh()
 
@@ -130,7 +106,7 @@ class Session:
         try:
             return _state_of(self.models, self._systems, pairs or parse_qsl(query))
         except ValueError as error:
-            self._notes["page"] = f"The address could not be read, so the page shows its first view: {error}"
+            self.notes["page"] = f"The address could not be read, so the page shows its first view: {error}"
             return _state_of(self.models, self._systems, parse_qsl(query))
 
     def _build(self) -> None:
@@ -154,18 +130,16 @@ class Session:
 
     def _begin(self, name: str, value: Any) -> None:
         """The page is there: work can begin."""
-        if self.worker is None:
-            self.worker = Worker(self._hear)
-            self.document.add_periodic_callback(self._watch, 500)
+        if self.work.begin(self._hear):
+            self.document.add_periodic_callback(self.work.watch, 500)
 
     def _hear(self, answer: Answer) -> None:
         """Hand an answer over, from the thread that listens to the worker's pipe."""
         with suppress(AttributeError):  # the tab has been closed, and its document taken apart
-            self.document.add_next_tick_callback(partial(self._take, answer))
+            self.document.add_next_tick_callback(partial(self.work.take, answer))
 
     def _close(self) -> None:
-        if self.worker is not None:
-            self.worker.close()
+        self.work.close()
 
     # --- what a person does
 
@@ -183,12 +157,12 @@ class Session:
             }  # fmt: skip
             if action not in known:
                 raise ValueError(f"the page asked for {str(action)[:40]!r}, which does not exist")
-            self._notes.pop("page", None)
-            self._notes.pop(name, None)
+            self.notes.pop("page", None)
+            self.notes.pop(name, None)
             known[action](name, value)
         except (ValueError, TypeError, KeyError) as error:
             place = str(message.get("name") or "page") if isinstance(message, dict) else "page"
-            self._notes[place] = str(error)
+            self.notes[place] = str(error)
         self._refresh()
 
     def _set(self, name: str, value: Any) -> None:
@@ -235,10 +209,10 @@ class Session:
     def _hand_over(self, told: dict[str, Any]) -> None:
         self._saved += 1
         if "wrong" in told:
-            self._notes["page"] = told["wrong"]
-            self._tell("notes", self._notes)
+            self.notes["page"] = told["wrong"]
+            self.tell("notes", self.notes)
         else:
-            self._tell("file", {**told, "n": self._saved})
+            self.tell("file", {**told, "n": self._saved})
 
     def _reset(self, name: str, value: Any) -> None:
         self.past.put(first_state(self.state.model, self.system))
@@ -276,132 +250,39 @@ class Session:
 
     # --- what is to be computed
 
-    def _wanted(self) -> dict[str, dict[str, Any]]:
+    def wanted(self) -> dict[str, dict[str, Any]]:
         """The request of every view that is shown, for the state of the page."""
         state = self.state
         if state.model not in self._texts:
             self._texts[state.model] = self.system.to_text()
-        base = {
-            "text": self._texts[state.model], "values": dict(state.values), "method": state.method,
-            "eta": state.eta if state.method == "smoothed" else 0.0, "transient": state.transient, "keep": state.keep,
-        }  # fmt: skip
-        orbit = {**base, "view": "orbit", "start": list(state.start)}
-        begin = list(first_state(state.model, self.system).start)
-        sweep = {
-            **base, "view": "first look", "values": {**state.values, state.over: state.low}, "over": state.over,
-            "low": state.low, "high": state.high, "columns": state.columns, "begin": begin,
-        }  # fmt: skip
-        found = {
-            "orbit": orbit, "section": {**orbit, "view": "section", "phase": state.phase}, "first look": sweep,
-            "diagram": {**sweep, "view": "diagram", "direction": state.direction},
-        }  # fmt: skip
-        judged = self.results.get("judged")
-        if judged is not None and self._done.get("orbit") == _key(orbit) and not self.system.is_map:
-            run = self.results["run"]["time"].values
-            found["stability"] = {
-                **orbit, "view": "stability", "period": int(judged["period_number"].values[0]),
-                "span": float(run[-1] - run[0]),
-            }  # fmt: skip
-        if self._done.get("diagram") == _key(found["diagram"]):
+        found = requests_of(self.system, self._texts[state.model], state)
+        known = "judged" in self.results and self.work.done.get("orbit") == key_of(found["orbit"])
+        if known and not self.system.is_map:
+            found["stability"] = stability_request(found["orbit"], self.results)
+        if self.work.done.get("diagram") == key_of(found["diagram"]):
             del found["first look"]
         return found
 
-    def _schedule(self) -> None:
-        """Ask for what is missing, the quick first; cancel what nobody waits for any more."""
-        if self.worker is None:
-            return
-        wanted = {view: (spec, _key(spec)) for view, spec in self._wanted().items()}
-        missing = [
-            view for view in ORDER
-            if view in wanted and wanted[view][1] not in (self._done.get(view), self._failed.get(view))
-        ]  # fmt: skip
-        now, running = time.monotonic(), self._running
-        if running is not None:
-            stale = running.view not in wanted or wanted[running.view][1] != running.key
-            quick = running.view in _CHEAP and now - running.since < _PATIENCE
-            overtaken = bool(missing) and ORDER.index(missing[0]) < ORDER.index(running.view)
-            if (stale or overtaken) and not quick and running.cancelled is None:
-                running.cancelled = now
-                self.worker.cancel(running.number)
-            return
-        if not missing:
-            self._tell("busy", {"view": ""})
-            return
-        view = missing[0]
-        self._count += 1
-        self._running = _Running(self._count, view, wanted[view][1], (self.state.model, self.state.over), now)
-        self.worker.ask(self._count, wanted[view][0])
-        starting = not self._done and not self._failed
-        self._tell("busy", {"view": view, "fraction": 0, "long": starting or view not in _CHEAP})
-
-    def _watch(self) -> None:
-        """End a worker that does not hear that its work is cancelled."""
-        running = self._running
-        if running is None or self.worker is None:
-            return
-        if running.cancelled is None:
-            self._schedule()
-        elif time.monotonic() - running.cancelled > _DEAF:
-            self.worker.end()
-
-    def _take(self, answer: Answer) -> None:
-        """Receive an answer of the worker."""
-        kind, count, content = answer
-        running = self._running
-        if kind == "ended":
-            self._restart(content)
-            return
-        if running is None or count != running.number:
-            return
-        if kind == "progress":
-            self._tell("busy", {"view": running.view, "fraction": round(float(content), 3), "long": True})
-            return
-        self._running = None
-        panel = _PANEL[running.view]
-        if kind == "error":
-            self._failed[running.view] = running.key
-            self._notes[panel] = str(content)
-        elif kind == "done":
-            found, warned = content
-            self._done[running.view] = running.key
-            self._failed.pop(running.view, None)
-            self._notes.pop(panel, None)
-            if warned:
-                self._notes[panel] = warned[0]
-            self._show(running, found)
-        self._tell("notes", self._notes)
-        self._schedule()
-
-    def _restart(self, code: int) -> None:
-        running, self._running = self._running, None
-        assert self.worker is not None
-        self.worker.start()
-        if running is not None:
-            known = self._crashed[running.key] = self._crashed.get(running.key, 0) + 1
-            if known > 1 and running.cancelled is None:
-                self._failed[running.view] = running.key
-        if running is None or running.cancelled is None:
-            self._notes["page"] = (
-                f"The process that computes ended unexpectedly (code {code}). Another one was started; "
-                "nothing that you set is lost."
-            )
-        self._tell("notes", self._notes)
-        self._schedule()
-
     # --- what is shown
 
-    def _show(self, running: _Running, found: Mapping[str, Any]) -> None:
+    @property
+    def subject(self) -> tuple[str, str]:
+        """The model, and the parameter of the diagram."""
+        return self.state.model, self.state.over
+
+    def show(self, request: Asked, found: Mapping[str, Any]) -> None:
+        """Draw an answer, where the page still shows what it is of."""
         state, system = self.state, self.system
-        view = running.view
-        if running.of[0] != state.model:
+        view = request.view
+        if request.of[0] != state.model:
             return
         if view in ("first look", "diagram"):
             result = found["diagram"]
-            if running.of[1] != state.over:
+            if request.of[1] != state.over:
                 return
             stage = "judged" if view == "diagram" else "first look"
             self.results["diagram"] = result
-            self.diagram.put(result, stage, state, running.key, system.parameters[state.over].unit)
+            self.diagram.put(result, stage, state, request.key, system.parameters[state.over].unit)
             self._axes_of_diagram()
             self._tell_ui()
         elif view == "orbit":
@@ -431,7 +312,7 @@ class Session:
         state, result = self.state, self.results["section"]
         names = [str(name) for name in result["state"].values]
         points = result["section"].values[:, [names.index(state.x), names.index(state.y)]]
-        apart = _distinct(result["section"].values)
+        apart = distinct(result["section"].values)
         points = points[-len(apart) :][apart] if apart.sum() <= MOST else points
         self.section.put(points, self.results.get("run"), state, symbols_of(self.system), self.system.states)
         self.portrait.mark(points)
@@ -448,86 +329,32 @@ class Session:
                     return float(self.state.values[names[k]])
         return None
 
-    def _tell(self, channel: str, content: Any) -> None:
+    def tell(self, channel: str, content: Any) -> None:
         text = json.dumps(content)
         if self._say[channel].value != text:
             self._say[channel].value = text
 
     def _tell_readout(self) -> None:
-        judged, system, state = self.results.get("judged"), self.system, self.state
-        if judged is None:
-            return
-        period = int(judged["period_number"].values[0])
-        status = str(np.ravel(words_of(judged["status"]))[0])
-        fields = [("motion", f"period {period}" if period else "no period found")]
-        if status not in ("ok", "not_periodic"):
-            fields.append(("status", status.replace("_", " ")))
-        section = self.results.get("section")
-        if section is not None:
-            n = int(_distinct(section["section"].values).sum())
-            fields.append(("section points", str(n) if n <= MOST else f"{section.sizes['iterate']}, no two alike"))
-        contacts = float(judged["contacts_per_period"].values[0])
-        if np.isfinite(contacts):
-            fields.append(("contacts per period", f"{contacts:.3g}"))
-        at = [str(name) for name in judged["state"].values].index(state.x)
-        ends = [float(judged[name].values[0, at]) for name in ("minimum", "maximum")]
-        if np.isfinite(ends).all():
-            unit = system.states[state.x]
-            fields.append((plain_of(symbols_of(system)[state.x]), f"{number(ends[0], unit)} … {number(ends[1], unit)}"))
-        stability = self.results.get("stability")
-        if stability and "multipliers" in stability:
-            largest = float(np.abs(stability["multipliers"]).max())
-            fields.append(("largest |multiplier|", f"{largest:.4f}"))
-        elif stability:
-            exponents = stability["exponents"]
-            largest, error = (float(exponents[name].values.max()) for name in ("exponents", "standard_error"))
-            fields.append(("largest exponent", f"{number(largest)} ± {error:.1g}"))
-        self._tell("readout", fields)
+        if "judged" in self.results:
+            self.tell("readout", readout(self.system, self.state, self.results))
 
     def _tell_ui(self) -> None:
-        state, system = self.state, self.system
-        symbols, first = symbols_of(system), first_state(state.model, system)
-        rows = []
-        for name, parameter in system.parameters.items():
-            value = state.values[name]
-            also = (value, state.low, state.high) if name == state.over else (value,)
-            low, high = slider_range(first.values[name], also)
-            rows.append({
-                "name": name, "html": html_of(symbols[name]), "unit": parameter.unit, "value": value, "low": low,
-                "high": high,
-            })  # fmt: skip
-        words = list(CLOUDS) if self.diagram.stage != "judged" else (
-            ["up", "down"] if state.direction == "both" else [state.direction]
-        )
-        names = {"first look": "first look, from rest, not judged", **CHOICES["direction"]}
-        words = words[:1] if self.diagram.stage != "judged" else words
-        self._tell("ui", {
-            "models": {name: "your system" if name == _GIVEN else name.replace("_", " ") for name in self.models},
-            "presets": list(presets_of(state)), "paper": state.model == PAPER, "parameters": rows,
-            "states": [
-                {"name": name, "html": html_of(symbols[name]), "plain": plain_of(symbols[name]), "unit": unit,
-                 "value": value}
-                for (name, unit), value in zip(system.states.items(), state.start, strict=True)
-            ],
-            "plain": {name: plain_of(symbols[name]) for name in system.parameters},
-            "choices": CHOICES, "kinds": KINDS,
-            "state": {key: value for key, value in vars(state).items() if key != "values"},
-            "heard": self._heard, "can": self.past.can, "query": to_query(state), "forced": system.period() is not None,
-            "legend": [[names[word], CLOUDS[word][0]] for word in words], "dark": self.dark, "large": self.large,
-        })  # fmt: skip
+        found = controls(self.system, self.state, self.models, self.diagram.stage)
+        look = {"dark": self.dark, "large": self.large}
+        self.tell("ui", {**found, **look, "heard": self._heard, "can": self.past.can})
 
     def _refresh(self) -> None:
         """The page as the state has it, and work for what that lacks."""
         state = self.state
-        if self._of != (state.model, state.over):
+        if self._of != self.subject:
             self.diagram.clear()
             self.results.pop("diagram", None)
             if self._of[0] != state.model:
                 self.results.clear()
-                self._done.clear()
+                self.work.done.clear()
             for view in ("first look", "diagram"):
-                self._done.pop(view, None)
-            self._of = state.model, state.over
+                self.work.done.pop(view, None)
+            self._of = self.subject
         if self._axes != (state.x, state.y, state.shown):
             self._axes = state.x, state.y, state.shown
             if self.diagram.result is not None:
@@ -540,8 +367,8 @@ class Session:
         self.diagram.here.location = state.values[state.over]
         if (self.diagram.plot.x_range.start, self.diagram.plot.x_range.end) != (state.low, state.high):
             self.diagram.show(x=(state.low, state.high))
-        self._tell("notes", self._notes)
-        self._schedule()  # before the page hears that its message has been taken in
+        self.tell("notes", self.notes)
+        self.work.go_on()  # before the page hears that its message has been taken in
         self._tell_ui()
 
 
@@ -553,7 +380,7 @@ def _system(models: Models, known: dict[str, System], name: str) -> System:
 
 def _state_of(models: Models, known: dict[str, System], pairs: Sequence[tuple[str, str]]) -> State:
     """The state that a page's address describes; the first model's first view where it says nothing."""
-    default = _GIVEN if _GIVEN in models else PAPER
+    default = GIVEN if GIVEN in models else PAPER
     name = next((value for key, value in pairs if key == "model"), default)
     if name not in models:
         raise ValueError(f"{name[:60]!r} is no model of this page; there are: {', '.join(models)}")
@@ -562,17 +389,3 @@ def _state_of(models: Models, known: dict[str, System], pairs: Sequence[tuple[st
     if name == PAPER and not pairs:
         state = presets_of(state)["Fig. 11"]
     return from_query(pairs, state, list(system.states))
-
-
-def _distinct(points: Any) -> Any:
-    """Marks of the points among the last 256 that differ from those before them by 1e-5 of their size or more."""
-    last = points[-256:]
-    close = 1e-5 * np.maximum(np.ptp(last, axis=0), np.abs(last).max(axis=0))
-    apart = np.ones(len(last), dtype=bool)
-    for k in range(1, len(last)):
-        apart[k] = not (np.abs(last[:k][apart[:k]] - last[k]) <= close).all(axis=1).any()
-    return apart
-
-
-def _key(spec: Mapping[str, Any]) -> str:
-    return json.dumps(spec, sort_keys=True)

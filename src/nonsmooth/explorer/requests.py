@@ -1,0 +1,47 @@
+"""Requests to the worker: one for each view of a state."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from nonsmooth.explorer.presets import first_state
+
+if TYPE_CHECKING:
+    from nonsmooth.explorer.state import State
+    from nonsmooth.system.system import System
+
+__all__ = ["key_of", "requests_of", "stability_request"]
+
+
+def requests_of(system: System, text: str, state: State) -> dict[str, dict[str, Any]]:
+    """The request of every view that a state determines; ``text`` is the system's."""
+    base = {
+        "text": text, "values": dict(state.values), "method": state.method,
+        "eta": state.eta if state.method == "smoothed" else 0.0, "transient": state.transient, "keep": state.keep,
+    }  # fmt: skip
+    orbit = {**base, "view": "orbit", "start": list(state.start)}
+    sweep = {
+        **base, "view": "first look", "values": {**state.values, state.over: state.low}, "over": state.over,
+        "low": state.low, "high": state.high, "columns": state.columns,
+        "begin": list(first_state(state.model, system).start),
+    }  # fmt: skip
+    return {
+        "orbit": orbit, "section": {**orbit, "view": "section", "phase": state.phase}, "first look": sweep,
+        "diagram": {**sweep, "view": "diagram", "direction": state.direction},
+    }  # fmt: skip
+
+
+def stability_request(orbit: Mapping[str, Any], results: Mapping[str, Any]) -> dict[str, Any]:
+    """The request for multipliers or exponents, once the orbit is there."""
+    run = results["run"]["time"].values
+    return {
+        **orbit, "view": "stability", "period": int(results["judged"]["period_number"].values[0]),
+        "span": float(run[-1] - run[0]),
+    }  # fmt: skip
+
+
+def key_of(request: Mapping[str, Any]) -> str:
+    """Text by which two requests are the same."""
+    return json.dumps(request, sort_keys=True)

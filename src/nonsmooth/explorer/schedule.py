@@ -1,0 +1,145 @@
+"""Work of one page: the worker is asked for what is missing, the quick first; what nobody waits for is cancelled."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from nonsmooth.explorer.requests import key_of
+from nonsmooth.explorer.worker import Answer, Worker
+
+if TYPE_CHECKING:
+    from nonsmooth.explorer.session import Session
+
+__all__ = ["ORDER", "Asked", "Schedule"]
+
+#: Views in the order in which they are computed.
+ORDER = ("orbit", "first look", "section", "diagram", "stability")
+#: Short work: a newer request of the same view waits for it, so that a drawing follows a hand that moves.
+_CHEAP = ("orbit", "first look", "section")
+_PATIENCE = 1.0  # seconds after which short work is cancelled like any other
+_DEAF = 5.0  # seconds in which cancelled work must end by itself
+_PANEL = {
+    "orbit": "portrait", "first look": "upper", "section": "section", "diagram": "upper", "stability": "readout",
+}  # fmt: skip
+
+
+@dataclass
+class Asked:
+    """A request that the worker has."""
+
+    number: int
+    view: str
+    key: str
+    of: tuple[str, str]  # the model, and the parameter of the diagram
+    since: float
+    cancelled: float | None = None
+
+
+class Schedule:
+    """Requests of one page (a :class:`nonsmooth.explorer.session.Session`) and their answers."""
+
+    def __init__(self, page: Session) -> None:
+        self.page = page
+        self.done: dict[str, str] = {}  # of each view the key of the request whose answer is shown
+        self._failed: dict[str, str] = {}
+        self._crashed: dict[str, int] = {}
+        self._running: Asked | None = None
+        self._count = 0
+        self.worker: Worker | None = None  # a request that opens no page starts no process
+
+    def begin(self, hear: Callable[[Answer], None]) -> bool:
+        """Start the worker; False where it has been started."""
+        if self.worker is not None:
+            return False
+        self.worker = Worker(hear)
+        return True
+
+    def close(self) -> None:
+        """End the worker."""
+        if self.worker is not None:
+            self.worker.close()
+
+    def go_on(self) -> None:
+        """Ask for what is missing, the quick first; cancel what nobody waits for any more."""
+        if self.worker is None:
+            return
+        wanted = {view: (spec, key_of(spec)) for view, spec in self.page.wanted().items()}
+        missing = [
+            view for view in ORDER
+            if view in wanted and wanted[view][1] not in (self.done.get(view), self._failed.get(view))
+        ]  # fmt: skip
+        now, running = time.monotonic(), self._running
+        if running is not None:
+            stale = running.view not in wanted or wanted[running.view][1] != running.key
+            quick = running.view in _CHEAP and now - running.since < _PATIENCE
+            overtaken = bool(missing) and ORDER.index(missing[0]) < ORDER.index(running.view)
+            if (stale or overtaken) and not quick and running.cancelled is None:
+                running.cancelled = now
+                self.worker.cancel(running.number)
+            return
+        if not missing:
+            self.page.tell("busy", {"view": ""})
+            return
+        view = missing[0]
+        self._count += 1
+        self._running = Asked(self._count, view, wanted[view][1], self.page.subject, now)
+        self.worker.ask(self._count, wanted[view][0])
+        starting = not self.done and not self._failed
+        self.page.tell("busy", {"view": view, "fraction": 0, "long": starting or view not in _CHEAP})
+
+    def watch(self) -> None:
+        """End a worker that does not hear that its work is cancelled."""
+        running = self._running
+        if running is None or self.worker is None:
+            return
+        if running.cancelled is None:
+            self.go_on()
+        elif time.monotonic() - running.cancelled > _DEAF:
+            self.worker.end()
+
+    def take(self, answer: Answer) -> None:
+        """Receive an answer of the worker."""
+        kind, count, content = answer
+        running = self._running
+        if kind == "ended":
+            self._restart(content)
+            return
+        if running is None or count != running.number:
+            return
+        if kind == "progress":
+            self.page.tell("busy", {"view": running.view, "fraction": round(float(content), 3), "long": True})
+            return
+        self._running = None
+        panel = _PANEL[running.view]
+        if kind == "error":
+            self._failed[running.view] = running.key
+            self.page.notes[panel] = str(content)
+        elif kind == "done":
+            found, warned = content
+            self.done[running.view] = running.key
+            self._failed.pop(running.view, None)
+            self.page.notes.pop(panel, None)
+            if warned:
+                self.page.notes[panel] = warned[0]
+            self.page.show(running, found)
+        self.page.tell("notes", self.page.notes)
+        self.go_on()
+
+    def _restart(self, code: int) -> None:
+        running, self._running = self._running, None
+        assert self.worker is not None
+        self.worker.start()
+        if running is not None:
+            known = self._crashed[running.key] = self._crashed.get(running.key, 0) + 1
+            if known > 1 and running.cancelled is None:
+                self._failed[running.view] = running.key
+        if running is None or running.cancelled is None:
+            self.page.notes["page"] = (
+                f"The process that computes ended unexpectedly (code {code}). Another one was started; "
+                "nothing that you set is lost."
+            )
+        self.page.tell("notes", self.page.notes)
+        self.go_on()
