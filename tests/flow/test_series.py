@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import nonsmooth as ns
 from nonsmooth.flow.engines.engine import Chain, Log, SectionPlan, State
 from nonsmooth.flow.engines.series import SeriesEngine, order_for
 from nonsmooth.kernels.hybrid import codes
@@ -413,3 +414,20 @@ def test_options_are_checked(options: dict[str, Any], message: str) -> None:
 def test_order_follows_the_tolerance() -> None:
     assert [order_for(10.0**-k) for k in (2, 6, 10, 15)] == [7, 11, 16, 22]
     assert order_for(1e-10, fixed_step=True) == 13  # ceil(1 - ln(1e-10) / 2)
+
+
+@pytest.mark.parametrize("method", ["rkf45", "taylor", "exact"])
+def test_a_run_that_pauses_goes_on_where_it_stood(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    from nonsmooth.flow.engines import loop
+
+    system = ns.models.discontinuous_support(omega=3.69, g=-0.0045, rho=0.29)
+
+    def runs() -> list[np.ndarray]:
+        swept = ns.sweep(system, "rho", [0.29, 0.3], method=method, transient=20, keep=4, max_period=2, progress=False)
+        run = ns.simulate(system, periods=5, method=method, samples=20)
+        return [swept.section.values, run.u.values, run.crossing_time.values]
+
+    whole = runs()
+    monkeypatch.setattr(loop, "PATIENCE", 30)
+    for one, two in zip(whole, runs(), strict=True):
+        np.testing.assert_array_equal(one, two)

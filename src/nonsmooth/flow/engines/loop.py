@@ -48,8 +48,9 @@ class LoopEngine(ABC):
     def touches_of_a_leg(self) -> int:
         """Number of touches that one segment may add to a log, at most."""
 
-    def go_on(self, tables: Any) -> None:  # noqa: B027 - most engines have nothing to do
-        """Give a run that has paused what it waits for."""
+    def go_on(self, tables: Any) -> bool:
+        """Give a run that has paused what it waits for; True where that exchanged model, tables or work."""
+        return False
 
     @cached_property
     def phases(self) -> Callable[[Any], FloatArray] | None:
@@ -87,12 +88,13 @@ class LoopEngine(ABC):
         begun = np.zeros((0, 0)) if starts is None else _with_memory(starts, state.memory)
         goal, motion = self._goal(transient, keep, 0.0, 0.0), self._motion(state, carry and state.settled)
         kernel, kept = self.module(tables, "sections").chain, out.record()
-        self.given(tables, "sections")[2].tally[BEGUN] = 0
+        model, own, work = self.given(tables, "sections")  # a run that pauses stands in its work
+        work.tally[BEGUN] = 0
         while first < last:  # Ctrl-C comes in between
-            model, own, work = self.given(tables, "sections")
             net = with_section(self.net_of(tables, first), plan.indicator)
             first = kernel(first, last, begun, model, net, section, goal, motion, kept, own, work)
-            self.go_on(tables)
+            if self.go_on(tables):
+                model, own, work = self.given(tables, "sections")
             _end_if_not_wanted()
         if carry:
             state.settled = True
@@ -112,12 +114,13 @@ class LoopEngine(ABC):
         crossings, touches = _crossings(1024, n_u, n_m), _touches(1024, n_u)
         kernel = self.module(tables, "record").record
         spare, code = self.touches_of_a_leg(), codes.LOG_FULL
-        self.given(tables, "record")[2].tally[BEGUN] = 0
+        model, own, work = self.given(tables, "record")
+        work.tally[BEGUN] = 0
         while code in (codes.LOG_FULL, codes.PAUSED):
-            model, own, work = self.given(tables, "record")
             log = records.Log(*(*sampled, *crossings, *touches, spare))
             code = kernel(model, self.net_of(tables, 0), nowhere(), goal, motion, log, own, work)
-            self.go_on(tables)
+            if self.go_on(tables):
+                model, own, work = self.given(tables, "record")
             _end_if_not_wanted()
             if code == codes.LOG_FULL:
                 crossings = _longer(crossings, _crossings(2 * len(crossings[0]), n_u, n_m))

@@ -73,8 +73,9 @@ class PatternEngine(LoopEngine):
         """None: an extremum of each condition of each element, in a hundred states, would fill the memory."""
         return 0
 
-    def go_on(self, tables: Any) -> None:
+    def go_on(self, tables: Any) -> bool:
         tables.complete()
+        return True
 
     def chain(
         self, tables: Points, first: int, last: int, state: State, starts: FloatArray | None,
