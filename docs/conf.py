@@ -92,9 +92,9 @@ def _formula(self: Any, node: nodes.Element) -> None:
 
 
 def _not_a_class(app: Sphinx, doctree: nodes.document) -> None:
-    """Leave "state" and "states" in the type of an argument as words: they are no link to an attribute of that name."""
+    """Leave words such as "state" and "name" in the type of an argument alone: they are no links to attributes."""
     for link in list(doctree.findall(pending_xref)):
-        if link.get("refspecific") and link.get("reftarget") in ("state", "states", "start"):
+        if link.get("refspecific") and link.get("reftarget") in ("name", "state", "states", "start"):
             link.replace_self(link.children)
 
 
