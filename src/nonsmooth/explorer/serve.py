@@ -51,13 +51,12 @@ def explore(
         A port that is taken, or a query that does not fit the system.
     """
     try:
-        import bokeh  # noqa: F401
+        from bokeh.application import Application
+        from bokeh.application.handlers.function import FunctionHandler
+        from bokeh.server.server import Server
     except ImportError as error:
         raise ImportError(f"the explorer needs {not_installed('bokeh', 'explorer')}") from error
     import matplotlib as mpl
-    from bokeh.application import Application
-    from bokeh.application.handlers.function import FunctionHandler
-    from bokeh.server.server import Server
 
     mpl.use("Agg")  # figures are made for files, in threads
     from nonsmooth.explorer.access import Access

@@ -95,8 +95,12 @@ class PlanarOnGpu:
         """Maxima and minima (N, rows) of states, indicators and outputs over the kept window."""
         high = (out.maximum, out.indicator_max, out.output_max)
         low = (out.minimum, out.indicator_min, out.output_min)
-        found = (np.concatenate([part.copy_to_host() for part in parts], axis=1) for parts in (high, low))
-        return tuple(np.delete(one, self.void, axis=1) for one in found)  # type: ignore[return-value]
+
+        def rows(parts: tuple[Any, ...]) -> FloatArray:
+            found = np.concatenate([part.copy_to_host() for part in parts], axis=1)
+            return np.delete(found, self.void, axis=1)
+
+        return rows(high), rows(low)
 
     def run(
         self, jobs: IntArray, states: States, transient: int, keep: Any, out: Buffers, settled: Any = False, *,

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from nonsmooth.system.elements.element import Condition, Element, Law, Leaving, check_side
+from nonsmooth.system.elements.element import Condition, Contact, Element, Law, Leaving
 
 if TYPE_CHECKING:
     from nonsmooth.system.assembly import Place
@@ -15,7 +15,7 @@ __all__ = ["Backlash", "ElasticStop", "PreloadedSpring"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class ElasticStop(Element):
+class ElasticStop(Contact):
     r"""A stop with a spring and a damper: F = -k \delta - c \dot\delta while the gap \delta is negative.
 
     Parameters
@@ -30,30 +30,14 @@ class ElasticStop(Element):
         See :class:`Element`.
     """
 
-    gap: Callable[..., Any] | None = None
-    position: Law = 0.0
-    side: int = 1
     stiffness: Law = 0.0
     damping: Law = 0.0
     pulls: bool = False
 
-    kinematics: ClassVar[str] = "gap"
     phases: ClassVar[tuple[str, ...]] = ("open", "contact")
     laws: ClassVar[tuple[str, ...]] = ("stiffness", "damping")
     conditions: ClassVar[tuple[str, ...]] = ("gap", "push")
     presses: ClassVar[bool] = True
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_side(self)
-
-    @property
-    def into(self) -> int:
-        """A positive force opens it, away from its side."""
-        return -self.side
-
-    def placed(self, q: Any, v: Any, law: Callable[[Law], Any]) -> Any:
-        return self.side * (law(self.position) - q)
 
     def force(self, here: Place) -> Any:
         return 0 if here.phase == "open" else -here.law("stiffness") * here.where + damped(here)

@@ -18,7 +18,7 @@ from nonsmooth.errors import SystemDefinitionError, shortened
 if TYPE_CHECKING:
     from nonsmooth.system.assembly import Place
 
-__all__ = ["CREEP", "SMALL", "Condition", "Element", "Law", "Leaving", "check_side"]
+__all__ = ["CREEP", "SMALL", "Condition", "Contact", "Element", "Law", "Leaving"]
 
 SMALL = 1e-4  # of the states' scale: what a rate or a gap that is held at zero may be off where a run begins
 CREEP = 1e-7  # of the same: the speed of approach below which impacts are not followed
@@ -121,9 +121,27 @@ class Element(ABC):
         """The place of the element, by a coordinate ``q`` and its speed ``v`` (:func:`nonsmooth.mechanical`)."""
 
 
-def check_side(element: Any) -> None:
-    """Raise where a stop's side is neither above nor below."""
-    if element.side not in (1, -1):
-        raise SystemDefinitionError(
-            f"{type(element).__name__}: side is 1 (the stop lies above) or -1 (below), not {element.side!r}"
-        )
+@dataclass(frozen=True, kw_only=True)
+class Contact(Element):
+    """A contact on one side, with a gap: the ground of rigid and elastic stops."""
+
+    gap: Callable[..., Any] | None = None
+    position: Law = 0.0
+    side: int = 1
+
+    kinematics: ClassVar[str] = "gap"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.side not in (1, -1):
+            raise SystemDefinitionError(
+                f"{type(self).__name__}: side is 1 (the stop lies above) or -1 (below), not {self.side!r}"
+            )
+
+    @property
+    def into(self) -> int:
+        """A positive force opens it, away from its side."""
+        return -self.side
+
+    def placed(self, q: Any, v: Any, law: Callable[[Law], Any]) -> Any:
+        return self.side * (law(self.position) - q)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from nonsmooth.errors import SystemDefinitionError
-from nonsmooth.system.elements.element import CREEP, SMALL, Condition, Element, Law, Leaving, check_side
+from nonsmooth.system.elements.element import CREEP, SMALL, Condition, Contact, Law, Leaving
 
 if TYPE_CHECKING:
     from nonsmooth.system.assembly import Place
@@ -16,7 +15,7 @@ __all__ = ["Stop"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Stop(Element):
+class Stop(Contact):
     r"""A rigid stop: impacts with restitution, then rest until the contact force would pull.
 
     With the gap :math:`\delta(t, u) \ge 0` and :math:`w = \dot\delta`, an impact at :math:`\delta = 0` turns w into
@@ -51,14 +50,10 @@ class Stop(Element):
     'floor_rest'
     """
 
-    gap: Callable[..., Any] | None = None
-    position: Law = 0.0
-    side: int = 1
     restitution: Law = 0.0
     rest: bool = True
     creep: float | None = None
 
-    kinematics: ClassVar[str] = "gap"
     phases: ClassVar[tuple[str, ...]] = ("open", "rest")
     laws: ClassVar[tuple[str, ...]] = ("restitution",)
     conditions: ClassVar[tuple[str, ...]] = ("gap", "closing", "opens", "slow", "off", "beyond")
@@ -68,21 +63,12 @@ class Stop(Element):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_side(self)
         if isinstance(self.restitution, (int, float)) and not 0 <= self.restitution <= 1:
             raise SystemDefinitionError(f"Stop: restitution = {self.restitution}; it lies between 0 and 1")
         if self.creep is not None and not (isinstance(self.creep, (int, float)) and self.creep > 0):
             raise SystemDefinitionError(f"Stop: creep is a positive speed, not {self.creep!r}")
         if not self.rest:
             object.__setattr__(self, "phases", ("open",))
-
-    @property
-    def into(self) -> int:
-        """A positive force opens it, away from its side."""
-        return -self.side
-
-    def placed(self, q: Any, v: Any, law: Callable[[Law], Any]) -> Any:
-        return self.side * (law(self.position) - q)
 
     def force(self, here: Place) -> Any:
         return 0
