@@ -172,7 +172,7 @@ def test_a_list_for_some_methods():
     left_out = [arguments for _, name, arguments in every if name == "series_module" and arguments[1] != "rkf45"]
     assert len(left_out) == 4 and [task for task in every if task[2] not in left_out] == chosen
     place = {(name, *arguments): k for k, (_, name, arguments) in enumerate(every)}
-    assert place["linear_module", 2, 1, "sections", 0] < place["settle_module", 2, 1]
+    assert place["linear_module", 2, 1, "sections", 0, False] < place["settle_module", 2, 1]
 
 
 #: A later process; the package's own folder of code made ahead is moved.

@@ -61,7 +61,7 @@ class PatternEngine(LoopEngine):
     def module(self, tables: Any, observer: str) -> ModuleType:
         from nonsmooth.kernels.linear.module import linear_module
 
-        return linear_module(len(self.scale), len(self.patterns.form.multiples), observer)
+        return linear_module(len(self.scale), len(self.patterns.form.multiples), observer, may_wait=True)
 
     def given(self, tables: Any, observer: str) -> tuple[Any, Any, Any]:
         return tables.form, tables.standing, tables.work

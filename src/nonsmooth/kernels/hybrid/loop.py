@@ -46,6 +46,14 @@ from nonsmooth.kernels.hybrid.places import (
     WAITS,
 )
 
+MAY_WAIT = 0  # 1 where modes are made when they are first visited: what never happens costs nothing
+
+
+@inline
+def waiting(work):
+    """The transition that waits for the tables of its mode, or -1."""
+    return work.tally[WAITS] - 1 if MAY_WAIT != 0 else -1
+
 
 @inline
 def next_holding(mode, tables, net, work):
@@ -74,7 +82,7 @@ def settle(i, form, net, tables, work):
                 impact = net.transitions[one, 1] == RESET
                 if impact and lies_beyond(one, form, net, work):
                     return BEYOND_STOP
-                if net.transitions[one, 0] < 0:
+                if MAY_WAIT != 0 and net.transitions[one, 0] < 0:
                     tally[WAITS] = one + 1
                     return PAUSED
                 if visited[net.transitions[one, 0]] == 0 or (impact and net.transitions[one, 0] == mode):
@@ -136,7 +144,8 @@ def transit(i, t, short, form, net, section, goal, seen, tables, work):
 
     PAUSED: the next of them waits for the tables of its mode; called again, it goes on there."""
     tally = work.tally
-    mode, code, fired, jumps = tally[MODE], OK, tally[FIRED], tally[TAKEN]
+    mode, code, fired = tally[MODE], OK, tally[FIRED]
+    jumps = tally[TAKEN] if MAY_WAIT != 0 else 0
     if jumps == 0:
         tally[SOURCE], tally[FIRST] = mode, t
         approach(mode, fired, seen, tables, work)
@@ -144,7 +153,7 @@ def transit(i, t, short, form, net, section, goal, seen, tables, work):
         if jumps > min(net.mode_start.shape[0] + 1, MOST_AT_ONCE):  # as many as modes, and three
             code = CHATTER
             break
-        if net.transitions[t, 0] < 0:
+        if MAY_WAIT != 0 and net.transitions[t, 0] < 0:
             tally[WAITS], tally[TAKEN], tally[CLOSELY] = t + 1, jumps, 1 if short else 0
             return PAUSED, 0
         mode = take(i, t, fired if jumps == 0 else -1, form, tables, net, work)
@@ -182,14 +191,16 @@ def march(i, form, net, section, goal, motion, seen, tables, work):
         open_window(i, form, section, seen, tables, work)
     patience = goal.patience
     strides = may_stride(i, form, net, section, seen)
-    while code == OK and (tally[WAITS] > 0 or not reached(goal, work)):
+    while code == OK and (waiting(work) >= 0 or not reached(goal, work)):
         patience -= 1
         code = PAUSED if patience < 0 and may_pause(work) else room(seen, work)
         if code != OK:
             break
-        t, short, sense, state = tally[WAITS] - 1, tally[CLOSELY] != 0, 0, tally[NOTED]
-        tally[WAITS] = 0
-        if t < 0:
+        t, sense = waiting(work), 0
+        if t >= 0:
+            tally[WAITS] = 0
+            short, state = tally[CLOSELY] != 0, tally[NOTED]
+        else:
             ready, clear = False, False
             if strides:
                 ready, clear, patience = hurry(i, form, net, section, goal, seen, tables, work, patience)

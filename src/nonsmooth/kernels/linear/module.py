@@ -20,12 +20,17 @@ OBSERVERS = {
 
 
 @cache
-def linear_module(states: int, harmonics: int, observer: str = "sections", memory: int = 0) -> ModuleType:
+def linear_module(
+    states: int, harmonics: int, observer: str = "sections", memory: int = 0, may_wait: bool = False
+) -> ModuleType:
     """The module for ``states`` >= 1 (the last ``memory`` of them being that) and ``harmonics`` >= 0
-    harmonics, with ``scratch`` and one observer's kernel: ``chain`` (sections), ``record`` or ``grow`` (growth)."""
+    harmonics, with ``scratch`` and one observer's kernel: ``chain`` (sections), ``record`` or ``grow`` (growth).
+
+    ``may_wait``: modes are made when they are first visited, and runs wait for their tables."""
     text = joined((*STEPPER, *OBSERVERS[observer]))
-    text = with_numbers(text, {"STATES": states, "HARMONICS": harmonics, "MEMORY": memory})
-    return load_module(text, f"linear_{observer}_{states}_{harmonics}" + (f"_{memory}" if memory else ""))
+    numbers = {"STATES": states, "HARMONICS": harmonics, "MEMORY": memory, "MAY_WAIT": int(may_wait)}
+    name = f"linear_{observer}_{states}_{harmonics}" + (f"_{memory}" if memory else "") + "_waits" * may_wait
+    return load_module(with_numbers(text, numbers), name)
 
 
 @cache
