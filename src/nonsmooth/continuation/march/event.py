@@ -222,18 +222,15 @@ def special_on(step: Step) -> list[Met]:
         if not kind.happened(step, was, now):
             continue
         there: tuple[float, Any] | None = kind.located(step)
-        # Beyond a change of equations nothing is missed.
-        missed = step.cause != "change" or kind.happened(step, was, kind.number(curve, step.last))
-        if there is None and kind.certain and missed:
-            warnings.warn(
-                f"a {kind.name.replace('_', '-')} between the parameter's values {a.value!r} and {b.value!r} was met "
-                "but not located, and is not listed",
-                RuntimeWarning, stacklevel=2,
-            )  # fmt: skip
-        if there is None or there[0] > stop:
-            continue
-        named = kind.named(step, there[1])
-        if named is not None:
+        if there is None:
+            # Beyond a change of equations nothing is missed.
+            if kind.certain and (step.cause != "change" or kind.happened(step, was, kind.number(curve, step.last))):
+                warnings.warn(
+                    f"a {kind.name.replace('_', '-')} between the parameter's values {a.value!r} and {b.value!r} was "
+                    "met but not located, and is not listed",
+                    RuntimeWarning, stacklevel=2,
+                )  # fmt: skip
+        elif there[0] <= stop and (named := kind.named(step, there[1])) is not None:
             found.append(Met(kind, *there, *named))
     # A branch that crosses another one where the parameter turns is one event, not two.
     crossings = [met.s for met in found if isinstance(met.kind, Crossing)]
