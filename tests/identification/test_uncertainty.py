@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from nonsmooth.identification.finding import Estimate
-from nonsmooth.identification.lines import york
 from nonsmooth.identification.profiles import profile_likelihood, profile_of
 from nonsmooth.identification.uncertainty import (
     correlated,
@@ -14,6 +13,7 @@ from nonsmooth.identification.uncertainty import (
     interval,
     uniform,
 )
+from nonsmooth.studies.savi2007.identification.lines import york
 
 
 def test_uniform_and_normal_limits():

@@ -37,7 +37,7 @@ _PATIENCE = 4000  # periods: above grazing the model's chaos is a transient, whi
 
 
 def _compute_17(settings: Settings) -> dict[str, xr.Dataset]:
-    from nonsmooth.experiment.rig.figures import SECTIONS
+    from nonsmooth.studies.savi2007.rig.figures import SECTIONS
 
     bench = settings.bench
     steps = [omega for omega, _, _ in SECTIONS[17]]
