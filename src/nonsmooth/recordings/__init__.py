@@ -3,8 +3,9 @@
 from nonsmooth.recordings.load import load_recording
 from nonsmooth.recordings.readers.capstone_writers import write_cap, write_capstone_csv
 from nonsmooth.recordings.recording import Recording, RecordingWarning
-from nonsmooth.recordings.session import Session, load_session
+from nonsmooth.recordings.session import Quantity, Session, load_session
 
 __all__ = [
-    "Recording", "RecordingWarning", "Session", "load_recording", "load_session", "write_cap", "write_capstone_csv",
+    "Quantity", "Recording", "RecordingWarning", "Session", "load_recording", "load_session", "write_cap",
+    "write_capstone_csv",
 ]  # fmt: skip

@@ -97,7 +97,7 @@ def test_the_bias_of_fig_6_for_5_mn():
 
 
 def test_the_table_of_the_theory_page_is_what_its_code_prints(capsys):
-    page = (Path(__file__).parents[2] / "docs" / "theory" / "uncertainty.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[3] / "docs" / "theory" / "uncertainty.md").read_text(encoding="utf-8")
     code, expected = re.search(r"```python\n(.*?)```\n\n```text\n(.*?)```", page, re.DOTALL).groups()
     exec(code, {})
     assert capsys.readouterr().out == expected

@@ -15,18 +15,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from nonsmooth.models import discontinuous_support
-from nonsmooth.recordings.recording import RecordingWarning
+from nonsmooth.recordings import RecordingWarning
 from nonsmooth.results.provenance import ATTRIBUTE, package_version
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from nonsmooth.identification.parameter_set import ParameterSet
-    from nonsmooth.recordings.recording import Recording
-    from nonsmooth.recordings.session import Session
+    from nonsmooth import ParameterSet, Recording, System
+    from nonsmooth.recordings import Session
     from nonsmooth.studies.savi2007.comparison import GapOffset
     from nonsmooth.studies.savi2007.rig import VirtualRig
-    from nonsmooth.system.system import System
 
 __all__ = ["SEED", "TRUTH", "Laboratory", "as_result"]
 
@@ -81,7 +79,7 @@ class Laboratory:
     @cached_property
     def session(self) -> Session:
         """The session that identification reads."""
-        from nonsmooth.recordings.session import load_session
+        from nonsmooth.recordings import load_session
 
         return load_session(self._identification)
 
@@ -130,7 +128,7 @@ class Laboratory:
 
     def record(self, name: str, made: Mapping[str, Recording]) -> Session:
         """Write recordings, by procedure, into the session folder ``name`` and read it."""
-        from nonsmooth.recordings.session import load_session
+        from nonsmooth.recordings import load_session
 
         return load_session(self._write(name, made))
 
@@ -158,7 +156,7 @@ class Laboratory:
 
     def compare(self, measured: xr.Dataset, settings: Mapping[str, Any], **options: Any) -> xr.Dataset:
         """The measurement over the model with the identified parameters."""
-        from nonsmooth.identification.compare.compare import compare
+        from nonsmooth import compare
 
         return compare(measured, self.model, parameters=self.identified, settings=settings, **{"draws": 0, **options})
 

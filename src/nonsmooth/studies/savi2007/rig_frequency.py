@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth import plot
-from nonsmooth.plot.comparison_diagram import comparison_diagram
-from nonsmooth.plot.comparison_motion import comparison_phase_portrait
+from nonsmooth.plot import comparison_diagram, comparison_phase_portrait
 from nonsmooth.studies.savi2007.diagrams import mark_values, shared_legend
 from nonsmooth.studies.savi2007.figure import Figure, only_outer, sheet
 from nonsmooth.studies.savi2007.flows import Settings

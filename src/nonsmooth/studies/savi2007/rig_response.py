@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth import plot
-from nonsmooth.plot.comparison_response import comparison_response
+from nonsmooth.plot import comparison_response
 from nonsmooth.studies.savi2007.diagrams import shared_legend
 from nonsmooth.studies.savi2007.figure import Figure, sheet
 from nonsmooth.studies.savi2007.flows import Settings

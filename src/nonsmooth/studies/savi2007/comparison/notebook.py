@@ -12,14 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.identification.compare.measured import measured_motion
-from nonsmooth.identification.compare.series import measured_response, measured_rise, measured_sections
+from nonsmooth.identification.compare import measured_motion, measured_response, measured_rise, measured_sections
 from nonsmooth.studies.savi2007.comparison.reference import GapOffset, GapReference, gap_reference
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from nonsmooth.recordings.session import Session
+    from nonsmooth.recordings import Session
 
 __all__ = ["SHOWS", "session_measurement"]
 

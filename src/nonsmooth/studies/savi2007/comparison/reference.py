@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 if TYPE_CHECKING:
-    from nonsmooth.recordings.session import Session
+    from nonsmooth.recordings import Session
     from nonsmooth.studies.savi2007.identification.gap import MeanShift
 
 __all__ = ["GapOffset", "GapReference", "gap_offset", "gap_reference"]
@@ -117,7 +117,7 @@ def gap_reference(
     ValueError
         A run without the channels that it needs; the message names run and channel.
     """
-    from nonsmooth.recordings.recording import RecordingWarning
+    from nonsmooth.recordings import RecordingWarning
     from nonsmooth.studies.savi2007.identification.evidence import gather
     from nonsmooth.studies.savi2007.identification.free_decay import free_decay
     from nonsmooth.studies.savi2007.identification.referral import mark_of, places

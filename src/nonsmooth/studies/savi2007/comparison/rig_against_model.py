@@ -17,7 +17,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from nonsmooth.recordings.recording import RecordingWarning
+from nonsmooth.recordings import RecordingWarning
 from nonsmooth.studies.savi2007.comparison.rig_tables import page
 from nonsmooth.studies.savi2007.comparison.rig_trial import RigTrial
 

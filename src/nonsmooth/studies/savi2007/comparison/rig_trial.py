@@ -18,13 +18,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.identification.compare.compare import compare
+from nonsmooth import compare
+from nonsmooth.identification.compare import measured_motion, measured_sections
 from nonsmooth.identification.compare.fold import fold
-from nonsmooth.identification.compare.measured import measured_motion
 from nonsmooth.identification.compare.periods import measured_period
-from nonsmooth.identification.compare.series import measured_sections
-from nonsmooth.recordings.recording import RecordingWarning
-from nonsmooth.recordings.session import Session, load_session
+from nonsmooth.recordings import RecordingWarning, Session, load_session
 from nonsmooth.studies.savi2007.comparison.notebook import session_measurement
 from nonsmooth.studies.savi2007.comparison.reference import GapOffset, gap_offset, gap_reference
 from nonsmooth.studies.savi2007.comparison.rig_tables import STEP
@@ -36,9 +34,8 @@ from nonsmooth.studies.savi2007.rig.notebook import write_session
 if TYPE_CHECKING:
     import xarray as xr
 
-    from nonsmooth.identification.parameter_set import ParameterSet
+    from nonsmooth import ParameterSet, System
     from nonsmooth.studies.savi2007.rig import VirtualRig
-    from nonsmooth.system.system import System
 
 __all__ = ["RigTrial"]
 
@@ -186,7 +183,7 @@ class RigTrial:
 
     def _first_flip(self, gap: float) -> float:
         """Roughly where the model halves its period in a rise."""
-        from nonsmooth.diagrams.sweep import sweep
+        from nonsmooth import sweep
 
         system = self.model.with_parameters(self.identified).with_parameters(omega=3.69, g=gap)
         values = np.arange(0.2, 0.7, 0.004)
@@ -212,7 +209,7 @@ class RigTrial:
 
     def _coexisting(self, settings: Mapping[str, Any]) -> dict[int, int]:
         """Number of seeded starts that lead the model to each period number."""
-        from nonsmooth.diagrams.sweep import sweep
+        from nonsmooth import sweep
         from nonsmooth.identification.compare.draws import nominal, read_settings
 
         system = nominal(self.model, self.identified, read_settings(settings, self.model))
@@ -224,7 +221,7 @@ class RigTrial:
 
     def transients(self, gap: float = 0.0009) -> list[int]:
         """Turns until the rig, let go as in Fig. 14, keeps period 2 (5998: longer): from its equations, no record."""
-        from nonsmooth.flow.poincare import poincare
+        from nonsmooth import poincare
         from nonsmooth.studies.savi2007.rig.sampled import METHOD
 
         length = figures.crank_for(self.rig, 0.33)

@@ -24,8 +24,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.errors import SolveError
-from nonsmooth.identification.finding import Estimate
+from nonsmooth import SolveError
+from nonsmooth.identification import Estimate
 from nonsmooth.identification.uncertainty import uniform
 
 __all__ = ["LAWS", "UNKNOWNS", "Adjusted", "Observation", "adjust"]

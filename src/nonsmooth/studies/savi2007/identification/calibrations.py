@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.identification.finding import Estimate, Finding
+from nonsmooth.identification import Estimate, Finding
 from nonsmooth.identification.uncertainty import coverage_factor, uniform
 from nonsmooth.recordings.signals.phase import drive_phase
 from nonsmooth.studies.savi2007.identification.evidence import Run

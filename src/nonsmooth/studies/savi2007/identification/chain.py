@@ -12,12 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.errors import SolveError
+from nonsmooth import ParameterSet, SolveError
+from nonsmooth.identification import Estimate, Finding
 from nonsmooth.identification.blas import one_blas_thread
-from nonsmooth.identification.finding import Estimate, Finding
-from nonsmooth.identification.parameter_set import ParameterSet
-from nonsmooth.recordings.recording import RecordingWarning
-from nonsmooth.recordings.session import Quantity, Session
+from nonsmooth.recordings import Quantity, RecordingWarning, Session
 from nonsmooth.recordings.signals.phase import drive_phase
 from nonsmooth.studies.savi2007.identification.adjustment import Adjusted, Observation, adjust
 from nonsmooth.studies.savi2007.identification.calibrations import crank_force, voltage_frequency

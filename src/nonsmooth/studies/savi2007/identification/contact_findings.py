@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.errors import SolveError
-from nonsmooth.identification.finding import Estimate, Finding
+from nonsmooth import SolveError
+from nonsmooth.identification import Estimate, Finding
 from nonsmooth.identification.profiles import Profile, profile_of
 from nonsmooth.identification.uncertainty import coverage_factor
-from nonsmooth.recordings.session import Quantity
+from nonsmooth.recordings import Quantity
 from nonsmooth.studies.savi2007.identification.multiple_shooting import ContactFit
 from nonsmooth.studies.savi2007.identification.shooting import ShootingFit, shoot
 

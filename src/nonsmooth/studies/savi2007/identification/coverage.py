@@ -47,8 +47,8 @@ def one_rig(seed: int, folder: str, awkward: bool = False) -> dict[str, Any]:
     if kept.is_file():
         found: dict[str, Any] = json.loads(kept.read_text(encoding="utf-8"))
         return found
-    from nonsmooth.identification.finding import Estimate
-    from nonsmooth.recordings.session import load_session
+    from nonsmooth.identification import Estimate
+    from nonsmooth.recordings import load_session
     from nonsmooth.studies.savi2007.comparison import gap_offset, session_measurement
     from nonsmooth.studies.savi2007.identification.chain import identify
     from nonsmooth.studies.savi2007.rig import NOMINAL_GAP, VirtualRig
@@ -139,7 +139,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     results = campaign(options.seeds, folder, options.processes, awkward=options.awkward)
     text = page(results, awkward=options.awkward)
     print(text)
-    from nonsmooth.results.store import save
+    from nonsmooth import save
 
     save(to_dataset(results), folder / "coverage.nc")
     if options.out is not None:

@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nonsmooth.identification.finding import Estimate, Finding
+from nonsmooth.identification import Estimate, Finding
 from nonsmooth.identification.uncertainty import uniform
-from nonsmooth.recordings.session import Quantity
+from nonsmooth.recordings import Quantity
 from nonsmooth.studies.savi2007.identification.consistency import birge_ratio
 
 __all__ = ["PAIRS", "Check", "cross_checks", "sentences"]

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.errors import SolveError
-from nonsmooth.identification.finding import Estimate, Finding
-from nonsmooth.recordings.session import Quantity
+from nonsmooth import SolveError
+from nonsmooth.identification import Estimate, Finding
+from nonsmooth.recordings import Quantity
 from nonsmooth.studies.savi2007.identification.free_decay import DecayFit
 from nonsmooth.studies.savi2007.identification.gap import grazing_amplitude
 from nonsmooth.studies.savi2007.identification.nonlinear_fit import nonlinear_fit

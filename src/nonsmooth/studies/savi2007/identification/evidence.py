@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.recordings.recording import Recording
+from nonsmooth import Recording
 from nonsmooth.recordings.session import PROCEDURES, SETTINGS, Quantity, Session, load_session
 from nonsmooth.recordings.signals.checks import take
 from nonsmooth.recordings.signals.displacement import position, resolution

@@ -27,7 +27,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.errors import SolveError
+from nonsmooth import SolveError
 from nonsmooth.studies.savi2007.identification.consistency import Consistent, consistent
 from nonsmooth.studies.savi2007.identification.pieces import Piece, start_state
 from nonsmooth.studies.savi2007.identification.shooting import ShootingFit, shoot

@@ -27,8 +27,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.identification.finding import Estimate, Finding
-from nonsmooth.recordings.session import Quantity
+from nonsmooth.identification import Estimate, Finding
+from nonsmooth.recordings import Quantity
 from nonsmooth.studies.savi2007.identification.steady import Steady
 
 if TYPE_CHECKING:

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from nonsmooth.identification.finding import Estimate, Finding
-from nonsmooth.identification.parameter_set import ParameterSet
+from nonsmooth import ParameterSet
+from nonsmooth.identification import Estimate, Finding
 from nonsmooth.studies.savi2007.identification.adjustment import Adjusted
 from nonsmooth.studies.savi2007.identification.referral import Referred
 

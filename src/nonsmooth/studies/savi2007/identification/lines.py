@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.errors import SolveError
+from nonsmooth import SolveError
 from nonsmooth.identification.uncertainty import correlated
 
 __all__ = ["LinearLaw", "StraightLine", "linear_law", "scattered_line", "york"]

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.errors import SolveError
+from nonsmooth import SolveError
 from nonsmooth.identification.arrow import Unsettled, reduced
 from nonsmooth.recordings.signals.phase import drive_phase
 from nonsmooth.studies.savi2007.identification.evidence import Run

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from nonsmooth.recordings.session import Quantity
+    from nonsmooth.recordings import Quantity
     from nonsmooth.studies.savi2007.identification.evidence import Evidence, Run
     from nonsmooth.studies.savi2007.identification.steady import Steady
 

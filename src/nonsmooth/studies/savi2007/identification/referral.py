@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.identification.finding import Estimate, Finding
+from nonsmooth.identification import Estimate, Finding
 from nonsmooth.identification.uncertainty import uniform
 from nonsmooth.studies.savi2007.identification.adjustment import Adjusted
 from nonsmooth.studies.savi2007.identification.consistency import consistent

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.errors import SolveError
+from nonsmooth import SolveError
 from nonsmooth.identification.arrow import settle
 from nonsmooth.identification.pieces import State
 from nonsmooth.identification.sandwich import sandwich

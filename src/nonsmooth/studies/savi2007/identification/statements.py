@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.identification.finding import Finding
-from nonsmooth.identification.parameter_set import ParameterSet
+from nonsmooth import ParameterSet
+from nonsmooth.identification import Finding
 from nonsmooth.studies.savi2007.identification.adjustment import Adjusted
 from nonsmooth.studies.savi2007.identification.consistency import birge_ratio
 from nonsmooth.studies.savi2007.identification.evidence import Evidence

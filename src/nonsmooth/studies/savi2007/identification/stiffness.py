@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.identification.finding import Estimate, Finding
+from nonsmooth.identification import Estimate, Finding
 from nonsmooth.identification.uncertainty import uniform
 from nonsmooth.recordings.signals.savitzky_golay import savitzky_golay
 from nonsmooth.studies.savi2007.identification.evidence import Run

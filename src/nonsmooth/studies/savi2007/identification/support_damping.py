@@ -15,8 +15,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.identification.finding import Estimate, Finding
-from nonsmooth.recordings.session import Quantity
+from nonsmooth.identification import Estimate, Finding
+from nonsmooth.recordings import Quantity
 from nonsmooth.studies.savi2007.identification.evidence import Run
 from nonsmooth.studies.savi2007.identification.free_decay import DecayFit, free_decay
 

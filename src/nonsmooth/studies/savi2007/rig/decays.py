@@ -12,9 +12,8 @@ from nonsmooth.studies.savi2007.rig.physics import NO_SUPPORT, hanging_mass
 from nonsmooth.studies.savi2007.rig.sampled import sampled
 
 if TYPE_CHECKING:
-    from nonsmooth.recordings.recording import Recording
+    from nonsmooth import Recording, System
     from nonsmooth.studies.savi2007.rig.virtual_rig import VirtualRig
-    from nonsmooth.system.system import System
 
 __all__ = ["drop", "impulse"]
 

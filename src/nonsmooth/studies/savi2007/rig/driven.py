@@ -16,9 +16,8 @@ from nonsmooth.studies.savi2007.rig.sampled import simulated
 if TYPE_CHECKING:
     import xarray as xr
 
-    from nonsmooth.recordings.recording import Recording
+    from nonsmooth import Recording, System
     from nonsmooth.studies.savi2007.rig.virtual_rig import VirtualRig
-    from nonsmooth.system.system import System
 
 __all__ = ["Setting", "records", "rise"]
 

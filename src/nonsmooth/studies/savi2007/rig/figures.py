@@ -17,7 +17,7 @@ from nonsmooth.studies.savi2007.rig.driven import Setting, records
 from nonsmooth.studies.savi2007.rig.motor import mean_position, voltage_for
 
 if TYPE_CHECKING:
-    from nonsmooth.recordings.recording import Recording
+    from nonsmooth import Recording
     from nonsmooth.studies.savi2007.rig.virtual_rig import VirtualRig
 
 __all__ = [

@@ -17,7 +17,7 @@ from nonsmooth.studies.savi2007.rig import sensors
 from nonsmooth.studies.savi2007.rig.physics import Wander, crank_angle, drive
 
 if TYPE_CHECKING:
-    from nonsmooth.recordings.recording import Recording
+    from nonsmooth import Recording
     from nonsmooth.studies.savi2007.rig.virtual_rig import VirtualRig
 
 __all__ = ["MAX_VOLTAGE", "crank", "frequency", "mean_position", "passages", "voltage", "voltage_for"]

@@ -7,12 +7,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nonsmooth.recordings.readers.capstone_writers import write_cap, write_capstone_csv
+from nonsmooth.recordings import write_cap, write_capstone_csv
 from nonsmooth.recordings.session import NOTEBOOK, SETTINGS
 from nonsmooth.studies.savi2007.rig import sensors
 
 if TYPE_CHECKING:
-    from nonsmooth.recordings.recording import Recording
+    from nonsmooth import Recording
     from nonsmooth.studies.savi2007.rig.virtual_rig import VirtualRig
 
 __all__ = ["truth_path", "write_session"]

@@ -31,7 +31,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from nonsmooth.system.system import System
+    from nonsmooth import System
 
 __all__ = [
     "AT_REST", "NO_SUPPORT", "WANDERING", "Wander", "car", "crank_angle", "drive", "driven_tension", "fixed_tension",
@@ -122,7 +122,7 @@ def car(*, relaxing: bool = True, rising: bool = False, wandering: bool = False,
 
 @cache
 def _hanging_mass() -> System:
-    from nonsmooth.system.system import System
+    from nonsmooth import System
 
     def field(t: Any, u: Any, p: Any) -> Any:
         return u.v, -(p.k_s * u.x + p.c_s * u.v) / p.test_mass
@@ -138,9 +138,7 @@ def _hanging_mass() -> System:
 
 @cache
 def _car(relaxing: bool, rising: bool, wandering: bool, side: int) -> System:
-    from nonsmooth.system.mode import Mode
-    from nonsmooth.system.system import System
-    from nonsmooth.system.transition import Transition
+    from nonsmooth import Mode, System, Transition
 
     def driven(t: Any, u: Any, p: Any) -> Any:
         return driven_tension(t, u.x, p, u.a if rising else p.crank_length, side, wander_of(p) if wandering else ())

@@ -13,7 +13,7 @@ from nonsmooth.studies.savi2007.rig.physics import driven_tension, fixed_tension
 if TYPE_CHECKING:
     import xarray as xr
 
-    from nonsmooth.system.system import System
+    from nonsmooth import System
 
 __all__ = ["sampled", "simulated"]
 
@@ -37,7 +37,7 @@ def simulated(
     SolveError
         If the run could not be completed.
     """
-    from nonsmooth.flow.simulate import simulate
+    from nonsmooth import simulate
 
     with_strings = "pretension" in system.parameters
     samples = instants if end is None else np.append(instants, end)

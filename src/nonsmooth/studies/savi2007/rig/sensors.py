@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.recordings.recording import RecordingWarning
+from nonsmooth.recordings import RecordingWarning
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nonsmooth.errors import SolveError
+from nonsmooth import SolveError
 from nonsmooth.studies.savi2007.rig.driven import Setting, records
 from nonsmooth.studies.savi2007.rig.motor import frequency, mean_position, voltage_for
 from nonsmooth.studies.savi2007.rig.truth import NOMINAL_GAP
 
 if TYPE_CHECKING:
-    from nonsmooth.recordings.recording import Recording
+    from nonsmooth import Recording
     from nonsmooth.studies.savi2007.rig.virtual_rig import VirtualRig
 
 __all__ = ["contact", "graze_frequency", "grazing", "response"]

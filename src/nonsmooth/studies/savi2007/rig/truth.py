@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.errors import DataFileError
+from nonsmooth import DataFileError
 from nonsmooth.system.names import unknown
 
 __all__ = ["FEATURES", "HOLDING", "NOMINAL_GAP", "UNITS", "awkward", "drawn", "load_truth", "published", "switched"]

@@ -20,8 +20,7 @@ from nonsmooth.system.names import unknown
 if TYPE_CHECKING:
     import xarray as xr
 
-    from nonsmooth.recordings.recording import Recording
-    from nonsmooth.system.system import System
+    from nonsmooth import Recording, System
 
 __all__ = ["IDENTIFICATION", "VirtualRig"]
 
@@ -167,7 +166,7 @@ class VirtualRig:
 
     def recording(self, procedure: str, runs: Sequence[tuple[str, Mapping[str, Any], Mapping[str, Any]]]) -> Recording:
         """The runs (name, sensors, settings) as a Recording that says that it is synthetic."""
-        from nonsmooth.recordings.recording import Recording
+        from nonsmooth import Recording
 
         record = {
             "file": "", "format": "virtual rig", "procedure": procedure, "seed": self.seed,
