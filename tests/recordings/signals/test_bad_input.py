@@ -22,7 +22,6 @@ from nonsmooth.recordings.signals.contacts import contacts
 from nonsmooth.recordings.signals.displacement import position
 from nonsmooth.recordings.signals.harmonics import fit
 from nonsmooth.recordings.signals.impacts import impacts
-from nonsmooth.recordings.signals.peaks import extremes
 from nonsmooth.recordings.signals.phase import drive_phase
 from nonsmooth.recordings.signals.savitzky_golay import savitzky_golay
 from nonsmooth.recordings.signals.sections import poincare
@@ -56,7 +55,6 @@ USES: dict[str, Use] = {
     "savitzky_golay": lambda x: savitzky_golay(x.time, x, resolution=COUNT),
     "contacts": lambda x: contacts(x.time, x, resolution=COUNT),
     "impacts": lambda x: impacts(x.time, x, resolution=COUNT),
-    "extremes": lambda x: extremes(x.time, x),
     "drive_phase": lambda x: drive_phase(x.time, x),
     "fit": lambda x: fit(x.time, x, 4.0),
     "spectrum": lambda x: spectrum(x),
@@ -229,11 +227,11 @@ def test_times_that_stand_twice_or_go_back() -> None:
         smooth(t, t, resolution=COUNT)
     t[50] = 0.3
     with pytest.raises(ValueError, match=r"time 0.49 s goes back to 0.3 s"):
-        extremes(t, t)
+        fit(t, t, 4.0)
     with pytest.raises(ValueError, match="1 of its times are not finite numbers"):
-        extremes(np.append(t, np.nan), np.append(t, 0.0))
+        fit(np.append(t, np.nan), np.append(t, 0.0), 4.0)
     with pytest.raises(ValueError, match=r"arrays of one length, got \(100,\) and \(99,\)"):
-        extremes(t, t[1:])
+        fit(t, t[1:], 4.0)
 
 
 def test_dropped_samples_are_a_gap_not_an_even_rate() -> None:

@@ -1,14 +1,13 @@
-"""Harmonic fits and extremes against signals in closed form; their errors against many of them."""
+"""Harmonic fits against signals in closed form; their errors against many of them."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from motions import COUNT, decay, rms, sine
+from motions import COUNT, rms, sine
 
 from nonsmooth.recordings.signals.displacement import found_resolution
 from nonsmooth.recordings.signals.harmonics import fit
-from nonsmooth.recordings.signals.peaks import extremes
 
 
 def test_a_signal_of_harmonics_is_found_exactly() -> None:
@@ -75,20 +74,6 @@ def test_a_line_in_noise_has_the_least_error_that_is_possible() -> None:
     assert found.mean_error == pytest.approx(0.1 / np.sqrt(2000), rel=0.1)
 
 
-@pytest.mark.parametrize("told", [True, False])
-def test_errors_of_extremes_are_as_stated(told: bool) -> None:
-    rng, z_time, z_value = np.random.default_rng(5), [], []
-    for _ in range(25):
-        w, phase, count = rng.uniform(2.9, 3.1), rng.uniform(0, 6), 2e-3
-        t = np.arange(2500) / 100
-        x = np.cos(w * t - phase) + (0 if told else rng.normal(0, count, len(t)))
-        found = extremes(t, np.round(x / count) * count if told else x, resolution=count if told else None)
-        turns = np.rint((w * found.time - phase) / np.pi)
-        z_time += list((found.time - (turns * np.pi + phase) / w) / found.time_error)
-        z_value += list((found.value - found.kind) / found.value_error)
-    assert 0.5 < rms(np.array(z_time)) < 1.3 and 0.5 < rms(np.array(z_value)) < 1.3
-
-
 def test_refused_fits() -> None:
     t = np.arange(100) / 100
     with pytest.raises(ValueError, match="lasts 0.99 s, less than one period of 1.257 s"):
@@ -97,26 +82,6 @@ def test_refused_fits() -> None:
         fit(t, t, 2 * np.pi * 20, 3)
     with pytest.raises(ValueError, match="omega must be positive"):
         fit(t, t, -1.0)
-
-
-@pytest.mark.parametrize(("amplitude", "omega", "rate"), [(0.02, 4.5, 0.5), (0.02, 4.5, 0.02), (0.003, 30.0, 0.2)])
-def test_extremes_of_a_decay(amplitude: float, omega: float, rate: float) -> None:
-    motion = decay(amplitude, omega, rate, 6.0 if rate == 0.5 else 15.0)
-    found = extremes(motion.t, motion.counted, resolution=COUNT)
-    lag = np.arctan(rate / omega)  # v = 0 at omega t = k pi - lag
-    k = np.round((omega * found.time.values + lag) / np.pi)
-    true = (k * np.pi - lag) / omega
-    value = amplitude * np.exp(-rate * true) * np.cos(omega * true)
-    assert 0.5 < rms((found.time.values - true) / found.time_error.values) < 1.5
-    assert 0.5 < rms((found.value.values - value) / found.value_error.values) < 1.4
-    assert (np.diff(k) == 1).all() and (found.kind.values == np.where(k % 2, -1, 1)).all()
-    assert len(extremes(motion.t, motion.counted, kind="maxima").time) == np.count_nonzero(found.kind == 1)
-
-
-def test_extremes_need_prominence() -> None:
-    motion = sine(0.02, 4.5, 0.0, 20.0)
-    toggling = motion.counted + COUNT * (np.arange(len(motion.t)) % 2)  # a count to and fro makes no extreme
-    assert len(extremes(motion.t, toggling, resolution=COUNT).time) == len(extremes(motion.t, motion.x).time)
 
 
 def test_the_step_is_read_off_the_values() -> None:
