@@ -21,7 +21,7 @@ __all__ = ["Bench"]
 
 
 class Bench:
-    """What a page has of a recording. Reading and fitting run in a process of their own, so that the views go on."""
+    """The recording of a page. Reading and fitting run in a process of their own, so that the views go on."""
 
     def __init__(self, page: Session) -> None:
         self.page = page
@@ -41,7 +41,8 @@ class Bench:
         """Messages of the page that concern a recording."""
         return {
             "drop": self._drop, "recording": self._change, "fit": self._fit, "tick": self._tick,
-            "cancel": lambda *_: self._stop(), "unread": self._unread, "remove": self._remove, "take drive": self._take_drive,
+            "cancel": lambda *_: self._stop(), "unread": self._unread, "remove": self._remove,
+            "take drive": self._take_drive,
         }  # fmt: skip
 
     # --- what a person does
@@ -220,7 +221,8 @@ class Bench:
         if laid["distance"] is not None:
             far = laid["distance"]
             remarks.append(
-                f"{far['periods']} forcing periods compared; the record's phase leads the model's by {number(far['shift'], digits=3)}"
+                f"{far['periods']} forcing periods compared; "
+                f"the record's phase leads the model's by {far['shift']:.3f} of a period"
             )
         drive = laid.get("drive")
         return {

@@ -297,7 +297,8 @@ class History(_Curves):
         self._put(run, time, column(run, "u", state.x).values)
         at = [str(name) for name in run["state"].values].index(state.x)
         self.crossings.data = {"x": run["crossing_time"].values, "y": run["u_before"].values[:, at]}
-        self.show((float(time[0]), float(time[-1])), extent(np.concatenate([column(run, "u", state.x).values, self.beside[1]])))
+        values = np.concatenate([column(run, "u", state.x).values, self.beside[1]])
+        self.show((float(time[0]), float(time[-1])), extent(values))
         self.x.name("t", str(run["time"].attrs.get("units", "1")))
         self.y.name(symbols[state.x], units[state.x])
 
@@ -325,7 +326,7 @@ class Section(_Figure):
         self.dots.glyph.update(size=9 if few else 2.5, fill_alpha=1.0 if few else 0.75)
         curves = [] if run is None else [column(run, "u", name).values for name in (state.x, state.y)]
         self.orbit.data = {"x": curves[0], "y": curves[1]} if few and curves else {"x": [], "y": []}
-        ends = [extent(np.concatenate([points[:, k], curves[k] if few and curves else [], self.beside[k]]), 0.08) for k in (0, 1)]
-        self.show(*ends)
+        orbit = curves if few and curves else [np.empty(0), np.empty(0)]
+        self.show(*(extent(np.concatenate([points[:, k], orbit[k], self.beside[k]]), 0.08) for k in (0, 1)))
         self.x.name(symbols[state.x], units[state.x])
         self.y.name(symbols[state.y], units[state.y])

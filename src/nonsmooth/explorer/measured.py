@@ -59,9 +59,10 @@ def laid_over(
     Returns
     -------
     dict
-        ``curve``, ``section`` and ``history`` (beside the motion in time), columns by state; ``distance``: ``of`` (a state), ``rms`` in its unit, ``part`` of
-        the recorded motion's own size, ``shift`` of the recording's phase, ``periods`` compared; ``drive``, the
-        recorded forcing period where turns of the drive were recorded. Without a distance ``why`` says why.
+        ``curve``, ``section`` and ``history`` (beside the motion in time), columns by state; ``distance``: ``of`` (a
+        state), ``rms`` in its unit, ``part`` of the recorded motion's own size, ``shift`` of the recording's phase,
+        ``periods`` compared; ``drive``, the recorded forcing period where turns of the drive were recorded. Without a
+        distance ``why`` says why.
     """
     samples: Samples = job["samples"]
     heard(0.0)
@@ -153,7 +154,7 @@ def strand_distance(
     if closed:  # once more, so that every shift finds whole periods
         phase, u = np.concatenate([phase, phase[1:] + phase[-1] - phase[0]]), np.concatenate([u, u[1:]])
     a = recorded / size
-    whole = max(int(round(phase[-1] - phase[0])) // (2 if closed else 1), 1)
+    whole = max(round(phase[-1] - phase[0]) // (2 if closed else 1), 1)
 
     def squares(shift: float) -> FloatArray:
         """Mean squares over phase, (recorded periods, the motion's periods, states)."""

@@ -16,7 +16,7 @@ from nonsmooth.explorer.state import number_of
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["LARGEST", "Channel", "Recorded", "Samples", "Setup", "matched", "samples_of"]
+__all__ = ["LARGEST", "Channel", "Recorded", "Samples", "Setup", "matched", "samples_of", "unlike"]
 
 FloatArray = NDArray[np.float64]
 LARGEST = 64 << 20  # bytes of a file that the page takes
@@ -46,7 +46,7 @@ class Recorded:
 
 @dataclass(frozen=True)
 class Setup:
-    """How a recording is read as the motion of a model.
+    """The reading of a recording as the motion of a model.
 
     Attributes
     ----------
@@ -81,7 +81,8 @@ class Setup:
             return matched(recorded, system, _known(value, recorded.runs, "run"))
         channels = recorded.runs[self.run]
         if name in ("begin", "end"):
-            made = replace(self, **{name: number_of(value, name)})
+            second = number_of(value, name)
+            made = replace(self, begin=second) if name == "begin" else replace(self, end=second)
             if not made.begin < made.end:
                 raise ValueError(f"the piece from {made.begin:g} to {made.end:g} s is empty")
             return made
@@ -107,7 +108,7 @@ class Setup:
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """What a recording says of a model's states, for the worker.
+    """Recorded states of a model, for the worker.
 
     Attributes
     ----------
@@ -140,7 +141,8 @@ def matched(recorded: Recorded, system: System, run: str = "") -> Setup:
     found: dict[str, str] = {}
     for state in system.states:
         same = [name for name in free if name.casefold() == state.casefold()]
-        found |= {state: name for name in same[:1]}
+        if same:
+            found[state] = same[0]
     for state, unit in system.states.items():
         alike = [name for name in free if name not in found.values() and unit not in ("", "1")
                  and _factor(channels[name].unit, unit)]  # fmt: skip

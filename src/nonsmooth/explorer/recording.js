@@ -1,7 +1,7 @@
 /* The panel of a recording: a file is read in the page as bytes and handed over; what they mean, the server's readers say. */
 (window.parts = window.parts || []).push(({act, field, put, fill, short}) => {
   const $ = id => document.getElementById(id);
-  let most = 0, built = "";
+  let most = 0, built = "", file = "";
 
   function take(file) {
     if (!file) return;
@@ -74,7 +74,8 @@
     }
     $("recording-body").hidden = !told.file;
     $("recording-hint").hidden = Boolean(told.file);
-    if (!told.file) return;
+    if (!told.file) { file = ""; return; }
+    if (file !== told.file) { file = told.file; $("recording-name").closest("div").scrollIntoView({block: "nearest"}); }
     $("recording-name").textContent = told.file;
     $("recording-name").title = told.more.join("\n");
     fill($("recording-run"), told.runs.map(one => [one, one]), told.run);

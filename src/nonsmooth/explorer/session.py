@@ -18,12 +18,12 @@ from bokeh.models import TextInput
 from jinja2 import DictLoader, Environment
 
 from nonsmooth.explorer.bench import Bench
-from nonsmooth.explorer.controls import GIVEN, controls
+from nonsmooth.explorer.controls import controls
 from nonsmooth.explorer.export import exported
 from nonsmooth.explorer.figures import MOST, Diagram, History, Portrait, Section, theme
 from nonsmooth.explorer.labels import symbols_of
 from nonsmooth.explorer.overlays import Overlay
-from nonsmooth.explorer.presets import PAPER, first_state, presets_of, slider_range
+from nonsmooth.explorer.presets import GIVEN, PAPER, first_state, presets_of, slider_range
 from nonsmooth.explorer.readout import distinct, readout
 from nonsmooth.explorer.requests import key_of, requests_of, stability_request
 from nonsmooth.explorer.schedule import Asked, Schedule
