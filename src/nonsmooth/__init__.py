@@ -19,12 +19,12 @@ if TYPE_CHECKING:
     from nonsmooth.attractors.basin_fractions import basin_fractions as basin_fractions
     from nonsmooth.attractors.basins import basins as basins
     from nonsmooth.continuation.bifurcation_diagram import bifurcation_diagram as bifurcation_diagram
+    from nonsmooth.continuation.branches.orbit import Orbit as Orbit
     from nonsmooth.continuation.continue_curve import continue_curve as continue_curve
     from nonsmooth.continuation.continue_equilibrium import continue_equilibrium as continue_equilibrium
     from nonsmooth.continuation.continue_orbit import continue_orbit as continue_orbit
     from nonsmooth.continuation.find import find_orbit as find_orbit
-    from nonsmooth.continuation.manifolds import manifolds as manifolds
-    from nonsmooth.continuation.orbit import Orbit as Orbit
+    from nonsmooth.continuation.manifolds.manifolds import manifolds as manifolds
     from nonsmooth.continuation.special import special_points as special_points
     from nonsmooth.diagrams.chart import chart as chart
     from nonsmooth.diagrams.correlation_dimension import correlation_dimension as correlation_dimension
@@ -92,12 +92,12 @@ _WHERE = {
     "chart": "diagrams.chart",
     "bifurcation_diagram": "continuation.bifurcation_diagram",
     "find_orbit": "continuation.find",
-    "Orbit": "continuation.orbit",
+    "Orbit": "continuation.branches.orbit",
     "continue_orbit": "continuation.continue_orbit",
     "continue_curve": "continuation.continue_curve",
     "continue_equilibrium": "continuation.continue_equilibrium",
     "special_points": "continuation.special",
-    "manifolds": "continuation.manifolds",
+    "manifolds": "continuation.manifolds.manifolds",
     "smoothing_report": "smoothing.report",
     "load_recording": "recordings.load",
     "Recording": "recordings.recording",
