@@ -36,8 +36,6 @@ if TYPE_CHECKING:
     from nonsmooth.errors import Interrupted as Interrupted
     from nonsmooth.errors import SolveError as SolveError
     from nonsmooth.errors import SystemDefinitionError as SystemDefinitionError
-    from nonsmooth.experiment.load import load_recording as load_recording
-    from nonsmooth.experiment.recording import Recording as Recording
     from nonsmooth.explorer.serve import explore as explore
     from nonsmooth.flow.poincare import poincare as poincare
     from nonsmooth.flow.sections import Poincare as Poincare
@@ -45,15 +43,17 @@ if TYPE_CHECKING:
     from nonsmooth.flow.sensitivity import sensitivity as sensitivity
     from nonsmooth.flow.simulate import simulate as simulate
     from nonsmooth.flow.starts import random_starts as random_starts
-    from nonsmooth.identification.chain import identify as identify
     from nonsmooth.identification.compare.compare import compare as compare
     from nonsmooth.identification.fit.fit import fit as fit
     from nonsmooth.identification.fit.select import select_model as select_model
     from nonsmooth.identification.fit.sensors import Sensor as Sensor
     from nonsmooth.identification.parameter_set import ParameterSet as ParameterSet
+    from nonsmooth.recordings.load import load_recording as load_recording
+    from nonsmooth.recordings.recording import Recording as Recording
     from nonsmooth.results.store import load as load
     from nonsmooth.results.store import save as save
     from nonsmooth.smoothing.report import smoothing_report as smoothing_report
+    from nonsmooth.studies.savi2007.identification.chain import identify as identify
     from nonsmooth.system.derived.maps import Branch as Branch
     from nonsmooth.system.derived.maps import Map as Map
     from nonsmooth.system.derived.mechanical import mechanical as mechanical
@@ -99,12 +99,12 @@ _WHERE = {
     "special_points": "continuation.special",
     "manifolds": "continuation.manifolds.manifolds",
     "smoothing_report": "smoothing.report",
-    "load_recording": "experiment.load",
-    "Recording": "experiment.recording",
+    "load_recording": "recordings.load",
+    "Recording": "recordings.recording",
     "fit": "identification.fit.fit",
     "Sensor": "identification.fit.sensors",
     "select_model": "identification.fit.select",
-    "identify": "identification.chain",
+    "identify": "studies.savi2007.identification.chain",
     "ParameterSet": "identification.parameter_set",
     "compare": "identification.compare.compare",
     "explore": "explorer.serve",
