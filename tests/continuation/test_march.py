@@ -95,7 +95,7 @@ def run(curve: Plane, x: float, p: float, way: float, *, low: float = -4.0, high
 
 
 def test_a_circle_closes_with_two_folds() -> None:
-    """x^2 + p^2 = 1: folds at p = 1 and -1, where x passes zero too; every point lies on it, the last where it began."""
+    """x^2 + p^2 = 1: folds at p = 1 and -1, where x passes zero too; the last point is the first."""
     found = run(circle(), -0.8, 0.6, 1.0, closes=True)
     assert found.ending == "closed"
     assert sorted((one.kind, round(one.point.value)) for one in found.special) == [
