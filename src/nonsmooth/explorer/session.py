@@ -13,7 +13,7 @@ from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qsl
 
-from bokeh.events import RangesUpdate, Tap
+from bokeh.events import RangesUpdate, Reset, Tap
 from bokeh.models import TextInput
 from jinja2 import Template
 
@@ -23,10 +23,11 @@ from nonsmooth.explorer.figures import MOST, Diagram, History, Portrait, Section
 from nonsmooth.explorer.labels import symbols_of
 from nonsmooth.explorer.presets import PAPER, first_state, presets_of, slider_range
 from nonsmooth.explorer.readout import distinct, readout
-from nonsmooth.explorer.requests import key_of, requests_of, stability_request
+from nonsmooth.explorer.requests import key_of, motion_of, requests_of, stability_request
 from nonsmooth.explorer.schedule import Asked, Schedule
 from nonsmooth.explorer.state import History as Past
 from nonsmooth.explorer.state import State, changed, from_query
+from nonsmooth.explorer.views import PANELS, VIEWS, View
 from nonsmooth.explorer.worker import Answer
 
 if TYPE_CHECKING:
@@ -70,6 +71,7 @@ class Session:
         self.results: dict[str, Any] = {}
         self.diagram, self.portrait = Diagram(), Portrait()
         self.history, self.section = History(), Section()
+        self.views: list[View] = [view() for view in VIEWS]
         self._say = {name: TextInput(name=name) for name in CHANNELS}
         self._act = TextInput(name="act")
         self.past = Past(self._first(query))
@@ -115,14 +117,24 @@ class Session:
         folder = files("nonsmooth.explorer")
         document.template = Template(folder.joinpath("page.html").read_text(encoding="utf-8"))
         document.template_variables["style"] = folder.joinpath("page.css").read_text(encoding="utf-8")
+        document.template_variables["panels"] = PANELS
+        document.template_variables["views"] = VIEWS
         document.template_variables["program"] = folder.joinpath("page.js").read_text(encoding="utf-8")
         self.diagram.plot.on_event(Tap, self._tap_diagram)
         self.diagram.plot.on_event(RangesUpdate, self._zoom_diagram)
         self.diagram.plot.on_change("inner_height", lambda attr, old, new: self._resized(int(new)))
         for one in (self.portrait, self.section):
             one.plot.on_event(Tap, self._tap_plane)
-        for figure in (self.diagram, self.portrait, self.history, self.section):
-            document.add_root(figure.plot)  # events are heard of what had a callback by now
+        own = []
+        for view in self.views:
+            plot = view.build(self)
+            if plot is not None:
+                own.append(plot)
+                plot.on_event(Tap, partial(self._tap_view, view))
+                plot.on_event(RangesUpdate, partial(self._zoom_view, view))
+                plot.on_event(Reset, partial(self._reset_view, view))
+        for plot in (*(one.plot for one in (self.diagram, self.portrait, self.history, self.section)), *own):
+            document.add_root(plot)  # events are heard of what had a callback by now
         for channel in (self._act, *self._say.values()):
             document.add_root(channel)
         document.theme = theme(self.dark, self.large)
@@ -223,7 +235,7 @@ class Session:
     def _look(self, name: str, value: Any) -> None:
         self.dark, self.large = bool(value["dark"]), bool(value["large"])
         self.document.theme = theme(self.dark, self.large)
-        for one in (self.portrait, self.history, self.section):
+        for one in (self.portrait, self.history, self.section, *self.views):
             one.paint(self.dark)
 
     def _tap_diagram(self, event: Any) -> None:
@@ -248,6 +260,20 @@ class Session:
         self.diagram.redraw(self.state)
         self._refresh()
 
+    def _tap_view(self, view: View, event: Any) -> None:
+        self.past.put(view.tapped(float(event.x), float(event.y), self.system, self.state))
+        self._refresh()
+
+    def _zoom_view(self, view: View, event: Any) -> None:
+        if event.x1 > event.x0 and event.y1 > event.y0:
+            x, y = (float(event.x0), float(event.x1)), (float(event.y0), float(event.y1))
+            self.past.put(view.zoomed(x, y, self.system, self.state), f"zoom {view.name}")
+        self._refresh()
+
+    def _reset_view(self, view: View, event: Any) -> None:
+        self.past.put(view.unzoomed(self.system, self.state))
+        self._refresh()
+
     # --- what is to be computed
 
     def wanted(self) -> dict[str, dict[str, Any]]:
@@ -257,10 +283,19 @@ class Session:
             self._texts[state.model] = self.system.to_text()
         found = requests_of(self.system, self._texts[state.model], state)
         known = "judged" in self.results and self.work.done.get("orbit") == key_of(found["orbit"])
+        base = dict(found)
+        if known:
+            base["motion"] = motion_of(found["orbit"], self.results)
         if known and not self.system.is_map:
             found["stability"] = stability_request(found["orbit"], self.results)
         if self.work.done.get("diagram") == key_of(found["diagram"]):
             del found["first look"]
+        if state.upper != "diagram":
+            found = {view: request for view, request in found.items() if view not in ("first look", "diagram")}
+        for view in self.views:
+            asked = view.requests(self.system, state, base) if view.shown(self.system, state) else {}
+            for stage in [*asked][-1:]:
+                found |= {stage: asked[stage]} if self.work.done.get(stage) == key_of(asked[stage]) else asked
         return found
 
     # --- what is shown
@@ -292,9 +327,16 @@ class Session:
         elif view == "section":
             self.results["section"] = found["section"]
             self._show_section()
-        else:
+        elif view == "stability":
             self.results["stability"] = found
             self._tell_readout()
+        else:
+            for one in self.views:
+                if view in one.stages:
+                    one.show(json.loads(request.key), found, system, state)
+                    if one.saved is not None:
+                        self.results[one.name] = found[one.saved[0]]
+            self._tell_ui()
 
     def _axes_of_diagram(self) -> None:
         state, system, symbols = self.state, self.system, symbols_of(self.system)
@@ -339,13 +381,13 @@ class Session:
             self.tell("readout", readout(self.system, self.state, self.results))
 
     def _tell_ui(self) -> None:
-        found = controls(self.system, self.state, self.models, self.diagram.stage)
+        found = controls(self.system, self.state, self.models, self.diagram.stage, self.views)
         look = {"dark": self.dark, "large": self.large}
         self.tell("ui", {**found, **look, "heard": self._heard, "can": self.past.can})
 
     def _refresh(self) -> None:
         """The page as the state has it, and work for what that lacks."""
-        state = self.state
+        state, system = self.state, self.system
         if self._of != self.subject:
             self.diagram.clear()
             self.results.pop("diagram", None)
@@ -354,6 +396,11 @@ class Session:
                 self.work.done.clear()
             for view in ("first look", "diagram"):
                 self.work.done.pop(view, None)
+            for one in self.views:
+                if one.depends(self._of, self.subject):
+                    one.clear()
+                    for stage in one.stages:
+                        self.work.done.pop(stage, None)
             self._of = self.subject
         if self._axes != (state.x, state.y, state.shown):
             self._axes = state.x, state.y, state.shown
@@ -364,6 +411,8 @@ class Session:
                 self._show_orbit()
             if "section" in self.results:
                 self._show_section()
+            for one in self.views:
+                one.redraw(system, state)
         self.diagram.here.location = state.values[state.over]
         if (self.diagram.plot.x_range.start, self.diagram.plot.x_range.end) != (state.low, state.high):
             self.diagram.show(x=(state.low, state.high))

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 import nonsmooth as ns
+from nonsmooth.explorer.views import CHOSEN
 
 __all__ = ["VIEWS", "Heard", "compute"]
 
@@ -131,4 +132,5 @@ def _is_exact(system: ns.System, options: Mapping[str, Any]) -> bool:
 
 VIEWS: dict[str, Callable[..., dict[str, Any]]] = {
     "orbit": _orbit, "section": _section, "stability": _stability, "first look": _first_look, "diagram": _diagram,
+    **{stage: view.compute for stage, view in CHOSEN.items()},
 }  # fmt: skip
