@@ -334,7 +334,7 @@ class Session:
             for one in self.views:
                 if view in one.stages:
                     one.show(json.loads(request.key), found, system, state)
-                    if one.saved is not None:
+                    if one.saved is not None and one.saved[0] in found:
                         self.results[one.name] = found[one.saved[0]]
             self._tell_ui()
 
@@ -414,6 +414,8 @@ class Session:
             for one in self.views:
                 one.redraw(system, state)
         self.diagram.here.location = state.values[state.over]
+        for one in self.views:
+            one.place(system, state)
         if (self.diagram.plot.x_range.start, self.diagram.plot.x_range.end) != (state.low, state.high):
             self.diagram.show(x=(state.low, state.high))
         self.tell("notes", self.notes)

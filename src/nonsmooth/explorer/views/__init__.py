@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from nonsmooth.explorer.views.basins import Basins
 from nonsmooth.explorer.views.branches import Branches
+from nonsmooth.explorer.views.chart import Chart
+from nonsmooth.explorer.views.response import Response
 from nonsmooth.explorer.views.spectrum import Spectrum
 from nonsmooth.explorer.views.view import Setting, View
 
 __all__ = ["CHOSEN", "PANELS", "SETTINGS", "VIEWS"]
 
 #: Views in the order of their tabs.
-VIEWS: tuple[type[View], ...] = (Branches, Spectrum)
+VIEWS: tuple[type[View], ...] = (Branches, Response, Chart, Basins, Spectrum)
 #: The views that were there first, by panel, and after them those of this list.
 PANELS: dict[str, dict[str, str]] = {
     panel: {**first, **{view.name: view.title for view in VIEWS if view.panel == panel and view.title}}

@@ -109,6 +109,9 @@ class View:
         """Draw what is there, as for other axes."""
         raise NotImplementedError
 
+    def place(self, system: System, state: State) -> None:
+        """Mark where the page is."""
+
     def clear(self) -> None:
         """Show nothing, as when another model was chosen."""
         self.results.clear()
