@@ -48,5 +48,5 @@ def motion_of(orbit: Mapping[str, Any], results: Mapping[str, Any]) -> dict[str,
 
 
 def key_of(request: Mapping[str, Any]) -> str:
-    """Text by which two requests are the same."""
-    return json.dumps(request, sort_keys=True)
+    """Text by which two requests are the same; a recording stands in it as its ``key``."""
+    return json.dumps(request, sort_keys=True, default=lambda one: one.key)

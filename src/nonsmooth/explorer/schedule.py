@@ -19,17 +19,17 @@ __all__ = ["ORDER", "Asked", "Schedule"]
 _STAGES = {stage: quick for view in VIEWS for stage, quick in view.stages.items()}
 #: Requests in the order in which they are computed.
 ORDER = (
-    "orbit", "first look", "section", *(stage for stage in _STAGES if _STAGES[stage]), "diagram", "stability",
+    "orbit", "recording", "first look", "section", *(stage for stage in _STAGES if _STAGES[stage]), "diagram", "stability",
     *(stage for stage in _STAGES if not _STAGES[stage]),
 )  # fmt: skip
 #: Short work: a newer request of the same view waits for it, so that a drawing follows a hand that moves.
-_CHEAP = ("orbit", "first look", "section", *(stage for stage in _STAGES if _STAGES[stage]))
+_CHEAP = ("orbit", "recording", "first look", "section", *(stage for stage in _STAGES if _STAGES[stage]))
 _PATIENCE = 1.0  # seconds after which short work is cancelled like any other
 _DEAF = 10.0  # seconds in which cancelled work must end by itself
 #: The view in which a message on a request appears.
 _PLACE = {
     "orbit": "portrait", "first look": "diagram", "section": "section", "diagram": "diagram", "stability": "readout",
-    **{stage: view.name for stage, view in CHOSEN.items()},
+    "recording": "recording", **{stage: view.name for stage, view in CHOSEN.items()},
 }  # fmt: skip
 
 

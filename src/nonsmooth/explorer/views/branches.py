@@ -31,6 +31,8 @@ class Branches(View):
         "branches", lambda system, state: "no", lambda system, state: {"no": "hidden", "yes": "shown"}
     )}  # fmt: skip
 
+    saved = ("branches", "bifurcation_diagram")
+
     @staticmethod
     def depends(old: tuple[str, str], new: tuple[str, str]) -> bool:
         """Return True: branches lie over the diagram's parameter."""
@@ -141,6 +143,11 @@ class Branches(View):
         super().clear()
         for source in (*self._lines.values(), self._points, self._marks):
             source.data = {key: [] for key in source.data}
+
+    @staticmethod
+    def axes(state: State) -> dict[str, str]:
+        """The state of the ordinate."""
+        return {"y": state.shown}
 
     def paint(self, dark: bool) -> None:
         """Draw in the ink of the page: the points below have the colours."""

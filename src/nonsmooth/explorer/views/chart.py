@@ -67,10 +67,9 @@ class Chart(View):
     def requests(self, system: System, state: State, base: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
         """Each finer than the one before it; at last the exponents, on a grid of their own."""
         across, low, high = (self.value(name, system, state) for name in ("across", "low", "high"))
-        if not across:
-            raise ValueError(f"{system.name!r} has one parameter: a chart needs two")
         sweep = base["first look"]
-        job = {**sweep, "values": {**sweep["values"], across: low}, "across": across, "bottom": min(low, high),
+        values = {name: low if name == across else value for name, value in sweep["values"].items()}
+        job = {**sweep, "values": values, "across": across, "bottom": min(low, high),
                "top": max(low, high), "columns": 0}  # fmt: skip
         return {stage: {**job, "view": stage} for stage in _SIZES}
 
@@ -79,6 +78,8 @@ class Chart(View):
         """A ``chart``; the finer ones infer what lies far from all boundaries."""
         from nonsmooth.explorer.work import section_of
 
+        if not job["across"]:
+            raise ValueError(f"{system.name!r} has one parameter; a chart needs two")
         n, m = _SIZES[job["view"]]
         grid = {job["over"]: np.linspace(job["low"], job["high"], n),
                 job["across"]: np.linspace(job["bottom"], job["top"], m)}  # fmt: skip

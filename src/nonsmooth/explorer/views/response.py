@@ -155,7 +155,8 @@ class Response(View):
 
         return [("up", COLORS["first"]), ("down, dashed", COLORS["second"])]
 
-    def axes(self, system: System, state: State) -> dict[str, str]:
+    @staticmethod
+    def axes(state: State) -> dict[str, str]:
         """The state of the ordinate."""
         return {"y": state.shown}
 

@@ -123,7 +123,8 @@ class View:
         """Words and colours."""
         return []
 
-    def axes(self, system: System, state: State) -> dict[str, str]:
+    @staticmethod
+    def axes(state: State) -> dict[str, str]:
         """Options of the function that draws a saved figure."""
         return {}
 
