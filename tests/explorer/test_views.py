@@ -94,3 +94,98 @@ def test_a_period_4_motion_has_lines_at_quarters(page: Any) -> None:
     page.tab.mouse.move(*page.place("spectrum", 1.0, float(lines["y"].max()) / 30))
     until_tip(page, "1 · ")
     page.picture("spectrum")
+
+
+def test_the_response_without_contact_is_the_linear_resonance_curve(page: Any) -> None:
+    page.write("v-p.g", "1")
+    page.tab.click("#tab-response")
+    page.write("response.low", "3")
+    page.write("response.high", "7")
+    page.tab.select_option("#shown", "x")
+    page.until_done()
+    p = {one["name"]: one["value"] for one in page.ui()["parameters"]}
+    for word in ("up", "down"):
+        drawn = data(page, f"response {word}")
+        omega = drawn["x"]
+        assert (omega[0], omega[-1], len(omega)) == (3.0, 7.0, 401)
+        known = p["rho"] / p["m"] / np.hypot(2 * p["k"] / p["m"] - omega**2, p["c"] * omega / p["m"])
+        np.testing.assert_allclose(drawn["y"], known, rtol=1e-5)
+    page.tab.mouse.click(*page.place("response", 5.0, 0.02))
+    page.until_done()
+    assert page.value("omega") == 5.0
+
+
+def test_a_jump_of_figure_9_and_the_orbit_of_a_click_on_its_upper_branch(page: Any) -> None:
+    page.tab.select_option("#preset", "Fig. 9")
+    page.tab.click("#tab-response")
+    page.until_done()
+    up, down = data(page, "response up"), data(page, "response down")
+    apart = np.flatnonzero(np.abs(up["y"] - down["y"]) > 1e-4)
+    assert len(apart)
+    at = apart[len(apart) // 2]
+    for curve in (up, down):  # the orbit shown is that of the curve that was clicked
+        page.tab.mouse.click(*page.place("response", up["x"][at], curve["y"][at]))
+        page.until_done()
+        low, high = (float(end.split()[0].replace("\u2212", "-")) for end in page.readout()["x"].split(" … "))
+        assert (high - low) / 2000 == pytest.approx(curve["y"][at], rel=2e-3)
+    page.picture("response")
+
+
+def test_a_chart_gets_finer_and_a_click_shows_the_orbit_of_that_cell(page: Any) -> None:
+    stage = 'Bokeh.documents[0].get_model_by_name("chart cells").data.stage[0]'
+    page.tab.click("#tab-chart")
+    page.until(f'{stage} === "first chart"')
+    page.until(f'{stage} === "chart"')
+    page.until('document.documentElement.dataset.busy === "fine chart"')
+    place = page.tab.evaluate("""(() => {
+        const data = Bokeh.documents[0].get_model_by_name("chart cells").data, image = data.image[0];
+        const [rows, columns] = image.shape, at = (i, j) => image[i * columns + j];
+        for (let i = 2; i < rows - 2; i++) for (let j = 2; j < columns - 2; j++)  // amid cells of period 3
+            if ([-2, -1, 0, 1, 2].every(k => at(i + k, j) === 2 && at(i, j + k) === 2))
+                return [data.x[0] + (j + 0.5) * data.dw[0] / columns, data.y[0] + (i + 0.5) * data.dh[0] / rows];
+    })()""")
+    place = page.place("chart", *place)
+    page.tab.mouse.move(*place)
+    assert "exponent near \u2212" in until_tip(page, ": period 3,")
+    page.tab.mouse.click(*place)
+    page.until('JSON.parse(Bokeh.documents[0].get_model_by_name("readout").value)[0][1] === "period 3"')
+    page.picture("chart")
+    low, high = (page.ui()["state"][end] for end in ("low", "high"))
+    page.tab.mouse.wheel(0, -240)
+    page.until('JSON.parse(Bokeh.documents[0].get_model_by_name("ui").value).query.includes("chart.low")')
+    page.until(f'{stage} === "first chart"')
+    state = page.ui()["state"]
+    assert high - low > state["high"] - state["low"]
+    cells = data(page, "chart cells")
+    assert cells["dw"][0] == pytest.approx((state["high"] - state["low"]) * 40 / 39)
+    page.tab.click("#tab-diagram")
+    page.until_done()
+    assert page.notes() == ""
+
+
+def test_a_click_in_a_basin_starts_there_and_reaches_its_attractor(page: Any) -> None:
+    page.write("v-p.rho", "0.323")
+    page.tab.click("#tab-basins")
+    page.until('Bokeh.documents[0].get_model_by_name("basins cells").data.stage[0] === "basins"')
+    legend = page.ui()["legends"]["basins"]
+    assert [words.split(":")[0] for words, _ in legend] == ["period 2 (a)", "period 2 (b)"]
+    marks = data(page, "basins points")
+    kinds = list(dict.fromkeys(marks["marker"]))
+    assert len(kinds) == 2
+    for label, kind in ((2, kinds[0]), (3, kinds[1])):
+        place = page.tab.evaluate(
+            """label => {
+                const data = Bokeh.documents[0].get_model_by_name("basins cells").data, image = data.image[0];
+                const [rows, columns] = image.shape, at = (i, j) => image[i * columns + j];
+                for (let i = 2; i < rows - 2; i++) for (let j = 2; j < columns - 2; j++)
+                    if ([-2, -1, 0, 1, 2].every(k => at(i + k, j) === label && at(i, j + k) === label))
+                        return [data.x[0] + (j + 0.5) * data.dw[0] / columns, data.y[0] + (i + 0.5) * data.dh[0] / rows];
+            }""",
+            label,
+        )
+        page.tab.mouse.click(*page.place("basins", *place))
+        page.until_done()
+        reached = sorted(data(page, "section points")["x"])
+        known = sorted(marks["x"][marks["marker"] == kind])
+        np.testing.assert_allclose(reached, known, rtol=1e-3)
+    page.picture("basins")

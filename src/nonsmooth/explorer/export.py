@@ -41,7 +41,7 @@ def exported(view: str, kind: str, results: Mapping[str, Any], state: Any) -> tu
     key, plot = VIEWS[view]
     result = results.get(key)
     if result is None or (view == "diagram" and "period_number" not in result):
-        raise ValueError(f"the {view} is not computed yet; wait for it and save it then")
+        raise ValueError(f"the view {view!r} has no result to save yet; show it, and wait until it is computed")
     axes: dict[str, str] = {
         "diagram": {"y": state.shown}, "portrait": {"x": state.x, "y": state.y}, "history": {"y": state.x},
         "section": {"x": state.x, "y": state.y}, **{one.name: one.axes(state) for one in CHOSEN},
@@ -95,6 +95,8 @@ def study_of(result: Any, axes: Mapping[str, str], model: str, stem: str) -> str
     if model not in ns.models.names():
         raise ValueError("a study file names a model of nonsmooth.models or a file; save the Python script instead")
     record, system = read_provenance(result), ns.system_of(result)
+    if record["verb"] == "bifurcation_diagram":
+        raise ValueError(f"{record['verb']} has no table in a study file; save the Python script instead")
     lines = ["[system]", f'model = "{model}"', f"parameters = {_toml(_values(system, record))}"]
     if system.is_smoothed:
         lines.append(f"smoothed = {_toml(system.eta)}")
@@ -116,13 +118,15 @@ def _values(system: Any, record: Mapping[str, Any]) -> dict[str, float]:
 
 def _options(record: Mapping[str, Any], result: Any) -> dict[str, Any]:
     """The options of the verb that are not at their defaults; values of a parameter as an array."""
-    defaults = inspect.signature(getattr(ns, record["verb"])).parameters
+    defaults = dict(inspect.signature(getattr(ns, record["verb"])).parameters)
+    if record["verb"] == "frequency_response":  # which hands its further options on
+        defaults = {**inspect.signature(ns.sweep).parameters, **defaults}
     found = {
         name: value for name, value in record["options"].items()
         if name not in defaults or value != defaults[name].default
     }  # fmt: skip
     if "values" in found:
-        found["values"] = result[found["parameter"]].values
+        found["values"] = result[record["options"]["parameter"]].values
     if "grid" in found:
         found["grid"] = {name: result[name].values for name in found["grid"]}
     return found

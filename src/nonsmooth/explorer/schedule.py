@@ -19,8 +19,8 @@ __all__ = ["ORDER", "Asked", "Schedule"]
 _STAGES = {stage: quick for view in VIEWS for stage, quick in view.stages.items()}
 #: Requests in the order in which they are computed.
 ORDER = (
-    "orbit", "recording", "first look", "section", *(stage for stage in _STAGES if _STAGES[stage]), "diagram", "stability",
-    *(stage for stage in _STAGES if not _STAGES[stage]),
+    "orbit", "recording", "first look", "section", *(stage for stage in _STAGES if _STAGES[stage]),
+    "diagram", "stability", *(stage for stage in _STAGES if not _STAGES[stage]),
 )  # fmt: skip
 #: Short work: a newer request of the same view waits for it, so that a drawing follows a hand that moves.
 _CHEAP = ("orbit", "recording", "first look", "section", *(stage for stage in _STAGES if _STAGES[stage]))

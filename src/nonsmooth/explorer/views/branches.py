@@ -59,7 +59,7 @@ class Branches(View):
         orbit = ns.find_orbit(
             system, start=list(job["start"]), transient=job["transient"], budget=_BUDGET, progress=heard
         )
-        return {"branches": ns.continue_orbit(orbit, over, ends)}
+        return {"cycle": ns.continue_orbit(orbit, over, ends)}
 
     def build(self, page: Session) -> Any:
         """Put lines and marks into the diagram."""
@@ -93,7 +93,7 @@ class Branches(View):
         from nonsmooth.plot.bifurcation_diagram import one_branch
         from nonsmooth.plot.branch import lines_of, ordinates_of, with_breaks
 
-        result = self.results.get("branches")
+        result = self.results.get("branches", self.results.get("cycle"))
         if result is None:
             return
         parameter = str(result.attrs["parameter"])

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Chart"]
 
-_SIZES = {"first chart": (40, 30), "chart": (144, 108), "fine chart": (288, 216), "exponents": (48, 36)}
+_SIZES = {"first chart": (40, 30), "chart": (144, 108), "exponents": (48, 36), "fine chart": (288, 216)}
 _RETURNS = 200  # over which an exponent of the chart is measured
 
 
@@ -52,7 +52,7 @@ class Chart(View):
     """Period numbers over the diagram's parameter and a second one, from the initial state at rest."""
 
     name, title, panel = "chart", "Chart", "upper"
-    stages: ClassVar = {"first chart": True, "chart": False, "fine chart": False, "exponents": False}
+    stages: ClassVar = {"first chart": True, "chart": False, "exponents": False, "fine chart": False}
     settings: ClassVar = {
         "chart.across": Setting("and", _other, _others, also=("chart.low", "chart.high")),
         "chart.low": Setting("from", _end(-0.4)), "chart.high": Setting("to", _end(0.4)),
@@ -65,7 +65,7 @@ class Chart(View):
         return True
 
     def requests(self, system: System, state: State, base: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-        """Each finer than the one before it; at last the exponents, on a grid of their own."""
+        """Each finer than the one before it, and exponents on a grid of their own."""
         across, low, high = (self.value(name, system, state) for name in ("across", "low", "high"))
         sweep = base["first look"]
         values = {name: low if name == across else value for name, value in sweep["values"].items()}
@@ -94,12 +94,16 @@ class Chart(View):
     def build(self, page: Session) -> Any:
         """The image of the classes."""
         self._cells = Cells("chart")
+        self._subject: dict[str, Any] = {}  # of which request the results are
         return self._cells.panel.plot
 
     def show(self, job: Mapping[str, Any], found: Mapping[str, Any], system: System, state: State) -> None:
         """Exponents of another range are of no use."""
+        subject = {key: value for key, value in job.items() if key != "view"}
+        if subject != self._subject:
+            self.results.clear()
+            self._subject = subject
         if job["view"] != "exponents":
-            self.results.pop("exponents", None)
             self._stage = job["view"]
         super().show(job, found, system, state)
 
