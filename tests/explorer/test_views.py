@@ -176,10 +176,10 @@ def test_a_click_in_a_basin_starts_there_and_reaches_its_attractor(page: Any) ->
         place = page.tab.evaluate(
             """label => {
                 const data = Bokeh.documents[0].get_model_by_name("basins cells").data, image = data.image[0];
-                const [rows, columns] = image.shape, at = (i, j) => image[i * columns + j];
-                for (let i = 2; i < rows - 2; i++) for (let j = 2; j < columns - 2; j++)
+                const [n, m] = image.shape, at = (i, j) => image[i * m + j];
+                for (let i = 2; i < n - 2; i++) for (let j = 2; j < m - 2; j++)
                     if ([-2, -1, 0, 1, 2].every(k => at(i + k, j) === label && at(i, j + k) === label))
-                        return [data.x[0] + (j + 0.5) * data.dw[0] / columns, data.y[0] + (i + 0.5) * data.dh[0] / rows];
+                        return [data.x[0] + (j + 0.5) * data.dw[0] / m, data.y[0] + (i + 0.5) * data.dh[0] / n];
             }""",
             label,
         )

@@ -255,8 +255,10 @@ class Session:
     def _look(self, name: str, value: Any) -> None:
         self.dark, self.large = bool(value["dark"]), bool(value["large"])
         self.document.theme = theme(self.dark, self.large)
-        for one in (self.portrait, self.history, self.section, self.overlay, *self.views):
+        for one in (self.portrait, self.history, self.section, self.overlay):
             one.paint(self.dark)
+        for view in self.views:
+            view.paint(self.dark)
 
     def _tap_diagram(self, event: Any) -> None:
         value, start = self.diagram.nearest(event.x, event.y, self.state)

@@ -61,7 +61,7 @@ class Basins(View):
         if None in window:
             window = _around(system, names, job, section, options)
         n = _SIZES[job["view"]]
-        grid = {name: np.linspace(*window[2 * k : 2 * k + 2], n) for k, name in enumerate(names)}
+        grid = {name: np.linspace(window[2 * k], window[2 * k + 1], n) for k, name in enumerate(names)}
         return {"basins": ns.basins(
             system, grid, fixed=job["fixed"] or None, section=section, transient=job["transient"], progress=heard,
             **options,

@@ -68,7 +68,7 @@ class Response(View):
         """Few frequencies, then many."""
         over, low, high = (self.value(name, system, state) for name in ("over", "low", "high"))
         sweep = base["first look"]
-        job = {**sweep, "values": {**state.values, over: low}, "over": over, "low": low, "high": high}
+        job = {**sweep, "values": {**state.values, over: low}, "over": over, "low": min(low, high), "high": max(low, high)}
         return {stage: {**job, "view": stage, "columns": n} for stage, n in _POINTS.items()}
 
     @staticmethod
@@ -77,7 +77,7 @@ class Response(View):
         from nonsmooth.explorer.work import section_of
 
         return {"response": ns.frequency_response(
-            system, np.linspace(*sorted((job["low"], job["high"])), job["columns"]), parameter=job["over"],
+            system, np.linspace(job["low"], job["high"], job["columns"]), parameter=job["over"],
             start=list(job["begin"]), section=section_of(system), transient=job["transient"], keep=job["keep"],
             progress=heard, **options,
         )}  # fmt: skip

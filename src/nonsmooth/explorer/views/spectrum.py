@@ -40,7 +40,7 @@ class Spectrum(View):
     @staticmethod
     def compute(system: System, job: Mapping[str, Any], options: Mapping[str, Any], heard: Heard) -> dict[str, Any]:
         """Spectra of all states over ``frequency``; ``unit`` is the frequency of the forcing, or of the returns."""
-        from nonsmooth.experiment.signals.spectrum import spectrum
+        from nonsmooth.recordings.signals.spectrum import spectrum
 
         heard(0.0)
         periods = job["period"] or _LONG
