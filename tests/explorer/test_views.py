@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.explorer.conftest import FEW
 
 import nonsmooth as ns
 
@@ -24,6 +25,14 @@ def data(page: Any, name: str) -> dict[str, np.ndarray]:
         f'Object.entries(Bokeh.documents[0].get_model_by_name("{name}").data).map(([k, v]) => [k, Array.from(v)])'
     )
     return {key: np.array([np.nan if v is None else v for v in values]) for key, values in found}
+
+
+def click(page: Any, figure: str, x: float, y: float) -> None:
+    """Click at a point of a figure, and wait until all is shown that changes by it."""
+    before = page.tab.evaluate("location.search")
+    page.tab.mouse.click(*page.place(figure, x, y))
+    page.until(f"location.search !== {json.dumps(before)}")
+    page.until_done()
 
 
 def until_tip(page: Any, words: str) -> str:
@@ -110,8 +119,7 @@ def test_the_response_without_contact_is_the_linear_resonance_curve(page: Any) -
         assert (omega[0], omega[-1], len(omega)) == (3.0, 7.0, 401)
         known = p["rho"] / p["m"] / np.hypot(2 * p["k"] / p["m"] - omega**2, p["c"] * omega / p["m"])
         np.testing.assert_allclose(drawn["y"], known, rtol=1e-5)
-    page.tab.mouse.click(*page.place("response", 5.0, 0.02))
-    page.until_done()
+    click(page, "response", 5.0, 0.02)
     assert page.value("omega") == 5.0
 
 
@@ -124,8 +132,7 @@ def test_a_jump_of_figure_9_and_the_orbit_of_a_click_on_its_upper_branch(page: A
     assert len(apart)
     at = apart[len(apart) // 2]
     for curve in (up, down):  # the orbit shown is that of the curve that was clicked
-        page.tab.mouse.click(*page.place("response", up["x"][at], curve["y"][at]))
-        page.until_done()
+        click(page, "response", up["x"][at], curve["y"][at])
         low, high = (float(end.split()[0].replace("\u2212", "-")) for end in page.readout()["x"].split(" … "))
         assert (high - low) / 2000 == pytest.approx(curve["y"][at], rel=2e-3)
     page.picture("response")
@@ -183,9 +190,33 @@ def test_a_click_in_a_basin_starts_there_and_reaches_its_attractor(page: Any) ->
             }""",
             label,
         )
-        page.tab.mouse.click(*page.place("basins", *place))
-        page.until_done()
+        click(page, "basins", *place)
         reached = sorted(data(page, "section points")["x"])
         known = sorted(marks["x"][marks["marker"] == kind])
         np.testing.assert_allclose(reached, known, rtol=1e-3)
     page.picture("basins")
+
+
+def test_a_first_visit_is_shown_round_in_three_steps_by_keys_alone(server: Any, new_page: Any) -> None:
+    page = new_page(first_visit=True)
+    page.open(f"{server.address}&{FEW}")
+    seen = []
+    for part in ("parameters", "upper", "plane"):
+        assert page.tab.evaluate(f'document.getElementById("{part}").classList.contains("toured")')
+        box = page.tab.locator("#tour").bounding_box()
+        assert box["x"] >= 0
+        assert box["x"] + box["width"] <= 1280
+        assert box["y"] + box["height"] <= 800
+        seen.append(page.tab.inner_text("#tour-title"))
+        if part == "upper":
+            page.picture("tour")
+            page.tab.locator("#tour-next").focus()
+        page.tab.keyboard.press("Enter")
+    assert [title[:5] for title in seen] == ["1 / 3", "2 / 3", "3 / 3"]
+    assert not page.tab.is_visible("#tour")
+    page.open(f"{server.address}&{FEW}")
+    assert not page.tab.is_visible("#tour")  # a second visit
+    page.tab.click("#help")
+    page.tab.keyboard.press("Escape")
+    assert not page.tab.is_visible("#tour")
+    assert page.tab.locator(".toured").count() == 0

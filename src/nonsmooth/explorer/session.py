@@ -40,7 +40,7 @@ __all__ = ["Session", "models_of"]
 #: To the browser, each one line of JSON; what comes from it is ``act``.
 CHANNELS = ("ui", "readout", "busy", "notes", "file", "recording")
 #: Files that make the page; what a part of the page does comes before the page itself.
-TEXTS = ("page.html", "recording.html", "page.css", "recording.js", "page.js")
+TEXTS = ("page.html", "recording.html", "page.css", "recording.js", "tour.js", "page.js")
 Models = Mapping[str, Callable[[], "System"]]
 
 

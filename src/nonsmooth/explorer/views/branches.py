@@ -125,7 +125,8 @@ class Branches(View):
                     lines[line] += [
                         np.append(with_breaks(values, some), np.nan), np.append(with_breaks(row, some), np.nan)
                     ]  # fmt: skip
-                for some, of in ((np.arange(len(values)), told), (at, named)):  # of points at one place the first is told
+                # of points at one place the first is told: the special ones
+                for some, of in ((np.arange(len(values)), told), (at, named)):
                     points["x"][:0], points["y"][:0] = values[some].tolist(), row[some].tolist()
                     points["words"][:0] = of
                 marks["x"].extend(values[at].tolist())

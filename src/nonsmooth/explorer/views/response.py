@@ -68,7 +68,8 @@ class Response(View):
         """Few frequencies, then many."""
         over, low, high = (self.value(name, system, state) for name in ("over", "low", "high"))
         sweep = base["first look"]
-        job = {**sweep, "values": {**state.values, over: low}, "over": over, "low": min(low, high), "high": max(low, high)}
+        low, high = sorted((low, high))
+        job = {**sweep, "values": {**state.values, over: low}, "over": over, "low": low, "high": high}
         return {stage: {**job, "view": stage, "columns": n} for stage, n in _POINTS.items()}
 
     @staticmethod
