@@ -357,7 +357,7 @@ class Session:
             self._tell_readout()
         else:
             for one in self.views:
-                if view in one.stages:
+                if view in one.stages and not one.depends(request.of, self.subject):
                     one.show(json.loads(request.key), found, system, state)
                     if one.saved is not None and one.saved[0] in found:
                         self.results[one.name] = found[one.saved[0]]

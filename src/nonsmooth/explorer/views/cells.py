@@ -52,7 +52,7 @@ class Cells:
             ".replace('-', '\\u2212') + after : '';",
         )  # fmt: skip
         plot.add_tools(HoverTool(
-            renderers=[image], attachment="right", point_policy="follow_mouse",
+            renderers=[image], point_policy="follow_mouse",
             tooltips='<div style="font:13px system-ui">$x{custom}, $y{custom}: @image{custom}@more{custom}</div>',
             formatters={"$x": places["x"], "$y": places["y"], "@image": self._words, "@more": self._more},
         ))  # fmt: skip

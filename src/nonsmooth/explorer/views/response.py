@@ -102,7 +102,7 @@ class Response(View):
                       line_width=2),
         ]  # fmt: skip
         self._up = lines[0]
-        plot.add_tools(HoverTool(renderers=lines, mode="vline", tooltips=TIP, attachment="right"))
+        plot.add_tools(HoverTool(renderers=lines, mode="vline", tooltips=TIP))
         self._here = Span(dimension="height", line_color=COLORS["third"], line_width=1.5, line_dash="dashed")
         plot.add_layout(self._here)
         return plot
