@@ -20,10 +20,10 @@ from nonsmooth.identification.fit.first_level import LEAST, level, settle_first
 from nonsmooth.identification.fit.windows import Window, Windows
 from nonsmooth.identification.pieces import State
 
-__all__ = ["Grown", "grow"]
+__all__ = ["POOR", "Grown", "grow"]
 
 FloatArray = NDArray[np.float64]
-_POOR = 50.0  # chi^2 per degree of freedom of the first windows, from which there is no use in longer ones
+POOR = 50.0  # chi^2 per degree of freedom of the first windows, from which there is no use in longer ones
 _CHAOS = 1e3  # growth of a start's change within a window, from which neighbouring motions are not followed
 _REGULAR = 10.0  # that growth, below which a motion is regular enough to be followed over twice the time
 _WORSE = 1.5  # chi^2 per degree of freedom against that of the level before: a longer window does not fit
@@ -109,7 +109,7 @@ def grow(
     """
     now, theta, starts, state = settle_first(problem, theta, length, start, free)
     told()
-    wide, poor, stuck = length, _reduced(now, state) > _POOR, False
+    wide, poor, stuck = length, _reduced(now, state) > POOR, False
     while not poor and len(now.pieces) > len(problem.records) and wide < longest:
         for factor in (4.0, 2.0):
             longer = _longer_windows(now, theta, starts, state, min(factor * wide, longest))
