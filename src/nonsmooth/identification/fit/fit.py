@@ -14,7 +14,7 @@ from nonsmooth.flow.arguments import check_system, real_number, whole_number, ye
 from nonsmooth.flow.starts import is_one_start, start_states
 from nonsmooth.identification.blas import one_blas_thread
 from nonsmooth.results.progress import Progress, progress
-from nonsmooth.system.names import by_name
+from nonsmooth.system.names import by_name, unknown
 
 if TYPE_CHECKING:
     from nonsmooth.identification.fit.growth import Grown
@@ -45,6 +45,7 @@ def fit(
     runs: Sequence[str] | None = None,
     time: str = "time",
     window: float | None = None,
+    profile: Sequence[str] = (),
     tries: int = 8,
     seed: int = 0,
     progress: Progress = True,
@@ -88,6 +89,9 @@ def fit(
         Name of the column or coordinate that holds the time.
     window : float, optional
         The longest window, in units of time, for motions that the model can be followed along only so far.
+    profile : sequence of str
+        Unknowns whose profile likelihood is computed, where the sum of squares may be no parabola within the
+        uncertainty: a finding ``"<name>, profile"`` and a note give the 95 % limits.
     tries : int
         First guesses to try, the given one and others around it (or within the bounds), while none fits.
     seed : int
@@ -137,11 +141,18 @@ def fit(
     longest = np.inf if window is None else real_number(window, "window")
     if not longest > 0:
         raise ValueError(f"window = {window!r}: the longest window is a positive time; leave it out for none")
+    profiles = [profile] if isinstance(profile, str) else list(profile)
+    for name in profiles:
+        if name not in problem.unknowns.names:
+            raise ValueError(f"profile: {unknown(name, 'an unknown', 'this fit', list(problem.unknowns.names))}")
     tried = whole_number(tries, "tries", 1)
     best = best_of(problem, begin, bool(free_start), longest, tried, whole_number(seed, "seed", 0), progress)
     options = {"parameters": list(problem.unknowns.names), "window": window, "tries": tries, "seed": seed}
     given = recording if isinstance(recording, list | tuple) else [recording]
-    return outcome(best, options, synthetic=any(getattr(one, "synthetic", False) for one in given))
+    return outcome(
+        best, options, synthetic=any(getattr(one, "synthetic", False) for one in given), profiles=profiles,
+        watched=progress,
+    )  # fmt: skip
 
 
 def problem_of(
