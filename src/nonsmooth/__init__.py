@@ -54,13 +54,13 @@ if TYPE_CHECKING:
     from nonsmooth.results.store import load as load
     from nonsmooth.results.store import save as save
     from nonsmooth.smoothing.report import smoothing_report as smoothing_report
-    from nonsmooth.system.maps import Branch as Branch
-    from nonsmooth.system.maps import Map as Map
-    from nonsmooth.system.mechanical import mechanical as mechanical
+    from nonsmooth.system.derived.maps import Branch as Branch
+    from nonsmooth.system.derived.maps import Map as Map
+    from nonsmooth.system.derived.mechanical import mechanical as mechanical
     from nonsmooth.system.mode import Band as Band
     from nonsmooth.system.mode import Mode as Mode
     from nonsmooth.system.origin import system_of as system_of
-    from nonsmooth.system.scalar import where as where
+    from nonsmooth.system.symbolic.scalar import where as where
     from nonsmooth.system.system import System as System
     from nonsmooth.system.transition import Surface as Surface
     from nonsmooth.system.transition import Transition as Transition
@@ -69,12 +69,12 @@ _WHERE = {
     "System": "system.system",
     "Transition": "system.transition",
     "Surface": "system.transition",
-    "Map": "system.maps",
-    "Branch": "system.maps",
+    "Map": "system.derived.maps",
+    "Branch": "system.derived.maps",
     "Mode": "system.mode",
-    "mechanical": "system.mechanical",
+    "mechanical": "system.derived.mechanical",
     "Band": "system.mode",
-    "where": "system.scalar",
+    "where": "system.symbolic.scalar",
     "system_of": "system.origin",
     "simulate": "flow.simulate",
     "sensitivity": "flow.sensitivity",

@@ -12,7 +12,7 @@ from nonsmooth.continuation.signature import AT_ONCE
 
 if TYPE_CHECKING:
     from nonsmooth.continuation.shooting import Shooting, Solved
-    from nonsmooth.system.traced import Traced
+    from nonsmooth.system.symbolic.traced import Traced
 
 __all__ = ["VIOLATIONS", "Path", "Walk"]
 
@@ -61,7 +61,7 @@ class Walk:
     def __init__(self, shooting: Shooting) -> None:
         from nonsmooth.flow.engines.loop import pack_net
         from nonsmooth.kernels.compile.pointers import addresses
-        from nonsmooth.system.generate import compile_model
+        from nonsmooth.system.codegen.generate import compile_model
 
         self.shooting, system = shooting, shooting.system
         traced: Traced = system.traced

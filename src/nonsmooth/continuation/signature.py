@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from nonsmooth.system.traced import Traced
+    from nonsmooth.system.symbolic.traced import Traced
 
 __all__ = ["AT_ONCE", "SECTION", "Signature", "Visit"]
 

@@ -6,10 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from nonsmooth.system.elements.element import Condition, Contact, Element, Law, Leaving
+from nonsmooth.system.derived.elements.element import Condition, Contact, Element, Law, Leaving
 
 if TYPE_CHECKING:
-    from nonsmooth.system.assembly import Place
+    from nonsmooth.system.derived.assembly import Place
 
 __all__ = ["Backlash", "ElasticStop", "PreloadedSpring"]
 

@@ -15,13 +15,13 @@ from typing import Any
 import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError, shortened
-from nonsmooth.system.assembly import Assembler, Part, Pattern
-from nonsmooth.system.elements import Element
-from nonsmooth.system.elements.element import Condition, Law
+from nonsmooth.system.derived.assembly import Assembler, Part, Pattern
+from nonsmooth.system.derived.elements import Element
+from nonsmooth.system.derived.elements.element import Condition, Law
 from nonsmooth.system.mode import Mode
 from nonsmooth.system.names import unknown
-from nonsmooth.system.scalar import Scalar, to_expression
-from nonsmooth.system.tracing import Symbols, call_scalar, call_vector
+from nonsmooth.system.symbolic.scalar import Scalar, to_expression
+from nonsmooth.system.symbolic.tracing import Symbols, call_scalar, call_vector
 from nonsmooth.system.transition import Surface, Transition
 
 __all__ = ["SPEED", "assembled", "element_names"]
@@ -292,7 +292,7 @@ def _opened(
     make: Expressions, parts: Mapping[str, Element], base: Mapping[str, tuple[sp.Expr, ...]], given: Mapping[str, Any]
 ) -> dict[str, Any]:
     """The system without its elements, with all that these need as indicators: modes are made when they are visited."""
-    from nonsmooth.system.patterns import Patterns
+    from nonsmooth.system.derived.patterns import Patterns
 
     if len(base) > 1 or any(given[key] for key in ("transitions", "indicators", "memory", "symmetry", "bands")):
         raise SystemDefinitionError(

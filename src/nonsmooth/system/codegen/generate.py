@@ -15,9 +15,9 @@ from typing import Any
 
 from sympy import Basic, Expr
 
-from nonsmooth.system.jet import jet_code
-from nonsmooth.system.printing import Printer, assignments
-from nonsmooth.system.traced import Traced
+from nonsmooth.system.codegen.jet import jet_code
+from nonsmooth.system.symbolic.printing import Printer, assignments
+from nonsmooth.system.symbolic.traced import Traced
 
 __all__ = ["MOST_MODELS", "SIGNATURES", "CompiledModel", "compile_model", "model_source"]
 

@@ -13,7 +13,7 @@ import numpy as np
 import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError
-from nonsmooth.system.traced import Traced
+from nonsmooth.system.symbolic.traced import Traced
 
 __all__ = ["check_period", "forcing_period", "timed_expressions"]
 

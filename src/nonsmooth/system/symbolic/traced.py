@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from sympy import Expr, Symbol
 
-    from nonsmooth.system.patterns import Patterns
+    from nonsmooth.system.derived.patterns import Patterns
 
 __all__ = ["NOT_UNIQUE", "Row", "Traced", "TracedTransition"]
 
@@ -83,7 +83,7 @@ class Traced:
         """The phase of a transition as it was written."""
         if isinstance(jump.at, int | float):
             return f"{jump.at:g}"
-        from nonsmooth.system.expressions import write_expression
+        from nonsmooth.system.symbolic.expressions import write_expression
 
         assert jump.at is not None
         return write_expression(jump.at, dict(zip(self.p, self.parameter_names, strict=True)))

@@ -15,7 +15,7 @@ from typing import Any
 import sympy as sp
 
 from nonsmooth.errors import shortened
-from nonsmooth.system.scalar import to_expression
+from nonsmooth.system.symbolic.scalar import to_expression
 
 __all__ = ["read_expression", "write_expression"]
 

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 from sympy import Basic, Expr, Symbol
 
-from nonsmooth.system.printing import Printer
-from nonsmooth.system.recurrences import Sum
-from nonsmooth.system.series import CornerError, Linear, Series
+from nonsmooth.system.codegen.recurrences import Sum
+from nonsmooth.system.codegen.series import CornerError, Linear, Series
+from nonsmooth.system.symbolic.printing import Printer
 
 __all__ = ["JetCode", "jet_code"]
 

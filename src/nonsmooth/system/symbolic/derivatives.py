@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import sympy as sp
 
 if TYPE_CHECKING:
-    from nonsmooth.system.traced import Traced
+    from nonsmooth.system.symbolic.traced import Traced
 
 __all__ = ["Derivatives"]
 

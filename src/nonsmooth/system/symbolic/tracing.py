@@ -12,7 +12,7 @@ import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError, shortened
 from nonsmooth.system.names import unknown
-from nonsmooth.system.scalar import Scalar, as_written, to_expression
+from nonsmooth.system.symbolic.scalar import Scalar, as_written, to_expression
 
 __all__ = ["Parameters", "States", "Symbols", "call_scalar", "call_vector", "refuse_corners"]
 

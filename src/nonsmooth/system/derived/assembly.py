@@ -1,4 +1,4 @@
-r"""The rules by which elements (:mod:`nonsmooth.system.elements`) come together in one combination of phases.
+r"""The rules by which elements (:mod:`nonsmooth.system.derived.elements`) come together in one combination of phases.
 
 The laws of the elements add to the field, ``f = f_0 + sum_e D_e F_e``, and the forces ``lambda`` of those that hold a
 rate ``g_i`` at zero solve
@@ -21,8 +21,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from nonsmooth.errors import SystemDefinitionError
-from nonsmooth.system.elements import Element
-from nonsmooth.system.elements.element import Leaving
+from nonsmooth.system.derived.elements import Element
+from nonsmooth.system.derived.elements.element import Leaving
 
 __all__ = ["Assembler", "Part", "Pattern", "Place"]
 

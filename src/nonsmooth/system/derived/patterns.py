@@ -3,8 +3,8 @@
 Twenty-five contacts have more combinations of phases than can be written out, and a motion visits few of them. Where
 every expression is affine in the states, a combination needs no algebra: a force, an indicator, a component of a reset
 is a :class:`Row` of numbers over w = (u, 1, cos k_1 w t, sin k_1 w t, ...), the vector that the exact flow moves, and
-the rules of :mod:`nonsmooth.system.assembly` are sums of such rows and one small linear system. The phases visited
-so far are numbered in the order of their first visit; that numbering is shared by all copies of a system.
+the rules of :mod:`nonsmooth.system.derived.assembly` are sums of such rows and one small linear system. The phases
+visited so far are numbered in the order of their first visit; that numbering is shared by all copies of a system.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from nonsmooth.errors import SystemDefinitionError
-from nonsmooth.system.assembly import Assembler, Part, Pattern
-from nonsmooth.system.traced import Row as Condition
-from nonsmooth.system.traced import Traced, TracedTransition
+from nonsmooth.system.derived.assembly import Assembler, Part, Pattern
+from nonsmooth.system.symbolic.traced import Row as Condition
+from nonsmooth.system.symbolic.traced import Traced, TracedTransition
 
 if TYPE_CHECKING:
-    from nonsmooth.system.combinations import Expressions
-    from nonsmooth.system.linear import LinearForm, LinearTables
+    from nonsmooth.system.codegen.linear import LinearForm, LinearTables
+    from nonsmooth.system.derived.combinations import Expressions
 
 __all__ = ["Patterns", "Row", "Rows"]
 
@@ -260,7 +260,7 @@ class Patterns:
     @cached_property
     def form(self) -> LinearForm:
         """The matrices of the equations without elements and the rows of all expressions, at parameter points."""
-        from nonsmooth.system.linear import linear_form
+        from nonsmooth.system.codegen.linear import linear_form
 
         form = linear_form(self.equations)
         if form is None or not form.affine_indicators:

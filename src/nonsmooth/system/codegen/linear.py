@@ -19,8 +19,8 @@ import sympy
 from numpy.typing import NDArray
 from sympy import Expr, Symbol
 
-from nonsmooth.system.printing import Printer, assignments
-from nonsmooth.system.traced import Traced, TracedTransition
+from nonsmooth.system.symbolic.printing import Printer, assignments
+from nonsmooth.system.symbolic.traced import Traced, TracedTransition
 
 __all__ = ["LinearForm", "LinearTables", "linear_form"]
 

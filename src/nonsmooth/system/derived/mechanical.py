@@ -10,10 +10,10 @@ import numpy as np
 import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError, shortened
-from nonsmooth.system.combinations import element_names
-from nonsmooth.system.elements import Element
+from nonsmooth.system.derived.combinations import element_names
+from nonsmooth.system.derived.elements import Element
 from nonsmooth.system.names import by_name, unknown
-from nonsmooth.system.scalar import Scalar, to_expression
+from nonsmooth.system.symbolic.scalar import Scalar, to_expression
 from nonsmooth.system.system import System
 
 __all__ = ["mechanical"]

@@ -36,8 +36,8 @@ from numpy.typing import NDArray
 
 from nonsmooth.errors import SystemDefinitionError, shortened
 from nonsmooth.system.equations import TracedSurface
-from nonsmooth.system.scalar import as_written
-from nonsmooth.system.traced import NOT_UNIQUE, Row, Traced, TracedTransition
+from nonsmooth.system.symbolic.scalar import as_written
+from nonsmooth.system.symbolic.traced import NOT_UNIQUE, Row, Traced, TracedTransition
 
 __all__ = ["repelled", "slide"]
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from nonsmooth.errors import SystemDefinitionError
-from nonsmooth.system.elements.element import CREEP, SMALL, Condition, Element, Law, Leaving
+from nonsmooth.system.derived.elements.element import CREEP, SMALL, Condition, Element, Law, Leaving
 
 if TYPE_CHECKING:
-    from nonsmooth.system.assembly import Place
+    from nonsmooth.system.derived.assembly import Place
 
 __all__ = ["Coulomb"]
 

@@ -19,10 +19,10 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from nonsmooth.system.generate import MOST_MODELS, SIGNATURES
-from nonsmooth.system.jet import jet_code
-from nonsmooth.system.printing import Printer, assignments
-from nonsmooth.system.traced import Traced, TracedTransition
+from nonsmooth.system.codegen.generate import MOST_MODELS, SIGNATURES
+from nonsmooth.system.codegen.jet import jet_code
+from nonsmooth.system.symbolic.printing import Printer, assignments
+from nonsmooth.system.symbolic.traced import Traced, TracedTransition
 
 __all__ = ["VariationalModel", "touch_function", "variational_model"]
 

@@ -14,9 +14,9 @@ import sympy
 from sympy import Basic, Expr, Symbol
 
 from nonsmooth.errors import SystemDefinitionError
-from nonsmooth.system import recurrences
-from nonsmooth.system.printing import Printer, assignments, is_corner
-from nonsmooth.system.recurrences import Node
+from nonsmooth.system.codegen import recurrences
+from nonsmooth.system.codegen.recurrences import Node
+from nonsmooth.system.symbolic.printing import Printer, assignments, is_corner
 
 __all__ = ["CornerError", "Linear", "Series"]
 

@@ -232,16 +232,16 @@ def _coordinate(state: str) -> Callable[..., Any]:
 
 def _image(branch: Branch, states: Sequence[str], what: str) -> Callable[..., Any]:
     """The branch as a reset."""
-    from nonsmooth.system.scalar import Scalar
-    from nonsmooth.system.tracing import call_vector
+    from nonsmooth.system.symbolic.scalar import Scalar
+    from nonsmooth.system.symbolic.tracing import call_vector
 
     return lambda t, u, p: [Scalar(entry) for entry in call_vector(branch.function, (u, p), states, what)]
 
 
 def _number(function: Any, what: str) -> Callable[..., Any]:
     """A function of (u, p) with one value as one of (t, u, p)."""
-    from nonsmooth.system.scalar import Scalar
-    from nonsmooth.system.tracing import call_scalar
+    from nonsmooth.system.symbolic.scalar import Scalar
+    from nonsmooth.system.symbolic.tracing import call_scalar
 
     return lambda t, u, p: Scalar(call_scalar(function, (u, p), what))
 

@@ -15,8 +15,8 @@ import numpy as np
 import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError
-from nonsmooth.system.period import timed_expressions
-from nonsmooth.system.traced import Traced
+from nonsmooth.system.symbolic.period import timed_expressions
+from nonsmooth.system.symbolic.traced import Traced
 
 __all__ = ["Domain"]
 
