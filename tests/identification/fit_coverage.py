@@ -25,9 +25,9 @@ MEANING = """\
 Each system is fitted to recordings of another program: its equations are written out a second time and integrated by
 SciPy's DOP853 between events, one quantity is read with noise, rounded to a count (each 1 % of the reading's standard
 deviation, 0.3 % for the damper), on a clock that jitters by 2 % of its step. Each seed has a start, readings and a
-first guess of its own, every parameter 30 % off either way. *Converged* are the fits without an anomaly; all others said
-so. Coverage and the root mean square (rms) of the normalised errors are pooled over the parameters of the fits that
-converged; *largest* is the largest of these errors. Seconds are those of processor time: the median over the seeds, and
+first guess of its own, every parameter 30 % off either way. *Converged* are the fits without an anomaly; all others
+said so. Coverage and the root mean square (rms) of the normalised errors are pooled over the parameters of the fits
+that converged; *largest* is the largest of these errors. Seconds are of processor time: the median over the seeds, and
 the largest, which is mostly the first with its compiling.
 """
 HEAD = "| system | parameters | converged | in the 95 % interval | rms of normalised errors | largest | seconds a fit |"

@@ -82,9 +82,7 @@ def level(
     return found[0], found[1], found[2]
 
 
-def settle_soft(
-    problem: Windows, theta: FloatArray, starts: FloatArray
-) -> tuple[FloatArray, FloatArray, State]:  # fmt: skip
+def settle_soft(problem: Windows, theta: FloatArray, starts: FloatArray) -> tuple[FloatArray, FloatArray, State]:
     """Unknowns, starts and residuals of a fit from far off, over the windows as they are."""
     state = problem.residuals(theta, starts)
     for _ in range(_ROUNDS):
