@@ -67,7 +67,7 @@ def test_derivatives_are_those_of_differences(system, start, measured, names):
     theta = problem.unknowns.guess.copy()
     if "phase" in names:
         theta[-1] = 0.3
-    begin = np.array([start[name] for name in made.states])
+    begin = np.array([[start[name] for name in made.states]])
     problem = problem.of(first_windows(problem, theta, np.inf, begin, True))
     (window,), starts = problem.pieces, problem.starts
     assert window.last == len(t)  # one window

@@ -51,7 +51,7 @@ def beginnings(
     start : array (records, n_u), optional
         First guess of the starts.
     """
-    first = {}
+    first: dict[int, Window] = {}
     for window in first_windows(problem, problem.unknowns.guess, length, start, True):
         first.setdefault(window.record, window)
     windows = [window for window in first.values() if window.first == 0]
@@ -60,7 +60,8 @@ def beginnings(
     times = _SWING
     tried = _best_drawn(_cut(problem, windows, times * length), rng)
     while tried:
-        now, fitted = _cut(problem, windows, times * length), []
+        now = _cut(problem, windows, times * length)
+        fitted: list[tuple[float, FloatArray, FloatArray]] = []
         size = np.array([np.where(window.spread > 0, window.spread, np.inf) for window in now.pieces])
         for theta, starts in tried:
             try:
