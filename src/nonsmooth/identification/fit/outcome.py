@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from nonsmooth.identification.arrow import inverted, reduced
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.fit.first_level import LEAST
-from nonsmooth.identification.fit.growth import Grown
+from nonsmooth.identification.fit.growth import SHORT, Grown
 from nonsmooth.identification.fit.profile import profiled
 from nonsmooth.identification.fit.residuals import by_place, residual_data
 from nonsmooth.identification.parameter_set import ParameterSet
@@ -204,7 +204,7 @@ def _anomalies(grown: Grown, data: xr.Dataset) -> list[str]:
             f"the model follows this record over windows of {length:.3g} only, though neighbouring motions do not "
             "separate faster: it does not describe the record over longer times, or another first guess does"
         )
-    if grown.short > 0.05:
+    if grown.short > SHORT:
         found.append(
             f"the fit stands {grown.short:.2g} standard uncertainties short of its minimum: the sum of squares has "
             "corners (grazes, rest), where no step leads on; what is left of the way is in the uncertainties"
