@@ -12,13 +12,8 @@ export OPENBLAS_NUM_THREADS ?= 1
 PYTEST_ARGS ?= -n auto --dist loadfile --no-loadscope-reorder
 
 .DEFAULT_GOAL := help
-<<<<<<< HEAD
-.PHONY: help reproduce reproduce-full test slow mutants fuzz altered coverage coverage-awkward coverage-fit \
-	rig-against-model check bench gpu gpu-compiler docs screenshots clean distclean
-=======
-.PHONY: help reproduce reproduce-full test slow mutants fuzz altered coverage coverage-awkward check \
+.PHONY: help reproduce reproduce-full test slow mutants fuzz altered coverage coverage-awkward coverage-fit check \
 	bench gpu gpu-compiler docs screenshots clean distclean
->>>>>>> main
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 26
@@ -50,15 +45,9 @@ coverage: $(VENV)/.compiled-run  ## identify 40 virtual rigs; writes docs/measur
 coverage-awkward: $(VENV)/.compiled-run  ## the same on rigs where much goes wrong; writes docs/measured_coverage_awkward.md
 	$(BIN)/python -m nonsmooth.studies.savi2007.identification.coverage --awkward --seeds 0-39 --out docs/measured_coverage_awkward.md
 
-<<<<<<< HEAD
 coverage-fit: $(VENV)/.compiled-test  ## fit ten systems to data of SciPy, 40 seeds each; writes docs/measured_coverage_fit.md
 	$(BIN)/python -m tests.identification.fit_coverage --seeds 0-39 --out docs/measured_coverage_fit.md
 
-rig-against-model: $(VENV)/.compiled-run  ## lay virtual rigs over the model; writes docs/measured_rig_against_model.md
-	$(BIN)/python -m nonsmooth.studies.savi2007.comparison.rig_against_model --seeds 2 3 --out docs/measured_rig_against_model.md
-
-=======
->>>>>>> main
 check: $(VENV)/.installed-dev  ## ruff, mypy, import-linter, codespell, the prose of docstrings
 	$(BIN)/ruff check .
 	$(BIN)/mypy
