@@ -108,7 +108,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     lines += [str(row) for row in rows] + [f"| all | | {converged} of {fits} | {pooled(rows)} | |"]
     print(lines[-1])
     if options.out is not None:
-        head = "# Measured coverage of fits\n\nPrinted by `python -m tests.identification.fit_coverage`.\n\n"
+        head = "# Measured coverage of fits\n\nPrinted by `python -m tests.identification.fit_coverage` (`make coverage-fit`).\n\n"
         options.out.write_text(head + MEANING + "\n" + "\n".join(lines) + "\n", encoding="utf-8")
     return 0
 
