@@ -108,7 +108,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     lines += [str(row) for row in rows] + [f"| all | | {converged} of {fits} | {pooled(rows)} | |"]
     print(lines[-1])
     if options.out is not None:
-        head = "# Measured coverage of fits\n\nPrinted by `python -m tests.identification.fit_coverage` (`make coverage-fit`).\n\n"
+        by = "Printed by `python -m tests.identification.fit_coverage` (`make coverage-fit`)."
+        head = f"# Measured coverage of fits\n\n{by}\n\n"
         options.out.write_text(head + MEANING + "\n" + "\n".join(lines) + "\n", encoding="utf-8")
     return 0
 
