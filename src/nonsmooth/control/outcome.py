@@ -1,0 +1,169 @@
+"""The branch of an experiment as a Dataset, in the schema of the branches of ``continue_orbit`` as far as it is known."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.control.harmonics import values_at
+from nonsmooth.control.march import March, Point
+from nonsmooth.control.release import STABLE, UNKNOWN, UNSTABLE
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Names", "branch_dataset"]
+
+FloatArray = NDArray[np.float64]
+TURN = np.linspace(0.0, 1.0, 2048, endpoint=False)
+#: Ways in which such a branch ends.
+ENDINGS = {
+    "range": "The branch reached the edge of the range.",
+    "points": "The largest number of points was reached.",
+    "lost": "No motion was found on which the control force vanishes, however small the step.",
+    "interrupted": "Interrupted: what was measured until then stands.",
+}
+
+
+@dataclass(frozen=True)
+class Names:
+    """Names and units of a rig's quantities."""
+
+    frequency: str = "frequency"
+    amplitude: str = "amplitude"
+    position: str = "x"
+    velocity: str = "v"
+    units: Mapping[str, str] | None = None
+
+    def unit(self, name: str) -> str:
+        """Unit of a quantity; ``1`` where the rig does not say."""
+        return (self.units or {}).get(name) or "1"
+
+
+def branch_dataset(
+    march: March, points: Sequence[Point], released: Sequence[tuple[int, float]], names: Names, parameter: str,
+    ending: str, record: Mapping[str, Any],
+) -> xr.Dataset:  # fmt: skip
+    """The points in the order in which they were measured."""
+    import xarray as xr
+
+    from nonsmooth.results.provenance import attribute
+    from nonsmooth.results.schema import strings
+    from nonsmooth.results.statuses import flag_attributes
+
+    other = names.amplitude if parameter == names.frequency else names.frequency
+    held = [point.held for point in points]
+    omega = np.array([one.frequency for one in held])
+    level = np.array([one.amplitude for one in held])
+    along, fixed = (omega, level) if parameter == names.frequency else (level, omega)
+    rows = [_motion(one.position.c, one.frequency) for one in held]
+    section, maximum, minimum = (np.array([row[i] for row in rows]).reshape(-1, 2) for i in range(3))
+    uncertainty, across = np.array([_uncertainties(march, point) for point in points]).reshape(-1, 2).T
+    unit = names.unit(names.position)
+    force = names.unit("force")
+    kind = np.array([one[0] for one in released], dtype=np.int8)
+    folds = _folds(march, points, along, across)
+    attrs = attribute(record) | {"parameter": parameter}
+
+    def over(values: Any, words: str, units: str = "1", **more: Any) -> tuple[str, Any, dict[str, Any]]:
+        return "point", np.asarray(values), {"long_name": words, "units": units, **more}
+
+    variables: dict[str, Any] = {
+        "section": (("point", "state"), section, {"long_name": "state at phase 0 of the drive"}),
+        "maximum": (("point", "state"), maximum, {"long_name": "largest value along the orbit"}),
+        "minimum": (("point", "state"), minimum, {"long_name": "smallest value along the orbit"}),
+        "amplitude": over(0.5 * (maximum - minimum)[:, 0], "half the peak-to-peak value", unit),
+        "amplitude_uncertainty": over(uncertainty, "standard uncertainty of the amplitude at this parameter", unit),
+        "parameter_uncertainty": over(
+            across, "standard uncertainty of the parameter at this amplitude", names.unit(parameter)
+        ),
+        "period": over(2 * np.pi / omega, "period of the drive", "s"),
+        "stability": over(
+            kind, "motion that was let go: came back, left, or not known", **flag_attributes(
+                ["not_known", "unstable", "stable"], [UNKNOWN, UNSTABLE, STABLE])),
+        "growth": over([one[1] for one in released], "factor by which a distance changed per turn when let go"),
+        "control_effort": over([p.held.effort for p in points], "rms of the control force that repeats", force),
+        "control_effort_noise": over([p.held.effort_noise for p in points], "the same of noise alone", force),
+        "control_effort_first": over([p.first_effort for p in points], "the same before the first correction", force),
+        "control_rms": over([p.held.force_rms for p in points], "rms of the whole control force", force),
+        "measurements": over([p.measurements for p in points], "measurements until the control force vanished"),
+        "position_cosine": (("point", "harmonic"), np.array([p.held.position.c.real for p in points]), {
+            "long_name": "cosine coefficients of the motion", "units": unit}),
+        "position_sine": (("point", "harmonic"), np.array([-p.held.position.c.imag for p in points]), {
+            "long_name": "sine coefficients of the motion", "units": unit}),
+        "special_kind": ("special", strings(["fold"] * len(folds)), {"long_name": "kind of the special point"}),
+        "special_point": ("special", np.array([one[2] for one in folds], dtype=np.int64), {"long_name": "nearest of the points"}),
+        "special_value": ("special", np.array([one[0] for one in folds]), {
+            "long_name": f"{parameter} at the special point", "units": names.unit(parameter)}),
+        "special_value_uncertainty": ("special", np.array([one[1] for one in folds]), {
+            "long_name": "its standard uncertainty", "units": names.unit(parameter)}),
+        "turns": ((), np.int64(march.holder.turns), {"long_name": "turns of the drive in all"}),
+        "ended_because": ((), ENDINGS[ending], {"long_name": "how the branch ends"}),
+    }  # fmt: skip
+    coords: dict[str, Any] = {
+        parameter: over(along, parameter, names.unit(parameter)),
+        other: ((), float(np.mean(fixed)), {"long_name": other, "units": names.unit(other)}),
+        "state": ("state", strings([names.position, names.velocity]), {"long_name": "state"}),
+        "state_unit": ("state", strings([unit, names.unit(names.velocity)]), {"long_name": "unit"}),
+        "harmonic": ("harmonic", np.arange(march.holder.harmonics + 1), {"long_name": "harmonic of the drive"}),
+    }
+    return xr.Dataset(variables, coords, attrs)
+
+
+def _motion(c: Any, frequency: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """State at phase 0, and the extremes of position and velocity."""
+    x, v = values_at(c, TURN), frequency * values_at(c, TURN, 1)
+    return np.array([x[0], v[0]]), np.array([x.max(), v.max()]), np.array([x.min(), v.min()])
+
+
+def _uncertainties(march: March, point: Point) -> tuple[float, float]:
+    """Standard uncertainties of the amplitude at this parameter, and of the parameter at this amplitude.
+
+    What is left of the mismatch, and the noise of the measured harmonics, through the measured derivatives. At a fold
+    the first is large and the second is not.
+    """
+    c, u = point.held.position.c, point.held.position.u
+    x = values_at(c, TURN)
+    order = np.arange(len(c))
+    ends = [np.exp(2j * np.pi * order * TURN[int(pick(x))]) for pick in (np.argmax, np.argmin)]
+    wave = 0.5 * (ends[0] - ends[1]) * march.size
+    slope = np.concatenate([wave.real, -wave.imag[1:]])  # of the amplitude by the scaled series
+    noise = np.concatenate([u, u[1:]]) / march.size
+    variance = point.mismatch**2 + noise**2
+    n = len(noise)
+    parameter, size = np.eye(n + 1)[0], np.concatenate([[0.0], slope / march.size])
+    spread = []
+    for held, seen, scale in ((parameter, size, march.size), (size, parameter, march.scale)):
+        try:
+            effect = seen @ np.linalg.inv(np.vstack([point.J, held]))[:, :n]
+        except np.linalg.LinAlgError:
+            spread.append(float("inf"))
+            continue
+        direct = float(np.sum((slope * noise) ** 2)) if seen is size else 0.0
+        spread.append(float(np.sqrt(scale**2 * np.sum(effect**2 * variance) + direct)))
+    return spread[0], spread[1]
+
+
+def _folds(
+    march: March, points: Sequence[Point], along: FloatArray, across: FloatArray
+) -> list[tuple[float, float, int]]:
+    """Turning points of the parameter: value, standard uncertainty, nearest point.
+
+    The vertex of the parabola through three neighbours, over the length of the branch; uncertain by that of the points,
+    and by how far the vertex lies beyond the outermost of them.
+    """
+    place = np.array([march.plane @ point.y for point in points]).reshape(-1, 3)
+    found = []
+    for i in range(1, len(points) - 1):
+        before, after = along[i] - along[i - 1], along[i + 1] - along[i]
+        if before * after >= 0 or min(abs(before), abs(after)) < 2 * across[i]:
+            continue
+        s = [-float(np.linalg.norm(place[i] - place[i - 1])), 0.0, float(np.linalg.norm(place[i + 1] - place[i]))]
+        a, b, c = np.polyfit(s, along[i - 1 : i + 2], 2)
+        vertex = float(c - b**2 / (4 * a))
+        found.append((vertex, float(np.hypot(across[i], vertex - along[i])), i))
+    return found
