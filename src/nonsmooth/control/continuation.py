@@ -187,12 +187,12 @@ def control_based_continuation(
     except KeyboardInterrupt as error:
         if march is None or not found:
             raise
-        part = branch_dataset(march, found, seen, names, follow, "interrupted", record_of)
+        part = branch_dataset(march, found, seen, names, getattr(names, follow), "interrupted", record_of)
         raise Interrupted(f"interrupted: {len(found)} points were measured", part) from error
     finally:
         with suppress(Exception):  # what went wrong before is what is said
             rig.apply_force(0.0)
-    return branch_dataset(march, found, seen, names, follow, ending, record_of)
+    return branch_dataset(march, found, seen, names, getattr(names, follow), ending, record_of)
 
 
 def _first(holder: Holder, begin: dict[str, float], harmonics: int | None, transient: int) -> Held:

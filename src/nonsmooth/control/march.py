@@ -95,14 +95,10 @@ class March:
             target = last.y + length * tangent
             if not inside(target[0] * self.scale):
                 return "range"
-            flat = self.plane.T @ (self.plane @ tangent)  # the plane across: parameter and first harmonic alone
-            found = self._correct(target, flat, target, length, (last.y, last.mismatch))
+            found = self._next(last, target, tangent, length)
             if found is None:
                 length *= 0.5
                 self.measure(last.y)  # back to what was held
-                target = last.y + length * tangent
-                place, here, _ = self.measure(target)
-                self._probe(place, here, min(PROBE, 0.25 * length))
                 continue
             yield found
             secant = found.y - last.y
@@ -110,6 +106,19 @@ class March:
             last = found
             length = min(step, length * (1.5 if found.measurements <= 4 else 0.8))
         return "lost"
+
+    def _next(self, last: Point, target: FloatArray, tangent: FloatArray, length: float) -> Point | None:
+        """The point on a plane through the target: first across the branch, then, past a corner, across the motion."""
+        across = self.plane @ tangent
+        found = self._correct(target, across @ self.plane, target, length, (last.y, last.mismatch))
+        if found is not None:
+            return found
+        # At a corner, as where a contact begins, the branch may turn back in the parameter at once. The motion goes on.
+        self.measure(last.y)
+        place, here, _ = self.measure(target)
+        self._probe(place, here, min(PROBE, 0.25 * length))
+        across[0] = 0.0
+        return self._correct(target, across @ self.plane, target, length, (place, here))
 
     def _probe(self, y: FloatArray, here: FloatArray, far: float) -> None:
         """Measure the derivatives by the parameter and the first harmonic at a place whose mismatch is known."""

@@ -154,16 +154,32 @@ def _folds(
     """Turning points of the parameter: value, standard uncertainty, nearest point.
 
     The vertex of the parabola through three neighbours, over the length of the branch; uncertain by that of the points,
-    and by how far the vertex lies beyond the outermost of them.
+    and by how far the vertex lies beyond the outermost of them. A turn that noise may have made is none.
     """
     place = np.array([march.plane @ point.y for point in points]).reshape(-1, 3)
     found = []
-    for i in range(1, len(points) - 1):
-        before, after = along[i] - along[i - 1], along[i + 1] - along[i]
-        if before * after >= 0 or min(abs(before), abs(after)) < 2 * across[i]:
+    for i in _turns(along, 4.0 * across):
+        if not 0 < i < len(points) - 1:
             continue
         s = [-float(np.linalg.norm(place[i] - place[i - 1])), 0.0, float(np.linalg.norm(place[i + 1] - place[i]))]
         a, b, c = np.polyfit(s, along[i - 1 : i + 2], 2)
         vertex = float(c - b**2 / (4 * a))
         found.append((vertex, float(np.hypot(across[i], vertex - along[i])), i))
+    return found
+
+
+def _turns(values: FloatArray, least: FloatArray) -> list[int]:
+    """Places of the extremes from which the values go back by more than ``least``, in turn maxima and minima."""
+    found: list[int] = []
+    extreme, sign = 0, 0.0
+    for i in range(1, len(values)):
+        away = values[i] - values[extreme]
+        if sign == 0.0:
+            if abs(away) > least[i]:
+                sign, extreme = float(np.sign(away)), i
+        elif sign * away > 0:
+            extreme = i
+        elif -sign * away > least[i]:
+            found.append(extreme)
+            extreme, sign = i, -sign
     return found

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 __all__ = ["SimulatedRig"]
 
+_NO_SAMPLES = np.empty(0)
+
 
 class SimulatedRig:
     r"""A driven system as a rig: a force acts on its mass, a sensor samples its position.
@@ -119,6 +121,7 @@ class SimulatedRig:
         }
         self._system = self._system.with_parameters(values)
         self._tables = self._engine.prepare(self._system.parameter_vector()[None, :])
+        self._room = self._engine.room(self._tables)
         period = self._system.period()
         assert period is not None  # `actuated` refuses systems without
         self._period = period
@@ -141,7 +144,8 @@ class SimulatedRig:
         late = self.jitter * float(np.clip(self._rng.standard_normal(), -3.0, 3.0)) if self.jitter else 0.0
         wait = max(self._due + late - self._late, 0.0)
         self._late = late
-        log = self._engine.record(self._tables, self._state, clock[1] * self._period + clock[0] + wait, np.empty(0))
+        until = clock[1] * self._period + clock[0] + wait
+        log = self._engine.record(self._tables, self._state, until, _NO_SAMPLES, self._room)
         if log.status != codes.OK:
             from nonsmooth.flow.failure import solve_error
 
