@@ -207,7 +207,8 @@ def _first(holder: Holder, begin: dict[str, float], harmonics: int | None, trans
     asked = min(MOST_HARMONICS, allowed) if harmonics is None else whole_number(harmonics, "harmonics", 1)
     if asked > allowed:
         raise ValueError(
-            f"harmonics = {asked} cannot be told apart by {per_turn:.3g} samples per turn of the drive: at most {allowed}"
+            f"harmonics = {asked} cannot be told apart by {per_turn:.3g} samples per turn of the drive: at most "
+            f"{allowed}"
         )
     holder.harmonics = asked
     free = holder.hold(frequency, amplitude, None)

@@ -25,7 +25,7 @@ FloatArray = NDArray[np.float64]
 
 
 class Samples(NamedTuple):
-    """What a run showed: phase of the drive (turns), position, and the force that was applied."""
+    """Samples of a run: phase of the drive (turns), position, and the force that was applied."""
 
     phase: FloatArray
     position: FloatArray
@@ -40,7 +40,6 @@ class Controller:
     proportional: float
     derivative: float
     smoothing: float  # tau
-    turns: int = 0  # of the drive, in all runs
 
     def run(self, reference: ComplexArray | None, frequency: float, turns: int) -> Samples:
         """March the rig for whole turns of the drive, held to the reference; without one no force acts."""
@@ -66,6 +65,5 @@ class Controller:
                 error, before = now, phase
                 self.rig.apply_force(force)
             rows.append((phase, position, force))
-        self.turns += turns
         table = np.array(rows)
         return Samples(table[:, 0], table[:, 1], table[:, 2])

@@ -31,7 +31,7 @@ class Held:
 
     @property
     def effort_noise(self) -> float:
-        """What ``effort`` would be of noise alone."""
+        """The same of noise alone."""
         return float(np.sqrt(np.sum(self.force.u**2)))
 
 

@@ -39,11 +39,6 @@ class Point:
     first_effort: float
     J: FloatArray  # (n, n + 1)
 
-    @property
-    def reference(self) -> ComplexArray:
-        """What the controller aims at."""
-        return self.held.reference
-
 
 @dataclass
 class March:
@@ -86,8 +81,10 @@ class March:
         found = self._correct(y, self.plane[0], y, LONGEST, (y, here))
         return found or Point(y, here, held, 1, first, self.J.copy())
 
-    def points(self, first: Point, step: float, inside: Callable[[float], bool], rising: bool) -> Generator[Point, None, str]:
-        """Points along the branch, until the parameter leaves its range or no step is small enough."""
+    def points(
+        self, first: Point, step: float, inside: Callable[[float], bool], rising: bool
+    ) -> Generator[Point, None, str]:
+        """Points along the branch, until the parameter leaves its range or no step is small enough; returns which."""
         last = first
         tangent = self._tangent(1.0 if rising else -1.0)
         length = 0.5 * step

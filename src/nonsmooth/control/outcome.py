@@ -1,4 +1,4 @@
-"""The branch of an experiment as a Dataset, in the schema of the branches of ``continue_orbit`` as far as it is known."""
+"""The branch of an experiment as a Dataset: the schema of ``continue_orbit``, as far as an experiment knows it."""
 
 from __future__ import annotations
 
@@ -20,6 +20,8 @@ __all__ = ["Names", "branch_dataset"]
 
 FloatArray = NDArray[np.float64]
 TURN = np.linspace(0.0, 1.0, 2048, endpoint=False)
+SIGNIFICANT = 4.0  # standard uncertainties
+MISFIT = 4.0  # mean square of the normalised differences from a parabola
 #: Ways in which such a branch ends.
 ENDINGS = {
     "range": "The branch reached the edge of the range.",
@@ -33,8 +35,8 @@ ENDINGS = {
 class Names:
     """Names and units of a rig's quantities."""
 
-    frequency: str = "frequency"
-    amplitude: str = "amplitude"
+    frequency: str = "drive_frequency"
+    amplitude: str = "drive_amplitude"
     position: str = "x"
     velocity: str = "v"
     units: Mapping[str, str] | None = None
@@ -96,7 +98,8 @@ def branch_dataset(
         "position_sine": (("point", "harmonic"), np.array([-p.held.position.c.imag for p in points]), {
             "long_name": "sine coefficients of the motion", "units": unit}),
         "special_kind": ("special", strings(["fold"] * len(folds)), {"long_name": "kind of the special point"}),
-        "special_point": ("special", np.array([one[2] for one in folds], dtype=np.int64), {"long_name": "nearest of the points"}),
+        "special_point": ("special", np.array([one[2] for one in folds], dtype=np.int64), {
+            "long_name": "nearest of the points"}),
         "special_value": ("special", np.array([one[0] for one in folds]), {
             "long_name": f"{parameter} at the special point", "units": names.unit(parameter)}),
         "special_value_uncertainty": ("special", np.array([one[1] for one in folds]), {
@@ -153,33 +156,43 @@ def _folds(
 ) -> list[tuple[float, float, int]]:
     """Turning points of the parameter: value, standard uncertainty, nearest point.
 
-    The vertex of the parabola through three neighbours, over the length of the branch; uncertain by that of the points,
-    and by how far the vertex lies beyond the outermost of them. A turn that noise may have made is none.
+    The vertex of a parabola over the length of the branch, by least squares through five points; through three where five
+    lie on none, as at a corner: it is then uncertain by how far the vertex lies beyond the outermost of them.
+    A turn that noise may have made is none.
     """
     place = np.array([march.plane @ point.y for point in points]).reshape(-1, 3)
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(place, axis=0), axis=1))])
     found = []
-    for i in _turns(along, 4.0 * across):
+    for i in _turns(along, across):
         if not 0 < i < len(points) - 1:
             continue
-        s = [-float(np.linalg.norm(place[i] - place[i - 1])), 0.0, float(np.linalg.norm(place[i + 1] - place[i]))]
-        a, b, c = np.polyfit(s, along[i - 1 : i + 2], 2)
+        near = slice(max(i - 2, 0), i + 3)
+        s, weight = length[near] - length[i], 1.0 / across[near]
+        fit, covariance = np.polyfit(s, along[near], 2, w=weight, cov="unscaled")
+        misfit = float(np.sum((weight * (along[near] - np.polyval(fit, s))) ** 2)) / max(len(s) - 3, 1)
+        if len(s) > 3 and misfit < MISFIT:
+            at = -fit[1] / (2 * fit[0])
+            slope = np.array([at**2, at, 1.0])  # of the vertex by the coefficients, which moves with none of them
+            spread = float(np.sqrt(max(misfit, 1.0) * slope @ covariance @ slope))
+            found.append((float(np.polyval(fit, at)), spread, i))
+            continue
+        a, b, c = np.polyfit(length[i - 1 : i + 2] - length[i], along[i - 1 : i + 2], 2)
         vertex = float(c - b**2 / (4 * a))
         found.append((vertex, float(np.hypot(across[i], vertex - along[i])), i))
     return found
 
 
-def _turns(values: FloatArray, least: FloatArray) -> list[int]:
-    """Places of the extremes from which the values go back by more than ``least``, in turn maxima and minima."""
+def _turns(values: FloatArray, uncertainty: FloatArray) -> list[int]:
+    """Places of the extremes from which the values go back significantly, in turn maxima and minima."""
     found: list[int] = []
     extreme, sign = 0, 0.0
     for i in range(1, len(values)):
         away = values[i] - values[extreme]
-        if sign == 0.0:
-            if abs(away) > least[i]:
-                sign, extreme = float(np.sign(away)), i
-        elif sign * away > 0:
+        significant = abs(away) > SIGNIFICANT * np.hypot(uncertainty[i], uncertainty[extreme])
+        if sign * away > 0:
             extreme = i
-        elif -sign * away > least[i]:
-            found.append(extreme)
-            extreme, sign = i, -sign
+        elif significant:
+            if sign:
+                found.append(extreme)
+            extreme, sign = i, float(np.sign(away))
     return found

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from nonsmooth.control.harmonics import fitted
 from nonsmooth.control.held import Held, Holder
 

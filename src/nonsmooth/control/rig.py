@@ -12,7 +12,7 @@ class Rig(Protocol):
 
     Any object with these three methods is a rig: an interface to hardware, or a simulation (:class:`SimulatedRig`).
     Nothing else is asked of it. Three attributes are used where they are there: ``mass`` (from which the gains follow),
-    ``names`` (a mapping from "frequency", "amplitude", "position", "velocity" to the names in results) and ``units``
+    ``names`` (a mapping from "frequency", "amplitude", "position" and "velocity" to the names in results) and ``units``
     (from these names, and "force", to units).
     """
 

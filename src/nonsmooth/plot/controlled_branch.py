@@ -82,8 +82,9 @@ def _amplitudes(ax: Axes, result: xr.Dataset, parameter: str, theory: xr.Dataset
     if result.sizes["special"]:
         at = result["special_point"].values
         ax.errorbar(
-            result["special_value"].values, amplitude[at], xerr=2 * result["special_value_uncertainty"].values, fmt="D",
-            color=style.COLORS["second"], markerfacecolor="none", markersize=6.5, elinewidth=0.8, zorder=5, label="fold",
+            result["special_value"].values, amplitude[at], xerr=2 * result["special_value_uncertainty"].values,
+            color=style.COLORS["second"], markerfacecolor="none", markersize=6.5, elinewidth=0.8, zorder=5, fmt="D",
+            label="fold",
         )  # fmt: skip
     state = str(result["state"].values[0])
     text, unit = name_and_unit(result, state)

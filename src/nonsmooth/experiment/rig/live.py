@@ -42,11 +42,11 @@ class LiveRig(SimulatedRig):
             raise ValueError("a motor that wanders has no phase to which a reference could be tied: motor_wander = 0")
         self._rig = rig
         screw = screw_for(rig, gap, crank_length)
-        settings = {"omega": omega, "crank_length": crank_length, "g": rig.true_gap(screw)}
+        at_rest = rig.true_gap(screw)
         super().__init__(
-            rig.system().with_parameters(rig.parameters(**settings)), amplitude="crank_length", rate=RATE,
-            resolution=COUNT if rig.quantisation else 0.0, jitter=rig.truth["clock_jitter"],
-            seed=rig.seed + 1000 * run, start={"x": min(0.0, settings["g"])}, method=METHOD["method"],
+            rig.system().with_parameters(rig.parameters(omega=omega, crank_length=crank_length, g=at_rest)),
+            amplitude="crank_length", rate=RATE, resolution=COUNT if rig.quantisation else 0.0, jitter=rig.truth["clock_jitter"],
+            seed=rig.seed + 1000 * run, start={"x": min(0.0, at_rest)}, method=METHOD["method"],
         )  # fmt: skip
         self.units["force"] = "N"
 
