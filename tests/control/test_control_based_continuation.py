@@ -147,7 +147,7 @@ def test_what_is_no_rig_is_told_how_to_become_one():
     with pytest.raises(ValueError, match="nearest: omega"):
         ns.SimulatedRig(model, frequency="omgea")
     with pytest.raises(ns.SystemDefinitionError, match="no forcing period"):
-        ns.SimulatedRig(ns.models.stick_slip_belt(), frequency="k", amplitude="k")
+        ns.SimulatedRig(ns.models.stick_slip_belt(), frequency="v_b", amplitude="F", mass=1.0)
 
 
 def test_a_motion_of_twice_the_period_is_no_beginning():

@@ -102,9 +102,10 @@ def control_based_continuation(
         ``amplitude_uncertainty``, ``parameter_uncertainty``; ``position_cosine`` and ``position_sine`` over
         ``harmonic``; ``control_effort`` (rms of the control force that repeats with each turn) with
         ``control_effort_noise`` (what noise alone would show) and ``control_effort_first`` (before the first
-        correction), ``control_rms``; ``stability``: 1 where the motion came back when it was displaced by 1 % and let
-        go, 0 where it left, -1 where neither was seen, and ``growth`` per turn. Over ``special`` the folds:
-        ``special_value`` with ``special_value_uncertainty``. ``ended_because`` in a sentence.
+        correction), ``control_rms``; ``stability`` of the motion displaced by 1 % and let go: 1 where it came back
+        to a third of that or less, 0 where it left to three times that, -1 where neither was seen, and ``growth``, the
+        mean factor per turn. Over ``special`` the folds: ``special_value`` with ``special_value_uncertainty``.
+        ``ended_because`` in a sentence.
 
     Raises
     ------
@@ -124,8 +125,8 @@ def control_based_continuation(
     low-passed at five times the drive's frequency. A motion with a Floquet multiplier beyond exp(pi) per turn needs
     more.
 
-    What is let go and does not come back within a third says nothing on the size of its basin. Bifurcations to longer
-    periods are not detected: the motion of the drive's period is held beyond them too, and ``stability`` is 0.
+    ``stability`` is what was seen, no multiplier: beside a fold it is -1. Bifurcations to longer periods are not
+    detected: the motion of the drive's period is held beyond them too, and it leaves when it is let go.
 
     References
     ----------

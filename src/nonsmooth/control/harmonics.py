@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 __all__ = ["Series", "fitted", "mean_square", "values_at"]
 
+SEEN = 4.0  # standard uncertainties
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
@@ -19,6 +20,11 @@ class Series:
 
     c: ComplexArray
     u: FloatArray
+
+    @property
+    def seen(self) -> ComplexArray:
+        """Coefficients that stand out of their noise, and 0 for the others, whose noise would add to extremes."""
+        return np.where(np.abs(self.c) > SEEN * self.u, self.c, 0.0)
 
 
 def values_at(c: ComplexArray, phase: FloatArray, derivative: int = 0) -> FloatArray:

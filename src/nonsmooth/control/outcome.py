@@ -62,7 +62,7 @@ def branch_dataset(
     omega = np.array([one.frequency for one in held])
     level = np.array([one.amplitude for one in held])
     along, fixed = (omega, level) if parameter == names.frequency else (level, omega)
-    rows = [_motion(one.position.c, one.frequency) for one in held]
+    rows = [_motion(one.position.seen, one.frequency) for one in held]
     section, maximum, minimum = (np.array([row[i] for row in rows]).reshape(-1, 2) for i in range(3))
     uncertainty, across = np.array([_uncertainties(march, point) for point in points]).reshape(-1, 2).T
     unit = names.unit(names.position)
@@ -87,7 +87,7 @@ def branch_dataset(
         "stability": over(
             kind, "motion that was let go: came back, left, or not known", **flag_attributes(
                 ["not_known", "unstable", "stable"], [UNKNOWN, UNSTABLE, STABLE])),
-        "growth": over([one[1] for one in released], "factor by which a distance changed per turn when let go"),
+        "growth": over([one[1] for one in released], "mean factor by which the distance changed per turn when let go"),
         "control_effort": over([p.held.effort for p in points], "rms of the control force that repeats", force),
         "control_effort_noise": over([p.held.effort_noise for p in points], "the same of noise alone", force),
         "control_effort_first": over([p.first_effort for p in points], "the same before the first correction", force),
@@ -129,7 +129,7 @@ def _uncertainties(march: March, point: Point) -> tuple[float, float]:
     What is left of the mismatch, and the noise of the measured harmonics, through the measured derivatives. At a fold
     the first is large and the second is not.
     """
-    c, u = point.held.position.c, point.held.position.u
+    c, u = point.held.position.seen, point.held.position.u
     x = values_at(c, TURN)
     order = np.arange(len(c))
     ends = [np.exp(2j * np.pi * order * TURN[int(pick(x))]) for pick in (np.argmax, np.argmin)]
@@ -156,9 +156,8 @@ def _folds(
 ) -> list[tuple[float, float, int]]:
     """Turning points of the parameter: value, standard uncertainty, nearest point.
 
-    The vertex of a parabola over the length of the branch, by least squares through five points; through three where five
-    lie on none, as at a corner: it is then uncertain by how far the vertex lies beyond the outermost of them.
-    A turn that noise may have made is none.
+    The vertex of a parabola over the length of the branch, by least squares through five points; where they lie on none,
+    the corner of the straight lines through two points on each side. A turn that noise may have made is none.
     """
     place = np.array([march.plane @ point.y for point in points]).reshape(-1, 3)
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(place, axis=0), axis=1))])
@@ -176,10 +175,31 @@ def _folds(
             spread = float(np.sqrt(max(misfit, 1.0) * slope @ covariance @ slope))
             found.append((float(np.polyval(fit, at)), spread, i))
             continue
-        a, b, c = np.polyfit(length[i - 1 : i + 2] - length[i], along[i - 1 : i + 2], 2)
-        vertex = float(c - b**2 / (4 * a))
-        found.append((vertex, float(np.hypot(across[i], vertex - along[i])), i))
+        value, spread = _corner(place, i)
+        near_by = 0.5 * float(np.min(np.abs(np.diff(along[i - 1 : i + 2]))))
+        found.append((value * march.scale, float(np.linalg.norm([across[i], spread * march.scale, near_by])), i))
     return found
+
+
+def _corner(place: FloatArray, i: int) -> tuple[float, float]:
+    """Parameter (scaled) where the lines through the points before and after a turn are nearest; its uncertainty.
+
+    The outermost point itself lies on one of the lines: the nearer of both ways to say so counts, and by how far they
+    differ is the uncertainty.
+    """
+    found = []
+    for before, after in (((i - 1, i), (i + 1, i + 2)), ((i - 2, i - 1), (i, i + 1))):
+        if min(before) < 0 or max(after) >= len(place):
+            continue
+        a, b = place[before[1]] - place[before[0]], place[after[0]] - place[after[1]]
+        along, *_ = np.linalg.lstsq(np.column_stack([a, -b]), place[after[0]] - place[before[1]], rcond=None)
+        meeting = (place[before[1]] + along[0] * a, place[after[0]] + along[1] * b)
+        apart = float(np.linalg.norm(meeting[0] - meeting[1]))
+        found.append((apart, 0.5 * float(meeting[0][0] + meeting[1][0])))
+    if not found:
+        return float(place[i][0]), float(np.ptp(place[i - 1 : i + 2, 0]))
+    values = [value for _, value in sorted(found)]
+    return values[0], max(abs(values[0] - values[-1]), 0.5 * abs(values[0] - float(place[i][0])))
 
 
 def _turns(values: FloatArray, uncertainty: FloatArray) -> list[int]:

@@ -9,7 +9,7 @@ __all__ = ["STABLE", "UNKNOWN", "UNSTABLE", "release"]
 
 STABLE, UNSTABLE, UNKNOWN = 1, 0, -1
 PUSH = 0.01  # of the motion's first harmonic
-LEFT = 3.0  # times the first distance
+FAR = 3.0  # times the displacement
 
 
 def release(holder: Holder, held: Held, turns: int) -> tuple[int, float]:
@@ -18,21 +18,24 @@ def release(holder: Holder, held: Held, turns: int) -> tuple[int, float]:
     Returns
     -------
     int
-        ``STABLE`` where the distance from the held motion fell below a third, ``UNSTABLE`` where it grew threefold,
-        else ``UNKNOWN``.
+        ``UNSTABLE`` where its distance from the held motion grew to three times the displacement, ``STABLE`` where it
+        ended below a third of it, else ``UNKNOWN``.
     float
-        Factor by which the distance changed per turn, from the first turn to the last before that happened.
+        Mean factor by which the distance changed per turn.
     """
     pushed = held.reference.copy()
     pushed[1] *= 1.0 + PUSH
     holder.run(held.frequency, pushed, holder.settle)
     here = held.position.c[1]
-    distances = []
+    displacement = PUSH * float(abs(here))
+    distances: list[float] = []
     for _ in range(turns):
         seen = holder.run(held.frequency, None, 1)
-        distances.append(abs(fitted(seen.phase, seen.position, 3).c[1] - here))
-        if len(distances) > 1 and not 1 / LEFT < distances[-1] / distances[0] < LEFT:
-            break
-    ratio = distances[-1] / distances[0]
-    factor = float(ratio ** (1.0 / (len(distances) - 1)))
-    return (UNSTABLE if ratio >= LEFT else STABLE if ratio <= 1 / LEFT else UNKNOWN), factor
+        distances.append(float(abs(fitted(seen.phase, seen.position, holder.harmonics).c[1] - here)))
+        if distances[-1] > FAR * displacement:
+            break  # it has left; how far it goes, the rig need not suffer
+    last = distances[-1]
+    factor = (last / distances[0]) ** (1.0 / (len(distances) - 1)) if len(distances) > 1 else float("inf")
+    if last > FAR * displacement:
+        return UNSTABLE, factor
+    return (STABLE if last < displacement / FAR else UNKNOWN), factor
