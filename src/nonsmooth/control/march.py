@@ -25,9 +25,6 @@ FloatArray = NDArray[np.float64]
 PROBE = 0.02  # displacement of a reference for a derivative, over the size of the motion
 LONGEST = 0.1  # correction of the first point in one go
 SEEN = 1e-3  # the least displacement that says something about derivatives, over the size of the motion
-CORNER = 1 / 16  # of the largest step: a shorter one that leads nowhere ends at a corner
-BEYOND = 1 / 2  # of the largest step: so far beyond a corner the branch is looked for
-WORSE = 2.0  # growth of the mismatch with which a correction is given up
 NOISE = 1.5  # of the effort over that of noise alone, at convergence
 
 
@@ -91,41 +88,34 @@ class March:
         last = first
         tangent = self._tangent(1.0 if rising else -1.0)
         length = 0.5 * step
-        while True:
+        while length > step / 20:
             target = last.y + length * tangent
             if not inside(target[0] * self.scale):
                 return "range"
-            found = self._ahead(last, target, tangent, length)
+            found = self._next(last, target, tangent, length)
             if found is None:
+                length *= 0.5
                 self.measure(last.y)  # back to what was held
-                if length > CORNER * step:
-                    length *= 0.5
-                    continue
-                found = self._round_a_corner(last, tangent, BEYOND * step)
-            if found is None:
-                return "lost"
+                continue
             yield found
             secant = found.y - last.y
             tangent = secant / np.linalg.norm(self.plane @ secant)
             last = found
             length = min(step, length * (1.5 if found.measurements <= 4 else 0.8))
+        return "lost"
 
-    def _ahead(self, last: Point, target: FloatArray, tangent: FloatArray, length: float) -> Point | None:
-        """The point on the plane through the target across the branch."""
-        across = self.plane @ tangent @ self.plane
-        return self._correct(target, across, target, length, (last.y, last.mismatch))
-
-    def _round_a_corner(self, last: Point, tangent: FloatArray, length: float) -> Point | None:
-        """A point well beyond a corner, on the plane across the motion's change, with derivatives measured there.
-
-        As where a contact begins, the branch may turn back in the parameter at once, while the motion goes on: the
-        parameter is left free.
-        """
-        target, here, _ = self.measure(last.y + length * tangent)
-        self._probe(target, here, min(PROBE, 0.25 * length))
+    def _next(self, last: Point, target: FloatArray, tangent: FloatArray, length: float) -> Point | None:
+        """The point on a plane through the target: first across the branch, then, past a corner, across the motion."""
         across = self.plane @ tangent
+        found = self._correct(target, across @ self.plane, target, length, (last.y, last.mismatch))
+        if found is not None:
+            return found
+        # At a corner, as where a contact begins, the branch may turn back in the parameter at once. The motion goes on.
+        self.measure(last.y)
+        place, here, _ = self.measure(target)
+        self._probe(place, here, min(PROBE, 0.25 * length))
         across[0] = 0.0
-        return self._correct(target, across @ self.plane, target, 5.0 * length, (target, here))
+        return self._correct(target, across @ self.plane, target, length, (place, here))
 
     def _probe(self, y: FloatArray, here: FloatArray, far: float) -> None:
         """Measure the derivatives by the parameter and the first harmonic at a place whose mismatch is known."""
@@ -146,7 +136,7 @@ class March:
 
         No correction is longer than ``longest``; ``before`` is another place with its mismatch.
         """
-        first = least = float("nan")
+        first = float("nan")
         for k in range(self.most):
             y, mismatch, held = self.measure(y)
             first = first if k else held.effort
@@ -156,10 +146,6 @@ class March:
             before = (y, mismatch)
             if self.converged(held):
                 return Point(y, mismatch, held, k + 1, first, self.J.copy())
-            norm = float(np.linalg.norm(mismatch))
-            least = norm if k == 0 else min(least, norm)
-            if norm > WORSE * least and norm > SEEN:
-                return None
             system = np.vstack([self.J, across])
             move = np.linalg.lstsq(system, np.append(-mismatch, across @ (target - y)), rcond=None)[0]
             y = y + move * min(1.0, longest / max(float(np.linalg.norm(self.plane @ move)), 1e-300))

@@ -156,8 +156,8 @@ def _folds(
 ) -> list[tuple[float, float, int]]:
     """Turning points of the parameter: value, standard uncertainty, nearest point.
 
-    The vertex of a parabola over the length of the branch, by least squares through five points; where they lie on none,
-    the corner of the straight lines through two points on each side. A turn that noise may have made is none.
+    The vertex of a parabola over the length of the branch, by least squares through five points; where they lie on
+    none, the corner of the straight lines through two points on each side. A turn that noise may have made is none.
     """
     place = np.array([march.plane @ point.y for point in points]).reshape(-1, 3)
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(place, axis=0), axis=1))])
