@@ -75,9 +75,9 @@ def test_branches_that_nobody_waits_for_are_cancelled_and_the_worker_stays(page:
     page.until('document.documentElement.dataset.busy === "branches"')
     page.write("transient", "100")
     page.until_done()
+    assert page.notes() == ""
     assert len(data(page, "special points")["x"]) > 0
     assert server.workers() == workers
-    assert page.notes() == ""
 
 
 def test_the_spectrum_of_a_motion_without_contact_is_one_line_of_the_linear_amplitude(page: Any) -> None:
