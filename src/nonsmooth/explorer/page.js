@@ -156,7 +156,7 @@
     const channel = doc && doc.get_model_by_name("act");
     if (!channel) return setTimeout(connect, 30);
     send = text => { channel.value = text; };
-    const parts = (window.parts || []).map(part => part({act, field, put, fill, short}));
+    const parts = (window.parts || []).map(part => part({act, field, put, fill, short, file}));
     for (const [name, hear] of Object.entries(Object.assign({ui: render, readout, busy, notes, file}, ...parts))) {
       const model = doc.get_model_by_name(name);
       const told = () => { if (model.value) hear(JSON.parse(model.value)); };

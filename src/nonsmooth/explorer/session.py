@@ -18,6 +18,7 @@ from bokeh.models import TextInput
 from jinja2 import DictLoader, Environment
 
 from nonsmooth.explorer.bench import Bench
+from nonsmooth.explorer.building import KINDS, LINK
 from nonsmooth.explorer.controls import controls
 from nonsmooth.explorer.export import exported
 from nonsmooth.explorer.figures import MOST, Diagram, History, Portrait, Section, theme
@@ -30,6 +31,7 @@ from nonsmooth.explorer.schedule import Asked, Schedule
 from nonsmooth.explorer.state import History as Past
 from nonsmooth.explorer.state import State, changed, from_query
 from nonsmooth.explorer.worker import Answer
+from nonsmooth.explorer.workshop import Workshop
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
@@ -37,9 +39,9 @@ if TYPE_CHECKING:
 __all__ = ["Session", "models_of"]
 
 #: To the browser, each one line of JSON; what comes from it is ``act``.
-CHANNELS = ("ui", "readout", "busy", "notes", "file", "recording")
+CHANNELS = ("ui", "readout", "busy", "notes", "file", "recording", "building")
 #: Files that make the page; what a part of the page does comes before the page itself.
-TEXTS = ("page.html", "recording.html", "page.css", "recording.js", "page.js")
+TEXTS = ("page.html", "recording.html", "building.html", "page.css", "recording.js", "building.js", "page.js")
 Models = Mapping[str, Callable[[], "System"]]
 
 
@@ -64,7 +66,7 @@ class Session:
     """
 
     def __init__(self, document: Any, models: Models, query: str = "") -> None:
-        self.document, self.models = document, models
+        self.document, self.models = document, dict(models)
         self.dark = self.large = False
         self._systems: dict[str, System] = {}
         self._texts: dict[str, str] = {}
@@ -75,6 +77,7 @@ class Session:
         self.diagram, self.portrait = Diagram(), Portrait()
         self.history, self.section = History(), Section()
         self.overlay, self.bench = Overlay(self.diagram, self.portrait, self.history, self.section), Bench(self)
+        self.workshop = Workshop(self)
         self._say = {name: TextInput(name=name) for name in CHANNELS}
         self._act = TextInput(name="act")
         self.past = Past(self._first(query))
@@ -130,6 +133,7 @@ class Session:
         folder = files("nonsmooth.explorer")
         texts = {name: folder.joinpath(name).read_text(encoding="utf-8") for name in TEXTS}
         document.template = Environment(loader=DictLoader(texts)).get_template("page.html")
+        document.template_variables.update(link=LINK, kinds=KINDS)
         document.template_variables["style"] = texts["page.css"]
         document.template_variables["program"] = "\n".join(text for name, text in texts.items() if name.endswith(".js"))
         self.diagram.plot.on_event(Tap, self._tap_diagram)
@@ -175,6 +179,7 @@ class Session:
                 "set": self._set, "model": self._model, "preset": self._preset, "end": self._end_step,
                 "undo": lambda *_: self.past.undo(), "redo": lambda *_: self.past.redo(), "look": self._look,
                 "reset": self._reset, "begin": self._begin, "save": self._save, **self.bench.actions,
+                **self.workshop.actions,
             }  # fmt: skip
             if action not in known:
                 raise ValueError(f"the page asked for {str(action)[:40]!r}, which does not exist")
@@ -202,6 +207,15 @@ class Session:
     def _model(self, name: str, value: Any) -> None:
         if value not in self.models:
             raise ValueError(f"{str(value)[:40]!r} is no model of this page")
+        self.show_model(value)
+
+    def add_model(self, name: str, system: System) -> str:
+        """Offer a model that was made in the page; returns its name."""
+        self.models[name] = lambda: system
+        return name
+
+    def show_model(self, value: str) -> None:
+        """Go on to a model, at its own parameters."""
         self.past.put(first_state(value, _system(self.models, self._systems, value)))
 
     def _preset(self, name: str, value: Any) -> None:
@@ -399,6 +413,7 @@ class Session:
         self.tell("notes", self.notes)
         self.work.go_on()  # before the page hears that its message has been taken in
         self.bench.tell()
+        self.workshop.tell()
         self._tell_ui()
 
 
