@@ -72,7 +72,7 @@ def test_what_does_not_fit_is_refused_with_its_row(change: dict[str, Any], said:
 
 def test_a_system_of_the_form_is_written_and_explored(page: Any) -> None:
     page.until_done()
-    page.tab.click("#build")
+    page.tab.select_option("#model", "")
     page.until('document.getElementById("building-python").textContent.includes("ns.elements.Stop")')
     page.tab.fill('#building-elements [data-key="restitution"]', "2")
     page.tab.press('#building-elements [data-key="restitution"]', "Tab")

@@ -65,7 +65,7 @@
       if (one.tagName === "BUTTON") one.disabled = $("building-elements").children.length >= told.most;
   }
 
-  $("build").addEventListener("click", () => {
+  document.addEventListener("build", () => {
     if (!begun) { begun = true; addMass(0.5); addElement("stop"); }
     $("building").showModal();
     changed();

@@ -190,9 +190,9 @@ def read_plan(form: Any) -> Plan:
     )
     elements = []
     for i, row in enumerate(parts, 1):
-        kind = row.get("kind")
+        kind = str(row.get("kind"))
         if kind not in KINDS:
-            raise ValueError(f"element {i}: {str(kind)[:40]!r} is no kind; there are: {', '.join(KINDS)}")
+            raise ValueError(f"element {i}: {kind[:40]!r} is no kind; there are: {', '.join(KINDS)}")
         at, other = (_mass(row.get(key, 0), len(links), low, f"element {i}") for key, low in (("at", 1), ("other", 0)))
         if at == other:
             raise ValueError(f"element {i} joins mass {at} with itself; choose the ground or another mass")

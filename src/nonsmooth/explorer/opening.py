@@ -61,10 +61,10 @@ def _opened(system: System, options: Mapping[str, Any], output: Mapping[str, str
     section = options.get("section")
     if isinstance(phase := getattr(section, "phase", None) or _item(section, "phase"), int | float):
         state = state.but("phase", float(phase) % 1.0)
-    start = options.get("start")
+    start: Any = options.get("start")
     if isinstance(start, Mapping) and set(start) <= set(states):
         start = [start.get(one, 0.0) for one in states]
-    if np.shape(start) == (len(states),) and np.isfinite(np.asarray(start, dtype=float)).all():
+    if start is not None and np.shape(start) == (len(states),) and np.isfinite(np.asarray(start, dtype=float)).all():
         state = state.but("start", tuple(float(one) for one in start))
     for field, chosen in output.items():
         if field in ("x", "y") and chosen in states:

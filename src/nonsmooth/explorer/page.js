@@ -85,7 +85,7 @@
   function render(ui) {
     last = ui;
     root.dataset.heard = ui.heard;
-    fill($("model"), Object.entries(ui.models), ui.state.model);
+    fill($("model"), [...Object.entries(ui.models), ["", "build one …"]], ui.state.model);
     fill($("preset"), [["", "choose …"], ...ui.presets.map(one => [one, one])], "");
     $("preset-label").hidden = !ui.presets.length;
     for (const name of ["method", "direction"]) fill($(name), Object.entries(ui.choices[name]), ui.state[name]);
@@ -167,7 +167,11 @@
       const commit = () => { act("set", one.dataset.set, one.value); act("end"); };
       if (one.tagName === "SELECT") one.addEventListener("change", commit); else field(one, commit);
     }
-    $("model").addEventListener("change", () => act("model", "", $("model").value));
+    $("model").addEventListener("change", () => {
+      if ($("model").value) return act("model", "", $("model").value);
+      $("model").value = last.state.model;
+      document.dispatchEvent(new Event("build"));
+    });
     $("preset").addEventListener("change", () => { if ($("preset").value) act("preset", "", $("preset").value); });
     $("phase-slider").addEventListener("input", () => { held = $("phase-slider"); act("set", "phase", Number(held.value)); });
     $("phase-slider").addEventListener("change", () => { held = null; act("end"); });
