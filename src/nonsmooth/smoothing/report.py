@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.continuation.branches.orbit import Orbit
 from nonsmooth.continuation.find import find_orbit
-from nonsmooth.continuation.orbit import Orbit
 from nonsmooth.diagrams.lyapunov import lyapunov
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.arguments import check_system, whole_number
