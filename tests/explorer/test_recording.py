@@ -13,7 +13,7 @@ import xarray as xr
 from tests.explorer.conftest import FEW
 
 import nonsmooth as ns
-from nonsmooth.experiment import Recording, write_cap, write_capstone_csv
+from nonsmooth.recordings import Recording, write_cap, write_capstone_csv
 from nonsmooth.explorer.bench import frequency_of
 from nonsmooth.explorer.measured import read, strand_distance
 from nonsmooth.explorer.recorded import LARGEST, matched, samples_of

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 import nonsmooth as ns
 from nonsmooth.errors import SolveError
-from nonsmooth.experiment.load import parse_recording
-from nonsmooth.experiment.reading import Options
+from nonsmooth.recordings.load import parse_recording
+from nonsmooth.recordings.reading import Options
 from nonsmooth.explorer.recorded import Channel, Recorded, Samples
 from nonsmooth.identification.compare.fold import fold
 from nonsmooth.identification.fit.first_windows import rates
@@ -73,7 +73,7 @@ def laid_over(
         return {**found, "why": "no distance: nothing forces this model, so that there is no phase to compare at"}
     phase = samples.time / period
     if len(samples.turns) >= 3:
-        from nonsmooth.experiment.signals.phase import drive_phase
+        from nonsmooth.recordings.signals.phase import drive_phase
 
         drive = drive_phase(samples.turns, span=(float(samples.time[0]), float(samples.time[-1])))
         phase, found["drive"] = drive.phase(samples.time) / (2 * np.pi), drive.period
@@ -229,7 +229,7 @@ class _Held:
 
 @lru_cache(maxsize=2)
 def _smoothed(text: str, held: _Held) -> dict[str, FloatArray]:
-    from nonsmooth.experiment.signals.smoothing import smooth
+    from nonsmooth.recordings.signals.smoothing import smooth
 
     system, samples = ns.System.from_text(text), held.samples
     names = list(system.states)
