@@ -13,11 +13,11 @@ import xarray as xr
 from tests.explorer.conftest import FEW
 
 import nonsmooth as ns
-from nonsmooth.recordings import Recording, write_cap, write_capstone_csv
 from nonsmooth.explorer.bench import frequency_of
 from nonsmooth.explorer.measured import read, strand_distance
 from nonsmooth.explorer.recorded import LARGEST, matched, samples_of
 from nonsmooth.identification.compare.fold import fold
+from nonsmooth.recordings import Recording, write_cap, write_capstone_csv
 
 TRUTH = {"k": 8.0, "c": 0.8, "g": -0.004}
 TRAVEL = 0.0789 / (2 * np.pi)  # m per rad, of the rotary sensor

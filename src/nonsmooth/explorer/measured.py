@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 import nonsmooth as ns
 from nonsmooth.errors import SolveError
-from nonsmooth.recordings.load import parse_recording
-from nonsmooth.recordings.reading import Options
 from nonsmooth.explorer.recorded import Channel, Recorded, Samples
 from nonsmooth.identification.compare.fold import fold
 from nonsmooth.identification.fit.first_windows import rates
+from nonsmooth.recordings.load import parse_recording
+from nonsmooth.recordings.reading import Options
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System

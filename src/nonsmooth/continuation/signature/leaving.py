@@ -3,48 +3,49 @@
 from __future__ import annotations
 
 from collections import Counter
+from typing import TYPE_CHECKING
 
-from nonsmooth.continuation.branches.switching import is_doubled
-from nonsmooth.continuation.march.arclength import Curve, Point
-from nonsmooth.continuation.march.events import Event, at_section
-from nonsmooth.continuation.march.marches import March
 from nonsmooth.continuation.problems.equilibrium import Equilibria
-from nonsmooth.continuation.signature.change import Change, common_point, contacts, past_the_section
+from nonsmooth.continuation.problems.symmetry import is_doubled
+from nonsmooth.continuation.signature.change import Change, common_point, past_the_section
 from nonsmooth.continuation.signature.grazing import graze
 from nonsmooth.continuation.signature.neighbours import beside
 
-__all__ = ["change_of_signature", "passed_by"]
+if TYPE_CHECKING:
+    from nonsmooth.continuation.march.event import Met
+    from nonsmooth.continuation.march.marches import March
+    from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
+
+__all__ = ["behind", "gained", "mark"]
 
 
-def change_of_signature(found: March, curve: Curve, met: list[Event]) -> tuple[Curve, Point] | None:
+def behind(found: March, curve: Orbits, met: list[Met]) -> tuple[Orbits, OrbitPoint] | None:
     """Record a change of signature and begin anew behind it; None where the branch ends."""
-    for kind, _, point in met:
-        if kind == "short" and at_section(curve, point):
-            after = past_the_section(curve, point)
+    for one in met:
+        if one.kind.at_section(curve, one.point):
+            after = past_the_section(curve, one.point)
             if after is None:
                 found.ending = "no_convergence"
             return after
-    beyond = beside(curve, met[0][2])
-    if beyond is None and met[0][0] == "unseen":
-        return None
-    name = _mark(found, curve, met, beyond)
-    if beyond is None and _is_centre(curve, met):
+    first = met[0]
+    beyond = beside(curve, first.point)
+    name = mark(found, curve, met, beyond)
+    if beyond is None and _is_centre(curve, first):
         found.ending = found.special[-1].kind = "focus_centre"
     elif beyond is None:
-        found.ending = "landing" if met[0][0] == "landed" else name
-    elif is_doubled(*beyond) and not is_doubled(curve, met[0][2]):
+        found.ending = first.kind.ending or name
+    elif is_doubled(*beyond) and not is_doubled(curve, first.point):
         # Beyond the graze at which a doubled orbit is born there is only the shorter one, gone round twice.
         found.ending = "branching"
         return None
     return beyond
 
 
-def _is_centre(curve: Curve, met: list[Event]) -> bool:
+def _is_centre(curve: Orbits, met: Met) -> bool:
     """Return whether an autonomous orbit has shrunk to a closed one of a linear mode."""
     if curve.shooting.forced:
         return False
-    kind, _, point = met[0]
-    free = [change.signature for change in contacts(curve, point, kind) if not change.gained]
+    free = [change.signature for change in met.kind.contacts(curve, met.point) if not change.gained]
     name = curve.shooting.active[0]
     return any(
         not one.crossings and Equilibria(curve.shooting.system, one.visits[0].mode, name, curve.width).linear
@@ -52,32 +53,26 @@ def _is_centre(curve: Curve, met: list[Event]) -> bool:
     )
 
 
-def passed_by(found: March, curve: Curve, kind: str, point: Point) -> None:
-    """Record a boundary that a virtual branch passes with its signature."""
-    _mark(found, curve, [(kind, 0.0, point)], beside(curve, point))
-
-
-def _mark(found: March, curve: Curve, met: list[Event], beyond: tuple[Curve, Point] | None) -> str:
+def mark(found: March, curve: Orbits, met: list[Met], beyond: tuple[Orbits, OrbitPoint] | None) -> str:
     """Record the end of a signature, by the contact that begins or ends there where one does; its name."""
-    kind, _, point = met[0]
-    known = [(change, there) for event, _, there in met for change in contacts(curve, there, event)]
+    kind, point = met[0].kind, met[0].point
     if beyond is not None:
         cycle = beyond[0].shooting.signature.cycle
-        for change, there in known:
-            if change.signature.cycle == cycle:
-                _mark_graze(found, curve, there, change, beyond)
-                return "grazing"
-    own = contacts(curve, point, kind)
-    name = "grazing" if own or kind in ("touch", "slow", "unseen") else "corner"
-    if kind == "unseen" and beyond is not None:
-        indicator = _gained(curve, beyond[0])
-    else:
-        indicator = own[0].indicator if own else _indicator(curve, point, kind)
+        for one in met:
+            for change in one.kind.contacts(curve, one.point):
+                if change.signature.cycle == cycle:
+                    _mark_graze(found, curve, one.point, change, beyond)
+                    return "grazing"
+    own = kind.contacts(curve, point)
+    name = "grazing" if own else kind.name
+    indicator = own[0].indicator if own else kind.surface(curve, point, beyond and beyond[0])
     found.mark(name, curve, point, indicator=indicator)
     return name
 
 
-def _mark_graze(found: March, curve: Curve, point: Point, change: Change, after: tuple[Curve, Point]) -> None:
+def _mark_graze(
+    found: March, curve: Orbits, point: OrbitPoint, change: Change, after: tuple[Orbits, OrbitPoint]
+) -> None:
     """Record a graze: the orbit without the contact, whichever side the branch came from."""
     fresh, first = after
     judged = graze(curve, point, first, change)
@@ -85,35 +80,10 @@ def _mark_graze(found: March, curve: Curve, point: Point, change: Change, after:
     found.mark("grazing", *free, indicator=change.indicator, graze=judged)
 
 
-def _gained(curve: Curve, fresh: Curve) -> int:
+def gained(curve: Orbits, fresh: Orbits) -> int:
     """The indicator of the first transition that another signature has more often (-1: none)."""
     more = Counter((v.transition, v.row) for v in fresh.shooting.signature.crossings)
     more.subtract((v.transition, v.row) for v in curve.shooting.signature.crossings)
     transitions = curve.shooting.system.traced.transitions
     rows = [transitions[k].rows[row].indicator for (k, row), n in more.items() if n > 0 and row >= 0]
     return rows[0] if rows else -1
-
-
-def _indicator(curve: Curve, point: Point, kind: str) -> int:
-    """The indicator of the surface that an event is about: of the row that is nearest to zero (-1: of none)."""
-    path, visits, shooting = point.path, curve.shooting.signature.visits, curve.shooting
-    if kind == "touch":
-        place, k = path.touched
-        return int(curve.walk.net.rows[path.which[place, k], 0])
-    times, states = shooting.split(point.X)
-    if kind == "landed":
-        place = int(path.landed.argmax())
-        k, z = int(path.landing[place]), states[place]
-    else:
-        if kind in ("short", "others"):
-            place = int(path.tau.argmin() if kind == "short" else path.others.argmax())
-        else:
-            place = int(curve.walk.conditional[int((path.own if kind == "own" else path.slope).argmin())])
-        k = int(path.other[place]) if kind == "others" else visits[place].transition
-        z = point.solved.segments.z[place]
-    rows = shooting.system.traced.transitions[k].rows
-    skipped = visits[place].row if kind == "own" else -1
-    t = float(times[min(place, len(times) - 1)])
-    near = [(abs(shooting.flow.jump(point.solved.values, k, t, z, r).h), row.indicator)
-            for r, row in enumerate(rows) if r != skipped]  # fmt: skip
-    return min(near)[1] if near else -1

@@ -10,13 +10,16 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.continuation.march.arclength import Curve, Point
 from nonsmooth.continuation.searches.settled import Guess, touching
 from nonsmooth.continuation.signature.rounds import Rounds
+
+if TYPE_CHECKING:
+    from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
 
 __all__ = ["beside"]
 
@@ -31,7 +34,7 @@ STEEP = 1e-3  # of a tangent: its parameter
 AGAIN = 3  # times that Newton's method is begun with one signature
 
 
-def beside(curve: Curve, point: Point) -> tuple[Curve, Point] | None:
+def beside(curve: Orbits, point: OrbitPoint) -> tuple[Orbits, OrbitPoint] | None:
     """The orbit with which a branch goes on at ``point``, where its signature ends, on a curve of its own.
 
     Its tangent leads away from there. None where there is none, or no simulated round shows it."""
@@ -44,7 +47,7 @@ def beside(curve: Curve, point: Point) -> tuple[Curve, Point] | None:
     return None
 
 
-def _at(curve: Curve, point: Point, side: float, aside: float) -> tuple[Curve, Point] | None:
+def _at(curve: Orbits, point: OrbitPoint, side: float, aside: float) -> tuple[Orbits, OrbitPoint] | None:
     """The orbit at one distance on one side of the parameter."""
     shooting = curve.shooting
     values = point.solved.values.copy()
@@ -61,7 +64,7 @@ def _at(curve: Curve, point: Point, side: float, aside: float) -> tuple[Curve, P
             found = other.at_parameter(X / other.scale, float(there[0]))
             if found is None or not _apart(curve, point, found) < NEAR:
                 break
-            if (found.path.violation() >= 0.0).all() and rounds.shows(other.shooting, found.X, values):
+            if not found.virtual and rounds.shows(other.shooting, found.X, values):
                 if not _arrives(curve, point, other, found, here):
                     break
                 facing = side * float(found.tangent[-1]) >= 0.0
@@ -71,7 +74,7 @@ def _at(curve: Curve, point: Point, side: float, aside: float) -> tuple[Curve, P
 
 
 def _guesses(
-    curve: Curve, point: Point, rounds: Rounds, values: FloatArray, side: float, aside: float
+    curve: Orbits, point: OrbitPoint, rounds: Rounds, values: FloatArray, side: float, aside: float
 ) -> Iterator[Guess | None]:
     """Rounds along the branch, from the end of the signature itself, and about it; that end without its touches."""
     shooting, slope = curve.shooting, float(point.tangent[-1])
@@ -87,7 +90,7 @@ def _guesses(
         yield rounds.read(shooting, point.X, values, change)
 
 
-def _apart(curve: Curve, a: Point, b: Point) -> float:
+def _apart(curve: Orbits, a: OrbitPoint, b: OrbitPoint) -> float:
     """Largest difference of extremes, in units of the states' sizes, and of the periods."""
     size = curve.size[: len(a.path.maximum)]
     extremes = np.concatenate([(a.path.maximum - b.path.maximum) / size, (a.path.minimum - b.path.minimum) / size])
@@ -95,7 +98,7 @@ def _apart(curve: Curve, a: Point, b: Point) -> float:
     return max(float(np.nanmax(np.abs(extremes), initial=0.0)), period)
 
 
-def _arrives(curve: Curve, point: Point, other: Curve, found: Point, here: float) -> bool:
+def _arrives(curve: Orbits, point: OrbitPoint, other: Orbits, found: OrbitPoint, here: float) -> bool:
     """Return whether the orbits found come to ``point`` as the parameter comes back to it."""
     value = here + NEARER * (float(found.X[-1]) - here)
     nearer = other.at_parameter(found.Y, value)
