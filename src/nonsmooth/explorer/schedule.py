@@ -118,6 +118,7 @@ class Schedule:
         if kind == "error":
             self._failed[running.view] = running.key
             self.page.notes[panel] = str(content)
+            self.page.failed(running.view)
         elif kind == "done":
             found, warned = content
             self.done[running.view] = running.key

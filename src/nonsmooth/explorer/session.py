@@ -332,6 +332,15 @@ class Session:
             self.results["stability"] = found
             self._tell_readout()
 
+    def failed(self, view: str) -> None:
+        """Take back what is said of a motion that could not be computed; its note says why."""
+        if view == "orbit":
+            for key in ("judged", "run", "section", "stability"):
+                self.results.pop(key, None)
+            for key in ("orbit", "section", "stability", "recording"):
+                self.work.done.pop(key, None)
+            self.tell("readout", [])
+
     def _axes_of_diagram(self) -> None:
         state, system, symbols = self.state, self.system, symbols_of(self.system)
         self.diagram.x.name(symbols[state.over], system.parameters[state.over].unit)
