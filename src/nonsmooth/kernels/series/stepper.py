@@ -11,7 +11,7 @@ from math import fabs, inf
 from numba import types
 
 import nonsmooth.kernels.series.places as place
-from nonsmooth.kernels.compile.cache import device, once
+from nonsmooth.kernels.compile.cache import device, inline, once
 from nonsmooth.kernels.hybrid.places import FIRED, MODE, NO_END, RETURNS, TIME, TRIES
 from nonsmooth.kernels.hybrid.records import GENERATED, SERIES_WORK
 from nonsmooth.kernels.series.crossing import NOISE, rows_hold, section_crossing, sides_at, snap
