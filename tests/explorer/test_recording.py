@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import base64
+import os
+import signal
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -10,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from tests.explorer.conftest import FEW
+from tests.explorer.conftest import FEW, wait_until
 
 import nonsmooth as ns
 from nonsmooth.explorer.bench import frequency_of
@@ -127,17 +129,25 @@ def test_a_file_that_is_no_recording_is_refused_and_nothing_is_lost(page: Any, r
     assert "distance of the recording" not in page.readout()
 
 
-def test_a_fit_is_cancelled(page: Any, rig: Path) -> None:
+def test_a_fit_is_cancelled_and_a_crash_of_it_is_said(page: Any, server: Any, rig: Path) -> None:
     page.until_done()
     drop(page, NAME, rig.read_bytes())
     page.tab.wait_for_selector("#recording-body:visible")
     page.write("factor-x", repr(TRAVEL))
     page.until_done()
+    before = len(server.workers())
     page.tab.click("#recording-fit")
     page.tab.click("#recording-cancel")
     page.tab.wait_for_selector("#recording-doing", state="hidden")
     page.until_done()
+    wait_until(lambda: len(server.workers()) <= before)
+    page.tab.click("#recording-fit")
+    wait_until(lambda: len(server.workers()) > before)
+    os.kill(max(server.workers()), signal.SIGKILL)
+    page.until('document.getElementById("wrong-recording").textContent.includes("ended unexpectedly (code -9)")')
+    page.until_done()
     assert page.tab.inner_text("#recording-found") == ""
+    assert page.tab.inner_text("#recording-name") == "rig.csv (synthetic)"
     assert page.value("k") == 8.47
 
 
