@@ -15,9 +15,8 @@ import xarray as xr
 from tests.explorer.conftest import FEW, wait_until
 
 import nonsmooth as ns
-from nonsmooth.explorer.bench import frequency_of
 from nonsmooth.explorer.measured import read, strand_distance
-from nonsmooth.explorer.recorded import LARGEST, matched, samples_of
+from nonsmooth.explorer.recorded import LARGEST, frequency_of, matched, response_points, samples_of
 from nonsmooth.identification.compare.fold import fold
 from nonsmooth.recordings import Recording, write_cap, write_capstone_csv
 
@@ -210,3 +209,27 @@ def test_a_recorded_drive_sets_the_frequency_of_the_model() -> None:
     system = ns.models.discontinuous_support()
     assert frequency_of(system, system.values, 2.0) == {"omega": pytest.approx(np.pi)}
     assert frequency_of(ns.models.border_collision(), {"mu": 1.0}, 2.0) == {}
+
+
+def test_measured_responses_of_runs_and_of_a_table_over_frequency(tmp_path: Path) -> None:
+    system = ns.models.discontinuous_support()
+    runs = {}
+    for k, omega in enumerate((3.0, 5.0), 1):
+        time, turns = np.linspace(0.0, 20.0, 2001), np.arange(8) * 2 * np.pi / omega
+        runs[f"Run #{k}"] = {
+            "Position": xr.Dataset({"Position": ("time", 10.0 * k * np.cos(omega * time), {"units": "mm"})},
+                                   {"time": ("time", time, {"units": "s"})}),
+            "Turn": xr.Dataset({"Turn": ("time", np.arange(8.0), {"units": "turns"})},
+                               {"time": ("time", turns, {"units": "s"})}),
+        }  # fmt: skip
+    file = write_capstone_csv(Recording.from_runs(runs, synthetic=True), tmp_path / "steps.csv")
+    recorded = read({"content": file.read_bytes(), "name": "steps.csv"})["recorded"]
+    omega, height = response_points(recorded, matched(recorded, system), system, system.values, "omega", "x")
+    np.testing.assert_allclose(omega, [3.0, 5.0], rtol=1e-6)
+    np.testing.assert_allclose(height, [0.01, 0.02], rtol=1e-3)
+    assert not len(response_points(recorded, matched(recorded, system), system, system.values, "rho", "x")[0])
+    table = b"frequency (Hz),amplitude (mm)\n" + b"".join(b"%g,%g\n" % (0.5 * k, k) for k in range(1, 12))
+    recorded = read({"content": table, "name": "table.csv"})["recorded"]
+    omega, height = response_points(recorded, matched(recorded, system), system, system.values, "omega", "x")
+    np.testing.assert_allclose(omega, np.pi * np.arange(1, 12))
+    np.testing.assert_allclose(height, 1e-3 * np.arange(1, 12))

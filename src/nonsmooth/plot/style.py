@@ -145,7 +145,8 @@ def even_dots(legend: Legend) -> None:
 def clear_legend(ax: Axes) -> Legend:
     """Place the legend in the axes where it covers nothing, else above them; call it when all is drawn."""
     legend = ax.legend(loc="best")
-    ax.figure.draw_without_rendering()
+    whole: Any = ax.figure.canvas.figure  # of a figure within a figure too
+    whole.draw_without_rendering()
     box = legend.get_window_extent()
     for line in ax.lines:
         path = line.get_path().transformed(line.get_transform())
