@@ -105,6 +105,18 @@ def test_a_dropped_recording_lies_over_the_model_and_its_parameters_are_found(pa
     page.until_done()
     assert page.value("k") == 8.47
     assert page.notes() == ""
+    page.tab.click("#redo")
+    page.tab.click("#tab-response")
+    page.tab.select_option("#shown", "x")
+    page.until('Bokeh.documents[0].get_model_by_name("recorded response").data.x.length === 1')
+    page.until_done()
+    measured, model = page.tab.evaluate("""(() => {
+        const of = name => Bokeh.documents[0].get_model_by_name(name).data, point = of("recorded response");
+        const curve = of("response up"), away = [...curve.x].map(x => Math.abs(x - point.x[0]));
+        return [[point.x[0], point.y[0]], curve.y[away.indexOf(Math.min(...away))]];
+    })()""")
+    np.testing.assert_allclose([measured[0], measured[1]], [3.69, model], rtol=0.02)
+    page.picture("recorded_response")
 
 
 def test_a_file_that_is_no_recording_is_refused_and_nothing_is_lost(page: Any, rig: Path) -> None:

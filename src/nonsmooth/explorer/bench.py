@@ -243,7 +243,7 @@ class Bench:
             far = laid["distance"]
             remarks.append(
                 f"{far['periods']} forcing periods compared; "
-                f"the record's phase leads the model's by {far['shift']:.3f} of a period"
+                f"the record's phase leads the model's by {round(far['shift'], 3) + 0.0:.3f} of a period"
             )
         drive = laid.get("drive")
         return {
