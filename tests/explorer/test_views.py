@@ -195,7 +195,7 @@ def test_a_click_in_a_basin_starts_there_and_reaches_its_attractor(page: Any) ->
         known = sorted(marks["x"][marks["marker"] == kind])
         np.testing.assert_allclose(reached, known, rtol=1e-3)
     page.tab.mouse.move(*page.place("basins", *place))
-    until_tip(page, "period 2 (b)")
+    assert "NaN" not in until_tip(page, "period 2 (b)")
     page.picture("basins")
 
 

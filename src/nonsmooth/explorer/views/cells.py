@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Cells"]
 
+_NOTHING = -1e300  # Bokeh writes NaN itself, and asks no formatter
 _PLACE = "return Number((value / Math.pow(10, power)).toPrecision(5)).toString().replace('-', '\\u2212') + unit;"
 
 
@@ -48,7 +49,7 @@ class Cells:
         self._places = places
         self._words = CustomJSHover(args={"words": [""]}, code="return words[value] ?? '';")
         self._more = CustomJSHover(
-            args={"before": "", "after": ""}, code="return Number.isFinite(value) ? before + value.toPrecision(3)"
+            args={"before": "", "after": ""}, code="return value > -1e299 ? before + value.toPrecision(3)"
             ".replace('-', '\\u2212') + after : '';",
         )  # fmt: skip
         plot.add_tools(HoverTool(
@@ -74,7 +75,7 @@ class Cells:
         steps = [(one[-1] - one[0]) / max(len(one) - 1, 1) for one in (x, y)]
         self.source.data = {
             "image": [classes.astype(np.float64)],
-            "more": [np.full(classes.shape, np.nan) if more is None else more.astype(np.float64)],
+            "more": [np.full(classes.shape, _NOTHING) if more is None else np.nan_to_num(more, nan=_NOTHING)],
             "x": [x[0] - steps[0] / 2], "y": [y[0] - steps[1] / 2], "dw": [steps[0] * len(x)],
             "dh": [steps[1] * len(y)], "stage": [stage],
         }  # fmt: skip
