@@ -220,6 +220,7 @@ def test_channels_are_matched_by_name_and_unit_and_scaled() -> None:
 def test_a_recorded_drive_sets_the_frequency_of_the_model() -> None:
     system = ns.models.discontinuous_support()
     assert frequency_of(system, system.values, 2.0) == {"omega": pytest.approx(np.pi)}
+    assert frequency_of(system, {**system.values, "omega": 0.0}, 2.0) == {}  # nothing is forced there
     assert frequency_of(ns.models.border_collision(), {"mu": 1.0}, 2.0) == {}
 
 
@@ -239,7 +240,9 @@ def test_measured_responses_of_runs_and_of_a_table_over_frequency(tmp_path: Path
     omega, height = response_points(recorded, matched(recorded, system), system, system.values, "omega", "x")
     np.testing.assert_allclose(omega, [3.0, 5.0], rtol=1e-6)
     np.testing.assert_allclose(height, [0.01, 0.02], rtol=1e-3)
-    assert not len(response_points(recorded, matched(recorded, system), system, system.values, "rho", "x")[0])
+    still = {**system.values, "omega": 0.0}
+    for values, over in ((system.values, "rho"), (still, "omega")):
+        assert not len(response_points(recorded, matched(recorded, system), system, values, over, "x")[0])
     table = b"frequency (Hz),amplitude (mm)\n" + b"".join(b"%g,%g\n" % (0.5 * k, k) for k in range(1, 12))
     recorded = read({"content": table, "name": "table.csv"})["recorded"]
     omega, height = response_points(recorded, matched(recorded, system), system, system.values, "omega", "x")

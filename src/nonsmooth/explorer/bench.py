@@ -15,6 +15,7 @@ from nonsmooth.explorer.recorded import (
     Recorded,
     Samples,
     Setup,
+    forcing_period,
     frequency_of,
     matched,
     response_points,
@@ -180,7 +181,7 @@ class Bench:
         self._told = []
         self.page.work.done.pop("recording", None)
         system = self.page.system
-        period = system.period()
+        period = forcing_period(system, self.page.state.values)
         times = {} if period is None else frequency_of(system, self.page.state.values, 2 * period)
         self._unticked = set(times) | {name for name, one in system.parameters.items() if one.unit == "kg"}
         self.setup = None if self.recorded is None else matched(self.recorded, system)

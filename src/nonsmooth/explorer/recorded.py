@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
 __all__ = [
-    "LARGEST", "Channel", "Recorded", "Samples", "Setup", "frequency_of", "matched", "response_points", "samples_of",
-    "unlike",
+    "LARGEST", "Channel", "Recorded", "Samples", "Setup", "forcing_period", "frequency_of", "matched", "response_points",
+    "samples_of", "unlike",
 ]  # fmt: skip
 
 FloatArray = NDArray[np.float64]
@@ -196,7 +196,7 @@ def response_points(
     """
     nothing = np.empty(0), np.empty(0)
     name = setup.channels.get(state)
-    now = system.period_at(values)
+    now = forcing_period(system, values)
     if name is None or now is None:
         return nothing
     factor = abs(setup.factors.get(state, 1.0))
@@ -223,16 +223,25 @@ def frequency_of(system: System, values: Mapping[str, float], period: float) -> 
 
     Frequencies, whose period is inversely proportional to them, and periods themselves are found.
     """
-    now = system.period_at(values)
+    now = forcing_period(system, values)
     if now is None:
         return {}
     for name, value in values.items():
-        if not value or system.period_at({**values, name: 1.01 * value}) == now:
+        if not value or forcing_period(system, {**values, name: 1.01 * value}) == now:
             continue
         for other in (value * now / period, value * period / now):
-            if abs(float(system.period_at({**values, name: other}) or 0.0) - period) < 1e-9 * period:
+            if abs((forcing_period(system, {**values, name: other}) or 0.0) - period) < 1e-9 * period:
                 return {name: other}
     return {}
+
+
+def forcing_period(system: System, values: Mapping[str, float]) -> float | None:
+    """The forcing period; None where there is none, as at the frequency 0."""
+    try:
+        period = system.period_at(values)
+    except ZeroDivisionError:
+        return None
+    return period if period is not None and 0 < period < math.inf else None
 
 
 def unlike(recorded: Recorded, setup: Setup, system: System) -> list[str]:
