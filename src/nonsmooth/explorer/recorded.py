@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
 __all__ = [
-    "LARGEST", "Channel", "Recorded", "Samples", "Setup", "forcing_period", "frequency_of", "matched", "response_points",
-    "samples_of", "unlike",
+    "LARGEST", "Channel", "Recorded", "Samples", "Setup", "forcing_period", "frequency_of", "matched",
+    "response_points", "samples_of", "unlike",
 ]  # fmt: skip
 
 FloatArray = NDArray[np.float64]
