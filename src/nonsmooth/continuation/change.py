@@ -7,6 +7,7 @@ speed, is put in or taken out. With which orbit the branch goes on is for ``neig
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,10 @@ from nonsmooth.continuation.anchor import anchored
 from nonsmooth.continuation.arclength import Curve, Point
 from nonsmooth.continuation.signature import AT_ONCE, Signature, Visit
 
-__all__ = ["Change", "common_point", "contacts", "past_the_section"]
+if TYPE_CHECKING:
+    from nonsmooth.continuation.shooting import Solved
+
+__all__ = ["Change", "common_orbit", "common_point", "contacts", "past_the_section"]
 
 FloatArray = NDArray[np.float64]
 
@@ -110,16 +114,28 @@ def _without(curve: Curve, point: Point, place: int, count: int) -> Change:
     )  # fmt: skip
 
 
-def common_point(curve: Curve, point: Point, change: Change) -> Point | None:
-    """The common orbit as a point of the new signature."""
+def common_orbit(curve: Curve, point: Point, change: Change) -> tuple[Curve, Solved, FloatArray] | None:
+    """The common orbit in the new signature: its curve, the equations there, and the tangent of the curve."""
     signature, times, states = change.signature, change.times, change.states
     if not curve.shooting.forced and len(times):
         end = float(point.solved.times[-1])
         signature, times, states = anchored(curve.shooting.flow, point.solved.values, signature, times, states, end)
     fresh, X = curve.with_signature(signature, times, states, float(point.solved.times[-1]), point.X[-1:])
     solved = fresh.shooting.evaluate(X)
+    if not np.isfinite(solved.jacobian).all():
+        return None
     null = fresh.null_vectors(solved)
-    return fresh.point(solved, X / fresh.scale, null[-1]) if len(null) else None
+    return (fresh, solved, null[-1]) if len(null) else None
+
+
+def common_point(curve: Curve, point: Point, change: Change) -> tuple[Curve, Point] | None:
+    """The common orbit as a point of the new signature, on its curve."""
+    found = common_orbit(curve, point, change)
+    if found is None:
+        return None
+    fresh, solved, tangent = found
+    there = fresh.point(solved, solved.X / fresh.scale, tangent)
+    return None if there is None else (fresh, there)
 
 
 def past_the_section(curve: Curve, point: Point) -> tuple[Curve, Point] | None:

@@ -24,10 +24,11 @@ def change_of_signature(found: March, curve: Curve, met: list[Event]) -> tuple[C
             if after is None:
                 found.ending = "no_convergence"
             return after
-    beyond = beside(curve, met[0][2])
+    known = _contacts(curve, met)
+    beyond = beside(curve, met[0][2], known)
     if beyond is None and met[0][0] == "unseen":
         return None
-    name = _mark(found, curve, met, beyond)
+    name = _mark(found, curve, met, known, beyond)
     if beyond is None and _is_centre(curve, met):
         found.ending = found.special[-1].kind = "focus_centre"
     elif beyond is None:
@@ -54,13 +55,21 @@ def _is_centre(curve: Curve, met: list[Event]) -> bool:
 
 def passed_by(found: March, curve: Curve, kind: str, point: Point) -> None:
     """Record a boundary that a virtual branch passes with its signature."""
-    _mark(found, curve, [(kind, 0.0, point)], beside(curve, point))
+    known = _contacts(curve, [(kind, 0.0, point)])
+    _mark(found, curve, [(kind, 0.0, point)], known, beside(curve, point, known))
 
 
-def _mark(found: March, curve: Curve, met: list[Event], beyond: tuple[Curve, Point] | None) -> str:
+def _contacts(curve: Curve, met: list[Event]) -> list[tuple[Change, Point]]:
+    """The contacts that may begin or end with what is met, each with the orbit there."""
+    return [(change, there) for kind, _, there in met for change in contacts(curve, there, kind)]
+
+
+def _mark(
+    found: March, curve: Curve, met: list[Event], known: list[tuple[Change, Point]],
+    beyond: tuple[Curve, Point] | None,
+) -> str:  # fmt: skip
     """Record the end of a signature, by the contact that begins or ends there where one does; its name."""
     kind, _, point = met[0]
-    known = [(change, there) for event, _, there in met for change in contacts(curve, there, event)]
     if beyond is not None:
         cycle = beyond[0].shooting.signature.cycle
         for change, there in known:
@@ -79,9 +88,8 @@ def _mark(found: March, curve: Curve, met: list[Event], beyond: tuple[Curve, Poi
 
 def _mark_graze(found: March, curve: Curve, point: Point, change: Change, after: tuple[Curve, Point]) -> None:
     """Record a graze: the orbit without the contact, whichever side the branch came from."""
-    fresh, first = after
-    judged = graze(curve, point, first, change)
-    free = (curve, point) if change.gained else (fresh, common_point(curve, point, change) or first)
+    judged = graze(curve, point, after[1], change)
+    free = (curve, point) if change.gained else common_point(curve, point, change) or after
     found.mark("grazing", *free, indicator=change.indicator, graze=judged)
 
 
