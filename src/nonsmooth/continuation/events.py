@@ -170,8 +170,8 @@ def smooth_events(
             continue
         if kind == "flip" and np.abs(point.multipliers + 1.0).min() > POLE:
             continue
-        if kind == "fold" and curve.shooting.forced and np.abs(point.multipliers - 1.0).min() > POLE:
-            continue  # a contact of no length turns the parameter too, without a multiplier 1
+        if kind in ("fold", "branch") and curve.shooting.forced and np.abs(point.multipliers - 1.0).min() > POLE:
+            continue  # a contact of no length turns the parameter or the determinant's sign too, without a multiplier 1
         found.append((_name(kind, curve, point), s, point))
     # A branch that crosses another one where the parameter turns is one event, not two.
     crossings = [s for kind, s, _ in found if kind in ("pitchfork", "branch_point", "flip_end")]
