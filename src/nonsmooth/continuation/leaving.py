@@ -4,16 +4,22 @@ from __future__ import annotations
 
 from collections import Counter
 
+import numpy as np
+
 from nonsmooth.continuation.arclength import Curve, Point
 from nonsmooth.continuation.change import Change, common_point, contacts, past_the_section
+from nonsmooth.continuation.detection import Tests
 from nonsmooth.continuation.equilibrium import Equilibria
-from nonsmooth.continuation.events import Event, at_section
+from nonsmooth.continuation.events import Event, at_section, first_met
 from nonsmooth.continuation.grazing import graze
 from nonsmooth.continuation.marches import March
 from nonsmooth.continuation.neighbours import beside
+from nonsmooth.continuation.path import VIOLATIONS
 from nonsmooth.continuation.switching import is_doubled
 
 __all__ = ["change_of_signature", "passed_by"]
+
+TWICE = 0.1  # along the branch: the end of a signature is not looked for from farther behind it
 
 
 def change_of_signature(found: March, curve: Curve, met: list[Event]) -> tuple[Curve, Point] | None:
@@ -76,6 +82,9 @@ def _mark(
             if change.signature.cycle == cycle:
                 _mark_graze(found, curve, there, change, beyond)
                 return "grazing"
+    behind = None if beyond is None else _from_behind(point, *beyond)
+    if behind is not None and (kind == "unseen" or _condition(beyond[0], behind[2]) < _condition(curve, point)):
+        curve, (kind, _, point) = beyond[0], behind
     own = contacts(curve, point, kind)
     name = "grazing" if own or kind in ("touch", "slow", "unseen") else "corner"
     if kind == "unseen" and beyond is not None:
@@ -84,6 +93,24 @@ def _mark(
         indicator = own[0].indicator if own else _indicator(curve, point, kind)
     found.mark(name, curve, point, indicator=indicator)
     return name
+
+
+def _from_behind(point: Point, fresh: Curve, first: Point) -> Event | None:
+    """The end of the new signature, ``fresh``, seen from its first orbit: the place at which the old one ends."""
+    away = abs(float(first.X[-1] - point.X[-1])) / fresh.width
+    back, steep = first.turned(), abs(float(first.tangent[-1]))
+    new = fresh.step(back, 2.0 * away / steep) if steep * TWICE > away else None
+    if new is None:
+        return None
+    crossed = [kind for kind, now in zip(VIOLATIONS, new.path.violation(), strict=True) if now < 0.0]
+    met = first_met(fresh, back, new, Tests(fresh), crossed, np.inf)
+    return (met[0][0], met[0][1], met[0][2].turned()) if met else None
+
+
+def _condition(curve: Curve, point: Point) -> float:
+    """Condition number of the equations: a visit that ends as it begins, at a double zero, is located badly."""
+    values = np.linalg.svd(point.solved.jacobian * curve.weights, compute_uv=False)
+    return float(values[0] / values[-1])
 
 
 def _mark_graze(found: March, curve: Curve, point: Point, change: Change, after: tuple[Curve, Point]) -> None:

@@ -40,8 +40,8 @@ AGAIN = 3  # times that Newton's method is begun with one signature
 def beside(curve: Curve, point: Point, contacts: Sequence[tuple[Change, Point]]) -> tuple[Curve, Point] | None:
     """The orbit with which a branch goes on at ``point``, where its signature ends, on a curve of its own.
 
-    ``contacts`` are those that may begin or end there. Its tangent leads away from there. None where there is none, or no
-    simulated round shows it."""
+    ``contacts`` are those that may begin or end there. Its tangent leads away from there. None where there is none, or
+    no simulated round shows it."""
     common = [end for change, there in contacts if (end := common_orbit(curve, there, change)) is not None]
     forward = float(np.sign(point.tangent[-1])) or 1.0
     for aside in ASIDE:
@@ -81,8 +81,8 @@ def _at(
 
 
 def _guesses(
-    curve: Curve, point: Point, common: list[tuple[Curve, Solved, FloatArray]], rounds: Rounds, values: FloatArray, side: float,
-    aside: float,
+    curve: Curve, point: Point, common: list[tuple[Curve, Solved, FloatArray]], rounds: Rounds, values: FloatArray,
+    side: float, aside: float,
 ) -> Iterator[Guess | None]:  # fmt: skip
     """Rounds along the branch, from the end of the signature itself, and about it; that end without its touches.
 
