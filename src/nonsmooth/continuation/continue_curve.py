@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.continuation.anchor import anchor_at
-from nonsmooth.continuation.arclength import Point
-from nonsmooth.continuation.begin import largest_step, limits, size_of
-from nonsmooth.continuation.curve_march import ENDS, march_curve
-from nonsmooth.continuation.locus import KINDS, Locus
-from nonsmooth.continuation.marches import in_turn, unless_interrupted
-from nonsmooth.continuation.physical import allowed_range
-from nonsmooth.continuation.reading import special_row
-from nonsmooth.continuation.shooting import Shooting
-from nonsmooth.continuation.surfaces import look_at_surfaces
+from nonsmooth.continuation.branches.reading import special_row
+from nonsmooth.continuation.march.arclength import Point
+from nonsmooth.continuation.march.begin import largest_step, limits, size_of
+from nonsmooth.continuation.march.curve_march import ENDS, march_curve
+from nonsmooth.continuation.march.marches import in_turn, unless_interrupted
+from nonsmooth.continuation.march.physical import allowed_range
+from nonsmooth.continuation.problems.anchor import anchor_at
+from nonsmooth.continuation.problems.locus import KINDS, Locus
+from nonsmooth.continuation.problems.shooting import Shooting
+from nonsmooth.continuation.problems.surfaces import look_at_surfaces
 from nonsmooth.errors import SolveError, shortened
 from nonsmooth.flow.arguments import whole_number
 from nonsmooth.system.names import by_name

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.continuation.begin import largest_step, limits
-from nonsmooth.continuation.equilibrium import Equilibria, Rest
-from nonsmooth.continuation.equilibrium_march import ENDS, march_rest
-from nonsmooth.continuation.marches import in_turn, unless_interrupted
-from nonsmooth.continuation.physical import allowed_range
+from nonsmooth.continuation.march.begin import largest_step, limits
+from nonsmooth.continuation.march.equilibrium_march import ENDS, march_rest
+from nonsmooth.continuation.march.marches import in_turn, unless_interrupted
+from nonsmooth.continuation.march.physical import allowed_range
+from nonsmooth.continuation.problems.equilibrium import Equilibria, Rest
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.arguments import check_system, whole_number
 from nonsmooth.flow.starts import first_state

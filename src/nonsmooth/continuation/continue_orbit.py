@@ -9,18 +9,25 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.continuation.arclength import Curve, Point
-from nonsmooth.continuation.begin import Asked, curve_of, largest_step, limits, resumed_at, sentence
-from nonsmooth.continuation.branch import march
-from nonsmooth.continuation.detection import Tests
-from nonsmooth.continuation.events import BESIDE
-from nonsmooth.continuation.files import branch_dataset
-from nonsmooth.continuation.marches import ENDINGS, March, in_turn
-from nonsmooth.continuation.orbit import Orbit
-from nonsmooth.continuation.other_branches import born, straight_on, switched
-from nonsmooth.continuation.physical import allowed_range
-from nonsmooth.continuation.reading import read_branch
-from nonsmooth.continuation.records import BranchRecord, PointRecord, SpecialRecord, from_march, joined, point_record
+from nonsmooth.continuation.branches.files import branch_dataset
+from nonsmooth.continuation.branches.orbit import Orbit
+from nonsmooth.continuation.branches.other_branches import born, straight_on, switched
+from nonsmooth.continuation.branches.reading import read_branch
+from nonsmooth.continuation.branches.records import (
+    BranchRecord,
+    PointRecord,
+    SpecialRecord,
+    from_march,
+    joined,
+    point_record,
+)
+from nonsmooth.continuation.march.arclength import Curve, Point
+from nonsmooth.continuation.march.begin import Asked, curve_of, largest_step, limits, resumed_at, sentence
+from nonsmooth.continuation.march.branch import march
+from nonsmooth.continuation.march.detection import Tests
+from nonsmooth.continuation.march.events import BESIDE
+from nonsmooth.continuation.march.marches import ENDINGS, March, in_turn
+from nonsmooth.continuation.march.physical import allowed_range
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.arguments import whole_number
 from nonsmooth.system.names import by_name

@@ -19,8 +19,8 @@ from nonsmooth.kernels.hybrid import codes
 from nonsmooth.kernels.hybrid.places import BEGUN
 
 if TYPE_CHECKING:
-    from nonsmooth.system.linear import LinearForm
-    from nonsmooth.system.traced import Traced
+    from nonsmooth.system.codegen.linear import LinearForm
+    from nonsmooth.system.symbolic.traced import Traced
 
 __all__ = ["LinearEngine", "PlanarEngine", "is_linear"]
 

@@ -13,8 +13,8 @@ from nonsmooth.studies.savi2007.measure import with_uncertainty
 if TYPE_CHECKING:
     import xarray as xr
 
-    from nonsmooth.identification.finding import Estimate, Finding
-    from nonsmooth.identification.parameter_set import ParameterSet
+    from nonsmooth import ParameterSet
+    from nonsmooth.identification import Estimate, Finding
 
 __all__ = ["Found", "Number", "estimates_of", "found_in", "kept", "the_finding"]
 
@@ -91,7 +91,7 @@ def found_in(data: xr.Dataset) -> Found:
 
 def estimates_of(dataset: xr.Dataset) -> dict[str, Number]:
     """All parameters of a saved ``ParameterSet``, with their 95 % intervals."""
-    from nonsmooth.identification.parameter_set import ParameterSet
+    from nonsmooth import ParameterSet
 
     found = ParameterSet.from_dataset(dataset)
     rows = {**found.estimates, **found.extra}

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Canvas
 
+    from nonsmooth import System
     from nonsmooth.studies.savi2007.laboratory import Laboratory
-    from nonsmooth.system.system import System
 
 __all__ = [
     "GRID", "SIDES", "Motions", "chosen", "compared", "diagram_of", "draw_pairs", "measured_periods_at", "model_at",

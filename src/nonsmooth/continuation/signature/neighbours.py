@@ -1,0 +1,124 @@
+"""Orbits beside the end of a signature, whatever signature they have.
+
+Beyond a boundary one simulated round tells which transitions happen, in which order: it gives a signature and a first
+guess, Newton's method the orbit, and a simulated round of that orbit whether the signature was the right one; if not,
+the signature that it shows is tried next. So corners, several events at one instant and segments that vanish or appear
+need no rules of their own.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.continuation.march.arclength import Curve, Point
+from nonsmooth.continuation.searches.settled import Guess, touching
+from nonsmooth.continuation.signature.change import Change, common_orbit
+from nonsmooth.continuation.signature.rounds import Rounds
+
+if TYPE_CHECKING:
+    from nonsmooth.continuation.problems.shooting import Solved
+
+__all__ = ["beside"]
+
+FloatArray = NDArray[np.float64]
+ASIDE = (1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4)  # of the range: how far beyond the boundary orbits are looked for
+NEARER = 0.1  # once more at this part of it: an orbit that the branch goes on with comes nearer
+SHRINKS = 0.5  # by at least this factor (a square root: 0.32)
+NEAR = 0.05  # of the orbit's size
+PERTURBED = 12  # rounds from about the orbit, on each side
+POWERS = (2.0, 1.0, 0.5)  # of the distance in the parameter: how far from it, beside a square root as beside a kink
+ROUNDS = 6  # signatures tried in a row
+STEEP = 1e-3  # of a tangent: its parameter
+AGAIN = 3  # times that Newton's method is begun with one signature
+
+
+def beside(curve: Curve, point: Point, contacts: Sequence[tuple[Change, Point]]) -> tuple[Curve, Point] | None:
+    """The orbit with which a branch goes on at ``point``, where its signature ends, on a curve of its own.
+
+    ``contacts`` are those that may begin or end there. Its tangent leads away from there. None where there is none, or
+    no simulated round shows it."""
+    common = [end for change, there in contacts if (end := common_orbit(curve, there, change)) is not None]
+    forward = float(np.sign(point.tangent[-1])) or 1.0
+    for aside in ASIDE:
+        for side in (forward, -forward):
+            found = _at(curve, point, common, side, aside)
+            if found is not None:
+                return found
+    return None
+
+
+def _at(
+    curve: Curve, point: Point, common: list[tuple[Curve, Solved, FloatArray]], side: float, aside: float
+) -> tuple[Curve, Point] | None:
+    """The orbit at one distance on one side of the parameter."""
+    shooting = curve.shooting
+    values = point.solved.values.copy()
+    here = float(point.X[-1])
+    values[shooting.places] = there = np.array([here + side * aside * curve.width])
+    rounds = Rounds(shooting)
+    tried = Counter({shooting.signature.cycle: AGAIN})
+    for guess in _guesses(curve, point, common, rounds, values, side, aside):
+        for _ in range(ROUNDS):
+            if guess is None or tried[guess.signature.cycle] >= AGAIN:
+                break
+            tried[guess.signature.cycle] += 1
+            other, X = curve.with_signature(guess.signature, guess.times, guess.states, guess.period, there)
+            found = other.at_parameter(X / other.scale, float(there[0]))
+            if found is None or not _apart(curve, point, found) < NEAR:
+                break
+            if (found.path.violation() >= 0.0).all() and rounds.shows(other.shooting, found.X, values):
+                if not _arrives(curve, point, other, found, here):
+                    break
+                facing = side * float(found.tangent[-1]) >= 0.0
+                return other, found if facing else found.turned()
+            guess = rounds.read(other.shooting, found.X, values)  # no orbit of the system: what its round shows is next
+    return None
+
+
+def _guesses(
+    curve: Curve, point: Point, common: list[tuple[Curve, Solved, FloatArray]], rounds: Rounds, values: FloatArray,
+    side: float, aside: float,
+) -> Iterator[Guess | None]:  # fmt: skip
+    """Rounds along the branch, from the end of the signature itself, and about it; that end without its touches.
+
+    First the common orbits of contacts, along their tangents: beyond an impact without speed a round shows none nearby.
+    """
+    for other, there, tangent in common:
+        if abs(float(tangent[-1])) > STEEP:
+            yield _as_guess(other, there, there.X + side * aside / float(tangent[-1]) * tangent * other.scale)
+    shooting, slope = curve.shooting, float(point.tangent[-1])
+    if abs(slope) > STEEP:
+        yield rounds.read(shooting, point.X + side * aside / slope * point.tangent * curve.scale, values)
+    yield rounds.read(shooting, point.X, values)
+    yield from touching(_as_guess(curve, point.solved, point.X), shooting.system)
+    random = np.random.default_rng(0)
+    for i in range(PERTURBED):
+        change = aside ** POWERS[i % 3] * random.uniform(-1.0, 1.0, shooting.n) * curve.size
+        yield rounds.read(shooting, point.X, values, change)
+
+
+def _as_guess(curve: Curve, near: Solved, X: FloatArray) -> Guess:
+    """Unknowns near a solved orbit of a curve as an interval of motion."""
+    shooting = curve.shooting
+    period = float(near.times[-1]) if shooting.forced else float(X[shooting.size - 1])
+    return Guess(shooting.period_number, period, shooting.signature, *shooting.split(X))
+
+
+def _apart(curve: Curve, a: Point, b: Point) -> float:
+    """Largest difference of extremes, in units of the states' sizes, and of the periods."""
+    size = curve.size[: len(a.path.maximum)]
+    extremes = np.concatenate([(a.path.maximum - b.path.maximum) / size, (a.path.minimum - b.path.minimum) / size])
+    period = abs(float(a.solved.times[-1] - b.solved.times[-1])) / curve.period
+    return max(float(np.nanmax(np.abs(extremes), initial=0.0)), period)
+
+
+def _arrives(curve: Curve, point: Point, other: Curve, found: Point, here: float) -> bool:
+    """Return whether the orbits found come to ``point`` as the parameter comes back to it."""
+    value = here + NEARER * (float(found.X[-1]) - here)
+    nearer = other.at_parameter(found.Y, value)
+    return nearer is not None and _apart(curve, point, nearer) <= SHRINKS * _apart(curve, point, found) + 1e-9
