@@ -20,6 +20,7 @@ from nonsmooth.continuation.signature.path import VIOLATIONS
 __all__ = ["change_of_signature", "passed_by"]
 
 TWICE = 0.1  # along the branch: the end of a signature is not looked for from farther behind it
+TOLERANCE = 1e-5  # of an indicator's size: a band as narrow as this stands for no width
 
 
 def change_of_signature(found: March, curve: Curve, met: list[Event]) -> tuple[Curve, Point] | None:
@@ -34,6 +35,8 @@ def change_of_signature(found: March, curve: Curve, met: list[Event]) -> tuple[C
     beyond = beside(curve, met[0][2], known)
     if beyond is None and met[0][0] == "unseen":
         return None
+    if beyond is not None and _is_tolerance(curve, _indicator(curve, met[0][2], met[0][0])):
+        return beyond
     name = _mark(found, curve, met, known, beyond)
     if beyond is None and _is_centre(curve, met):
         found.ending = found.special[-1].kind = "focus_centre"
@@ -152,3 +155,22 @@ def _indicator(curve: Curve, point: Point, kind: str) -> int:
     near = [(abs(shooting.flow.jump(point.solved.values, k, t, z, r).h), row.indicator)
             for r, row in enumerate(rows) if r != skipped]  # fmt: skip
     return min(near)[1] if near else -1
+
+
+def _is_tolerance(curve: Curve, indicator: int) -> bool:
+    """Return whether an indicator only sets a tolerance: below the creep of a stop impacts are completed as rest.
+
+    It differs from another one of its condition, with the other sign, by a small number."""
+    system = curve.shooting.system
+    traced = system.traced
+    for jump in traced.transitions:
+        signs = {row.indicator: row.sign for row in jump.rows}
+        for other, sign in signs.items():
+            if sign * signs.get(indicator, 0) >= 0:
+                continue
+            h = traced.indicators[other]
+            width = traced.indicators[indicator] - h
+            size = sum(abs(h.diff(u)) * scale for u, scale in zip(traced.u, system.scale_vector(), strict=True))
+            if width.is_number and size.is_number and 0.0 < abs(float(width)) < TOLERANCE * float(size):
+                return True
+    return False

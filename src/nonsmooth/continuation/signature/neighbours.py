@@ -34,6 +34,7 @@ PERTURBED = 12  # rounds from about the orbit, on each side
 POWERS = (2.0, 1.0, 0.5)  # of the distance in the parameter: how far from it, beside a square root as beside a kink
 ROUNDS = 6  # signatures tried in a row
 STEEP = 1e-3  # of a tangent: its parameter
+BACK = 1e-3  # of its distance: an orbit nearer than this to the branch that has come here is on it
 AGAIN = 3  # times that Newton's method is begun with one signature
 
 
@@ -72,7 +73,7 @@ def _at(
             if found is None or not _apart(curve, point, found) < NEAR:
                 break
             if (found.path.violation() >= 0.0).all() and rounds.shows(other.shooting, found.X, values):
-                if not _arrives(curve, point, other, found, here):
+                if not _arrives(curve, point, other, found, here) or _leads_back(curve, point, found):
                     break
                 facing = side * float(found.tangent[-1]) >= 0.0
                 return other, found if facing else found.turned()
@@ -122,3 +123,12 @@ def _arrives(curve: Curve, point: Point, other: Curve, found: Point, here: float
     value = here + NEARER * (float(found.X[-1]) - here)
     nearer = other.at_parameter(found.Y, value)
     return nearer is not None and _apart(curve, point, nearer) <= SHRINKS * _apart(curve, point, found) + 1e-9
+
+
+def _leads_back(curve: Curve, point: Point, found: Point) -> bool:
+    """Return whether an orbit lies on the branch that has come to ``point``, whatever its signature says."""
+    value = float(found.X[-1])
+    if (value - float(point.X[-1])) * float(point.tangent[-1]) > 0.0:
+        return False
+    own = curve.at_parameter(point.Y, value)
+    return own is not None and _apart(curve, own, found) < BACK * _apart(curve, point, found)
