@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 import nonsmooth as ns
 
-__all__ = ["goes_on", "misses", "return_map"]
+__all__ = ["goes_on", "misses", "retraced"]
 
 FloatArray = NDArray[np.float64]
 BESIDE = (1e-2, 2e-3, 4e-4)  # of the range: how far from an end fixed points are looked for
@@ -126,3 +126,15 @@ def misses(system: ns.System, branch: xr.Dataset, name: str, count: int = 12) ->
         missed = np.abs(run["u"].values[-1] - point["section"].values) / system.scale_vector()
         worst = max(worst, float(np.nanmax(missed)))
     return worst
+
+
+def retraced(branch: xr.Dataset, name: str) -> bool:
+    """Return whether a closed branch goes back through its own orbits."""
+    values, states = branch[name].values, branch["section"].values
+    middle = 0.5 * (values.min() + values.max())
+    met = []
+    for i in np.flatnonzero((values[:-1] - middle) * (values[1:] - middle) < 0.0):
+        x = (middle - values[i]) / (values[i + 1] - values[i])
+        met.append((1 - x) * states[i] + x * states[i + 1])
+    apart = [np.abs(a - b).max() for k, a in enumerate(met) for b in met[:k]]
+    return min(apart, default=0.0) < SAME * np.abs(states).max()

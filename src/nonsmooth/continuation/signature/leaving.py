@@ -20,6 +20,7 @@ from nonsmooth.continuation.signature.path import VIOLATIONS
 __all__ = ["change_of_signature", "passed_by"]
 
 TWICE = 0.1  # along the branch: the end of a signature is not looked for from farther behind it
+WITHIN = 1e-9  # of the range: as near as an event is located that only simulations show
 TOLERANCE = 1e-5  # of an indicator's size: a band as narrow as this stands for no width
 
 
@@ -86,7 +87,7 @@ def _mark(
                 _mark_graze(found, curve, there, change, beyond)
                 return "grazing"
     behind = None if beyond is None else _from_behind(point, *beyond)
-    if behind is not None and (kind == "unseen" or _condition(beyond[0], behind[2]) < _condition(curve, point)):
+    if beyond is not None and behind is not None and _is_better(curve, kind, point, beyond[0], behind[2]):
         curve, (kind, _, point) = beyond[0], behind
     own = contacts(curve, point, kind)
     name = "grazing" if own or kind in ("touch", "slow", "unseen") else "corner"
@@ -108,6 +109,13 @@ def _from_behind(point: Point, fresh: Curve, first: Point) -> Event | None:
     crossed = [kind for kind, now in zip(VIOLATIONS, new.path.violation(), strict=True) if now < 0.0]
     met = first_met(fresh, back, new, Tests(fresh), crossed, np.inf)
     return (met[0][0], met[0][1], met[0][2].turned()) if met else None
+
+
+def _is_better(curve: Curve, kind: str, point: Point, fresh: Curve, there: Point) -> bool:
+    """Return whether the end of the new signature, ``there``, is the better place of a corner than ``point``."""
+    if kind == "unseen":  # within the interval that simulations leave
+        return abs(float(there.X[-1] - point.X[-1])) < WITHIN * curve.width
+    return _condition(fresh, there) < _condition(curve, point)
 
 
 def _condition(curve: Curve, point: Point) -> float:
