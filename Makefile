@@ -12,7 +12,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 PYTEST_ARGS ?= -n auto --dist loadfile --no-loadscope-reorder
 
 .DEFAULT_GOAL := help
-.PHONY: help reproduce reproduce-full test slow mutants fuzz altered coverage coverage-awkward rig-against-model check \
+.PHONY: help reproduce reproduce-full test slow mutants fuzz altered coverage coverage-awkward check \
 	bench gpu gpu-compiler docs screenshots clean distclean
 
 help:  ## list the targets
@@ -44,9 +44,6 @@ coverage: $(VENV)/.compiled-run  ## identify 40 virtual rigs; writes docs/measur
 
 coverage-awkward: $(VENV)/.compiled-run  ## the same on rigs where much goes wrong; writes docs/measured_coverage_awkward.md
 	$(BIN)/python -m nonsmooth.studies.savi2007.identification.coverage --awkward --seeds 0-39 --out docs/measured_coverage_awkward.md
-
-rig-against-model: $(VENV)/.compiled-run  ## lay virtual rigs over the model; writes docs/measured_rig_against_model.md
-	$(BIN)/python -m nonsmooth.studies.savi2007.comparison.rig_against_model --seeds 2 3 --out docs/measured_rig_against_model.md
 
 check: $(VENV)/.installed-dev  ## ruff, mypy, import-linter, codespell, the prose of docstrings
 	$(BIN)/ruff check .

@@ -103,6 +103,13 @@ class Page:
         )
         return float(found[0]), float(found[1])
 
+    def picture(self, name: str) -> None:
+        """A screenshot for the guide, where its folder is named in the environment variable NONSMOOTH_PICTURES."""
+        if folder := os.environ.get("NONSMOOTH_PICTURES"):
+            self.until_done()
+            self.tab.wait_for_timeout(500)
+            self.tab.screenshot(path=str(Path(folder) / f"explorer_{name}.png"))
+
     def notes(self) -> str:
         return str(self.tab.evaluate(
             '[...document.querySelectorAll(".note:not([hidden]), .wrong")].map(one => one.textContent).join(" ").trim()'

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from nonsmooth.identification.finding import Estimate
+from nonsmooth.identification.profiles import profile_of
 from nonsmooth.identification.uncertainty import (
     correlated,
     correlation_times,
@@ -13,7 +14,6 @@ from nonsmooth.identification.uncertainty import (
     uniform,
 )
 from nonsmooth.studies.savi2007.identification.lines import york
-from nonsmooth.studies.savi2007.identification.profiles import profile_of
 
 
 def test_uniform_and_normal_limits():

@@ -181,7 +181,7 @@ def _polished(system: System, guesses: list[Guess], given: bool, unstable: bool,
             continue
         clearance = walk.clearance(path, len(system.indicators))
         noise = NOISE * float(guess.size.max())
-        virtual = bool((path.violation() < -noise).any())
+        virtual = bool((path.margins < -noise).any())
         orbit = orbit_of(shooting, solved, path, clearance, virtual)
         if virtual:
             reasons.append(("virtual", f"the {name} orbit found passes through a boundary it should obey"))

@@ -8,16 +8,14 @@ from typing import TYPE_CHECKING, Any
 from nonsmooth.explorer.export import KINDS
 from nonsmooth.explorer.figures import CLOUDS
 from nonsmooth.explorer.labels import html_of, plain_of, symbols_of
-from nonsmooth.explorer.presets import PAPER, first_state, presets_of, slider_range
+from nonsmooth.explorer.presets import GIVEN, PAPER, first_state, presets_of, slider_range
 from nonsmooth.explorer.state import CHOICES, to_query
 
 if TYPE_CHECKING:
     from nonsmooth.explorer.state import State
     from nonsmooth.system.system import System
 
-__all__ = ["GIVEN", "controls"]
-
-GIVEN = "given"  # the name of a model of one's own
+__all__ = ["controls"]
 
 
 def controls(system: System, state: State, models: Iterable[str], stage: str) -> dict[str, Any]:

@@ -83,6 +83,7 @@ class _Figure:
             axis.formatter = CustomJSTickFormatter(args={"power": 0}, code=_TICKS)
         self.x = _Axis(self.plot.xaxis[0], self.plot.x_range)
         self.y = _Axis(self.plot.yaxis[0], self.plot.y_range)
+        self.beside: tuple[Any, Any] = ([], [])  # what else the axes must show
 
     def show(self, x: tuple[float, float] | None = None, y: tuple[float, float] | None = None) -> None:
         """Set the ranges, also those that a reset comes back to."""
@@ -268,8 +269,8 @@ class Portrait(_Curves):
         self._put(run, xs, ys)
         for line in self.lines:  # of a map the iterates alone
             line.visible = not is_map
-        for axis, values, name in ((self.x, xs, state.x), (self.y, ys, state.y)):
-            ends = extent(values)
+        for axis, values, also, name in ((self.x, xs, self.beside[0], state.x), (self.y, ys, self.beside[1], state.y)):
+            ends = extent(np.concatenate([values, also]))
             own = axis.range.start, axis.range.end
             fits = own[0] <= ends[0] + 0.05 * (ends[1] - ends[0]) and ends[1] - 0.05 * (ends[1] - ends[0]) <= own[1]
             if not (fits and ends[1] - ends[0] > 0.5 * (own[1] - own[0])):
@@ -296,7 +297,8 @@ class History(_Curves):
         self._put(run, time, column(run, "u", state.x).values)
         at = [str(name) for name in run["state"].values].index(state.x)
         self.crossings.data = {"x": run["crossing_time"].values, "y": run["u_before"].values[:, at]}
-        self.show((float(time[0]), float(time[-1])), extent(column(run, "u", state.x).values))
+        values = np.concatenate([column(run, "u", state.x).values, self.beside[1]])
+        self.show((float(time[0]), float(time[-1])), extent(values))
         self.x.name("t", str(run["time"].attrs.get("units", "1")))
         self.y.name(symbols[state.x], units[state.x])
 
@@ -324,7 +326,7 @@ class Section(_Figure):
         self.dots.glyph.update(size=9 if few else 2.5, fill_alpha=1.0 if few else 0.75)
         curves = [] if run is None else [column(run, "u", name).values for name in (state.x, state.y)]
         self.orbit.data = {"x": curves[0], "y": curves[1]} if few and curves else {"x": [], "y": []}
-        ends = [extent(np.concatenate([points[:, k], curves[k] if few and curves else []]), 0.08) for k in (0, 1)]
-        self.show(*ends)
+        orbit = curves if few and curves else [np.empty(0), np.empty(0)]
+        self.show(*(extent(np.concatenate([points[:, k], orbit[k], self.beside[k]]), 0.08) for k in (0, 1)))
         self.x.name(symbols[state.x], units[state.x])
         self.y.name(symbols[state.y], units[state.y])

@@ -156,7 +156,8 @@
     const channel = doc && doc.get_model_by_name("act");
     if (!channel) return setTimeout(connect, 30);
     send = text => { channel.value = text; };
-    for (const [name, hear] of Object.entries({ui: render, readout, busy, notes, file})) {
+    const parts = (window.parts || []).map(part => part({act, field, put, fill, short}));
+    for (const [name, hear] of Object.entries(Object.assign({ui: render, readout, busy, notes, file}, ...parts))) {
       const model = doc.get_model_by_name(name);
       const told = () => { if (model.value) hear(JSON.parse(model.value)); };
       model.properties.value.change.connect(told);

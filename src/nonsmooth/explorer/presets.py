@@ -12,9 +12,10 @@ from nonsmooth.studies.savi2007 import printed
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["PAPER", "first_state", "presets_of", "slider_range"]
+__all__ = ["GIVEN", "PAPER", "first_state", "presets_of", "slider_range"]
 
 PAPER = "discontinuous_support"
+GIVEN = "given"  # the name of a model of one's own
 _GAP = {**printed.FIGURE_13, "over": "g", "low": -0.0015, "high": 0.002, "shown": "v"}
 _AMPLITUDE = {**printed.FIGURE_11, "over": "rho", "low": 0.2, "high": 0.5, "shown": "v"}
 _FREQUENCY = {**printed.FIGURE_17, "over": "omega", "low": 8.4, "high": 10.4, "shown": "v"}

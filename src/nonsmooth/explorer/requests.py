@@ -43,5 +43,5 @@ def stability_request(orbit: Mapping[str, Any], results: Mapping[str, Any]) -> d
 
 
 def key_of(request: Mapping[str, Any]) -> str:
-    """Text by which two requests are the same."""
-    return json.dumps(request, sort_keys=True)
+    """Text by which two requests are the same; a recording stands in it as its ``key``."""
+    return json.dumps(request, sort_keys=True, default=lambda one: one.key)

@@ -16,13 +16,14 @@ if TYPE_CHECKING:
 __all__ = ["ORDER", "Asked", "Schedule"]
 
 #: Views in the order in which they are computed.
-ORDER = ("orbit", "first look", "section", "diagram", "stability")
+ORDER = ("orbit", "recording", "first look", "section", "diagram", "stability")
 #: Short work: a newer request of the same view waits for it, so that a drawing follows a hand that moves.
-_CHEAP = ("orbit", "first look", "section")
+_CHEAP = ("orbit", "recording", "first look", "section")
 _PATIENCE = 1.0  # seconds after which short work is cancelled like any other
 _DEAF = 5.0  # seconds in which cancelled work must end by itself
 _PANEL = {
     "orbit": "portrait", "first look": "upper", "section": "section", "diagram": "upper", "stability": "readout",
+    "recording": "recording",
 }  # fmt: skip
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 from urllib.parse import parse_qsl, urlencode
 
-__all__ = ["CHOICES", "History", "State", "from_query", "to_query"]
+__all__ = ["CHOICES", "History", "State", "from_query", "to_query", "within"]
 
 #: Fields that hold one of these words, with what a person reads for it.
 CHOICES: dict[str, dict[str, str]] = {
@@ -139,6 +139,12 @@ def changed(state: State, name: str, value: Any, states: Sequence[str]) -> State
     if name in ("low", "high"):
         return state.but(name, number_of(value, name))
     raise ValueError(f"{name!r} is nothing that a view holds")
+
+
+def within(name: str, value: int) -> int:
+    """The nearest value that the page allows for a field that holds a whole number."""
+    least, most = _WHOLE[name]
+    return min(max(value, least), most)
 
 
 def number_of(value: Any, name: str) -> float:

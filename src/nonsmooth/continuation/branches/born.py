@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.continuation.march.arclength import Curve, Point
 from nonsmooth.continuation.problems.anchor import anchor_at
 from nonsmooth.continuation.problems.equilibrium import Equilibria
+from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
 from nonsmooth.continuation.problems.shooting import Shooting
 from nonsmooth.continuation.signature.rounds import Rounds
 from nonsmooth.continuation.signature.signature import Signature, Visit
@@ -24,7 +24,7 @@ SMALL = 1e-2  # amplitude of the first cycle, in units of the states' scales
 
 def first_cycle(
     system: System, name: str, value: float, mode: int, u: FloatArray, width: float
-) -> tuple[Curve, Point] | None:
+) -> tuple[Orbits, OrbitPoint] | None:
     r"""A small cycle :math:`u + \epsilon \, \mathrm{Re}(q e^{i \omega t})`, corrected to an orbit."""
     eigen = _rotation(system, name, value, mode, u, width)
     if eigen is None:
@@ -35,7 +35,7 @@ def first_cycle(
     own = own * np.exp(-1j * np.angle(np.sum(own**2 / scale**2)) / 2)
     shooting = Shooting(system, Signature((Visit(mode),)), 0, (name,))
     period = 2 * np.pi / omega
-    curve = Curve(shooting, scale, period, width)
+    curve = Orbits(shooting, scale, period, (width,))
     for amplitude in (SMALL, 0.3 * SMALL, 3 * SMALL):
         z = rested + amplitude * own.real
         anchor_at(shooting, shooting.values, z, scale)
@@ -43,10 +43,7 @@ def first_cycle(
         border = np.zeros(curve.n)
         border[: shooting.n] = own.real / scale
         border /= np.linalg.norm(border)
-        found = curve.correct(Y, border, float(border @ Y), most=20)
-        if found is None:
-            continue
-        point = curve.point(found[0], found[1], border)
+        point = curve.near(Y, border, most=20)
         if point is not None and np.nanmax(point.path.maximum - point.path.minimum) > 0:
             return curve, point
     return None
@@ -54,7 +51,7 @@ def first_cycle(
 
 def cycle_about_a_centre(
     system: System, name: str, value: float, mode: int, u: FloatArray, width: float
-) -> tuple[Curve, Point] | None:
+) -> tuple[Orbits, OrbitPoint] | None:
     r"""A cycle a little larger than the closed orbit of a linear mode that touches the mode's boundary.
 
     At a focus-centre every :math:`u + A \, \mathrm{Re}(q e^{i \theta})` within the mode is closed; the cycle leaves the
@@ -83,7 +80,7 @@ def cycle_about_a_centre(
         small, large = (small, middle) if margins(middle).max() >= 0.0 else (middle, large)
     scale = np.concatenate([np.abs(large * own).real.max() * np.ones(n), np.ones(len(system.memory))])
     period = 2 * np.pi / omega
-    curve = Curve(Shooting(system, Signature((Visit(mode),)), 0, (name,)), scale, period, width)
+    curve = Orbits(Shooting(system, Signature((Visit(mode),)), 0, (name,)), scale, period, (width,))
     rounds = Rounds(curve.shooting)
     inside = turns[int(margins(large).argmin())]
     for beyond in (0.03, 0.1, 0.01, 0.3):
@@ -96,9 +93,8 @@ def cycle_about_a_centre(
         border = np.zeros(fresh.n)
         border[: curve.shooting.n] = (X[: curve.shooting.n] - rested) / scale
         border /= np.linalg.norm(border)
-        found = fresh.correct(Y, border, float(border @ Y), most=20)
-        point = None if found is None else fresh.point(found[0], found[1], border)
-        if point is not None and (point.path.violation() >= 0.0).all():
+        point = fresh.near(Y, border, most=20)
+        if point is not None and not point.virtual:
             return fresh, point
     return None
 

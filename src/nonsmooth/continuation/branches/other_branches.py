@@ -18,12 +18,13 @@ from nonsmooth.continuation.branches.records import (
     joined,
     point_record,
 )
-from nonsmooth.continuation.march.arclength import Curve, Point
 from nonsmooth.continuation.march.begin import Asked, limits, resumed_at, sentence
-from nonsmooth.continuation.march.branch import march
+from nonsmooth.continuation.march.crossing import other_direction
+from nonsmooth.continuation.march.march import march
 from nonsmooth.continuation.march.marches import March, in_turn
 from nonsmooth.continuation.march.physical import allowed_range
-from nonsmooth.continuation.problems.multipliers import multipliers_of
+from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
+from nonsmooth.continuation.problems.shooting import Shooting
 from nonsmooth.errors import SolveError
 
 if TYPE_CHECKING:
@@ -37,8 +38,6 @@ AWAY = (1e-3, 3e-3, 3e-4, 1e-2, 1e-4)  # from a crossing of branches
 
 def switched(start: xr.Dataset, name: str | None, given: Any, asked: Asked) -> xr.Dataset:
     """The other branch through a special point."""
-    from nonsmooth.continuation.branches.switching import emanating
-
     system, kind, own, point, period_number, before = special_row(start, "continue_orbit")
     _check_parameter(name, own)
     low, high = limits(system, own, before if given is None else given, None)
@@ -51,19 +50,18 @@ def switched(start: xr.Dataset, name: str | None, given: Any, asked: Asked) -> x
     record = BranchRecord(own, (low, high), period_number, [point], [])
     curve, X = resumed_at(system, record, point, own, high - low)
     ways = emanating(curve, X, point.tangent / curve.scale, kind)
-    begun: list[tuple[Curve, Point]] = []
+    begun: list[tuple[Orbits, OrbitPoint]] = []
     for fresh, Y, direction in ways:
         for away in AWAY:
             guess = Y + away * direction
-            found = fresh.correct(guess, direction, float(direction @ guess))
-            first = None if found is None else fresh.point(found[0], found[1], direction)
-            if first is not None and (first.path.violation() >= 0.0).all():
+            first = fresh.near(guess, direction)
+            if first is not None and not first.virtual:
                 begun.append((fresh, first))
                 break
     if not begun:
         raise SolveError(f"no other branch was found at this {kind}", status="no_convergence")
     closed = (ways[0][0].shooting.signature, ways[0][1] * ways[0][0].scale)
-    marches = in_turn(*(partial(march, *point, asked.limits(bounds, closed), asked.first) for point in begun))
+    marches = in_turn(*(partial(march, *point, asked.limits(bounds, closed)) for point in begun))
     number = begun[0][0].shooting.period_number
     sentences = [sentence(one, bounds, own, (low, high)) for one in marches]
     forward = from_march(marches[0])
@@ -95,12 +93,11 @@ def straight_on(start: xr.Dataset, name: str | None, given: Any, asked: Asked) -
     curve, X = resumed_at(system, BranchRecord(own, (low, high), period_number, [point], []), point, own, high - low)
     border = point.tangent / curve.scale
     border /= np.linalg.norm(border)
-    found = curve.correct(X / curve.scale, border, float(border @ (X / curve.scale)))
-    first = None if found is None else curve.point(found[0], found[1], border)
+    first = curve.near(X / curve.scale, border)
     if first is None:
         raise SolveError(f"Newton's method did not converge at this {kind}", status="no_convergence")
     both = (first.turned(), first)
-    marches = in_turn(*(partial(march, curve, one, asked.limits(bounds), asked.first) for one in both))
+    marches = in_turn(*(partial(march, curve, one, asked.limits(bounds)) for one in both))
     points, special = joined(from_march(marches[0]), [point_record(curve, first)], from_march(marches[1]))
     here = one_row(start, "continue_orbit")
     mark = SpecialRecord(
@@ -134,8 +131,8 @@ def born(start: xr.Dataset, name: str | None, given: Any, asked: Asked) -> xr.Da
     # The first cycle of a Hopf point is small; about a centre the one that touches the boundary is followed back to.
     back = March(ending="branching")
     if kind == "focus_centre":
-        back = march(curve, first.turned(), asked.limits(bounds), asked.first)
-    found = march(curve, first, asked.limits(bounds), asked.first)
+        back = march(curve, first.turned(), asked.limits(bounds))
+    found = march(curve, first, asked.limits(bounds))
     words = "The branch begins at the Hopf point." if kind == "hopf" else sentence(back, bounds, own, (low, high))
     points, special = joined(from_march(back), [point_record(curve, first)], from_march(found))
     sentences = (words, sentence(found, bounds, own, (low, high)))
@@ -148,10 +145,44 @@ def _check_parameter(name: str | None, own: str) -> None:
         raise ValueError(f"this special point lies on a branch in {own!r}, not in {name!r}")
 
 
-def _origin(curve: Curve, Y: FloatArray, direction: FloatArray) -> PointRecord:
+def _origin(curve: Orbits, Y: FloatArray, direction: FloatArray) -> PointRecord:
     """The special point itself, as a point of the branch that leaves it."""
-    solved = curve.shooting.evaluate(Y * curve.scale)
-    path = curve.walk.along(solved, curve.shooting.split(solved.X)[1])
-    assert path is not None
-    M = solved.monodromy
-    return point_record(curve, Point(Y, direction, solved, M, multipliers_of(M), path, 0))
+    point = curve.described(Y, direction, 0.0, 0, curve.evaluate(Y))
+    assert point is not None
+    return point_record(curve, point)
+
+
+def doubled(shooting: Shooting, X: FloatArray) -> tuple[Shooting, FloatArray]:
+    """The same orbit gone round twice."""
+    n = shooting.period_number
+    times, states = shooting.split(X)
+    period = shooting.period(X)
+    signature = shooting.signature.repeated(2, n)
+    twice = Shooting(shooting.system, signature, 2 * n, shooting.active)
+    # The second round begins at the section within the last visit, which is not a crossing.
+    t2 = np.concatenate([times, times + period])
+    z2 = np.concatenate([states, states[1:]])
+    X2 = twice.join(t2, z2, 2 * period, X[shooting.size :])
+    twice.divided, twice.alone = 2 * shooting.divided, 2 * shooting.alone
+    if shooting.reference is not None:
+        twice.reference = shooting.reference
+    return twice, X2
+
+
+def emanating(
+    curve: Orbits, X: FloatArray, along: FloatArray, kind: str
+) -> list[tuple[Orbits, FloatArray, FloatArray]]:
+    """Curve, common point and direction of each new half branch at a special point.
+
+    A flip has one (the orbit begun a round later is the same orbit); a pitchfork or a branch point two.
+    """
+    if kind == "flip":
+        twice, X2 = doubled(curve.shooting, X)
+        fresh = Orbits(twice, curve.size, 2 * curve.period, curve.widths)
+        # Across the branch gone round twice: the null vector without a change of the parameter.
+        direction = other_direction(fresh, X2 / fresh.scale, None)
+        return [] if direction is None else [(fresh, X2 / fresh.scale, direction)]
+    direction = other_direction(curve, X / curve.scale, along / np.linalg.norm(along))
+    if direction is None:
+        return []
+    return [(curve, X / curve.scale, direction), (curve, X / curve.scale, -direction)]

@@ -12,8 +12,8 @@ from nonsmooth.continuation.problems.multipliers import stable_by
 from nonsmooth.continuation.signature.signature import Signature
 
 if TYPE_CHECKING:
-    from nonsmooth.continuation.march.arclength import Curve, Point
     from nonsmooth.continuation.march.marches import March, Special
+    from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
 
 __all__ = ["BranchRecord", "PointRecord", "SpecialRecord", "from_march", "joined"]
 
@@ -66,7 +66,7 @@ class BranchRecord:
     sentences: tuple[str, str] = ("", "")
 
 
-def point_record(curve: Curve, point: Point, virtual: bool = False) -> PointRecord:
+def point_record(curve: Orbits, point: OrbitPoint, virtual: bool = False) -> PointRecord:
     """Record of a solved point."""
     shooting, path = curve.shooting, point.path
     n_u = len(shooting.system.states)

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from nonsmooth.continuation.branches.orbit import Orbit
 from nonsmooth.continuation.branches.records import BranchRecord, PointRecord
-from nonsmooth.continuation.march.arclength import Curve
 from nonsmooth.continuation.march.marches import ENDINGS, Limits, March
 from nonsmooth.continuation.problems.anchor import anchor_at
+from nonsmooth.continuation.problems.orbits import Orbits
 from nonsmooth.continuation.problems.shooting import Shooting
 from nonsmooth.continuation.problems.surfaces import look_at_surfaces
 from nonsmooth.errors import shortened
@@ -21,10 +21,9 @@ from nonsmooth.flow.arguments import real_number
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["FIRST", "Asked", "curve_of", "largest_step", "limits", "resumed_at", "sentence", "size_of"]
+__all__ = ["Asked", "curve_of", "largest_step", "limits", "resumed_at", "sentence", "size_of"]
 
 FloatArray = NDArray[np.float64]
-FIRST = 1e-3  # step
 
 
 @dataclass(frozen=True)
@@ -37,12 +36,7 @@ class Asked:
 
     def limits(self, bounds: tuple[float, float], closed: Any = None) -> Limits:
         """Return the limits of a march within ``bounds``."""
-        return Limits(*bounds, self.step, self.points, closed, self.virtual)
-
-    @property
-    def first(self) -> float:
-        """The first step."""
-        return min(FIRST, self.step)
+        return Limits(((-1, *bounds),), self.step, self.points, closed, self.virtual)
 
     def options(self, name: str, given: tuple[float, float], **more: Any) -> dict[str, Any]:
         """The record of the options in the result."""
@@ -85,7 +79,7 @@ def size_of(maximum: FloatArray, minimum: FloatArray, system: System) -> FloatAr
     return np.concatenate([np.where(still, np.maximum(half, largest), half), np.ones(len(system.memory))])
 
 
-def curve_of(orbit: Orbit, name: str, width: float) -> tuple[Curve, FloatArray]:
+def curve_of(orbit: Orbit, name: str, width: float) -> tuple[Orbits, FloatArray]:
     """The curve through an orbit, and its unknowns."""
     system = orbit.system
     shooting = Shooting(system, orbit.signature, orbit.period_number, (name,))
@@ -96,7 +90,7 @@ def curve_of(orbit: Orbit, name: str, width: float) -> tuple[Curve, FloatArray]:
         orbit.crossing_times, np.vstack([section, orbit.crossing_states]), orbit.period, [system.values[name]]
     )
     look_at_surfaces(shooting, X)
-    return Curve(shooting, size, orbit.period, width), X
+    return Orbits(shooting, size, orbit.period, (width,)), X
 
 
 def sentence(found: March, bounds: tuple[float, float], name: str, asked: tuple[float, float]) -> str:
@@ -112,10 +106,10 @@ def sentence(found: March, bounds: tuple[float, float], name: str, asked: tuple[
 
 def resumed_at(
     system: System, record: BranchRecord, point: PointRecord, name: str, width: float
-) -> tuple[Curve, FloatArray]:
+) -> tuple[Orbits, FloatArray]:
     """The curve through a recorded point."""
     shooting = Shooting(system, point.signature, record.period_number, (name,))
     size = size_of(point.maximum, point.minimum, system)
     anchor_at(shooting, shooting.parameters(point.X), point.X[: shooting.n], size)
     look_at_surfaces(shooting, point.X)
-    return Curve(shooting, size, point.period, width), point.X
+    return Orbits(shooting, size, point.period, (width,)), point.X

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.continuation.march.arclength import Curve, Point
-from nonsmooth.continuation.signature.grazing import Graze
-from nonsmooth.continuation.signature.signature import Signature
 from nonsmooth.errors import Interrupted
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from nonsmooth.continuation.march.arclength import Curve, Point
+    from nonsmooth.continuation.signature.grazing import Graze
+
 __all__ = [
-    "ENDINGS", "INTERRUPTED", "Limits", "March", "Place", "Row", "Special", "in_turn", "march_until",
+    "ENDINGS", "INTERRUPTED", "Limits", "March", "Place", "Row", "Special", "both_ways", "in_turn",
     "unless_interrupted",
 ]  # fmt: skip
 
@@ -55,35 +55,21 @@ ENDINGS = {
 }
 
 
-class Marched(Protocol):
-    """Any march: of orbits, of special points, of equilibria."""
-
-    ending: str
-
-
-M = TypeVar("M", bound=Marched)
-
-
-def march_until(found: M, follow: Callable[..., None], *arguments: Any) -> M:
-    """March into ``found`` by ``follow(found, *arguments)`` until the branch ends, or Ctrl-C ends it."""
-    try:
-        follow(found, *arguments)
-    except KeyboardInterrupt:  # unless_interrupted raises it again, with what was found
-        found.ending = "interrupted"
-    return found
-
-
-def in_turn(*begin: Callable[[], M]) -> list[M]:
+def in_turn(*begin: Callable[[], March]) -> list[March]:
     """Marches, one after the other; empty ones after one that came round to its beginning or was interrupted."""
-    found: list[M] = []
+    found: list[March] = []
     for one in begin:
-        if found and found[-1].ending in ("closed", "interrupted"):
-            empty = type(found[-1])()
-            empty.ending = found[-1].ending
-            found.append(empty)
-        else:
-            found.append(one())
+        ended = bool(found) and found[-1].ending in ("closed", "interrupted")
+        found.append(March(ending=found[-1].ending) if ended else one())
     return found
+
+
+def both_ways(back: March, first: Row, ahead: March) -> tuple[list[Row], list[tuple[str, int]]]:
+    """Rows of a march back, reversed, the first point, a march ahead; special points with their places."""
+    n = len(back.rows)
+    special = [(one.kind, n - 1 - one.row) for one in back.special[::-1]]
+    special += [(one.kind, n + 1 + one.row) for one in ahead.special]
+    return [*back.rows[::-1], first, *ahead.rows], special
 
 
 def unless_interrupted(result: xr.Dataset, endings: Sequence[str]) -> xr.Dataset:
@@ -97,16 +83,16 @@ def unless_interrupted(result: xr.Dataset, endings: Sequence[str]) -> xr.Dataset
     )
 
 
-#: Signature and unknowns of an orbit.
-Place = tuple[Signature, NDArray[np.float64]]
+#: The word of a curve (of orbits: the signature), and the unknowns.
+Place = tuple[Any, NDArray[np.float64]]
 
 
 @dataclass
 class Row:
     """One point of the branch with the curve it lies on; ``virtual`` beyond a boundary that its path should obey."""
 
-    curve: Curve
-    point: Point
+    curve: Any
+    point: Any
     virtual: bool = False
 
 
@@ -115,8 +101,8 @@ class Special:
     """A special point: its kind, its place among the rows, and what belongs to its kind."""
 
     kind: str
-    curve: Curve
-    point: Point
+    curve: Any
+    point: Any
     row: int = -1
     indicator: int = -1
     graze: Graze | None = None
@@ -124,17 +110,17 @@ class Special:
 
 @dataclass
 class March:
-    """Rows in the order of the march, special points, and the ending (a key of ``ENDINGS``)."""
+    """Rows in the order of the march, special points, and the ending (a key of the curve's ``endings``)."""
 
     rows: list[Row] = field(default_factory=list)
     special: list[Special] = field(default_factory=list)
     ending: str = "points"
 
-    def add(self, curve: Curve, point: Point) -> None:
+    def add(self, curve: Curve[Any], point: Point) -> None:
         """Append a point."""
-        self.rows.append(Row(curve, point, bool((point.path.violation() < 0.0).any())))
+        self.rows.append(Row(curve, point, point.virtual))
 
-    def mark(self, kind: str, curve: Curve, point: Point, *, virtual: bool = False, **more: Any) -> None:
+    def mark(self, kind: str, curve: Curve[Any], point: Point, *, virtual: bool = False, **more: Any) -> None:
         """Append a special point, and a row for it; on a boundary itself no path is virtual."""
         self.rows.append(Row(curve, point, virtual))
         self.special.append(Special(kind, curve, point, len(self.rows) - 1, **more))
@@ -144,8 +130,7 @@ class March:
 class Limits:
     """Limits of a march."""
 
-    low: float
-    high: float
+    box: tuple[tuple[int, float, float], ...]  # place of a parameter among the unknowns, low, high
     largest: float  # step
     points: int
     closed: Place | None = None  # where the branch would close

@@ -17,90 +17,130 @@ grazing             grazing_fold det(I - M), grazing_flip det(I + M), for M- and
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from nonsmooth.continuation.march.roots import zero_on
+from nonsmooth.continuation.march.event import Event, Step, locate
 from nonsmooth.continuation.problems.multipliers import product_of_pairs, without_own
 from nonsmooth.continuation.problems.normal_form import flip_coefficient, torus_coefficient
-from nonsmooth.continuation.signature.change import contacts
+from nonsmooth.continuation.signature.change import inserted
 from nonsmooth.continuation.signature.grazing import both_sides
 
 if TYPE_CHECKING:
-    from nonsmooth.continuation.march.arclength import Point
     from nonsmooth.continuation.problems.locus import Locus
+    from nonsmooth.continuation.problems.orbits import OrbitPoint
 
-__all__ = ["ENDED", "Second", "name_of", "numbers", "root", "sign_changes"]
+__all__ = ["kinds_on"]
 
-FloatArray = NDArray[np.float64]
 PAIR = 1e-6  # imaginary part of a complex pair
 NOISE = 1e-6  # a coefficient that stays below this balance vanishes all along (an area-preserving map)
 POLE = 1e-3  # of the numbers at both ends: one that is larger at its root has gone through infinity
-COEFFICIENTS = ("generalised_flip", "chenciner")
-#: Names of the numbers of a grazing curve that stand for the same point seen from the other side.
-_NAMES = {"contact_fold": "grazing_fold", "contact_flip": "grazing_flip"}
 #: Points at which a Neimark-Sacker curve ends: beyond, the two multipliers are real.
 ENDED = ("resonance_1_1", "resonance_1_2")
+Number = Callable[["Locus", "OrbitPoint"], float]
 
 
-def name_of(number: str) -> str:
-    """The point of codimension two at which a number vanishes."""
-    return _NAMES.get(number, number)
+class CodimensionTwo(Event):
+    """A second number vanishes on a curve of special points."""
+
+    certain = False
+
+    def __init__(self, name: str, number: Number) -> None:
+        self.name, self._number = name, number
+
+    def number(self, curve: Any, point: Any) -> float:
+        """The number."""
+        return self._number(curve, point)
+
+    def named(self, step: Step, point: Any) -> tuple[str, str | None] | None:
+        """Its name; None where the number went through infinity."""
+        was, now = (self.number(step.curve, end) for end in (step.a, step.b))
+        if abs(self.number(step.curve, point)) > POLE * max(abs(was), abs(now)):
+            return None
+        return self.name, None
 
 
-def numbers(locus: Locus, place: Point) -> dict[str, float]:
-    """The numbers at one place of a curve, in the order of the table above."""
-    found = _of_multipliers(locus, place)
-    if locus.shooting.forced and locus.kind == "flip":
-        found["generalised_flip"] = _coefficient(locus, place)[0]
-    elif locus.shooting.forced and locus.kind == "neimark_sacker":
-        found["chenciner"] = _coefficient(locus, place)[0]
-    return found
+class OfPair(CodimensionTwo):
+    """A number of the pair on the unit circle of a Neimark-Sacker curve; at 1 and -1 the curve ends."""
+
+    def named(self, step: Step, point: Any) -> tuple[str, str | None] | None:
+        """Its name; None where the pair is real."""
+        if self.name in ENDED:
+            return self.name, "resonance"
+        return super().named(step, point) if np.abs(point.multipliers.imag).max() >= PAIR else None
 
 
-def _of_multipliers(locus: Locus, place: Point) -> dict[str, float]:
-    M, forced = place.M, locus.shooting.forced
-    at_one = 0 if forced else 1  # derivatives of p that vanish at 1 anyway
-    p = np.poly(M)
-    enough = len(M) >= (2 if forced else 3)
-    found: dict[str, float] = {}
-    if locus.kind == "fold":
-        found["fold_flip"] = float(np.polyval(p, -1.0))
-        if enough:
-            found["resonance_1_1"] = _derivative(p, 1.0, at_one + 1)
-            found["fold_neimark_sacker"] = _others(locus, place, 1.0)
-    elif locus.kind == "flip":
-        found["fold_flip"] = _derivative(p, 1.0, at_one)
-        if enough:
-            found["resonance_1_2"] = _derivative(p, -1.0, 1)
-            found["flip_neimark_sacker"] = _others(locus, place, -1.0)
-    elif locus.kind == "neimark_sacker":
-        i, j = _pair(place, forced)
-        mu = place.multipliers
-        total = float((mu[i] + mu[j]).real)
-        found = {"resonance_1_1": total - 2.0, "resonance_1_2": total + 2.0, "resonance_1_3": total + 1.0,
-                 "resonance_1_4": total}  # fmt: skip
-        rest = without_own(np.delete(mu, [i, j]), forced)
-        if len(rest):
-            found["fold_neimark_sacker"] = float(np.prod(1.0 - rest).real)
-            found["flip_neimark_sacker"] = float(np.prod(1.0 + rest).real)
-    elif locus.kind == "grazing":
-        found["grazing_fold"] = _derivative(p, 1.0, at_one)
-        found["grazing_flip"] = float(np.linalg.det(M + np.eye(len(M))))
-        if forced:
-            found |= _with_contact(locus, place)
-    return found
+class Coefficient(CodimensionTwo):
+    """The coefficient of a normal form vanishes."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(name, lambda curve, point: _coefficient(curve, point)[0])
+
+    def happened(self, step: Step, was: float, now: float) -> bool:
+        """Return whether its sign changes, and it is not zero all along."""
+        balance = (abs(_coefficient(step.curve, end)[1]) for end in (step.a, step.b))
+        return was * now < 0.0 and max(balance) >= NOISE
 
 
-def _coefficient(locus: Locus, place: Point) -> tuple[float, float]:
+class Cusp(Event):
+    """Both parameters turn round together."""
+
+    name = "cusp"
+    certain = False
+
+    def number(self, curve: Any, point: Any) -> float:
+        """Nothing to watch at one point: two directions are compared."""
+        return np.nan
+
+    def happened(self, step: Step, was: float, now: float) -> bool:
+        """Return whether the direction of the parameters turns on the step."""
+        return float(step.a.tangent[-2:] @ step.b.tangent[-2:]) < 0.0
+
+    def located(self, step: Step) -> tuple[float, Any] | None:
+        """The zero of the direction's component along the earlier one."""
+        before = step.a.tangent[-2:]
+        return locate(step, lambda point: float(point.tangent[-2:] @ before))
+
+
+def kinds_on(kind: str, forced: bool) -> tuple[Event, ...]:
+    """The points of codimension two that curves of one kind are searched for."""
+    own = 0 if forced else 1  # derivatives of p that vanish at 1 anyway
+    if kind == "fold":
+        return (
+            CodimensionTwo("fold_flip", _polynomial(-1.0, 0)),
+            CodimensionTwo("resonance_1_1", _polynomial(1.0, own + 1)),
+            CodimensionTwo("fold_neimark_sacker", _others(1.0)),
+            Cusp(),
+        )
+    if kind == "flip":
+        found: tuple[Event, ...] = (
+            CodimensionTwo("fold_flip", _polynomial(1.0, own)),
+            CodimensionTwo("resonance_1_2", _polynomial(-1.0, 1)),
+            CodimensionTwo("flip_neimark_sacker", _others(-1.0)),
+        )
+        return (*found, Coefficient("generalised_flip")) if forced else found
+    if kind == "neimark_sacker":
+        found = (
+            *(OfPair(name, _sum_and(x)) for name, x in (("resonance_1_1", -2.0), ("resonance_1_2", 2.0),
+                                                        ("resonance_1_3", 1.0), ("resonance_1_4", 0.0))),
+            OfPair("fold_neimark_sacker", _rest(-1.0)), OfPair("flip_neimark_sacker", _rest(1.0)),
+        )  # fmt: skip
+        return (*found, Coefficient("chenciner")) if forced else found
+    found = (
+        CodimensionTwo("grazing_fold", _polynomial(1.0, own)),
+        CodimensionTwo("grazing_flip", lambda _, place: float(np.linalg.det(place.M + np.eye(len(place.M))))),
+    )
+    contact = (CodimensionTwo(name, _with_contact(x)) for name, x in (("grazing_fold", -1.0), ("grazing_flip", 1.0)))
+    return (*found, *contact) if forced else found
+
+
+def _coefficient(locus: Locus, place: OrbitPoint) -> tuple[float, float]:
     """The normal form's coefficient and its balance, on a curve of flips or of Neimark-Sacker points; NaN: none."""
     try:
         if locus.kind == "flip":
             return flip_coefficient(locus.shooting, place.solved, locus.scale)
-        mu = complex(place.multipliers[_pair(place, locus.shooting.forced)[0]])
+        mu = complex(place.multipliers[_pair(locus, place)[0]])
         if abs(mu.imag) > PAIR:
             return torus_coefficient(locus.shooting, place.solved, locus.scale, mu)
     except np.linalg.LinAlgError:  # at a resonance or another multiplier 1 there is none
@@ -108,23 +148,56 @@ def _coefficient(locus: Locus, place: Point) -> tuple[float, float]:
     return np.nan, np.nan
 
 
-def _derivative(p: Any, x: float, order: int) -> float:
-    return float(np.polyval(np.polyder(p, order), x)) if order else float(np.polyval(p, x))
+def _polynomial(x: float, order: int) -> Number:
+    """The characteristic polynomial of M or a derivative at x; NaN where too few multipliers are left for it."""
+
+    def number(locus: Locus, place: OrbitPoint) -> float:
+        least = 2 if locus.shooting.forced else 3
+        if order > (0 if locus.shooting.forced or x != 1.0 else 1) and len(place.M) < least:
+            return np.nan
+        p = np.poly(place.M)
+        return float(np.polyval(np.polyder(p, order), x)) if order else float(np.polyval(p, x))
+
+    return number
 
 
-def _others(locus: Locus, place: Point, own: float) -> float:
+def _others(own: float) -> Number:
     """prod (mu_i mu_j - 1) of the multipliers without the critical one; NaN without a complex pair."""
-    mu = np.delete(place.multipliers, np.abs(place.multipliers - own).argmin())
-    mu = without_own(mu, locus.shooting.forced)
-    return product_of_pairs(mu) if (np.abs(mu.imag) > PAIR).any() else np.nan
+
+    def number(locus: Locus, place: OrbitPoint) -> float:
+        mu = np.delete(place.multipliers, np.abs(place.multipliers - own).argmin())
+        mu = without_own(mu, locus.shooting.forced)
+        return product_of_pairs(mu) if (np.abs(mu.imag) > PAIR).any() else np.nan
+
+    return number
 
 
-def _pair(place: Point, forced: bool) -> tuple[int, int]:
+def _sum_and(x: float) -> Number:
+    """The sum of the pair on the unit circle, and x."""
+
+    def number(locus: Locus, place: OrbitPoint) -> float:
+        i, j = _pair(locus, place)
+        return float((place.multipliers[i] + place.multipliers[j]).real) + x
+
+    return number
+
+
+def _rest(sign: float) -> Number:
+    """prod (1 +- mu) of the multipliers without the pair; NaN where there are none."""
+
+    def number(locus: Locus, place: OrbitPoint) -> float:
+        rest = without_own(np.delete(place.multipliers, _pair(locus, place)), locus.shooting.forced)
+        return float(np.prod(1.0 + sign * rest).real) if len(rest) else np.nan
+
+    return number
+
+
+def _pair(locus: Locus, place: OrbitPoint) -> tuple[int, int]:
     """The two multipliers whose product is 1."""
     mu = place.multipliers
     i, j = np.triu_indices(len(mu), 1)
     far = np.abs(mu[i] * mu[j] - 1.0)
-    if not forced:  # the own multiplier 1 is none of them, unless it has become double
+    if not locus.shooting.forced:  # the own multiplier 1 is none of them, unless it has become double
         own = int(np.abs(mu - 1.0).argmin())
         if len(mu) > 2:
             far[(i == own) | (j == own)] = np.inf
@@ -132,60 +205,18 @@ def _pair(place: Point, forced: bool) -> tuple[int, int]:
     return (int(i[at]), int(j[at])) if mu[i[at]].imag >= 0.0 else (int(j[at]), int(i[at]))
 
 
-def _with_contact(locus: Locus, place: Point) -> dict[str, float]:
-    """det(I -+ M+); where M+ is unbounded (a rigid impact), its leading coefficient."""
-    as_curve: Any = locus  # what is asked of a curve here is its shooting and its walk
-    for change in contacts(as_curve, place, "touch"):
-        M, far, near = both_sides(locus.shooting, place.solved, change)
-        if not (np.isfinite(far).all() and np.isfinite(near).all()):
-            continue
-        one = np.eye(len(M))
-        if np.abs(near).max() < 1.5 * np.abs(far).max():
-            limit = 2 * near - far
-            fold, flip = (float(np.linalg.det(one + sign * limit)) for sign in (-1.0, 1.0))
-            return {"contact_fold": fold, "contact_flip": flip}
-        size = np.abs(far).max()
-        return {
-            name: float(np.linalg.det(one + sign * near) - np.linalg.det(one + sign * far)) / size
-            for name, sign in (("contact_fold", -1.0), ("contact_flip", 1.0))
-        }
-    return {}
+def _with_contact(sign: float) -> Number:
+    """det(I +- M+); where M+ is unbounded (a rigid impact), its leading coefficient."""
 
+    def number(locus: Locus, place: OrbitPoint) -> float:
+        for change in inserted(locus, place):
+            M, far, near = both_sides(locus.shooting, place.solved, change)
+            if not (np.isfinite(far).all() and np.isfinite(near).all()):
+                continue
+            one = np.eye(len(M))
+            if np.abs(near).max() < 1.5 * np.abs(far).max():
+                return float(np.linalg.det(one + sign * (2 * near - far)))
+            return float(np.linalg.det(one + sign * near) - np.linalg.det(one + sign * far)) / np.abs(far).max()
+        return np.nan
 
-def sign_changes(locus: Locus, a: Point, b: Point, before: dict[str, float], after: dict[str, float],
-                 stop: float) -> list[tuple[float, str, Point]]:  # fmt: skip
-    """Points of codimension two between two places of a curve, nearer to the first than ``stop``."""
-    found: list[tuple[float, str, Point]] = []
-    for name, was in before.items():
-        now = after.get(name, np.nan)
-        if not was * now < 0.0:
-            continue
-        if name in COEFFICIENTS and max(abs(_coefficient(locus, place)[1]) for place in (a, b)) < NOISE:
-            continue
-        second = Second(locus, name)
-        there = root(locus, a, b, second)
-        if there is None or there[0] >= stop or abs(second(there[1])) > POLE * max(abs(was), abs(now)):
-            continue
-        if locus.kind == "neimark_sacker" and name not in ENDED and abs(np.abs(there[1].multipliers.imag).max()) < PAIR:
-            continue
-        found.append((there[0], name_of(name), there[1]))
-    return found
-
-
-@dataclass
-class Second:
-    """The number that vanishes at a point of codimension two."""
-
-    locus: Locus
-    name: str
-
-    def __call__(self, place: Point) -> float:
-        if self.name in COEFFICIENTS:
-            return _coefficient(self.locus, place)[0]
-        return _of_multipliers(self.locus, place).get(self.name, np.nan)
-
-
-def root(locus: Locus, a: Point, b: Point, number: Callable[[Point], float]) -> tuple[float, Point] | None:
-    """The zero of ``number`` on the curve between two of its places: its distance from the first, and the place."""
-    end = float(a.tangent @ (b.Y - a.Y))
-    return zero_on(lambda s: a if s == 0.0 else b if s == end else locus.between(a, b, s), end, number)
+    return number

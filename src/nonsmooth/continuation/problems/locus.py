@@ -1,4 +1,4 @@
-r"""Loci of special points in two parameters.
+r"""Curves of special points in two parameters.
 
 The equations of the orbit, F(X, p_1, p_2) = 0, and one more, psi = 0:
 
@@ -14,30 +14,47 @@ psi is differentiated by central differences, in the unknowns and in both parame
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.continuation.march.arclength import Point
+from nonsmooth.continuation.march.marches import INTERRUPTED
+from nonsmooth.continuation.problems.codimension_two import kinds_on
 from nonsmooth.continuation.problems.multipliers import multipliers_of, product_of_pairs, without_own
+from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
 from nonsmooth.continuation.problems.solve import determinant
-from nonsmooth.continuation.signature.path import Walk
 
 if TYPE_CHECKING:
+    from nonsmooth.continuation.march.event import Met, Step
+    from nonsmooth.continuation.march.marches import March
     from nonsmooth.continuation.problems.shooting import Shooting, Solved
 
 __all__ = ["KINDS", "Locus"]
 
 FloatArray = NDArray[np.float64]
-KINDS = ("fold", "flip", "neimark_sacker", "grazing")
+#: The kinds that have curves, each with the point of codimension two at which its curve meets a graze.
+KINDS = {
+    "fold": "grazing_fold", "flip": "grazing_flip", "neimark_sacker": "grazing_neimark_sacker",
+    "grazing": "double_grazing",
+}  # fmt: skip
+ENDS = {
+    "range": "The curve reached the edge of the box.",
+    "closed": "The curve came back to where it began.",
+    "points": "The largest number of points was reached.",
+    "no_convergence": "Newton's method did not converge, however small the step.",
+    "grazing": "A contact begins or ends here: beyond this point the orbit has another signature.",
+    "corner": "The orbit meets the corner of two boundaries: beyond this point it has another signature.",
+    "resonance": "Both multipliers meet on the real axis: beyond this point they are real, and there is no torus.",
+    "interrupted": f"{INTERRUPTED}.",
+}
 STEP = 1e-6  # of central differences, in scaled unknowns
-MOST = 8
-DONE = 1e-11
+KEPT = 1e-3  # in scaled unknowns: so far the gradient of psi serves Newton's method
 CLOSE = 2e-12
 
 
-class Locus:
+class Locus(Orbits):
     """A curve of special points of one kind, of orbits with one signature.
 
     Parameters
@@ -50,18 +67,17 @@ class Locus:
         Sizes of the states, the times and the two parameters.
     """
 
+    endings = ENDS
+    tolerance = 1e-11  # the gradient of psi is not exact: no step is followed by one of its square
+
     def __init__(
         self, shooting: Shooting, kind: str, size: FloatArray, period: float, widths: tuple[float, float]
     ) -> None:
-        self.shooting, self.kind, self.walk = shooting, kind, Walk(shooting)
-        m = shooting.m
-        scale = shooting.join(np.full(m, period), np.tile(size, (m + 1, 1)), period, widths)
-        scale[: shooting.size] *= np.sqrt(m + 1)
-        self.scale, self.size, self.period, self.widths = scale, size, period, widths
-        self.rows = 1.0 / scale[: shooting.size]
-        self.n = shooting.size + 2
+        super().__init__(shooting, size, period, widths)
+        self.kind, self.kinds = kind, kinds_on(kind, shooting.forced)
         self._eye = np.eye(shooting.n)
         self._unit = 1.0  # of psi
+        self._gradient: tuple[FloatArray, FloatArray] | None = None  # the last one, and its place
         self.touched: tuple[int, int] | None = None  # (visit, transition) of a grazing curve
 
     def psi(self, solved: Solved) -> float:
@@ -95,70 +111,34 @@ class Locus:
             ahead, behind = Y.copy(), Y.copy()
             ahead[j] += STEP
             behind[j] -= STEP
-            above, below = (self.shooting.evaluate(Z * self.scale) for Z in (ahead, behind))
-            g[j] = (self.psi(above) - self.psi(below)) / (2 * STEP)
+            g[j] = (self.psi(self.evaluate(ahead)) - self.psi(self.evaluate(behind))) / (2 * STEP)
         return g
 
-    def _matrix(self, solved: Solved, gradient: FloatArray, border: FloatArray) -> FloatArray:
-        matrix = np.empty((self.n, self.n))
-        matrix[:-2] = solved.jacobian * self.rows[:, None] * self.scale
-        matrix[-2], matrix[-1] = gradient, border
-        return matrix
+    def fill(self, solved: Solved, matrix: FloatArray) -> None:
+        """Put the Jacobian and the gradient of psi into ``matrix``; one that was taken near by serves."""
+        super().fill(solved, matrix)
+        Y = solved.X / self.scale
+        if self._gradient is None or not np.abs(Y - self._gradient[1]).max() < KEPT:
+            self._gradient = self.gradient(Y), Y
+        matrix[-1] = self._gradient[0]
 
-    def correct(
-        self, Y: FloatArray, border: FloatArray, level: float, *, tolerance: float = DONE, most: int = MOST,
-        gradient: FloatArray | None = None,
-    ) -> tuple[Solved, FloatArray, FloatArray, int] | None:  # fmt: skip
-        """Newton for F = 0, psi = 0, border . Y = level; the gradient of psi is renewed where it converges slowly."""
-        last = np.inf
-        if gradient is None:
-            gradient = self.gradient(Y)
-        for i in range(most):
-            solved = self.shooting.evaluate(Y * self.scale)
-            right = np.concatenate([solved.residual * self.rows, [self.psi(solved), border @ Y - level]])
-            if not np.isfinite(right).all():
-                return None
-            try:
-                step = np.linalg.solve(self._matrix(solved, gradient, border), right)
-            except np.linalg.LinAlgError:
-                return None
-            length = float(np.abs(step).max())
-            if not length < 1e2:
-                return None
-            if length < tolerance or (i > 4 and length < 1e-10):
-                return solved, Y, gradient, i
-            Y = Y - step
-            if length > 0.05 * last and length > 1e3 * tolerance:
-                gradient = self.gradient(Y)
-            last = length
-        return None
+    def residual(self, solved: Solved) -> FloatArray:
+        """The scaled residual, and psi."""
+        return np.append(super().residual(solved), self.psi(solved))
 
-    def place(self, found: tuple[Solved, FloatArray, FloatArray, int], border: FloatArray) -> Point | None:
-        """A solved point with its tangent (along ``border``), multipliers and path."""
-        solved, Y, _, iterations = found
-        gradient = self.gradient(Y)
-        right = np.zeros(self.n)
-        right[-1] = 1.0
-        try:
-            t = np.linalg.solve(self._matrix(solved, gradient, border), right)
-        except np.linalg.LinAlgError:
-            return None
-        length = float(np.linalg.norm(t))
-        path = self.walk.along(solved, self.shooting.split(solved.X)[1])
-        if not np.isfinite(length) or path is None:
-            return None
-        M = solved.monodromy
-        return Point(Y, np.asarray(t / length, dtype=float), solved, M, multipliers_of(M), path, iterations)
+    def point(self, solved: Solved, Y: FloatArray, border: FloatArray, iterations: int = 0) -> OrbitPoint | None:
+        """A solved point, its tangent by a gradient of its own."""
+        self._gradient = None
+        return super().point(solved, Y, border, iterations)
 
-    def first(self, X: FloatArray) -> Point | None:
+    def first(self, X: FloatArray) -> OrbitPoint | None:
         """The locus at a special point: the shortest correction, and a tangent of either sense."""
         Y = X / self.scale
         self.calibrate(Y)
-        for _ in range(3 * MOST):
-            solved = self.shooting.evaluate(Y * self.scale)
-            gradient = self.gradient(Y)
-            matrix = self._matrix(solved, gradient, np.zeros(self.n))[:-1]
-            right = np.append(solved.residual * self.rows, self.psi(solved))
+        for _ in range(3 * self.most):
+            self._gradient = None
+            solved = self.evaluate(Y)
+            matrix, right = self.bordered(solved, np.zeros(self.n))[:-1], self.residual(solved)
             if not (np.isfinite(matrix).all() and np.isfinite(right).all()):
                 return None
             step = np.linalg.lstsq(matrix, right, rcond=1e-12)[0]
@@ -167,22 +147,34 @@ class Locus:
                 break
         else:
             return None
-        _, values, vectors = np.linalg.svd(matrix)
-        if values[-1] < 1e-9 * values[0]:
-            return None
-        solved = self.shooting.evaluate(Y * self.scale)
-        return self.place((solved, Y, gradient, 0), vectors[-1])
+        solved = self.evaluate(Y)
+        null = self.null_vectors(solved, 1e-9)
+        return self.point(solved, Y, null[-1]) if len(null) == 1 else None
 
-    def step(self, place: Point, ds: float) -> Point | None:
-        """The point at distance ds along the tangent."""
-        Y = place.Y + ds * place.tangent
-        found = self.correct(Y, place.tangent, float(place.tangent @ Y))
-        return None if found is None else self.place(found, place.tangent)
+    def word(self) -> Any:
+        """The kind."""
+        return self.kind
 
-    def between(self, a: Point, b: Point, s: float) -> Point | None:
-        """The point at distance s from ``a`` towards ``b``, to the last digits."""
-        end = float(a.tangent @ (b.Y - a.Y))
-        Y = a.Y + s / end * (b.Y - a.Y)
-        level = float(a.tangent @ a.Y) + s
-        found = self.correct(Y + (level - a.tangent @ Y) * a.tangent, a.tangent, level, tolerance=CLOSE, most=2 * MOST)
-        return None if found is None else self.place(found, a.tangent)
+    def margins(self, point: OrbitPoint) -> FloatArray:
+        """Margins of the path to its boundaries; on a grazing curve by another touch than its own."""
+        path = point.path
+        if self.kind == "grazing":
+            inner = path.inner.copy()
+            inner[self.touched or path.touched] = -np.inf
+            path = replace(path, touch=float(inner.max(initial=-np.inf)))
+        return path.margins
+
+    def unseen(self, step: Step) -> None:
+        """Nothing: no round shows a path that only touches."""
+
+    def behind(self, found: March, met: list[Met]) -> None:
+        """Record the point at which the curve meets a graze or a corner; it ends there."""
+        found.ending = met[0].name
+        found.mark(KINDS[self.kind] if met[0].name == "grazing" else met[0].name, self, met[0].point)
+
+    def over(self, point: OrbitPoint) -> None:
+        """Nothing: no curve ends with a point of its own."""
+
+    def why(self, point: OrbitPoint) -> str:
+        """Return ``no_convergence``: the box was cut to what the equations allow."""
+        return "no_convergence"

@@ -94,7 +94,10 @@ def _vectors(A: FloatArray, at: complex) -> tuple[Any, Any, complex]:
     values, left = np.linalg.eig(A.T)
     p = left[:, int(np.abs(values - np.conj(mu)).argmin())]
     q = q / np.linalg.norm(q)
-    return q, p / np.conj(np.vdot(p, q)), complex(mu)
+    along = np.vdot(p, q)
+    if along == 0.0:
+        raise np.linalg.LinAlgError("the eigenvalue is double: its eigenvectors are orthogonal")
+    return q, p / np.conj(along), complex(mu)
 
 
 def _summed(terms: list[complex]) -> tuple[float, float]:

@@ -105,6 +105,8 @@ class Shooting:
         self.at_once = [v.row == AT_ONCE for v in signature.crossings]
         self._one = np.eye(n)
         self._columns = self.z_at[:, None] + np.arange(n)
+        after = self._columns[1:].ravel()  # the states after the transitions, in their own equations
+        self._after = after * (self.size + a) + after
         self.reference: tuple[FloatArray, FloatArray] | None = None  # autonomous, no crossings: (z_ref, f_ref)
         self.tried: Solved | None = None
         self.alone = [False] * m  # crossings whose other rows vanish together with the one that fires
@@ -169,72 +171,49 @@ class Shooting:
 
     def evaluate(self, X: FloatArray) -> Solved:
         """Residual and Jacobian at X."""
-        n, m, a, size = self.n, self.m, self.n_active, self.size
+        n, m, size = self.n, self.m, self.size
         values = self.parameters(X)
         t, z = self.split(X)
-        if self.forced:
-            T, dT = self.flow.period(values)
-            end = self.period_number * T
-        else:
-            T, dT, end = float(X[size - 1]), np.zeros(a), float(X[size - 1])
-        times = self.instants(X)
+        T, dT = self.flow.period(values) if self.forced else (float(X[size - 1]), np.zeros(self.n_active))
+        end = self.period_number * T if self.forced else T
+        times = np.concatenate([[0.0], t, [end]])
         lengths = np.diff(times)
         lengths[np.abs(lengths) < ROUNDING * abs(end)] = 0.0  # the step of the next visit is not begun from rounding
         segments = self.flow.segments(values, self.modes, times[:-1], lengths, z)
-        F, J = np.zeros(size), np.zeros((size, size + a))
+        # The states before the transitions, differentiated in t_(i-1), z_i, t_i (neighbours in X) and the parameters
+        pull = np.matmul(segments.Phi, segments.f_begin[:, :, None])
+        D = np.concatenate([-pull, segments.Phi, segments.f_end[:, :, None], segments.P], axis=2)
+        F, J = np.zeros(size), np.zeros((size, len(X)))
         jumps = []
-        pull = np.matmul(segments.Phi, segments.f_begin[:, :, None])[:, :, 0]
-        for i in range(m):
-            k, row, at, turn = self.jumps[i]
-            before = segments.z[i]
-            jump = self.flow.jump(values, k, float(t[i]), before, row)
+        for i, (k, row, at, turn) in enumerate(self.jumps):
+            jump = self.flow.jump(values, k, float(t[i]), segments.z[i], row)
             jumps.append(jump)
-            D = np.zeros((n, size + a))  # derivative of the state before the transition
-            zi = self.z_at[i]
-            D[:, zi : zi + n] = segments.Phi[i]
-            if i:
-                D[:, self.t_at[i - 1]] = -pull[i]
-            ti = self.t_at[i]
-            D[:, ti] = segments.f_end[i]
-            if a:
-                D[:, size:] = segments.P[i]
-            r = ti
+            r, first = self.t_at[i], self.z_at[i] - 1
+            block = self._transition(jump, D[i])
+            J[r : r + n + 1, max(first, 0) : r + 1] = block[:, max(-first, 0) : n + 2]
+            J[r : r + n + 1, size:] = block[:, n + 2 :]
+            F[r], F[r + 1 : r + 1 + n] = jump.h, z[i + 1] - jump.z_after
             if self.at_once[i]:
+                J[r] = 0.0
                 F[r] = t[i] - t[i - 1]
-                J[r, ti], J[r, self.t_at[i - 1]] = 1.0, -1.0
-            elif at is None:
-                F[r] = jump.h
-                J[r] = jump.h_z @ D
-                J[r, ti] += jump.h_t
-                if a:
-                    J[r, size:] += jump.h_p
-                if self.divided[i]:
-                    divide(self, i, F, J, r, values, times, z)
-            else:
+                J[r, r], J[r, self.t_at[i - 1]] = 1.0, -1.0
+            elif at is not None:
                 phase, slopes = self.flow.phase(values, k)
+                J[r] = 0.0
                 F[r] = t[i] - (turn + phase) * T
-                J[r, ti] = 1.0
-                if a:
-                    J[r, size:] = -(turn + phase) * dT - T * slopes
-            F[r + 1 : r + 1 + n] = z[i + 1] - jump.z_after
-            block = -(jump.R_z @ D)
-            block[:, ti] -= jump.R_t
-            if a:
-                block[:, size:] -= jump.R_p
-            zn = self.z_at[i + 1]
-            block[:, zn : zn + n] += self._one
-            J[r + 1 : r + 1 + n] = block
+                J[r, r] = 1.0
+                J[r, size:] = -(turn + phase) * dT - T * slopes
+            elif self.divided[i]:
+                divide(self, i, F, J, r, values, times, z)
+        J.ravel()[self._after] = 1.0
         # Closure
         F[:n] = segments.z[m] - z[0]
-        zi = self.z_at[m]
-        J[:n, zi : zi + n] += segments.Phi[m]
+        first = self.z_at[m] - 1
+        J[:n, max(first, 0) : first + 1 + n] = D[m, :, max(-first, 0) : n + 1]
         J[:n, :n] -= self._one
-        if m:
-            J[:n, self.t_at[-1]] -= pull[m]
-        if a:
-            J[:n, size:] = segments.P[m]
-            if self.forced:
-                J[:n, size:] += segments.f_end[m][:, None] * (self.period_number * dT)
+        J[:n, size:] = segments.P[m]
+        if self.forced:
+            J[:n, size:] += segments.f_end[m][:, None] * (self.period_number * dT)
         for j in self.free:
             F[j] = 0.0
             J[j] = 0.0
@@ -243,6 +222,19 @@ class Shooting:
             J[:n, size - 1] += segments.f_end[m]
             self._anchor(F, J, X, t, z[0])
         return Solved(X, F, J, times, segments, jumps, values, self.free, self.at_once)
+
+    def _transition(self, jump: Jump, D: FloatArray) -> FloatArray:
+        """Derivatives of the condition and of -R at a transition, by those of the state before it."""
+        n = self.n
+        found = np.empty((n + 1, D.shape[1]))
+        found[0] = jump.h_z @ D
+        np.matmul(jump.R[:n, :n], D, out=found[1:])
+        found[1:, n + 1] += jump.fields[2, :n]
+        found[1:, n + 2 :] += jump.R[:n, n:]
+        np.negative(found[1:], out=found[1:])
+        found[0, n + 1] += jump.h_t
+        found[0, n + 2 :] += jump.h_p
+        return found
 
     def _anchor(self, F: FloatArray, J: FloatArray, X: FloatArray, t: FloatArray, z0: FloatArray) -> None:
         """The phase condition of an autonomous orbit."""

@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.continuation.march.arclength import Curve, Point
 from nonsmooth.continuation.problems.anchor import anchored
 from nonsmooth.continuation.signature.signature import AT_ONCE, Signature, Visit
 
 if TYPE_CHECKING:
+    from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
     from nonsmooth.continuation.problems.shooting import Solved
 
-__all__ = ["Change", "common_orbit", "common_point", "contacts", "past_the_section"]
+__all__ = ["Change", "common_orbit", "common_point", "inserted", "past_the_section", "without"]
 
 FloatArray = NDArray[np.float64]
 
@@ -38,19 +38,13 @@ class Change:
     touch: float  # when
 
 
-def contacts(curve: Curve, point: Point, kind: str) -> list[Change]:
-    """Contacts that may begin or end at a located event ``kind``; none where it is about something else."""
-    found = {"touch": _touched, "short": _shortened, "slow": _slowed}.get(kind)
-    return found(curve, point) if found else []
-
-
-def _parts(curve: Curve, point: Point) -> tuple[tuple[Visit, ...], FloatArray, FloatArray]:
+def _parts(curve: Orbits, point: OrbitPoint) -> tuple[tuple[Visit, ...], FloatArray, FloatArray]:
     times, states = curve.shooting.split(point.X)
     return curve.shooting.signature.visits, times, states
 
 
-def _touched(curve: Curve, point: Point) -> list[Change]:
-    """A transition that has only been touched: put it in, and if it leads to another mode the ways back too."""
+def inserted(curve: Orbits, point: OrbitPoint) -> list[Change]:
+    """The orbit with the transition that it touches, and if that leads to another mode with each of the ways back."""
     visits, times, states = _parts(curve, point)
     path, flow, values = point.path, curve.shooting.flow, point.solved.values
     place, k = path.touched
@@ -81,30 +75,8 @@ def _touched(curve: Curve, point: Point) -> list[Change]:
     return found
 
 
-def _shortened(curve: Curve, point: Point) -> list[Change]:
-    """A visit that has shrunk to nothing between two visits of one mode, without speed: take it out."""
-    visits = curve.shooting.signature.visits
-    i = int(point.path.tau.argmin())
-    if i in (0, len(visits) - 1) or visits[i - 1].mode != visits[i + 1].mode or visits[i - 1].row < 0:
-        return []
-    slope = point.path.slope[curve.walk.conditional.tolist().index(i - 1)]
-    steepest = float(np.abs(point.path.slope).max())
-    if not (slope < 1e-3 * max(steepest, 1e-300) or len(point.path.slope) < 3):
-        return []
-    return [_without(curve, point, i - 1, 2)]
-
-
-def _slowed(curve: Curve, point: Point) -> list[Change]:
-    """A crossing that has become a touch: an impact of no speed is taken out."""
-    visits = curve.shooting.signature.visits
-    i = int(curve.walk.conditional[int(point.path.slope.argmin())])
-    count = 1
-    while visits[i + count].row == AT_ONCE:  # an impact made of several transitions
-        count += 1
-    return [_without(curve, point, i, count)] if visits[i + count].mode == visits[i].mode else []
-
-
-def _without(curve: Curve, point: Point, place: int, count: int) -> Change:
+def without(curve: Orbits, point: OrbitPoint, place: int, count: int) -> Change:
+    """The orbit without ``count`` visits that have no length, from ``place`` on."""
     visits, times, states = _parts(curve, point)
     jump = curve.shooting.system.traced.transitions[visits[place].transition]
     gone = np.arange(place, place + count)
@@ -114,7 +86,7 @@ def _without(curve: Curve, point: Point, place: int, count: int) -> Change:
     )  # fmt: skip
 
 
-def common_orbit(curve: Curve, point: Point, change: Change) -> tuple[Curve, Solved, FloatArray] | None:
+def common_orbit(curve: Orbits, point: OrbitPoint, change: Change) -> tuple[Orbits, Solved, FloatArray] | None:
     """The common orbit in the new signature: its curve, the equations there, and the tangent of the curve."""
     signature, times, states = change.signature, change.times, change.states
     if not curve.shooting.forced and len(times):
@@ -128,17 +100,16 @@ def common_orbit(curve: Curve, point: Point, change: Change) -> tuple[Curve, Sol
     return (fresh, solved, null[-1]) if len(null) else None
 
 
-def common_point(curve: Curve, point: Point, change: Change) -> tuple[Curve, Point] | None:
-    """The common orbit as a point of the new signature, on its curve."""
+def common_point(curve: Orbits, point: OrbitPoint, change: Change) -> OrbitPoint | None:
+    """The common orbit as a point of the new signature."""
     found = common_orbit(curve, point, change)
     if found is None:
         return None
     fresh, solved, tangent = found
-    there = fresh.point(solved, solved.X / fresh.scale, tangent)
-    return None if there is None else (fresh, there)
+    return fresh.point(solved, solved.X / fresh.scale, tangent)
 
 
-def past_the_section(curve: Curve, point: Point) -> tuple[Curve, Point] | None:
+def past_the_section(curve: Orbits, point: OrbitPoint) -> tuple[Orbits, OrbitPoint] | None:
     """The same orbit where a crossing has passed the section: the last of the round in place of the first, or so.
 
     It faces in the same direction: that of the parameter, or of the state at the section near a fold."""

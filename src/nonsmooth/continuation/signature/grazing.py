@@ -24,7 +24,7 @@ from nonsmooth.continuation.signature.signature import AT_ONCE
 from nonsmooth.flow.saltation import chained
 
 if TYPE_CHECKING:
-    from nonsmooth.continuation.march.arclength import Curve, Point
+    from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
     from nonsmooth.continuation.problems.shooting import Shooting, Solved
     from nonsmooth.continuation.signature.change import Change
     from nonsmooth.continuation.signature.signature import Visit
@@ -49,7 +49,7 @@ class Graze:
     doubled: bool  # an orbit of twice the period is born here
 
 
-def graze(curve: Curve, point: Point, first: Point, change: Change) -> Graze | None:
+def graze(curve: Orbits, point: OrbitPoint, first: OrbitPoint, change: Change) -> Graze | None:
     """Judge the graze at ``point``, where ``curve`` ends; ``first`` is the first point behind it."""
     shooting = curve.shooting
     M, M_far, M_near = both_sides(shooting, point.solved, change)

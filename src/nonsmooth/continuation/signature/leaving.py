@@ -3,59 +3,58 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nonsmooth.continuation.branches.switching import is_doubled
-from nonsmooth.continuation.march.arclength import Curve, Point
-from nonsmooth.continuation.march.detection import Tests
-from nonsmooth.continuation.march.events import Event, at_section, first_met
-from nonsmooth.continuation.march.marches import March
+from nonsmooth.continuation.march.event import Met, Step, first_met
 from nonsmooth.continuation.problems.equilibrium import Equilibria
-from nonsmooth.continuation.signature.change import Change, common_point, contacts, past_the_section
+from nonsmooth.continuation.problems.symmetry import is_doubled
+from nonsmooth.continuation.signature.change import Change, common_point, past_the_section
 from nonsmooth.continuation.signature.grazing import graze
 from nonsmooth.continuation.signature.neighbours import beside
-from nonsmooth.continuation.signature.path import VIOLATIONS
 
-__all__ = ["change_of_signature", "passed_by"]
+if TYPE_CHECKING:
+    from nonsmooth.continuation.march.marches import March
+    from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
 
-TWICE = 0.1  # along the branch: the end of a signature is not looked for from farther behind it
+__all__ = ["behind", "contacts_of", "gained", "mark"]
+
+FARTHEST = 0.1  # along the branch: the end of a signature is not looked for from farther behind it
 WITHIN = 1e-9  # of the range: as near as an event is located that only simulations show
 TOLERANCE = 1e-5  # of an indicator's size: a band as narrow as this stands for no width
 
 
-def change_of_signature(found: March, curve: Curve, met: list[Event]) -> tuple[Curve, Point] | None:
+def behind(found: March, curve: Orbits, met: list[Met]) -> tuple[Orbits, OrbitPoint] | None:
     """Record a change of signature and begin anew behind it; None where the branch ends."""
-    for kind, _, point in met:
-        if kind == "short" and at_section(curve, point):
-            after = past_the_section(curve, point)
+    for one in met:
+        if one.kind.at_section(curve, one.point):
+            after = past_the_section(curve, one.point)
             if after is None:
                 found.ending = "no_convergence"
             return after
-    known = _contacts(curve, met)
-    beyond = beside(curve, met[0][2], known)
-    if beyond is None and met[0][0] == "unseen":
-        return None
-    if beyond is not None and _is_tolerance(curve, _indicator(curve, met[0][2], met[0][0])):
+    first = met[0]
+    beyond = beside(curve, first.point, contacts_of(curve, met))
+    if beyond is not None and _is_tolerance(curve, first.kind.surface(curve, first.point, beyond[0])):
         return beyond
-    name = _mark(found, curve, met, known, beyond)
-    if beyond is None and _is_centre(curve, met):
+    name = mark(found, curve, met, beyond)
+    if beyond is None and _is_centre(curve, first):
         found.ending = found.special[-1].kind = "focus_centre"
     elif beyond is None:
-        found.ending = "landing" if met[0][0] == "landed" else name
-    elif is_doubled(*beyond) and not is_doubled(curve, met[0][2]):
+        found.ending = first.kind.ending or name
+    elif is_doubled(*beyond) and not is_doubled(curve, first.point):
         # Beyond the graze at which a doubled orbit is born there is only the shorter one, gone round twice.
         found.ending = "branching"
         return None
     return beyond
 
 
-def _is_centre(curve: Curve, met: list[Event]) -> bool:
+def _is_centre(curve: Orbits, met: Met) -> bool:
     """Return whether an autonomous orbit has shrunk to a closed one of a linear mode."""
     if curve.shooting.forced:
         return False
-    kind, _, point = met[0]
-    free = [change.signature for change in contacts(curve, point, kind) if not change.gained]
+    free = [change.signature for change in met.kind.contacts(curve, met.point) if not change.gained]
     name = curve.shooting.active[0]
     return any(
         not one.crossings and Equilibria(curve.shooting.system, one.visits[0].mode, name, curve.width).linear
@@ -63,75 +62,67 @@ def _is_centre(curve: Curve, met: list[Event]) -> bool:
     )
 
 
-def passed_by(found: March, curve: Curve, kind: str, point: Point) -> None:
-    """Record a boundary that a virtual branch passes with its signature."""
-    known = _contacts(curve, [(kind, 0.0, point)])
-    _mark(found, curve, [(kind, 0.0, point)], known, beside(curve, point, known))
-
-
-def _contacts(curve: Curve, met: list[Event]) -> list[tuple[Change, Point]]:
+def contacts_of(curve: Orbits, met: list[Met]) -> list[tuple[Change, OrbitPoint]]:
     """The contacts that may begin or end with what is met, each with the orbit there."""
-    return [(change, there) for kind, _, there in met for change in contacts(curve, there, kind)]
+    return [(change, one.point) for one in met for change in one.kind.contacts(curve, one.point)]
 
 
-def _mark(
-    found: March, curve: Curve, met: list[Event], known: list[tuple[Change, Point]],
-    beyond: tuple[Curve, Point] | None,
-) -> str:  # fmt: skip
+def mark(found: March, curve: Orbits, met: list[Met], beyond: tuple[Orbits, OrbitPoint] | None) -> str:
     """Record the end of a signature, by the contact that begins or ends there where one does; its name."""
-    kind, _, point = met[0]
+    kind, point = met[0].kind, met[0].point
     if beyond is not None:
         cycle = beyond[0].shooting.signature.cycle
-        for change, there in known:
+        for change, there in contacts_of(curve, met):
             if change.signature.cycle == cycle:
                 _mark_graze(found, curve, there, change, beyond)
                 return "grazing"
-    behind = None if beyond is None else _from_behind(point, *beyond)
-    if beyond is not None and behind is not None and _is_better(curve, kind, point, beyond[0], behind[2]):
-        curve, (kind, _, point) = beyond[0], behind
-    own = contacts(curve, point, kind)
-    name = "grazing" if own or kind in ("touch", "slow", "unseen") else "corner"
-    if kind == "unseen" and beyond is not None:
-        indicator = _gained(curve, beyond[0])
-    else:
-        indicator = own[0].indicator if own else _indicator(curve, point, kind)
+        end = _from_behind(point, *beyond)
+        if end is not None and _is_better(curve, met[0], beyond[0], end.point):
+            curve, kind, point = beyond[0], end.kind, end.point
+    own = kind.contacts(curve, point)
+    name = "grazing" if own else kind.name
+    indicator = own[0].indicator if own else kind.surface(curve, point, beyond and beyond[0])
     found.mark(name, curve, point, indicator=indicator)
     return name
 
 
-def _from_behind(point: Point, fresh: Curve, first: Point) -> Event | None:
+def _from_behind(point: OrbitPoint, fresh: Orbits, first: OrbitPoint) -> Met | None:
     """The end of the new signature, ``fresh``, seen from its first orbit: the place at which the old one ends."""
     away = abs(float(first.X[-1] - point.X[-1])) / fresh.width
     back, steep = first.turned(), abs(float(first.tangent[-1]))
-    new = fresh.step(back, 2.0 * away / steep) if steep * TWICE > away else None
+    new = fresh.step(back, 2.0 * away / steep) if steep * FARTHEST > away else None
     if new is None:
         return None
-    crossed = [kind for kind, now in zip(VIOLATIONS, new.path.violation(), strict=True) if now < 0.0]
-    met = first_met(fresh, back, new, Tests(fresh), crossed, np.inf)
-    return (met[0][0], met[0][1], met[0][2].turned()) if met else None
+    met = first_met(Step(fresh, back, new, ([], []), (fresh.margins(back), fresh.margins(new)), True))
+    return replace(met[0], point=met[0].point.turned()) if met else None
 
 
-def _is_better(curve: Curve, kind: str, point: Point, fresh: Curve, there: Point) -> bool:
-    """Return whether the end of the new signature, ``there``, is the better place of a corner than ``point``."""
-    if kind == "unseen":  # within the interval that simulations leave
-        return abs(float(there.X[-1] - point.X[-1])) < WITHIN * curve.width
-    return _condition(fresh, there) < _condition(curve, point)
+def _is_better(curve: Orbits, met: Met, fresh: Orbits, there: OrbitPoint) -> bool:
+    """Return whether the end of the new signature, ``there``, is a better place of a corner than that of the old one.
+
+    A visit that ends as it begins, at a double zero, is located badly."""
+    if met.kind.place < 0:  # no margin tells where it is: within the interval that simulations leave
+        return abs(float(there.X[-1] - met.point.X[-1])) < WITHIN * curve.width
+    return _condition(fresh, there) < _condition(curve, met.point)
 
 
-def _condition(curve: Curve, point: Point) -> float:
-    """Condition number of the equations: a visit that ends as it begins, at a double zero, is located badly."""
+def _condition(curve: Orbits, point: OrbitPoint) -> float:
+    """Condition number of the equations."""
     values = np.linalg.svd(point.solved.jacobian * curve.weights, compute_uv=False)
     return float(values[0] / values[-1])
 
 
-def _mark_graze(found: March, curve: Curve, point: Point, change: Change, after: tuple[Curve, Point]) -> None:
+def _mark_graze(
+    found: March, curve: Orbits, point: OrbitPoint, change: Change, after: tuple[Orbits, OrbitPoint]
+) -> None:
     """Record a graze: the orbit without the contact, whichever side the branch came from."""
-    judged = graze(curve, point, after[1], change)
-    free = (curve, point) if change.gained else common_point(curve, point, change) or after
+    fresh, first = after
+    judged = graze(curve, point, first, change)
+    free = (curve, point) if change.gained else (fresh, common_point(curve, point, change) or first)
     found.mark("grazing", *free, indicator=change.indicator, graze=judged)
 
 
-def _gained(curve: Curve, fresh: Curve) -> int:
+def gained(curve: Orbits, fresh: Orbits) -> int:
     """The indicator of the first transition that another signature has more often (-1: none)."""
     more = Counter((v.transition, v.row) for v in fresh.shooting.signature.crossings)
     more.subtract((v.transition, v.row) for v in curve.shooting.signature.crossings)
@@ -140,32 +131,7 @@ def _gained(curve: Curve, fresh: Curve) -> int:
     return rows[0] if rows else -1
 
 
-def _indicator(curve: Curve, point: Point, kind: str) -> int:
-    """The indicator of the surface that an event is about: of the row that is nearest to zero (-1: of none)."""
-    path, visits, shooting = point.path, curve.shooting.signature.visits, curve.shooting
-    if kind == "touch":
-        place, k = path.touched
-        return int(curve.walk.net.rows[path.which[place, k], 0])
-    times, states = shooting.split(point.X)
-    if kind == "landed":
-        place = int(path.landed.argmax())
-        k, z = int(path.landing[place]), states[place]
-    else:
-        if kind in ("short", "others"):
-            place = int(path.tau.argmin() if kind == "short" else path.others.argmax())
-        else:
-            place = int(curve.walk.conditional[int((path.own if kind == "own" else path.slope).argmin())])
-        k = int(path.other[place]) if kind == "others" else visits[place].transition
-        z = point.solved.segments.z[place]
-    rows = shooting.system.traced.transitions[k].rows
-    skipped = visits[place].row if kind == "own" else -1
-    t = float(times[min(place, len(times) - 1)])
-    near = [(abs(shooting.flow.jump(point.solved.values, k, t, z, r).h), row.indicator)
-            for r, row in enumerate(rows) if r != skipped]  # fmt: skip
-    return min(near)[1] if near else -1
-
-
-def _is_tolerance(curve: Curve, indicator: int) -> bool:
+def _is_tolerance(curve: Orbits, indicator: int) -> bool:
     """Return whether an indicator only sets a tolerance: below the creep of a stop impacts are completed as rest.
 
     It differs from another one of its condition, with the other sign, by a small number."""

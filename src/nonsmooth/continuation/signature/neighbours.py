@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.continuation.march.arclength import Curve, Point
 from nonsmooth.continuation.searches.settled import Guess, touching
 from nonsmooth.continuation.signature.change import Change, common_orbit
 from nonsmooth.continuation.signature.rounds import Rounds
 
 if TYPE_CHECKING:
+    from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
     from nonsmooth.continuation.problems.shooting import Solved
 
 __all__ = ["beside"]
@@ -38,7 +38,9 @@ BACK = 1e-3  # of its distance: an orbit nearer than this to the branch that has
 AGAIN = 3  # times that Newton's method is begun with one signature
 
 
-def beside(curve: Curve, point: Point, contacts: Sequence[tuple[Change, Point]]) -> tuple[Curve, Point] | None:
+def beside(
+    curve: Orbits, point: OrbitPoint, contacts: Sequence[tuple[Change, OrbitPoint]] = ()
+) -> tuple[Orbits, OrbitPoint] | None:
     """The orbit with which a branch goes on at ``point``, where its signature ends, on a curve of its own.
 
     ``contacts`` are those that may begin or end there. Its tangent leads away from there. None where there is none, or
@@ -54,8 +56,8 @@ def beside(curve: Curve, point: Point, contacts: Sequence[tuple[Change, Point]])
 
 
 def _at(
-    curve: Curve, point: Point, common: list[tuple[Curve, Solved, FloatArray]], side: float, aside: float
-) -> tuple[Curve, Point] | None:
+    curve: Orbits, point: OrbitPoint, common: list[tuple[Orbits, Solved, FloatArray]], side: float, aside: float
+) -> tuple[Orbits, OrbitPoint] | None:
     """The orbit at one distance on one side of the parameter."""
     shooting = curve.shooting
     values = point.solved.values.copy()
@@ -72,7 +74,7 @@ def _at(
             found = other.at_parameter(X / other.scale, float(there[0]))
             if found is None or not _apart(curve, point, found) < NEAR:
                 break
-            if (found.path.violation() >= 0.0).all() and rounds.shows(other.shooting, found.X, values):
+            if not found.virtual and rounds.shows(other.shooting, found.X, values):
                 if not _arrives(curve, point, other, found, here) or _leads_back(curve, point, found):
                     break
                 facing = side * float(found.tangent[-1]) >= 0.0
@@ -82,8 +84,8 @@ def _at(
 
 
 def _guesses(
-    curve: Curve, point: Point, common: list[tuple[Curve, Solved, FloatArray]], rounds: Rounds, values: FloatArray,
-    side: float, aside: float,
+    curve: Orbits, point: OrbitPoint, common: list[tuple[Orbits, Solved, FloatArray]], rounds: Rounds,
+    values: FloatArray, side: float, aside: float,
 ) -> Iterator[Guess | None]:  # fmt: skip
     """Rounds along the branch, from the end of the signature itself, and about it; that end without its touches.
 
@@ -103,14 +105,14 @@ def _guesses(
         yield rounds.read(shooting, point.X, values, change)
 
 
-def _as_guess(curve: Curve, near: Solved, X: FloatArray) -> Guess:
+def _as_guess(curve: Orbits, near: Solved, X: FloatArray) -> Guess:
     """Unknowns near a solved orbit of a curve as an interval of motion."""
     shooting = curve.shooting
     period = float(near.times[-1]) if shooting.forced else float(X[shooting.size - 1])
     return Guess(shooting.period_number, period, shooting.signature, *shooting.split(X))
 
 
-def _apart(curve: Curve, a: Point, b: Point) -> float:
+def _apart(curve: Orbits, a: OrbitPoint, b: OrbitPoint) -> float:
     """Largest difference of extremes, in units of the states' sizes, and of the periods."""
     size = curve.size[: len(a.path.maximum)]
     extremes = np.concatenate([(a.path.maximum - b.path.maximum) / size, (a.path.minimum - b.path.minimum) / size])
@@ -118,14 +120,14 @@ def _apart(curve: Curve, a: Point, b: Point) -> float:
     return max(float(np.nanmax(np.abs(extremes), initial=0.0)), period)
 
 
-def _arrives(curve: Curve, point: Point, other: Curve, found: Point, here: float) -> bool:
+def _arrives(curve: Orbits, point: OrbitPoint, other: Orbits, found: OrbitPoint, here: float) -> bool:
     """Return whether the orbits found come to ``point`` as the parameter comes back to it."""
     value = here + NEARER * (float(found.X[-1]) - here)
     nearer = other.at_parameter(found.Y, value)
     return nearer is not None and _apart(curve, point, nearer) <= SHRINKS * _apart(curve, point, found) + 1e-9
 
 
-def _leads_back(curve: Curve, point: Point, found: Point) -> bool:
+def _leads_back(curve: Orbits, point: OrbitPoint, found: OrbitPoint) -> bool:
     """Return whether an orbit lies on the branch that has come to ``point``, whatever its signature says."""
     value = float(found.X[-1])
     if (value - float(point.X[-1])) * float(point.tangent[-1]) > 0.0:

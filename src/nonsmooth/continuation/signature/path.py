@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
     from nonsmooth.continuation.problems.shooting import Shooting, Solved
     from nonsmooth.system.symbolic.traced import Traced
 
-__all__ = ["VIOLATIONS", "Path", "Walk"]
+__all__ = ["Path", "Walk"]
 
 FloatArray = NDArray[np.float64]
 ORDER = 20
@@ -22,7 +23,6 @@ RTOL = 1e-15
 ROUNDING = 1e-13  # of an indicator's size
 BEGUN = 1e-10  # of the period
 SOLVED = 1e-6  # of its size: as near to a boundary just crossed as an orbit is solved for
-VIOLATIONS = ("touch", "short", "slow", "own", "others", "landed")
 
 
 @dataclass
@@ -44,16 +44,22 @@ class Path:
     landed: FloatArray  # (m + 1,) where each visit begins, the largest margin of its transitions: 0 on a boundary
     landing: NDArray[np.int64]  # (m + 1,) which transition
 
-    def violation(self) -> FloatArray:
+    @cached_property
+    def margins(self) -> FloatArray:
         """Six numbers that are positive (or inf) on an orbit of the system; one turns negative beyond a boundary.
 
-        In order (``VIOLATIONS``): the nearest touch, the shortest visit, the slowest crossing, the other rows of the
-        conditions that fire, the conditions that do not, those that hold where a visit begins (behind a reset).
+        The shortest visit, the slowest crossing, the other rows of the conditions that fire, the nearest touch, the
+        conditions that do not fire, those that hold where a visit begins (behind a reset); see ``boundaries``.
         """
         return np.array([
-            -self.touch, self.tau.min(), self.slope.min(initial=np.inf), self.own.min(initial=np.inf),
+            self.tau.min(), self.slope.min(initial=np.inf), self.own.min(initial=np.inf), -self.touch,
             -self.others.max(initial=-np.inf), -self.landed.max(),
         ])  # fmt: skip
+
+    @property
+    def virtual(self) -> bool:
+        """True where the path goes through a boundary that it should obey."""
+        return bool((self.margins < 0.0).any())
 
 
 class Walk:

@@ -54,9 +54,7 @@ class PatternEngine(LoopEngine):
 
     def prepare(self, points: FloatArray) -> Points:
         linear = self.patterns.form.evaluate(points)
-        with np.errstate(divide="ignore"):
-            period = np.where(linear.omega > 0.0, 2.0 * np.pi / linear.omega, np.inf)
-        return Points(np.asarray(points, dtype=float), linear, period)
+        return Points(np.asarray(points, dtype=float), linear, linear.period)
 
     def module(self, tables: Any, observer: str) -> ModuleType:
         from nonsmooth.kernels.linear.module import linear_module

@@ -14,9 +14,10 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from nonsmooth import __version__
 from nonsmooth.models import discontinuous_support
 from nonsmooth.recordings import RecordingWarning
-from nonsmooth.results.provenance import ATTRIBUTE, package_version
+from nonsmooth.results.provenance import ATTRIBUTE
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -189,5 +190,5 @@ class Laboratory:
 
 def as_result(dataset: xr.Dataset, what: str) -> xr.Dataset:
     """A dataset that was put together here, with the record that ``nonsmooth.load`` asks for; synthetic."""
-    record = {"version": package_version(), "verb": "rig", "what": what, "synthetic": True}
+    record = {"version": __version__, "verb": "rig", "what": what, "synthetic": True}
     return dataset.assign_attrs({"synthetic": "yes", ATTRIBUTE: json.dumps(record)})

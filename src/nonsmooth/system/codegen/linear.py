@@ -55,6 +55,12 @@ class LinearTables:
     rc: FloatArray  # (P, T, H, n)
     rs: FloatArray  # (P, T, H, n)
 
+    @property
+    def period(self) -> FloatArray:
+        """Forcing periods, (P,); infinite for an autonomous system."""
+        with np.errstate(divide="ignore"):
+            return np.where(self.omega > 0.0, 2.0 * np.pi / self.omega, np.inf)
+
 
 @dataclass(frozen=True)
 class LinearForm:

@@ -30,7 +30,7 @@ from nonsmooth.studies.savi2007.identification.half_power import half_power
 from nonsmooth.studies.savi2007.identification.joining import joined
 from nonsmooth.studies.savi2007.identification.multiple_shooting import ContactFit, shoot_contacts
 from nonsmooth.studies.savi2007.identification.natural_frequency import natural_frequency
-from nonsmooth.studies.savi2007.identification.plausibility import check_plausible, not_driven
+from nonsmooth.studies.savi2007.identification.plausibility import check_plausible, not_driven, slipped_late
 from nonsmooth.studies.savi2007.identification.receptance import receptance_fit
 from nonsmooth.studies.savi2007.identification.referral import counted_gap, mark_of, refer
 from nonsmooth.studies.savi2007.identification.statements import (
@@ -270,24 +270,12 @@ class _Chain:
                 [(run.time, run.positions) for run in runs], resolution=resolution, names=[run.name for run in runs]
             )
         self.left_out("impulse", decay)
-        self.slipped_late(runs, decay)
+        for sentence in slipped_late(runs, decay, resolution):
+            self.say(sentence)
         self.observe(("omega_0", "b", "f"), decay.values[:3], decay.covariance[:3, :3], "free decay")
         self.beside("natural frequency (Fig. 5)", lambda: natural_frequency(runs, decay))
         self.beside("damping by free decay", lambda: decay_damping(runs, decay, self.mass, resolution=resolution))
         return decay
-
-    def slipped_late(self, runs: tuple[Run, ...], decay: DecayFit) -> None:
-        """Name taps that end farther from rest than friction can hold a car: the string slipped after the part used."""
-        held = float(decay.values[2] / decay.values[0] ** 2) + 2 * self.evidence.resolution
-        for i in decay.runs:
-            end = float(np.median(runs[i].positions[-max(10, len(runs[i].time) // 20) :]))
-            off = end - decay.values[3]
-            if abs(off) > held:
-                self.say(
-                    f"impulse: run {runs[i].name!r}, channel 'Angle': ends {1e3 * off:+.2f} mm from where the car "
-                    f"rests, and friction holds it within ±{1e3 * held:.2f} mm: the string slipped on the wheel after "
-                    "the part that is used"
-                )
 
     def response(self, decay: DecayFit | None) -> Steady:
         """The steady runs without support, and the dampings found from them."""

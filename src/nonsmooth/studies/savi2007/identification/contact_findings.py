@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from nonsmooth import SolveError
 from nonsmooth.identification import Estimate, Finding
+from nonsmooth.identification.profiles import Profile, profile_of
 from nonsmooth.identification.uncertainty import coverage_factor
 from nonsmooth.recordings import Quantity
 from nonsmooth.studies.savi2007.identification.multiple_shooting import ContactFit
-from nonsmooth.studies.savi2007.identification.profiles import Profile, profile_of
 from nonsmooth.studies.savi2007.identification.shooting import ShootingFit, shoot
 
 if TYPE_CHECKING:

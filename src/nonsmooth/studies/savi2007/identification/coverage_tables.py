@@ -198,7 +198,8 @@ def to_dataset(results: Sequence[Mapping[str, Any]]) -> xr.Dataset:
     """Truth, estimate, standard uncertainty and 95 % interval over rig and parameter, as the picture takes them."""
     import xarray as xr
 
-    from nonsmooth.results.provenance import ATTRIBUTE, package_version
+    from nonsmooth import __version__
+    from nonsmooth.results.provenance import ATTRIBUTE
 
     names = list(ASKED)
     table: FloatArray = np.array(
@@ -211,5 +212,5 @@ def to_dataset(results: Sequence[Mapping[str, Any]]) -> xr.Dataset:
     return xr.Dataset(
         {**{name: (over, table[..., i]) for i, name in enumerate(columns)}, "viscous_only_c": ("rig", viscous)},
         {"rig": [result["seed"] for result in results], "parameter": names},
-        {ATTRIBUTE: json.dumps({"version": package_version(), "verb": "coverage"}), "synthetic": "yes"},
+        {ATTRIBUTE: json.dumps({"version": __version__, "verb": "coverage"}), "synthetic": "yes"},
     )

@@ -15,9 +15,10 @@ import numpy as np
 if TYPE_CHECKING:
     from nonsmooth.recordings import Quantity
     from nonsmooth.studies.savi2007.identification.evidence import Evidence, Run
+    from nonsmooth.studies.savi2007.identification.free_decay import DecayFit
     from nonsmooth.studies.savi2007.identification.steady import Steady
 
-__all__ = ["check_plausible", "few", "not_driven"]
+__all__ = ["check_plausible", "few", "not_driven", "slipped_late"]
 
 #: Procedures in which the car (or the test mass) moves, and those in which a force changes.
 _MOVES = ("springs", "support", "impulse", "drop", "response", "grazing", "contact", "rise", "section")
@@ -159,3 +160,16 @@ def _length(run: Run, name: str) -> float:
     if not value > 0:
         raise ValueError(f"{run.label}: {name} = {run.settings[name]!r} must be a positive length in m")
     return value
+
+
+def slipped_late(taps: Sequence[Run], decay: DecayFit, resolution: float) -> Iterator[str]:
+    """A sentence for each tap that ends farther from rest than friction can hold a car: the string slipped later."""
+    held = float(decay.values[2] / decay.values[0] ** 2) + 2 * resolution
+    for run in (taps[i] for i in decay.runs):
+        off = float(np.median(run.positions[-max(10, len(run.time) // 20) :])) - decay.values[3]
+        if abs(off) > held:
+            yield (
+                f"impulse: run {run.name!r}, channel 'Angle': ends {1e3 * off:+.2f} mm from where the car rests, and "
+                f"friction holds it within ±{1e3 * held:.2f} mm: the string slipped on the wheel after the part that "
+                "is used"
+            )

@@ -53,7 +53,19 @@ class ElasticStop(Contact):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Backlash(Element):
+class Displaced(Element):
+    """An element that says where it is by a displacement of its own."""
+
+    displacement: Callable[..., Any] | None = None
+
+    kinematics: ClassVar[str] = "displacement"
+
+    def placed(self, q: Any, v: Any, law: Callable[[Law], Any]) -> Any:
+        return q
+
+
+@dataclass(frozen=True, kw_only=True)
+class Backlash(Displaced):
     r"""Play with elastic flanks: F = -k (s - b) - c \dot s above the half width b, its mirror image below -b.
 
     Parameters
@@ -65,18 +77,13 @@ class Backlash(Element):
         See :class:`Element`.
     """
 
-    displacement: Callable[..., Any] | None = None
     half_width: Law = 0.0
     stiffness: Law = 0.0
     damping: Law = 0.0
 
-    kinematics: ClassVar[str] = "displacement"
     phases: ClassVar[tuple[str, ...]] = ("free", "above", "below")
     laws: ClassVar[tuple[str, ...]] = ("half_width", "stiffness", "damping")
     conditions: ClassVar[tuple[str, ...]] = ("upper", "lower")
-
-    def placed(self, q: Any, v: Any, law: Callable[[Law], Any]) -> Any:
-        return q
 
     def force(self, here: Place) -> Any:
         if here.phase == "free":
@@ -96,7 +103,7 @@ class Backlash(Element):
 
 
 @dataclass(frozen=True, kw_only=True)
-class PreloadedSpring(Element):
+class PreloadedSpring(Displaced):
     r"""A spring with preload P and stiffness k: F = -P - k s for s > 0, P - k s for s < 0.
 
     Parameters
@@ -108,17 +115,12 @@ class PreloadedSpring(Element):
         See :class:`Element`.
     """
 
-    displacement: Callable[..., Any] | None = None
     preload: Law = 0.0
     stiffness: Law = 0.0
 
-    kinematics: ClassVar[str] = "displacement"
     phases: ClassVar[tuple[str, ...]] = ("above", "below")
     laws: ClassVar[tuple[str, ...]] = ("preload", "stiffness")
     conditions: ClassVar[tuple[str, ...]] = ("side",)
-
-    def placed(self, q: Any, v: Any, law: Callable[[Law], Any]) -> Any:
-        return q
 
     def force(self, here: Place) -> Any:
         side = 1 if here.phase == "above" else -1
