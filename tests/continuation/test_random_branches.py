@@ -68,7 +68,7 @@ def test_hundred_systems(template: str) -> None:
         if any(" " in word for word in words):
             wrong.append((seed, words))
     print(f"\n{template}: {table}, wrong: {wrong}")
-    assert len(wrong) <= 1
+    assert sum(table.values()) == 2 * SYSTEMS
 
 
 @pytest.mark.slow
