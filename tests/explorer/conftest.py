@@ -152,9 +152,11 @@ def new_page(browser: Any) -> Iterator[Callable[..., Page]]:
     """Open tabs, and see that none of them had an error."""
     pages: list[Page] = []
 
-    def make(width: int = 1280, height: int = 800) -> Page:
+    def make(width: int = 1280, height: int = 800, first_visit: bool = False) -> Page:
         tab = browser.new_context(viewport={"width": width, "height": height}, accept_downloads=True).new_page()
         tab.set_default_timeout(30_000)
+        if not first_visit:
+            tab.add_init_script("localStorage.setItem('nonsmooth-tour', 'seen')")
         pages.append(Page(tab))
         return pages[-1]
 

@@ -23,12 +23,14 @@ from nonsmooth.plot.labels import column, words_of_flags
 from nonsmooth.plot.segments import pieces_by_mode, with_gaps
 from nonsmooth.plot.style import COLORS
 
-__all__ = ["CLOUDS", "MOST", "Diagram", "History", "Portrait", "Section", "theme"]
+__all__ = ["CLOUDS", "MOST", "TIP", "Diagram", "History", "Panel", "Portrait", "Section", "extent", "theme"]
 
 _MODES = [COLORS[name] for name in ("first", "second", "third", "fourth")]
 _MANY_MODES = 8
 MOST = 64  # section points that are told apart one by one
 _HEIGHT = 400  # of an image before the page has said how large it is
+#: Tooltip with the words of the point below the mouse.
+TIP = '<div style="font:13px system-ui">@words</div>'
 _TICKS = "return Number((tick * Math.pow(10, -power)).toPrecision(8)).toString().replace('-', '\\u2212')"
 #: Names of a cloud in the legend of a diagram, with their colours and the height of a dot.
 CLOUDS = {
@@ -44,7 +46,7 @@ def theme(dark: bool, large: bool) -> Theme:
     )
     size = 20 if large else 13
     return Theme(json={"attrs": {
-        "Plot": {"background_fill_color": paper, "border_fill_color": paper, "outline_line_color": line},
+        "Plot": {"background_fill_color": paper, "border_fill_color": None, "outline_line_color": line},
         "Grid": {"grid_line_color": faint},
         "Axis": {
             "axis_line_color": line, "major_tick_line_color": line, "minor_tick_line_color": None,
@@ -69,7 +71,7 @@ class _Axis:
         self.axis.formatter.args = {"power": power}
 
 
-class _Figure:
+class Panel:
     """A figure without title, with zoom, axes that have units, and ranges that the page sets."""
 
     def __init__(self, name: str, tools: str = "pan,box_zoom,wheel_zoom,reset", **options: Any) -> None:
@@ -79,7 +81,7 @@ class _Figure:
         )  # fmt: skip
         self.plot.toolbar.logo = None
         self.plot.toolbar.autohide = True
-        for axis in self.plot.axis:
+        for axis in self.plot.axis[:] if "y_axis_type" not in options else self.plot.xaxis:
             axis.formatter = CustomJSTickFormatter(args={"power": 0}, code=_TICKS)
         self.x = _Axis(self.plot.xaxis[0], self.plot.x_range)
         self.y = _Axis(self.plot.yaxis[0], self.plot.y_range)
@@ -103,7 +105,7 @@ def extent(values: Any, margin: float = 0.06) -> tuple[float, float]:
     return low - room, high + room
 
 
-class Diagram(_Figure):
+class Diagram(Panel):
     """Section points over a parameter, as an image; a line marks the parameter's value."""
 
     def __init__(self) -> None:
@@ -122,7 +124,7 @@ class Diagram(_Figure):
         )  # fmt: skip
         self.plot.add_tools(HoverTool(
             renderers=[bars], mode="vline", line_policy="interp", attachment="right",
-            tooltips='<div style="font:13px system-ui">@words</div>', point_policy="follow_mouse",
+            tooltips=TIP, point_policy="follow_mouse",
         ))  # fmt: skip
         self.here = Span(dimension="height", line_color=COLORS["third"], line_width=1.5, line_dash="dashed")
         self.plot.add_layout(self.here)
@@ -226,7 +228,7 @@ def words_of(status: Any) -> Any:
     return np.vectorize(lambda code: names.get(int(code), "?"), otypes=[object])(status.values)
 
 
-class _Curves(_Figure):
+class _Curves(Panel):
     """Lines in one colour per mode."""
 
     def __init__(self, name: str, **options: Any) -> None:
@@ -303,7 +305,7 @@ class History(_Curves):
         self.y.name(symbols[state.x], units[state.x])
 
 
-class Section(_Figure):
+class Section(Panel):
     """Section points in the phase plane."""
 
     def __init__(self) -> None:

@@ -13,7 +13,7 @@ from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qsl
 
-from bokeh.events import RangesUpdate, Tap
+from bokeh.events import RangesUpdate, Reset, Tap
 from bokeh.models import TextInput
 from jinja2 import DictLoader, Environment
 
@@ -25,10 +25,11 @@ from nonsmooth.explorer.labels import symbols_of
 from nonsmooth.explorer.overlays import Overlay
 from nonsmooth.explorer.presets import GIVEN, PAPER, first_state, presets_of, slider_range
 from nonsmooth.explorer.readout import distinct, readout
-from nonsmooth.explorer.requests import key_of, requests_of, stability_request
+from nonsmooth.explorer.requests import key_of, motion_of, requests_of, stability_request
 from nonsmooth.explorer.schedule import Asked, Schedule
 from nonsmooth.explorer.state import History as Past
 from nonsmooth.explorer.state import State, changed, from_query
+from nonsmooth.explorer.views import PANELS, VIEWS, View
 from nonsmooth.explorer.worker import Answer
 
 if TYPE_CHECKING:
@@ -39,7 +40,7 @@ __all__ = ["Session", "models_of"]
 #: To the browser, each one line of JSON; what comes from it is ``act``.
 CHANNELS = ("ui", "readout", "busy", "notes", "file", "recording")
 #: Files that make the page; what a part of the page does comes before the page itself.
-TEXTS = ("page.html", "recording.html", "page.css", "recording.js", "page.js")
+TEXTS = ("page.html", "recording.html", "page.css", "recording.js", "tour.js", "page.js")
 Models = Mapping[str, Callable[[], "System"]]
 
 
@@ -74,6 +75,7 @@ class Session:
         self.results: dict[str, Any] = {}
         self.diagram, self.portrait = Diagram(), Portrait()
         self.history, self.section = History(), Section()
+        self.views: list[View] = [view() for view in VIEWS]
         self.overlay, self.bench = Overlay(self.diagram, self.portrait, self.history, self.section), Bench(self)
         self._say = {name: TextInput(name=name) for name in CHANNELS}
         self._act = TextInput(name="act")
@@ -132,13 +134,23 @@ class Session:
         document.template = Environment(loader=DictLoader(texts)).get_template("page.html")
         document.template_variables["style"] = texts["page.css"]
         document.template_variables["program"] = "\n".join(text for name, text in texts.items() if name.endswith(".js"))
+        document.template_variables["panels"] = PANELS
+        document.template_variables["views"] = VIEWS
         self.diagram.plot.on_event(Tap, self._tap_diagram)
         self.diagram.plot.on_event(RangesUpdate, self._zoom_diagram)
         self.diagram.plot.on_change("inner_height", lambda attr, old, new: self._resized(int(new)))
         for one in (self.portrait, self.section):
             one.plot.on_event(Tap, self._tap_plane)
-        for figure in (self.diagram, self.portrait, self.history, self.section):
-            document.add_root(figure.plot)  # events are heard of what had a callback by now
+        own = []
+        for view in self.views:
+            plot = view.build(self)
+            if plot is not None:
+                own.append(plot)
+                plot.on_event(Tap, partial(self._tap_view, view))
+                plot.on_event(RangesUpdate, partial(self._zoom_view, view))
+                plot.on_event(Reset, partial(self._reset_view, view))
+        for plot in (*(one.plot for one in (self.diagram, self.portrait, self.history, self.section)), *own):
+            document.add_root(plot)  # events are heard of what had a callback by now
         for channel in (self._act, *self._say.values()):
             document.add_root(channel)
         document.theme = theme(self.dark, self.large)
@@ -245,6 +257,8 @@ class Session:
         self.document.theme = theme(self.dark, self.large)
         for one in (self.portrait, self.history, self.section, self.overlay):
             one.paint(self.dark)
+        for view in self.views:
+            view.paint(self.dark)
 
     def _tap_diagram(self, event: Any) -> None:
         value, start = self.diagram.nearest(event.x, event.y, self.state)
@@ -268,18 +282,42 @@ class Session:
         self.diagram.redraw(self.state)
         self.refresh()
 
+    def _tap_view(self, view: View, event: Any) -> None:
+        self.past.put(view.tapped(float(event.x), float(event.y), self.system, self.state))
+        self.refresh()
+
+    def _zoom_view(self, view: View, event: Any) -> None:
+        if event.x1 > event.x0 and event.y1 > event.y0:
+            x, y = (float(event.x0), float(event.x1)), (float(event.y0), float(event.y1))
+            self.past.put(view.zoomed(x, y, self.system, self.state), f"zoom {view.name}")
+        self.refresh()
+
+    def _reset_view(self, view: View, event: Any) -> None:
+        self.past.put(view.unzoomed(self.system, self.state))
+        self.refresh()
+
     # --- what is to be computed
 
     def wanted(self) -> dict[str, dict[str, Any]]:
         """The request of every view that is shown, for the state of the page."""
-        found = requests_of(self.system, self.text, self.state)
+        state = self.state
+        found = requests_of(self.system, self.text, state)
         known = "judged" in self.results and self.work.done.get("orbit") == key_of(found["orbit"])
+        base = dict(found)
+        if known:
+            base["motion"] = motion_of(found["orbit"], self.results)
         if known and not self.system.is_map:
             found["stability"] = stability_request(found["orbit"], self.results)
         if known and (request := self.bench.request(found["orbit"], self._period_number())) is not None:
             found["recording"] = request
         if self.work.done.get("diagram") == key_of(found["diagram"]):
             del found["first look"]
+        if state.upper != "diagram":
+            found = {view: request for view, request in found.items() if view not in ("first look", "diagram")}
+        for view in self.views:
+            asked = view.requests(self.system, state, base) if view.shown(self.system, state) else {}
+            for stage in [*asked][-1:]:
+                found |= {stage: asked[stage]} if self.work.done.get(stage) == key_of(asked[stage]) else asked
         return found
 
     # --- what is shown
@@ -314,9 +352,16 @@ class Session:
         elif view == "recording":
             self.bench.put(found)
             self._show_recording()
-        else:
+        elif view == "stability":
             self.results["stability"] = found
             self._tell_readout()
+        else:
+            for one in self.views:
+                if view in one.stages and not one.depends(request.of, self.subject):
+                    one.show(json.loads(request.key), found, system, state)
+                    if one.saved is not None and one.saved[0] in found:
+                        self.results[one.name] = found[one.saved[0]]
+            self._tell_ui()
 
     def _axes_of_diagram(self) -> None:
         state, system, symbols = self.state, self.system, symbols_of(self.system)
@@ -368,13 +413,13 @@ class Session:
             self.tell("readout", [*readout(self.system, self.state, self.results), *self.bench.readout()])
 
     def _tell_ui(self) -> None:
-        found = controls(self.system, self.state, self.models, self.diagram.stage)
+        found = controls(self.system, self.state, self.models, self.diagram.stage, self.views)
         look = {"dark": self.dark, "large": self.large}
         self.tell("ui", {**found, **look, "heard": self._heard, "can": self.past.can})
 
     def refresh(self) -> None:
         """The page as the state has it, and work for what that lacks."""
-        state = self.state
+        state, system = self.state, self.system
         if self._of != self.subject:
             self.diagram.clear()
             self.results.pop("diagram", None)
@@ -384,16 +429,29 @@ class Session:
                 self.bench.arrange()
             for view in ("first look", "diagram"):
                 self.work.done.pop(view, None)
+            for one in self.views:
+                if one.depends(self._of, self.subject):
+                    one.clear()
+                    for stage in one.stages:
+                        self.work.done.pop(stage, None)
             self._of = self.subject
         if self._axes != (state.x, state.y, state.shown):
             self._axes = state.x, state.y, state.shown
             if self.diagram.result is not None:
                 self.diagram.redraw(state)
                 self._axes_of_diagram()
+            if "run" in self.results:
+                self._show_orbit()
+            if "section" in self.results:
+                self._show_section()
+            for one in self.views:
+                one.redraw(system, state)
             self._show_recording()
         if self.bench.laid is None and not self.overlay.is_empty:
             self._show_recording()
         self.diagram.here.location = state.values[state.over]
+        for one in self.views:
+            one.place(system, state)
         if (self.diagram.plot.x_range.start, self.diagram.plot.x_range.end) != (state.low, state.high):
             self.diagram.show(x=(state.low, state.high))
         self.tell("notes", self.notes)

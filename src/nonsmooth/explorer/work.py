@@ -10,6 +10,7 @@ import numpy as np
 
 import nonsmooth as ns
 from nonsmooth.explorer.measured import fitted, laid_over, read
+from nonsmooth.explorer.views import CHOSEN
 
 __all__ = ["VIEWS", "Heard", "compute", "periods_shown"]
 
@@ -140,5 +141,6 @@ def _is_exact(system: ns.System, options: Mapping[str, Any]) -> bool:
 
 VIEWS: dict[str, Callable[..., dict[str, Any]]] = {
     "orbit": _orbit, "section": _section, "stability": _stability, "first look": _first_look, "diagram": _diagram,
+    **{stage: view.compute for stage, view in CHOSEN.items()},
     "recording": laid_over, "fit": fitted,
 }  # fmt: skip

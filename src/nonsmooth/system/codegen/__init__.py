@@ -1,1 +1,1 @@
-"""What the steppers need of a system: matrices of linear modes, Taylor jets, equations of variation."""
+"""Code for the steppers: matrices of linear modes, Taylor jets, equations of variation."""
