@@ -119,6 +119,17 @@ def buck(V: float) -> ns.System:
     )  # fmt: skip
 
 
+def test_corner_is_the_same_from_either_side() -> None:
+    """Unequal friction: where rest turns to a stop and a slip, from there a visit ends in a double zero."""
+    found = []
+    for begin in (0.472, 0.49):
+        branch = ns.continue_orbit(ns.find_orbit(coulomb(begin, 0.3, 0.8, 0.02)), "w", (0.45, 0.5))
+        special = ns.special_points(branch)
+        assert list(special["kind"].values) == ["corner", "grazing"]
+        found.append(special["w"].values)
+    assert found[0] == pytest.approx(found[1], abs=1e-13)
+
+
 def test_skipped_cycle_of_the_buck_converter() -> None:
     """The branch of period 2 loses one of its two switchings at 36.3532370641 V and goes on to 40 V."""
     first = ns.continue_orbit(ns.find_orbit(buck(22.0), start={"v": 12.0, "i": 0.5}), "V", (20.0, 40.0))
@@ -127,9 +138,14 @@ def test_skipped_cycle_of_the_buck_converter() -> None:
     assert float(branch["V"][-1]) == pytest.approx(40.0)
     corner = ns.special_points(branch).isel(special=-1)
     assert (str(corner["kind"].values), float(corner["V"])) == ("corner", pytest.approx(36.3532370641, abs=1e-8))
+    assert str(branch["ended_because"].values[0]) == "The branch begins at the flip."
     # Beyond: one switching on, one off, two ticks, by Newton's method from elsewhere.
     orbit = ns.find_orbit(buck(40.0), start=branch["section"].values[-1], transient=0, period_number=2)
     assert sorted(v.row for v in orbit.signature.crossings) == [-2, -1, -1, 0]
+    back = ns.continue_orbit(orbit, "V", (20.0, 40.0))
+    there = ns.special_points(back)
+    assert sorted(there["kind"].values) == ["corner", "flip", "flip"]  # and ends at the flip that it leaves
+    assert there["V"].values.max() == pytest.approx(float(corner["V"]), abs=1e-11)
     assert branch["floquet_multipliers"].values[-1] == pytest.approx(orbit.floquet_multipliers, abs=1e-8)
     assert orbit.trajectory()["u"].values[-1, :2] == pytest.approx(orbit.u[:2], abs=1e-9)
 

@@ -30,6 +30,7 @@ __all__ = ["Curve", "Point", "passes_through"]
 FloatArray = NDArray[np.float64]
 DONE = 1e-9  # a step this small is followed by one of its square
 FARTHEST = 2.5  # times the last step: a cubic is not trusted beyond
+SMALL = 1e-6  # residual of a first guess that a small step alone makes a solution
 CLOSE = 1e-12  # where multipliers are wanted to the last digits
 
 
@@ -194,7 +195,9 @@ class Curve(ABC, Generic[P]):
             length = float(np.abs(step).max())
             if not length < self.longest or (i > 1 and length > self.grows * last and length > 1e-10):
                 return None
-            if length < tolerance or (i > 3 and length < 1e-10):
+            # Beside a square root the slopes are so steep that steps are small far from the solution: there they grow.
+            shrinks = length <= last if i else float(np.abs(right).max()) < SMALL
+            if (length < tolerance and shrinks) or (i > 3 and length < 1e-10):
                 if length > 1e-14:  # the last evaluation serves; its error is the square of this step
                     Y = Y - step
                     solved = self.moved(solved, Y)

@@ -45,6 +45,8 @@ class CrossingOfOrbits(Crossing):
 
     def named(self, step: Step, point: Any) -> tuple[str, str | None] | None:
         """The flip of the orbit of half the period, which ends the branch; a pitchfork where a symmetry breaks."""
+        if step.curve.shooting.forced and np.abs(point.multipliers - 1.0).min() > POLE:
+            return None  # a contact of no length turns the determinant's sign too
         if is_doubled(step.curve, point):
             return "flip", "branching"
         return ("pitchfork" if breaks_symmetry(step.curve, point) else "branch_point"), None

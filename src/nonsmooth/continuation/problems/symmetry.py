@@ -24,7 +24,7 @@ def is_doubled(curve: Orbits, point: OrbitPoint) -> bool:
     word = [(v.mode, v.transition, v.row) for v in visits[:-1]]
     if word[: m // 2] != word[m // 2 :]:
         return False
-    half = _state_at(curve, point, 0.5 * float(point.solved.times[-1]))
+    half = _state_in(curve, point, m // 2, 0.5 * float(point.solved.times[-1]))
     here = point.X[: len(half)]
     return bool(np.abs((half - here) / curve.size[: len(half)]).max() < 1e-4)
 
@@ -49,10 +49,12 @@ def breaks_symmetry(curve: Orbits, point: OrbitPoint) -> bool:
 
 def _state_at(curve: Orbits, point: OrbitPoint, t: float) -> FloatArray:
     """The state at a time after the section."""
-    times, states = curve.shooting.split(point.X)
-    begins = np.concatenate([[0.0], times])
-    i = int(np.searchsorted(begins, t, side="right")) - 1
-    mode = curve.shooting.signature.visits[i].mode
-    flow, values = curve.shooting.flow, point.solved.values
-    segments = flow.segments(values, [mode], [begins[i]], [t - begins[i]], states[i][None, :])
+    return _state_in(curve, point, int(np.searchsorted(point.solved.times[1:-1], t, side="right")), t)
+
+
+def _state_in(curve: Orbits, point: OrbitPoint, i: int, t: float) -> FloatArray:
+    """The state at a time that lies in visit i, or at its ends."""
+    states = curve.shooting.split(point.X)[1]
+    mode, begin = curve.shooting.signature.visits[i].mode, float(point.solved.times[i])
+    segments = curve.shooting.flow.segments(point.solved.values, [mode], [begin], [t - begin], states[i][None, :])
     return np.asarray(segments.z[0, : len(curve.shooting.system.states)])

@@ -43,7 +43,9 @@ def visits_of(
 
 
 def _fired_row(flow: VariationalFlow, values: FloatArray, k: int, t: float, z: FloatArray, same: bool) -> int:
-    """The row of transition k that is zero; AT_ONCE where one at the ``same`` instant has led behind them all."""
+    """The row of transition k that is zero; AT_ONCE where one at the ``same`` instant has led behind them all.
+
+    So it is in a mode in which the indicator stands still: none is reached there."""
     found = flow.jump(values, k, t, z)
     size = float(np.abs(found.h_z) @ flow.scale) + abs(float(found.h_z @ z))
-    return AT_ONCE if same and abs(found.h) > BEHIND * size else found.row
+    return AT_ONCE if same and (found.rate == 0.0 or abs(found.h) > BEHIND * size) else found.row

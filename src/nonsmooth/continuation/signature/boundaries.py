@@ -8,7 +8,7 @@ import numpy as np
 
 from nonsmooth.continuation.march.event import BESIDE, Event, Met, Step
 from nonsmooth.continuation.signature.change import Change, inserted, without
-from nonsmooth.continuation.signature.leaving import gained, mark
+from nonsmooth.continuation.signature.leaving import contacts_of, gained, mark
 from nonsmooth.continuation.signature.neighbours import beside
 from nonsmooth.continuation.signature.signature import AT_ONCE
 
@@ -80,7 +80,7 @@ class Boundary(Event):
 
     def record(self, found: Any, step: Step, met: Met) -> None:
         """List a boundary that a branch passes with its signature."""
-        mark(found, step.curve, [met], beside(step.curve, met.point))
+        mark(found, step.curve, [met], beside(step.curve, met.point, contacts_of(step.curve, [met])))
 
 
 class Short(Boundary):

@@ -17,8 +17,9 @@ from nonsmooth.continuation.signature.signature import AT_ONCE, Signature, Visit
 
 if TYPE_CHECKING:
     from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
+    from nonsmooth.continuation.problems.shooting import Solved
 
-__all__ = ["Change", "common_point", "inserted", "past_the_section", "without"]
+__all__ = ["Change", "common_orbit", "common_point", "inserted", "past_the_section", "without"]
 
 FloatArray = NDArray[np.float64]
 
@@ -85,16 +86,27 @@ def without(curve: Orbits, point: OrbitPoint, place: int, count: int) -> Change:
     )  # fmt: skip
 
 
-def common_point(curve: Orbits, point: OrbitPoint, change: Change) -> OrbitPoint | None:
-    """The common orbit as a point of the new signature."""
+def common_orbit(curve: Orbits, point: OrbitPoint, change: Change) -> tuple[Orbits, Solved, FloatArray] | None:
+    """The common orbit in the new signature: its curve, the equations there, and the tangent of the curve."""
     signature, times, states = change.signature, change.times, change.states
     if not curve.shooting.forced and len(times):
         end = float(point.solved.times[-1])
         signature, times, states = anchored(curve.shooting.flow, point.solved.values, signature, times, states, end)
     fresh, X = curve.with_signature(signature, times, states, float(point.solved.times[-1]), point.X[-1:])
     solved = fresh.shooting.evaluate(X)
+    if not np.isfinite(solved.jacobian).all():
+        return None
     null = fresh.null_vectors(solved)
-    return fresh.point(solved, X / fresh.scale, null[-1]) if len(null) else None
+    return (fresh, solved, null[-1]) if len(null) else None
+
+
+def common_point(curve: Orbits, point: OrbitPoint, change: Change) -> OrbitPoint | None:
+    """The common orbit as a point of the new signature."""
+    found = common_orbit(curve, point, change)
+    if found is None:
+        return None
+    fresh, solved, tangent = found
+    return fresh.point(solved, solved.X / fresh.scale, tangent)
 
 
 def past_the_section(curve: Orbits, point: OrbitPoint) -> tuple[Orbits, OrbitPoint] | None:

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from nonsmooth.continuation.march.event import Met, Step, first_met
 from nonsmooth.continuation.problems.equilibrium import Equilibria
 from nonsmooth.continuation.problems.symmetry import is_doubled
 from nonsmooth.continuation.signature.change import Change, common_point, past_the_section
@@ -12,11 +16,14 @@ from nonsmooth.continuation.signature.grazing import graze
 from nonsmooth.continuation.signature.neighbours import beside
 
 if TYPE_CHECKING:
-    from nonsmooth.continuation.march.event import Met
     from nonsmooth.continuation.march.marches import March
     from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
 
-__all__ = ["behind", "gained", "mark"]
+__all__ = ["behind", "contacts_of", "gained", "mark"]
+
+FARTHEST = 0.1  # along the branch: the end of a signature is not looked for from farther behind it
+WITHIN = 1e-9  # of the range: as near as an event is located that only simulations show
+TOLERANCE = 1e-5  # of an indicator's size: a band as narrow as this stands for no width
 
 
 def behind(found: March, curve: Orbits, met: list[Met]) -> tuple[Orbits, OrbitPoint] | None:
@@ -28,7 +35,9 @@ def behind(found: March, curve: Orbits, met: list[Met]) -> tuple[Orbits, OrbitPo
                 found.ending = "no_convergence"
             return after
     first = met[0]
-    beyond = beside(curve, first.point)
+    beyond = beside(curve, first.point, contacts_of(curve, met))
+    if beyond is not None and _is_tolerance(curve, first.kind.surface(curve, first.point, beyond[0])):
+        return beyond
     name = mark(found, curve, met, beyond)
     if beyond is None and _is_centre(curve, first):
         found.ending = found.special[-1].kind = "focus_centre"
@@ -53,21 +62,54 @@ def _is_centre(curve: Orbits, met: Met) -> bool:
     )
 
 
+def contacts_of(curve: Orbits, met: list[Met]) -> list[tuple[Change, OrbitPoint]]:
+    """The contacts that may begin or end with what is met, each with the orbit there."""
+    return [(change, one.point) for one in met for change in one.kind.contacts(curve, one.point)]
+
+
 def mark(found: March, curve: Orbits, met: list[Met], beyond: tuple[Orbits, OrbitPoint] | None) -> str:
     """Record the end of a signature, by the contact that begins or ends there where one does; its name."""
     kind, point = met[0].kind, met[0].point
     if beyond is not None:
         cycle = beyond[0].shooting.signature.cycle
-        for one in met:
-            for change in one.kind.contacts(curve, one.point):
-                if change.signature.cycle == cycle:
-                    _mark_graze(found, curve, one.point, change, beyond)
-                    return "grazing"
+        for change, there in contacts_of(curve, met):
+            if change.signature.cycle == cycle:
+                _mark_graze(found, curve, there, change, beyond)
+                return "grazing"
+        end = _from_behind(point, *beyond)
+        if end is not None and _is_better(curve, met[0], beyond[0], end.point):
+            curve, kind, point = beyond[0], end.kind, end.point
     own = kind.contacts(curve, point)
     name = "grazing" if own else kind.name
     indicator = own[0].indicator if own else kind.surface(curve, point, beyond and beyond[0])
     found.mark(name, curve, point, indicator=indicator)
     return name
+
+
+def _from_behind(point: OrbitPoint, fresh: Orbits, first: OrbitPoint) -> Met | None:
+    """The end of the new signature, ``fresh``, seen from its first orbit: the place at which the old one ends."""
+    away = abs(float(first.X[-1] - point.X[-1])) / fresh.width
+    back, steep = first.turned(), abs(float(first.tangent[-1]))
+    new = fresh.step(back, 2.0 * away / steep) if steep * FARTHEST > away else None
+    if new is None:
+        return None
+    met = first_met(Step(fresh, back, new, ([], []), (fresh.margins(back), fresh.margins(new)), True))
+    return replace(met[0], point=met[0].point.turned()) if met else None
+
+
+def _is_better(curve: Orbits, met: Met, fresh: Orbits, there: OrbitPoint) -> bool:
+    """Return whether the end of the new signature, ``there``, is a better place of a corner than that of the old one.
+
+    A visit that ends as it begins, at a double zero, is located badly."""
+    if met.kind.place < 0:  # no margin tells where it is: within the interval that simulations leave
+        return abs(float(there.X[-1] - met.point.X[-1])) < WITHIN * curve.width
+    return _condition(fresh, there) < _condition(curve, met.point)
+
+
+def _condition(curve: Orbits, point: OrbitPoint) -> float:
+    """Condition number of the equations."""
+    values = np.linalg.svd(point.solved.jacobian * curve.weights, compute_uv=False)
+    return float(values[0] / values[-1])
 
 
 def _mark_graze(
@@ -87,3 +129,22 @@ def gained(curve: Orbits, fresh: Orbits) -> int:
     transitions = curve.shooting.system.traced.transitions
     rows = [transitions[k].rows[row].indicator for (k, row), n in more.items() if n > 0 and row >= 0]
     return rows[0] if rows else -1
+
+
+def _is_tolerance(curve: Orbits, indicator: int) -> bool:
+    """Return whether an indicator only sets a tolerance: below the creep of a stop impacts are completed as rest.
+
+    It differs from another one of its condition, with the other sign, by a small number."""
+    system = curve.shooting.system
+    traced = system.traced
+    for jump in traced.transitions:
+        signs = {row.indicator: row.sign for row in jump.rows}
+        for other, sign in signs.items():
+            if sign * signs.get(indicator, 0) >= 0:
+                continue
+            h = traced.indicators[other]
+            width = traced.indicators[indicator] - h
+            size = sum(abs(h.diff(u)) * scale for u, scale in zip(traced.u, system.scale_vector(), strict=True))
+            if width.is_number and size.is_number and 0.0 < abs(float(width)) < TOLERANCE * float(size):
+                return True
+    return False

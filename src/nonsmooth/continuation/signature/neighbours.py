@@ -9,17 +9,19 @@ need no rules of their own.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.continuation.searches.settled import Guess, touching
+from nonsmooth.continuation.signature.change import Change, common_orbit
 from nonsmooth.continuation.signature.rounds import Rounds
 
 if TYPE_CHECKING:
     from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
+    from nonsmooth.continuation.problems.shooting import Solved
 
 __all__ = ["beside"]
 
@@ -29,25 +31,33 @@ NEARER = 0.1  # once more at this part of it: an orbit that the branch goes on w
 SHRINKS = 0.5  # by at least this factor (a square root: 0.32)
 NEAR = 0.05  # of the orbit's size
 PERTURBED = 12  # rounds from about the orbit, on each side
+POWERS = (2.0, 1.0, 0.5)  # of the distance in the parameter: how far from it, beside a square root as beside a kink
 ROUNDS = 6  # signatures tried in a row
 STEEP = 1e-3  # of a tangent: its parameter
+BACK = 1e-3  # of its distance: an orbit nearer than this to the branch that has come here is on it
 AGAIN = 3  # times that Newton's method is begun with one signature
 
 
-def beside(curve: Orbits, point: OrbitPoint) -> tuple[Orbits, OrbitPoint] | None:
+def beside(
+    curve: Orbits, point: OrbitPoint, contacts: Sequence[tuple[Change, OrbitPoint]] = ()
+) -> tuple[Orbits, OrbitPoint] | None:
     """The orbit with which a branch goes on at ``point``, where its signature ends, on a curve of its own.
 
-    Its tangent leads away from there. None where there is none, or no simulated round shows it."""
+    ``contacts`` are those that may begin or end there. Its tangent leads away from there. None where there is none, or
+    no simulated round shows it."""
+    common = [end for change, there in contacts if (end := common_orbit(curve, there, change)) is not None]
     forward = float(np.sign(point.tangent[-1])) or 1.0
     for aside in ASIDE:
         for side in (forward, -forward):
-            found = _at(curve, point, side, aside)
+            found = _at(curve, point, common, side, aside)
             if found is not None:
                 return found
     return None
 
 
-def _at(curve: Orbits, point: OrbitPoint, side: float, aside: float) -> tuple[Orbits, OrbitPoint] | None:
+def _at(
+    curve: Orbits, point: OrbitPoint, common: list[tuple[Orbits, Solved, FloatArray]], side: float, aside: float
+) -> tuple[Orbits, OrbitPoint] | None:
     """The orbit at one distance on one side of the parameter."""
     shooting = curve.shooting
     values = point.solved.values.copy()
@@ -55,7 +65,7 @@ def _at(curve: Orbits, point: OrbitPoint, side: float, aside: float) -> tuple[Or
     values[shooting.places] = there = np.array([here + side * aside * curve.width])
     rounds = curve.rounds
     tried = Counter({shooting.signature.cycle: AGAIN})
-    for guess in _guesses(curve, point, rounds, values, side, aside):
+    for guess in _guesses(curve, point, common, rounds, values, side, aside):
         for _ in range(ROUNDS):
             if guess is None or tried[guess.signature.cycle] >= AGAIN:
                 break
@@ -65,7 +75,7 @@ def _at(curve: Orbits, point: OrbitPoint, side: float, aside: float) -> tuple[Or
             if found is None or not _apart(curve, point, found) < NEAR:
                 break
             if not found.virtual and rounds.shows(other.shooting, found.X, values):
-                if not _arrives(curve, point, other, found, here):
+                if not _arrives(curve, point, other, found, here) or _leads_back(curve, point, found):
                     break
                 facing = side * float(found.tangent[-1]) >= 0.0
                 return other, found if facing else found.turned()
@@ -74,20 +84,32 @@ def _at(curve: Orbits, point: OrbitPoint, side: float, aside: float) -> tuple[Or
 
 
 def _guesses(
-    curve: Orbits, point: OrbitPoint, rounds: Rounds, values: FloatArray, side: float, aside: float
-) -> Iterator[Guess | None]:
-    """Rounds along the branch, from the end of the signature itself, and about it; that end without its touches."""
+    curve: Orbits, point: OrbitPoint, common: list[tuple[Orbits, Solved, FloatArray]], rounds: Rounds,
+    values: FloatArray, side: float, aside: float,
+) -> Iterator[Guess | None]:  # fmt: skip
+    """Rounds along the branch, from the end of the signature itself, and about it; that end without its touches.
+
+    First the common orbits of contacts, along their tangents: beyond an impact without speed a round shows none nearby.
+    """
+    for other, there, tangent in common:
+        if abs(float(tangent[-1])) > STEEP:
+            yield _as_guess(other, there, there.X + side * aside / float(tangent[-1]) * tangent * other.scale)
     shooting, slope = curve.shooting, float(point.tangent[-1])
     if abs(slope) > STEEP:
         yield rounds.read(shooting, point.X + side * aside / slope * point.tangent * curve.scale, values)
     yield rounds.read(shooting, point.X, values)
-    times, states = shooting.split(point.X)
-    end = Guess(shooting.period_number, float(point.solved.times[-1]), shooting.signature, times, states)
-    yield from touching(end, shooting.system)
+    yield from touching(_as_guess(curve, point.solved, point.X), shooting.system)
     random = np.random.default_rng(0)
     for i in range(PERTURBED):
-        change = aside * 10.0 ** (i % 3) * random.uniform(-1.0, 1.0, shooting.n) * curve.size
+        change = aside ** POWERS[i % 3] * random.uniform(-1.0, 1.0, shooting.n) * curve.size
         yield rounds.read(shooting, point.X, values, change)
+
+
+def _as_guess(curve: Orbits, near: Solved, X: FloatArray) -> Guess:
+    """Unknowns near a solved orbit of a curve as an interval of motion."""
+    shooting = curve.shooting
+    period = float(near.times[-1]) if shooting.forced else float(X[shooting.size - 1])
+    return Guess(shooting.period_number, period, shooting.signature, *shooting.split(X))
 
 
 def _apart(curve: Orbits, a: OrbitPoint, b: OrbitPoint) -> float:
@@ -103,3 +125,12 @@ def _arrives(curve: Orbits, point: OrbitPoint, other: Orbits, found: OrbitPoint,
     value = here + NEARER * (float(found.X[-1]) - here)
     nearer = other.at_parameter(found.Y, value)
     return nearer is not None and _apart(curve, point, nearer) <= SHRINKS * _apart(curve, point, found) + 1e-9
+
+
+def _leads_back(curve: Orbits, point: OrbitPoint, found: OrbitPoint) -> bool:
+    """Return whether an orbit lies on the branch that has come to ``point``, whatever its signature says."""
+    value = float(found.X[-1])
+    if (value - float(point.X[-1])) * float(point.tangent[-1]) > 0.0:
+        return False
+    own = curve.at_parameter(point.Y, value)
+    return own is not None and _apart(curve, own, found) < BACK * _apart(curve, point, found)

@@ -21,6 +21,7 @@ FloatArray = NDArray[np.float64]
 ORDER = 20
 RTOL = 1e-15
 ROUNDING = 1e-13  # of an indicator's size
+BEGUN = 1e-10  # of the period
 SOLVED = 1e-6  # of its size: as near to a boundary just crossed as an orbit is solved for
 
 
@@ -143,6 +144,9 @@ class Walk:
         )  # fmt: skip
         if status:
             return None
+        # Where several rows vanish as a visit begins, a lift-off, rounding of one is no maximum of another.
+        begun = place - solved.times[:-1, None] <= BEGUN * float(solved.times[-1])
+        inner[begun & (np.maximum(np.abs(inner), np.abs(begin)) <= ROUNDING * size)] = -np.inf
         at = int(inner.argmax()) if n_t else 0
         touched = (at // n_t, at % n_t) if n_t else (0, 0)
         own = end[self.inside]
