@@ -61,7 +61,7 @@ def observe(i, step, stop, triggered, form, net, section, goal, seen, tables, wo
         seen.sums[0] += tables.field[mode, r, r] * step
     if BANDED:
         if tables.lines[mode, 0, 0] > 0:
-            carry(tables, work, mode, step, scale, seen.frame)
+            carry(tables, work, mode, step / tables.info[mode, 0], scale, seen.frame)
             return OPEN_RUN
     spacing, full = tables.info[mode, 1], step == tables.info[mode, 0]
     node = NODES if full else min(int(step / spacing + 0.5), NODES)
@@ -131,7 +131,7 @@ def approach(mode, fired, seen, tables, work):
 
 
 @once
-def cross(i, t, mode, jumps, form, net, goal, seen, tables, work):
+def cross(i, t, mode, jumps, form, net, section, goal, seen, tables, work):
     """Saltation of a transition, from the mode in which it was taken to ``mode``."""
     before, f, R = work.wp, seen.fields, seen.reset
     slope_along(tables.field, work.tally[MODE], before, f[0])

@@ -78,52 +78,70 @@ def next_stop(i, form, net, section, goal, work):
     return stop, which
 
 
-@once
-def clear_step(tables, net, work, mode):
-    """Return whether no transition can fire on the step from w to w1: each has a row that certainly stays <= 0."""
-    w, w1, zero, rows = work.w, work.w1, work.zero, net.rows
-    clear = True
-    for k in range(net.mode_start[mode], net.mode_start[mode + 1]):
-        t = net.mode_list[k]
-        blocked = False
-        for r in range(net.row_start[t], net.row_start[t + 1]):
-            f = rows[r, 0]
-            sign = float(rows[r, 1])
-            g0 = sign * value_of(tables, mode, f, w)
-            if zero[f] != 0:
-                g0 = 0.0
-            g1 = sign * value_of(tables, mode, f, w1)
-            s0 = sign * slope_of(tables, mode, f, w)
-            s1 = sign * slope_of(tables, mode, f, w1)
+@inline
+def blocked(tables, work, mode, rows, lo, hi, h, w1):
+    """Return the first of the rows lo..hi that certainly stays <= 0 for a time h, behind which w is w1; -1: none."""
+    w, zero = work.w, work.zero
+    found = -1
+    for r in range(lo, hi):
+        f = rows[r, 0]
+        sign = float(rows[r, 1])
+        g0 = sign * value_of(tables, mode, f, w)
+        g1 = sign * value_of(tables, mode, f, w1)
+        s0 = sign * slope_of(tables, mode, f, w)
+        s1 = sign * slope_of(tables, mode, f, w1)
+        if f < zero.shape[0] and zero[f] != 0:
+            g0 = 0.0
             if zero[f] >= 2:
                 s0 = 0.0
-            if classify(g0, s0, g1, s1, tables.info[mode, 0], bound_at(tables, work, mode, f)) == NEVER:
-                blocked = True
-                break
-        if not blocked:
-            clear = False
+        if classify(g0, s0, g1, s1, h, bound_at(tables, work, mode, f)) == NEVER:
+            found = r
             break
-    return clear
+    return found
+
+
+@inline
+def begins_with(rows, lo, hi, r):
+    """Return whether the first of the rows lo..hi is the condition of row r (-1: none)."""
+    return r >= 0 and lo < hi and rows[lo, 0] == rows[r, 0] and rows[lo, 1] == rows[r, 1]
+
+
+@once
+def first_open(tables, net, work, mode):
+    """The place in the mode's list of the first transition that may fire on the step from w to w1; -1: none may."""
+    place, low = -1, -1
+    for k in range(net.mode_start[mode], net.mode_start[mode + 1]):
+        lo, hi = net.row_start[net.mode_list[k]], net.row_start[net.mode_list[k] + 1]
+        if begins_with(net.rows, lo, hi, low):
+            continue
+        low = blocked(tables, work, mode, net.rows, lo, hi, tables.info[mode, 0], work.w1)
+        if low < 0:
+            place = k - net.mode_start[mode]
+            break
+    return place
 
 
 @once
 def stride(tables, net, work, mode, s, whole, target, period, returns, most, patience):
     """Whole steps without crossings, past section phases, as long as ``returns`` < ``most``; ``patience`` of them.
 
-    Returns (s, whole, returns, clear, patience left); w1 then stands at the end of the step that is not clear, or that
-    would be one return too many (``clear``: no transition on it)."""
+    Returns (s, whole, returns, first, patience left); w1 then stands at the end of the next step, on which the mode's
+    transition at the place ``first`` may fire, or none (-1; the step would be one return too many)."""
     w, w1 = work.w, work.w1
     step = tables.info[mode, 0]
     whole_step(tables, work, mode)
-    clear = False
-    while patience > 0 and clear_step(tables, net, work, mode):
+    first = 0
+    while patience > 0:
+        first = first_open(tables, net, work, mode)
+        if first >= 0:
+            break
         patience -= 1
         after = s + step
         if (s < target and target <= after) or (s < target + period and target + period <= after):
             if returns + 1 >= most:
-                clear = True
                 break
             returns += 1
+        first = 0
         s = after
         for j in range(M):
             w[j] = w1[j]
@@ -139,7 +157,7 @@ def stride(tables, net, work, mode, s, whole, target, period, returns, most, pat
         for f in range(work.zero.shape[0]):
             work.zero[f] = 0
         whole_step(tables, work, mode)
-    return s, whole, returns, clear, patience
+    return s, whole, returns, first, patience
 
 
 @once
@@ -152,18 +170,19 @@ def steps_at_a_stride(i, form, net, section):
 
 
 @once
-def leg(i, form, net, section, goal, tables, work, r_max, ready, clear):
+def leg(i, form, net, section, goal, tables, work, r_max, ready, first):
     """March one step of the mode, or less: to r_max, or to the first crossing or section return.
 
-    w1 stands at the end of the whole step (``ready``: it does so already; ``clear``: and nothing happens on it),
-    ``end`` at the segment's end where that is shorter (the third number returned tells). Returns (time marched,
+    w1 stands at the end of the whole step (``ready``: it does so already). Of the mode's transitions only those from
+    place ``first`` on may fire on it (-1: none may, and nothing else happens).
+    ``end`` stands at the segment's end where that is shorter (the third number returned tells). Returns (time marched,
     transition or -1, whole step or not, section direction or 0).
     """
     end, there, found, rows = work.end, work.there, work.found, net.rows
     mode = work.tally[MODE]
     found[NODE] = -1
     step = tables.info[mode, 0]
-    if clear:
+    if first < 0:
         return step, -1, True, 0
     if not ready:
         whole_step(tables, work, mode)
@@ -171,11 +190,12 @@ def leg(i, form, net, section, goal, tables, work, r_max, ready, clear):
     fired = -1
     crossed = 0
     functional = -1
+    low = -1
     n_rows = rows.shape[0]
     start = net.mode_start[mode]
     n_own = net.mode_start[mode + 1] - start
     n_all = n_own + 2 if section.indicator >= 0 and (section.mode < 0 or section.mode == mode) else n_own
-    for k in range(n_all):
+    for k in range(first, n_all):
         t = -1
         sense = 0
         if k < n_own:
@@ -188,6 +208,12 @@ def leg(i, form, net, section, goal, tables, work, r_max, ready, clear):
             hi = lo + 1
         if lo == hi or section.rising * sense < 0:
             continue
+        if fired >= 0 or crossed != 0:  # what counts still must happen before
+            if begins_with(rows, lo, hi, low):
+                continue
+            low = blocked(tables, work, mode, rows, lo, hi, best, end)
+            if low >= 0:
+                continue
         tau = search(tables, work, mode, rows, lo, hi, sense * found[SIDE] > 0, best)
         if tau >= 0.0 and (tau < best or (fired < 0 and crossed == 0 and tau <= best)):
             best = tau

@@ -17,7 +17,7 @@ every inner loop has constant bounds. Arrays (M columns of w, functionals = indi
     field[mode, n, M]              rows of u'
     info[mode, 2 + n]              step, node spacing, u_eq
     bands[mode, STATES + M, n]     of many states with few entries, which have no propagators: from place 1 on the
-                                   diagonals of A, and from n on the columns of what is not a state; see ``bands``
+                                   diagonals of A, from 2 n on the columns of what is not a state; see ``bands``
     lines[mode, STATES + M, 3]     how many diagonals (0: propagators); of each its offset, its first row and the row
                                    behind its last; of each column whether it has entries
     some[mode, functional, 2, M + 1]  of many states: how many columns of the Taylor rows are not zero, and which; and

@@ -114,7 +114,7 @@ def to_node(tables, work, mode, node, out):
     w, rot = work.w, tables.rot
     if BANDED:
         if tables.lines[mode, 0, 0] > 0:
-            along(work.row, node * tables.info[mode, 1], out)
+            along(work.row, node / NODES, out)
             return
     for h in range(HARMONICS):
         c = rot[mode, node, 2 * h]
@@ -176,7 +176,7 @@ def dense(tables, work, mode, tau, out):
     """w at any instant of the step."""
     if BANDED:
         if tables.lines[mode, 0, 0] > 0:
-            along(work.row, tau, out)
+            along(work.row, tau / tables.info[mode, 0], out)
             return
     spacing = tables.info[mode, 1]
     wn, scr, rates = work.wn, work.scr, work.rates
