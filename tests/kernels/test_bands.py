@@ -88,7 +88,7 @@ def test_the_bound_on_a_fourth_derivative_holds_on_the_whole_step(generators, ma
     M, step = generators[mode], tables.info[mode, 0]
     fourth = np.linalg.matrix_power(M, 4)
     largest = np.max([np.abs(fourth @ expm(M * s) @ work.w) for s in np.linspace(0.0, step, 41)], axis=0)
-    bounds = np.array([module.bound_at(tables, work, mode, f) for f in range(STATES)])
+    bounds = np.array([module.bound_at(tables, work.row, mode, f, work.w) for f in range(STATES)])
     assert (bounds >= largest[:STATES]).all()
     assert (bounds <= 100.0 * largest[:STATES].max()).all()  # and is of some use
 

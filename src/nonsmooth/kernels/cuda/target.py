@@ -19,7 +19,7 @@ from nonsmooth.kernels.compile.lanes import plain
 
 __all__ = [
     "REGISTERS", "THREADS", "add_products", "callback", "cuda", "device", "dot", "entry", "inline", "kernel", "local",
-    "once", "sizes", "spread", "sum_columns", "sum_rows", "sum_some_rows",
+    "once", "sizes", "spread", "sum_columns", "sum_rows", "sum_some_rows", "sum_terms",
 ]  # fmt: skip
 
 THREADS = 64  # in a block: few, because a trajectory fills a thread's registers
@@ -37,7 +37,8 @@ def device(function: Callable[..., Any]) -> Any:
 inline = once = device
 sum_rows, sum_columns = device(plain.sum_rows), device(plain.sum_columns)
 dot, sizes, spread = device(plain.dot), device(plain.sizes), device(plain.spread)
-sum_some_rows, add_products = device(plain.sum_some_rows), device(plain.add_products)
+sum_some_rows = device(plain.sum_some_rows)
+add_products, sum_terms = device(plain.add_products), device(plain.sum_terms)
 
 
 def local(function: Callable[..., Any]) -> Any:

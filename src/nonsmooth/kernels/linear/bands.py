@@ -8,10 +8,8 @@ behind each other and go in vectors: masses in a row have five. A mode with too 
 moves by its propagators.
 """
 
-from math import fabs
-
 from nonsmooth.kernels.compile.cache import device
-from nonsmooth.kernels.compile.lanes import add_products
+from nonsmooth.kernels.compile.lanes import add_products, sum_terms
 from nonsmooth.kernels.linear.tables import HARMONICS, MANY, ONE, STATES, WAVE, M
 
 ORDER = 22  # of the series: (pi / 2)^23 / 23! is 1e-18
@@ -41,11 +39,12 @@ def fill_bands(mode, tables):
             bands[mode, count, r] = step * field[mode, r, r + offset]
     lines[mode, 0, 0] = count
     for j in range(ONE, M):
-        moved = 0
+        first, last = STATES, 0
         for r in range(STATES):
             bands[mode, STATES + j, r] = step * field[mode, r, j]
-            moved = 1 if moved != 0 or field[mode, r, j] != 0.0 else 0
-        lines[mode, STATES + j, 0] = moved
+            if field[mode, r, j] != 0.0:
+                first, last = min(first, r), r + 1
+        lines[mode, STATES + j, 1], lines[mode, STATES + j, 2] = first, last
 
 
 @device
@@ -57,10 +56,8 @@ def next_term(tables, mode, row, k):
     for d in range(1, lines[mode, 0, 0] + 1):
         add_products(row, k + 1, bands, mode, d, lines[mode, d, 0], lines[mode, d, 1], lines[mode, d, 2])
     for j in range(ONE if k == 0 else WAVE, M):
-        if lines[mode, STATES + j, 0] != 0:
-            factor = row[k, j]
-            for r in range(STATES):
-                row[k + 1, r] += factor * bands[mode, STATES + j, r]
+        for r in range(lines[mode, STATES + j, 1], lines[mode, STATES + j, 2]):
+            row[k + 1, r] += bands[mode, STATES + j, r] * row[k, j]
 
 
 @device
@@ -69,9 +66,7 @@ def expand(tables, work, mode):
     row, w, rates, step = work.row, work.w, work.rates, tables.info[mode, 0]
     for j in range(M):
         row[0, j] = w[j]
-        row[STEEP, j] = 0.0
     row[0, ONE] = 1.0
-    factor = 1.0 / (step * step * step * step)
     for k in range(1, ORDER + 1):
         next_term(tables, mode, row, k - 1)
         row[k, ONE] = 0.0
@@ -79,21 +74,16 @@ def expand(tables, work, mode):
             turn_by = step * rates[h]
             row[k, WAVE + 2 * h] = -turn_by * row[k - 1, WAVE + 1 + 2 * h]
             row[k, WAVE + 1 + 2 * h] = turn_by * row[k - 1, WAVE + 2 * h]
-        if k >= 4:
-            factor /= max(k - 4, 1)
-            for j in range(M):
-                row[STEEP, j] += factor * fabs(row[k, j])
+    sum_terms(row[STEEP], row, 4, ORDER, 1.0, 1, M)
+    quick = 1.0 / (step * step * step * step)
+    for j in range(M):
+        row[STEEP, j] *= quick
 
 
 @device
 def along(row, x, out):
     """w at a part x of the step, from the terms of its series."""
-    for j in range(M):
-        out[j] = row[ORDER, j]
-    for k in range(ORDER - 1, -1, -1):
-        part = x / (k + 1)
-        for j in range(M):
-            out[j] = part * out[j] + row[k, j]
+    sum_terms(out, row, 0, ORDER, x, 0, M)
 
 
 @device

@@ -127,6 +127,7 @@ def build(i, form, tables, work):
                     fun[mode, f, WAVE + 2 * h] = form.oc[i, o, given, h]
                     fun[mode, f, WAVE + 1 + 2 * h] = form.os[i, o, given, h]
             if isnan(fun[mode, f, ONE]):  # not asked for in this mode
+                fun[mode, f, SIZES] = -1.0
                 continue
             fill_functional(mode, f, tables, rates, work.row)
             fun[mode, f, SIZES], fun[mode, f, SIZES + 1] = 0.0, 0.0

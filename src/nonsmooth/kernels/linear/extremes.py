@@ -15,13 +15,13 @@ from nonsmooth.kernels.linear.values import bound_at, compose, slope_of, to_node
 def locate_maximum(tables, work, mode, f, sign, a, b, best):
     """The larger of ``best`` and the maximum of sign * functional over [a, b] of the step, piece by piece."""
     spacing = tables.info[mode, 1]
-    wn, wq, scr, points = work.wn, work.wq, work.scr, work.points
-    bound = bound_at(tables, work, mode, f)
+    w, wn, wq, scr, points = work.w, work.wn, work.wq, work.scr, work.points
+    bound = bound_at(tables, work.row, mode, f, w)
     size = NODES // 4
     node = min(int(a / spacing) // size * size, NODES - size)
     while node < NODES and node * spacing <= b:
-        to_node(tables, work, mode, node, wn)
-        to_node(tables, work, mode, node + size, wq)
+        to_node(tables, work.row, mode, node, w, wn)
+        to_node(tables, work.row, mode, node + size, w, wq)
         g0 = sign * value_of(tables, mode, f, wn) - best
         g1 = sign * value_of(tables, mode, f, wq) - best
         s0 = sign * slope_of(tables, mode, f, wn)
@@ -30,7 +30,7 @@ def locate_maximum(tables, work, mode, f, sign, a, b, best):
             if size > 2:
                 size //= 2
                 continue
-            to_node(tables, work, mode, node + 1, wn)
+            to_node(tables, work.row, mode, node + 1, w, wn)
             compose(tables, mode, f, wn, scr, 0)
             lo = max(a - (node + 1) * spacing, -spacing)
             hi = min(b - (node + 1) * spacing, spacing)
@@ -46,9 +46,8 @@ def locate_maximum(tables, work, mode, f, sign, a, b, best):
 
 
 @inline
-def exceeds(tables, work, mode, f, lowest, highest):
+def exceeds(tables, row, mode, f, w, w1, lowest, highest):
     """Return whether functional f may leave [lowest, highest] on the step from w to w1: (below, above)."""
-    w, w1 = work.w, work.w1
     g0 = value_of(tables, mode, f, w)
     g1 = value_of(tables, mode, f, w1)
     h = tables.info[mode, 0]
@@ -58,7 +57,7 @@ def exceeds(tables, work, mode, f, lowest, highest):
     c2 = 0.5 * (b1 + b2)
     c3 = 0.25 * (3.0 * b2 + g1)
     h2 = h * h
-    wide = bound_at(tables, work, mode, f) * h2 * h2 * (1.0 / 144.0)
+    wide = bound_at(tables, row, mode, f, w) * h2 * h2 * (1.0 / 144.0)
     below = min(min(min(g0, g1), min(c1, c3)), c2 - wide) < lowest
     above = max(max(max(g0, g1), max(c1, c3)), c2 + wide) > highest
     return below, above
@@ -84,7 +83,7 @@ def widen(i, a, b, form, tables, work, kept):
         if MEMORY > 0 and n_i + OWN <= f < n_i + STATES:
             continue
         hi, lo, k = extremes_of(f, kept, n_i)
-        below, above = exceeds(tables, work, mode, f, lo[i, k], hi[i, k])
+        below, above = exceeds(tables, work.row, mode, f, work.w, work.w1, lo[i, k], hi[i, k])
         if above:
             hi[i, k] = locate_maximum(tables, work, mode, f, 1.0, a, b, hi[i, k])
         if below:

@@ -49,8 +49,10 @@ def mark_zeros(tables, work, mode):
         largest = max(largest, fabs(w[r]))
     most = 17.0 * EPS * largest  # noise is below this with every state as large as the largest
     for f in range(zero.shape[0]):
-        value = fabs(value_of(tables, mode, f, w))
         zero[f] = 0
+        if fun[mode, f, SIZES] < 0.0:  # not asked for in this mode
+            continue
+        value = fabs(value_of(tables, mode, f, w))
         if not value <= most * (fun[mode, f, SIZES] + 0.25 * step * fun[mode, f, SIZES + 1]):
             continue
         if value <= rounding(tables, mode, f, 0, w) + 0.25 * step * rounding(tables, mode, f, M, w):

@@ -99,7 +99,7 @@ def finest(tables, work, mode, rows, lo, hi, node, up):
     ``up``: they are positive at its start already, so one has to fall first."""
     spacing = tables.info[mode, 1]
     wn, scr, points, zero, found = work.wn, work.scr, work.points, work.zero, work.found
-    to_node(tables, work, mode, node, wn)
+    to_node(tables, work.row, mode, node, work.w, wn)
     found[NODE] = -1
     for r in range(lo, hi):
         row = r - lo
@@ -183,8 +183,8 @@ def search(tables, work, mode, rows, lo, hi, held, r_max):
         last = node + size
         h = size * spacing
         if size < NODES:
-            to_node(tables, work, mode, node, wp)
-            to_node(tables, work, mode, last, wq)
+            to_node(tables, work.row, mode, node, w, wp)
+            to_node(tables, work.row, mode, last, w, wq)
         n_open = 0
         n_once = 0
         once = lo
@@ -207,7 +207,7 @@ def search(tables, work, mode, rows, lo, hi, held, r_max):
                 g0 = 0.0
                 if zero[f] >= 2:
                     s0 = 0.0
-            kind = classify(g0, s0, g1, s1, h, bound_at(tables, work, mode, f))
+            kind = classify(g0, s0, g1, s1, h, bound_at(tables, work.row, mode, f, w))
             if kind == NEVER:
                 never = True
                 break

@@ -94,7 +94,7 @@ def blocked(tables, work, mode, rows, lo, hi, h, w1):
             g0 = 0.0
             if zero[f] >= 2:
                 s0 = 0.0
-        if classify(g0, s0, g1, s1, h, bound_at(tables, work, mode, f)) == NEVER:
+        if classify(g0, s0, g1, s1, h, bound_at(tables, work.row, mode, f, w)) == NEVER:
             found = r
             break
     return found

@@ -19,7 +19,7 @@ every inner loop has constant bounds. Arrays (M columns of w, functionals = indi
     bands[mode, STATES + M, n]     of many states with few entries, which have no propagators: from place 1 on the
                                    diagonals of A, from 2 n on the columns of what is not a state; see ``bands``
     lines[mode, STATES + M, 3]     how many diagonals (0: propagators); of each its offset, its first row and the row
-                                   behind its last; of each column whether it has entries
+                                   behind its last; of each column these two
     some[mode, functional, 2, M + 1]  of many states: how many columns of the Taylor rows are not zero, and which; and
                                    of the states in value and slope
 """

@@ -62,12 +62,12 @@ def slope_of(tables, mode, f, w):
 
 
 @inline
-def bound_at(tables, work, mode, f):
+def bound_at(tables, row, mode, f, w):
     """Bound on the fourth derivative of functional f on the step that starts at w."""
-    w, fun, info = work.w, tables.fun, tables.info
+    fun, info = tables.fun, tables.info
     if BANDED:
         if tables.lines[mode, 0, 0] > 0:
-            return bound_by_series(tables, work, mode, f)
+            return bound_by_series(tables, row, mode, f)
     total = fun[mode, f, 2 * M + STATES]
     if STATES >= MANY:
         return spread(total, fun[mode, f], 2 * M, w, info[mode], STATES)
@@ -77,9 +77,9 @@ def bound_at(tables, work, mode, f):
 
 
 @inline
-def bound_by_series(tables, work, mode, f):
+def bound_by_series(tables, row, mode, f):
     """The same from those on w itself."""
-    fun, some, row = tables.fun, tables.some, work.row
+    fun, some = tables.fun, tables.some
     total = 0.0
     for j in range(WAVE, M):
         total += fabs(fun[mode, f, j]) * row[STEEP, j]
@@ -109,12 +109,12 @@ def rounding(tables, mode, f, at, w):
 
 
 @inline
-def to_node(tables, work, mode, node, out):
+def to_node(tables, row, mode, node, w, out):
     """w at a node of the step, from w at its start."""
-    w, rot = work.w, tables.rot
+    rot = tables.rot
     if BANDED:
         if tables.lines[mode, 0, 0] > 0:
-            along(work.row, node / NODES, out)
+            along(row, node / NODES, out)
             return
     for h in range(HARMONICS):
         c = rot[mode, node, 2 * h]
@@ -131,7 +131,7 @@ def whole_step(tables, work, mode):
     if BANDED:
         if tables.lines[mode, 0, 0] > 0:
             expand(tables, work, mode)
-    to_node(tables, work, mode, NODES, work.w1)
+    to_node(tables, work.row, mode, NODES, work.w, work.w1)
 
 
 @inline
@@ -148,7 +148,7 @@ def at_node(tables, work, mode, node):
     """w at a node of the step, into ``work.wn``."""
     found = work.found
     if found[NODE] != node and found[NODE] != -2 - node:
-        to_node(tables, work, mode, node, work.wn)
+        to_node(tables, work.row, mode, node, work.w, work.wn)
         found[NODE] = -2 - node
 
 
