@@ -4,14 +4,14 @@ A step that certainly does not leave the extremes so far costs a dozen multiplic
 is halved down to two node spacings, where the polynomial's critical points decide.
 """
 
-from nonsmooth.kernels.compile.cache import device, inline, once
+from nonsmooth.kernels.compile.cache import inline, once
 from nonsmooth.kernels.hybrid.places import MODE
 from nonsmooth.kernels.linear.polynomial import NEVER, THIRD, classify, critical_points, horner
 from nonsmooth.kernels.linear.tables import MEMORY, NODES, ONE, OWN, STATES
 from nonsmooth.kernels.linear.values import bound_at, compose, slope_of, to_node, value_of
 
 
-@device
+@once
 def locate_maximum(tables, work, mode, f, sign, a, b, best):
     """The larger of ``best`` and the maximum of sign * functional over [a, b] of the step, piece by piece."""
     spacing = tables.info[mode, 1]
@@ -84,10 +84,14 @@ def widen(i, a, b, form, tables, work, kept):
             continue
         hi, lo, k = extremes_of(f, kept, n_i)
         below, above = exceeds(tables, work.row, mode, f, work.w, work.w1, lo[i, k], hi[i, k])
-        if above:
-            hi[i, k] = locate_maximum(tables, work, mode, f, 1.0, a, b, hi[i, k])
-        if below:
-            lo[i, k] = -locate_maximum(tables, work, mode, f, -1.0, a, b, -lo[i, k])
+        for side in range(2):
+            if above if side == 0 else below:
+                sign = 1.0 if side == 0 else -1.0
+                found = sign * locate_maximum(tables, work, mode, f, sign, a, b, hi[i, k] if side == 0 else -lo[i, k])
+                if side == 0:
+                    hi[i, k] = found
+                else:
+                    lo[i, k] = found
 
 
 @once
