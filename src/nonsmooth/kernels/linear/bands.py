@@ -19,7 +19,7 @@ WORTH = 3  # a series may take so many times the multiplications of a propagator
 
 @device
 def fill_bands(mode, tables):
-    """List the diagonals of a mode's matrix and the columns of its forcing, where a series is worth it."""
+    """List the diagonals of a mode's matrix and the columns of its forcing, where a series costs less."""
     field, bands, lines, step = tables.field, tables.bands, tables.lines, tables.info[mode, 0]
     count, total = 0, 0
     for offset in range(1 - STATES, STATES):

@@ -25,7 +25,7 @@ from nonsmooth.kernels.linear.tables import (
 
 @device
 def fill_ways(i, given, mode, form, tables, rates, row):
-    """What leads to any instant of a step of the mode: a series over few entries, or propagators."""
+    """Prepare the steps of a mode: a series over few entries, or propagators."""
     fill_turns(mode, rates, tables.info[mode, 1], tables.rot)
     if BANDED:
         fill_bands(mode, tables)

@@ -1,4 +1,4 @@
-"""Where a step of the exact flow leads, and the values of functionals (indicators, states, outputs) on it.
+"""States on a step of the exact flow, and the values of functionals (indicators, states, outputs) there.
 
 At any of 33 nodes of a step the state is one product with a propagator, and a functional beside a node a Taylor
 polynomial of degree 7 (remainder below 1e-16 of the amplitude over 3/4 of a node spacing of 0.05 rad, 4e-18 over half
