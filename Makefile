@@ -12,7 +12,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 PYTEST_ARGS ?= -n auto --dist loadfile --no-loadscope-reorder
 
 .DEFAULT_GOAL := help
-.PHONY: help reproduce reproduce-full test slow mutants fuzz altered coverage coverage-awkward rig-against-model check \
+.PHONY: help reproduce reproduce-full test slow mutants fuzz altered coverage coverage-awkward check \
 	bench gpu gpu-compiler docs screenshots clean distclean
 
 help:  ## list the targets
@@ -34,19 +34,16 @@ mutants: $(VENV)/.compiled-test  ## small mistakes in the sources, one by one: e
 	$(BIN)/python tests/mutants.py
 
 fuzz: $(VENV)/.compiled-test  ## read 100 000 damaged recordings with every reader
-	$(BIN)/python -m pytest -m slow tests/experiment/test_fuzz.py -s
+	$(BIN)/python -m pytest -m slow tests/recordings/test_fuzz.py -s
 
 altered: $(VENV)/.compiled-test  ## alter bytes of 400 saved files of each format: none loads with other content
 	$(BIN)/python -m pytest -m slow tests/results/test_altered_bytes.py -s
 
 coverage: $(VENV)/.compiled-run  ## identify 40 virtual rigs; writes docs/measured_coverage.md
-	$(BIN)/python -m nonsmooth.identification.coverage --seeds 0-39 --out docs/measured_coverage.md
+	$(BIN)/python -m nonsmooth.studies.savi2007.identification.coverage --seeds 0-39 --out docs/measured_coverage.md
 
 coverage-awkward: $(VENV)/.compiled-run  ## the same on rigs where much goes wrong; writes docs/measured_coverage_awkward.md
-	$(BIN)/python -m nonsmooth.identification.coverage --awkward --seeds 0-39 --out docs/measured_coverage_awkward.md
-
-rig-against-model: $(VENV)/.compiled-run  ## lay virtual rigs over the model; writes docs/measured_rig_against_model.md
-	$(BIN)/python -m nonsmooth.identification.compare.rig_against_model --seeds 2 3 --out docs/measured_rig_against_model.md
+	$(BIN)/python -m nonsmooth.studies.savi2007.identification.coverage --awkward --seeds 0-39 --out docs/measured_coverage_awkward.md
 
 check: $(VENV)/.installed-dev  ## ruff, mypy, import-linter, codespell, the prose of docstrings
 	$(BIN)/ruff check .

@@ -17,9 +17,9 @@ import numpy as np
 import xarray as xr
 
 import nonsmooth as ns
-from nonsmooth.experiment.signals.restitution import flights
-from nonsmooth.experiment.signals.rigid_body import corner_heights, corner_restitution, cube
 from nonsmooth.plot.identification import restitution, toss
+from nonsmooth.recordings.signals.restitution import flights
+from nonsmooth.recordings.signals.rigid_body import corner_heights, corner_restitution, cube
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -43,7 +43,7 @@ def main() -> Figure:
     import matplotlib.pyplot as plt
 
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ns.experiment.RecordingWarning)  # units that are no SI units
+        warnings.simplefilter("ignore", ns.recordings.RecordingWarning)  # units that are no SI units
         recording = ns.load_recording(measured(), columns=COLUMNS)
     found, falls, longer, lows = [], [], 0, []
     for run in recording.runs:

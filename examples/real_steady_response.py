@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import nonsmooth as ns
-from nonsmooth.experiment.signals.checks import take
-from nonsmooth.experiment.signals.steady import steady_response
 from nonsmooth.plot.identification import steady_amplitude, steady_phase
+from nonsmooth.recordings.signals.checks import take
+from nonsmooth.recordings.signals.steady import steady_response
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -36,7 +36,7 @@ def main() -> Figure:
     import matplotlib.pyplot as plt
 
     with warnings.catch_warnings():  # the file's oddities: its header counts 1000 samples, 1176 follow, ...
-        warnings.simplefilter("ignore", ns.experiment.RecordingWarning)
+        warnings.simplefilter("ignore", ns.recordings.RecordingWarning)
         recording = ns.load_recording(measured())
     strain = take(recording, "Strain_0", "Segment 1", units=("Strain",))
     found = steady_response(strain.time, strain)

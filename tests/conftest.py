@@ -26,7 +26,7 @@ FIRST = (
     "diagrams/test_chart_known_answers.py",  # settle_many
     "flow/test_variational.py",  # march_legs, many models
     "diagrams/test_lyapunov.py",  # spectrum without a harmonic
-    "experiment/rig/test_virtual_rig.py",  # the models of the rig
+    "studies/rig/test_virtual_rig.py",  # the models of the rig
     "diagrams/test_correlation_dimension.py",  # spectrum
     "flow/test_poincare.py",  # chain without a harmonic
     "diagrams/test_sweep.py",  # chain
@@ -60,7 +60,7 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     class ByFile(LoadFileScheduling):
         def _split_scope(self, nodeid: str) -> str:
             file = super()._split_scope(nodeid)
-            return "tests/studies" if file.startswith("tests/studies/") else file
+            return "tests/studies" if file.startswith("tests/studies/test_savi2007") else file
 
     return ByFile(config, log) if config.getvalue("dist") == "loadfile" else None
 

@@ -12,12 +12,12 @@ import pytest
 
 import nonsmooth
 from nonsmooth.cli import main as cli
-from nonsmooth.continuation.arclength import Curve
+from nonsmooth.continuation.march.arclength import Curve
 
 SOURCES = Path(nonsmooth.__file__).parent
 #: Who may catch Ctrl-C without raising it at once, and why.
 CATCHES = {
-    "continuation/marches.py: march_until",  # unless_interrupted raises it with what was found
+    "continuation/march/march.py: march",  # unless_interrupted raises it with what was found
     "campaign/threads.py: run",  # a worker hands it to the thread that waits, which raises it
     "cli/main.py: _answer",  # the exit code 130
     "explorer/worker.py: _answer",  # the process that asked is told that the work was cancelled

@@ -19,12 +19,12 @@ if TYPE_CHECKING:
     from nonsmooth.attractors.basin_fractions import basin_fractions as basin_fractions
     from nonsmooth.attractors.basins import basins as basins
     from nonsmooth.continuation.bifurcation_diagram import bifurcation_diagram as bifurcation_diagram
+    from nonsmooth.continuation.branches.orbit import Orbit as Orbit
     from nonsmooth.continuation.continue_curve import continue_curve as continue_curve
     from nonsmooth.continuation.continue_equilibrium import continue_equilibrium as continue_equilibrium
     from nonsmooth.continuation.continue_orbit import continue_orbit as continue_orbit
     from nonsmooth.continuation.find import find_orbit as find_orbit
-    from nonsmooth.continuation.manifolds import manifolds as manifolds
-    from nonsmooth.continuation.orbit import Orbit as Orbit
+    from nonsmooth.continuation.manifolds.manifolds import manifolds as manifolds
     from nonsmooth.continuation.special import special_points as special_points
     from nonsmooth.diagrams.chart import chart as chart
     from nonsmooth.diagrams.correlation_dimension import correlation_dimension as correlation_dimension
@@ -36,8 +36,6 @@ if TYPE_CHECKING:
     from nonsmooth.errors import Interrupted as Interrupted
     from nonsmooth.errors import SolveError as SolveError
     from nonsmooth.errors import SystemDefinitionError as SystemDefinitionError
-    from nonsmooth.experiment.load import load_recording as load_recording
-    from nonsmooth.experiment.recording import Recording as Recording
     from nonsmooth.explorer.serve import explore as explore
     from nonsmooth.flow.poincare import poincare as poincare
     from nonsmooth.flow.sections import Poincare as Poincare
@@ -45,22 +43,24 @@ if TYPE_CHECKING:
     from nonsmooth.flow.sensitivity import sensitivity as sensitivity
     from nonsmooth.flow.simulate import simulate as simulate
     from nonsmooth.flow.starts import random_starts as random_starts
-    from nonsmooth.identification.chain import identify as identify
     from nonsmooth.identification.compare.compare import compare as compare
     from nonsmooth.identification.fit.fit import fit as fit
     from nonsmooth.identification.fit.select import select_model as select_model
     from nonsmooth.identification.fit.sensors import Sensor as Sensor
     from nonsmooth.identification.parameter_set import ParameterSet as ParameterSet
+    from nonsmooth.recordings.load import load_recording as load_recording
+    from nonsmooth.recordings.recording import Recording as Recording
     from nonsmooth.results.store import load as load
     from nonsmooth.results.store import save as save
     from nonsmooth.smoothing.report import smoothing_report as smoothing_report
-    from nonsmooth.system.maps import Branch as Branch
-    from nonsmooth.system.maps import Map as Map
-    from nonsmooth.system.mechanical import mechanical as mechanical
+    from nonsmooth.studies.savi2007.identification.chain import identify as identify
+    from nonsmooth.system.derived.maps import Branch as Branch
+    from nonsmooth.system.derived.maps import Map as Map
+    from nonsmooth.system.derived.mechanical import mechanical as mechanical
     from nonsmooth.system.mode import Band as Band
     from nonsmooth.system.mode import Mode as Mode
     from nonsmooth.system.origin import system_of as system_of
-    from nonsmooth.system.scalar import where as where
+    from nonsmooth.system.symbolic.scalar import where as where
     from nonsmooth.system.system import System as System
     from nonsmooth.system.transition import Surface as Surface
     from nonsmooth.system.transition import Transition as Transition
@@ -69,12 +69,12 @@ _WHERE = {
     "System": "system.system",
     "Transition": "system.transition",
     "Surface": "system.transition",
-    "Map": "system.maps",
-    "Branch": "system.maps",
+    "Map": "system.derived.maps",
+    "Branch": "system.derived.maps",
     "Mode": "system.mode",
-    "mechanical": "system.mechanical",
+    "mechanical": "system.derived.mechanical",
     "Band": "system.mode",
-    "where": "system.scalar",
+    "where": "system.symbolic.scalar",
     "system_of": "system.origin",
     "simulate": "flow.simulate",
     "sensitivity": "flow.sensitivity",
@@ -92,19 +92,19 @@ _WHERE = {
     "chart": "diagrams.chart",
     "bifurcation_diagram": "continuation.bifurcation_diagram",
     "find_orbit": "continuation.find",
-    "Orbit": "continuation.orbit",
+    "Orbit": "continuation.branches.orbit",
     "continue_orbit": "continuation.continue_orbit",
     "continue_curve": "continuation.continue_curve",
     "continue_equilibrium": "continuation.continue_equilibrium",
     "special_points": "continuation.special",
-    "manifolds": "continuation.manifolds",
+    "manifolds": "continuation.manifolds.manifolds",
     "smoothing_report": "smoothing.report",
-    "load_recording": "experiment.load",
-    "Recording": "experiment.recording",
+    "load_recording": "recordings.load",
+    "Recording": "recordings.recording",
     "fit": "identification.fit.fit",
     "Sensor": "identification.fit.sensors",
     "select_model": "identification.fit.select",
-    "identify": "identification.chain",
+    "identify": "studies.savi2007.identification.chain",
     "ParameterSet": "identification.parameter_set",
     "compare": "identification.compare.compare",
     "explore": "explorer.serve",

@@ -11,8 +11,8 @@ import xarray as xr
 from scipy.optimize import brentq
 
 import nonsmooth as ns
-from nonsmooth.continuation.locus import Locus
-from nonsmooth.continuation.shooting import Shooting
+from nonsmooth.continuation.problems.locus import Locus
+from nonsmooth.continuation.problems.shooting import Shooting
 
 
 def mapping(f: Callable[[Any, Any], Any], start: Mapping[str, float], **parameters: float) -> tuple[ns.System, Any]:

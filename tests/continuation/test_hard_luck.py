@@ -10,10 +10,10 @@ import reference_values as known
 import xarray as xr
 
 import nonsmooth as ns
-from nonsmooth.continuation.arclength import Curve
-from nonsmooth.continuation.equilibrium import Equilibria
-from nonsmooth.continuation.locus import Locus
-from nonsmooth.continuation.marches import ENDINGS
+from nonsmooth.continuation.march.arclength import Curve
+from nonsmooth.continuation.march.marches import ENDINGS
+from nonsmooth.continuation.problems.equilibrium import Equilibria
+from nonsmooth.continuation.problems.locus import Locus
 
 support = ns.models.discontinuous_support
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.experiment.session import PROCEDURES
-from nonsmooth.identification.evidence import _NEEDS
+from nonsmooth.recordings.session import PROCEDURES
+from nonsmooth.studies.savi2007.identification.evidence import _NEEDS
 
 PAGE = Path(__file__).parents[2] / "docs" / "guides" / "what_each_procedure_needs.md"
 SECTIONS = dict(re.findall(r"^## `(\w+)`\n(.*?)(?=^## |\Z)", PAGE.read_text(encoding="utf-8"), flags=re.S | re.M))
@@ -31,7 +31,7 @@ def test_a_procedure_is_as_the_page_says(procedure: str, tmp_path: Path) -> None
     assert lines is not None and lines[1].count("\n") == 10
     file.write_text(lines[1], encoding="utf-8")
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ns.experiment.RecordingWarning)
+        warnings.simplefilter("ignore", ns.recordings.RecordingWarning)
         recording = ns.load_recording(file)
     assert recording.units == {name: UNITS[name] for name in _NEEDS[procedure]}
     if "Turn" in _NEEDS[procedure]:

@@ -103,6 +103,13 @@ class Page:
         )
         return float(found[0]), float(found[1])
 
+    def picture(self, name: str) -> None:
+        """A screenshot for the guide, where its folder is named in the environment variable NONSMOOTH_PICTURES."""
+        if folder := os.environ.get("NONSMOOTH_PICTURES"):
+            self.until_done()
+            self.tab.wait_for_timeout(500)
+            self.tab.screenshot(path=str(Path(folder) / f"explorer_{name}.png"))
+
     def notes(self) -> str:
         return str(self.tab.evaluate(
             '[...document.querySelectorAll(".note:not([hidden]), .wrong")].map(one => one.textContent).join(" ").trim()'
@@ -145,9 +152,11 @@ def new_page(browser: Any) -> Iterator[Callable[..., Page]]:
     """Open tabs, and see that none of them had an error."""
     pages: list[Page] = []
 
-    def make(width: int = 1280, height: int = 800) -> Page:
+    def make(width: int = 1280, height: int = 800, first_visit: bool = False) -> Page:
         tab = browser.new_context(viewport={"width": width, "height": height}, accept_downloads=True).new_page()
         tab.set_default_timeout(30_000)
+        if not first_visit:
+            tab.add_init_script("localStorage.setItem('nonsmooth-tour', 'seen')")
         pages.append(Page(tab))
         return pages[-1]
 

@@ -30,6 +30,14 @@ def results() -> dict[str, Any]:
         ),
         "run": ns.simulate(SYSTEM, periods=8, **SHORT),
         "section": ns.poincare(SYSTEM, section=ns.Stroboscopic(0.25), n=12, **SHORT),
+        "response": ns.frequency_response(SYSTEM, np.linspace(3.0, 5.0, 5), keep=20, progress=False, **SHORT),
+        "chart": ns.chart(
+            SYSTEM, {"rho": np.linspace(0.2, 0.5, 6), "omega": np.linspace(3.0, 5.0, 5)}, refine=True, progress=False,
+            **SHORT,
+        ),
+        "basins": ns.basins(
+            SYSTEM, {"x": np.linspace(-0.01, 0.01, 5), "v": np.linspace(-0.1, 0.1, 4)}, transient=60, progress=False
+        ),
     }  # fmt: skip
 
 
@@ -44,7 +52,10 @@ def same(path: Path, shown: Any) -> None:
     assert made.drop_attrs().identical(shown.drop_attrs())
 
 
-@pytest.mark.parametrize(("view", "key"), [("diagram", "diagram"), ("portrait", "run"), ("section", "section")])
+@pytest.mark.parametrize(("view", "key"), [
+    ("diagram", "diagram"), ("portrait", "run"), ("section", "section"), ("response", "response"), ("chart", "chart"),
+    ("basins", "basins"),
+])  # fmt: skip
 def test_the_script_and_the_study_file_make_what_was_shown(
     view: str, key: str, results: dict[str, Any], tmp_path: Path
 ) -> None:
@@ -71,6 +82,15 @@ def test_a_system_of_ones_own_and_a_smoothed_one_are_written_whole(results: dict
         exported("history", "toml", {"run": run}, own)
 
 
+def test_branches_are_saved_as_the_script_that_makes_them(tmp_path: Path) -> None:
+    shown = ns.bifurcation_diagram(SYSTEM, "rho", (0.26, 0.3), start=[0.0, 0.0], transient=100, progress=False)
+    script = write(tmp_path, "branches", "py", {"branches": shown})
+    subprocess.run([sys.executable, script.name], cwd=tmp_path, check=True)
+    same(script.with_suffix(".nc"), shown)
+    with pytest.raises(ValueError, match="no table in a study file"):
+        exported("branches", "toml", {"branches": shown}, STATE)
+
+
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind not in ("py", "toml")])
 def test_figures_and_data(kind: str, results: dict[str, Any], tmp_path: Path) -> None:
     begins = {"pdf": b"%PDF", "png": b"\x89PNG", "svg": b"<?xml", "nc": b"\x89HDF"}[kind]
@@ -81,7 +101,7 @@ def test_figures_and_data(kind: str, results: dict[str, Any], tmp_path: Path) ->
 
 
 def test_a_first_look_is_not_saved(results: dict[str, Any]) -> None:
-    with pytest.raises(ValueError, match="not computed yet"):
+    with pytest.raises(ValueError, match="has no result to save yet"):
         exported("diagram", "pdf", {"diagram": results["diagram"].drop_vars("period_number")}, STATE)
     with pytest.raises(ValueError, match="cannot be saved as 'exe'"):
         exported("diagram", "exe", results, STATE)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import queue
+import time
 from collections.abc import Iterator
 from typing import Any
 
@@ -58,6 +59,19 @@ def test_work_that_is_not_wanted_ends(worker: Worker, answers: queue.Queue[Answe
         pass
     worker.cancel(2)
     assert last_of(answers, 2)[0] == "cancelled"
+
+
+def test_work_that_does_not_ask_is_interrupted_and_the_process_stays(
+    worker: Worker, answers: queue.Queue[Answer]
+) -> None:
+    process = worker._process
+    worker.ask(5, job("branches", low=0.2, high=0.5, transient=10_000_000))  # hours of sweeps that report nothing
+    time.sleep(0.5)
+    worker.cancel(5)
+    assert last_of(answers, 5)[0] == "cancelled"
+    worker.ask(6, job("orbit"))
+    assert last_of(answers, 6)[0] == "done"
+    assert worker._process is process
 
 
 def test_an_error_is_a_sentence(worker: Worker, answers: queue.Queue[Answer]) -> None:

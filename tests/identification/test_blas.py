@@ -30,9 +30,9 @@ try:
 except KeyError:
     pass
 assert [library.get() for library in libraries] == [2] * len(libraries)
-from nonsmooth.identification import identify
+from nonsmooth.studies.savi2007.identification import identify
 blas._functions, told = None, []
-import nonsmooth.identification.chain as chain
+import nonsmooth.studies.savi2007.identification.chain as chain
 chain.gather = lambda *a, **k: told.extend(library.get() for library in libraries) or (_ for _ in ()).throw(KeyError)
 try:
     identify("nowhere")

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from nonsmooth.identification.finding import Estimate
-from nonsmooth.identification.lines import york
-from nonsmooth.identification.profiles import profile_likelihood, profile_of
+from nonsmooth.identification.profiles import profile_of
 from nonsmooth.identification.uncertainty import (
     correlated,
     correlation_times,
@@ -14,6 +13,7 @@ from nonsmooth.identification.uncertainty import (
     interval,
     uniform,
 )
+from nonsmooth.studies.savi2007.identification.lines import york
 
 
 def test_uniform_and_normal_limits():
@@ -49,7 +49,8 @@ def test_correlation_of_an_autoregressive_series():
 
 
 def test_profile_of_a_parabola_gives_the_normal_interval():
-    profile = profile_likelihood(lambda p: (p - [1.0, 2.0]) / [0.1, 0.2], [1.0, 2.0], 0, np.linspace(0.5, 1.5, 101))
+    value = np.linspace(0.5, 1.5, 101)
+    profile = profile_of(value, ((value - 1.0) / 0.1) ** 2, 1.0)
     assert (profile.low, profile.high) == pytest.approx((1 - 0.19600, 1 + 0.19600), abs=1e-3)
 
 

@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 
 import nonsmooth as ns
 from nonsmooth.elements import Coulomb, Stop
-from nonsmooth.system import combinations
+from nonsmooth.system.derived import combinations
 
 END = 25.0
 

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from nonsmooth.experiment.signals.steady import steady_response
 from nonsmooth.identification.amplitude_dependent import ResponseCurve, amplitude_dependent
 from nonsmooth.plot import identification as pictures
+from nonsmooth.recordings.signals.steady import steady_response
 
 W0, C, MASS = 2 * np.pi * 20.0, 2.0, 1.7  # a linear mode: rad/s, 1/s, kg
 

@@ -11,7 +11,7 @@ import pytest
 import xarray as xr
 
 import nonsmooth as ns
-from nonsmooth.experiment.session import load_session
+from nonsmooth.recordings.session import load_session
 from nonsmooth.studies.savi2007 import Reproduction, reproduce, study
 from nonsmooth.studies.savi2007.bench import Bench
 from nonsmooth.studies.savi2007.claims import CLAIMS

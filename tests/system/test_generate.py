@@ -10,8 +10,8 @@ import pytest
 import sympy as sp
 
 from nonsmooth import models
-from nonsmooth.system.generate import compile_model, model_source
-from nonsmooth.system.traced import Row, Traced, TracedTransition
+from nonsmooth.system.codegen.generate import compile_model, model_source
+from nonsmooth.system.symbolic.traced import Row, Traced, TracedTransition
 
 T = sp.Symbol("t_", real=True)
 X, Y = sp.symbols("u_x u_lambda", real=True)
@@ -154,7 +154,7 @@ SCRIPT = """
 import json, time, numpy as np
 from nonsmooth import models
 from nonsmooth.kernels.compile.cache import _passing, cache_statistics
-from nonsmooth.system.generate import compile_model, model_source
+from nonsmooth.system.codegen.generate import compile_model, model_source
 import sys
 traced = models.discontinuous_support().traced
 model = compile_model(traced)

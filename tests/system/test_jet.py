@@ -8,9 +8,9 @@ import pytest
 import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError
-from nonsmooth.system.generate import compile_model
-from nonsmooth.system.jet import jet_code
-from nonsmooth.system.traced import Traced
+from nonsmooth.system.codegen.generate import compile_model
+from nonsmooth.system.codegen.jet import jet_code
+from nonsmooth.system.symbolic.traced import Traced
 
 T = sp.Symbol("t", real=True)
 X, Y, Z = sp.symbols("x y z", real=True)

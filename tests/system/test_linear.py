@@ -7,8 +7,8 @@ import pytest
 import sympy as sp
 
 from nonsmooth import models
-from nonsmooth.system.linear import linear_form
-from nonsmooth.system.traced import Row, Traced, TracedTransition
+from nonsmooth.system.codegen.linear import linear_form
+from nonsmooth.system.symbolic.traced import Row, Traced, TracedTransition
 
 T = sp.Symbol("t", real=True)
 X, Y, Z, V = sp.symbols("x y z v", real=True)

@@ -10,7 +10,7 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.elements import Coulomb, ElasticStop, Stop
-from nonsmooth.system import combinations
+from nonsmooth.system.derived import combinations
 
 LAW = {"w": 0.3, "mu": 0.3}  # impacts, rest, slip and stick in each period
 

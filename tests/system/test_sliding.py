@@ -9,7 +9,7 @@ import pytest
 import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError
-from nonsmooth.system.linear import linear_form
+from nonsmooth.system.codegen.linear import linear_form
 from nonsmooth.system.system import System
 from nonsmooth.system.transition import Surface, Transition
 

@@ -192,10 +192,16 @@ def test_what_does_not_fit_together_is_refused(build, sentence):
 
 
 def test_every_name_the_results_use_is_reserved():
+    import nonsmooth as ns
     from nonsmooth.system.names import RESERVED
 
-    for name in ("time", "iterate", "touch", "section", "maximum", "u", "t", "p", "direction", "exponent"):
-        assert name in RESERVED
+    rig = ns.models.discontinuous_support()
+    own = {*rig.parameters, *(f"{output}_{end}" for output in rig.outputs for end in ("maximum", "minimum"))}
+    over = {"parameter": "g", "values": [0.0017, 0.0018]}
+    found = ns.lyapunov(rig, periods=40, **over), ns.sweep(rig, **over, transient=5, keep=2)
+    for result in found:
+        assert {*map(str, result.variables), *map(str, result.sizes)} - own <= RESERVED
+    assert {"time", "touch", "u", "t", "p"} <= RESERVED
 
 
 def stick_slip():

@@ -10,9 +10,9 @@ import sympy as sp
 
 from nonsmooth import models
 from nonsmooth.errors import SystemDefinitionError
-from nonsmooth.system.expressions import read_expression, write_expression
 from nonsmooth.system.mode import Mode
-from nonsmooth.system.scalar import where
+from nonsmooth.system.symbolic.expressions import read_expression, write_expression
+from nonsmooth.system.symbolic.scalar import where
 from nonsmooth.system.system import System
 from nonsmooth.system.transition import Surface, Transition
 
@@ -172,7 +172,7 @@ def test_what_takes_for_ever_is_refused_before_it_is_worked_out():
     """In a process of its own: a power that is worked out cannot be interrupted."""
     code = (
         "import json, sys, sympy\n"
-        "from nonsmooth.system.expressions import read_expression\n"
+        "from nonsmooth.system.symbolic.expressions import read_expression\n"
         "symbols = {'u.x': sympy.Symbol('u_x', real=True), 't': sympy.Symbol('t_', real=True)}\n"
         "for text in json.load(sys.stdin):\n"
         "    try:\n        print(read_expression(text, symbols))\n"

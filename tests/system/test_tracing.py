@@ -7,7 +7,7 @@ import pytest
 import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError
-from nonsmooth.system.scalar import where
+from nonsmooth.system.symbolic.scalar import where
 from nonsmooth.system.system import System
 from nonsmooth.system.transition import Transition
 

@@ -68,9 +68,9 @@ def _run(options: argparse.Namespace) -> int:
 
 def _run_folder(options: argparse.Namespace) -> int:
     """Everything in a session that a model can be laid over: a response, a rise, and each section by itself."""
-    from nonsmooth.experiment.session import load_session
-    from nonsmooth.identification.compare import gap_reference
-    from nonsmooth.identification.compare.notebook import SHOWS
+    from nonsmooth.recordings.session import load_session
+    from nonsmooth.studies.savi2007.comparison import gap_reference
+    from nonsmooth.studies.savi2007.comparison.notebook import SHOWS
 
     here = Path()
     read = cache(load_session)  # each file once, however many runs of it are compared
@@ -102,8 +102,9 @@ def _run_folder(options: argparse.Namespace) -> int:
 def _run_study(
     study: Mapping[str, Any], folder: Path, quiet: bool, keep: bool = True, read: Callable[[Path], Any] | None = None
 ) -> int:
-    from nonsmooth.experiment.session import load_session
-    from nonsmooth.identification.compare import compare, session_measurement
+    from nonsmooth.identification.compare import compare
+    from nonsmooth.recordings.session import load_session
+    from nonsmooth.studies.savi2007.comparison import session_measurement
 
     system, parameters = _theory(study, folder)
     table = dict(study["measured"])
@@ -132,7 +133,7 @@ def _run_study(
 
 def _offset(study: Mapping[str, Any], parameters: Any, session: Any, folder: Path, read: Callable[[Path], Any]) -> Any:
     """Identified gap less the screw's reading; 0 where the gap was not identified, or not from contact."""
-    from nonsmooth.identification.compare import gap_offset
+    from nonsmooth.studies.savi2007.comparison import gap_offset
 
     if "gap_at_rest" not in getattr(parameters, "extra", {}):
         return 0.0

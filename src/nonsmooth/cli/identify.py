@@ -57,8 +57,8 @@ def add(commands: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from nonsmooth.identification.chain import identify
-    from nonsmooth.identification.statements import require
+    from nonsmooth.studies.savi2007.identification.chain import identify
+    from nonsmooth.studies.savi2007.identification.statements import require
 
     study = _read(options.study)
     found = identify(
@@ -86,7 +86,7 @@ def said(found: Any) -> int:
 
 
 def _read(path: Path) -> _Study:
-    from nonsmooth.experiment.session import NOTEBOOK
+    from nonsmooth.recordings.session import NOTEBOOK
 
     if path.is_dir():
         if not (path / NOTEBOOK).is_file():
@@ -104,7 +104,7 @@ def _read(path: Path) -> _Study:
 
 def _study(path: Path, asked: Mapping[str, Any], output: Mapping[str, Any]) -> _Study:
     from nonsmooth.cli.study import load_model
-    from nonsmooth.experiment.session import APPARATUS
+    from nonsmooth.recordings.session import APPARATUS
 
     where, folder = f"{path}, table [identify]", path.parent
     for key, table, place in (

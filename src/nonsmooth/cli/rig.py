@@ -39,8 +39,8 @@ def add(commands: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from nonsmooth.experiment.rig import VirtualRig
-    from nonsmooth.experiment.rig.notebook import truth_path
+    from nonsmooth.studies.savi2007.rig import VirtualRig
+    from nonsmooth.studies.savi2007.rig.notebook import truth_path
 
     if options.figure is not None and options.procedures:
         raise ValueError("give --figure or --procedures, not both: a figure says itself what is to be recorded")

@@ -41,7 +41,7 @@ def _run(options: argparse.Namespace) -> int:
     if options.file.suffix == ".toml":
         raise ValueError(f"{options.file}: is a study file and no result; `nonsmooth run {options.file}` runs it")
     if options.file.suffix not in (".nc", ".zarr"):  # what an instrument wrote
-        from nonsmooth.experiment.load import load_recording
+        from nonsmooth.recordings.load import load_recording
 
         print(printable(repr(load_recording(options.file))))
         return 0

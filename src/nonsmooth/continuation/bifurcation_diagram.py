@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.continuation.begin import largest_step, limits
+from nonsmooth.continuation.branches.reading import read_branch
 from nonsmooth.continuation.continue_orbit import continue_orbit
 from nonsmooth.continuation.find import find_orbit
-from nonsmooth.continuation.reading import read_branch
-from nonsmooth.continuation.search import Search, search_within
-from nonsmooth.continuation.shooting import Shooting
+from nonsmooth.continuation.march.begin import largest_step, limits
+from nonsmooth.continuation.problems.shooting import Shooting
+from nonsmooth.continuation.searches.search import Search, search_within
 from nonsmooth.continuation.special import special_points
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.arguments import check_system, real_number, whole_number

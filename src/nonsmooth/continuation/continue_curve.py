@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.continuation.anchor import anchor_at
-from nonsmooth.continuation.arclength import Point
-from nonsmooth.continuation.begin import largest_step, limits, size_of
-from nonsmooth.continuation.curve_march import ENDS, march_curve
-from nonsmooth.continuation.locus import KINDS, Locus
-from nonsmooth.continuation.marches import in_turn, unless_interrupted
-from nonsmooth.continuation.physical import allowed_range
-from nonsmooth.continuation.reading import special_row
-from nonsmooth.continuation.shooting import Shooting
-from nonsmooth.continuation.surfaces import look_at_surfaces
+from nonsmooth.continuation.branches.reading import special_row
+from nonsmooth.continuation.march.begin import largest_step, limits, size_of
+from nonsmooth.continuation.march.march import march
+from nonsmooth.continuation.march.marches import Limits, Row, both_ways, in_turn, unless_interrupted
+from nonsmooth.continuation.march.physical import allowed_range
+from nonsmooth.continuation.problems.anchor import anchor_at
+from nonsmooth.continuation.problems.locus import KINDS, Locus
+from nonsmooth.continuation.problems.orbits import OrbitPoint
+from nonsmooth.continuation.problems.shooting import Shooting
+from nonsmooth.continuation.problems.surfaces import look_at_surfaces
 from nonsmooth.errors import SolveError, shortened
 from nonsmooth.flow.arguments import whole_number
 from nonsmooth.system.names import by_name
@@ -83,15 +82,14 @@ def continue_curve(
     first = locus.first(X)
     if first is None:
         raise SolveError(f"the curve of the {kind} could not be begun at this point", status="no_convergence")
-    allowed = tuple(allowed_range(start, name, *ends) for name, ends in zip(names, box, strict=True))
-    turned = replace(first, tangent=-first.tangent)
+    allowed = tuple((i - 2, *allowed_range(start, names[i], *ends)) for i, ends in enumerate(box))
+    closed = (locus.word(), first.X)
     ahead, back = in_turn(
-        lambda: march_curve(locus, first, allowed, largest, most, begin=first),
-        lambda: march_curve(locus, turned, allowed, largest, most),
+        lambda: march(locus, first, Limits(allowed, largest, most, closed)),
+        lambda: march(locus, first.turned(), Limits(allowed, largest, most)),
     )
-    n = len(back.places)
-    places = [*back.places[::-1], first, *ahead.places]
-    special = [(name, n - 1 - i) for name, i in back.special[::-1]] + [(name, n + 1 + i) for name, i in ahead.special]
+    rows, special = both_ways(back, Row(locus, first), ahead)
+    places = [row.point for row in rows]
     return _dataset(system, locus, names, places, special, (back.ending, ahead.ending), {
         "ranges": {name: list(ends) for name, ends in zip(names, box, strict=True)}, "step": largest, "points": most,
         "kind": kind,
@@ -114,7 +112,7 @@ def _box(system: System, ranges: Any) -> tuple[tuple[str, str], list[tuple[float
 
 
 def _dataset(
-    system: System, locus: Locus, names: tuple[str, str], places: list[Point], special: list[tuple[str, int]],
+    system: System, locus: Locus, names: tuple[str, str], places: list[OrbitPoint], special: list[tuple[str, int]],
     ended: tuple[str, str], options: dict[str, Any],
 ) -> xr.Dataset:  # fmt: skip
     from nonsmooth.results.branches import curve
@@ -134,6 +132,6 @@ def _dataset(
     found = curve(
         labels, attrs, {name: [float(place.X[-2 + i]) for place in places] for i, name in enumerate(names)}, arrays,
         special, kind=locus.kind, period_number=locus.shooting.period_number,
-        signature=locus.shooting.signature.text(system.traced), endings=ENDS, ended=ended,
+        signature=locus.shooting.signature.text(system.traced), endings=locus.endings, ended=ended,
     )  # fmt: skip
     return unless_interrupted(found, ended)

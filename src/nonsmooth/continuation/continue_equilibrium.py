@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.continuation.begin import largest_step, limits
-from nonsmooth.continuation.equilibrium import Equilibria, Rest
-from nonsmooth.continuation.equilibrium_march import ENDS, march_rest
-from nonsmooth.continuation.marches import in_turn, unless_interrupted
-from nonsmooth.continuation.physical import allowed_range
+from nonsmooth.continuation.march.begin import largest_step, limits
+from nonsmooth.continuation.march.march import march
+from nonsmooth.continuation.march.marches import Limits, Row, both_ways, in_turn, unless_interrupted
+from nonsmooth.continuation.march.physical import allowed_range
+from nonsmooth.continuation.problems.equilibrium import Equilibria, Rest
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.arguments import check_system, whole_number
 from nonsmooth.flow.starts import first_state
@@ -94,22 +92,17 @@ def continue_equilibrium(
             "lies outside its mode. Give a nearer start",
             status="no_convergence",
         )
-    bounds = allowed_range(system, parameter, low, high)
+    box = ((-1, *allowed_range(system, parameter, low, high)),)
     curve, rest = first
-    up, down = in_turn(*(partial(march_rest, curve, _facing(rest, way), bounds, largest, most) for way in (1.0, -1.0)))
-    n = len(down.rests)
-    rests = [*down.rests[::-1], (curve, rest), *up.rests]
-    special = [(kind, n - 1 - i) for kind, i in down.special[::-1]] + [(kind, n + 1 + i) for kind, i in up.special]
-    return _dataset(system, parameter, rests, special, (down.ending, up.ending), {
+    up, down = in_turn(
+        lambda: march(curve, rest.facing(1.0), Limits(box, largest, most)),
+        lambda: march(curve, rest.facing(-1.0), Limits(box, largest, most)),
+    )
+    rows, special = both_ways(down, Row(curve, rest), up)
+    return _dataset(system, parameter, [(row.curve, row.point) for row in rows], special, (down.ending, up.ending), {
         "parameter": parameter, "range": (low, high), "step": largest, "points": most, "mode": mode,
         "start": [float(x) for x in state.u],
     })  # fmt: skip
-
-
-def _facing(rest: Rest, sign: float) -> Rest:
-    if rest.tangent[-1] * sign >= 0:
-        return rest
-    return replace(rest, tangent=-rest.tangent, orientation=-rest.orientation)
 
 
 def _dataset(
@@ -121,10 +114,10 @@ def _dataset(
     from nonsmooth.results.provenance import provenance
 
     labels = labels_of(system)
-    n = max(curve.n for curve, _ in rests)
+    n = max(len(rest.eigenvalues) for _, rest in rests)
     eigenvalues = np.full((len(rests), n), np.nan + 0j)
-    for row, (curve, rest) in zip(eigenvalues, rests, strict=True):
-        row[: curve.n] = rest.eigenvalues
+    for row, (_, rest) in zip(eigenvalues, rests, strict=True):
+        row[: len(rest.eigenvalues)] = rest.eigenvalues
     attrs: dict[str, Any] = dict(provenance(labels, "continue_equilibrium", options, method="pseudo-arclength"))
     attrs["parameter"] = parameter
     arrays = {
@@ -134,5 +127,5 @@ def _dataset(
         "mode": np.array([curve.mode for curve, _ in rests]),
     }
     values = np.array([rest.value for _, rest in rests])
-    found = equilibria(labels, attrs, parameter, values, arrays, special, endings=ENDS, ended=ended)
+    found = equilibria(labels, attrs, parameter, values, arrays, special, endings=Equilibria.endings, ended=ended)
     return unless_interrupted(found, ended)

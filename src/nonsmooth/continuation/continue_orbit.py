@@ -9,18 +9,25 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.continuation.arclength import Curve, Point
-from nonsmooth.continuation.begin import Asked, curve_of, largest_step, limits, resumed_at, sentence
-from nonsmooth.continuation.branch import march
-from nonsmooth.continuation.detection import Tests
-from nonsmooth.continuation.events import BESIDE
-from nonsmooth.continuation.files import branch_dataset
-from nonsmooth.continuation.marches import ENDINGS, March, in_turn
-from nonsmooth.continuation.orbit import Orbit
-from nonsmooth.continuation.other_branches import born, straight_on, switched
-from nonsmooth.continuation.physical import allowed_range
-from nonsmooth.continuation.reading import read_branch
-from nonsmooth.continuation.records import BranchRecord, PointRecord, SpecialRecord, from_march, joined, point_record
+from nonsmooth.continuation.branches.files import branch_dataset
+from nonsmooth.continuation.branches.orbit import Orbit
+from nonsmooth.continuation.branches.other_branches import born, straight_on, switched
+from nonsmooth.continuation.branches.reading import read_branch
+from nonsmooth.continuation.branches.records import (
+    BranchRecord,
+    PointRecord,
+    SpecialRecord,
+    from_march,
+    joined,
+    point_record,
+)
+from nonsmooth.continuation.march.begin import Asked, curve_of, largest_step, limits, resumed_at, sentence
+from nonsmooth.continuation.march.event import BESIDE, Crossing
+from nonsmooth.continuation.march.march import march
+from nonsmooth.continuation.march.marches import ENDINGS, March, in_turn
+from nonsmooth.continuation.march.physical import allowed_range
+from nonsmooth.continuation.problems.orbit_events import NeimarkSacker
+from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.arguments import whole_number
 from nonsmooth.system.names import by_name
@@ -120,7 +127,7 @@ def _from_orbit(orbit: Orbit, name: str | None, given: Any, asked: Asked) -> xr.
     if first is None:
         raise SolveError("Newton's method did not converge at the orbit itself: give its parameter another value",
                          status="no_convergence")  # fmt: skip
-    first = _facing(first, 1.0)
+    first = first.facing(1.0)
     bounds = allowed_range(system, name, low, high)
     up, down = _both_ways(curve, first, bounds, asked)
     points, special = joined(from_march(down), [point_record(curve, first)], from_march(up))
@@ -131,47 +138,41 @@ def _from_orbit(orbit: Orbit, name: str | None, given: Any, asked: Asked) -> xr.
     return branch_dataset(system, record, asked.options(name, (low, high)))
 
 
-def _both_ways(curve: Curve, first: Point, bounds: tuple[float, float], asked: Asked) -> tuple[March, March]:
+def _both_ways(curve: Orbits, first: OrbitPoint, bounds: tuple[float, float], asked: Asked) -> tuple[March, March]:
     """Marches with rising and with falling parameter; a closed branch needs only one."""
     up, down = in_turn(
-        lambda: march(curve, first, asked.limits(bounds, (curve.shooting.signature, first.X)), asked.first),
-        lambda: march(curve, _facing(first, -1.0), asked.limits(bounds), asked.first),
+        lambda: march(curve, first, asked.limits(bounds, (curve.shooting.signature, first.X))),
+        lambda: march(curve, first.facing(-1.0), asked.limits(bounds)),
     )
     return up, down
 
 
-def _at_the_start(curve: Curve, first: Point, down: March, up: March) -> list[str]:
+def _at_the_start(curve: Orbits, first: OrbitPoint, down: March, up: March) -> list[str]:
     """Folds, flips and tori at the first orbit itself: rounding decides whether a march from there sees them."""
     if not (down.rows and up.rows) or not all(march.rows[0].curve is curve for march in (down, up)):
         return []
-    tests = Tests(curve)
-    here, before, after = (tests.smooth(point) for point in (first, down.rows[0].point, up.rows[0].point))
-    before[0] = -before[0]  # the march down has its tangents the other way
+    before, after = down.rows[0].point.turned(), up.rows[0].point  # the march down has its tangents the other way
     seen = {one.kind for march in (down, up) for one in march.special
             if one.curve is curve and np.abs(one.point.Y - first.Y).max() < BESIDE}  # fmt: skip
     found = []
-    for i, kind in ((0, "fold"), (2, "flip"), (3, "neimark_sacker")):
-        if kind in seen or not before[i] * after[i] < 0.0 or abs(here[i]) > ZERO * max(abs(before[i]), abs(after[i])):
+    for kind in curve.kinds:
+        if isinstance(kind, Crossing) or kind.name in seen:
             continue
-        if kind != "neimark_sacker" or (np.abs(first.multipliers.imag) > BESIDE).any():
-            found.append(kind)
+        here, was, now = (kind.number(curve, point) for point in (first, before, after))
+        if not was * now < 0.0 or abs(here) > ZERO * max(abs(was), abs(now)):
+            continue
+        if not isinstance(kind, NeimarkSacker) or (np.abs(first.multipliers.imag) > BESIDE).any():
+            found.append(kind.name)
     return found
 
 
-def _facing(point: Point, sign: float) -> Point:
-    """The same point with its tangent towards rising (1) or falling (-1) values."""
-    towards = float(point.tangent[-1])
-    return point if (towards or 1.0) * sign > 0 else point.turned()
-
-
-def _near(curve: Curve, X: FloatArray) -> Point | None:
+def _near(curve: Orbits, X: FloatArray) -> OrbitPoint | None:
     """The first point where the parameter cannot be held: at a fold."""
     Y = X / curve.scale
     null = curve.null_vectors(curve.shooting.evaluate(X))
     if not len(null):
         return None
-    found = curve.correct(Y, null[-1], float(null[-1] @ Y), most=20)
-    return None if found is None else curve.point(found[0], found[1], null[-1])
+    return curve.near(Y, null[-1], most=20)
 
 
 def _go_on(start: xr.Dataset, name: str | None, given: Any, asked: Asked) -> xr.Dataset:
@@ -195,14 +196,13 @@ def _go_on(start: xr.Dataset, name: str | None, given: Any, asked: Asked) -> xr.
         border = point.tangent / curve.scale * (1.0 if side else -1.0)
         border /= np.linalg.norm(border)
         Y = X / curve.scale
-        found = curve.correct(Y, border, float(border @ Y))
-        begin = None if found is None else curve.point(found[0], found[1], border)
+        begin = curve.near(Y, border)
         if begin is None:
             endings[side], sentences[side] = "no_convergence", ENDINGS["no_convergence"]
             continue
         other = record.points[-1 if side == 0 else 0]
         closed = (other.signature, other.X) if len(record.points) > 1 else None
-        begun[side] = partial(march, curve, begin, asked.limits(bounds, closed), asked.first)
+        begun[side] = partial(march, curve, begin, asked.limits(bounds, closed))
     for side, more in zip(begun, in_turn(*begun.values()), strict=True):
         ends[side] = from_march(more)
         sentences[side] = sentence(more, bounds, name, (low, high))

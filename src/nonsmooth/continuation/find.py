@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.continuation.anchor import anchor_at
-from nonsmooth.continuation.multipliers import multipliers_of, nearest_to_one, stability
-from nonsmooth.continuation.orbit import Orbit, orbit_of
-from nonsmooth.continuation.path import Walk
-from nonsmooth.continuation.primitive import primitive
-from nonsmooth.continuation.search import search_within
-from nonsmooth.continuation.settled import CLOSED, NEAR, Guess, forced_guesses, settle_forced, touching
-from nonsmooth.continuation.shooting import Shooting
+from nonsmooth.continuation.branches.orbit import Orbit, orbit_of
+from nonsmooth.continuation.problems.anchor import anchor_at
+from nonsmooth.continuation.problems.multipliers import multipliers_of, nearest_to_one, stability
+from nonsmooth.continuation.problems.shooting import Shooting
+from nonsmooth.continuation.searches.primitive import primitive
+from nonsmooth.continuation.searches.search import search_within
+from nonsmooth.continuation.searches.settled import CLOSED, NEAR, Guess, forced_guesses, settle_forced, touching
+from nonsmooth.continuation.signature.path import Walk
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.arguments import check_system, real_number, whole_number
 from nonsmooth.flow.engines.methods import engine_for
@@ -26,7 +26,7 @@ from nonsmooth.results.progress import Progress
 from nonsmooth.system.names import by_name
 
 if TYPE_CHECKING:
-    from nonsmooth.continuation.search import Search
+    from nonsmooth.continuation.searches.search import Search
     from nonsmooth.flow.engines.engine import State
     from nonsmooth.system.system import System
 
@@ -120,7 +120,7 @@ def _guesses(
     """
     engine = engine_for(system, rtol=RTOL)
     if system.period() is None:
-        from nonsmooth.continuation.settled_autonomous import autonomous_guesses
+        from nonsmooth.continuation.searches.settled_autonomous import autonomous_guesses
 
         guesses = autonomous_guesses(system, engine, state, transient, max_period, period_number, search)
     else:
@@ -181,7 +181,7 @@ def _polished(system: System, guesses: list[Guess], given: bool, unstable: bool,
             continue
         clearance = walk.clearance(path, len(system.indicators))
         noise = NOISE * float(guess.size.max())
-        virtual = bool((path.violation() < -noise).any())
+        virtual = bool((path.margins < -noise).any())
         orbit = orbit_of(shooting, solved, path, clearance, virtual)
         if virtual:
             reasons.append(("virtual", f"the {name} orbit found passes through a boundary it should obey"))

@@ -8,20 +8,21 @@ from typing import TYPE_CHECKING, Any
 from nonsmooth.explorer.export import KINDS
 from nonsmooth.explorer.figures import CLOUDS
 from nonsmooth.explorer.labels import html_of, plain_of, symbols_of
-from nonsmooth.explorer.presets import PAPER, first_state, presets_of, slider_range
+from nonsmooth.explorer.presets import GIVEN, PAPER, first_state, presets_of, slider_range
 from nonsmooth.explorer.state import CHOICES, to_query
 
 if TYPE_CHECKING:
     from nonsmooth.explorer.state import State
+    from nonsmooth.explorer.views import View
     from nonsmooth.system.system import System
 
-__all__ = ["GIVEN", "controls"]
-
-GIVEN = "given"  # the name of a model of one's own
+__all__ = ["controls"]
 
 
-def controls(system: System, state: State, models: Iterable[str], stage: str) -> dict[str, Any]:
+def controls(system: System, state: State, models: Iterable[str], stage: str, views: Iterable[View]) -> dict[str, Any]:
     """Content of the controls for a state; ``stage`` is that of the diagram."""
+    views = list(views)
+    settings = {name: (view, one) for view in views for name, one in view.settings.items() if one.label}
     symbols, first = symbols_of(system), first_state(state.model, system)
     rows = []
     for name, parameter in system.parameters.items():
@@ -46,7 +47,12 @@ def controls(system: System, state: State, models: Iterable[str], stage: str) ->
         ],
         "plain": {name: plain_of(symbols[name]) for name in system.parameters},
         "choices": CHOICES, "kinds": KINDS,
-        "state": {key: value for key, value in vars(state).items() if key != "values"},
+        "state": {key: value for key, value in vars(state).items() if key not in ("values", "settings")},
         "query": to_query(state), "forced": system.period() is not None,
-        "legend": [[names[word], CLOUDS[word][0]] for word in words],
+        "legends": {
+            "diagram": [[names[word], CLOUDS[word][0]] for word in words],
+            **{view.name: view.legend(system, state) for view in views},
+        },
+        "settings": {name: view.value(name.partition(".")[2], system, state) for name, (view, _) in settings.items()},
+        "words": {name: one.choices(system, state) for name, (_, one) in settings.items() if one.choices is not None},
     }  # fmt: skip

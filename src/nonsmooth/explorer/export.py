@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 import nonsmooth as ns
+from nonsmooth.explorer.views import VIEWS as CHOSEN
 from nonsmooth.results.provenance import read_provenance
 
 __all__ = ["KINDS", "VIEWS", "exported"]
@@ -22,7 +23,7 @@ __all__ = ["KINDS", "VIEWS", "exported"]
 #: Views that can be saved: the result that each shows, and the function of ``nonsmooth.plot`` that draws it.
 VIEWS = {
     "diagram": ("diagram", "bifurcation"), "portrait": ("run", "phase_portrait"), "history": ("run", "time_history"),
-    "section": ("section", "section"),
+    "section": ("section", "section"), **{view.name: (view.name, view.saved[1]) for view in CHOSEN if view.saved},
 }  # fmt: skip
 KINDS = {"pdf": "PDF", "png": "PNG", "svg": "SVG", "nc": "NetCDF", "py": "Python script", "toml": "study file"}
 
@@ -40,10 +41,10 @@ def exported(view: str, kind: str, results: Mapping[str, Any], state: Any) -> tu
     key, plot = VIEWS[view]
     result = results.get(key)
     if result is None or (view == "diagram" and "period_number" not in result):
-        raise ValueError(f"the {view} is not computed yet; wait for it and save it then")
-    axes = {
+        raise ValueError(f"the view {view!r} has no result to save yet; show it, and wait until it is computed")
+    axes: dict[str, str] = {
         "diagram": {"y": state.shown}, "portrait": {"x": state.x, "y": state.y}, "history": {"y": state.x},
-        "section": {"x": state.x, "y": state.y},
+        "section": {"x": state.x, "y": state.y}, **{one.name: one.axes(state) for one in CHOSEN},
     }[view]  # fmt: skip
     stem = f"{state.model}_{view}"
     if kind == "py":
@@ -68,8 +69,8 @@ def python_of(result: Any, plot: str, axes: Mapping[str, str], model: str, stem:
     record, system = read_provenance(result), ns.system_of(result)
     options = _options(record, result)
     positional = []
-    for name in ("parameter", "values"):
-        if name in options:
+    for name in ("grid", "parameter", "values", "range"):
+        if name in options and not (record["verb"] == "frequency_response" and name == "parameter"):
             positional.append(_python(options.pop(name)))
     arguments = ", ".join(["system", *positional, *(f"{name}={_python(value)}" for name, value in options.items())])
     marks = ", ".join(f"{name}={value!r}" for name, value in axes.items())
@@ -94,6 +95,8 @@ def study_of(result: Any, axes: Mapping[str, str], model: str, stem: str) -> str
     if model not in ns.models.names():
         raise ValueError("a study file names a model of nonsmooth.models or a file; save the Python script instead")
     record, system = read_provenance(result), ns.system_of(result)
+    if record["verb"] == "bifurcation_diagram":
+        raise ValueError(f"{record['verb']} has no table in a study file; save the Python script instead")
     lines = ["[system]", f'model = "{model}"', f"parameters = {_toml(_values(system, record))}"]
     if system.is_smoothed:
         lines.append(f"smoothed = {_toml(system.eta)}")
@@ -115,13 +118,17 @@ def _values(system: Any, record: Mapping[str, Any]) -> dict[str, float]:
 
 def _options(record: Mapping[str, Any], result: Any) -> dict[str, Any]:
     """The options of the verb that are not at their defaults; values of a parameter as an array."""
-    defaults = inspect.signature(getattr(ns, record["verb"])).parameters
+    defaults = dict(inspect.signature(getattr(ns, record["verb"])).parameters)
+    if record["verb"] == "frequency_response":  # which hands its further options on
+        defaults = {**inspect.signature(ns.sweep).parameters, **defaults}
     found = {
         name: value for name, value in record["options"].items()
         if name not in defaults or value != defaults[name].default
     }  # fmt: skip
     if "values" in found:
-        found["values"] = result[found["parameter"]].values
+        found["values"] = result[record["options"]["parameter"]].values
+    if "grid" in found:
+        found["grid"] = {name: result[name].values for name in found["grid"]}
     return found
 
 
@@ -140,6 +147,8 @@ def _python(value: Any) -> str:
         known = inspect.signature(kind).parameters
         given = [f"{k}={v!r}" for k, v in value.items() if k in known and v != known[k].default]
         return f"ns.{value['type']}({', '.join(given)})"
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{k!r}: {_python(v)}" for k, v in value.items()) + "}"
     return repr(value)
 
 

@@ -23,12 +23,14 @@ from nonsmooth.plot.labels import column, words_of_flags
 from nonsmooth.plot.segments import pieces_by_mode, with_gaps
 from nonsmooth.plot.style import COLORS
 
-__all__ = ["CLOUDS", "MOST", "Diagram", "History", "Portrait", "Section", "theme"]
+__all__ = ["CLOUDS", "MOST", "TIP", "Diagram", "History", "Panel", "Portrait", "Section", "extent", "theme"]
 
 _MODES = [COLORS[name] for name in ("first", "second", "third", "fourth")]
 _MANY_MODES = 8
 MOST = 64  # section points that are told apart one by one
 _HEIGHT = 400  # of an image before the page has said how large it is
+#: Tooltip with the words of the point below the mouse.
+TIP = '<div style="font:13px system-ui">@words</div>'
 _TICKS = "return Number((tick * Math.pow(10, -power)).toPrecision(8)).toString().replace('-', '\\u2212')"
 #: Names of a cloud in the legend of a diagram, with their colours and the height of a dot.
 CLOUDS = {
@@ -44,7 +46,7 @@ def theme(dark: bool, large: bool) -> Theme:
     )
     size = 20 if large else 13
     return Theme(json={"attrs": {
-        "Plot": {"background_fill_color": paper, "border_fill_color": paper, "outline_line_color": line},
+        "Plot": {"background_fill_color": paper, "border_fill_color": None, "outline_line_color": line},
         "Grid": {"grid_line_color": faint},
         "Axis": {
             "axis_line_color": line, "major_tick_line_color": line, "minor_tick_line_color": None,
@@ -69,7 +71,7 @@ class _Axis:
         self.axis.formatter.args = {"power": power}
 
 
-class _Figure:
+class Panel:
     """A figure without title, with zoom, axes that have units, and ranges that the page sets."""
 
     def __init__(self, name: str, tools: str = "pan,box_zoom,wheel_zoom,reset", **options: Any) -> None:
@@ -79,10 +81,11 @@ class _Figure:
         )  # fmt: skip
         self.plot.toolbar.logo = None
         self.plot.toolbar.autohide = True
-        for axis in self.plot.axis:
+        for axis in self.plot.axis[:] if "y_axis_type" not in options else self.plot.xaxis:
             axis.formatter = CustomJSTickFormatter(args={"power": 0}, code=_TICKS)
         self.x = _Axis(self.plot.xaxis[0], self.plot.x_range)
         self.y = _Axis(self.plot.yaxis[0], self.plot.y_range)
+        self.beside: tuple[Any, Any] = ([], [])  # what else the axes must show
 
     def show(self, x: tuple[float, float] | None = None, y: tuple[float, float] | None = None) -> None:
         """Set the ranges, also those that a reset comes back to."""
@@ -102,7 +105,7 @@ def extent(values: Any, margin: float = 0.06) -> tuple[float, float]:
     return low - room, high + room
 
 
-class Diagram(_Figure):
+class Diagram(Panel):
     """Section points over a parameter, as an image; a line marks the parameter's value."""
 
     def __init__(self) -> None:
@@ -121,7 +124,7 @@ class Diagram(_Figure):
         )  # fmt: skip
         self.plot.add_tools(HoverTool(
             renderers=[bars], mode="vline", line_policy="interp", attachment="right",
-            tooltips='<div style="font:13px system-ui">@words</div>', point_policy="follow_mouse",
+            tooltips=TIP, point_policy="follow_mouse",
         ))  # fmt: skip
         self.here = Span(dimension="height", line_color=COLORS["third"], line_width=1.5, line_dash="dashed")
         self.plot.add_layout(self.here)
@@ -225,7 +228,7 @@ def words_of(status: Any) -> Any:
     return np.vectorize(lambda code: names.get(int(code), "?"), otypes=[object])(status.values)
 
 
-class _Curves(_Figure):
+class _Curves(Panel):
     """Lines in one colour per mode."""
 
     def __init__(self, name: str, **options: Any) -> None:
@@ -268,8 +271,8 @@ class Portrait(_Curves):
         self._put(run, xs, ys)
         for line in self.lines:  # of a map the iterates alone
             line.visible = not is_map
-        for axis, values, name in ((self.x, xs, state.x), (self.y, ys, state.y)):
-            ends = extent(values)
+        for axis, values, also, name in ((self.x, xs, self.beside[0], state.x), (self.y, ys, self.beside[1], state.y)):
+            ends = extent(np.concatenate([values, also]))
             own = axis.range.start, axis.range.end
             fits = own[0] <= ends[0] + 0.05 * (ends[1] - ends[0]) and ends[1] - 0.05 * (ends[1] - ends[0]) <= own[1]
             if not (fits and ends[1] - ends[0] > 0.5 * (own[1] - own[0])):
@@ -296,12 +299,13 @@ class History(_Curves):
         self._put(run, time, column(run, "u", state.x).values)
         at = [str(name) for name in run["state"].values].index(state.x)
         self.crossings.data = {"x": run["crossing_time"].values, "y": run["u_before"].values[:, at]}
-        self.show((float(time[0]), float(time[-1])), extent(column(run, "u", state.x).values))
+        values = np.concatenate([column(run, "u", state.x).values, self.beside[1]])
+        self.show((float(time[0]), float(time[-1])), extent(values))
         self.x.name("t", str(run["time"].attrs.get("units", "1")))
         self.y.name(symbols[state.x], units[state.x])
 
 
-class Section(_Figure):
+class Section(Panel):
     """Section points in the phase plane."""
 
     def __init__(self) -> None:
@@ -324,7 +328,7 @@ class Section(_Figure):
         self.dots.glyph.update(size=9 if few else 2.5, fill_alpha=1.0 if few else 0.75)
         curves = [] if run is None else [column(run, "u", name).values for name in (state.x, state.y)]
         self.orbit.data = {"x": curves[0], "y": curves[1]} if few and curves else {"x": [], "y": []}
-        ends = [extent(np.concatenate([points[:, k], curves[k] if few and curves else []]), 0.08) for k in (0, 1)]
-        self.show(*ends)
+        orbit = curves if few and curves else [np.empty(0), np.empty(0)]
+        self.show(*(extent(np.concatenate([points[:, k], orbit[k], self.beside[k]]), 0.08) for k in (0, 1)))
         self.x.name(symbols[state.x], units[state.x])
         self.y.name(symbols[state.y], units[state.y])

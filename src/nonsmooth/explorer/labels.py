@@ -12,7 +12,7 @@ from nonsmooth.system.parameter import latex_name
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["axis_label", "html_of", "number", "plain_of", "power_of", "symbols_of"]
+__all__ = ["PREFIXES", "axis_label", "html_of", "number", "plain_of", "power_of", "symbols_of"]
 
 _GREEK: Mapping[str, str] = {
     "alpha": "α", "beta": "β", "gamma": "γ", "delta": "δ", "epsilon": "ε", "zeta": "ζ", "eta": "η", "theta": "θ",
@@ -21,7 +21,7 @@ _GREEK: Mapping[str, str] = {
     "Lambda": "Λ", "Xi": "Ξ", "Pi": "Π", "Sigma": "Σ", "Phi": "Φ", "Psi": "Ψ", "Omega": "Ω",
 }  # fmt: skip
 _BELOW = dict(zip("0123456789aehijklmnoprstuvx", "₀₁₂₃₄₅₆₇₈₉ₐₑₕᵢⱼₖₗₘₙₒₚᵣₛₜᵤᵥₓ", strict=True))
-_PREFIXES = {0: "", -3: "m", -6: "µ", -9: "n"}
+PREFIXES = {0: "", -3: "m", -6: "µ", -9: "n"}
 
 
 def symbols_of(system: System) -> dict[str, str]:
@@ -61,11 +61,11 @@ def power_of(unit: str, *values: float) -> int:
 def axis_label(latex: str, unit: str, power: int = 0) -> str:
     """``ρ (N)``; the symbol alone of what has no unit."""
     text = plain_of(latex)
-    return text if unit in ("", "1") else f"{text} ({_PREFIXES[power]}{unit})"
+    return text if unit in ("", "1") else f"{text} ({PREFIXES[power]}{unit})"
 
 
 def number(value: float, unit: str = "", digits: int = 4) -> str:
     """A value with its unit, in the prefix that suits it: ``−4.5 mm``."""
     power = power_of(unit, value)
     text = f"{value / 10.0**power:.{digits}g}".replace("-", "\N{MINUS SIGN}")
-    return text if unit in ("", "1") else f"{text} {_PREFIXES[power]}{unit}"
+    return text if unit in ("", "1") else f"{text} {PREFIXES[power]}{unit}"

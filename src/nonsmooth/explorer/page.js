@@ -82,6 +82,19 @@
     ui.states.forEach(one => put($("v-start." + one.name), short(one.value)));
   }
 
+  /* The tab that is chosen in each panel, with its controls and its figure. */
+  function tabs(ui) {
+    for (const list of document.querySelectorAll("[data-panel]")) {
+      const chosen = ui.state[list.dataset.panel];
+      for (const tab of list.children) {
+        tab.setAttribute("aria-selected", tab.dataset.view === chosen);
+        tab.tabIndex = tab.dataset.view === chosen ? 0 : -1;
+      }
+      for (const one of list.closest(".panel").querySelectorAll(".own, .view"))
+        one.classList.toggle("away", !one.dataset.view.split(" ").includes(chosen));
+    }
+  }
+
   function render(ui) {
     last = ui;
     root.dataset.heard = ui.heard;
@@ -98,11 +111,15 @@
     $("phase-box").hidden = !ui.forced;
     $("eta-label").hidden = ui.state.method !== "smoothed";
     [$("undo").disabled, $("redo").disabled] = ui.can.map(can => !can);
-    $("legend").replaceChildren(...ui.legend.flatMap(([text, color]) => {
-      const dot = document.createElement("i");
-      dot.style.background = color;
-      return [dot, text];
-    }));
+    for (const [name, words] of Object.entries(ui.words)) fill($(name), Object.entries(words), ui.settings[name]);
+    for (const [name, value] of Object.entries(ui.settings)) if (!(name in ui.words)) put($(name), short(value));
+    for (const [name, legend] of Object.entries(ui.legends)) if ($("legend-" + name))
+      $("legend-" + name).replaceChildren(...legend.flatMap(([text, color]) => {
+        const dot = document.createElement("i");
+        dot.style.background = color;
+        return [dot, text];
+      }));
+    tabs(ui);
     parameters(ui);
     root.classList.toggle("dark", ui.dark);
     root.classList.toggle("large", ui.large);
@@ -122,7 +139,8 @@
     root.dataset.busy = told.view;
     $("busy").hidden = !told.long;
     if (!told.long) return;
-    $("busy").querySelector("progress").value = told.fraction;
+    const bar = $("busy").querySelector("progress");
+    if (told.fraction) bar.value = told.fraction; else bar.removeAttribute("value");
     $("busy").querySelector("span").textContent = told.view;
   }
 
@@ -156,7 +174,8 @@
     const channel = doc && doc.get_model_by_name("act");
     if (!channel) return setTimeout(connect, 30);
     send = text => { channel.value = text; };
-    for (const [name, hear] of Object.entries({ui: render, readout, busy, notes, file})) {
+    const parts = (window.parts || []).map(part => part({act, field, put, fill, short}));
+    for (const [name, hear] of Object.entries(Object.assign({ui: render, readout, busy, notes, file}, ...parts))) {
       const model = doc.get_model_by_name(name);
       const told = () => { if (model.value) hear(JSON.parse(model.value)); };
       model.properties.value.change.connect(told);
@@ -165,6 +184,18 @@
     for (const one of document.querySelectorAll("[data-set]")) {
       const commit = () => { act("set", one.dataset.set, one.value); act("end"); };
       if (one.tagName === "SELECT") one.addEventListener("change", commit); else field(one, commit);
+    }
+    for (const list of document.querySelectorAll("[data-panel]")) {
+      list.addEventListener("click", event => {
+        if (event.target.dataset.view) { act("set", list.dataset.panel, event.target.dataset.view); act("end"); }
+      });
+      list.addEventListener("keydown", event => {
+        const step = {ArrowRight: 1, ArrowLeft: -1}[event.key], all = [...list.children];
+        if (!step) return;
+        const next = all[(all.indexOf(event.target) + step + all.length) % all.length];
+        next.focus();
+        next.click();
+      });
     }
     $("model").addEventListener("change", () => act("model", "", $("model").value));
     $("preset").addEventListener("change", () => { if ($("preset").value) act("preset", "", $("preset").value); });

@@ -12,9 +12,10 @@ from nonsmooth.studies.savi2007 import printed
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["PAPER", "first_state", "presets_of", "slider_range"]
+__all__ = ["GIVEN", "PAPER", "USUAL", "first_state", "presets_of", "slider_range"]
 
 PAPER = "discontinuous_support"
+GIVEN = "given"  # the name of a model of one's own
 _GAP = {**printed.FIGURE_13, "over": "g", "low": -0.0015, "high": 0.002, "shown": "v"}
 _AMPLITUDE = {**printed.FIGURE_11, "over": "rho", "low": 0.2, "high": 0.5, "shown": "v"}
 _FREQUENCY = {**printed.FIGURE_17, "over": "omega", "low": 8.4, "high": 10.4, "shown": "v"}
@@ -35,7 +36,7 @@ _FIGURES: Mapping[str, Mapping[str, Any]] = {
     **{f"Fig. 18 {'abc'[i]}": {**_FREQUENCY, "omega": omega} for i, omega in enumerate(printed.FIGURE_18)},
 }  # fmt: skip
 #: What is varied first, where a model has it.
-_USUAL = ("rho", "omega", "A", "g", "alpha", "mu", "r", "q", "v_b", "V_in", "gamma")
+USUAL = ("rho", "omega", "A", "g", "alpha", "mu", "r", "q", "v_b", "V_in", "gamma")
 
 
 def presets_of(state: State) -> dict[str, State]:
@@ -62,7 +63,7 @@ def first_state(model: str, system: System) -> State:
     """A view of a system at its own parameters, over the parameter that is usually varied."""
     names, states = list(system.parameters), list(system.states)
     values = {name: float(system.values[name]) for name in names}
-    over = next((name for name in _USUAL if name in values), names[0])
+    over = next((name for name in USUAL if name in values), names[0])
     low, high = (0.2, 0.5) if model == PAPER else _around(values[over])
     y = states[_velocity(states)]
     start = tuple(0.0 if system.period() is not None else 0.1 * s for s in system.scale_vector())

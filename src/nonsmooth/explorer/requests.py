@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from nonsmooth.explorer.state import State
     from nonsmooth.system.system import System
 
-__all__ = ["key_of", "requests_of", "stability_request"]
+__all__ = ["key_of", "motion_of", "requests_of", "stability_request"]
 
 
 def requests_of(system: System, text: str, state: State) -> dict[str, dict[str, Any]]:
@@ -35,13 +35,18 @@ def requests_of(system: System, text: str, state: State) -> dict[str, dict[str, 
 
 def stability_request(orbit: Mapping[str, Any], results: Mapping[str, Any]) -> dict[str, Any]:
     """The request for multipliers or exponents, once the orbit is there."""
+    return {**motion_of(orbit, results), "view": "stability"}
+
+
+def motion_of(orbit: Mapping[str, Any], results: Mapping[str, Any]) -> dict[str, Any]:
+    """The request of the orbit, with its period number and the time that its record takes."""
     run = results["run"]["time"].values
     return {
-        **orbit, "view": "stability", "period": int(results["judged"]["period_number"].values[0]),
+        **orbit, "period": int(results["judged"]["period_number"].values[0]), "begin": float(run[0]),
         "span": float(run[-1] - run[0]),
     }  # fmt: skip
 
 
 def key_of(request: Mapping[str, Any]) -> str:
-    """Text by which two requests are the same."""
-    return json.dumps(request, sort_keys=True)
+    """Text by which two requests are the same; a recording stands in it as its ``key``."""
+    return json.dumps(request, sort_keys=True, default=lambda one: one.key)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from nonsmooth.explorer.requests import key_of
+from nonsmooth.explorer.views import CHOSEN, VIEWS
 from nonsmooth.explorer.worker import Answer, Worker
 
 if TYPE_CHECKING:
@@ -15,14 +16,20 @@ if TYPE_CHECKING:
 
 __all__ = ["ORDER", "Asked", "Schedule"]
 
-#: Views in the order in which they are computed.
-ORDER = ("orbit", "first look", "section", "diagram", "stability")
+_STAGES = {stage: quick for view in VIEWS for stage, quick in view.stages.items()}
+#: Requests in the order in which they are computed.
+ORDER = (
+    "orbit", "recording", "first look", "section", *(stage for stage in _STAGES if _STAGES[stage]),
+    "diagram", "stability", *(stage for stage in _STAGES if not _STAGES[stage]),
+)  # fmt: skip
 #: Short work: a newer request of the same view waits for it, so that a drawing follows a hand that moves.
-_CHEAP = ("orbit", "first look", "section")
+_CHEAP = ("orbit", "recording", "first look", "section", *(stage for stage in _STAGES if _STAGES[stage]))
 _PATIENCE = 1.0  # seconds after which short work is cancelled like any other
-_DEAF = 5.0  # seconds in which cancelled work must end by itself
-_PANEL = {
-    "orbit": "portrait", "first look": "upper", "section": "section", "diagram": "upper", "stability": "readout",
+_DEAF = 10.0  # seconds in which cancelled work must end by itself
+#: The view in which a message on a request appears.
+_PLACE = {
+    "orbit": "portrait", "first look": "diagram", "section": "section", "diagram": "diagram", "stability": "readout",
+    "recording": "recording", **{stage: view.name for stage, view in CHOSEN.items()},
 }  # fmt: skip
 
 
@@ -113,17 +120,17 @@ class Schedule:
             self.page.tell("busy", {"view": running.view, "fraction": round(float(content), 3), "long": True})
             return
         self._running = None
-        panel = _PANEL[running.view]
+        place = _PLACE[running.view]
         if kind == "error":
             self._failed[running.view] = running.key
-            self.page.notes[panel] = str(content)
+            self.page.notes[place] = str(content)
         elif kind == "done":
             found, warned = content
             self.done[running.view] = running.key
             self._failed.pop(running.view, None)
-            self.page.notes.pop(panel, None)
+            self.page.notes.pop(place, None)
             if warned:
-                self.page.notes[panel] = warned[0]
+                self.page.notes[place] = warned[0]
             self.page.show(running, found)
         self.page.tell("notes", self.page.notes)
         self.go_on()

@@ -13,20 +13,23 @@ from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qsl
 
-from bokeh.events import RangesUpdate, Tap
+from bokeh.events import RangesUpdate, Reset, Tap
 from bokeh.models import TextInput
-from jinja2 import Template
+from jinja2 import DictLoader, Environment
 
-from nonsmooth.explorer.controls import GIVEN, controls
+from nonsmooth.explorer.bench import Bench
+from nonsmooth.explorer.controls import controls
 from nonsmooth.explorer.export import exported
 from nonsmooth.explorer.figures import MOST, Diagram, History, Portrait, Section, theme
 from nonsmooth.explorer.labels import symbols_of
-from nonsmooth.explorer.presets import PAPER, first_state, presets_of, slider_range
+from nonsmooth.explorer.overlays import Overlay
+from nonsmooth.explorer.presets import GIVEN, PAPER, first_state, presets_of, slider_range
 from nonsmooth.explorer.readout import distinct, readout
-from nonsmooth.explorer.requests import key_of, requests_of, stability_request
+from nonsmooth.explorer.requests import key_of, motion_of, requests_of, stability_request
 from nonsmooth.explorer.schedule import Asked, Schedule
 from nonsmooth.explorer.state import History as Past
 from nonsmooth.explorer.state import State, changed, from_query
+from nonsmooth.explorer.views import PANELS, VIEWS, View
 from nonsmooth.explorer.worker import Answer
 
 if TYPE_CHECKING:
@@ -35,7 +38,9 @@ if TYPE_CHECKING:
 __all__ = ["Session", "models_of"]
 
 #: To the browser, each one line of JSON; what comes from it is ``act``.
-CHANNELS = ("ui", "readout", "busy", "notes", "file")
+CHANNELS = ("ui", "readout", "busy", "notes", "file", "recording")
+#: Files that make the page; what a part of the page does comes before the page itself.
+TEXTS = ("page.html", "recording.html", "page.css", "recording.js", "tour.js", "page.js")
 Models = Mapping[str, Callable[[], "System"]]
 
 
@@ -70,6 +75,8 @@ class Session:
         self.results: dict[str, Any] = {}
         self.diagram, self.portrait = Diagram(), Portrait()
         self.history, self.section = History(), Section()
+        self.views: list[View] = [view() for view in VIEWS]
+        self.overlay, self.bench = Overlay(self.diagram, self.portrait, self.history, self.section), Bench(self)
         self._say = {name: TextInput(name=name) for name in CHANNELS}
         self._act = TextInput(name="act")
         self.past = Past(self._first(query))
@@ -78,7 +85,7 @@ class Session:
         self._build()
         self.work = Schedule(self)
         document.on_session_destroyed(lambda context: self._close())
-        self._refresh()
+        self.refresh()
 
     @staticmethod
     def check(models: Models, query: str) -> None:
@@ -94,6 +101,16 @@ class Session:
     def system(self) -> System:
         """The system at its own parameters."""
         return _system(self.models, self._systems, self.state.model)
+
+    @property
+    def text(self) -> str:
+        """The system's text, as the worker takes it."""
+        if self.state.model not in self._texts:
+            self._texts[self.state.model] = self.system.to_text()
+        return self._texts[self.state.model]
+
+    def _period_number(self) -> int:
+        return int(self.results["judged"]["period_number"].values[0])
 
     def _first(self, query: str) -> State:
         context = self.document.session_context
@@ -113,16 +130,27 @@ class Session:
         document = self.document
         document.title = "nonsmooth explorer"
         folder = files("nonsmooth.explorer")
-        document.template = Template(folder.joinpath("page.html").read_text(encoding="utf-8"))
-        document.template_variables["style"] = folder.joinpath("page.css").read_text(encoding="utf-8")
-        document.template_variables["program"] = folder.joinpath("page.js").read_text(encoding="utf-8")
+        texts = {name: folder.joinpath(name).read_text(encoding="utf-8") for name in TEXTS}
+        document.template = Environment(loader=DictLoader(texts)).get_template("page.html")
+        document.template_variables["style"] = texts["page.css"]
+        document.template_variables["program"] = "\n".join(text for name, text in texts.items() if name.endswith(".js"))
+        document.template_variables["panels"] = PANELS
+        document.template_variables["views"] = VIEWS
         self.diagram.plot.on_event(Tap, self._tap_diagram)
         self.diagram.plot.on_event(RangesUpdate, self._zoom_diagram)
         self.diagram.plot.on_change("inner_height", lambda attr, old, new: self._resized(int(new)))
         for one in (self.portrait, self.section):
             one.plot.on_event(Tap, self._tap_plane)
-        for figure in (self.diagram, self.portrait, self.history, self.section):
-            document.add_root(figure.plot)  # events are heard of what had a callback by now
+        own = []
+        for view in self.views:
+            plot = view.build(self)
+            if plot is not None:
+                own.append(plot)
+                plot.on_event(Tap, partial(self._tap_view, view))
+                plot.on_event(RangesUpdate, partial(self._zoom_view, view))
+                plot.on_event(Reset, partial(self._reset_view, view))
+        for plot in (*(one.plot for one in (self.diagram, self.portrait, self.history, self.section)), *own):
+            document.add_root(plot)  # events are heard of what had a callback by now
         for channel in (self._act, *self._say.values()):
             document.add_root(channel)
         document.theme = theme(self.dark, self.large)
@@ -135,11 +163,16 @@ class Session:
 
     def _hear(self, answer: Answer) -> None:
         """Hand an answer over, from the thread that listens to the worker's pipe."""
+        self.later(self.work.take, answer)
+
+    def later(self, act: Callable[..., None], *given: Any) -> None:
+        """Call a function in the thread that the page belongs to, from any other one."""
         with suppress(AttributeError):  # the tab has been closed, and its document taken apart
-            self.document.add_next_tick_callback(partial(self.work.take, answer))
+            self.document.add_next_tick_callback(partial(act, *given))
 
     def _close(self) -> None:
         self.work.close()
+        self.bench.close()
 
     # --- what a person does
 
@@ -153,7 +186,7 @@ class Session:
             known: dict[str, Callable[[str, Any], object]] = {
                 "set": self._set, "model": self._model, "preset": self._preset, "end": self._end_step,
                 "undo": lambda *_: self.past.undo(), "redo": lambda *_: self.past.redo(), "look": self._look,
-                "reset": self._reset, "begin": self._begin, "save": self._save,
+                "reset": self._reset, "begin": self._begin, "save": self._save, **self.bench.actions,
             }  # fmt: skip
             if action not in known:
                 raise ValueError(f"the page asked for {str(action)[:40]!r}, which does not exist")
@@ -163,7 +196,7 @@ class Session:
         except (ValueError, TypeError, KeyError) as error:
             place = str(message.get("name") or "page") if isinstance(message, dict) else "page"
             self.notes[place] = str(error)
-        self._refresh()
+        self.refresh()
 
     def _set(self, name: str, value: Any) -> None:
         self.past.put(self._arranged(name, changed(self.state, name, value, list(self.system.states))), name)
@@ -201,8 +234,7 @@ class Session:
                 told = {"name": file, "content": base64.b64encode(content).decode()}
             except Exception as error:
                 told = {"wrong": str(error)}
-            with suppress(AttributeError):  # the tab has been closed
-                self.document.add_next_tick_callback(partial(self._hand_over, told))
+            self.later(self._hand_over, told)
 
         threading.Thread(target=make, daemon=True).start()
 
@@ -223,20 +255,22 @@ class Session:
     def _look(self, name: str, value: Any) -> None:
         self.dark, self.large = bool(value["dark"]), bool(value["large"])
         self.document.theme = theme(self.dark, self.large)
-        for one in (self.portrait, self.history, self.section):
+        for one in (self.portrait, self.history, self.section, self.overlay):
             one.paint(self.dark)
+        for view in self.views:
+            view.paint(self.dark)
 
     def _tap_diagram(self, event: Any) -> None:
         value, start = self.diagram.nearest(event.x, event.y, self.state)
         state = self.state.with_value(self.state.over, value)
         self.past.put(state if start is None else replace(state, start=start))
-        self._refresh()
+        self.refresh()
 
     def _tap_plane(self, event: Any) -> None:
         start = dict(zip(self.system.states, self.state.start, strict=True))
         start[self.state.x], start[self.state.y] = float(event.x), float(event.y)
         self.past.put(replace(self.state, start=tuple(start.values())))
-        self._refresh()
+        self.refresh()
 
     def _resized(self, pixels: int) -> None:
         self.diagram.pixels = max(pixels, 50)
@@ -246,21 +280,44 @@ class Session:
         if event.x1 > event.x0:
             self.past.put(replace(self.state, low=float(event.x0), high=float(event.x1)), "zoom")
         self.diagram.redraw(self.state)
-        self._refresh()
+        self.refresh()
+
+    def _tap_view(self, view: View, event: Any) -> None:
+        self.past.put(view.tapped(float(event.x), float(event.y), self.system, self.state))
+        self.refresh()
+
+    def _zoom_view(self, view: View, event: Any) -> None:
+        if event.x1 > event.x0 and event.y1 > event.y0:
+            x, y = (float(event.x0), float(event.x1)), (float(event.y0), float(event.y1))
+            self.past.put(view.zoomed(x, y, self.system, self.state), f"zoom {view.name}")
+        self.refresh()
+
+    def _reset_view(self, view: View, event: Any) -> None:
+        self.past.put(view.unzoomed(self.system, self.state))
+        self.refresh()
 
     # --- what is to be computed
 
     def wanted(self) -> dict[str, dict[str, Any]]:
         """The request of every view that is shown, for the state of the page."""
         state = self.state
-        if state.model not in self._texts:
-            self._texts[state.model] = self.system.to_text()
-        found = requests_of(self.system, self._texts[state.model], state)
+        found = requests_of(self.system, self.text, state)
         known = "judged" in self.results and self.work.done.get("orbit") == key_of(found["orbit"])
+        base = dict(found)
+        if known:
+            base["motion"] = motion_of(found["orbit"], self.results)
         if known and not self.system.is_map:
             found["stability"] = stability_request(found["orbit"], self.results)
+        if known and (request := self.bench.request(found["orbit"], self._period_number())) is not None:
+            found["recording"] = request
         if self.work.done.get("diagram") == key_of(found["diagram"]):
             del found["first look"]
+        if state.upper != "diagram":
+            found = {view: request for view, request in found.items() if view not in ("first look", "diagram")}
+        for view in self.views:
+            asked = view.requests(self.system, state, base) if view.shown(self.system, state) else {}
+            for stage in [*asked][-1:]:
+                found |= {stage: asked[stage]} if self.work.done.get(stage) == key_of(asked[stage]) else asked
         return found
 
     # --- what is shown
@@ -292,9 +349,19 @@ class Session:
         elif view == "section":
             self.results["section"] = found["section"]
             self._show_section()
-        else:
+        elif view == "recording":
+            self.bench.put(found)
+            self._show_recording()
+        elif view == "stability":
             self.results["stability"] = found
             self._tell_readout()
+        else:
+            for one in self.views:
+                if view in one.stages and not one.depends(request.of, self.subject):
+                    one.show(json.loads(request.key), found, system, state)
+                    if one.saved is not None and one.saved[0] in found:
+                        self.results[one.name] = found[one.saved[0]]
+            self._tell_ui()
 
     def _axes_of_diagram(self) -> None:
         state, system, symbols = self.state, self.system, symbols_of(self.system)
@@ -318,6 +385,13 @@ class Session:
         self.portrait.mark(points)
         self._tell_readout()
 
+    def _show_recording(self) -> None:
+        self.overlay.put(self.bench.laid, self.state)
+        if "run" in self.results:
+            self._show_orbit()
+        if "section" in self.results:
+            self._show_section()
+
     def _zone(self) -> float | None:
         """The gap behind which contact lies, where an indicator is ``x`` less a parameter."""
         traced = self.system.traced
@@ -336,24 +410,30 @@ class Session:
 
     def _tell_readout(self) -> None:
         if "judged" in self.results:
-            self.tell("readout", readout(self.system, self.state, self.results))
+            self.tell("readout", [*readout(self.system, self.state, self.results), *self.bench.readout()])
 
     def _tell_ui(self) -> None:
-        found = controls(self.system, self.state, self.models, self.diagram.stage)
+        found = controls(self.system, self.state, self.models, self.diagram.stage, self.views)
         look = {"dark": self.dark, "large": self.large}
         self.tell("ui", {**found, **look, "heard": self._heard, "can": self.past.can})
 
-    def _refresh(self) -> None:
+    def refresh(self) -> None:
         """The page as the state has it, and work for what that lacks."""
-        state = self.state
+        state, system = self.state, self.system
         if self._of != self.subject:
             self.diagram.clear()
             self.results.pop("diagram", None)
             if self._of[0] != state.model:
                 self.results.clear()
                 self.work.done.clear()
+                self.bench.arrange()
             for view in ("first look", "diagram"):
                 self.work.done.pop(view, None)
+            for one in self.views:
+                if one.depends(self._of, self.subject):
+                    one.clear()
+                    for stage in one.stages:
+                        self.work.done.pop(stage, None)
             self._of = self.subject
         if self._axes != (state.x, state.y, state.shown):
             self._axes = state.x, state.y, state.shown
@@ -364,11 +444,19 @@ class Session:
                 self._show_orbit()
             if "section" in self.results:
                 self._show_section()
+            for one in self.views:
+                one.redraw(system, state)
+            self._show_recording()
+        if self.bench.laid is None and not self.overlay.is_empty:
+            self._show_recording()
         self.diagram.here.location = state.values[state.over]
+        for one in self.views:
+            one.place(system, state)
         if (self.diagram.plot.x_range.start, self.diagram.plot.x_range.end) != (state.low, state.high):
             self.diagram.show(x=(state.low, state.high))
         self.tell("notes", self.notes)
         self.work.go_on()  # before the page hears that its message has been taken in
+        self.bench.tell()
         self._tell_ui()
 
 

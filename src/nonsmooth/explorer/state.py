@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 from urllib.parse import parse_qsl, urlencode
 
-__all__ = ["CHOICES", "History", "State", "from_query", "to_query"]
+from nonsmooth.explorer.views import PANELS, SETTINGS
+
+__all__ = ["CHOICES", "History", "State", "from_query", "to_query", "within"]
 
 #: Fields that hold one of these words, with what a person reads for it.
 CHOICES: dict[str, dict[str, str]] = {
@@ -16,6 +18,7 @@ CHOICES: dict[str, dict[str, str]] = {
         "both": "up and down", "up": "up", "down": "down", "rest": "each from rest", "many": "8 starts each",
     },
     "method": {"auto": "exact or Taylor", "smoothed": "smoothed switch", "rkf45": "RKF45"},
+    **PANELS,
 }  # fmt: skip
 #: Whole numbers, with their limits.
 _WHOLE = {"transient": (0, 100_000), "keep": (4, 2000), "columns": (10, 4000)}
@@ -40,6 +43,10 @@ class State:
         State of the diagram's ordinate.
     phase : float
         Of the section, in forcing periods.
+    upper, plane, lower : str
+        The view that each of these panels shows.
+    settings : mapping
+        Of the views, by name (see :class:`nonsmooth.explorer.views.view.Setting`); what is not held is the default.
     """
 
     model: str
@@ -58,6 +65,10 @@ class State:
     transient: int = 300
     keep: int = 100
     columns: int = 600
+    upper: str = "diagram"
+    plane: str = "portrait"
+    lower: str = "history"
+    settings: Mapping[str, float | str] = field(default_factory=dict)
 
     def with_value(self, name: str, value: float) -> State:
         """The same with another value of a parameter."""
@@ -68,18 +79,25 @@ class State:
         given: dict[str, Any] = {field: value}
         return replace(self, **given)
 
+    def with_settings(self, **values: float | str | None) -> State:
+        """The same with other settings of views, ``view__setting``; None for the default."""
+        found = {**self.settings, **{name.replace("__", "."): value for name, value in values.items()}}
+        return replace(self, settings={name: value for name, value in found.items() if value is not None})
+
 
 def to_query(state: State) -> str:
     """The state as the query of a URL; a parameter stands under its name with ``p.`` before it."""
     pairs: list[tuple[str, str]] = []
-    for field in fields(state):
-        value = getattr(state, field.name)
-        if field.name == "values":
+    for one in fields(state):
+        value = getattr(state, one.name)
+        if one.name == "values":
             pairs += [(f"p.{name}", repr(float(number))) for name, number in value.items()]
-        elif field.name == "start":
+        elif one.name == "settings":
+            pairs += [(name, str(given)) for name, given in value.items()]
+        elif one.name == "start":
             pairs.append(("start", " ".join(repr(float(number)) for number in value)))
-        elif field.default != value:
-            pairs.append((field.name, repr(value) if isinstance(value, float) else str(value)))
+        elif one.default != value:
+            pairs.append((one.name, repr(value) if isinstance(value, float) else str(value)))
     return urlencode(pairs)
 
 
@@ -112,6 +130,8 @@ def changed(state: State, name: str, value: Any, states: Sequence[str]) -> State
         if parameter not in state.values:
             raise ValueError(f"{parameter!r} is no parameter; there are: {', '.join(state.values)}")
         return state.with_value(parameter, number_of(value, parameter))
+    if name in SETTINGS:
+        return _with_setting(state, name, value)
     if name == "over":
         return replace(state, over=_one_of(value, list(state.values), name))
     if name in ("x", "y", "shown"):
@@ -141,6 +161,12 @@ def changed(state: State, name: str, value: Any, states: Sequence[str]) -> State
     raise ValueError(f"{name!r} is nothing that a view holds")
 
 
+def within(name: str, value: int) -> int:
+    """The nearest value that the page allows for a field that holds a whole number."""
+    least, most = _WHOLE[name]
+    return min(max(value, least), most)
+
+
 def number_of(value: Any, name: str) -> float:
     """A finite number from what a browser sent.
 
@@ -156,6 +182,14 @@ def number_of(value: Any, name: str) -> float:
     if not math.isfinite(number):
         raise ValueError(f"{name}: {str(value)[:40]!r} is no number; write it as 0.45 or 4.5e-1")
     return number
+
+
+def _with_setting(state: State, name: str, value: Any) -> State:
+    """Words that a setting has no choice of become its default where it is read."""
+    setting = SETTINGS[name]
+    found = {key: given for key, given in state.settings.items() if key not in setting.also}
+    found[name] = number_of(value, name) if setting.choices is None else str(value)[:60]
+    return replace(state, settings=found)
 
 
 def _one_of(value: Any, allowed: Sequence[str], name: str) -> str:

@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 
 import nonsmooth as ns
+from nonsmooth.explorer.measured import fitted, laid_over, read
+from nonsmooth.explorer.views import CHOSEN
 
-__all__ = ["VIEWS", "Heard", "compute"]
+__all__ = ["VIEWS", "Heard", "compute", "periods_shown"]
 
 #: Hears the fraction done and says whether the work is still wanted.
 Heard = Callable[[float], bool]
@@ -28,10 +30,13 @@ def compute(job: Mapping[str, Any], heard: Heard) -> dict[str, Any]:
     Parameters
     ----------
     job : mapping
-        ``view``, the ``text`` of the system, its ``values``, ``method``, ``eta`` and the view's own options.
+        ``view``, the ``text`` of the system, its ``values``, ``method``, ``eta`` and the view's own options; a file
+        that is to be read has its ``content`` and ``name``.
     heard : function
         Hears the fraction done; False cancels.
     """
+    if job["view"] == "read":
+        return read(job)
     system = _system(job["text"]).with_parameters(job["values"])
     if job["method"] == "smoothed":
         system = system.smoothed(job["eta"])
@@ -58,7 +63,7 @@ def _orbit(system: ns.System, job: Mapping[str, Any], options: dict[str, Any], h
         transient=transient, keep=job["keep"], progress=heard, **options,
     )  # fmt: skip
     period = int(judged["period_number"].values[0])
-    shown = 2 * min(period, _LONGEST) if period else _CHAOTIC
+    shown = periods_shown(period)
     if system.period() is not None:
         run = ns.simulate(system, periods=shown, transient=transient, start=start, **options)
     else:
@@ -67,6 +72,11 @@ def _orbit(system: ns.System, job: Mapping[str, Any], options: dict[str, Any], h
         begin, end = (float(times["time"].values[k]) for k in (0, -1))
         run = ns.simulate(system, duration=end - begin, transient=begin, start=start, **options)
     return {"judged": judged, "run": run}
+
+
+def periods_shown(period: int) -> int:
+    """Forcing periods of a motion of this period number (0: none) that are drawn."""
+    return 2 * min(period, _LONGEST) if period else _CHAOTIC
 
 
 def _section(system: ns.System, job: Mapping[str, Any], options: dict[str, Any], heard: Heard) -> dict[str, Any]:
@@ -131,4 +141,6 @@ def _is_exact(system: ns.System, options: Mapping[str, Any]) -> bool:
 
 VIEWS: dict[str, Callable[..., dict[str, Any]]] = {
     "orbit": _orbit, "section": _section, "stability": _stability, "first look": _first_look, "diagram": _diagram,
+    **{stage: view.compute for stage, view in CHOSEN.items()},
+    "recording": laid_over, "fit": fitted,
 }  # fmt: skip

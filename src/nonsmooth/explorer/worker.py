@@ -1,11 +1,12 @@
 """A process that computes, and the page's side of it: asked, cancelled, started again where it ended.
 
 Requests and answers are pickles on the two pipes of the process, both ends of which are ours. A request may be
-cancelled: the verbs hear of it through their ``progress``.
+cancelled: the verbs hear of it through their ``progress``, and those that say nothing for a while as Ctrl-C.
 """
 
 from __future__ import annotations
 
+import _thread
 import os
 import pickle
 import queue
@@ -22,6 +23,7 @@ from typing import Any
 __all__ = ["Answer", "Worker"]
 
 _OFTEN = 0.15  # seconds between two words on progress
+_SILENT = 1.0  # seconds in which cancelled work must end before it is interrupted
 
 #: ``(kind, number, content)``: "progress" with the fraction done, "done" with results and warnings, "cancelled",
 #: "error" with a sentence, "ended" with the exit code of the process.
@@ -92,13 +94,41 @@ class Worker:
             self._hear(("ended", 0, code))
 
 
+class _Cancelled:
+    """Numbers of requests that nobody waits for, and the way to end the one at work."""
+
+    def __init__(self) -> None:
+        self.numbers: set[int] = set()
+        self.at_work = 0
+        # Ctrl-C on the terminal comes here too: it ends the server, and that closes the pipe
+        signal.signal(signal.SIGINT, self._interrupted)
+
+    def add(self, number: int) -> None:
+        """Cancel a request; in a while as Ctrl-C does, should its verb not hear of it."""
+        self.numbers.add(number)
+        late = threading.Timer(_SILENT, self._interrupt, (number,))
+        late.daemon = True
+        late.start()
+
+    def _interrupt(self, number: int) -> None:
+        if self.at_work != number:
+            return
+        if hasattr(signal, "pthread_kill"):  # wakes it where it waits for other threads, too
+            signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
+        else:
+            _thread.interrupt_main()
+
+    def _interrupted(self, signum: int, frame: Any) -> None:
+        if self.at_work in self.numbers:
+            raise KeyboardInterrupt
+
+
 def main() -> None:
     """Answer requests until the pipe is closed. What is printed goes to stderr."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C on the terminal ends the server, and that closes the pipe
+    cancelled = _Cancelled()
     out = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     waiting: queue.SimpleQueue[tuple[int, dict[str, Any]] | None] = queue.SimpleQueue()
-    cancelled: set[int] = set()
     threading.Thread(target=_read, args=(waiting, cancelled), daemon=True).start()
     from nonsmooth.explorer.work import compute
 
@@ -108,29 +138,37 @@ def main() -> None:
 
     while (request := waiting.get()) is not None:
         number, job = request
-        if number not in cancelled:
+        if number not in cancelled.numbers:
             with suppress(BrokenPipeError):
                 send(_answer(number, job, compute, cancelled, send))
-        cancelled.discard(number)
+        cancelled.numbers.discard(number)
 
 
 def _answer(
-    number: int, job: dict[str, Any], compute: Callable[..., dict[str, Any]], cancelled: set[int],
+    number: int, job: dict[str, Any], compute: Callable[..., dict[str, Any]], cancelled: _Cancelled,
     send: Callable[[Answer], None],
 ) -> Answer:  # fmt: skip
     last = time.monotonic()
 
     def heard(fraction: float) -> bool:
         nonlocal last
+        if number in cancelled.numbers:
+            return False
         if time.monotonic() - last > _OFTEN:
             last = time.monotonic()
+            cancelled.at_work = 0  # a message is not cut in two
             send(("progress", number, fraction))
-        return number not in cancelled
+            cancelled.at_work = number
+        return True
 
     try:
         with warnings.catch_warnings(record=True) as said:
             warnings.simplefilter("always")
-            found = compute(job, heard)
+            try:
+                cancelled.at_work = number
+                found = compute(job, heard)
+            finally:
+                cancelled.at_work = 0
         return "done", number, (found, [str(one.message) for one in said])
     except KeyboardInterrupt:
         return "cancelled", number, None
@@ -144,7 +182,7 @@ def _told(error: Exception) -> str:
     return str(error) if isinstance(error, SolveError) else f"{type(error).__name__}: {error}"
 
 
-def _read(waiting: queue.SimpleQueue[Any], cancelled: set[int]) -> None:
+def _read(waiting: queue.SimpleQueue[Any], cancelled: _Cancelled) -> None:
     with suppress(EOFError, OSError, pickle.UnpicklingError):
         while True:
             what, number, job = pickle.load(sys.stdin.buffer)

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
+    from nonsmooth.system.symbolic.traced import Traced
     from nonsmooth.system.system import System
-    from nonsmooth.system.traced import Traced
 
 __all__ = ["AT_REST", "ROUNDING", "Equilibrium", "ModeField", "equilibrium_at", "refuse_resting", "sorted_eigenvalues"]
 

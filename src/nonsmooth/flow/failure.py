@@ -9,8 +9,8 @@ from nonsmooth.kernels.hybrid import codes
 
 if TYPE_CHECKING:
     from nonsmooth.flow.engines.engine import Log
+    from nonsmooth.system.symbolic.traced import TracedTransition
     from nonsmooth.system.system import System
-    from nonsmooth.system.traced import TracedTransition
 
 __all__ = ["solve_error", "wrong_way"]
 

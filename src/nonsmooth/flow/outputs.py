@@ -11,7 +11,7 @@ import numpy as np
 from nonsmooth.flow.engines.engine import FloatArray
 
 if TYPE_CHECKING:
-    from nonsmooth.system.traced import Traced
+    from nonsmooth.system.symbolic.traced import Traced
 
 __all__ = ["output_values"]
 

@@ -12,8 +12,8 @@ from nonsmooth.errors import shortened
 from nonsmooth.flow.arguments import real_number
 
 if TYPE_CHECKING:
+    from nonsmooth.system.symbolic.traced import Traced
     from nonsmooth.system.system import System
-    from nonsmooth.system.traced import Traced
 
 __all__ = ["with_ramps"]
 
@@ -44,8 +44,8 @@ def with_ramps(system: System, ramps: Mapping[str, Any], t_begin: float, t_end: 
     from sympy import Float
 
     from nonsmooth.system.names import unknown
-    from nonsmooth.system.scalar import Scalar
-    from nonsmooth.system.tracing import call_scalar, refuse_corners
+    from nonsmooth.system.symbolic.scalar import Scalar
+    from nonsmooth.system.symbolic.tracing import call_scalar, refuse_corners
 
     traced = system.declared
     if not isinstance(ramps, Mapping):

@@ -27,8 +27,8 @@ from nonsmooth.flow.variational import VariationalFlow
 from nonsmooth.kernels.hybrid import codes
 
 if TYPE_CHECKING:
+    from nonsmooth.system.symbolic.traced import Traced
     from nonsmooth.system.system import System
-    from nonsmooth.system.traced import Traced
 
 __all__ = ["Frame", "Growth", "frame_for"]
 

@@ -107,7 +107,7 @@ def start_states(system: System, start: Any) -> FloatArray:
     alone = is_one_start(start)
     states = _state(system, start)[None, :] if alone else np.stack([_state(system, one) for one in start])
     if system.surfaces:
-        from nonsmooth.system.sliding import repelled
+        from nonsmooth.system.derived.sliding import repelled
 
         if found := repelled(system, states):
             surface, which = found

@@ -25,8 +25,8 @@ from nonsmooth.flow.saltation import Jump, Touch, chained
 from nonsmooth.system.phases import phase_slopes, varying_phases
 
 if TYPE_CHECKING:
+    from nonsmooth.system.symbolic.traced import Traced
     from nonsmooth.system.system import System
-    from nonsmooth.system.traced import Traced
 
 __all__ = ["Jump", "Segments", "Touch", "VariationalFlow"]
 
@@ -68,7 +68,7 @@ class VariationalFlow:
     def __init__(self, traced: Traced, active: tuple[str, ...], scale: FloatArray) -> None:
         from nonsmooth.kernels.compile.pointers import addresses
         from nonsmooth.kernels.tangent.legs import Equations
-        from nonsmooth.system.variations import variational_model
+        from nonsmooth.system.codegen.variations import variational_model
 
         self.traced, self.active = traced, active
         self.places = tuple(traced.parameter_names.index(name) for name in active)
@@ -166,7 +166,7 @@ class VariationalFlow:
     def indicator(self, values: Any, i: int, mode: int, t: float, z: Any) -> Touch:
         """Indicator ``i`` at (t, z) with its first two derivatives along the flow of ``mode``, and gradients."""
         if (i, mode) not in self._touches:
-            from nonsmooth.system.variations import touch_function
+            from nonsmooth.system.codegen.variations import touch_function
 
             self._touches[i, mode] = touch_function(self.traced, self.places, i, mode)
         numbers = np.asarray(z, dtype=float).tolist()

@@ -34,7 +34,7 @@ from nonsmooth.identification.response_fit import FEWEST_CURVES, ResponseFit
 if TYPE_CHECKING:
     import xarray as xr
 
-    from nonsmooth.experiment.recording import Recording
+    from nonsmooth.recordings.recording import Recording
 
 __all__ = ["ResponseCurve", "amplitude_dependent", "response_curves"]
 
@@ -87,7 +87,7 @@ def response_curves(
     ValueError
         If a channel is missing or its unit is not one of those.
     """
-    from nonsmooth.experiment.signals.checks import take
+    from nonsmooth.recordings.signals.checks import take
 
     curves = []
     for run in recording.runs:

@@ -150,42 +150,17 @@ class ResponseFit:
         self.amplitude = np.abs(self.measured - R * self.force if self.force is not None else self.measured)
 
     def _settle(self, p: FloatArray, sigma: float, prior: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Levenberg-Marquardt from ``p``; the outcome and its normal matrix. ``prior``: 1 / variance of unknowns."""
+        """Least squares from ``p``; the outcome and its normal matrix. ``prior``: 1 / variance of unknowns."""
+        from scipy.optimize import least_squares
 
-        def cost(q: FloatArray) -> float:
-            left = self._left(q) / sigma
-            return float(left @ left + prior @ q**2)
-
-        damping, now = 1e-4, cost(p)
-        for _ in range(200):
-            J = self._jacobian(p) / sigma
-            # Without BLAS: its threads take longer to meet than so small a product takes.
-            normal = np.einsum("ki,kj->ij", J, J) + np.diag(prior)
-            slope = J.T @ (self._left(p) / sigma) + prior * p
-            scale = np.sqrt(np.maximum(np.diag(normal), 1e-30))
-            inverse = np.linalg.pinv(normal / np.outer(scale, scale), hermitian=True)
-            # the undamped step in standard uncertainties: a damped one is short wherever it is taken
-            far = float(np.max(np.abs(inverse @ (slope / scale)) / np.sqrt(np.maximum(np.diag(inverse), 1e-300))))
-            if far < 1e-3:
-                return p, normal
-            change = np.zeros_like(p)
-            while damping < 1e12:
-                step = normal / np.outer(scale, scale) + damping * np.eye(len(p))
-                change = -np.linalg.solve(step, slope / scale) / scale
-                then = cost(p + change)
-                if then <= now:
-                    break
-                damping *= 10.0
-            else:
-                if far < 0.05:  # no smaller sum of squares: rounding
-                    return p, normal
-                raise SolveError(
-                    f"the fit of the responses stops {far:.2g} standard uncertainties away from its minimum; take "
-                    "fewer knots"
-                )
-            p, now = p + change, then
-            damping = max(0.1 * damping, 1e-12)
-        raise SolveError("the fit of the responses has not converged in 200 steps; take fewer knots")
+        known = np.sqrt(prior)
+        found = least_squares(
+            lambda q: np.concatenate([self._left(q) / sigma, known * q]), p,
+            lambda q: np.vstack([self._jacobian(q) / sigma, np.diag(known)]), method="lm", x_scale="jac",
+        )  # fmt: skip
+        if not found.success:
+            raise SolveError(f"the fit of the responses has not converged: {found.message} Take fewer knots")
+        return found.x, found.jac.T @ found.jac
 
     def _start(self, count: int) -> FloatArray:
         """Natural frequencies by the tops of the curves; damping by the width of the lowest, the least bent of them."""

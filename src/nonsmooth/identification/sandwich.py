@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from nonsmooth.identification.arrow import inverted, reduced
 from nonsmooth.identification.pieces import Fittable, State
+from nonsmooth.identification.uncertainty import newey_west
 
 __all__ = ["Sandwich", "sandwich"]
 
@@ -71,14 +72,8 @@ def sandwich(
 
 
 def _meat(scores: Sequence[tuple[Any, FloatArray, FloatArray]], p: int) -> FloatArray:
-    """Sum of products of scores up to a lag of a few correlation times, Bartlett's weights, within pieces."""
+    """Sum of products of scores, over neighbours in time within pieces."""
     meat = np.zeros((p, p))
     for piece, g, r in scores:
-        score = piece.by_instant(g * r[:, None])
-        here = score.T @ score
-        lags = min(len(score) - 1, int(np.ceil(4 * piece.correlation(r))) + 2)
-        for k in range(1, lags + 1):
-            cross = score[k:].T @ score[:-k]
-            here += (1.0 - k / (lags + 1)) * (cross + cross.T)
-        meat[np.ix_(piece.which, piece.which)] += here
+        meat[np.ix_(piece.which, piece.which)] += newey_west(piece.by_instant(g * r[:, None]), piece.correlation(r))
     return meat

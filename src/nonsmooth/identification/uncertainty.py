@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
-    "correlated", "correlation_times", "coverage_factor", "factor_interval", "interval", "uniform",
+    "correlated", "correlation_times", "coverage_factor", "factor_interval", "interval", "newey_west", "uniform",
 ]  # fmt: skip
 
 FloatArray = NDArray[np.float64]
@@ -113,6 +113,16 @@ def correlation_times(residuals: Any, *, longest: int | None = None) -> float:
     return max(1.0, float(1.0 + 2.0 * rho[1:end].sum()))
 
 
+def newey_west(scores: FloatArray, times: float) -> FloatArray:
+    """Sum of the scores' products (p, p) up to a lag of a few correlation ``times``, with Bartlett's weights."""
+    found = scores.T @ scores
+    lags = min(len(scores) - 1, int(np.ceil(4 * times)) + 2)
+    for k in range(1, lags + 1):
+        cross = scores[k:].T @ scores[:-k]
+        found += (1.0 - k / (lags + 1)) * (cross + cross.T)
+    return found
+
+
 def correlated(jacobian: Any, residuals: Any, pieces: Sequence[int] | None = None) -> FloatArray:
     r"""Covariance of a least-squares estimate whose residuals are correlated in time.
 
@@ -151,11 +161,7 @@ def correlated(jacobian: Any, residuals: Any, pieces: Sequence[int] | None = Non
     for length in lengths:
         piece = slice(begin, begin + length)
         score = (j[piece] / scale) * r[piece, None]
-        meat += score.T @ score
-        lags = min(length - 1, int(np.ceil(4 * correlation_times(r[piece]))) + 2)
-        for k in range(1, lags + 1):
-            cross = score[k:].T @ score[:-k]
-            meat += (1.0 - k / (lags + 1)) * (cross + cross.T)
+        meat += newey_west(score, correlation_times(r[piece]))
         begin += length
     sandwich = inverse @ meat @ inverse * n / max(n - p, 1)
     found = sandwich

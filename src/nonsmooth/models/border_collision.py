@@ -13,7 +13,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from nonsmooth.system.maps import Map
+    from nonsmooth.system.derived.maps import Map
 
 __all__ = ["border_collision"]
 
@@ -47,7 +47,7 @@ def border_collision(**parameters: float) -> Map:
     ----------
     H.E. Nusse, J.A. Yorke, Physica D 57 (1992) 39-57; H.E. Nusse, E. Ott, J.A. Yorke, Phys. Rev. E 49 (1994) 1073-1076.
     """
-    from nonsmooth.system.maps import Branch, Map
+    from nonsmooth.system.derived.maps import Branch, Map
 
     system = Map(
         name="border-collision normal form",

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from nonsmooth.system.maps import Map
+    from nonsmooth.system.derived.maps import Map
 
 __all__ = ["bouncing_ball_map"]
 
@@ -47,7 +47,7 @@ def bouncing_ball_map(**parameters: float) -> Map:
     P.J. Holmes, J. Sound Vib. 84 (1982) 173-189; J. Guckenheimer, P. Holmes, *Nonlinear Oscillations, Dynamical
     Systems, and Bifurcations of Vector Fields*, Springer 1983, sec. 2.4.
     """
-    from nonsmooth.system.maps import Branch, Map
+    from nonsmooth.system.derived.maps import Branch, Map
 
     system = Map(
         name="bouncing ball map",

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from nonsmooth.system.elements import Backlash
+from nonsmooth.system.derived.elements import Backlash
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System

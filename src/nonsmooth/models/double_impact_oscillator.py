@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.system.elements import Stop
+from nonsmooth.system.derived.elements import Stop
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
@@ -64,7 +64,7 @@ def double_impact_oscillator(**parameters: float) -> System:
     >>> orbit.period_number, orbit.stable
     (1, True)
     """
-    from nonsmooth.system.mechanical import mechanical
+    from nonsmooth.system.derived.mechanical import mechanical
 
     system = mechanical(
         1.0, _damping, 1.0, name="double impact oscillator", coordinates="x", forcing={"x": _force},

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.system.elements import Backlash
+from nonsmooth.system.derived.elements import Backlash
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
@@ -61,7 +61,7 @@ def gear_pair(**parameters: float) -> System:
     >>> int((curve.contacts_per_period.sel(direction="up") > 0).sum())  # the teeth part near resonance
     2
     """
-    from nonsmooth.system.mechanical import mechanical
+    from nonsmooth.system.derived.mechanical import mechanical
 
     system = mechanical(
         1.0, _damping, 0.0, name="gear pair", forcing={"q": _load},

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.system.elements import Stop
+from nonsmooth.system.derived.elements import Stop
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
@@ -77,7 +77,7 @@ def impact_damper(**parameters: float) -> System:
     >>> float(run.u.sel(state="x").max()) < 0.05 / (2 * 0.01) / 5  # a fifth of the amplitude without the ball
     True
     """
-    from nonsmooth.system.mechanical import mechanical
+    from nonsmooth.system.derived.mechanical import mechanical
 
     system = mechanical(
         _masses, _damping, np.diag([1.0, 0.0]), name="impact damper", coordinates=["x", "y"], forcing={"x": _force},

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.system.elements import Stop
+from nonsmooth.system.derived.elements import Stop
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.system.elements import Coulomb, Stop
+from nonsmooth.system.derived.elements import Coulomb, Stop
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
@@ -56,7 +56,7 @@ def impact_friction_oscillator(**parameters: float) -> System:
     >>> bool(run.u.sel(state="x").max() <= 1.0)
     True
     """
-    from nonsmooth.system.mechanical import mechanical
+    from nonsmooth.system.derived.mechanical import mechanical
 
     system = mechanical(
         1.0, _damping, 1.0, name="impact-friction oscillator", coordinates="x", forcing={"x": _force},

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.system.elements import ElasticStop
+from nonsmooth.system.derived.elements import ElasticStop
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System

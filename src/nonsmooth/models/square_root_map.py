@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from nonsmooth.system.maps import Map
+    from nonsmooth.system.derived.maps import Map
 
 __all__ = ["square_root_map"]
 
@@ -52,7 +52,7 @@ def square_root_map(**parameters: float) -> Map:
     A.B. Nordmark, J. Sound Vib. 145 (1991) 279-297; W. Chin, E. Ott, H.E. Nusse, C. Grebogi, Phys. Rev. E 50 (1994)
     4427-4444.
     """
-    from nonsmooth.system.maps import Branch, Map
+    from nonsmooth.system.derived.maps import Branch, Map
 
     system = Map(
         name="square-root map",

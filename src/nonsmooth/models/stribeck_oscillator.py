@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.system.elements import Coulomb
+from nonsmooth.system.derived.elements import Coulomb
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
@@ -63,7 +63,7 @@ def stribeck_oscillator(**parameters: float) -> System:
     >>> "belt_stick" in {belt.modes[i] for i in run.mode.values}
     True
     """
-    from nonsmooth.system.mechanical import mechanical
+    from nonsmooth.system.derived.mechanical import mechanical
 
     system = mechanical(
         1.0, _damping, 1.0, name="Stribeck oscillator", coordinates="x", forcing={"x": _force},

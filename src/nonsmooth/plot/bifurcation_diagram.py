@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = ["bifurcation_diagram"]
+__all__ = ["bifurcation_diagram", "one_branch"]
 
 
 def bifurcation_diagram(
@@ -51,7 +51,7 @@ def bifurcation_diagram(
             color=style.COLORS["pale"], label="sweeps",
         )  # fmt: skip
         for k in range(result.sizes["branch_id"]):
-            draw_branch(drawn, _one(result, k), y=name, special=special)
+            draw_branch(drawn, one_branch(result, k), y=name, special=special)
         style.even_dots(drawn.legend(loc="best"))
         drawn.dataLim.update_from_data_x(result["swept_value"].values, ignore=False)
         drawn.margins(x=0)
@@ -59,7 +59,7 @@ def bifurcation_diagram(
     return drawn
 
 
-def _one(result: xr.Dataset, k: int) -> xr.Dataset:
+def one_branch(result: xr.Dataset, k: int) -> xr.Dataset:
     """One of the branches, as ``draw_branch`` takes it."""
     points = np.flatnonzero(result["branch"].values == k)
     marks = np.flatnonzero(result["special_branch"].values == k)

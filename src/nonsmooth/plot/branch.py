@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-__all__ = ["MARKS", "branch", "draw_branch"]
+__all__ = ["MARKS", "branch", "draw_branch", "lines_of", "ordinates_of", "with_breaks"]
 
 #: Marker and words of each kind of special point.
 MARKS = {
@@ -94,9 +94,9 @@ def draw_branch(
         raise ValueError(f"quantity = {quantity!r}; allowed: {', '.join(map(repr, _WORDS))}")
     (name,) = only_states(result, y)
     values = result[_parameter(result)].values
-    ordinates = _ordinates(result, name, quantity)
+    ordinates = ordinates_of(result, name, quantity)
     shade = color or style.COLORS["first"]
-    for line, at in _lines(result):
+    for line, at in lines_of(result):
         under = behind and line == "-"
         looks: dict[str, Any] = {"linewidth": width, "zorder": 3}
         if under:
@@ -105,14 +105,14 @@ def draw_branch(
         for row in ordinates:
             known = ax.get_legend_handles_labels()[1]
             ax.plot(
-                _with_breaks(values, at), _with_breaks(row, at), line, color=shade,
+                with_breaks(values, at), with_breaks(row, at), line, color=shade,
                 label=None if words in known else words, **looks,
             )  # fmt: skip
     if special:
         _mark(ax, result, ordinates)
 
 
-def _ordinates(result: xr.Dataset, name: str, quantity: str) -> NDArray[np.float64]:
+def ordinates_of(result: xr.Dataset, name: str, quantity: str) -> NDArray[np.float64]:
     """One line for each section point of the orbit, (lines, point); an equilibrium is its own maximum and minimum."""
     if "eigenvalues" in result:
         rest = result["u"].sel(state=name).values.astype(float)
@@ -161,7 +161,7 @@ def _virtual(result: xr.Dataset) -> NDArray[np.bool_]:
     return np.asarray(result["virtual"].values, dtype=bool)
 
 
-def _lines(result: xr.Dataset) -> list[tuple[str, NDArray[np.intp]]]:
+def lines_of(result: xr.Dataset) -> list[tuple[str, NDArray[np.intp]]]:
     """The style of each kind of line, and the points that it joins (-1: a break).
 
     A segment that begins at a special point, where stability changes, is of the kind of its end.
@@ -183,5 +183,6 @@ def _lines(result: xr.Dataset) -> list[tuple[str, NDArray[np.intp]]]:
     return found
 
 
-def _with_breaks(values: NDArray[np.float64], at: NDArray[np.intp]) -> NDArray[np.float64]:
+def with_breaks(values: NDArray[np.float64], at: NDArray[np.intp]) -> NDArray[np.float64]:
+    """Return the values at points of a line, NaN at its breaks."""
     return np.where(at < 0, np.nan, values[at])

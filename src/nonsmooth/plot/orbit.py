@@ -32,7 +32,7 @@ def orbit(result: Any, ax: Axes | None = None, *, x: str | None = None, y: str |
     x, y
         The states of the two axes; by default the first two.
     """
-    from nonsmooth.continuation.orbit import Orbit
+    from nonsmooth.continuation.branches.orbit import Orbit
 
     if not isinstance(result, Orbit):
         result = Orbit.from_dataset(result)

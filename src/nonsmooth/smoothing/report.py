@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.continuation.branches.orbit import Orbit
 from nonsmooth.continuation.find import find_orbit
-from nonsmooth.continuation.orbit import Orbit
 from nonsmooth.diagrams.lyapunov import lyapunov
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.arguments import check_system, whole_number
@@ -17,9 +17,9 @@ from nonsmooth.flow.starts import plain_start
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.progress import Progress
 from nonsmooth.smoothing.attractors import Box, Found, attractors_of, matched
+from nonsmooth.system.derived.smoothing import BANDS
 from nonsmooth.system.names import by_name
 from nonsmooth.system.parameter import finite_number
-from nonsmooth.system.smoothing import BANDS
 
 if TYPE_CHECKING:
     import xarray as xr

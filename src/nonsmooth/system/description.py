@@ -13,7 +13,6 @@ from typing import Any
 import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError, shortened
-from nonsmooth.system.domain import Domain
 from nonsmooth.system.equations import (
     TracedBand,
     TracedSurface,
@@ -25,11 +24,12 @@ from nonsmooth.system.equations import (
 from nonsmooth.system.mode import Band, Mode
 from nonsmooth.system.names import check_names, unknown
 from nonsmooth.system.parameter import Parameter, finite_number
-from nonsmooth.system.period import check_period, forcing_period, timed_expressions
-from nonsmooth.system.scalar import to_expression
+from nonsmooth.system.symbolic.domain import Domain
+from nonsmooth.system.symbolic.period import check_period, forcing_period, timed_expressions
+from nonsmooth.system.symbolic.scalar import to_expression
+from nonsmooth.system.symbolic.traced import Traced
+from nonsmooth.system.symbolic.tracing import Symbols, call_scalar
 from nonsmooth.system.symmetry import Symmetry, trace_symmetry
-from nonsmooth.system.traced import Traced
-from nonsmooth.system.tracing import Symbols, call_scalar
 from nonsmooth.system.transition import Surface, Transition
 
 __all__ = ["Description", "describe"]
@@ -57,7 +57,7 @@ class Description:
         """Return the declared equations, or what they became, with their sliding modes."""
         if not self.surfaces:
             return traced
-        from nonsmooth.system.sliding import slide
+        from nonsmooth.system.derived.sliding import slide
 
         return slide(traced, self.surfaces, self.scale)
 
@@ -104,7 +104,7 @@ def describe(
     ranges: Sequence[tuple[sp.Expr, str]] = ()
     patterns: Any = None
     if elements:
-        from nonsmooth.system.combinations import assembled
+        from nonsmooth.system.derived.combinations import assembled
 
         given = {
             "indicators": indicators, "transitions": transitions, "outputs": outputs, "memory": memory,

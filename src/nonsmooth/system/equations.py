@@ -13,9 +13,9 @@ from nonsmooth.system.condition import read_condition
 from nonsmooth.system.mode import Band
 from nonsmooth.system.names import unknown
 from nonsmooth.system.parameter import Parameter
-from nonsmooth.system.scalar import Scalar, as_written, to_expression
-from nonsmooth.system.traced import Row, Traced, TracedTransition
-from nonsmooth.system.tracing import Symbols, call_scalar, call_vector, refuse_corners
+from nonsmooth.system.symbolic.scalar import Scalar, as_written, to_expression
+from nonsmooth.system.symbolic.traced import Row, Traced, TracedTransition
+from nonsmooth.system.symbolic.tracing import Symbols, call_scalar, call_vector, refuse_corners
 from nonsmooth.system.transition import Surface, Transition
 
 __all__ = ["TracedBand", "TracedSurface", "sliding_mode", "trace_band", "trace_surface", "trace_system"]

@@ -28,7 +28,9 @@ RESERVED = frozenset(
         # variables of results
         "section", "maximum", "minimum", "amplitude", "residual", "period", "period_number", "crossings_per_period",
         "contacts_per_period", "clearance", "signature", "stable", "label", "kind", "transition",
-        "floquet_multipliers", "start_state", "state_unit", "state_symbol", "provenance",
+        "floquet_multipliers", "exponents", "standard_error", "running", "batch", "trace_defect", "kaplan_yorke",
+        "nearest_graze", "equilibrium", "elapsed", "fraction", "fraction_error", "minimal_shock",
+        "start_state", "state_unit", "state_symbol", "provenance",
         # arguments of the user's functions
         "u", "t", "p",
     ]

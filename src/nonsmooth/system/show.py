@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 import sympy as sp
 
 from nonsmooth.results.representation import html_table, text_table
-from nonsmooth.system.expressions import write_expression
 from nonsmooth.system.parameter import latex_name
+from nonsmooth.system.symbolic.expressions import write_expression
 
 if TYPE_CHECKING:
+    from nonsmooth.system.symbolic.traced import Row, Traced, TracedTransition
     from nonsmooth.system.system import System
-    from nonsmooth.system.traced import Row, Traced, TracedTransition
 
 __all__ = ["latex", "page", "table"]
 

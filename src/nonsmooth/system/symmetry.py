@@ -13,12 +13,12 @@ import sympy as sp
 from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.system.names import unknown
 from nonsmooth.system.parameter import finite_number
-from nonsmooth.system.scalar import Scalar
-from nonsmooth.system.traced import Traced
-from nonsmooth.system.tracing import call_vector
+from nonsmooth.system.symbolic.scalar import Scalar
+from nonsmooth.system.symbolic.traced import Traced
+from nonsmooth.system.symbolic.tracing import call_vector
 
 if TYPE_CHECKING:
-    from nonsmooth.system.tracing import Symbols
+    from nonsmooth.system.symbolic.tracing import Symbols
 
 __all__ = ["Symmetry", "trace_symmetry"]
 

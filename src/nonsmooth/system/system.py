@@ -20,9 +20,9 @@ from nonsmooth.system.values import changed_values, parameter_rows, smoothed_val
 from nonsmooth.system.variant import ONE_ETA, SHARP, Variant, variant_of
 
 if TYPE_CHECKING:
-    from nonsmooth.system.derivatives import Derivatives
+    from nonsmooth.system.symbolic.derivatives import Derivatives
+    from nonsmooth.system.symbolic.traced import Traced, TracedTransition
     from nonsmooth.system.symmetry import Symmetry
-    from nonsmooth.system.traced import Traced, TracedTransition
 
 __all__ = ["System"]
 

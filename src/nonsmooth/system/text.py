@@ -17,11 +17,11 @@ from nonsmooth.errors import SystemDefinitionError, shortened
 from nonsmooth.system.condition import condition_text
 from nonsmooth.system.description import Description
 from nonsmooth.system.equations import TracedSurface
-from nonsmooth.system.expressions import read_expression, write_expression
 from nonsmooth.system.mode import Band, Mode
-from nonsmooth.system.scalar import Scalar
-from nonsmooth.system.traced import Row
-from nonsmooth.system.tracing import Symbols
+from nonsmooth.system.symbolic.expressions import read_expression, write_expression
+from nonsmooth.system.symbolic.scalar import Scalar
+from nonsmooth.system.symbolic.traced import Row
+from nonsmooth.system.symbolic.tracing import Symbols
 from nonsmooth.system.transition import Surface, Transition
 from nonsmooth.system.variant import variant_of
 
@@ -131,7 +131,7 @@ def _content(d: Description) -> dict[str, Any]:
             "modes": {t.mode_names[i]: t.mode_names[j] for i, j in enumerate(d.symmetry.modes)},
         }
     if known:
-        from nonsmooth.system.combinations import SPEED
+        from nonsmooth.system.derived.combinations import SPEED
 
         names = {**names, SPEED: "speed"}
         content["elements"] = {k: _element_content(one, text) for k, one in known.items()}
@@ -254,8 +254,8 @@ class _Reader:
         }
 
     def element(self, entry: Mapping[str, Any]) -> Any:
-        from nonsmooth.system import elements
-        from nonsmooth.system.combinations import SPEED
+        from nonsmooth.system.derived import elements
+        from nonsmooth.system.derived.combinations import SPEED
 
         if entry["kind"] not in elements.__all__ or entry["kind"] == "Element":
             raise SystemDefinitionError(f"there is no element {shortened(entry['kind'])}")

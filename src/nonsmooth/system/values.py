@@ -68,7 +68,7 @@ def smoothed_values(
     description: Description, values: Mapping[str, float], eta: Any, band: str
 ) -> tuple[dict[str, float], Variant]:
     """The variant for these half widths and this band, and its values; None takes the smoothing away."""
-    from nonsmooth.system.smoothing import BANDS
+    from nonsmooth.system.derived.smoothing import BANDS
 
     if band not in BANDS:
         raise ValueError(f"band is one of {', '.join(BANDS)}, not {shortened(band)}")

@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
 from typing import Any
 
-from nonsmooth.system.derivatives import Derivatives
 from nonsmooth.system.description import Description
-from nonsmooth.system.domain import Domain
-from nonsmooth.system.traced import Traced
+from nonsmooth.system.symbolic.derivatives import Derivatives
+from nonsmooth.system.symbolic.domain import Domain
+from nonsmooth.system.symbolic.traced import Traced
 
 __all__ = ["ETA_PER_INDICATOR", "ONE_ETA", "SHARP", "Variant", "variant_of"]
 
@@ -28,7 +28,7 @@ class Variant:
             self.traced: Traced = description.with_sliding(description.traced)
             extra = tuple(_static_ratios(description))
         else:
-            from nonsmooth.system.smoothing import smooth
+            from nonsmooth.system.derived.smoothing import smooth
 
             smoothed = smooth(description, kind == ONE_ETA, band or "linear")
             self.traced, self.etas, extra = smoothed.traced, smoothed.etas, smoothed.apart

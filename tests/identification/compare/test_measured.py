@@ -7,24 +7,23 @@ import pytest
 import xarray as xr
 
 import nonsmooth as ns
-from nonsmooth.experiment import Recording, load_session
-from nonsmooth.experiment.rig import VirtualRig
-from nonsmooth.experiment.rig.driven import Setting, records
-from nonsmooth.experiment.rig.figures import TAPS, without_support
-from nonsmooth.experiment.rig.motor import frequency, mean_position, voltage_for
-from nonsmooth.experiment.rig.notebook import write_session
 from nonsmooth.identification.compare import (
     compare,
-    gap_reference,
     measured_motion,
     measured_response,
     measured_rise,
     measured_sections,
-    session_measurement,
 )
 from nonsmooth.identification.compare import measured as module
+from nonsmooth.recordings import Recording, load_session
+from nonsmooth.studies.savi2007.comparison import gap_reference, session_measurement
+from nonsmooth.studies.savi2007.rig import VirtualRig
+from nonsmooth.studies.savi2007.rig.driven import Setting, records
+from nonsmooth.studies.savi2007.rig.figures import TAPS, without_support
+from nonsmooth.studies.savi2007.rig.motor import frequency, mean_position, voltage_for
+from nonsmooth.studies.savi2007.rig.notebook import write_session
 
-pytestmark = pytest.mark.filterwarnings("ignore::nonsmooth.experiment.RecordingWarning")
+pytestmark = pytest.mark.filterwarnings("ignore::nonsmooth.recordings.RecordingWarning")
 TRAVEL = 0.0789
 COUNT = TRAVEL / 1440
 OMEGA = 5.3

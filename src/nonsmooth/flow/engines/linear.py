@@ -19,8 +19,8 @@ from nonsmooth.kernels.hybrid import codes
 from nonsmooth.kernels.hybrid.places import BEGUN
 
 if TYPE_CHECKING:
-    from nonsmooth.system.linear import LinearForm
-    from nonsmooth.system.traced import Traced
+    from nonsmooth.system.codegen.linear import LinearForm
+    from nonsmooth.system.symbolic.traced import Traced
 
 __all__ = ["LinearEngine", "PlanarEngine", "is_linear"]
 
@@ -84,17 +84,15 @@ class LinearEngine(LoopEngine):
             waves = np.zeros((*shape, n_h))
             outputs = (np.zeros((*shape, t.A.shape[-1])), np.zeros(shape), waves, waves)
         multiples = np.array(self.form.multiples, dtype=np.int64)
-        with np.errstate(divide="ignore"):
-            period = np.where(t.omega > 0.0, 2.0 * np.pi / t.omega, np.inf)
         from nonsmooth.kernels.compile.cache import compiled
         from nonsmooth.kernels.hybrid.records import Form
 
         lacking = np.hstack([self.lacking, np.ones((n_modes, len(self.traced.m)), dtype=np.int64)])
         form = Form(
-            t.A, t.b, t.c, t.s, multiples, t.omega, period,
+            t.A, t.b, t.c, t.s, multiples, t.omega, t.period,
             t.ia, t.ib, t.ic, t.is_, *outputs, t.ra, t.rb, t.rc, t.rs, lacking,
         )  # fmt: skip
-        tables = Tables(points, form, period, (n_modes, n_i, outputs[0].shape[1], len(self.net.rows)), n_h)
+        tables = Tables(points, form, form.period, (n_modes, n_i, outputs[0].shape[1], len(self.net.rows)), n_h)
         if n_points > 1:  # threads may share them
             compiled(self.module(tables, "sections").chain)
         return tables

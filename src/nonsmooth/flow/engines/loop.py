@@ -17,7 +17,7 @@ from nonsmooth.kernels.hybrid.stopping import flag
 from nonsmooth.system.phases import phases, varying_phases
 
 if TYPE_CHECKING:
-    from nonsmooth.system.traced import Traced, TracedTransition
+    from nonsmooth.system.symbolic.traced import Traced, TracedTransition
 
 __all__ = ["DIVERGENCE", "LoopEngine", "pack_net"]
 

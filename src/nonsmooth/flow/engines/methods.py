@@ -13,8 +13,8 @@ from nonsmooth.flow.arguments import float_array, real_number, whole_number
 from nonsmooth.flow.engines.engine import Engine, FloatArray
 
 if TYPE_CHECKING:
+    from nonsmooth.system.symbolic.traced import Traced
     from nonsmooth.system.system import System
-    from nonsmooth.system.traced import Traced
 
 __all__ = ["EXPERT", "METHODS", "RTOL", "engine_for", "warn_if_coarse"]
 
@@ -71,7 +71,7 @@ def engine_for(
         return _of_patterns(system, method, rtol is not None or atol is not None or step is not None or bool(expert))
     form = None
     if method in ("auto", "exact") and traced is None:
-        from nonsmooth.system.linear import linear_form
+        from nonsmooth.system.codegen.linear import linear_form
 
         form = linear_form(equations)
     if method == "exact":

@@ -1,4 +1,4 @@
-"""The engine of systems whose modes are made when they are first visited (:mod:`nonsmooth.system.patterns`).
+"""The engine of systems whose modes are made when they are first visited (:mod:`nonsmooth.system.derived.patterns`).
 
 It is that of the exact flow; only the tables grow. A run that is about to enter a pattern without tables pauses, they
 are put behind those that stand, and it goes on. Each parameter point has tables of its own, and numbers its patterns as
@@ -22,10 +22,10 @@ from nonsmooth.kernels.hybrid.places import RESET, WAITS
 from nonsmooth.results.memory import free_memory, room_for
 
 if TYPE_CHECKING:
-    from nonsmooth.system.assembly import Pattern
-    from nonsmooth.system.linear import LinearTables
-    from nonsmooth.system.patterns import Patterns
-    from nonsmooth.system.traced import Traced
+    from nonsmooth.system.codegen.linear import LinearTables
+    from nonsmooth.system.derived.assembly import Pattern
+    from nonsmooth.system.derived.patterns import Patterns
+    from nonsmooth.system.symbolic.traced import Traced
 
 __all__ = ["PatternEngine"]
 
@@ -54,9 +54,7 @@ class PatternEngine(LoopEngine):
 
     def prepare(self, points: FloatArray) -> Points:
         linear = self.patterns.form.evaluate(points)
-        with np.errstate(divide="ignore"):
-            period = np.where(linear.omega > 0.0, 2.0 * np.pi / linear.omega, np.inf)
-        return Points(np.asarray(points, dtype=float), linear, period)
+        return Points(np.asarray(points, dtype=float), linear, linear.period)
 
     def module(self, tables: Any, observer: str) -> ModuleType:
         from nonsmooth.kernels.linear.module import linear_module

@@ -20,8 +20,8 @@ from nonsmooth.flow.engines.series_tables import Tables, exact_steps, periods, w
 from nonsmooth.kernels.series.places import METHODS
 
 if TYPE_CHECKING:
-    from nonsmooth.system.generate import CompiledModel
-    from nonsmooth.system.traced import Traced
+    from nonsmooth.system.codegen.generate import CompiledModel
+    from nonsmooth.system.symbolic.traced import Traced
 
 __all__ = ["SeriesEngine", "order_for"]
 
@@ -116,7 +116,7 @@ class SeriesEngine(LoopEngine):
     @cached_property
     def model(self) -> CompiledModel:
         """The generated functions of the system."""
-        from nonsmooth.system.generate import compile_model
+        from nonsmooth.system.codegen.generate import compile_model
 
         return compile_model(self.layers.model)
 

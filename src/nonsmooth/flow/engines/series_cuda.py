@@ -41,7 +41,7 @@ class Buffers:
 def module_of(engine: SeriesEngine, tables: Tables) -> Any:
     """The kernels for an engine's system, method and order."""
     from nonsmooth.kernels.cuda.series_module import cuda_series_module, cuda_series_source
-    from nonsmooth.system.generate import model_source
+    from nonsmooth.system.codegen.generate import model_source
 
     net, form = engine.net, engine.generated(tables)
     sizes = {

@@ -12,7 +12,7 @@ import numpy as np
 from nonsmooth.flow.engines.engine import FloatArray
 
 if TYPE_CHECKING:
-    from nonsmooth.system.traced import Traced
+    from nonsmooth.system.symbolic.traced import Traced
 
 __all__ = ["Tables", "exact_steps", "periods", "work_of"]
 
@@ -81,7 +81,7 @@ def exact_steps(traced: Traced, points: FloatArray, order: int) -> tuple[FloatAr
     ValueError
         Some mode is not linear with constant coefficients and harmonic forcing.
     """
-    from nonsmooth.system.linear import linear_form
+    from nonsmooth.system.codegen.linear import linear_form
 
     form = linear_form(traced)
     if form is None:

@@ -9,7 +9,7 @@ import numpy as np
 if TYPE_CHECKING:
     import xarray as xr
 
-    from nonsmooth.experiment.recording import Recording
+    from nonsmooth.recordings.recording import Recording
 
 __all__ = ["measured_motion"]
 
@@ -67,9 +67,9 @@ def measured_motion(
     """
     import xarray as xr
 
-    from nonsmooth.experiment.signals.checks import take
-    from nonsmooth.experiment.signals.displacement import position, resolution
-    from nonsmooth.experiment.signals.phase import drive_phase
+    from nonsmooth.recordings.signals.checks import take
+    from nonsmooth.recordings.signals.displacement import position, resolution
+    from nonsmooth.recordings.signals.phase import drive_phase
 
     name = run if run is not None else recording.runs[0]
     turned = take(recording, angle, run, units=ANGLES, samples=64)
@@ -109,9 +109,9 @@ def _smoothed(time: Any, x: xr.DataArray, step: float, omega: float, support: bo
     Of a long record a piece in the middle tells the support's place and the intensities of the smoother's noise; to
     find them in the whole would take ten passes over it.
     """
-    from nonsmooth.experiment.signals.contacts import contacts
-    from nonsmooth.experiment.signals.sections import poincare
-    from nonsmooth.experiment.signals.smoothing import smooth
+    from nonsmooth.recordings.signals.contacts import contacts
+    from nonsmooth.recordings.signals.sections import poincare
+    from nonsmooth.recordings.signals.smoothing import smooth
 
     # Without a support the motion is smooth: no contact is an answer that the smoother takes, too.
     def touching(t: Any, values: Any) -> Any:

@@ -6,15 +6,21 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nonsmooth.identification.compare.fold import fold
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["measured_response", "measured_rise", "measured_sections"]
+__all__ = ["measured_response", "measured_rise", "measured_sections", "section_points"]
 
 FEW = 6  # turns of the drive below which no period number is sought
+
+
+def section_points(motion: xr.Dataset) -> NDArray[np.float64]:
+    """Points of a measured motion at phase 0, one for each whole period of the drive: (periods, states)."""
+    return fold(motion["phase"].values, motion["u"].values, 8)[:, 0]
 
 
 def measured_response(motions: Sequence[xr.Dataset], directions: Sequence[str], *, settle: int = 4) -> xr.Dataset:
@@ -132,7 +138,7 @@ def measured_sections(
     import xarray as xr
 
     order = np.argsort(values)
-    clouds = [fold(motions[i]["phase"].values, motions[i]["u"].values, 8)[:, 0] for i in order]
+    clouds = [section_points(motions[i]) for i in order]
     points = np.full((len(clouds), max(map(len, clouds)), clouds[0].shape[1]), np.nan)
     for row, cloud in zip(points, clouds, strict=True):
         row[: len(cloud)] = cloud

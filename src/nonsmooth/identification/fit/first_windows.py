@@ -20,7 +20,7 @@ from nonsmooth.identification.fit.windows import Window, Windows
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["first_length", "first_windows", "states_from_samples"]
+__all__ = ["first_length", "first_windows", "rates", "states_from_samples"]
 
 FloatArray = NDArray[np.float64]
 _AROUND = 3  # samples on either side, from which value and slope at a sample are taken
@@ -142,7 +142,7 @@ def states_from_samples(problem: Windows, theta: FloatArray, record: Record, whi
     at = record.time[which]
     system, names = problem.system, list(problem.system.states)
     told = np.full((len(at), len(names)), np.nan)
-    rates = _rates(system)
+    known = rates(system)
     measured = problem.sensor_values(theta)
     for c, (quantity, sensor) in enumerate(measured.items()):
         if quantity not in names:
@@ -151,12 +151,12 @@ def states_from_samples(problem: Windows, theta: FloatArray, record: Record, whi
         t, y = record.time[have], (record.values[have, c] - sensor.offset) / sensor.gain
         value, slope = _local(t, y, at)
         told[:, k] = value
-        if k in rates and names[rates[k]] not in measured:
-            told[:, rates[k]] = slope
+        if k in known and names[known[k]] not in measured:
+            told[:, known[k]] = slope
     return told
 
 
-def _rates(system: System) -> Mapping[int, int]:
+def rates(system: System) -> Mapping[int, int]:
     """States whose rate is another state in every mode that has them: position -> velocity."""
     traced, found = system.traced, {}
     for i in range(len(traced.u)):

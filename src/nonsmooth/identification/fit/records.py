@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.errors import shortened
-from nonsmooth.experiment.recording import Recording
 from nonsmooth.flow.arguments import float_array, real_number
 from nonsmooth.identification.fit.sensors import Sensor, read_sensors
+from nonsmooth.recordings.recording import Recording
 from nonsmooth.system.names import unknown
 
 if TYPE_CHECKING:

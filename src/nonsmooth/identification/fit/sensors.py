@@ -14,8 +14,8 @@ from nonsmooth.flow.arguments import real_number
 from nonsmooth.system.names import unknown
 
 if TYPE_CHECKING:
+    from nonsmooth.system.symbolic.traced import Traced
     from nonsmooth.system.system import System
-    from nonsmooth.system.traced import Traced
 
 __all__ = ["OF_A_SENSOR", "Readout", "Sensor", "read_sensors"]
 

@@ -31,7 +31,7 @@ def cuda_series_source(model: str, sizes: Mapping[str, int], tables: Mapping[str
     Parameters
     ----------
     model : str
-        Text of the model's module (``system.generate.model_source``).
+        Text of the model's module (``system.codegen.generate.model_source``).
     sizes : mapping
         The numbers at the top of ``cuda.series``.
     tables : mapping

@@ -1,16 +1,21 @@
-"""Parts of a step of the series methods: how long it is, and how a crossing on it is placed."""
+"""A step of the series methods: its length, its polynomials, and the first transition on it."""
 
-from math import fabs
+from math import fabs, inf, sqrt
+from math import log as ln
+
+from numpy import float32
 
 import nonsmooth.kernels.series.places as place
-from nonsmooth.kernels.compile.cache import device, once
-from nonsmooth.kernels.hybrid.places import MODE
-from nonsmooth.kernels.series.crossing import rows_hold
-from nonsmooth.kernels.series.generated import values_of
-from nonsmooth.kernels.series.rkf45 import first_step
-from nonsmooth.kernels.series.taylor import dense_states, step_length
+from nonsmooth.kernels.compile.cache import device, inline, once
+from nonsmooth.kernels.hybrid.places import MODE, NO_END, TIME, WAITED
+from nonsmooth.kernels.series.crossing import earliest, rows_hold
+from nonsmooth.kernels.series.generated import field_of, jet_of, values_of
+from nonsmooth.kernels.series.polynomial import NONE
+from nonsmooth.kernels.series.rkf45 import first_step, hermite, quiet, stages, time_to_transition
+from nonsmooth.kernels.series.taylor import dense_states, fill_powers, step_length
+from nonsmooth.kernels.series.trust import trusted
 
-__all__ = ["METHOD", "at_end", "judged_at_end", "planned_length", "polished"]
+__all__ = ["METHOD", "at_end", "judged_at_end", "log_tolerance", "make_step", "polished"]
 
 # Of ``series.places``: set where the text is joined, so that each method has a kernel of its own.
 METHOD = 0
@@ -94,3 +99,143 @@ def planned_length(i, mode, form, J, log_rtol, work):
     if form.nonlinear_rows == 1:
         return converged(J, form.order, n, form.indicators, form.exact_steps[i, mode], work.scale)
     return form.exact_steps[i, mode]
+
+
+@inline
+def log_tolerance(form):
+    """Logarithm of what the last terms of a series may be."""
+    return ln(max(0.1 * form.rtol, 1e-16))
+
+
+@once
+def length_of_step(i, form, net, work, r_max):
+    """The length of the next step, before crossings in sight shorten it; -1: there is none."""
+    tally, memo, rkf = work.tally, work.memo, METHOD == place.RKF45
+    J = work.J0 if rkf else work.C
+    n, mode, t = work.w.shape[0], tally[MODE], memo[TIME]
+    if tally[place.READY] == 0:
+        jet = jet_of(form)
+        jet(mode, 2 if rkf else form.order, t, work.w, work.q, J, work.W)
+        for j in range(form.indicators):
+            work.scale[j] = max(work.scale[j], fabs(J[n + j, 0]))
+        if tally[place.ZERO_ROW] >= 0:
+            J[n + tally[place.ZERO_ROW], 0] = 0.0
+            work.side[tally[place.ZERO_ROW]] = 0
+            tally[place.ZERO_ROW] = -1
+        tally[place.READY] = 1
+    h = planned_length(i, mode, form, J, log_tolerance(form), work)
+    if not (h > 1e-16 * t):
+        return -1.0
+    if form.period[i] < NO_END:
+        h = min(h, form.period[i])
+    elif h >= NO_END and r_max >= NO_END:  # a polynomial solution: any length is right
+        h = max(1.0, memo[WAITED])
+    memo[place.PLANNED] = h
+    if rkf and form.step <= 0.0 and work.dwell[mode] < 2.0 * h:  # a mode that was left soon the last time
+        h = min(h, 1.1 * time_to_transition(mode, work.J0, n, net, h))
+    tally[place.LANDING] = 0
+    if h >= r_max * (1.0 - 1e-13):
+        h = r_max
+        tally[place.LANDING] = 1
+    elif form.step <= 0.0 and h > 0.5 * r_max:
+        h = 0.5 * r_max
+    return h
+
+
+@once
+def runge_kutta(form, work, h, shortest):
+    """A Runge-Kutta step of length h or less, whose error is small enough: (length, error); a length of -1: none."""
+    mode, t, n, error, K = work.tally[MODE], work.memo[TIME], work.w.shape[0], 0.0, work.K
+    field = field_of(form)
+    j = 0
+    while True:
+        K[0][j] = work.J0[j, 1]
+        j += 1
+        if j >= n:
+            break
+    while True:
+        error = stages(field, mode, t, work.w, work.q, h, n, K, form.step <= 0.0, form.absolute, form.rtol)
+        if form.step > 0.0 or error <= 1.0:
+            break
+        h *= max(0.2, 0.9 * error**-0.1) if error < inf else 0.1
+        work.memo[place.PLANNED], work.tally[place.LANDING] = h, 0
+        if not (h > shortest):
+            return -1.0, error
+    jet = jet_of(form)
+    jet(mode, 2, t + h, K[7], work.q, work.J1, work.W)
+    return h, error
+
+
+@inline
+def forget_signs(n, side):
+    """No signs are known. (Written so that the compiler does not prepare the loop for many.)"""
+    j = 0
+    while n > 0:
+        side[j] = 0
+        j += 1
+        if j >= n:
+            break
+
+
+@once
+def make_step(i, form, net, section, wanted, work, r_max):
+    """A step and its first transition, into ``work``; False where there is none (the motion has left every bound)."""
+    tally, memo, rkf = work.tally, work.memo, METHOD == place.RKF45
+    mode, t, n, fixed = tally[MODE], memo[TIME], work.w.shape[0], form.step
+    degree, n_i = 5 if rkf else form.order, form.indicators
+    checked = form.checked == 1 and METHOD == place.TAYLOR and fixed <= 0.0
+    tail = 1.0 if METHOD == place.TAYLOR else 0.0
+    h = length_of_step(i, form, net, work, r_max)
+    pending, hit, x, calm, halvings, error, sure = -1, -1, NONE, False, 0, 0.0, 0.0
+    if h < 0.0:
+        return False
+    while True:
+        if rkf:
+            h, error = runge_kutta(form, work, h, 1e-16 * t)
+            if h < 0.0:
+                return False
+        forget_signs(n_i, work.side_next)
+        slack = form.rtol if rkf and fixed <= 0.0 else 0.0
+        if rkf:
+            calm = form.locate == 0 or quiet(mode, n, h, slack, net, section, work)
+            if calm and not wanted:
+                break
+            hermite(work.J0, work.J1, work.C.shape[0] - form.guards, h, work.C)
+            slack *= sqrt(error)
+        fill_powers(h, degree, work.powers)
+        if calm:
+            break
+        if form.locate == 1:
+            work.found[0] = 0
+            forget_signs(n_i, work.side_next)
+            x, pending, hit = earliest(mode, degree, n, net, tail, slack, work)
+            if work.found[0] == 1 and fixed <= 0.0 and halvings < place.HALVINGS:
+                h *= 0.5  # a graze nearer than the polynomial is sure of
+                tally[place.LANDING] = 0
+                halvings += 1
+                continue
+            if work.found[0] == 1:
+                tally[place.DOUBTFUL] = 1
+        if not checked or h <= sure:
+            break
+        whole = x * h if pending >= 0 else h
+        sure = trusted(form, work, h, whole)
+        if sure >= whole:
+            break
+        h, tally[place.LANDING] = sure, 0
+        if not (h > 1e-16 * t):
+            return False
+    part = h
+    if pending >= 0:
+        part = x * h
+        tally[place.LANDING] = 0
+        if rkf:
+            part = polished(form, work, net.rows[hit, 0], t, h, part)
+    if rkf:
+        growth = min(5.0, 0.9 * float32(error) ** float32(-0.1)) if error > 1e-30 else 5.0
+        work.usual[mode] = growth * h if growth < 1.0 else max(memo[place.PLANNED], growth * h)
+    tally[place.PENDING], tally[place.HIT] = pending, net.rows[hit, 0] if pending >= 0 else -1
+    tally[place.CALM] = 1 if calm else 0
+    memo[place.BASE], memo[place.LENGTH], memo[place.PART], memo[place.CURSOR] = t, h, part, 0.0
+    tally[place.STEPS] += 1
+    return True

@@ -9,9 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
-from nonsmooth import plot
-from nonsmooth.flow.poincare import poincare
-from nonsmooth.flow.simulate import simulate
+from nonsmooth import System, plot, poincare, simulate
 from nonsmooth.results.labels import labels_of
 from nonsmooth.results.provenance import provenance
 from nonsmooth.studies.savi2007.diagrams import shared_legend
@@ -19,7 +17,6 @@ from nonsmooth.studies.savi2007.figure import Figure, sheet
 from nonsmooth.studies.savi2007.flows import ETA, EXACT, SMOOTHED, Settings
 from nonsmooth.studies.savi2007.grazing import grazing_frequencies, steady_state
 from nonsmooth.studies.savi2007.printed import FIGURE_9, FIGURE_11, FIGURE_13
-from nonsmooth.system.system import System
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Canvas

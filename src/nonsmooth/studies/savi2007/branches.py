@@ -12,18 +12,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nonsmooth.continuation.continue_orbit import continue_orbit
-from nonsmooth.continuation.find import find_orbit
-from nonsmooth.continuation.special import special_points
-from nonsmooth.errors import SolveError
-from nonsmooth.flow.poincare import poincare
+from nonsmooth import SolveError, continue_orbit, find_orbit, poincare, special_points
 from nonsmooth.studies.savi2007.flows import EXACT
 from nonsmooth.studies.savi2007.printed import FIGURE_9, FIGURE_10, FIGURE_11, FIGURE_13, FIGURE_17
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from nonsmooth.system.system import System
+    from nonsmooth import System
 
 __all__ = ["BEGINNINGS", "Beginning", "at_ends", "branches", "branches_of", "rows_of"]
 

@@ -12,12 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nonsmooth import plot
-from nonsmooth.continuation.continue_curve import continue_curve
-from nonsmooth.continuation.continue_orbit import continue_orbit
-from nonsmooth.continuation.find import find_orbit
-from nonsmooth.diagrams.chart import chart
-from nonsmooth.errors import SolveError
+from nonsmooth import SolveError, chart, continue_curve, continue_orbit, find_orbit, plot
 from nonsmooth.plot.curve import KINDS
 from nonsmooth.results.statuses import by_code
 from nonsmooth.studies.savi2007.branches import BEGINNINGS, branches, rows_of

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nonsmooth.continuation.special import special_points
+from nonsmooth import special_points
 from nonsmooth.studies.savi2007.grazing import grazing_frequencies
 from nonsmooth.studies.savi2007.measure import Interval, changes, jumps, lowest, range_of
 from nonsmooth.studies.savi2007.printed import FIGURE_9, NATURAL_FREQUENCY, NUMBERS, TABLE_1

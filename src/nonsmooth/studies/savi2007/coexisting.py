@@ -10,9 +10,7 @@ from matplotlib.legend_handler import HandlerTuple
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from nonsmooth import plot
-from nonsmooth.attractors.basins import basins
-from nonsmooth.flow.simulate import simulate
+from nonsmooth import basins, plot, simulate
 from nonsmooth.plot.basins import names_of as kinds_of
 from nonsmooth.plot.basins import section_mark
 from nonsmooth.plot.palette import attractor_color

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth import plot
-from nonsmooth.diagrams.sweep import sweep
+from nonsmooth import plot, sweep
 from nonsmooth.plot.branch import draw_branch
 from nonsmooth.plot.style import even_dots, halo, small
 from nonsmooth.results.provenance import read_provenance

@@ -7,14 +7,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from nonsmooth.results.provenance import ATTRIBUTE, package_version, read_provenance
+from nonsmooth import __version__
+from nonsmooth.results.provenance import ATTRIBUTE, read_provenance
 from nonsmooth.studies.savi2007.measure import with_uncertainty
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from nonsmooth.identification.finding import Estimate, Finding
-    from nonsmooth.identification.parameter_set import ParameterSet
+    from nonsmooth import ParameterSet
+    from nonsmooth.identification import Estimate, Finding
 
 __all__ = ["Found", "Number", "estimates_of", "found_in", "kept", "the_finding"]
 
@@ -71,7 +72,7 @@ def kept(finding: Finding) -> xr.Dataset:
 
     data = xr.Dataset(attrs={"synthetic": "yes"}) if finding.data is None else finding.data.copy()
     record = {
-        "version": package_version(), "verb": "identify", "synthetic": data.attrs.get("synthetic") == "yes",
+        "version": __version__, "verb": "identify", "synthetic": data.attrs.get("synthetic") == "yes",
         "name": finding.name, "number": _plain(finding.estimate), "method": finding.method,
         "others": {name: _plain(other) for name, other in finding.others.items()}, "notes": list(finding.notes),
         "samples": finding.samples_used, "runs": len(finding.runs),
@@ -91,7 +92,7 @@ def found_in(data: xr.Dataset) -> Found:
 
 def estimates_of(dataset: xr.Dataset) -> dict[str, Number]:
     """All parameters of a saved ``ParameterSet``, with their 95 % intervals."""
-    from nonsmooth.identification.parameter_set import ParameterSet
+    from nonsmooth import ParameterSet
 
     found = ParameterSet.from_dataset(dataset)
     rows = {**found.estimates, **found.extra}

@@ -9,7 +9,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
-from nonsmooth.errors import DataFileError
+from nonsmooth import DataFileError
 from nonsmooth.studies.savi2007.flows import Settings
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ Made: TypeAlias = "tuple[dict[str, xr.Dataset], float]"
 
 def finish(name: str, data: Mapping[str, xr.Dataset], seconds: float, settings: Settings) -> None:
     """Write the datasets of a figure, and last the record that it is finished."""
-    from nonsmooth.results.store import save
+    from nonsmooth import save
 
     folder = settings.place
     record = folder / f"{name}.json"
@@ -75,7 +75,7 @@ def just_made(name: str, settings: Settings) -> Made:
 
 
 def _loaded(folder: Path, name: str, keys: Sequence[str], seconds: float) -> Made | None:
-    from nonsmooth.results.store import load
+    from nonsmooth import load
 
     try:
         return {key: load(folder / f"{name}_{key}.nc") for key in keys}, seconds

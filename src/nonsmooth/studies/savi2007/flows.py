@@ -7,9 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from nonsmooth.flow.starts import random_starts
+from nonsmooth import System, random_starts
 from nonsmooth.models import discontinuous_support
-from nonsmooth.system.system import System
 
 if TYPE_CHECKING:
     from nonsmooth.studies.savi2007.laboratory import Laboratory

@@ -7,9 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nonsmooth import plot
-from nonsmooth.diagrams.sweep import sweep
-from nonsmooth.flow.poincare import poincare
+from nonsmooth import plot, poincare, sweep
 from nonsmooth.plot.style import halo, small
 from nonsmooth.studies.savi2007.branches import branches
 from nonsmooth.studies.savi2007.diagrams import ABOUT_BRANCHES, diagrams, draw_diagram, how, mark_grazing, shared_legend

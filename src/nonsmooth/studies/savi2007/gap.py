@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from nonsmooth import plot
-from nonsmooth.flow.poincare import poincare
-from nonsmooth.flow.sections import Stroboscopic
+from nonsmooth import Stroboscopic, plot, poincare
 from nonsmooth.plot.units import prefixed
 from nonsmooth.studies.savi2007.branches import branches
 from nonsmooth.studies.savi2007.diagrams import ABOUT_BRANCHES, diagrams, draw_diagram, how, shared_legend

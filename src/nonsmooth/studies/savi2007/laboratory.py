@@ -14,19 +14,18 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from nonsmooth.experiment.recording import RecordingWarning
+from nonsmooth import __version__
 from nonsmooth.models import discontinuous_support
-from nonsmooth.results.provenance import ATTRIBUTE, package_version
+from nonsmooth.recordings import RecordingWarning
+from nonsmooth.results.provenance import ATTRIBUTE
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from nonsmooth.experiment.recording import Recording
-    from nonsmooth.experiment.rig import VirtualRig
-    from nonsmooth.experiment.session import Session
-    from nonsmooth.identification.compare import GapOffset
-    from nonsmooth.identification.parameter_set import ParameterSet
-    from nonsmooth.system.system import System
+    from nonsmooth import ParameterSet, Recording, System
+    from nonsmooth.recordings import Session
+    from nonsmooth.studies.savi2007.comparison import GapOffset
+    from nonsmooth.studies.savi2007.rig import VirtualRig
 
 __all__ = ["SEED", "TRUTH", "Laboratory", "as_result"]
 
@@ -66,14 +65,14 @@ class Laboratory:
     @cached_property
     def rig(self) -> VirtualRig:
         """The rig of Table 1, with more physics than the model: friction, strings, an uneven motor, sensors."""
-        from nonsmooth.experiment.rig import VirtualRig
+        from nonsmooth.studies.savi2007.rig import VirtualRig
 
         return VirtualRig.published(SEED)
 
     @cached_property
     def identified(self) -> ParameterSet:
         """The parameters, from the folder ``identification`` alone."""
-        from nonsmooth.identification.chain import identify
+        from nonsmooth.studies.savi2007.identification.chain import identify
 
         with self._noted():
             return identify(self._identification)
@@ -81,13 +80,13 @@ class Laboratory:
     @cached_property
     def session(self) -> Session:
         """The session that identification reads."""
-        from nonsmooth.experiment.session import load_session
+        from nonsmooth.recordings import load_session
 
         return load_session(self._identification)
 
     @cached_property
     def _identification(self) -> Path:
-        from nonsmooth.experiment.rig import IDENTIFICATION
+        from nonsmooth.studies.savi2007.rig import IDENTIFICATION
 
         options: dict[str, Any] = _FEWER if self.quick else {}
         wanted = IDENTIFICATION if self.procedures is None else self.procedures
@@ -95,7 +94,7 @@ class Laboratory:
         return self._write("identification", {name: self.rig.record(name, **options.get(name, {})) for name in names})
 
     def _write(self, name: str, made: Mapping[str, Recording]) -> Path:
-        from nonsmooth.experiment.rig.notebook import write_session
+        from nonsmooth.studies.savi2007.rig.notebook import write_session
 
         title = f"virtual rig with the published parameters, {name}"
         return write_session(self.rig, self.folder / name, made, self.folder / TRUTH, title=title)
@@ -105,7 +104,7 @@ class Laboratory:
         import numpy as np
         import xarray as xr
 
-        from nonsmooth.experiment.signals.displacement import found_resolution
+        from nonsmooth.recordings.signals.displacement import found_resolution
 
         with self._noted():
             item = self.session.recordings("springs")[0]
@@ -130,7 +129,7 @@ class Laboratory:
 
     def record(self, name: str, made: Mapping[str, Recording]) -> Session:
         """Write recordings, by procedure, into the session folder ``name`` and read it."""
-        from nonsmooth.experiment.session import load_session
+        from nonsmooth.recordings import load_session
 
         return load_session(self._write(name, made))
 
@@ -143,7 +142,7 @@ class Laboratory:
         self, session: Session, procedure: str, runs: str | Sequence[str] | None = None
     ) -> tuple[xr.Dataset, dict[str, Any]]:
         """Arguments of ``compare``: a measurement, and the settings of the model that belong to it."""
-        from nonsmooth.identification.compare import session_measurement
+        from nonsmooth.studies.savi2007.comparison import session_measurement
 
         offset = self._gap_offset
         with self._noted():
@@ -158,7 +157,7 @@ class Laboratory:
 
     def compare(self, measured: xr.Dataset, settings: Mapping[str, Any], **options: Any) -> xr.Dataset:
         """The measurement over the model with the identified parameters."""
-        from nonsmooth.identification.compare.compare import compare
+        from nonsmooth import compare
 
         return compare(measured, self.model, parameters=self.identified, settings=settings, **{"draws": 0, **options})
 
@@ -170,7 +169,7 @@ class Laboratory:
     @cached_property
     def _gap_offset(self) -> GapOffset:
         """Gap less the screw's reading, from the records with contact, and its uncertainty."""
-        from nonsmooth.identification.compare import gap_offset
+        from nonsmooth.studies.savi2007.comparison import gap_offset
 
         with self._noted():
             return gap_offset(self.identified, self.session)
@@ -191,5 +190,5 @@ class Laboratory:
 
 def as_result(dataset: xr.Dataset, what: str) -> xr.Dataset:
     """A dataset that was put together here, with the record that ``nonsmooth.load`` asks for; synthetic."""
-    record = {"version": package_version(), "verb": "rig", "what": what, "synthetic": True}
+    record = {"version": __version__, "verb": "rig", "what": what, "synthetic": True}
     return dataset.assign_attrs({"synthetic": "yes", ATTRIBUTE: json.dumps(record)})

@@ -7,9 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nonsmooth import plot
-from nonsmooth.diagrams.sweep import sweep
-from nonsmooth.flow.simulate import simulate
+from nonsmooth import plot, simulate, sweep
 from nonsmooth.plot.units import prefixed
 from nonsmooth.studies.savi2007.diagrams import shared_legend
 from nonsmooth.studies.savi2007.figure import only_outer, sheet

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 
-from nonsmooth.results.provenance import package_version
+from nonsmooth import __version__
 from nonsmooth.studies.savi2007.figure import Figure
 from nonsmooth.studies.savi2007.flows import ETA, SMOOTHED, Settings
 from nonsmooth.studies.savi2007.pages import (
@@ -226,7 +226,7 @@ def _about_the_model() -> str:
     return (
         "Every statement is measured on the paper's own model with the parameters of its Table 1: by the exact flow, "
         f"and by the paper's smoothed switch with eta = {ETA:g} m, integrated by Runge-Kutta-Fehlberg at rtol = "
-        f"{SMOOTHED.options['rtol']:g}. Written by nonsmooth {package_version()}; all numbers are read off the "
+        f"{SMOOTHED.options['rtol']:g}. Written by nonsmooth {__version__}; all numbers are read off the "
         "datasets beside this file."
     )
 

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nonsmooth import plot
-from nonsmooth.diagrams.response import frequency_response
+from nonsmooth import frequency_response, plot
 from nonsmooth.plot.style import small
 from nonsmooth.studies.savi2007.branches import branches, branches_of
 from nonsmooth.studies.savi2007.diagrams import mark_grazing, shared_legend

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth import plot
-from nonsmooth.plot.comparison_diagram import comparison_diagram
+from nonsmooth.plot import comparison_diagram
 from nonsmooth.studies.savi2007.amplitude import PRINTED
 from nonsmooth.studies.savi2007.diagrams import mark_values, shared_legend
 from nonsmooth.studies.savi2007.figure import Figure, sheet

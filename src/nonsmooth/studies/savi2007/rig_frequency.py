@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth import plot
-from nonsmooth.plot.comparison_diagram import comparison_diagram
-from nonsmooth.plot.comparison_motion import comparison_phase_portrait
+from nonsmooth.plot import comparison_diagram, comparison_phase_portrait
 from nonsmooth.studies.savi2007.diagrams import mark_values, shared_legend
 from nonsmooth.studies.savi2007.figure import Figure, only_outer, sheet
 from nonsmooth.studies.savi2007.flows import Settings
@@ -37,7 +36,7 @@ _PATIENCE = 4000  # periods: above grazing the model's chaos is a transient, whi
 
 
 def _compute_17(settings: Settings) -> dict[str, xr.Dataset]:
-    from nonsmooth.experiment.rig.figures import SECTIONS
+    from nonsmooth.studies.savi2007.rig.figures import SECTIONS
 
     bench = settings.bench
     steps = [omega for omega, _, _ in SECTIONS[17]]

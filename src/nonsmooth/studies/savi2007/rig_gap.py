@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth import plot
-from nonsmooth.diagrams.sweep import sweep
+from nonsmooth import plot, sweep
+from nonsmooth.plot import comparison_diagram
 from nonsmooth.plot.comparison import MEASURED, THEORY
-from nonsmooth.plot.comparison_diagram import comparison_diagram
 from nonsmooth.plot.labels import name_and_unit, name_axes
 from nonsmooth.studies.savi2007.diagrams import mark_values, shared_legend
 from nonsmooth.studies.savi2007.figure import Figure, only_outer, sheet

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from nonsmooth import plot
+from nonsmooth.identification.compare.series import measured_sections, section_points
 from nonsmooth.plot.comparison import MEASURED, THEORY
 from nonsmooth.plot.labels import name_and_unit, name_axes
 from nonsmooth.plot.phase_portrait import shade_zone
@@ -23,8 +24,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Canvas
 
+    from nonsmooth import System
     from nonsmooth.studies.savi2007.laboratory import Laboratory
-    from nonsmooth.system.system import System
 
 __all__ = [
     "GRID", "SIDES", "Motions", "chosen", "compared", "diagram_of", "draw_pairs", "measured_periods_at", "model_at",
@@ -60,30 +61,12 @@ def compared(bench: Laboratory, found: Motions, **options: Any) -> dict[str, xr.
 
 
 def diagram_of(found: Motions, parameter: str) -> tuple[xr.Dataset, dict[str, Any]]:
-    """The section points of motions at several values of a parameter, as ``compare`` takes a diagram; settings."""
-    import xarray as xr
-
-    from nonsmooth.identification.compare.fold import fold
-
-    points = [fold(motion["phase"].values, motion["u"].values, 8)[:, 0] for motion, _ in found.values()]
-    n = min(len(rows) for rows in points)
-    at = [settings[parameter] for _, settings in found.values()]
-    first, settings = next(iter(found.values()))
-    errors = np.median(np.concatenate([motion["u_error"].values for motion, _ in found.values()]), axis=0)
+    """Section points of motions at several values of a parameter, as ``compare`` takes a diagram; settings."""
+    measured, settings = zip(*found.values(), strict=True)
+    values = [float(np.atleast_1d(one[parameter])[0]) for one in settings]
     unit = {"g": "m", "omega": "rad/s", "rho": "N"}[parameter]
-    measured = xr.Dataset(
-        {
-            "section": ((parameter, "iterate", "state"), np.stack([rows[-n:] for rows in points])),
-            "section_error": ("state", errors),
-        },
-        {
-            parameter: (parameter, [float(np.atleast_1d(value)[0]) for value in at], {"units": unit}),
-            "state": first["state"].values, "state_unit": ("state", first["state_unit"].values),
-        },
-        {key: first.attrs[key] for key in ("synthetic", "file") if key in first.attrs}
-        | {"title": f"{len(found)} steady runs"},
-    )  # fmt: skip
-    return measured, {key: value for key, value in settings.items() if key != parameter}
+    others = {key: value for key, value in settings[0].items() if key != parameter}
+    return measured_sections(measured, parameter, values, unit=unit), others
 
 
 def model_at(bench: Laboratory, settings: Mapping[str, Any]) -> System:
@@ -100,12 +83,11 @@ def runs_of(found: Motions, parameter: str) -> xr.Dataset:
     """Of each motion: the parameter's ``setting`` and measured ``value``, ``period_number``, ``contact`` (0 or 1)."""
     import xarray as xr
 
-    from nonsmooth.identification.compare.fold import fold
     from nonsmooth.identification.compare.periods import measured_period
 
     values, numbers, touches = [], [], []
     for motion, settings in found.values():
-        points = fold(motion["phase"].values, motion["u"].values, 8)[:, 0]
+        points = section_points(motion)
         error = np.median(motion["u_error"].values, axis=0)
         values.append(float(np.atleast_1d(settings[parameter])[0]))
         numbers.append(measured_period(points, error, max_period=16).number)

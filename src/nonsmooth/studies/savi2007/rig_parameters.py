@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth import plot
-from nonsmooth.experiment.rig import IDENTIFICATION
 from nonsmooth.plot import identification as pictures
 from nonsmooth.plot.comparison import ABOVE
 from nonsmooth.studies.savi2007.figure import Figure, sheet
 from nonsmooth.studies.savi2007.findings import Number, estimates_of, found_in, kept, the_finding
 from nonsmooth.studies.savi2007.flows import Settings
 from nonsmooth.studies.savi2007.printed import NUMBERS, TABLE_1
+from nonsmooth.studies.savi2007.rig import IDENTIFICATION
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -120,8 +120,8 @@ def _caption_8(data: Mapping[str, xr.Dataset]) -> str:
 def _compute_table(settings: Settings) -> dict[str, xr.Dataset]:
     import xarray as xr
 
-    from nonsmooth.experiment.rig import UNITS, load_truth
     from nonsmooth.studies.savi2007.laboratory import TRUTH, as_result
+    from nonsmooth.studies.savi2007.rig import UNITS, load_truth
 
     bench = settings.bench
     identified = bench.identified.to_dataset()  # first: it reads the session folder only

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth import plot
-from nonsmooth.plot.comparison_response import comparison_response
+from nonsmooth.plot import comparison_response
 from nonsmooth.studies.savi2007.diagrams import shared_legend
 from nonsmooth.studies.savi2007.figure import Figure, sheet
 from nonsmooth.studies.savi2007.flows import Settings
@@ -36,7 +36,7 @@ def _compute(number: int) -> Callable[[Settings], dict[str, xr.Dataset]]:
 
 def _steps(settings: Settings, number: int) -> dict[str, Any]:
     """Steps of the frequency: the rig's own for Fig. 9; for Fig. 10 finer about its small jump; few for a quick run."""
-    from nonsmooth.experiment.rig.motor import voltage_for
+    from nonsmooth.studies.savi2007.rig.motor import voltage_for
 
     if settings.quick:
         omegas, options = np.arange(2.5, 6.6, 0.25), {"duration": 14.0}

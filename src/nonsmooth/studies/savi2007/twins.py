@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nonsmooth.flow.poincare import poincare
+from nonsmooth import poincare
 from nonsmooth.studies.savi2007.flows import EXACT, Flow
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from nonsmooth.system.system import System
+    from nonsmooth import System
 
 __all__ = ["twins"]
 

@@ -1,0 +1,182 @@
+"""``Orbit``: one periodic orbit with its signature and multipliers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.continuation.problems.multipliers import multipliers_of, stability, stable_by
+from nonsmooth.continuation.signature.signature import Signature
+from nonsmooth.results.representation import cut, html_table
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from nonsmooth.continuation.problems.shooting import Shooting, Solved
+    from nonsmooth.continuation.signature.path import Path
+    from nonsmooth.system.system import System
+
+__all__ = ["Orbit", "orbit_of"]
+
+FloatArray = NDArray[np.float64]
+RTOL = 1e-13  # of the trajectory, where the flow is not exact
+AT_SECTION = 1e-14  # of the period: a transition nearer to the section than rounding tells
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Orbit:
+    """A periodic orbit, found by :func:`nonsmooth.find_orbit`.
+
+    Attributes
+    ----------
+    system : System
+        At the parameters of the orbit.
+    u : array (n,)
+        The state at the section: phase 0 of the forcing; of an autonomous system the middle of the first visit.
+    mode : str
+        The mode there.
+    memory : array (n_memory,)
+    period : float
+    period_number : int
+        Forcing periods once round; 0 where the system is autonomous.
+    signature : Signature
+        Modes visited and transitions taken, in order from the section.
+    crossing_times : array (n_crossings,)
+        Instants of the transitions after the section.
+    crossing_states : array (n_crossings, n + n_memory)
+        States (and memory) just after them.
+    monodromy_matrix : array (n, n)
+        Derivative of the return map, through every transition (with its saltation matrix); rows and columns of the
+        memory follow those of the states. A state or a memory that nothing on the orbit changes counts as a parameter:
+        its row, its column and its multiplier are 0.
+    floquet_multipliers : array (n,), complex
+        Its eigenvalues, largest modulus first; that of an autonomous orbit's own direction, 1, is among them.
+    stable : bool
+        All multipliers (but that one) lie inside the unit circle.
+    maximum, minimum : array (n,)
+        Extremes of the states.
+    clearance : mapping of indicator to float
+        Least distance to a transition that does not happen; NaN where none comes near.
+    virtual : bool
+        Whether the path goes through a boundary it should have obeyed: no orbit of the system then.
+    options : mapping
+        Arguments of :func:`nonsmooth.find_orbit`, as they were given.
+    """
+
+    system: System
+    u: FloatArray
+    mode: str
+    memory: FloatArray
+    period: float
+    period_number: int
+    signature: Signature
+    crossing_times: FloatArray
+    crossing_states: FloatArray
+    monodromy_matrix: FloatArray
+    floquet_multipliers: NDArray[np.complex128]
+    stable: bool
+    maximum: FloatArray
+    minimum: FloatArray
+    clearance: dict[str, float]
+    virtual: bool = False
+    reference: tuple[FloatArray, FloatArray] | None = field(default=None)
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def crossings_per_period(self) -> float:
+        """Transitions per forcing period (autonomous: once round)."""
+        return len(self.signature.crossings) / max(self.period_number, 1)
+
+    @property
+    def contacts_per_period(self) -> float:
+        """Entries into contact per forcing period (autonomous: once round)."""
+        jumps = self.system.transitions
+        return sum(jumps[v.transition].contact for v in self.signature.crossings) / max(self.period_number, 1)
+
+    def trajectory(self, samples: int | None = None) -> xr.Dataset:
+        """The orbit once round, as a result of ``simulate``; begun behind the transitions that lie on the section."""
+        from nonsmooth.flow.simulate import simulate
+
+        u, memory, mode = self.u, self.memory, self.mode
+        n, visits = len(self.u), self.signature.visits
+        for i in np.flatnonzero(self.crossing_times <= AT_SECTION * self.period):  # a start cannot lead into a stop
+            u, memory = np.split(self.crossing_states[i], [n])
+            mode = self.system.modes[visits[i + 1].mode]
+        return simulate(
+            self.system, duration=self.period, start=self._start(u, memory), mode=mode, samples=samples or 1025,
+            rtol=RTOL,
+        )  # fmt: skip
+
+    def _start(self, u: FloatArray, memory: FloatArray) -> Any:
+        """A state as a start; with the memory, where the system has one."""
+        if not len(memory):
+            return u
+        import xarray as xr
+
+        variables: dict[str, Any] = {
+            "u": (("time", "state"), u[None, :]),
+            "mode": ("time", np.zeros(1, dtype=int), {"flag_meanings": "-"}),  # given by name beside it
+        }
+        variables |= {name: ("time", [value]) for name, value in zip(self.system.memory, memory, strict=True)}
+        return xr.Dataset(variables, {"state": list(self.system.states)})
+
+    def __repr__(self) -> str:
+        title, rows = self._shown()
+        return "\n".join([f"<{title}", *(f"  {head}: {text}" for head, text in rows)]) + ">"
+
+    def _repr_html_(self) -> str:
+        return html_table(*self._shown())
+
+    def _shown(self) -> tuple[str, list[tuple[str, str]]]:
+        """Title and rows of the representations."""
+        name = f"period-{self.period_number}" if self.period_number else "autonomous"
+        words = stability(self.floquet_multipliers, self.period_number > 0)
+        if self.virtual:
+            words = "virtual"
+        numbers = ", ".join(f"{mu:.6g}" for mu in self.floquet_multipliers)
+        state = ", ".join(f"{k} = {v:.9g}" for k, v in zip(self.system.states, self.u, strict=True))
+        signature, crossings = self.signature.text(self.system.traced), len(self.signature.crossings)
+        if (short := cut(signature)) != signature:
+            short += f" ({crossings} transitions)"
+        return f"Orbit of {self.system.name!r}: {name}, {words}, period {self.period:.9g}", [
+            ("section", f"{cut(state)} (mode {self.mode!r})"), ("multipliers", cut(numbers)), ("signature", short),
+        ]  # fmt: skip
+
+    def to_dataset(self) -> xr.Dataset:
+        """The orbit as a Dataset that can be saved; ``from_dataset`` reads it back."""
+        from nonsmooth.continuation.branches.files import orbit_dataset
+
+        return orbit_dataset(self)
+
+    @classmethod
+    def from_dataset(cls, dataset: xr.Dataset) -> Orbit:
+        """Read `to_dataset` back, from memory or from a file."""
+        from nonsmooth.continuation.branches.reading import read_orbit
+
+        return read_orbit(dataset)
+
+
+def orbit_of(shooting: Shooting, solved: Solved, path: Path, clearance: FloatArray, virtual: bool) -> Orbit:
+    """The record of a solved orbit."""
+    X = solved.X
+    system = shooting.system.with_parameters(
+        dict(zip(shooting.system.values, map(float, solved.values), strict=True))
+    ) if shooting.n_active else shooting.system  # fmt: skip
+    times, states = shooting.split(X)
+    n_u = len(system.states)
+    M = solved.monodromy
+    multipliers = multipliers_of(M)
+    return Orbit(
+        system=system, u=states[0, :n_u].copy(), mode=system.modes[shooting.at_section],
+        memory=states[0, n_u:].copy(), period=float(solved.times[-1]), period_number=shooting.period_number,
+        signature=shooting.signature, crossing_times=times.copy(), crossing_states=states[1:].copy(),
+        monodromy_matrix=M, floquet_multipliers=multipliers,
+        stable=stable_by(multipliers, shooting.forced),
+        maximum=path.maximum.copy(), minimum=path.minimum.copy(),
+        clearance=dict(zip(system.indicators, map(float, clearance), strict=True)), virtual=virtual,
+        reference=shooting.reference,
+    )  # fmt: skip

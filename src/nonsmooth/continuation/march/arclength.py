@@ -1,0 +1,317 @@
+r"""Curves of solutions in scaled unknowns: predictor, corrector, tangent, and points between two others.
+
+A problem with one more unknown than equations has curves of solutions. Each problem is a subclass that says what its
+equations are and what is known of a solved point; a point at distance ds along the tangent t of the last one solves
+
+.. math:: F(Y) = 0, \qquad t \cdot Y = t \cdot Y_0 + ds .
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.continuation.problems.solve import determinant, solve
+from nonsmooth.errors import SystemDefinitionError
+
+if TYPE_CHECKING:
+    from typing import Self
+
+    from nonsmooth.continuation.march.event import Event, Met, Step
+    from nonsmooth.continuation.march.marches import March
+
+__all__ = ["Curve", "Point", "passes_through"]
+
+FloatArray = NDArray[np.float64]
+DONE = 1e-9  # a step this small is followed by one of its square
+FARTHEST = 2.5  # times the last step: a cubic is not trusted beyond
+CLOSE = 1e-12  # where multipliers are wanted to the last digits
+
+
+@dataclass
+class Point:
+    """A solved point of a curve."""
+
+    Y: FloatArray  # X / scale
+    tangent: FloatArray  # unit length, in scaled unknowns
+    orientation: float  # sign of the bordered determinant
+    iterations: int
+    solved: Any
+
+    @property
+    def X(self) -> FloatArray:
+        """The unknowns, the parameters last."""
+        return np.asarray(self.solved.X)
+
+    @property
+    def value(self) -> float:
+        """The last parameter."""
+        return float(self.X[-1])
+
+    @property
+    def virtual(self) -> bool:
+        """True for a point that belongs to no motion of the system."""
+        return False
+
+    def turned(self) -> Self:
+        """The same point looked at the other way along the branch; the bordered determinant turns with the tangent."""
+        return replace(self, tangent=-self.tangent, orientation=-self.orientation)
+
+    def facing(self, sign: float) -> Self:
+        """The same point with its tangent towards rising (1) or falling (-1) values."""
+        return self if (float(self.tangent[-1]) or 1.0) * sign > 0 else self.turned()
+
+
+P = TypeVar("P", bound=Point)
+
+
+class Curve(ABC, Generic[P]):
+    """Solutions of n - 1 equations for n unknowns, the parameters last.
+
+    Attributes
+    ----------
+    scale : array (n,)
+        Sizes of the unknowns.
+    kinds : sequence of Event
+        Special points that every step is searched for.
+    boundaries : sequence of Event
+        Events at which the equations stop to hold; what explains the others first.
+    endings : mapping
+        The ways in which a branch can end, with the sentence for each.
+    most, longest, grows : int, float, float
+        Newton's method: iterations, the longest step (scaled), the growth of steps that is not let pass.
+    """
+
+    scale: FloatArray
+    kinds: Sequence[Event] = ()
+    boundaries: Sequence[Event] = ()
+    endings: dict[str, str]
+    most = 8
+    longest, grows = 1e3, 2.0
+    tolerance = DONE
+
+    @property
+    def n(self) -> int:
+        """The number of unknowns."""
+        return len(self.scale)
+
+    # --- the problem
+
+    @abstractmethod
+    def evaluate(self, Y: FloatArray) -> Any:
+        """The equations at Y."""
+
+    @abstractmethod
+    def fill(self, solved: Any, matrix: FloatArray) -> None:
+        """Put the scaled Jacobian into ``matrix`` (n - 1, n)."""
+
+    @abstractmethod
+    def residual(self, solved: Any) -> FloatArray:
+        """The scaled residual (n - 1,)."""
+
+    @abstractmethod
+    def moved(self, solved: Any, Y: FloatArray) -> Any:
+        """The equations after a last step so small that their derivatives stay."""
+
+    @abstractmethod
+    def described(
+        self, Y: FloatArray, tangent: FloatArray, orientation: float, iterations: int, solved: Any
+    ) -> P | None:
+        """A solved point with all that is known of it; None where that cannot be computed."""
+
+    @abstractmethod
+    def behind(self, found: March, met: list[Met]) -> tuple[Curve[Any], Any] | None:
+        """Record the boundaries ``met`` at one place; the curve and the point behind, or None."""
+
+    def word(self) -> Any:
+        """Return what tells curves of one branch apart."""
+        return None
+
+    def margins(self, point: P) -> FloatArray:
+        """The numbers that turn negative beyond the boundaries."""
+        return np.empty(0)
+
+    def spread(self, a: P, b: P) -> float:
+        """Difference of what is known of two neighbours, from 0 to 1."""
+        return 0.0
+
+    def unseen(self, step: Step) -> Met | None:
+        """The first place on a step that margins do not tell lies beyond a boundary."""
+        return None
+
+    def passed_by(self, step: Step) -> list[Met]:
+        """Boundaries that a branch passes on a step with the equations that it has."""
+        return []
+
+    def passed(self, point: P) -> P | None:
+        """The last point where a phase condition was put through it; None where there is none to move."""
+        return None
+
+    def over(self, point: P) -> str | None:
+        """The ending (a key of ``endings``) of a branch whose last point this is; None where it goes on."""
+        return None
+
+    def why(self, point: P) -> str:
+        """The ending of a branch on which no point follows this one."""
+        return "no_convergence"
+
+    # --- the march along it
+
+    def bordered(self, solved: Any, border: FloatArray) -> FloatArray:
+        """The scaled Jacobian with a last row."""
+        matrix = np.empty((self.n, self.n))
+        self.fill(solved, matrix[:-1])
+        matrix[-1] = border
+        return matrix
+
+    def correct(
+        self, Y: FloatArray, border: FloatArray, level: float, *, tolerance: float | None = None,
+        most: int | None = None, singular: bool = False,
+    ) -> tuple[Any, FloatArray, int] | None:  # fmt: skip
+        """Newton for F = 0 and border . Y = level, from Y; None where it does not converge.
+
+        ``singular`` takes the shortest step where the matrix has no inverse: at a crossing of branches.
+        """
+        tolerance = self.tolerance if tolerance is None else tolerance
+        right = np.empty(self.n)
+        last = np.inf
+        for i in range(most or self.most):
+            solved = self.evaluate(Y)
+            right[:-1] = self.residual(solved)
+            right[-1] = border @ Y - level
+            try:
+                if singular:
+                    step = np.linalg.lstsq(self.bordered(solved, border), right, rcond=1e-7)[0]
+                else:
+                    step = solve(self.bordered(solved, border), right)
+            except np.linalg.LinAlgError:
+                return None
+            length = float(np.abs(step).max())
+            if not length < self.longest or (i > 1 and length > self.grows * last and length > 1e-10):
+                return None
+            if length < tolerance or (i > 3 and length < 1e-10):
+                if length > 1e-14:  # the last evaluation serves; its error is the square of this step
+                    Y = Y - step
+                    solved = self.moved(solved, Y)
+                return solved, Y, i
+            Y = Y - step
+            last = length
+        return None
+
+    def tangent(self, solved: Any, border: FloatArray) -> tuple[FloatArray, float] | None:
+        """Unit tangent with a positive component along ``border``, and the sign of the bordered determinant."""
+        matrix = self.bordered(solved, border)
+        right = np.zeros(self.n)
+        right[-1] = 1.0
+        try:
+            t = solve(matrix, right)
+        except np.linalg.LinAlgError:
+            return None
+        length = np.sqrt(t @ t)
+        if not np.isfinite(length):
+            return None
+        t /= length
+        matrix[-1] = t
+        return t, determinant(matrix)[0]
+
+    def null_vectors(self, solved: Any, tolerance: float = 1e-7) -> FloatArray:
+        """Orthonormal vectors (k, n) that the scaled Jacobian takes to zero."""
+        matrix = np.empty((self.n - 1, self.n))
+        self.fill(solved, matrix)
+        _, values, right = np.linalg.svd(matrix)
+        rank = int((values > tolerance * values[0]).sum())
+        return np.asarray(right[rank:])
+
+    def point(self, solved: Any, Y: FloatArray, border: FloatArray, iterations: int = 0) -> P | None:
+        """A solved point with its tangent along ``border``."""
+        found = self.tangent(solved, border)
+        return None if found is None else self.described(Y, *found, iterations, solved)
+
+    def near(self, Y: FloatArray, border: FloatArray, *, most: int | None = None) -> P | None:
+        """The point across ``border`` through Y, with its tangent along it."""
+        found = self.correct(Y, border, float(border @ Y), most=most)
+        return None if found is None else self.point(found[0], found[1], border)
+
+    def predicted(self, point: P, ds: float, before: P | None) -> FloatArray:
+        """A guess at distance ds along the tangent: straight, or on the cubic through both last points and tangents."""
+        Y = point.Y + ds * point.tangent
+        if before is None:
+            return Y
+        back = point.Y - before.Y
+        h = float(before.tangent @ back)
+        if not (h > 0.0 and ds < FARTHEST * h):
+            return Y
+        second = (2 * before.tangent + 4 * point.tangent - 6 / h * back) / h
+        third = (6 * (before.tangent + point.tangent) - 12 / h * back) / (h * h)
+        return Y + ds * ds * (0.5 * second + ds / 6 * third)
+
+    def step(self, point: P, ds: float, before: P | None = None) -> P | None:
+        """The point at distance ds along the tangent; with the point ``before`` from a better guess."""
+        level = float(point.tangent @ point.Y) + ds
+        try:
+            found = self.correct(self.predicted(point, ds, before), point.tangent, level)
+        except SystemDefinitionError:
+            return None
+        # Newton may have gone to another branch: then the point lies far from the predictor.
+        if found is None or np.abs(found[1] - point.Y - ds * point.tangent).max() > 0.5 * ds + 1e-12:
+            return None
+        return self.point(found[0], found[1], point.tangent, found[2])
+
+    def between(self, a: P, b: P, s: float) -> P | None:
+        """The point at distance s from ``a`` towards ``b``, to the last digits."""
+        end = float(a.tangent @ (b.Y - a.Y))
+        x = s / end
+        # Hermite's cubic through both points and tangents.
+        slope = end / max(float(a.tangent @ b.tangent), 1e-3)
+        Y = (
+            a.Y * (1 + 2 * x) * (1 - x) ** 2 + a.tangent * (end * x * (1 - x) ** 2)
+            + b.Y * x * x * (3 - 2 * x) - b.tangent * (slope * x * x * (1 - x))
+        )  # fmt: skip
+        level = float(a.tangent @ a.Y) + s
+        found = self.correct(Y, a.tangent, level, tolerance=CLOSE, most=2 * self.most)
+        if found is None or np.abs(found[1] - Y).max() > 0.1 * abs(end):
+            found = self.correct(Y, a.tangent, level, tolerance=1e-10, most=2 * self.most, singular=True)
+        if found is None:
+            return None
+        point = self.point(found[0], found[1], a.tangent, found[2])
+        if point is not None and float(point.tangent @ a.tangent) < 0.5:
+            # At a crossing of branches any direction in their plane is null: keep that of the branch.
+            towards = (1 - x) * a.tangent + x * b.tangent
+            point.tangent = towards / np.linalg.norm(towards)
+        return point
+
+    def at_parameter(self, Y: FloatArray, value: float, which: int = -1) -> P | None:
+        """The point at a value of a parameter, by Newton from Y."""
+        border = np.zeros(self.n)
+        border[which] = 1.0
+        Y = Y.copy()
+        Y[which] = value / self.scale[which]
+        found = self.correct(Y, border, float(Y[which]), tolerance=CLOSE, most=2 * self.most)
+        if found is None:
+            return None
+        solved, Y, iterations = found
+        null = self.null_vectors(solved)
+        return self.point(solved, Y, null[-1], iterations) if len(null) else None
+
+    def at_edge(self, a: P, b: P, edge: float, which: int) -> P | None:
+        """The point at the edge of a parameter's range, between two points."""
+        edge_there = edge / self.scale[which]
+        x = (edge_there - a.Y[which]) / (b.Y[which] - a.Y[which])
+        point = self.at_parameter(a.Y + x * (b.Y - a.Y), edge, which)
+        if point is None or np.abs(point.Y - a.Y).max() > 4 * np.abs(b.Y - a.Y).max():
+            return None
+        if float(point.tangent @ a.tangent) < 0:
+            point.tangent = -point.tangent
+        return point
+
+
+def passes_through(Y: FloatArray, a: FloatArray, b: FloatArray) -> bool:
+    """Return whether the step from a to b goes through Y, as nearly as a chord follows a curve."""
+    step = b - a
+    x = float(step @ (Y - a)) / float(step @ step)
+    return 1e-9 < x <= 1.0 and float(np.abs(Y - a - x * step).max()) < 0.3 * float(np.abs(step).max())

@@ -1,0 +1,73 @@
+"""Crossings of branches: the exact place, and the direction of the other branch."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from nonsmooth.continuation.march.arclength import Curve
+
+__all__ = ["branch_point", "other_direction"]
+
+FloatArray = NDArray[np.float64]
+
+
+def other_direction(curve: Curve[Any], Y: FloatArray, along: FloatArray | None) -> FloatArray | None:
+    """A unit vector that the Jacobian at a crossing takes to zero, across the direction ``along`` already known.
+
+    ``along`` is None where only the null vectors are known: then the one with no component in the parameter.
+    """
+    matrix = curve.bordered(curve.evaluate(Y), np.zeros(curve.n))[:-1]
+    plane = np.linalg.svd(matrix)[2][-2:]
+    if along is None:
+        a, b = plane
+        vector = a * b[-1] - b * a[-1]
+    else:
+        inside = plane @ along
+        vector = np.array([-inside[1], inside[0]]) @ plane
+    length = float(np.linalg.norm(vector))
+    return None if length < 1e-12 else vector / length
+
+
+def branch_point(curve: Curve[Any], Y: FloatArray, *, tolerance: float = 1e-11, most: int = 12) -> FloatArray | None:
+    r"""The crossing of branches near Y, to the last digits (Moore's system, which is regular there).
+
+    .. math:: F(Y) + \beta \psi_0 = 0, \quad F_Y^T \psi = 0, \quad \psi_0 \cdot \psi = 1
+
+    in Y, psi and beta, with :math:`\beta = 0` at the solution; second derivatives by central differences.
+    """
+    n = len(Y) - 1
+
+    def scaled(Z: FloatArray) -> tuple[FloatArray, FloatArray]:
+        solved = curve.evaluate(Z)
+        return curve.residual(solved), curve.bordered(solved, np.zeros(n + 1))[:-1]
+
+    _, J = scaled(Y)
+    psi = np.linalg.svd(J)[0][:, -1]
+    first, beta, step = psi.copy(), 0.0, 1e-5
+    for _ in range(most):
+        F, J = scaled(Y)
+        second = np.empty((n + 1, n + 1))
+        for j in range(n + 1):
+            moved = np.zeros(n + 1)
+            moved[j] = step
+            second[:, j] = (scaled(Y + moved)[1] - scaled(Y - moved)[1]).T @ psi / (2 * step)
+        matrix = np.zeros((2 * n + 2, 2 * n + 2))
+        matrix[:n, : n + 1], matrix[:n, -1] = J, first
+        matrix[n : 2 * n + 1, : n + 1], matrix[n : 2 * n + 1, n + 1 : 2 * n + 1] = second, J.T
+        matrix[-1, n + 1 : 2 * n + 1] = first
+        right = np.concatenate([F + beta * first, J.T @ psi, [first @ psi - 1.0]])
+        try:
+            change = np.linalg.solve(matrix, right)
+        except np.linalg.LinAlgError:
+            return None
+        Y, psi, beta = Y - change[: n + 1], psi - change[n + 1 : 2 * n + 1], beta - change[-1]
+        size = float(np.abs(change[: n + 1]).max())
+        if not size < 0.1:
+            return None
+        if size < tolerance:
+            return Y if abs(beta) < 1e-8 else None
+    return None

@@ -1,0 +1,238 @@
+r"""Events on one step of a branch: the number that vanishes there, its exact place, and the name it is listed by.
+
+A kind of event is an object of a class below or of one that a problem adds. It watches a number along the branch; the
+zero is bracketed by the ends of a step and found by Brent's method, every trial being a solved point.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.continuation.march.crossing import branch_point
+from nonsmooth.continuation.problems.solve import determinant
+
+if TYPE_CHECKING:
+    from nonsmooth.continuation.march.arclength import Point
+    from nonsmooth.continuation.march.marches import March
+
+__all__ = ["BESIDE", "Crossing", "Event", "Fold", "Met", "Step", "first_met", "locate", "special_on"]
+
+BEGUN = 1e-6
+ROUNDING = 1e-13  # of the numbers at both ends: smaller than this is zero, however short the step
+LARGEST = 1e3  # of a number, for Brent's method: margins may be infinite
+BESIDE = 1e-6  # along the branch: nearer to a boundary than this is the boundary itself
+CLOSING = 1e-4  # along the branch: nearer to its first point than this is that point, a crossing of branches maybe
+TURN = 1e-5  # along the branch: a fold nearer to a crossing of branches than this is that crossing
+ABOUT = 1e-2  # along the branch: steps are short beside a crossing of branches, and its first place is rough
+SAME = 1e-9  # of the numbers at both ends: smaller than this at the place of another event is the same event
+
+
+@dataclass
+class Met:
+    """An event that was located: its kind, its distance from the last point, the point there, and its name.
+
+    ``ending`` is a key of the curve's ``endings`` where the branch ends with it."""
+
+    kind: Any  # an Event
+    s: float
+    point: Any
+    name: str
+    ending: str | None = None
+
+
+@dataclass
+class Step:
+    """A step along a curve, from a to b; ``numbers`` of its kinds, ``margins`` of its boundaries, each at both ends."""
+
+    curve: Any
+    a: Any
+    b: Any
+    numbers: tuple[list[float], list[float]]
+    margins: tuple[Any, Any]
+    first: bool = False  # of the march
+    virtual: bool = False  # beyond a boundary the branch goes straight on
+    cause: str = ""  # why the branch stops on this step: "range", "change" or "closed"
+    stop: float = field(init=False)  # at this distance from a
+    last: Any = field(init=False)  # at this point
+
+    def __post_init__(self) -> None:
+        self.end = float(self.a.tangent @ (self.b.Y - self.a.Y))
+        self.stop, self.last = self.end, self.b
+
+    def ends(self, cause: str, s: float, point: Any) -> None:
+        """The branch stops at a point at distance s."""
+        self.cause, self.stop, self.last = cause, s, point
+
+
+class Event:
+    """A kind of event.
+
+    Attributes
+    ----------
+    name : str
+        As it is listed.
+    certain : bool
+        Where its number changes the sign it did happen: that it cannot be located is told.
+    """
+
+    name = ""
+    certain = True
+
+    def number(self, curve: Any, point: Any) -> float:
+        """The number that vanishes at the event."""
+        raise NotImplementedError
+
+    def happened(self, step: Step, was: float, now: float) -> bool:
+        """Return whether the event lies on the step."""
+        return was * now < 0.0
+
+    def located(self, step: Step) -> tuple[float, Any] | None:
+        """Distance from the beginning of the step, and the point there; None where it is not found."""
+        return locate(step, partial(self.number, step.curve))
+
+    def met(self, step: Step) -> Met | None:
+        """The event on a step, by its own name."""
+        there = self.located(step)
+        return None if there is None else Met(self, *there, self.name)
+
+    def named(self, step: Step, point: Any) -> tuple[str, str | None] | None:
+        """Its name, and the ending where the branch ends there; None where the number vanished for another reason."""
+        return self.name, None
+
+    def record(self, found: March, step: Step, met: Met) -> None:
+        """List the event."""
+        found.mark(met.name, step.curve, met.point, virtual=step.virtual and met.point.virtual)
+
+
+class Fold(Event):
+    """The parameter turns: the last component of the tangent vanishes."""
+
+    name = "fold"
+
+    def number(self, curve: Any, point: Any) -> float:
+        """The last component of the tangent."""
+        return float(point.tangent[-1])
+
+
+class Crossing(Event):
+    """Another branch crosses: the bordered determinant changes its sign."""
+
+    name = "branch_point"
+    certain = False
+
+    def number(self, curve: Any, point: Any) -> float:
+        """The sign of the bordered determinant."""
+        return float(point.orientation)
+
+    def located(self, step: Step) -> tuple[float, Any] | None:
+        """The zero of the determinant itself, made exact by a system that is regular there."""
+        curve, a, b = step.curve, step.a, step.b
+        reference = determinant(curve.bordered(a.solved, a.tangent))[1]
+
+        def number(point: Any) -> float:
+            sign, size = determinant(curve.bordered(point.solved, point.tangent))
+            return float(sign * np.exp(size - reference))
+
+        there = locate(step, number)
+        if there is None:
+            return None
+        point = there[1]
+        Y = branch_point(curve, point.Y)
+        if Y is None or np.abs(Y - point.Y).max() > max(float(np.abs(b.Y - a.Y).max()), ABOUT):
+            return there
+        # Any direction in the plane of both branches is null here, and the border is singular: keep that of the branch.
+        exact = curve.described(Y, point.tangent, point.orientation, point.iterations, curve.evaluate(Y))
+        return there if exact is None else (float(a.tangent @ (Y - a.Y)), exact)
+
+
+def locate(step: Step, number: Callable[[Any], float]) -> tuple[float, Any] | None:
+    """The zero of ``number`` on a step: its distance from the beginning, and the point there.
+
+    None where there is no change of sign, or where a trial has no point or no number (NaN)."""
+    from scipy.optimize import brentq
+
+    at_ends = number(step.a), number(step.b)
+    if at_ends[0] * at_ends[1] > 0.0 and abs(at_ends[0]) < BEGUN * abs(at_ends[1]):
+        return 0.0, step.a  # the branch begins at the event itself
+    known: dict[float, Point] = {0.0: step.a, step.end: step.b}
+    nothing = ROUNDING * max((abs(x) for x in at_ends if np.isfinite(x)), default=1.0)
+
+    def value(s: float) -> float:
+        if s not in known:
+            point = step.curve.between(step.a, step.b, s)
+            if point is None:
+                raise ArithmeticError
+            known[s] = point
+        x = number(known[s])
+        if x != x:
+            raise ArithmeticError
+        return 0.0 if abs(x) < nothing and 0.0 < s < step.end else min(max(x, -LARGEST), LARGEST)
+
+    try:
+        s = float(brentq(value, 0.0, step.end, xtol=1e-16, rtol=1e-15, maxiter=200))
+        value(s)
+    except (ArithmeticError, ValueError, RuntimeError):
+        return None
+    return s, known[s]
+
+
+def first_met(step: Step) -> list[Met] | None:
+    """The first boundary on a step: all that is met there, what explains it best first.
+
+    Beyond the place where an impact or a short visit ends the path also goes through the boundary, and the other way
+    round: what vanishes explains what is touched. None where a boundary was passed but not located.
+    """
+    located: list[Met] = []
+    passed = False
+    for kind, was, now in zip(step.curve.boundaries, *step.margins, strict=True):
+        if not kind.happened(step, was, now):
+            continue
+        passed = True
+        known = [(kind.number(step.curve, met.point), met) for met in located]
+        # Both are infinite where a visit has turned negative: it is not followed.
+        largest = max((abs(x) for x in (was, now) if np.isfinite(x)), default=0.0)
+        same = [Met(kind, met.s, met.point, kind.name) for value, met in known
+                if abs(value) < max(SAME * largest, ROUNDING)]  # fmt: skip
+        if same or any(value > 0.0 for value, _ in known):  # met at the same place, or farther on
+            located += same[:1]
+            continue
+        there: tuple[float, Any] | None = kind.located(step)
+        if there is not None and there[0] <= step.stop * (1 + 1e-12):
+            located.append(Met(kind, *there, kind.name))
+    if not located:
+        return None if passed and not step.cause else []
+    first = min(met.s for met in located)
+    return [met for met in located if met.s <= first + BESIDE]
+
+
+def special_on(step: Step) -> list[Met]:
+    """The special points before the stop of a step, in their order."""
+    found: list[Met] = []
+    curve, a, b = step.curve, step.a, step.b
+    # At a change of equations the parameter may turn too: that belongs to the change. Where a branch closes its first
+    # point has been looked at.
+    stop = step.stop - {"change": BESIDE, "closed": CLOSING}.get(step.cause, 0.0)
+    for kind, was, now in zip(curve.kinds, *step.numbers, strict=True):
+        if not kind.happened(step, was, now):
+            continue
+        there: tuple[float, Any] | None = kind.located(step)
+        if there is None:
+            # Beyond a change of equations nothing is missed.
+            if kind.certain and (step.cause != "change" or kind.happened(step, was, kind.number(curve, step.last))):
+                warnings.warn(
+                    f"a {kind.name.replace('_', '-')} between the parameter's values {a.value!r} and {b.value!r} was "
+                    "met but not located, and is not listed",
+                    RuntimeWarning, stacklevel=2,
+                )  # fmt: skip
+        elif there[0] <= stop and (named := kind.named(step, there[1])) is not None:
+            found.append(Met(kind, *there, *named))
+    # A branch that crosses another one where the parameter turns is one event, not two.
+    crossings = [met.s for met in found if isinstance(met.kind, Crossing)]
+    found = [met for met in found if not isinstance(met.kind, Fold) or all(abs(met.s - s) > TURN for s in crossings)]
+    return sorted(found, key=lambda met: met.s)

@@ -1,0 +1,192 @@
+"""The march along a branch: step size, range, budget, events in their order, and the end."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from nonsmooth.continuation.march.arclength import Curve, passes_through
+from nonsmooth.continuation.march.event import Step, first_met, special_on
+from nonsmooth.continuation.march.marches import Limits, March, Place
+
+__all__ = ["march"]
+
+FIRST = 1e-3  # step
+LEAST_STEP = 1e-9
+COSINE = 0.98  # of the angle between the tangents of neighbours
+SPREAD = 0.15  # change of what is known of neighbours (of orbits: chordal, of the multipliers)
+
+
+def march(curve: Curve[Any], point: Any, limits: Limits) -> March:
+    """Follow a branch from a point along its tangent until it ends; the first row is the point after it."""
+    found = March()
+    try:
+        _Marching(found, limits).follow(curve, point)
+    except KeyboardInterrupt:  # unless_interrupted raises it again, with what was found
+        found.ending = "interrupted"
+    return found
+
+
+class _Marching:
+    """A march under way: the curve and its last points, the step size, and the numbers that are watched."""
+
+    def __init__(self, found: March, limits: Limits) -> None:
+        self.found, self.limits = found, limits
+        self.ds, self.easy = min(FIRST, limits.largest), 1.0
+        self.circle: Place | None = None  # a point that is met again if the branch goes round (Brent's method)
+        self.again = 8
+
+    def follow(self, curve: Curve[Any], point: Any) -> None:
+        """March on, point by point."""
+        found = self.found
+        self._begin(curve, point)
+        while len(found.rows) < self.limits.points:
+            new = self._next()
+            if new is None:
+                found.ending = self.curve.why(self.point)
+                return
+            step = self._within(new)
+            met = None if step is None else first_met(step)
+            if step is None or met is None:  # an event that is not located: nearer
+                self.ds *= 0.25
+                if self.ds < LEAST_STEP:
+                    found.ending = "no_convergence"
+                    return
+                continue
+            if not met and not step.cause and (unseen := self.curve.unseen(step)):
+                met = [unseen]
+            if met:
+                step.ends("change", met[0].s, met[0].point)
+            self._close(step)
+            if self._special(step):
+                return
+            if step.cause in ("range", "closed"):
+                found.add(self.curve, step.last)
+                found.ending = step.cause
+                return
+            if step.cause == "change":
+                after = self.curve.behind(found, met)
+                if after is None:
+                    return
+                self._begin(*after)
+                self.ds = 0.1 * self.limits.largest
+                found.add(*after)
+                continue
+            if self._ended(step):
+                return
+
+    def _begin(self, curve: Curve[Any], point: Any) -> None:
+        """Go on from a point of a curve."""
+        self.curve, self.before, self.point = curve, None, curve.passed(point) or point
+        self.numbers, self.margins = self._watched(self.point)
+
+    def _watched(self, point: Any) -> tuple[list[float], Any]:
+        """The numbers of all kinds of events at a point, and its margins to the boundaries."""
+        return [kind.number(self.curve, point) for kind in self.curve.kinds], self.curve.margins(point)
+
+    def _next(self) -> Any:
+        """The next point, at a distance at which it is like the last one; None where there is none."""
+        curve, point = self.curve, self.point
+        while True:
+            new = curve.step(point, self.ds, self.before)
+            if new is None:
+                self.ds *= 0.5
+                if self.ds < LEAST_STEP:
+                    return None
+                continue
+            cosine, spread = float(new.tangent @ point.tangent), curve.spread(new, point)
+            if self.ds > 1e-6 and (cosine < COSINE or spread > SPREAD):
+                self.ds *= max(0.2, min(0.7, 0.7 * SPREAD / max(spread, 1e-12)))
+                continue
+            self.easy = _easy(new.iterations, 1.0 - cosine, spread)
+            return new
+
+    def _within(self, new: Any) -> Step | None:
+        """The step to the new point, or to the edge of the range before it; None where that is not found."""
+        reached, s = new, np.inf
+        for which, low, high in self.limits.box:
+            value = float(new.X[which])
+            if low <= value <= high:
+                continue
+            last = self.curve.at_edge(self.point, new, low if value < low else high, which)
+            if last is None:
+                return None
+            there = float(self.point.tangent @ (last.Y - self.point.Y))
+            if there < s:
+                reached, s = last, there
+        numbers, margins = self._watched(reached)
+        return Step(
+            self.curve, self.point, reached, (self.numbers, numbers), (self.margins, margins), not self.found.rows,
+            self.limits.virtual, "" if reached is new else "range",
+        )  # fmt: skip
+
+    def _close(self, step: Step) -> None:
+        """End a step where the branch comes back to its beginning."""
+        if len(self.found.rows) < 3:
+            return
+        back = came_back(self.limits.closed, step)
+        if back is not None and back <= step.stop:
+            step.ends("closed", back, self.curve.between(step.a, step.b, back) or step.b)
+
+    def _special(self, step: Step) -> bool:
+        """List the special points of a step; True where the branch ends at one."""
+        met = special_on(step)
+        if step.virtual:
+            met = sorted([*met, *self.curve.passed_by(step)], key=lambda one: one.s)
+        for one in met:
+            edge = self._beyond(one.point)
+            if edge is not None:  # a fold just beyond the edge of the range
+                which, end = edge
+                step.ends("range", one.s, self.curve.at_edge(step.a, one.point, end, which) or one.point)
+                return False
+            one.kind.record(self.found, step, one)
+            if one.ending is not None:
+                self.found.ending = one.ending
+                return True
+        return False
+
+    def _beyond(self, point: Any) -> tuple[int, float] | None:
+        """The edge of the range that a point lies beyond: the place of the parameter, and the edge."""
+        for which, low, high in self.limits.box:
+            value = float(point.X[which])
+            if not low <= value <= high:
+                return which, low if value < low else high
+        return None
+
+    def _ended(self, step: Step) -> bool:
+        """Take the step; True where the branch ends with it."""
+        found, curve, new = self.found, self.curve, step.b
+        found.add(curve, new)
+        ending = curve.over(new)
+        if ending is None and new.virtual and came_back(self.circle, step) is not None:
+            ending = "circle"
+        if ending is not None:
+            found.ending = ending
+            return True
+        if len(found.rows) >= 2 * self.again:
+            self.circle, self.again = (curve.word(), new.X), len(found.rows)
+        self.ds = min(self.ds * self.easy, self.limits.largest)
+        anchored = curve.passed(new)
+        self.before, self.point = (self.point, new) if anchored is None else (None, anchored)
+        self.numbers, self.margins = step.numbers[1], step.margins[1]
+        return False
+
+
+def _easy(iterations: int, bend: float, spread: float) -> float:
+    """The factor of the next step, from Newton's iterations and how much neighbours differ."""
+    easy = 2.0 if iterations <= 3 else 1.3
+    if bend > 0.3 * (1.0 - COSINE):
+        easy = min(easy, float(np.sqrt(0.5 * (1.0 - COSINE) / bend)))
+    if spread > 0.3 * SPREAD:
+        easy = min(easy, SPREAD / max(spread, 1e-12) * 0.6)
+    return min(easy, 0.7) if iterations >= 6 else easy
+
+
+def came_back(place: Place | None, step: Step) -> float | None:
+    """Distance along the step at which the branch comes back to a place; None where it does not."""
+    a, b = step.a, step.b
+    if place is None or place[0] != step.curve.word() or float(np.abs(b.Y - a.Y).max()) >= 0.2:
+        return None
+    Y = place[1] / step.curve.scale
+    return float(a.tangent @ (Y - a.Y)) if passes_through(Y, a.Y, b.Y) else None

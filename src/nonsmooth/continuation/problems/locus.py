@@ -1,0 +1,180 @@
+r"""Curves of special points in two parameters.
+
+The equations of the orbit, F(X, p_1, p_2) = 0, and one more, psi = 0:
+
+========================  ====================================================
+fold                      det F_X (scaled)
+flip                      det(M + I)
+neimark_sacker            :math:`\prod_{i<j} (\mu_i \mu_j - 1)`
+grazing                   largest local maximum of the margin that is touched
+========================  ====================================================
+
+psi is differentiated by central differences, in the unknowns and in both parameters.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.continuation.march.marches import INTERRUPTED
+from nonsmooth.continuation.problems.codimension_two import kinds_on
+from nonsmooth.continuation.problems.multipliers import multipliers_of, product_of_pairs, without_own
+from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
+from nonsmooth.continuation.problems.solve import determinant
+
+if TYPE_CHECKING:
+    from nonsmooth.continuation.march.event import Met, Step
+    from nonsmooth.continuation.march.marches import March
+    from nonsmooth.continuation.problems.shooting import Shooting, Solved
+
+__all__ = ["KINDS", "Locus"]
+
+FloatArray = NDArray[np.float64]
+#: The kinds that have curves, each with the point of codimension two at which its curve meets a graze.
+KINDS = {
+    "fold": "grazing_fold", "flip": "grazing_flip", "neimark_sacker": "grazing_neimark_sacker",
+    "grazing": "double_grazing",
+}  # fmt: skip
+ENDS = {
+    "range": "The curve reached the edge of the box.",
+    "closed": "The curve came back to where it began.",
+    "points": "The largest number of points was reached.",
+    "no_convergence": "Newton's method did not converge, however small the step.",
+    "grazing": "A contact begins or ends here: beyond this point the orbit has another signature.",
+    "corner": "The orbit meets the corner of two boundaries: beyond this point it has another signature.",
+    "resonance": "Both multipliers meet on the real axis: beyond this point they are real, and there is no torus.",
+    "interrupted": f"{INTERRUPTED}.",
+}
+STEP = 1e-6  # of central differences, in scaled unknowns
+KEPT = 1e-3  # in scaled unknowns: so far the gradient of psi serves Newton's method
+CLOSE = 2e-12
+
+
+class Locus(Orbits):
+    """A curve of special points of one kind, of orbits with one signature.
+
+    Parameters
+    ----------
+    shooting : Shooting
+        With two active parameters.
+    kind : str
+        One of ``KINDS``.
+    size, period, widths
+        Sizes of the states, the times and the two parameters.
+    """
+
+    endings = ENDS
+    tolerance = 1e-11  # the gradient of psi is not exact: no step is followed by one of its square
+
+    def __init__(
+        self, shooting: Shooting, kind: str, size: FloatArray, period: float, widths: tuple[float, float]
+    ) -> None:
+        super().__init__(shooting, size, period, widths)
+        self.kind, self.kinds = kind, kinds_on(kind, shooting.forced)
+        self._eye = np.eye(shooting.n)
+        self._unit = 1.0  # of psi
+        self._gradient: tuple[FloatArray, FloatArray] | None = None  # the last one, and its place
+        self.touched: tuple[int, int] | None = None  # (visit, transition) of a grazing curve
+
+    def psi(self, solved: Solved) -> float:
+        """The number that vanishes on the locus."""
+        if self.kind == "fold":
+            n = self.shooting.size
+            sign, size = determinant(solved.jacobian[:, :n] * self.rows[:, None] * self.scale[:n])
+            return sign * float(np.exp(size)) / self._unit
+        if self.kind == "grazing":
+            path = self.walk.along(solved, self.shooting.split(solved.X)[1])
+            if path is None:
+                return np.nan
+            if self.touched is None:
+                self.touched = path.touched
+            return float(path.inner[self.touched]) / self._unit
+        M = solved.monodromy
+        if self.kind == "flip":
+            return float(np.linalg.det(M + self._eye))
+        return product_of_pairs(without_own(multipliers_of(M), self.shooting.forced))
+
+    def calibrate(self, Y: FloatArray) -> None:
+        """Choose the unit of psi so that its gradient is of order one."""
+        self._unit = 1.0
+        size = float(np.abs(self.gradient(Y)).max())
+        self._unit = size if np.isfinite(size) and size > 0 else 1.0
+
+    def gradient(self, Y: FloatArray) -> FloatArray:
+        """d psi / dY by central differences."""
+        g = np.empty(self.n)
+        for j in range(self.n):
+            ahead, behind = Y.copy(), Y.copy()
+            ahead[j] += STEP
+            behind[j] -= STEP
+            g[j] = (self.psi(self.evaluate(ahead)) - self.psi(self.evaluate(behind))) / (2 * STEP)
+        return g
+
+    def fill(self, solved: Solved, matrix: FloatArray) -> None:
+        """Put the Jacobian and the gradient of psi into ``matrix``; one that was taken near by serves."""
+        super().fill(solved, matrix)
+        Y = solved.X / self.scale
+        if self._gradient is None or not np.abs(Y - self._gradient[1]).max() < KEPT:
+            self._gradient = self.gradient(Y), Y
+        matrix[-1] = self._gradient[0]
+
+    def residual(self, solved: Solved) -> FloatArray:
+        """The scaled residual, and psi."""
+        return np.append(super().residual(solved), self.psi(solved))
+
+    def point(self, solved: Solved, Y: FloatArray, border: FloatArray, iterations: int = 0) -> OrbitPoint | None:
+        """A solved point, its tangent by a gradient of its own."""
+        self._gradient = None
+        return super().point(solved, Y, border, iterations)
+
+    def first(self, X: FloatArray) -> OrbitPoint | None:
+        """The locus at a special point: the shortest correction, and a tangent of either sense."""
+        Y = X / self.scale
+        self.calibrate(Y)
+        for _ in range(3 * self.most):
+            self._gradient = None
+            solved = self.evaluate(Y)
+            matrix, right = self.bordered(solved, np.zeros(self.n))[:-1], self.residual(solved)
+            if not (np.isfinite(matrix).all() and np.isfinite(right).all()):
+                return None
+            step = np.linalg.lstsq(matrix, right, rcond=1e-12)[0]
+            Y = np.asarray(Y - step, dtype=float)
+            if np.abs(step).max() < CLOSE:
+                break
+        else:
+            return None
+        solved = self.evaluate(Y)
+        null = self.null_vectors(solved, 1e-9)
+        return self.point(solved, Y, null[-1]) if len(null) == 1 else None
+
+    def word(self) -> Any:
+        """The kind."""
+        return self.kind
+
+    def margins(self, point: OrbitPoint) -> FloatArray:
+        """Margins of the path to its boundaries; on a grazing curve by another touch than its own."""
+        path = point.path
+        if self.kind == "grazing":
+            inner = path.inner.copy()
+            inner[self.touched or path.touched] = -np.inf
+            path = replace(path, touch=float(inner.max(initial=-np.inf)))
+        return path.margins
+
+    def unseen(self, step: Step) -> None:
+        """Nothing: no round shows a path that only touches."""
+
+    def behind(self, found: March, met: list[Met]) -> None:
+        """Record the point at which the curve meets a graze or a corner; it ends there."""
+        found.ending = met[0].name
+        found.mark(KINDS[self.kind] if met[0].name == "grazing" else met[0].name, self, met[0].point)
+
+    def over(self, point: OrbitPoint) -> None:
+        """Nothing: no curve ends with a point of its own."""
+
+    def why(self, point: OrbitPoint) -> str:
+        """Return ``no_convergence``: the box was cut to what the equations allow."""
+        return "no_convergence"

@@ -1,0 +1,195 @@
+"""Periodic orbits of one signature over their active parameters, as curves."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.continuation.march.arclength import Curve, Point
+from nonsmooth.continuation.march.marches import ENDINGS
+from nonsmooth.continuation.problems.anchor import anchor_at, plane_across
+from nonsmooth.continuation.problems.multipliers import multipliers_of
+from nonsmooth.continuation.problems.orbit_events import KINDS, SMALL, swing
+from nonsmooth.continuation.problems.shooting import Shooting, Solved
+from nonsmooth.continuation.problems.surfaces import look_at_surfaces
+from nonsmooth.continuation.signature.boundaries import BOUNDARIES, Unseen, passed_by
+from nonsmooth.continuation.signature.leaving import behind
+from nonsmooth.continuation.signature.neighbours import beside
+from nonsmooth.continuation.signature.path import Path, Walk
+from nonsmooth.continuation.signature.rounds import Rounds
+from nonsmooth.errors import SystemDefinitionError
+
+if TYPE_CHECKING:
+    from nonsmooth.continuation.march.event import Event, Met, Step
+    from nonsmooth.continuation.march.marches import March
+    from nonsmooth.continuation.signature.signature import Signature
+
+__all__ = ["OrbitPoint", "Orbits"]
+
+FloatArray = NDArray[np.float64]
+AHEAD = 1e-6  # of the range
+
+
+@dataclass
+class OrbitPoint(Point):
+    """A solved orbit."""
+
+    solved: Solved
+    M: FloatArray
+    multipliers: NDArray[np.complex128]
+    path: Path
+
+    @property
+    def virtual(self) -> bool:
+        """True where its path goes through a boundary that it should obey."""
+        return self.path.virtual
+
+
+class Orbits(Curve[OrbitPoint]):
+    """Orbits of one signature with their active parameters.
+
+    Parameters
+    ----------
+    shooting : Shooting
+        With one active parameter (two for curves of special points).
+    size : array (n_z,)
+        Sizes of the states (and memory).
+    period : float
+        Size of the times.
+    widths : sequence of float
+        Sizes of the parameters: the widths of their ranges.
+    """
+
+    kinds: Sequence[Event] = KINDS
+    boundaries = BOUNDARIES
+    endings = ENDINGS
+
+    def __init__(self, shooting: Shooting, size: FloatArray, period: float, widths: Sequence[float]) -> None:
+        self.shooting, self.walk = shooting, Walk(shooting)
+        m = shooting.m
+        self.size, self.period, self.widths = size, period, tuple(widths)
+        scale = shooting.join(np.full(m, period), np.tile(size, (m + 1, 1)), period, widths)
+        # The length of a curve should not depend on how many visits an orbit is cut into.
+        scale[: shooting.size] *= np.sqrt(m + 1)
+        self.scale = scale
+        self.rows = 1.0 / scale[: shooting.size]
+        self.weights = self.rows[:, None] * scale[None, :]
+        self.watched = True  # by simulated rounds
+
+    @property
+    def width(self) -> float:
+        """Size of the last parameter."""
+        return self.widths[-1]
+
+    @cached_property
+    def rounds(self) -> Rounds:
+        """Simulated rounds of its orbits."""
+        return Rounds(self.shooting)
+
+    def with_signature(
+        self, signature: Signature, times: FloatArray, states: FloatArray, period: float, parameters: Any
+    ) -> tuple[Orbits, FloatArray]:
+        """The curve of another signature in the same units, and the unknowns there from instants and states."""
+        old = self.shooting
+        fresh = Shooting(old.system, signature, old.period_number, old.active)
+        X = fresh.join(times, states, period, parameters)
+        anchor_at(fresh, fresh.parameters(X), states[0], self.size)
+        look_at_surfaces(fresh, X)
+        return Orbits(fresh, self.size, self.period, self.widths), X
+
+    def evaluate(self, Y: FloatArray) -> Solved:
+        """The equations of multiple shooting."""
+        return self.shooting.evaluate(Y * self.scale)
+
+    def fill(self, solved: Solved, matrix: FloatArray) -> None:
+        """Put the scaled Jacobian into ``matrix``."""
+        np.multiply(solved.jacobian, self.weights, out=matrix[: self.shooting.size])
+
+    def residual(self, solved: Solved) -> FloatArray:
+        """The scaled residual."""
+        return solved.residual * self.rows
+
+    def moved(self, solved: Solved, Y: FloatArray) -> Solved:
+        """The equations after a last step so small that their derivatives stay."""
+        return self.shooting.moved(solved, Y * self.scale)
+
+    def described(
+        self, Y: FloatArray, tangent: FloatArray, orientation: float, iterations: int, solved: Solved
+    ) -> OrbitPoint | None:
+        """The orbit with its multipliers and its path."""
+        M = solved.monodromy
+        path = self.walk.along(solved, self.shooting.split(solved.X)[1])
+        if path is None or not np.isfinite(M).all():
+            return None
+        return OrbitPoint(Y, tangent, orientation, iterations, solved, M, multipliers_of(M), path)
+
+    def word(self) -> Signature:
+        """The signature."""
+        return self.shooting.signature
+
+    def margins(self, point: OrbitPoint) -> FloatArray:
+        """The margins of the path, in the order of the boundaries."""
+        return point.path.margins
+
+    def spread(self, a: OrbitPoint, b: OrbitPoint) -> float:
+        """Largest distance of multipliers on the Riemann sphere, matched in order of modulus."""
+        mu, nu = a.multipliers, b.multipliers
+        return float((np.abs(mu - nu) / np.sqrt((1 + np.abs(mu) ** 2) * (1 + np.abs(nu) ** 2))).max())
+
+    def shows(self, point: OrbitPoint) -> bool:
+        """Return whether a simulated round of an orbit takes the transitions of the signature."""
+        return self.rounds.shows(self.shooting, point.X, point.solved.values)
+
+    def unseen(self, step: Step) -> Met | None:
+        """The first place on a step where only a simulated round tells that the signature ends."""
+        if step.virtual or not self.watched or self.shows(step.b):
+            return None
+        met = Unseen().met(step)
+        if met is None or beside(self, met.point) is not None:
+            return met
+        warnings.warn(
+            f"a simulation of the orbit at {self.shooting.active[-1]} = {met.point.value!r} takes other transitions "
+            "than the branch: its points from here on are not confirmed",
+            RuntimeWarning, stacklevel=2,
+        )  # fmt: skip
+        self.watched = False
+        return None
+
+    def passed_by(self, step: Step) -> list[Met]:
+        """Boundaries that a virtual branch passes on a step."""
+        return passed_by(step)
+
+    def behind(self, found: March, met: list[Met]) -> tuple[Orbits, OrbitPoint] | None:
+        """Record the change of signature; the orbit behind it, or None."""
+        return behind(found, self, met)
+
+    def over(self, point: OrbitPoint) -> str | None:
+        """Return ``equilibrium`` where an autonomous orbit has all but shrunk to one."""
+        return "equilibrium" if swing(self, point) < SMALL else None
+
+    def why(self, point: OrbitPoint) -> str:
+        """Return ``physical`` where the equations do not allow the parameter ahead."""
+        ahead = point.value + AHEAD * self.width * float(np.sign(point.tangent[-1]))
+        try:
+            self.shooting.system.with_parameters({self.shooting.active[-1]: ahead})
+        except (SystemDefinitionError, ValueError):
+            return "physical"
+        return "no_convergence"
+
+    def passed(self, point: OrbitPoint) -> OrbitPoint | None:
+        """The same orbit with the phase condition of one without transitions put through it."""
+        shooting, z = self.shooting, point.X[: self.shooting.n]
+        if shooting.reference is None:
+            return None
+        shooting.reference = plane_across(z, point.solved.segments.f_begin[0], self.size)
+        row = point.solved.jacobian[-1]
+        row[:] = 0.0
+        row[: shooting.n] = shooting.reference[1]
+        found = self.tangent(point.solved, point.tangent)
+        return point if found is None else replace(point, tangent=found[0], orientation=found[1])

@@ -1,0 +1,201 @@
+"""From a simulation to a first guess: let the motion settle, find its period, read off its signature."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.continuation.signature.signature import AT_ONCE, Signature, Visit
+from nonsmooth.flow.engines.engine import Chain, Log, SectionPlan, State
+from nonsmooth.flow.variational import VariationalFlow
+from nonsmooth.kernels.hybrid import codes
+
+if TYPE_CHECKING:
+    from nonsmooth.continuation.searches.search import Search
+    from nonsmooth.flow.engines.engine import Engine
+    from nonsmooth.system.system import System
+
+__all__ = ["CLOSED", "NEAR", "Guess", "fired_row", "forced_guesses", "settle_forced", "touching"]
+
+FloatArray = NDArray[np.float64]
+CHOICE = 6  # candidates tried: period numbers, or returning points for a given one
+CLOSED = 1e-8  # a return nearer than this has closed: the shortest such period comes first
+TOUCH = 1e-6  # of the period, of the motion's size: a contact as short, an impact as weak as this may be a touch
+BEHIND = 1e-9  # of an indicator's size: nearer to a boundary than this is on it
+NEAR = 0.2  # of the motion's size: a return farther off than this is no candidate
+
+
+@dataclass
+class Guess:
+    """An interval of motion that nearly closes, read as an orbit; ``gap`` tells how far off it closes (scaled)."""
+
+    period_number: int  # 0: autonomous
+    period: float
+    signature: Signature
+    times: FloatArray  # of its crossings
+    states: FloatArray  # (m + 1, n_z): at the section and after the crossings
+    gap: float = 0.0
+    size: FloatArray = field(default_factory=lambda: np.empty(0))  # (n_u,) half the range of each state
+    gaps: FloatArray = field(default_factory=lambda: np.empty(0))  # after 1, 2 ... forcing periods
+    kicks: FloatArray | None = None  # (m,) change of state in each crossing, scaled; None: not known
+
+
+@dataclass
+class Settled:
+    """Section points after the transient."""
+
+    points: FloatArray  # (keep, n_u)
+    modes: NDArray[np.int64]  # (keep,)
+    size: FloatArray
+    state: State
+    status: int
+    engine: Engine
+    tables: Any
+
+
+def settle_forced(system: System, engine: Engine, state: State, transient: int, keep: int, search: Search) -> Settled:
+    """Run a forced system through a transient and keep the section points after it."""
+    traced = system.traced
+    sizes = len(traced.u), len(traced.indicators), len(traced.outputs)
+    tables = engine.prepare(system.parameter_vector()[None, :])
+    passed, left, begun = Chain.empty(1, 1, *sizes), transient, state.copy()
+
+    def march(piece: float) -> bool:
+        nonlocal left
+        some = min(max(1, round(piece)), left)
+        if some:
+            engine.chain(tables, 0, 1, state, None, SectionPlan(), some - 1, 1, passed)
+            left -= some
+        return int(passed.status[0]) in (codes.OK, codes.NOT_GUARANTEED)
+
+    search.in_pieces(float(transient), march)
+    if passed.status[0] == codes.BEYOND_STOP:  # an impact on the section: a motion that was cut there cannot begin
+        state, left, passed.status[0] = begun, transient, codes.OK
+    out = Chain.empty(1, keep, *sizes)
+    if passed.status[0] in (codes.OK, codes.NOT_GUARANTEED):
+        engine.chain(tables, 0, 1, state, None, SectionPlan(), left, keep, out)
+    else:
+        out.status[0] = passed.status[0]
+    search.look()
+    size = np.maximum(0.5 * (out.maximum[0] - out.minimum[0]), 1e-3 * system.scale_vector())
+    return Settled(np.nan_to_num(out.section[0]), out.section_mode[0], size, state, int(out.status[0]), engine, tables)
+
+
+def forced_guesses(system: System, settled: Settled, period_number: int | None, most: int) -> list[Guess]:
+    """Candidates for the period number, the smallest first, from the last section point.
+
+    For a given period number: from the section points that return nearest to themselves. A return is one in the mode
+    it began in.
+    """
+    points = settled.points / settled.size
+
+    def gap(i: int, j: int) -> float:
+        return float(np.abs(points[i] - points[j]).max()) if settled.modes[i] == settled.modes[j] else np.inf
+
+    guesses = []
+    if period_number is not None:
+        p = period_number
+        gaps = np.array([gap(i, i + p) for i in range(len(points) - p)])
+        places = [int(i) for i in np.argsort(gaps, kind="stable")[:CHOICE]]
+        if len(settled.state.memory):  # the memory is known at the last point only
+            places = [len(gaps) - 1]
+        starts = [(p, i, float(gaps[i])) for i in places]
+    else:
+        last = len(points) - 1
+        gaps = np.array([gap(last, last - p) for p in range(1, most + 1)])
+        starts = [(p, last, float(gaps[p - 1])) for p in range(1, most + 1) if gaps[p - 1] <= NEAR]
+        # Chaos comes near its beginning again and again: the nearest few are tried.
+        starts = sorted(sorted(starts, key=lambda start: (max(start[2], CLOSED), start[0]))[:CHOICE])
+    for p, i, _ in starts:
+        back = period_number is None
+        returns = np.array([gap(i, i - q if back else i + q) for q in range(1, p + 1)])
+        guess = _read_round(system, settled, p, i, returns) if np.isfinite(returns[-1]) else None
+        if guess is not None:
+            guesses.append(guess)
+    return guesses
+
+
+def _read_round(system: System, settled: Settled, p: int, i: int, gaps: FloatArray) -> Guess | None:
+    """The motion over p forcing periods from section point i, as an orbit; None where it ends in another mode."""
+    state = settled.state.copy()
+    if i < len(settled.points) - 1:
+        state.u[:], state.counters[0] = settled.points[i], settled.modes[i]
+        state.counters[1:] = (-1, 0, 0)
+    state.clock[:], state.settled = 0.0, True
+    period = float(system.period() or 0.0)
+    start = np.concatenate([state.u, state.memory])
+    mode = int(state.counters[0])
+    log = settled.engine.record(settled.tables, state, p * period, np.empty(0))
+    if log.status not in (codes.OK, codes.NOT_GUARANTEED):
+        return None
+    states = np.concatenate([np.nan_to_num(log.u_after), log.memory_after], axis=1)
+    signature = _signature(system, log, start, mode)
+    if signature.visits[-1].mode != mode:
+        return None
+    kicks = np.abs(np.nan_to_num(log.u_after - log.u_before) / settled.size).max(axis=1, initial=0.0)
+    if len(states):  # the memory returns too, or the round is a longer one
+        begun, ended = start[len(state.u) :], states[-1, len(state.u) :]
+        apart = np.abs(ended - begun) / np.maximum(np.maximum(np.abs(begun), np.abs(ended)), 1e-12)
+        gaps[-1] = max(gaps[-1], float(apart.max(initial=0.0)))
+    return Guess(
+        p, p * period, signature, log.crossing_time, np.vstack([start, states]), float(gaps[-1]), settled.size, gaps,
+        kicks,
+    )  # fmt: skip
+
+
+def touching(guess: Guess, system: System) -> list[Guess]:
+    """The same motion without contacts that are no more than a touch: an orbit at its grazing point, or none such."""
+    signature, times, states = guess.signature, guess.times, guess.states
+    kicks = np.full(len(times), np.inf) if guess.kicks is None else guess.kicks
+    jumps = system.transitions
+    i = 0
+    while i < len(times):
+        visits = signature.visits
+        here = jumps[visits[i].transition]
+        if here.at is not None:  # it happens whether it changes the state or not
+            i += 1
+            continue
+        if here.reset is not None and here.source == here.target and kicks[i] < TOUCH:
+            kicks = np.delete(kicks, i)
+            signature = signature.without(i, 1)
+            times, states = np.delete(times, i), np.delete(states, i + 1, axis=0)
+            continue
+        short = i + 1 < len(times) and times[i + 1] - times[i] < TOUCH * guess.period
+        if short and visits[i].mode == visits[i + 2].mode and visits[i + 1].row >= 0:
+            signature = signature.without(i, 2)
+            kicks = np.delete(kicks, [i, i + 1])
+            times, states = np.delete(times, [i, i + 1]), np.delete(states, [i + 1, i + 2], axis=0)
+            continue
+        i += 1
+    if len(times) == len(guess.times):
+        return []
+    return [replace(guess, signature=signature, times=times, states=states)]
+
+
+def fired_row(flow: VariationalFlow, values: FloatArray, k: int, t: float, z: FloatArray, same: bool) -> int:
+    """The row of transition k that is zero; AT_ONCE where one at the ``same`` instant has led behind them all."""
+    found = flow.jump(values, k, t, z)
+    size = float(np.abs(found.h_z) @ flow.scale) + abs(float(found.h_z @ z))
+    return AT_ONCE if same and abs(found.h) > BEHIND * size else found.row
+
+
+def _signature(system: System, log: Log, start: FloatArray, mode: int) -> Signature:
+    """The signature of a logged round; the row of each condition that became true last is the one that is zero."""
+    traced, flow, values = system.traced, VariationalFlow.of(system), system.parameter_vector()
+    period = float(system.period() or 1.0)
+    memory = start[len(traced.u) :]
+    visits = []
+    for i, k in enumerate(log.crossing_transition):
+        jump, t = traced.transitions[k], float(log.crossing_time[i])
+        if jump.at is not None:
+            visits.append(Visit(jump.source, int(k), -1, round(t / period - flow.phase(values, int(k))[0])))
+        else:
+            z = np.concatenate([np.nan_to_num(log.u_before[i]), memory])
+            same = i > 0 and t == log.crossing_time[i - 1]
+            visits.append(Visit(jump.source, int(k), fired_row(flow, values, int(k), t, z, same)))
+        memory = log.memory_after[i]
+    last = traced.transitions[log.crossing_transition[-1]].target if visits else mode
+    return Signature((*visits, Visit(int(last))))

@@ -1,0 +1,1 @@
+"""Signatures of orbits: whether a path obeys its own, and which one follows where it ends."""

@@ -1,0 +1,105 @@
+"""Orbits beside the end of a signature, whatever signature they have.
+
+Beyond a boundary one simulated round tells which transitions happen, in which order: it gives a signature and a first
+guess, Newton's method the orbit, and a simulated round of that orbit whether the signature was the right one; if not,
+the signature that it shows is tried next. So corners, several events at one instant and segments that vanish or appear
+need no rules of their own.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.continuation.searches.settled import Guess, touching
+from nonsmooth.continuation.signature.rounds import Rounds
+
+if TYPE_CHECKING:
+    from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
+
+__all__ = ["beside"]
+
+FloatArray = NDArray[np.float64]
+ASIDE = (1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4)  # of the range: how far beyond the boundary orbits are looked for
+NEARER = 0.1  # once more at this part of it: an orbit that the branch goes on with comes nearer
+SHRINKS = 0.5  # by at least this factor (a square root: 0.32)
+NEAR = 0.05  # of the orbit's size
+PERTURBED = 12  # rounds from about the orbit, on each side
+ROUNDS = 6  # signatures tried in a row
+STEEP = 1e-3  # of a tangent: its parameter
+AGAIN = 3  # times that Newton's method is begun with one signature
+
+
+def beside(curve: Orbits, point: OrbitPoint) -> tuple[Orbits, OrbitPoint] | None:
+    """The orbit with which a branch goes on at ``point``, where its signature ends, on a curve of its own.
+
+    Its tangent leads away from there. None where there is none, or no simulated round shows it."""
+    forward = float(np.sign(point.tangent[-1])) or 1.0
+    for aside in ASIDE:
+        for side in (forward, -forward):
+            found = _at(curve, point, side, aside)
+            if found is not None:
+                return found
+    return None
+
+
+def _at(curve: Orbits, point: OrbitPoint, side: float, aside: float) -> tuple[Orbits, OrbitPoint] | None:
+    """The orbit at one distance on one side of the parameter."""
+    shooting = curve.shooting
+    values = point.solved.values.copy()
+    here = float(point.X[-1])
+    values[shooting.places] = there = np.array([here + side * aside * curve.width])
+    rounds = Rounds(shooting)
+    tried = Counter({shooting.signature.cycle: AGAIN})
+    for guess in _guesses(curve, point, rounds, values, side, aside):
+        for _ in range(ROUNDS):
+            if guess is None or tried[guess.signature.cycle] >= AGAIN:
+                break
+            tried[guess.signature.cycle] += 1
+            other, X = curve.with_signature(guess.signature, guess.times, guess.states, guess.period, there)
+            found = other.at_parameter(X / other.scale, float(there[0]))
+            if found is None or not _apart(curve, point, found) < NEAR:
+                break
+            if not found.virtual and rounds.shows(other.shooting, found.X, values):
+                if not _arrives(curve, point, other, found, here):
+                    break
+                facing = side * float(found.tangent[-1]) >= 0.0
+                return other, found if facing else found.turned()
+            guess = rounds.read(other.shooting, found.X, values)  # no orbit of the system: what its round shows is next
+    return None
+
+
+def _guesses(
+    curve: Orbits, point: OrbitPoint, rounds: Rounds, values: FloatArray, side: float, aside: float
+) -> Iterator[Guess | None]:
+    """Rounds along the branch, from the end of the signature itself, and about it; that end without its touches."""
+    shooting, slope = curve.shooting, float(point.tangent[-1])
+    if abs(slope) > STEEP:
+        yield rounds.read(shooting, point.X + side * aside / slope * point.tangent * curve.scale, values)
+    yield rounds.read(shooting, point.X, values)
+    times, states = shooting.split(point.X)
+    end = Guess(shooting.period_number, float(point.solved.times[-1]), shooting.signature, times, states)
+    yield from touching(end, shooting.system)
+    random = np.random.default_rng(0)
+    for i in range(PERTURBED):
+        change = aside * 10.0 ** (i % 3) * random.uniform(-1.0, 1.0, shooting.n) * curve.size
+        yield rounds.read(shooting, point.X, values, change)
+
+
+def _apart(curve: Orbits, a: OrbitPoint, b: OrbitPoint) -> float:
+    """Largest difference of extremes, in units of the states' sizes, and of the periods."""
+    size = curve.size[: len(a.path.maximum)]
+    extremes = np.concatenate([(a.path.maximum - b.path.maximum) / size, (a.path.minimum - b.path.minimum) / size])
+    period = abs(float(a.solved.times[-1] - b.solved.times[-1])) / curve.period
+    return max(float(np.nanmax(np.abs(extremes), initial=0.0)), period)
+
+
+def _arrives(curve: Orbits, point: OrbitPoint, other: Orbits, found: OrbitPoint, here: float) -> bool:
+    """Return whether the orbits found come to ``point`` as the parameter comes back to it."""
+    value = here + NEARER * (float(found.X[-1]) - here)
+    nearer = other.at_parameter(found.Y, value)
+    return nearer is not None and _apart(curve, point, nearer) <= SHRINKS * _apart(curve, point, found) + 1e-9

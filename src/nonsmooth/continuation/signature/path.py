@@ -1,0 +1,187 @@
+"""The path of an orbit between its transitions: extremes, clearances, and whether it obeys every boundary."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.continuation.signature.signature import AT_ONCE
+
+if TYPE_CHECKING:
+    from nonsmooth.continuation.problems.shooting import Shooting, Solved
+    from nonsmooth.system.symbolic.traced import Traced
+
+__all__ = ["Path", "Walk"]
+
+FloatArray = NDArray[np.float64]
+ORDER = 20
+RTOL = 1e-15
+ROUNDING = 1e-13  # of an indicator's size
+SOLVED = 1e-6  # of its size: as near to a boundary just crossed as an orbit is solved for
+
+
+@dataclass
+class Path:
+    """Extremes and margins along an orbit; see ``kernels.orbit_path`` for the arrays over (visit, transition)."""
+
+    maximum: FloatArray  # (n_u,)
+    minimum: FloatArray
+    inner: FloatArray  # (m + 1, n_transitions)
+    place: FloatArray
+    which: NDArray[np.int64]
+    touch: float  # largest of inner: below 0 the nearest approach to a transition that does not happen
+    touched: tuple[int, int]  # its (visit, transition)
+    own: FloatArray  # (m,) at each transition, the least of its other rows: 0 at a corner of its condition
+    others: FloatArray  # (m,) at each transition, the largest margin of the other transitions: 0 at a corner
+    other: NDArray[np.int64]  # (m,) which one
+    slope: FloatArray  # (m,) how fast the indicator that fires rises: 0 where the orbit only touches
+    tau: FloatArray  # (m + 1,) lengths of the visits; inf where it is fixed by the forcing
+    landed: FloatArray  # (m + 1,) where each visit begins, the largest margin of its transitions: 0 on a boundary
+    landing: NDArray[np.int64]  # (m + 1,) which transition
+
+    @cached_property
+    def margins(self) -> FloatArray:
+        """Six numbers that are positive (or inf) on an orbit of the system; one turns negative beyond a boundary.
+
+        The shortest visit, the slowest crossing, the other rows of the conditions that fire, the nearest touch, the
+        conditions that do not fire, those that hold where a visit begins (behind a reset); see ``boundaries``.
+        """
+        return np.array([
+            self.tau.min(), self.slope.min(initial=np.inf), self.own.min(initial=np.inf), -self.touch,
+            -self.others.max(initial=-np.inf), -self.landed.max(),
+        ])  # fmt: skip
+
+    @property
+    def virtual(self) -> bool:
+        """True where the path goes through a boundary that it should obey."""
+        return bool((self.margins < 0.0).any())
+
+
+class Walk:
+    """Walks along orbits of one system with one signature."""
+
+    def __init__(self, shooting: Shooting) -> None:
+        from nonsmooth.flow.engines.loop import pack_net
+        from nonsmooth.kernels.compile.pointers import addresses
+        from nonsmooth.system.codegen.generate import compile_model
+
+        self.shooting, system = shooting, shooting.system
+        traced: Traced = system.traced
+        self.model = compile_model(traced)
+        self.functions = addresses(self.model.jet)
+        self.net = pack_net(traced)
+        n_t = len(traced.transitions)
+        n, m = len(traced.u), shooting.m + 1
+        visits = shooting.signature.visits
+        self.modes = shooting.modes
+        self.fired = np.array([v.transition for v in visits], dtype=np.int64)
+        self.fired_row = np.array(
+            [-1 if v.row < 0 else int(self.net.row_start[v.transition]) + v.row for v in visits], dtype=np.int64
+        )
+        self.lacking = np.array(traced.lacking, dtype=np.int64).reshape(len(traced.mode_names), n)
+        self.weight = system.scale_vector() * 1e-3
+        rows = n + len(traced.indicators) + len(traced.outputs)
+        self.scratch = (
+            np.zeros((rows, ORDER + 1)), np.zeros((self.model.n_scratch, ORDER + 1)), np.zeros(n),
+            np.zeros(len(traced.p) + len(traced.m)), np.zeros(len(traced.indicators)),
+        )  # fmt: skip
+        self.shape = (m, n_t)
+        self.n = n
+        conditions = self.net.at < 0
+        armed = [[traced.transitions[k].source == mode for k in range(n_t)] for mode in self.modes]
+        self.armed = np.array(armed, dtype=bool).reshape(m, n_t)
+        self.armed &= conditions[None, :]
+        self.elsewhere = self.armed.copy()  # transitions that could fire at the end of a visit but do not
+        for i, k in enumerate(self.fired):
+            if k >= 0:
+                self.elsewhere[i, k] = False
+        self.conditional = np.flatnonzero(self.fired_row[:-1] >= 0)
+        self.at_once = np.array([*shooting.at_once, False], dtype=bool)  # visits of no length
+        fixed = [shooting.forced]
+        for visit in visits[:-1]:
+            if visit.row == AT_ONCE:
+                fixed.append(fixed[-1])
+            else:  # at a phase that does not depend on the parameters
+                fixed.append(isinstance(traced.transitions[visit.transition].at, int | float))
+        fixed.append(shooting.forced)
+        ends = np.array(fixed, dtype=bool)
+        # Visits whose length cannot vanish
+        self.fixed = (ends[:-1] & ends[1:]) | self.at_once if m > 1 else np.array([True])
+        self.crossed = np.zeros((m, len(traced.indicators)), dtype=bool)  # indicators zero where a visit begins
+        for i in range(1, m):
+            if self.at_once[i - 1]:
+                self.crossed[i] = self.crossed[i - 1]
+            elif self.fired_row[i - 1] >= 0:
+                self.crossed[i, self.net.rows[self.fired_row[i - 1], 0]] = True
+        for i in range(m):  # of conditions that hold together the first is taken
+            if self.at_once[i]:
+                self.elsewhere[i, self.fired[i] :] = False
+        self.inside = np.array([(i, self.fired[i]) for i in self.conditional], dtype=np.int64).reshape(-1, 2).T
+
+    def along(self, solved: Solved, states: FloatArray) -> Path | None:
+        """Walk along the visits of a solved orbit; ``states`` (m + 1, n_z) begin them.
+
+        None where the states grow without bound."""
+        from nonsmooth.kernels.tangent.orbit_path import Margins, Visits, follow
+
+        m, n_t = self.shape
+        extremes = np.empty((2, self.n))
+        inner, place, begin, size, end = (np.empty((m, n_t)) for _ in range(5))
+        begin_row = np.empty((m, n_t), dtype=np.int64)
+        which, slope = np.empty((m, n_t), dtype=np.int64), np.empty((m, 2))
+        tau = np.where(self.at_once, 0.0, solved.times[1:] - solved.times[:-1])
+        status = follow(
+            self.functions, ORDER, RTOL, self.weight, self.lacking, self.net, solved.values,
+            Visits(self.modes, solved.times[:-1], tau, np.ascontiguousarray(states), self.fired, self.fired_row),
+            self.scratch, extremes, Margins(inner, place, which, begin, begin_row, size, end, slope),
+        )  # fmt: skip
+        if status:
+            return None
+        at = int(inner.argmax()) if n_t else 0
+        touched = (at // n_t, at % n_t) if n_t else (0, 0)
+        own = end[self.inside[0], self.inside[1]]
+        own[np.array(self.shooting.alone, dtype=bool)[self.conditional]] = np.inf  # no corner to watch
+        if n_t and m > 1:
+            rest = np.where(self.elsewhere[:-1], end[:-1], -np.inf)
+            other = rest.argmax(axis=1)
+            others = rest[np.arange(m - 1), other]
+        else:
+            other, others = np.zeros(m - 1, dtype=np.int64), np.full(m - 1, -np.inf)
+        held = self._held(begin, begin_row, size) if len(self.net.rows) > 2 else np.full((m, 1), -np.inf)
+        landing = held.argmax(axis=1)
+        extremes[~np.isfinite(extremes)] = np.nan  # states that no visit has
+        return Path(
+            extremes[0], extremes[1], inner, place, which, float(inner[touched]) if n_t else -np.inf, touched,
+            own, others, other, slope[self.conditional, 0], np.where(self.fixed, np.inf, tau),
+            held[np.arange(m), landing], landing,
+        )  # fmt: skip
+
+    def _held(self, begin: FloatArray, row: NDArray[np.int64], size: FloatArray) -> FloatArray:
+        """Margins where the visits begin; -inf for those that are zero there.
+
+        Beside a boundary that has just been crossed only what is solved for tells which side is meant."""
+        crossed = self.crossed.copy()
+        for i in np.flatnonzero(self.shooting.divided):  # the exit lies in the surface of the entry
+            crossed[i, self.net.rows[self.fired_row[i], 0]] = True
+        near = np.where(np.take_along_axis(crossed, self.net.rows[row, 0], axis=1), SOLVED, ROUNDING)
+        zero = np.abs(begin) <= near * size
+        held = np.where(self.armed & ~zero, begin, -np.inf)
+        held[0] = -np.inf  # the section is passed, nothing has led there
+        for i in np.flatnonzero(self.at_once):  # what happens at once must hold; the others: ``elsewhere``
+            k = self.fired[i]
+            held[i], held[i, k] = -np.inf, 0.0 if zero[i, k] else -begin[i, k]
+        return held
+
+    def clearance(self, path: Path, indicators: int) -> FloatArray:
+        """Per indicator the least distance left to a transition that did not happen; NaN where none came near."""
+        found = np.full(indicators, np.nan)
+        for visit, k in np.argwhere(np.isfinite(path.inner)):
+            i = int(self.net.rows[path.which[visit, k], 0])
+            distance = -path.inner[visit, k]
+            if not found[i] <= distance:
+                found[i] = distance
+        return found

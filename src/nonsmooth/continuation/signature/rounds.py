@@ -1,0 +1,172 @@
+"""One simulated round of an orbit, read as a signature: which transitions happen, and in which order.
+
+The simulation isolates every crossing, so a round that shows an orbit's own signature proves it admissible.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.continuation.problems.anchor import anchored
+from nonsmooth.continuation.searches.settled import Guess, fired_row
+from nonsmooth.continuation.signature.signature import Signature, Visit
+from nonsmooth.flow.engines.engine import State
+from nonsmooth.flow.engines.methods import engine_for
+from nonsmooth.kernels.hybrid import codes
+
+if TYPE_CHECKING:
+    from nonsmooth.continuation.problems.shooting import Shooting
+    from nonsmooth.flow.engines.engine import Engine, Log
+
+__all__ = ["Rounds"]
+
+FloatArray = NDArray[np.float64]
+RTOL = 1e-13  # where the flow is not exact
+ROUNDING = 1e-14  # of the period
+LATE = 0.25  # of the period: the largest change of the period of a neighbour
+
+
+class Rounds:
+    """Rounds of orbits of one system, begun in the middle of their longest visits."""
+
+    def __init__(self, shooting: Shooting) -> None:
+        self.system, self.flow, self.period_number = shooting.system, shooting.flow, shooting.period_number
+        self.engine = engine_for(shooting.system, rtol=RTOL)
+        if self.engine.name == "exact":
+            self.engine = engine_for(shooting.system)
+
+    def read(
+        self, shooting: Shooting, X: FloatArray, values: FloatArray, change: FloatArray | float = 0.0
+    ) -> Guess | None:
+        """The round at ``values`` from the middle of the longest visit of an orbit, its state changed by ``change``.
+
+        None where it fails, or does not come back to the mode where it began."""
+        i, begin, z, period = self._middle(shooting, X, values)
+        mode = int(shooting.modes[i])
+        own = np.ones(len(z), dtype=bool)
+        own[: len(self.system.states)] = [not lacks for lacks in self.system.traced.lacking[mode]]
+        z = np.where(own, z + change, z)
+        return (self._forced if shooting.forced else self.free)(values, z, mode, begin, period)
+
+    def shows(self, shooting: Shooting, X: FloatArray, values: FloatArray) -> bool:
+        """Return whether the round of an orbit takes the transitions of its signature; True where it fails.
+
+        What the exact flow denies the series are asked too."""
+        i, begin, z, period = self._middle(shooting, X, values)
+        taken = [visit.transition for visit in shooting.signature.crossings]
+        for engine in (lambda: self.engine, lambda: self.second):
+            log = self._run(values, z, int(shooting.modes[i]), begin, begin + period, [], engine())
+            if log is None or log.crossing_transition.tolist() == taken[i:] + taken[:i]:
+                return True
+        return False
+
+    @cached_property
+    def second(self) -> Engine:
+        """The engine that is asked where the first one denies a signature."""
+        return self.engine if self.engine.name != "exact" else engine_for(self.system, "taylor", rtol=RTOL)
+
+    def _middle(
+        self, shooting: Shooting, X: FloatArray, values: FloatArray
+    ) -> tuple[int, float, FloatArray, float]:
+        """The longest visit of an orbit, time and state in its middle, and the period."""
+        times, states = shooting.split(X)
+        forced = shooting.forced
+        period = self.period_number * self.flow.period(values)[0] if forced else float(X[shooting.size - 1])
+        ends = np.concatenate([[0.0], times, [period]])
+        i = int(np.diff(ends).argmax()) if forced else 0  # without forcing the section lies within a visit
+        begin = float(ends[i])
+        into = 0.5 * float(ends[i + 1] - begin) if forced else 0.0
+        z = self.flow.segments(values, shooting.modes[i : i + 1], [begin], [into], states[i][None, :]).z[0]
+        return i, begin + into, z, period
+
+    def _run(
+        self, values: FloatArray, z: FloatArray, mode: int, begin: float, until: float, at: Any,
+        engine: Engine | None = None,
+    ) -> Log | None:  # fmt: skip
+        n = len(self.system.states)
+        state = State(z[:n].copy(), z[n:].copy())
+        state.counters[0], state.settled = mode, True
+        T = self.flow.period(values)[0]
+        state.clock[:] = (begin % T, begin // T, T) if np.isfinite(T) else (begin, 0.0, 0.0)
+        engine = engine or self.engine
+        log = engine.record(engine.prepare(values[None, :]), state, until, np.asarray(at, dtype=float))
+        return log if log.status in (codes.OK, codes.NOT_GUARANTEED) else None
+
+    def _forced(self, values: FloatArray, z: FloatArray, mode: int, begin: float, period: float) -> Guess | None:
+        log = self._run(values, z, mode, begin, begin + period, [period])
+        if log is None:
+            return None
+        visits, instants, after = self._visits(values, log, z, begin)
+        last = self.system.traced.transitions[visits[-1].transition].target if visits else mode
+        if last != mode:
+            return None
+        first = self._behind(visits, instants, period)
+        order = [*range(first, len(visits)), *range(first)]
+        turned = np.concatenate([instants[first:] - period, instants[:first]])
+        moved = [visits[j] for j in order]
+        at_section = visits[first].mode if first < len(visits) else last
+        for i in range(len(visits) - first):  # begun before the section, over in the next round
+            if moved[i].row == -1:
+                moved[i] = replace(moved[i], turn=moved[i].turn - self.period_number)
+        turned = np.maximum(turned, 0.0)
+        if first < len(visits) and turned[0] < ROUNDING * period:  # a transition at the section itself
+            section = np.nan_to_num(log.u_before[first])
+            memory = after[first - 1][len(section) :] if first else z[len(section) :]
+        else:
+            section, memory = np.nan_to_num(log.sample_u[0]), log.sample_memory[0]
+        states = np.vstack([np.concatenate([section, memory])[None, :], after[order]])
+        return Guess(self.period_number, period, Signature((*moved, Visit(at_section))), turned, states)
+
+    def _behind(self, visits: list[Visit], instants: FloatArray, period: float) -> int:
+        """The first visit that ends at the section or behind it: a phase of 0 is at the section, whatever rounding."""
+        for j, visit in enumerate(visits):
+            if visit.turn >= self.period_number if visit.row == -1 else instants[j] >= period:
+                return j
+        return len(visits)
+
+    def free(self, values: FloatArray, z: FloatArray, mode: int, begin: float, period: float) -> Guess | None:
+        """A round without forcing, from a state, that takes about ``period``."""
+        log = self._run(values, z, mode, 0.0, (1.5 + LATE) * period, [])
+        if log is None:
+            return None
+        visits, instants, after = self._visits(values, log, z, 0.0)
+        if not visits:
+            return Guess(0, period, Signature((Visit(mode),)), np.empty(0), z[None, :])
+        again = [
+            j for j in range(1, len(visits))
+            if visits[j] == visits[0] and abs(instants[j] - instants[0] - period) < LATE * period
+        ]  # fmt: skip
+        if not again:
+            return None
+        j = min(again, key=lambda j: float(np.abs(after[j] - after[0]).max()))
+        period = float(instants[j] - instants[0])
+        signature = Signature((*visits[:j], Visit(mode)))
+        states = np.vstack([z[None, :], after[:j]])
+        found = anchored(self.flow, values, signature, instants[:j], states, period)
+        return Guess(0, period, *found)
+
+    def _visits(
+        self, values: FloatArray, log: Log, z: FloatArray, begin: float
+    ) -> tuple[list[Visit], FloatArray, FloatArray]:
+        """Visits in the order of the log, their ends, and the states after them."""
+        traced, n = self.system.traced, len(self.system.states)
+        memory = z[n:]
+        visits = []
+        T = self.flow.period(values)[0]
+        for i, k in enumerate(log.crossing_transition):
+            jump, t = traced.transitions[k], float(log.crossing_time[i])
+            if jump.at is not None:
+                turn = round(t / T - self.flow.phase(values, int(k))[0])
+                visits.append(Visit(jump.source, int(k), -1, turn))
+            else:
+                before = np.concatenate([np.nan_to_num(log.u_before[i]), memory])
+                same = i > 0 and t == float(log.crossing_time[i - 1])
+                visits.append(Visit(jump.source, int(k), fired_row(self.flow, values, int(k), t, before, same)))
+            memory = log.memory_after[i]
+        after = np.concatenate([np.nan_to_num(log.u_after), log.memory_after], axis=1).reshape(len(visits), len(z))
+        return visits, np.asarray(log.crossing_time, dtype=float).copy(), after

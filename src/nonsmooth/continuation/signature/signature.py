@@ -1,0 +1,94 @@
+"""The signature of a periodic orbit: the modes it visits and the transitions that end the visits.
+
+The first visit begins, and the last one ends, at the section: phase 0 of the forcing, or for an autonomous system a
+point within a visit. Two orbits that are read from different points of the same cycle have the same ``cycle``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from nonsmooth.system.symbolic.traced import Traced
+
+__all__ = ["AT_ONCE", "SECTION", "Signature", "Visit"]
+
+SECTION = -1
+AT_ONCE = -2  # a row: the condition holds already where the transition before has led
+
+
+@dataclass(frozen=True)
+class Visit:
+    """Motion in ``mode`` until ``transition`` fires because row ``row`` of its condition becomes true.
+
+    ``transition`` is -1 for the visit that ends at the section; ``row`` is -1 there and for a transition at a phase,
+    which then happens in the forcing period ``turn`` (0 ... n) after the section. ``row`` is -2 where the transition
+    follows another one at the same instant, because the reset has led behind its boundary.
+    """
+
+    mode: int
+    transition: int = SECTION
+    row: int = -1
+    turn: int = 0
+
+
+@dataclass(frozen=True)
+class Signature:
+    """Visits in their order from the section; the last one ends at the section.
+
+    Attributes
+    ----------
+    visits : tuple of Visit
+    """
+
+    visits: tuple[Visit, ...]
+
+    @property
+    def crossings(self) -> tuple[Visit, ...]:
+        """The visits that end with a transition."""
+        return self.visits[:-1]
+
+    @property
+    def cycle(self) -> tuple[tuple[int, int, int], ...]:
+        """(mode, transition, row) once round, begun where this is smallest: equal for all sections of one cycle."""
+        word = [(v.mode, v.transition, v.row) for v in self.crossings]
+        if not word:
+            return ((self.visits[0].mode, SECTION, -1),)
+        return min(tuple(word[i:] + word[:i]) for i in range(len(word)))
+
+    def repeated(self, times: int, turns: int = 0) -> Signature:
+        """The same orbit gone round several times; ``turns`` forcing periods are one round."""
+        visits = [
+            Visit(v.mode, v.transition, v.row, v.turn + turns * i if v.row == -1 else 0)
+            for i in range(times)
+            for v in self.crossings
+        ]
+        return Signature((*visits, self.visits[-1]))
+
+    def with_inserted(self, place: int, inserted: Sequence[Visit]) -> Signature:
+        """With further visits that interrupt visit ``place``."""
+        return Signature((*self.visits[:place], *inserted, *self.visits[place:]))
+
+    def without(self, first: int, count: int) -> Signature:
+        """Without ``count`` visits from ``first`` on: what remains is one visit where they stood."""
+        return Signature((*self.visits[:first], *self.visits[first + count :]))
+
+    def text(self, traced: Traced) -> str:
+        """In words: ``free (penetration) contact (separation) free``."""
+        names = traced.mode_names
+        parts = []
+        for visit in self.visits:
+            parts.append(names[visit.mode])
+            if visit.transition == SECTION:
+                continue
+            jump = traced.transitions[visit.transition]
+            if visit.row == AT_ONCE:
+                parts.append("(at once)")
+            elif jump.at is not None:
+                parts.append(f"(at {traced.phase_text(jump)})")
+            else:
+                row = jump.rows[visit.row]
+                parts.append(f"({traced.indicator_names[row.indicator]} {'>' if row.sign > 0 else '<'} 0)")
+        return " ".join(parts)

@@ -1,0 +1,263 @@
+"""The recording beside the model: a file dropped into the page, its channels, and the fit of the parameters to it."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import PurePath
+from typing import TYPE_CHECKING, Any
+
+from nonsmooth.explorer.labels import html_of, number, plain_of, symbols_of
+from nonsmooth.explorer.recorded import LARGEST, Recorded, Samples, Setup, matched, samples_of, unlike
+from nonsmooth.explorer.work import periods_shown
+from nonsmooth.explorer.worker import Answer, Worker
+
+if TYPE_CHECKING:
+    from nonsmooth.explorer.session import Session
+
+__all__ = ["Bench"]
+
+
+class Bench:
+    """The recording of a page. Reading and fitting run in a process of their own, so that the views go on."""
+
+    def __init__(self, page: Session) -> None:
+        self.page = page
+        self.recorded: Recorded | None = None
+        self.setup: Setup | None = None
+        self.laid: Mapping[str, Any] | None = None
+        self.doing, self._fraction = "", 0.0
+        self._job: tuple[int, str, str] = (0, "", "")  # number, what, model
+        self._count = 0
+        self._worker: Worker | None = None
+        self._unticked: set[str] = set()
+        self._told: list[tuple[str, str]] = []
+        self._samples: tuple[Setup, Samples | None] | None = None
+
+    @property
+    def actions(self) -> dict[str, Callable[[str, Any], object]]:
+        """Messages of the page that concern a recording."""
+        return {
+            "drop": self._drop, "recording": self._change, "fit": self._fit, "tick": self._tick,
+            "cancel": lambda *_: self._stop(), "unread": self._unread, "remove": self._remove,
+            "take drive": self._take_drive,
+        }  # fmt: skip
+
+    # --- what a person does
+
+    def _drop(self, name: str, value: Any) -> None:
+        """Read a file, in place of the one that is there once it has been read."""
+        file = PurePath(str(value["file"])).name[:120]
+        try:
+            content = base64.b64decode(str(value["content"]), validate=True)
+        except (binascii.Error, ValueError):
+            raise ValueError(f"{file}: the file did not arrive whole; drop it again") from None
+        if len(content) > LARGEST:
+            raise ValueError(_too_large(file, len(content)))
+        self._start("reading", {"view": "read", "content": content, "name": file})
+
+    def _unread(self, name: str, value: Any) -> None:
+        """The page could not hand a file over, or did not for its size."""
+        file, size = str(value["file"])[:120], int(value["size"])
+        if size > LARGEST:
+            raise ValueError(_too_large(file, size))
+        raise ValueError(f"{file} cannot be read: is it a folder, or was it moved?")
+
+    def _change(self, name: str, value: Any) -> None:
+        if self.recorded is None or self.setup is None:
+            raise ValueError("there is no recording yet; drop a file into the page")
+        field = name.removeprefix("recording.")
+        self.setup = self.setup.changed(field, value, self.recorded, self.page.system)
+
+    def _tick(self, name: str, value: Any) -> None:
+        parameter = name.removeprefix("fit.")
+        if parameter not in self.page.system.parameters:
+            raise ValueError(f"{parameter[:40]!r} is no parameter of this model")
+        (self._unticked.discard if value else self._unticked.add)(parameter)
+
+    def _fit(self, name: str, value: Any) -> None:
+        samples, state = self.samples(), self.page.state
+        ticked = [one for one in self.page.system.parameters if one not in self._unticked]
+        if samples is None:
+            raise ValueError("there is nothing to fit to: choose the channel of a state")
+        if not ticked:
+            raise ValueError("tick the parameters that are to be found")
+        self._told = []
+        self._start("fitting", {
+            "view": "fit", "text": self.page.text, "values": dict(state.values), "method": "auto", "eta": 0.0,
+            "parameters": ticked, "samples": samples,
+        })  # fmt: skip
+
+    def _remove(self, name: str, value: Any) -> None:
+        self._stop()
+        self.recorded = self.setup = self.laid = None
+        self._told = []
+        self.page.notes.pop("recording", None)
+
+    def _take_drive(self, name: str, value: Any) -> None:
+        """Set the forcing period to the recorded one, by the parameter that alone makes it."""
+        period = (self.laid or {}).get("drive")
+        page = self.page
+        found = {} if period is None else frequency_of(page.system, page.state.values, period)
+        if not found:
+            raise ValueError("no parameter of this model sets its forcing period by itself; set it by hand")
+        page.past.put(replace(page.state, values={**page.state.values, **found}))
+
+    # --- work in a process of its own
+
+    def _start(self, what: str, job: dict[str, Any]) -> None:
+        self._stop()
+        self._count += 1
+        self._job = self._count, what, self.page.state.model
+        self.doing, self._fraction = what, 0.0
+        self._worker = Worker(lambda answer: self.page.later(self._hear, answer))
+        self._worker.ask(self._count, job)
+
+    def _stop(self) -> None:
+        """End the work; nothing of it remains."""
+        if self._worker is not None:
+            self._worker.close()
+        self._worker, self.doing = None, ""
+
+    close = _stop
+
+    def _hear(self, answer: Answer) -> None:
+        kind, count, content = answer
+        number_, what, model = self._job
+        if self._worker is None or (kind != "ended" and count != number_):
+            return
+        if kind == "progress":
+            self._fraction = float(content)
+            self.tell()
+            return
+        self._stop()
+        if kind == "ended":
+            self.page.notes["recording"] = (
+                f"The process that was {what} ended unexpectedly (code {content}); nothing has changed."
+            )
+        elif kind == "error":
+            self.page.notes["recording"] = str(content)
+        elif what == "reading":
+            self._has_read(content[0]["recorded"])
+        elif model == self.page.state.model:
+            self._has_fitted(content[0])
+        self.page.refresh()
+
+    def _has_read(self, recorded: Recorded) -> None:
+        self.recorded = recorded
+        self.page.notes.pop("recording", None)
+        self.arrange()
+
+    def _has_fitted(self, found: Mapping[str, Any]) -> None:
+        """Write the parameters to the sliders, as one step that can be undone, and say how well they are known."""
+        page = self.page
+        page.past.put(replace(page.state, values={**page.state.values, **found["values"]}))
+        symbols = symbols_of(page.system)
+        self._told = [("warning", sentence) for sentence in found["anomalies"]]
+        self._told += [(plain_of(symbols[name]), text) for name, text in found["told"].items()]
+        every = "" if found["step"] == 1 else f", each {found['step']}th"
+        self._told.append(("fitted to", f"{found['samples']} readings{every}"))
+
+    # --- what the page asks for and shows
+
+    def arrange(self) -> None:
+        """Find the channels of the present model's states, as after another model was chosen."""
+        self._samples = self.laid = None
+        self._told = []
+        self.page.work.done.pop("recording", None)
+        system = self.page.system
+        period = system.period()
+        times = {} if period is None else frequency_of(system, self.page.state.values, 2 * period)
+        self._unticked = set(times) | {name for name, one in system.parameters.items() if one.unit == "kg"}
+        self.setup = None if self.recorded is None else matched(self.recorded, system)
+
+    def samples(self) -> Samples | None:
+        """The recorded states in the units of the model."""
+        if self.recorded is None or self.setup is None:
+            return None
+        if self._samples is None or self._samples[0] is not self.setup:
+            self._samples = self.setup, samples_of(self.recorded, self.setup)
+        return self._samples[1]
+
+    def request(self, orbit: Mapping[str, Any], period: int) -> dict[str, Any] | None:
+        """The request that lays the recording over the motion of this request."""
+        samples = self.samples()
+        if samples is None or len(samples.time) < 8:
+            return None
+        state = self.page.state
+        return {
+            **orbit, "view": "recording", "samples": samples, "period": period, "periods": periods_shown(period),
+            "phase": state.phase, "shown": state.x,
+        }  # fmt: skip
+
+    def put(self, found: Mapping[str, Any]) -> None:
+        """Take in what the worker found of the recording beside the motion."""
+        self.laid = found
+        self.tell()
+
+    def readout(self) -> list[tuple[str, str]]:
+        """The distance for the line above the views."""
+        far = None if self.laid is None else self.laid["distance"]
+        if far is None:
+            return []
+        unit = self.page.system.states[far["of"]]
+        name = plain_of(symbols_of(self.page.system)[far["of"]])
+        return [("distance of the recording", f"{number(far['rms'], unit, 3)} rms in {name} ({far['part']:.1%})")]
+
+    def tell(self) -> None:
+        """The panel as it is now."""
+        self.page.tell("recording", self._content())
+
+    def _content(self) -> dict[str, Any]:
+        busy = {"doing": self.doing, "fraction": round(self._fraction, 3), "most": LARGEST}
+        if self.recorded is None or self.setup is None:
+            return {**busy, "file": ""}
+        system, symbols = self.page.system, symbols_of(self.page.system)
+        channels, setup = self.recorded.runs[self.setup.run], self.setup
+        laid = self.laid or {"distance": None, "why": "", "curve": {}}
+        remarks = [*unlike(self.recorded, setup, system), *([laid["why"]] if laid["why"] else [])]
+        if laid["distance"] is not None:
+            far = laid["distance"]
+            remarks.append(
+                f"{far['periods']} forcing periods compared; "
+                f"the record's phase leads the model's by {far['shift']:.3f} of a period"
+            )
+        drive = laid.get("drive")
+        return {
+            **busy, "file": self.recorded.file + (" (synthetic)" if self.recorded.synthetic else ""),
+            "run": setup.run, "runs": list(self.recorded.runs), "turns": setup.turns,
+            "channels": [[name, f"{name} ({one.unit})" if one.unit else name] for name, one in channels.items()],
+            "begin": setup.begin, "end": setup.end,
+            "rows": [
+                {"name": name, "html": html_of(symbols[name]), "unit": unit, "channel": setup.channels.get(name, ""),
+                 "factor": setup.factors.get(name, 1.0), "shift": setup.shifts.get(name, 0.0)}
+                for name, unit in system.states.items()
+            ],
+            "ticks": [
+                {"name": name, "html": html_of(symbols[name]), "on": name not in self._unticked}
+                for name in system.parameters
+            ],
+            "drive": "" if drive is None else f"forcing period {number(drive, 's', 5)} recorded",
+            "found": self._told, "remarks": remarks, "more": list(self.recorded.remarks[:8]),
+        }  # fmt: skip
+
+
+def _too_large(file: str, size: int) -> str:
+    return f"{file} has {size / (1 << 20):.0f} MiB; the page takes {LARGEST >> 20} MiB: export fewer runs"
+
+
+def frequency_of(system: Any, values: Mapping[str, float], period: float) -> dict[str, float]:
+    """The parameter that alone sets the forcing period, at the value that makes it this long; empty where none does.
+
+    Frequencies, whose period is inversely proportional to them, and periods themselves are found.
+    """
+    now = system.period_at(values)
+    if now is None:
+        return {}
+    for name, value in values.items():
+        for other in (value * now / period, value * period / now):
+            if value and abs(system.period_at({**values, name: other}) - period) < 1e-9 * period and period != now:
+                return {name: other}
+    return {}

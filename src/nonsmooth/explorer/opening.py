@@ -1,0 +1,98 @@
+"""First view of a page that opens on a study file or a result: its model, parameters, range and initial state."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.explorer.presets import GIVEN, first_state
+from nonsmooth.explorer.state import CHOICES, to_query, within
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from nonsmooth.system.system import System
+
+__all__ = ["opened_result", "opened_study"]
+
+
+def opened_study(system: System, options: Mapping[str, Any], output: Mapping[str, str]) -> tuple[System | None, str]:
+    """The system of a study and the query of its view; no system where it is one of ``nonsmooth.models``."""
+    return _opened(system, options, output)
+
+
+def opened_result(result: xr.Dataset) -> tuple[System | None, str]:
+    """The system of a result and the query of its view; no system where it is one of ``nonsmooth.models``.
+
+    Raises
+    ------
+    ValueError
+        A Dataset that was not made from a system.
+    """
+    from nonsmooth.results.provenance import read_provenance
+    from nonsmooth.system.origin import system_of
+
+    system, options = system_of(result), dict(read_provenance(result).get("options", {}))
+    for name in system.parameters:
+        if name in result.dims:
+            options |= {"parameter": name, "values": result[name].values}
+            break
+    return _opened(system, options, {})
+
+
+def _opened(system: System, options: Mapping[str, Any], output: Mapping[str, str]) -> tuple[System | None, str]:
+    name = _name_of(system)
+    state = first_state(name, system)
+    states = list(system.states)
+    for parameter, values in _ranges(options):
+        ends = [float(end) for end in (np.min(values), np.max(values))] if np.size(values) > 1 else []
+        if parameter in state.values and ends and ends[0] < ends[1]:
+            state = state.but("over", parameter).but("low", ends[0]).but("high", ends[1])
+            break
+    for field in ("transient", "keep"):
+        if isinstance(options.get(field), int):
+            state = state.but(field, within(field, options[field]))
+    if isinstance(direction := options.get("direction"), str) and direction in CHOICES["direction"]:
+        state = state.but("direction", direction)
+    if options.get("method") == "rkf45":
+        state = state.but("method", "rkf45")
+    section = options.get("section")
+    if isinstance(phase := getattr(section, "phase", None) or _item(section, "phase"), int | float):
+        state = state.but("phase", float(phase) % 1.0)
+    start = options.get("start")
+    if isinstance(start, Mapping) and set(start) <= set(states):
+        start = [start.get(one, 0.0) for one in states]
+    if start is not None and np.shape(start) == (len(states),) and np.isfinite(np.asarray(start, dtype=float)).all():
+        state = state.but("start", tuple(float(one) for one in start))
+    for field, chosen in output.items():
+        if field in ("x", "y") and chosen in states:
+            state = state.but(field, chosen) if {"x", "y"} <= output.keys() else state.but("shown", chosen)
+    return (None if name != GIVEN else system), to_query(state)
+
+
+def _ranges(options: Mapping[str, Any]) -> list[tuple[str, Any]]:
+    """Parameters that a verb varies, with their values or their range."""
+    grid = options.get("grid")
+    pairs = list(grid.items()) if isinstance(grid, Mapping) else []
+    values = options.get("values", options.get("range"))
+    if isinstance(values, np.ndarray | list | tuple):
+        pairs.insert(0, (str(options.get("parameter", "omega")), values))
+    return [(name, one) for name, one in pairs if isinstance(one, np.ndarray | list | tuple)]
+
+
+def _item(value: Any, key: str) -> Any:
+    return value.get(key) if isinstance(value, Mapping) else None
+
+
+def _name_of(system: System) -> str:
+    """The model of the gallery that this system is, at any values of its parameters."""
+    from nonsmooth import models
+
+    name = system.name.replace(" ", "_")
+    if name in models.names():
+        model = getattr(models, name)()
+        if list(model.parameters) == list(system.parameters) and model.with_parameters(system.values) == system:
+            return name
+    return GIVEN

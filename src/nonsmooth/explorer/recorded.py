@@ -1,0 +1,199 @@
+"""A recording as the page holds it: its runs and channels, and which of them shows which state."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.explorer.state import number_of
+
+if TYPE_CHECKING:
+    from nonsmooth.system.system import System
+
+__all__ = ["LARGEST", "Channel", "Recorded", "Samples", "Setup", "matched", "samples_of", "unlike"]
+
+FloatArray = NDArray[np.float64]
+LARGEST = 64 << 20  # bytes of a file that the page takes
+_MOST = 6000  # samples that are drawn and compared
+_PREFIXES = {"": 1.0, "c": 1e-2, "m": 1e-3, "µ": 1e-6, "μ": 1e-6, "u": 1e-6, "n": 1e-9, "k": 1e3}
+_ANGLES = {"deg": math.pi / 180, "°": math.pi / 180, "rev": 2 * math.pi}
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """One channel of one run."""
+
+    unit: str
+    time: FloatArray
+    values: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """A file that was dropped into the page, as the worker has read it."""
+
+    file: str
+    runs: Mapping[str, Mapping[str, Channel]]
+    remarks: tuple[str, ...]
+    synthetic: bool
+
+
+@dataclass(frozen=True)
+class Setup:
+    """The reading of a recording as the motion of a model.
+
+    Attributes
+    ----------
+    run : str
+    channels : mapping
+        State to channel; a state that no channel shows is missing.
+    factors, shifts : mapping
+        State = factor * reading + shift.
+    turns : str
+        Channel with one row for each turn of the drive; "" where there is none.
+    begin, end : float
+        The piece in use, in seconds.
+    """
+
+    run: str
+    channels: Mapping[str, str]
+    factors: Mapping[str, float]
+    shifts: Mapping[str, float]
+    turns: str
+    begin: float
+    end: float
+
+    def changed(self, name: str, value: Any, recorded: Recorded, system: System) -> Setup:
+        """The same with another value of a field: ``run``, ``turns``, ``begin``, ``end``, ``channel.STATE``, ....
+
+        Raises
+        ------
+        ValueError
+            A field, a state or a channel that does not exist, and text that is no number.
+        """
+        if name == "run":
+            return matched(recorded, system, _known(value, recorded.runs, "run"))
+        channels = recorded.runs[self.run]
+        if name in ("begin", "end"):
+            second = number_of(value, name)
+            made = replace(self, begin=second) if name == "begin" else replace(self, end=second)
+            if not made.begin < made.end:
+                raise ValueError(f"the piece from {made.begin:g} to {made.end:g} s is empty")
+            return made
+        if name == "turns":
+            return replace(self, turns=_known(value, ["", *channels], "channel"))
+        what, _, state = name.partition(".")
+        if what not in ("channel", "factor", "shift") or state not in system.states:
+            raise ValueError(f"{name[:40]!r} is nothing that a recording has")
+        if what == "shift":
+            return replace(self, shifts={**self.shifts, state: number_of(value, name)})
+        if what == "factor":
+            factor = number_of(value, name)
+            if factor == 0:
+                raise ValueError(f"{name} = 0 makes every reading equal; give how much of the state one unit shows")
+            return replace(self, factors={**self.factors, state: factor})
+        chosen = _known(value, ["", *channels], "channel")
+        rest = {one: channel for one, channel in self.channels.items() if one != state}
+        if not chosen:
+            return replace(self, channels=rest)
+        factor = _factor(channels[chosen].unit, system.states[state]) or 1.0
+        return replace(self, channels={**rest, state: chosen}, factors={**self.factors, state: factor})
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Recorded states of a model, for the worker.
+
+    Attributes
+    ----------
+    time : array (N,)
+        Seconds.
+    columns : mapping of state to array (N,)
+        In the states' units; NaN where there is no reading.
+    turns : array
+        Times at which the drive passed its mark; empty where they were not recorded.
+    """
+
+    time: FloatArray
+    columns: Mapping[str, FloatArray]
+    turns: FloatArray
+    key: str = field(init=False)
+
+    def __post_init__(self) -> None:
+        digest = hashlib.sha256()
+        for name, values in {"": self.time, **self.columns, "turns": self.turns}.items():
+            digest.update(name.encode() + b"\0" + np.ascontiguousarray(values).tobytes())
+        object.__setattr__(self, "key", digest.hexdigest())
+
+
+def matched(recorded: Recorded, system: System, run: str = "") -> Setup:
+    """The setup that names and units suggest."""
+    run = run or next(iter(recorded.runs))
+    channels = recorded.runs[run]
+    turns = next((name for name, one in channels.items() if name.casefold().startswith("turn")), "")
+    free = [name for name in channels if name != turns]
+    found: dict[str, str] = {}
+    for state in system.states:
+        same = [name for name in free if name.casefold() == state.casefold()]
+        if same:
+            found[state] = same[0]
+    for state, unit in system.states.items():
+        alike = [name for name in free if name not in found.values() and unit not in ("", "1")
+                 and _factor(channels[name].unit, unit)]  # fmt: skip
+        if state not in found and alike:
+            found[state] = alike[0]
+    if not found and free:
+        found[next(iter(system.states))] = free[0]
+    factors = {state: _factor(channels[name].unit, system.states[state]) or 1.0 for state, name in found.items()}
+    times = [channels[name].time for name in found.values()]
+    begin, end = (min(t[0] for t in times), max(t[-1] for t in times)) if times else (0.0, 1.0)
+    return Setup(run, found, factors, {}, turns, float(begin), float(end))
+
+
+def samples_of(recorded: Recorded, setup: Setup, most: int = _MOST) -> Samples | None:
+    """The piece in use, in the states' units; at most ``most`` samples, the last ones. None where no state is shown."""
+    channels = recorded.runs[setup.run]
+    if not setup.channels:
+        return None
+    clocks = {state: channels[name].time for state, name in setup.channels.items()}
+    every = np.unique(np.concatenate(list(clocks.values())))
+    time = every[(every >= setup.begin) & (every <= setup.end)][-most:]
+    columns = {}
+    for state, name in setup.channels.items():
+        column = np.full(len(time), np.nan)
+        own, inside = clocks[state], np.isin(clocks[state], time)
+        values = channels[name].values[inside]
+        column[np.searchsorted(time, own[inside])] = setup.factors.get(state, 1.0) * values + setup.shifts.get(state, 0)
+        columns[state] = column
+    return Samples(time, columns, channels[setup.turns].time if setup.turns else np.empty(0))
+
+
+def unlike(recorded: Recorded, setup: Setup, system: System) -> list[str]:
+    """Sentences on channels whose unit is not the state's, while their factor is still 1."""
+    channels = recorded.runs[setup.run]
+    return [
+        f"{name} is in {channels[name].unit or 'no unit'}, {state} in {system.states[state]}: give the factor"
+        for state, name in setup.channels.items()
+        if setup.factors.get(state, 1.0) == 1.0 and system.states[state] not in ("", "1")
+        and not _factor(channels[name].unit, system.states[state])
+    ]  # fmt: skip
+
+
+def _factor(unit: str, wanted: str) -> float | None:
+    """Size of one unit in another; None where they do not measure the same."""
+    if wanted == "rad" and unit in _ANGLES:
+        return _ANGLES[unit]
+    return next((size for prefix, size in _PREFIXES.items() if unit == prefix + wanted), None)
+
+
+def _known(value: Any, allowed: Any, what: str) -> str:
+    if value not in allowed:
+        names = ", ".join(repr(one) for one in allowed)
+        raise ValueError(f"{str(value)[:40]!r} is no {what} of this recording; there are: {names}")
+    return str(value)

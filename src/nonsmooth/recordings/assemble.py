@@ -1,0 +1,187 @@
+"""From traces to a ``Recording``: one clock per sensor, names that fit a tree, and a remark for all that is odd."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.recordings.limits import MAX_COLUMNS
+from nonsmooth.recordings.reading import Reading, Source, Trace
+from nonsmooth.recordings.recording import Recording, mixed_units
+from nonsmooth.recordings.remarks import Remarks
+from nonsmooth.recordings.sampling import examine, missing_runs
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["assemble"]
+
+#: A sensor with fewer samples says next to nothing of a motion; below this a remark is made.
+SHORT = 32
+#: The photogate's channel: one row for each turn, so that few rows are no fault.
+EVENTS = "Turn"
+
+
+def assemble(reading: Reading, source: Source, options: Mapping[str, Any], axis: str = "time") -> Recording:
+    """Check the traces, group them by run and clock, and label them."""
+    remarks = reading.remarks
+    traces = []
+    for trace in reading.traces:
+        if len(trace.values) == 0:
+            remarks.of(trace.run, trace.name, "holds no value; left out")
+        else:
+            traces.append(trace)
+    if not traces:
+        raise source.error("", "holds no samples; expected at least one channel with values")
+    if len(traces) > MAX_COLUMNS:
+        raise source.error("", f"holds {len(traces)} channels; at most {MAX_COLUMNS} are read")
+    _compare_units(traces, remarks)
+
+    runs: dict[str, dict[str, xr.Dataset]] = {}
+    run_attrs: dict[str, dict[str, str]] = {}
+    names: dict[str, str] = {}
+    for trace in traces:
+        if trace.run not in names:
+            names[trace.run] = _fit(trace.run or "run", names.values())
+            run_attrs[names[trace.run]] = {"long_name": trace.run, **reading.run_attrs.get(trace.run, {})}
+    for run, node in names.items():
+        sensors: dict[str, xr.Dataset] = {}
+        for group in _by_clock([trace for trace in traces if trace.run == run]):
+            label = _fit(group[0].name or "sensor", sensors)
+            sensors[label] = _sensor(group, source, axis, remarks)
+        runs[node] = sensors
+    record = {
+        "file": source.name, "format": source.format, "bytes": source.size, "sha256": source.sha256,
+        "options": dict(options), "header": reading.header,
+    }  # fmt: skip
+    return Recording.from_runs(
+        runs, synthetic=reading.synthetic, source=record, warnings=remarks.sentences(), run_attrs=run_attrs
+    )
+
+
+def _by_clock(traces: list[Trace]) -> list[list[Trace]]:
+    """Traces sampled at the same instants, in the order in which their first one appears."""
+    groups: dict[tuple[int, float, float, str], list[list[Trace]]] = {}
+    ordered: list[list[Trace]] = []
+    for trace in traces:
+        first, last = float(trace.axis[0]), float(trace.axis[-1])
+        # NaN is not equal to itself and would never be found again; such times are refused later.
+        key = (len(trace.axis), first if first == first else 0.0, last if last == last else 0.0, trace.axis_unit)
+        same = groups.setdefault(key, [])
+        for group in same:
+            if group[0].axis is trace.axis or np.array_equal(group[0].axis, trace.axis, equal_nan=True):
+                group.append(trace)
+                break
+        else:
+            same.append([trace])
+            ordered.append(same[-1])
+    return ordered
+
+
+def _sensor(group: list[Trace], source: Source, axis: str, remarks: Remarks) -> xr.Dataset:
+    import xarray as xr
+
+    first = group[0]
+    where = f"run {first.run!r}, channel {first.name!r}"
+    if len(group) > 1:
+        where += f" (and {len(group) - 1} sampled with it)"
+    bad = np.flatnonzero(~np.isfinite(first.axis))
+    if len(bad):
+        raise source.error(first.place(int(bad[0])), f"{where}: the {axis} is not a finite number")
+
+    def note(sentence: str) -> None:
+        for trace in group:
+            remarks.of(trace.run, trace.name, sentence)
+
+    attrs: dict[str, Any] = _clock(first, where, source, note) if axis == "time" else {}
+    if len(first.values) < SHORT and any(trace.name != EVENTS for trace in group):
+        note(f"only {len(first.values)} samples; too short to identify anything from")
+    variables: dict[str, Any] = {}
+    for trace in group:
+        total, start, longest = missing_runs(trace.values)
+        if total:
+            at = f"{axis} = {trace.axis[start]:.9g} {trace.axis_unit}".rstrip()
+            remarks.of(
+                trace.run, trace.name,
+                f"{total} of {len(trace.values)} values are not finite numbers, "
+                f"the longest run of them {longest} from {at} on; they are kept as they are",
+            )  # fmt: skip
+        name = _fit(trace.name or "channel", [*variables, axis])
+        if name != trace.name and name != _clean(trace.name):
+            sentence = f"the name stands there twice, or is the axis; this one is called {name!r}"
+            remarks.of(trace.run, trace.name, sentence)
+        variables[name] = (
+            axis, trace.values,
+            {"long_name": trace.name, "units": trace.unit, "origin": trace.origin, **trace.attrs},
+        )  # fmt: skip
+    coordinate = (axis, first.axis, {"long_name": axis, "units": first.axis_unit})
+    return xr.Dataset(variables, {axis: coordinate}, attrs)
+
+
+def _clock(trace: Trace, where: str, source: Source, note: Callable[[str], None]) -> dict[str, Any]:
+    """Attributes of a sensor's clock; remarks on gaps, changes and rounded times."""
+    time = trace.axis
+    back = np.flatnonzero(np.diff(time) < 0)
+    if len(back):
+        i = int(back[0])
+        raise source.error(
+            trace.place(i + 1),
+            f"{where}: time goes back from {time[i]:.9g} s to {time[i + 1]:.9g} s; if a new run begins here, "
+            "name the column that numbers the runs, columns={'run': ...}",
+        )
+    clock = examine(time)
+    if clock.repeated:
+        note(
+            f"{clock.repeated} of {len(time) - 1} time steps are zero; the times were written with too few "
+            "digits (export more of them) or samples stand twice"
+        )
+    if clock.change is not None:
+        i, before, after = clock.change
+        note(
+            f"the sample rate changes from {before:.6g} Hz to {after:.6g} Hz near t = {time[i]:.9g} s "
+            f"({trace.place(i)}); split the recording there before using methods that need one rate"
+        )
+    for i, count in clock.gaps[:3]:
+        note(f"gap of {count} samples after t = {time[i]:.9g} s ({trace.place(i)}); nothing was filled in")
+    if len(clock.gaps) > 3:
+        note(f"{len(clock.gaps) - 3} more gaps")
+    kind = "regular" if clock.regular else "irregular"
+    return {"rate": clock.rate, "sampling": kind}
+
+
+def _compare_units(traces: list[Trace], remarks: Remarks) -> None:
+    units: dict[str, dict[str, str]] = {}
+    runs: dict[str, set[str]] = {}
+    for trace in traces:
+        runs.setdefault(trace.name, set()).add(trace.run)
+        units.setdefault(trace.name, {}).setdefault(trace.unit, trace.run)
+    for name, found in units.items():
+        if set(found) == {""}:
+            (run,) = runs[name] if len(runs[name]) == 1 else ("",)
+            remarks.of(run, name, f"the file gives no unit; say it with units={{{name!r}: ...}}")
+        if len(found) > 1:
+            remarks.of(
+                "", name,
+                f"has units {mixed_units(found)}; nothing was converted: take each run's own unit, or read the runs "
+                "one by one",
+            )  # fmt: skip
+
+
+def _clean(name: str) -> str:
+    """A name that a tree and a file can hold: no slash, nothing that does not print."""
+    text = "".join("_" if c == "/" or not c.isprintable() else c for c in name).strip()
+    return "_" if text in ("", ".", "..") else text
+
+
+def _fit(name: str, taken: Any) -> str:
+    """``name`` cleaned, numbered if it is taken."""
+    base = _clean(name)
+    held = set(taken)
+    if base not in held:
+        return base
+    k = 2
+    while f"{base} ({k})" in held:
+        k += 1
+    return f"{base} ({k})"

@@ -1,0 +1,219 @@
+"""``load_recording``: find out which format a file has, read it, hand back a ``Recording``."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import os
+import stat
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from nonsmooth.errors import DataFileError
+from nonsmooth.recordings.assemble import assemble
+from nonsmooth.recordings.limits import MAX_FILE_BYTES
+from nonsmooth.recordings.reading import Column, Options, Reading, Source, Trace, names_of
+from nonsmooth.recordings.recording import Recording, RecordingWarning
+
+__all__ = ["FORMATS", "content_of", "load_recording", "parse_recording"]
+
+#: Each format, and the module whose ``read`` reads it.
+FORMATS = {
+    "capstone-csv": "capstone_csv",
+    "capstone-cap": "capstone_cap",
+    "csv": "delimited",
+    "lvm": "lvm",
+    "tdms": "tdms",
+    "mat": "matlab",
+}
+_SPOKEN = 20  # warnings shown one by one; the rest is counted, and all are in Recording.warnings
+
+
+def load_recording(
+    path: str | os.PathLike[str],
+    *,
+    format: str | None = None,
+    columns: Mapping[str, Column] | None = None,
+    axis: str = "time",
+    rate: float | None = None,
+    units: Mapping[str, str] | None = None,
+    delimiter: str | None = None,
+    decimal: str | None = None,
+) -> Recording:
+    """Read what an instrument recorded: runs, channels, units, sample rates, and where each came from.
+
+    PASCO Capstone (``.csv`` exports in both locales, ``.cap``), any table (CSV, TSV), LabVIEW (``.lvm``, ``.tdms``)
+    and MATLAB (``.mat``, v5 to v7.3). The format is told by the content, not by the file's name.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+    format : str, optional
+        ``"capstone-csv"``, ``"capstone-cap"``, ``"csv"``, ``"lvm"``, ``"tdms"`` or ``"mat"``, where the content is
+        not to be asked.
+    columns : mapping, optional
+        For tables and MATLAB files: our name -> the file's column, by its header, or its place counted from 0, or
+        ``(column, unit)``. ``"time"`` (or ``axis``) names the time column and ``"run"`` a column that numbers
+        the runs. Columns that are not named are left out.
+    axis : str
+        What the samples stand over; ``"time"`` in seconds, or e.g. ``"frequency"`` for a table of responses.
+    rate : float, optional
+        Sample rate in Hz, for files that have no time column; time then begins at 0.
+    units : mapping, optional
+        Units of channels, for what the file does not say; they replace what it says. By channel (``"Angle, Ch P2"``),
+        or by quantity for all channels that measure it (``"Angle"``).
+    delimiter, decimal : str, optional
+        For tables: the character between fields and the decimal mark, where they are not to be guessed.
+
+    Returns
+    -------
+    Recording
+        The runs and their sensors as an ``xarray.DataTree``. What was noticed on the way is in ``.warnings`` and is
+        shown as :class:`~nonsmooth.recordings.RecordingWarning`.
+
+    Raises
+    ------
+    DataFileError
+        If the file cannot be read as what it is: the message names the file, the line or record, and what was
+        expected.
+    ValueError, TypeError
+        If an argument is not one of those above, or does not concern this format.
+
+    Examples
+    --------
+    >>> recording = ns.load_recording("pulls.csv")                                  # doctest: +SKIP
+    >>> recording.channel("Position", run="Run #1")                                 # doctest: +SKIP
+    >>> ns.load_recording("log.csv", columns={"time": "t", "x": ("pos", "mm")})     # doctest: +SKIP
+    """
+    options = _checked(format, columns, axis, rate, units, delimiter, decimal)
+    file = Path(path)
+    recording = parse_recording(content_of(file), file.name, options, format=format)
+    for remark in recording.warnings[:_SPOKEN]:
+        warnings.warn(f"{file.name}: {remark}", RecordingWarning, stacklevel=2)
+    if len(recording.warnings) > _SPOKEN:
+        more = len(recording.warnings) - _SPOKEN
+        warnings.warn(f"{file.name}: {more} more; see Recording.warnings", RecordingWarning, stacklevel=2)
+    return recording
+
+
+def parse_recording(data: bytes, name: str, options: Options | None = None, *, format: str | None = None) -> Recording:
+    """The recording in ``data``; ``name`` is what errors call it."""
+    options = options or Options()
+    unread = Source(name, len(data), "", "")
+    kind = format if format is not None else _detect(data, unread, options)
+    source = Source(name, len(data), hashlib.sha256(data).hexdigest(), kind)
+    reader = import_module(f"nonsmooth.recordings.readers.{FORMATS[kind]}")
+    read: Callable[[bytes, Source, Options], Reading] = reader.read
+    # Numbers from elsewhere may lie at both ends of the range of doubles; what is not finite is judged by assemble.
+    with np.errstate(all="ignore"):
+        reading = read(data, source, options)
+        _replace_units(reading, source, options)
+        return assemble(reading, source, _given(options), options.axis)
+
+
+def _checked(
+    format: str | None,
+    columns: Mapping[str, Column] | None,
+    axis: str,
+    rate: float | None,
+    units: Mapping[str, str] | None,
+    delimiter: str | None,
+    decimal: str | None,
+) -> Options:
+    if format is not None and format not in FORMATS:
+        raise ValueError(f"format must be one of {', '.join(FORMATS)}, got {format!r}")
+    if columns is not None and (not isinstance(columns, Mapping) or not columns):
+        raise TypeError("columns must be a mapping of our names to the file's, as {'time': 't', 'x': ('pos', 'mm')}")
+    for ours, theirs in (columns or {}).items():
+        given = theirs[0] if isinstance(theirs, tuple) and len(theirs) == 2 else theirs
+        if isinstance(given, bool) or not isinstance(given, str | int) or not isinstance(ours, str):
+            raise TypeError(f"columns[{ours!r}] must be a header, a place from 0, or (one of these, unit): {theirs!r}")
+    if not isinstance(axis, str) or not axis.isidentifier() or axis == "run":
+        raise ValueError(f"axis must be a name such as 'time' or 'frequency', got {axis!r}")
+    if rate is not None and not (isinstance(rate, int | float) and math.isfinite(rate) and rate > 0):
+        raise ValueError(f"rate must be a positive number of samples per second, got {rate!r}")
+    if rate is not None and (axis != "time" or axis in (columns or {})):
+        raise ValueError("rate makes a time axis where the file has none; give it without columns['time'] and axis")
+    if delimiter is not None and (not isinstance(delimiter, str) or len(delimiter) != 1 or delimiter in '"\r\n'):
+        raise ValueError(f"delimiter must be one character such as ',', ';' or a tab, got {delimiter!r}")
+    if decimal not in (None, ".", ","):
+        raise ValueError(f"decimal must be '.' or ',', got {decimal!r}")
+    if decimal == "," and delimiter == ",":
+        raise ValueError("delimiter and decimal cannot both be ','")
+    return Options(columns, axis, None if rate is None else float(rate), dict(units or {}), delimiter, decimal)
+
+
+def content_of(file: Path) -> bytes:
+    """The bytes of a regular file of at most 1 GiB.
+
+    Raises
+    ------
+    DataFileError
+        If it cannot be opened, is empty, too large, or no file: a pipe would wait for who writes into it.
+    """
+    try:
+        with open(file, "rb", opener=_without_waiting) as opened:
+            state = os.fstat(opened.fileno())
+            if not stat.S_ISREG(state.st_mode):
+                raise DataFileError(f"{file}: is a pipe, a socket or a device, no file; copy what it gives into a file")
+            data = opened.read(MAX_FILE_BYTES + 1) if state.st_size <= MAX_FILE_BYTES else b""
+    except OSError as error:
+        raise DataFileError(f"{file}: cannot be opened ({error.strerror or error})") from error
+    size = max(state.st_size, len(data))
+    if size > MAX_FILE_BYTES:
+        raise DataFileError(f"{file}: has {size} bytes; at most {MAX_FILE_BYTES} are read: export fewer runs per file")
+    if not data:
+        raise DataFileError(f"{file}: is empty")
+    return data
+
+
+def _without_waiting(path: str, flags: int) -> int:
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
+
+
+def _detect(data: bytes, source: Source, options: Options) -> str:
+    """The format, by the first bytes."""
+    if data.startswith(b"PK\x03\x04"):
+        return "capstone-cap"
+    if data.startswith(b"TDSm"):
+        return "tdms"
+    if data.startswith((b"MATLAB ", b"\x89HDF\r\n\x1a\n")):
+        return "mat"
+    if data.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"LabVIEW Measurement"):
+        return "lvm"
+    if b"\0" in data[:4096] and not data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        hint = "a .mat file of version 4 is not read: save it again with -v7" if source.name.endswith(".mat") else ""
+        known = "is none of the formats known: Capstone .csv and .cap, tables, LabVIEW .lvm and .tdms, MATLAB .mat"
+        raise source.error("", known + (f" ({hint})" if hint else ""))
+    from nonsmooth.recordings.readers.capstone_csv import looks_like_capstone
+
+    plain = options.columns is not None or options.rate is not None or options.axis != "time"
+    return "csv" if plain or not looks_like_capstone(data, options) else "capstone-csv"
+
+
+def _replace_units(reading: Reading, source: Source, options: Options) -> None:
+    names = {trace.name for trace in reading.traces}
+    quantities = {trace.attrs.get("measurement", trace.name) for trace in reading.traces}
+    for name in options.units:
+        if name not in names | quantities:
+            raise source.error("", f"units names {name!r}, which is no channel; there are: {names_of(sorted(names))}")
+
+    def unit(trace: Trace) -> str:
+        given = options.units.get(trace.name, options.units.get(trace.attrs.get("measurement", "")))
+        return trace.unit if given is None else given
+
+    if options.units:
+        reading.traces = [replace(trace, unit=unit(trace)) for trace in reading.traces]
+
+
+def _given(options: Options) -> dict[str, Any]:
+    """The arguments that differ from their defaults, for the provenance."""
+    default = Options()
+    return {name: value for name, value in vars(options).items() if value != getattr(default, name)}

@@ -1,0 +1,1 @@
+"""One file per format; what each ``read`` gives, ``assemble`` makes a ``Recording`` of."""

@@ -1,0 +1,191 @@
+"""PASCO Capstone experiments (``.cap``): a ZIP archive with ``main.xml`` and one member per block of data.
+
+``DataSource`` is a measurement, ``DataSet`` one run of it, ``DataSegmentElement`` a block. A member is a row of
+12-byte records, a valid flag (u32) and a value (f64), little-endian; the members are longer than what was measured, so
+trailing records have the flag 0, and the number of valid ones equals ``DataCacheDataSize``. A flag of 2 begins text
+that a user typed into a table; it is no measurement and is left out with a remark. ``BaseUnit`` is a unit, or the
+number of one in a table of the file (an element whose name holds ``Unit``, with that number as its ``...ID``).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.recordings.readers.archive import Archive
+from nonsmooth.recordings.readers.capstone_xml import Experiment, Segment, parse
+from nonsmooth.recordings.reading import Options, Reading, Source, Trace
+from nonsmooth.recordings.remarks import Remarks
+
+__all__ = ["RECORD", "SYNTHETIC", "read"]
+
+RECORD = np.dtype([("valid", "<u4"), ("value", "<f8")])
+
+#: What ``write_cap`` puts into the header's attribute ``Origin``.
+SYNTHETIC = "synthetic"
+
+_TYPED_TEXT = 2
+
+
+def read(data: bytes, source: Source, options: Options) -> Reading:
+    """Read a Capstone experiment."""
+    if options.columns is not None or options.rate is not None or options.axis != "time":
+        raise ValueError("columns, rate and axis do not concern a Capstone file, which says them itself")
+    archive = Archive(data, source)
+    if "main.xml" not in archive.names:
+        raise source.error("", "is a ZIP archive without main.xml; expected a PASCO Capstone experiment")
+    experiment = parse(archive.pieces("main.xml"), source)
+    reading = Reading()
+    reading.header = {**experiment.header, "sensors": experiment.sensors}
+    reading.synthetic = experiment.header.get("Origin", "").startswith(SYNTHETIC)
+    for run, name in experiment.empty:
+        reading.remarks.of(f"Run #{run}", name, "has no stored values (it may be calculated); left out")
+    comma = experiment.header.get("DecimalSeparator", ".") == ","
+    traces = []
+    for group in _groups(experiment, reading):
+        trace = _trace(group, archive, comma, experiment.units, reading.remarks, source)
+        if trace is not None:
+            traces.append(trace)
+    runs = dict.fromkeys(trace.run for trace in traces)
+    order = sorted(runs, key=lambda run: int(run.removeprefix("Run #")))
+    reading.traces = [trace for run in order for trace in traces if trace.run == run]
+    return reading
+
+
+def _groups(experiment: Experiment, reading: Reading) -> Iterator[list[Segment]]:
+    """The blocks of one measurement in one run, together."""
+    groups: dict[int, list[Segment]] = {}
+    for segment in experiment.segments:
+        if segment.deleted:
+            reading.remarks.of(_run(segment), segment.measurement, "deleted by the user in Capstone; left out")
+            continue
+        groups.setdefault(segment.data_set, []).append(segment)
+    return iter(groups.values())
+
+
+def _run(segment: Segment) -> str:
+    return f"Run #{segment.run}"
+
+
+def _trace(
+    group: list[Segment], archive: Archive, comma: bool, units: Mapping[str, str], remarks: Remarks, source: Source
+) -> Trace | None:
+    first = group[0]
+    place = f"main.xml, line {first.line}"
+    if not (first.run.isascii() and first.run.isdigit() and len(first.run) < 10):
+        raise source.error(place, f"DataGroupNumber is {first.run[:40]!r}, expected the number of a run")
+    run, name = _run(first), first.measurement
+    times, values = [], []
+    for segment in group:
+        stretch = _stretch(segment, archive, comma, source)
+        if stretch is None:
+            remarks.of(run, name, f"{segment.values} holds text that a user typed, no measurement; left out")
+            continue
+        if stretch.blank:
+            remarks.of(run, name, f"{stretch.blank} records between valid ones are marked invalid; they are NaN")
+        times.append(stretch.times)
+        values.append(stretch.values)
+    if not values:
+        return None
+    # As in the CSV export, so that a channel has one name in both.
+    port = first.channel.removeprefix("Ch ")
+    name = f"{first.measurement}, Ch {port}" if port else first.measurement
+    attrs = {"measurement": first.measurement} | ({"port": port} if port else {})
+    origin = ", ".join(segment.values for segment in group[:4]) + (", ..." if len(group) > 4 else "")
+    axis, column = (np.concatenate(times), np.concatenate(values)) if len(values) > 1 else (times[0], values[0])
+    unit = first.unit.strip()
+    if unit.isdigit():  # the number of a unit, not a unit
+        remedy = f"say it with units={{{name!r}: ...}}"
+        unit = units.get(unit, "")
+        if not unit:
+            remarks.of(run, name, f"its unit is number {first.unit} of a table that is not in the file; {remedy}")
+    return Trace(run, name, unit, axis, column, origin, attrs=attrs)
+
+
+@dataclass(frozen=True, eq=False)
+class _Stretch:
+    times: NDArray[np.float64]
+    values: NDArray[np.float64]
+    blank: int
+
+
+def _stretch(segment: Segment, archive: Archive, comma: bool, source: Source) -> _Stretch | None:
+    place = f"main.xml, line {segment.line}"
+    if not (segment.size.isascii() and segment.size.isdigit() and len(segment.size) < 16):
+        raise source.error(place, f"DataCacheDataSize is {segment.size[:40]!r}, expected a number of records")
+    size = int(segment.size)
+    values = _records(segment.values, size, archive, source)
+    if values is None:
+        return None
+    if size == 0:
+        return _Stretch(np.empty(0), np.empty(0), 0)
+    blank = len(values) - size
+    if segment.times:
+        times = _records(segment.times, size, archive, source)
+        if times is None or len(times) != len(values):
+            raise source.error(segment.times, f"does not hold one time for each of the {len(values)} values")
+        return _Stretch(times, values, blank)
+    start = _decimal(segment.start, comma)
+    interval = _decimal(segment.interval, comma)
+    if start is None or interval is None or not interval > 0:
+        raise source.error(
+            place,
+            f"the clock of {segment.values} is IntervalCacheStartValue = {segment.start[:40]!r}, "
+            f"IntervalCacheInterval = {segment.interval[:40]!r}; expected a time and a step > 0",
+        )
+    return _Stretch(start + interval * np.arange(len(values), dtype=np.float64), values, blank)
+
+
+def _records(member: str, size: int, archive: Archive, source: Source) -> NDArray[np.float64] | None:
+    """The values up to the last valid one (an invalid one before it is NaN); None if the member holds typed text."""
+    found: list[NDArray[np.float64]] = []
+    rest, records, valid, last = b"", 0, 0, 0
+    for piece in archive.pieces(member):
+        rest += piece
+        whole = len(rest) // RECORD.itemsize * RECORD.itemsize
+        table = np.frombuffer(rest[:whole], RECORD)
+        rest = rest[whole:]
+        if records == 0 and len(table) and table["valid"][0] == _TYPED_TEXT:
+            return None
+        odd = np.flatnonzero(table["valid"] > 1)
+        if len(odd):
+            k = int(odd[0])
+            raise source.error(
+                f"{member}, record {records + k + 1}", f"its valid flag is {table['valid'][k]}, expected 0 or 1"
+            )
+        marked = np.flatnonzero(table["valid"])
+        valid += len(marked)
+        if valid > size:
+            raise source.error(
+                f"{member}, record {records + len(table)}", f"has more valid records than the {size} of main.xml"
+            )
+        if len(marked):
+            last = records + int(marked[-1]) + 1
+        if valid < size or len(marked):
+            # Nothing behind the last valid record is kept.
+            end = int(marked[-1]) + 1 if valid == size else len(table)
+            found.append(np.where(table["valid"][:end] == 1, table["value"][:end], math.nan))
+        records += len(table)
+    if rest:
+        raise source.error(f"{member}, record {records + 1}", f"is cut short: {len(rest)} of {RECORD.itemsize} bytes")
+    if valid < size:
+        raise source.error(
+            f"{member}, record {records}", f"{valid} of {records} records are valid, main.xml announces {size}"
+        )
+    return np.concatenate(found)[:last] if found else np.empty(0)
+
+
+def _decimal(text: str, comma: bool) -> float | None:
+    if comma:
+        text = text.replace(",", ".")
+    if not text.isascii() or "_" in text or len(text) > 64:
+        return None
+    try:
+        value = float(text)
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None

@@ -1,0 +1,175 @@
+"""PASCO Capstone's CSV export: one header row, the columns of all runs side by side.
+
+A header reads ``<measurement>[, Ch <port>] (<unit>) <run>``; the unit may be missing and the run's name is free text.
+What ends a header can therefore not be told from that header alone: the ``Time`` columns begin with a known word, so
+they give the names of the runs, and every other header must end with one of these. Fields are separated by ``,`` with
+a decimal point, or by ``;`` with a decimal comma.
+"""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from nonsmooth.errors import DataFileError
+from nonsmooth.recordings.limits import MAX_COLUMNS
+from nonsmooth.recordings.readers.text_table import Cells, checked_header, decoded, read_cells, rows, split_unit
+from nonsmooth.recordings.reading import TIME_WORDS, Options, Reading, Source, Trace, names_of, scaled_time
+from nonsmooth.recordings.remarks import Remarks
+
+__all__ = ["SYNTHETIC", "looks_like_capstone", "read"]
+
+#: What ``write_capstone_csv`` puts behind a run's name: the only free text of the format.
+SYNTHETIC = " [synthetic]"
+
+_TIME = re.compile(
+    rf"(?:{'|'.join(sorted(map(re.escape, TIME_WORDS - {'t'}), key=len, reverse=True))})"
+    r"(?:\s*\((?P<unit>[^()]*)\))?(?:\s+(?P<run>.*\S))?\s*",
+    re.IGNORECASE | re.DOTALL,
+)
+_PORT = re.compile(r"(?P<measurement>.+), Ch (?P<port>[^,]+)", re.DOTALL)
+
+
+def looks_like_capstone(data: bytes, options: Options) -> bool:
+    """Return whether the first line holds a ``Time`` column with a run's name, and another column of that run."""
+    source = Source("", len(data), "", "")
+    begin = data[: 1 << 20]
+    end = begin.find(b"\n") + 1 or len(begin)
+    if begin.startswith((b"\xff\xfe", b"\xfe\xff")):
+        begin, end = begin[: len(begin) // 2 * 2], len(begin) // 2 * 2
+    try:
+        delimiter = options.delimiter or _delimiter(begin[:end], source)
+        header = next(rows(decoded(begin[:end], source, Remarks()), delimiter, source), (1, []))[1]
+    except DataFileError:
+        return False
+    # Stripped first: on much white space at the end the expression would try every way to share it out.
+    names = [text.strip() for text in header[: MAX_COLUMNS + 1]]
+    runs = [match["run"] for match in map(_TIME.fullmatch, names) if match and match["run"]]
+    return any(name.endswith(" " + run) and not _TIME.fullmatch(name) for run in runs for name in names)
+
+
+def read(data: bytes, source: Source, options: Options) -> Reading:
+    """Read a Capstone CSV export."""
+    if options.columns is not None or options.rate is not None or options.axis != "time":
+        raise ValueError("columns, rate and axis do not concern a Capstone file; read it with format='csv' to use them")
+    reading = Reading()
+    delimiter = options.delimiter or _delimiter(data, source)
+    decimal = options.decimal or ("." if delimiter == "," else None)
+    table = rows(decoded(data, source, reading.remarks), delimiter, source)
+    line, fields = next(table, (1, []))
+    header = checked_header(fields, line, source)
+    times, channels = _layout(header, source)
+    cells = read_cells(
+        table, header, range(len(header)), decimal, source, reading.remarks, ends_with_newline=data.endswith(b"\n")
+    )
+    for column, (run, label) in channels.items():
+        time = _time_of(times, run, column)
+        reading.traces.append(_trace(column, run, label, time, times[time][1], cells, source, reading.remarks))
+    used = {_time_of(times, run, column) for column, (run, _) in channels.items()}
+    for column, (run, _) in times.items():
+        if column not in used:
+            reading.remarks.of(run, header[column], "is the time of no channel")
+    runs = {run for run, _ in times.values()}
+    reading.synthetic = any(run.endswith(SYNTHETIC) for run in runs)
+    if reading.synthetic:
+        reading.traces = [_without_mark(trace) for trace in reading.traces]
+    reading.header = {"delimiter": delimiter, "columns": len(header), "rows": len(cells.lines)}
+    return reading
+
+
+def _layout(header: list[str], source: Source) -> tuple[dict[int, tuple[str, str]], dict[int, tuple[str, str]]]:
+    """Columns of time as (run, unit), and columns of values as (run, header without the run)."""
+    times: dict[int, tuple[str, str]] = {}
+    for column, text in enumerate(header):
+        match = _TIME.fullmatch(text.strip())
+        if match and match["run"]:
+            times[column] = (match["run"], (match["unit"] or "").strip())
+    if not times:
+        raise source.error(
+            "line 1",
+            f"no time column with a run's name, as 'Time (s) Run #1'; the columns are {names_of(header)}. "
+            "Export the time too, or read the file with format='csv' and columns= or rate=",
+        )
+    runs = sorted(dict.fromkeys(run for run, _ in times.values()), key=len, reverse=True)
+    channels: dict[int, tuple[str, str]] = {}
+    for column, text in enumerate(header):
+        if column in times or not text.strip():
+            continue
+        run = next((run for run in runs if text.strip().endswith(" " + run)), None)
+        if run is None:
+            raise source.error(
+                "line 1",
+                f"column {column + 1} ({text!r}) belongs to no run that has a time column "
+                f"({names_of(sorted(runs, key=len))}); export the time of its run too",
+            )
+        channels[column] = (run, text.strip().removesuffix(run).strip())
+    if not channels:
+        raise source.error("line 1", "holds time columns only; expected channels such as 'Position (m) Run #1'")
+    return times, channels
+
+
+def _time_of(times: dict[int, tuple[str, str]], run: str, column: int) -> int:
+    """The run's time column before this one, else its first."""
+    own = [k for k, (r, _) in times.items() if r == run]
+    before = [k for k in own if k < column]
+    return before[-1] if before else own[0]
+
+
+def _trace(
+    column: int, run: str, label: str, time: int, time_unit: str, cells: Cells, source: Source, remarks: Remarks
+) -> Trace:
+    name, unit = split_unit(label)
+    where = f"run {run!r}, channel {name!r}"
+    held = cells.rows[column]
+    timed = np.searchsorted(cells.rows[time], held)
+    found = timed < len(cells.rows[time])
+    found[found] = cells.rows[time][timed[found]] == held[found]
+    if not found.all():
+        line = cells.lines[held[int(np.flatnonzero(~found)[0])]]
+        raise source.error(f"line {line}", f"{where} has a value where its run has no time")
+    seconds = scaled_time(cells.values[time][timed], time_unit)
+    if seconds is None:
+        raise source.error("line 1", f"{where}: its time is in {time_unit!r}, which is no unit of time")
+    if not time_unit:
+        remarks.of(run, name, "the time has no unit; taken as seconds")
+    if len(held):
+        _, between = cells.blanks(column)
+        last_time = cells.rows[time][-1] if len(cells.rows[time]) else -1
+        trailing = int(np.count_nonzero(cells.rows[time] > held[-1]))
+        if trailing:
+            remarks.of(
+                run, name,
+                f"{trailing} trailing blanks dropped: it ends at line {cells.lines[held[-1]]}, "
+                f"the time of its run at line {cells.lines[last_time]}",
+            )  # fmt: skip
+        if between:
+            remarks.of(run, name, f"{between} blank fields before its last value dropped; it has its own clock")
+    match = _PORT.fullmatch(name)
+    attrs = {"measurement": match["measurement"], "port": match["port"]} if match else {"measurement": name}
+    return Trace(
+        run, name, unit, seconds, cells.values[column], f"column {column + 1}", lines=cells.lines[held], attrs=attrs
+    )
+
+
+def _without_mark(trace: Trace) -> Trace:
+    from dataclasses import replace
+
+    return replace(trace, run=trace.run.removesuffix(SYNTHETIC))
+
+
+def _delimiter(data: bytes, source: Source) -> str:
+    """``;`` if the first line holds one outside quotes, else ``,``."""
+    end = data.find(b"\n")
+    first = data[: end if end >= 0 else len(data)][: 1 << 20]
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        text = data[: min(len(data), 1 << 21) // 2 * 2].decode("utf-16", errors="replace").split("\n", 1)[0]
+    else:
+        text = first.decode("utf-8", errors="replace")
+    outside = "".join(text.split('"')[::2])
+    for candidate in ("\t", ";", ","):
+        if candidate in outside:
+            return candidate
+    if "\t" in text or not outside.strip():
+        return ","
+    raise source.error("line 1", "holds one field only; expected fields separated by ',' or ';'")

@@ -1,0 +1,216 @@
+"""Write recordings as PASCO Capstone would: CSV exports in both locales, and ``.cap`` experiments.
+
+For computed recordings, so that what reads a lab's files can be tried without a lab. Everything written here is
+labelled synthetic: in the header of a ``.cap``, behind each run's name in a CSV. ``load_recording`` reads the label.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+import tempfile
+import zipfile
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.errors import DataFileError
+from nonsmooth.recordings.readers import capstone_cap, capstone_csv
+from nonsmooth.recordings.recording import Recording
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["write_cap", "write_capstone_csv"]
+
+_PAGE = 256  # records; Capstone's members are longer than what was measured
+
+
+def write_capstone_csv(
+    recording: Recording,
+    path: str | os.PathLike[str],
+    *,
+    decimal: str = ".",
+    digits: int = 8,
+    byte_order_mark: bool = True,
+) -> Path:
+    """Write a recording as Capstone's CSV export, labelled synthetic.
+
+    One header row, the runs side by side, one time column per run. Sensors of other rates leave blanks, and so does a
+    value that is not a finite number. A reader gets back the digits written, not the doubles.
+
+    Parameters
+    ----------
+    recording : Recording
+        Over ``time``.
+    path : path
+        Replaced if it is there.
+    decimal : {".", ","}
+        ``","`` writes the other locale: ``;`` between fields.
+    digits : int
+        Decimals of every number (Capstone writes 8).
+    byte_order_mark : bool
+        Begin with the mark of UTF-8.
+
+    Raises
+    ------
+    ValueError
+        If the recording has another axis than time, ``decimal`` or ``digits`` is neither of those above, or two
+        samples of a channel fall on one printed time.
+    """
+    if decimal not in (".", ","):
+        raise ValueError(f"decimal must be '.' or ',', got {decimal!r}")
+    if not 1 <= digits <= 17:
+        raise ValueError(f"digits must be 1 to 17, got {digits!r}")
+    headers: list[str] = []
+    columns: list[list[str]] = []
+    for run in recording.runs:
+        label = f"{_long_name(recording, run)}{capstone_csv.SYNTHETIC}"
+        sensors = list(_sensors(recording, run))
+        printed = [[_print(t, digits) for t in ds["time"].values.tolist()] for ds in sensors]
+        times = dict(sorted({text: float(text) for texts in printed for text in texts}.items(), key=lambda kv: kv[1]))
+        row = {text: k for k, text in enumerate(times)}
+        headers.append(f"Time (s) {label}")
+        columns.append(list(times))
+        for ds, texts in zip(sensors, printed, strict=True):
+            if len(set(texts)) < len(texts):
+                raise ValueError(f"run {run!r}: {digits} decimals are too few for its times; samples would coincide")
+            for name, array in ds.data_vars.items():
+                unit = f" ({array.attrs['units']})" if array.attrs.get("units") else ""
+                headers.append(f"{array.attrs.get('long_name', name)}{unit} {label}")
+                column = [""] * len(times)
+                for text, value in zip(texts, array.values.tolist(), strict=True):
+                    column[row[text]] = _print(value, digits) if np.isfinite(value) else ""
+                columns.append(column)
+    longest = max(map(len, columns), default=0)
+    table = io.StringIO(newline="")
+    writer = csv.writer(table, delimiter=";" if decimal == "," else ",", lineterminator="\r\n")
+    writer.writerow(headers)
+    for k in range(longest):
+        fields = (column[k] if k < len(column) else "" for column in columns)
+        writer.writerow([f.replace(".", decimal) for f in fields])
+    mark = b"\xef\xbb\xbf" if byte_order_mark else b""
+    return _put(Path(path), mark + table.getvalue().encode("utf-8"))
+
+
+def write_cap(recording: Recording, path: str | os.PathLike[str], *, sensors: Sequence[Mapping[str, str]] = ()) -> Path:
+    """Write a recording as a Capstone experiment, labelled synthetic; values and times come back bit for bit.
+
+    Runs are numbered from 1 in the recording's order: the format has no names for them. An even clock is written as
+    start and interval where these give back every time exactly, else as a member of its own.
+
+    Parameters
+    ----------
+    recording : Recording
+        Over ``time``.
+    path : path
+        Replaced if it is there.
+    sensors : sequence of mappings
+        Attributes of ``Sensor`` elements, such as ``{"Name": "Rotary Motion Sensor", "SamplePeriod": "0.01"}``.
+
+    Raises
+    ------
+    ValueError
+        If the recording has another axis than time.
+    """
+    members: dict[str, bytes] = {}
+    sources: dict[tuple[str, str, str], list[str]] = {}
+    for group, run in enumerate(recording.runs, 1):
+        for ds in _sensors(recording, run):
+            time = ds["time"].values.astype(np.float64)
+            clock = _even(time)
+            if clock is None:
+                times = f"data/{len(members) + 1:08d}.tmp"
+                members[times] = _records(time)
+                independent = f'FileName="{times}"'
+            else:
+                independent = f'IntervalCacheStartValue="{clock[0]!r}" IntervalCacheInterval="{clock[1]!r}"'
+            for name, array in ds.data_vars.items():
+                values = f"data/{len(members) + 1:08d}.tmp"
+                members[values] = _records(array.values.astype(np.float64))
+                port = str(array.attrs.get("port", ""))
+                measurement = str(array.attrs.get("measurement", array.attrs.get("long_name", name)))
+                key = (measurement, port, str(array.attrs.get("units", "")))
+                sources.setdefault(key, []).append(
+                    f'      <DataSet DataGroupNumber="{group}">\n        <DataSegmentElement>\n'
+                    f'          <DependentStorageElement FileName="{values}" DataCacheDataSize="{array.size}"/>\n'
+                    f"          <IndependentStorageElement {independent}/>\n"
+                    "        </DataSegmentElement>\n      </DataSet>\n"
+                )
+    xml = _document(sources, sensors)
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        # A fixed date: equal recordings give equal files.
+        for name, content in {"main.xml": xml.encode("utf-8"), **members}.items():
+            info = zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0))
+            info.compress_type = zipfile.ZIP_DEFLATED
+            archive.writestr(info, content)
+    return _put(Path(path), packed.getvalue())
+
+
+def _document(sources: Mapping[tuple[str, str, str], list[str]], sensors: Sequence[Mapping[str, str]]) -> str:
+    lines = [
+        '<?xml version="1.0" encoding="utf-8"?>\n<DSProExperiment>\n',
+        '  <Header Version="1" DecimalSeparator="." '
+        f'Origin="{capstone_cap.SYNTHETIC}: computed by nonsmooth, not measured"/>\n',
+    ]
+    for sensor in sensors:
+        lines.append(f"  <Sensor {' '.join(f'{key}={quoteattr(str(value))}' for key, value in sensor.items())}/>\n")
+    lines.append("  <DataRepository>\n")
+    for (measurement, port, unit), sets in sources.items():
+        named = {"MeasurementName": measurement, "ChannelIDName": port, "BaseUnit": unit}
+        shown = " ".join(f"{key}={quoteattr(value)}" for key, value in named.items() if value)
+        lines += [f"    <DataSource {shown}>\n", *sets, "    </DataSource>\n"]
+    return "".join([*lines, "  </DataRepository>\n</DSProExperiment>\n"])
+
+
+def _sensors(recording: Recording, run: str) -> Iterator[xr.Dataset]:
+    for sensor, leaf in recording.tree[run].children.items():
+        dataset = leaf.to_dataset()
+        if tuple(dataset.dims) != ("time",):
+            raise ValueError(f"run {run!r}, sensor {sensor!r} is over {tuple(dataset.dims)}; only time can be written")
+        yield dataset
+
+
+def _long_name(recording: Recording, run: str) -> str:
+    return str(recording.tree[run].attrs.get("long_name") or run)
+
+
+def _print(value: float, digits: int) -> str:
+    text = f"{value:.{digits}f}"
+    return text.removeprefix("-") if float(text) == 0 else text
+
+
+def _records(values: NDArray[np.float64]) -> bytes:
+    table = np.zeros(-(-max(len(values), 1) // _PAGE) * _PAGE, capstone_cap.RECORD)
+    table["valid"][: len(values)] = 1
+    table["value"][: len(values)] = values
+    return table.tobytes()
+
+
+def _even(time: NDArray[np.float64]) -> tuple[float, float] | None:
+    """Start and interval that give back every time exactly, as the reader computes them."""
+    if len(time) < 2:
+        return (float(time[0]), 1.0) if len(time) else (0.0, 1.0)
+    start, mean = float(time[0]), float((time[-1] - time[0]) / (len(time) - 1))
+    index = np.arange(len(time))
+    for interval in (mean, float(time[1] - time[0]), float(f"{mean:.6g}"), float(f"{mean:.12g}")):
+        if interval > 0 and np.array_equal(start + interval * index, time):
+            return start, interval
+    return None
+
+
+def _put(target: Path, content: bytes) -> Path:
+    """Write beside the place and move there when whole."""
+    if not target.parent.is_dir():
+        raise DataFileError(f"{target}: the folder {target.parent} does not exist; create it first")
+    with tempfile.TemporaryDirectory(prefix=f".{target.name}-", dir=target.parent) as folder:
+        fresh = Path(folder) / "new"
+        fresh.write_bytes(content)
+        os.replace(fresh, target)
+    return target

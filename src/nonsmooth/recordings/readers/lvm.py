@@ -1,0 +1,278 @@
+"""LabVIEW measurement files (``.lvm``): a header, then segments of ``Samples``, ``X0``, ``Delta_X`` and rows of values.
+
+Each segment is a run. ``Samples`` counts the first write only, so rows are read on to the next header or the end.
+Channels may have unequal numbers of samples; the k-th value of a channel is its k-th sample, whatever row it is
+printed in. The ``X_Value`` column is the clock of the first channel. A channel with the same step follows it, shifted
+by the difference of their ``X0`` (the column does not add up the rounding of ``Delta_X``); any other has
+X0 + k Delta_X.
+"""
+
+from __future__ import annotations
+
+import math
+from array import array
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.recordings.limits import MAX_COLUMNS
+from nonsmooth.recordings.readers.text_table import decoded, number
+from nonsmooth.recordings.reading import Options, Reading, Source, Trace
+from nonsmooth.recordings.remarks import Remarks
+
+__all__ = ["read"]
+
+_END = "***End_of_Header***"
+_MAX_SEGMENTS = 1024
+_MAX_COMMENTS = 64  # kept per segment
+
+Lines = Iterator[tuple[int, list[str]]]
+
+
+@dataclass
+class _Segment:
+    """A segment's header and its columns of values, each with rows (from 0); the lines and X of the rows."""
+
+    line: int
+    names: list[str]
+    fields: dict[str, list[str]]
+    x: list[array[float]]
+    values: list[array[float]]
+    rows: list[array[int]]
+    lines: array[int] = field(default_factory=lambda: array("q"))
+    comments: list[str] = field(default_factory=list)
+    more_comments: int = 0
+
+
+def read(data: bytes, source: Source, options: Options) -> Reading:
+    """Read a LabVIEW measurement file."""
+    if options.columns is not None or options.rate is not None:
+        raise ValueError("columns and rate do not concern a .lvm file, which says them itself; take channels by name")
+    reading = Reading()
+    separator, lines = _lines(data, source, reading.remarks)
+    header = _keys(lines, source, "the file's header")
+    reading.header = {key: " ".join(values) for key, values in header.items() if key}
+    decimal = _word(header, "Decimal_Separator", ".") or "."
+    if decimal not in ".," or len(decimal) != 1 or decimal == separator:
+        raise source.error("", f"Decimal_Separator is {decimal[:20]!r}, expected '.' or ','")
+    clocks = _word(header, "X_Columns", "One")
+    if clocks not in ("One", "No", "Multi"):
+        raise source.error("", f"X_Columns is {clocks[:20]!r}, expected One, No or Multi")
+    ends = data.endswith(b"\n")
+    for k, segment in enumerate(_segments(lines, clocks, decimal, source, ends), 1):
+        run = f"Segment {k}"
+        if segment.comments:
+            extra = [f"(and {segment.more_comments} more)"] if segment.more_comments else []
+            reading.run_attrs[run] = {"comments": "\n".join(segment.comments + extra)}
+        reading.traces += _traces(run, segment, clocks, decimal, source, options, reading.remarks)
+    if not reading.traces:
+        raise source.error("", f"holds no segment of data after its header; expected one that ends in {_END}")
+    return reading
+
+
+def _lines(data: bytes, source: Source, remarks: Remarks) -> tuple[str, Lines]:
+    """The separator, and the lines split by it, with their numbers."""
+    stream = decoded(data, source, remarks)
+    top: list[str] = []
+    separator = "\t"
+    for text in stream:
+        top.append(text)
+        if text.startswith("Separator"):
+            separator = "," if text.rstrip().endswith("Comma") else "\t"
+        if text.startswith(_END) or len(top) > 200:
+            break
+    if not top or not top[0].lstrip().startswith("LabVIEW Measurement"):
+        raise source.error("line 1", "expected 'LabVIEW Measurement'")
+
+    def split() -> Lines:
+        special = False
+        for number_, text in enumerate(_both(top, stream), 1):
+            # Blocks of other programs' data; their own business.
+            if text.startswith("***Start_Special***"):
+                special = True
+            if not special:
+                yield number_, text.rstrip("\r\n").split(separator)
+            if text.startswith("***End_Special***"):
+                special = False
+
+    return separator, split()
+
+
+def _both(top: list[str], rest: Iterator[str]) -> Iterator[str]:
+    yield from top
+    yield from rest
+
+
+def _keys(lines: Lines, source: Source, what: str, first: list[str] | None = None) -> dict[str, list[str]]:
+    """Key and values of each line up to the end of a header."""
+    found: dict[str, list[str]] = {first[0].strip(): first[1:]} if first else {}
+    for _, fields in lines:
+        if fields[0].startswith(_END):
+            return found
+        if len(found) > 256:
+            break
+        if fields[0].strip():
+            found[fields[0].strip()] = fields[1:]
+    raise source.error("", f"{what} has no end; expected {_END}")
+
+
+def _word(header: dict[str, list[str]], key: str, default: str) -> str:
+    values = header.get(key) or [default]
+    return values[0].strip() if len(values[0].strip()) else values[0][:1] or default
+
+
+def _segments(lines: Lines, clocks: str, decimal: str, source: Source, ends: bool) -> Iterator[_Segment]:
+    segment: _Segment | None = None
+    count = 0
+    last = 0
+    channels = 0
+    for line, fields in lines:
+        if not any(f.strip() for f in fields):
+            continue
+        key = fields[0].strip()
+        if key and (key[0].isalpha() or key.startswith("*")) and number(key, decimal) is None:
+            if segment is not None:
+                yield segment
+            count += 1
+            if count > _MAX_SEGMENTS:
+                raise source.error(f"line {line}", f"holds more than {_MAX_SEGMENTS} segments")
+            segment = _begin(line, fields, lines, clocks, source)
+            channels += len(segment.names)
+            if channels > MAX_COLUMNS:
+                held = f"its {count} segments hold {channels} channels so far"
+                raise source.error(f"line {line}", f"{held}; at most {MAX_COLUMNS} are read")
+            last = 0
+        elif segment is None:
+            raise source.error(f"line {line}", "holds values before any segment's header")
+        else:
+            _row(segment, line, fields, clocks, decimal, source)
+            last = len(fields) if not ends else 0
+    if segment is not None:
+        if last and last < _width(segment, clocks):
+            raise source.error(f"line {segment.lines[-1]}", "ends in the middle of a row: the file is cut short")
+        yield segment
+
+
+def _begin(line: int, fields: list[str], lines: Lines, clocks: str, source: Source) -> _Segment:
+    header = _keys(lines, source, f"the segment's header that begins in line {line}", fields)
+    said = _word(header, "Channels", "")
+    if not (said.isascii() and said.isdigit()) or not 0 < int(said[:9]) <= MAX_COLUMNS:
+        raise source.error(f"line {line}", f"Channels is {said[:20]!r}, expected a number from 1 to {MAX_COLUMNS}")
+    n = int(said)
+    at, top = next(lines, (line, []))
+    if not top or top[0].strip() != "X_Value":
+        raise source.error(f"line {at}", "expected the names of the columns, beginning with X_Value")
+    names = top[1:] if clocks != "Multi" else top[1::2]
+    if len(names) < n:
+        raise source.error(f"line {at}", f"names {len(names)} columns, the segment has {n} channels")
+    return _Segment(
+        line, [name.strip() for name in names[:n]], header,
+        [array("d") for _ in range(n if clocks == "Multi" else 1)],
+        [array("d") for _ in range(n)], [array("q") for _ in range(n)],
+    )  # fmt: skip
+
+
+def _width(segment: _Segment, clocks: str) -> int:
+    n = len(segment.names)
+    return 2 * n if clocks == "Multi" else n + 1
+
+
+def _row(segment: _Segment, line: int, fields: list[str], clocks: str, decimal: str, source: Source) -> None:
+    row = len(segment.lines)
+    segment.lines.append(line)
+    width = _width(segment, clocks)
+    comment = [text.strip() for text in fields[width:] if text.strip()]
+    if comment and len(segment.comments) < _MAX_COMMENTS:
+        segment.comments.append(f"line {line}: {' '.join(comment)[:400]}")
+    elif comment:
+        segment.more_comments += 1
+    if clocks == "One":
+        segment.x[0].append(_value(fields[0], "X_Value", line, decimal, source))
+    # A short row costs what it weighs, however many channels the header announces.
+    present = len(fields) // 2 if clocks == "Multi" else len(fields) - 1
+    for k, name in enumerate(segment.names[:present]):
+        place = 2 * k + 1 if clocks == "Multi" else k + 1
+        text = fields[place]
+        if text and not text.isspace():
+            segment.values[k].append(_value(text, name, line, decimal, source))
+            segment.rows[k].append(row)
+            if clocks == "Multi":
+                segment.x[k].append(_value(fields[place - 1], f"X_Value of {name}", line, decimal, source))
+
+
+def _value(text: str, name: str, line: int, decimal: str, source: Source) -> float:
+    if not text.strip():
+        return math.nan
+    value = number(text, decimal)
+    if value is None:
+        raise source.error(
+            f"line {line}", f"column {name!r} holds {text[:40]!r}, expected a number with the decimal mark {decimal!r}"
+        )
+    return value
+
+
+def _traces(
+    run: str, segment: _Segment, clocks: str, decimal: str, source: Source, options: Options, remarks: Remarks
+) -> Iterator[Trace]:
+    at = f"line {segment.line}"
+    n = len(segment.names)
+    start = _numbers(segment, "X0", 0.0, decimal, at, source)
+    step = _numbers(segment, "Delta_X", math.nan, decimal, at, source)
+    said = _numbers(segment, "Samples", math.nan, decimal, at, source)
+    units = _texts(segment, "Y_Unit_Label", n)
+    lines = np.frombuffer(segment.lines, np.int64) if segment.lines else np.empty(0, np.int64)
+    clock = np.frombuffer(segment.x[0], np.float64) if segment.x[0] else np.empty(0)
+    dimension = (_texts(segment, "X_Dimension", n)[0] or "Time").strip()
+    if dimension.casefold() != options.axis.casefold():
+        raise source.error(at, f"its channels are over {dimension!r}; read it with axis={dimension.lower()!r}")
+    unit = "s" if options.axis == "time" else _texts(segment, "X_Unit_Label", n)[0]
+    dates, times = _texts(segment, "Date", n), _texts(segment, "Time", n)
+    for k, name in enumerate(segment.names):
+        where = f"run {run!r}, channel {name!r}"
+        rows = np.frombuffer(segment.rows[k], np.int64) if segment.rows[k] else np.empty(0, np.int64)
+        values = np.frombuffer(segment.values[k], np.float64) if segment.values[k] else np.empty(0)
+        if clocks == "Multi":
+            axis = np.frombuffer(segment.x[k], np.float64) if segment.x[k] else np.empty(0)
+        elif clocks == "One" and _same(step[k], step[0]) and len(rows) and len(clock):
+            axis = clock[rows] + (start[k] - start[0])
+        else:
+            if len(values) > 1 and not step[k] > 0:
+                raise source.error(at, f"{where}: Delta_X is {step[k]:g}, expected a step > 0")
+            axis = start[k] + np.arange(len(values)) * (step[k] if step[k] > 0 else 1.0)
+        blanks = len(lines) - len(values)
+        if blanks and len(values):
+            remarks.of(run, name, f"{blanks} blank fields dropped; {len(values)} values in {len(lines)} rows")
+        if said[k] < len(values):
+            remarks.of(run, name, f"Samples says {said[k]:g} (its first write), {len(values)} were read")
+        elif said[k] > len(values):
+            remarks.of(run, name, f"Samples says {said[k]:g}, only {len(values)} follow; the file may be cut short")
+        if k and start[k] != start[0]:
+            remarks.of(run, name, f"its clock begins at X0 = {start[k]:g}, that of the first channel at {start[0]:g}")
+        begun = f"{dates[k]} {times[k]}".strip()
+        yield Trace(
+            run, name, units[k], axis, values, f"column {k + 2} from line {segment.line} on", unit,
+            lines=lines[rows], attrs={"started": begun} if begun else {},
+        )  # fmt: skip
+
+
+def _same(one: float, other: float) -> bool:
+    return one == other or (math.isnan(one) and math.isnan(other))
+
+
+def _texts(segment: _Segment, key: str, n: int) -> list[str]:
+    return ([text.strip() for text in segment.fields.get(key, [])] + [""] * n)[:n]
+
+
+def _numbers(
+    segment: _Segment, key: str, default: float, decimal: str, place: str, source: Source
+) -> NDArray[np.float64]:
+    found = np.full(len(segment.names), default)
+    for k, text in enumerate(_texts(segment, key, len(segment.names))):
+        if text:
+            value = number(text, decimal)
+            if value is None or not math.isfinite(value):
+                raise source.error(place, f"{key} of channel {k + 1} is {text[:40]!r}, expected a number")
+            found[k] = value
+    return found

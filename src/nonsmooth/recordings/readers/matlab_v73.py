@@ -1,0 +1,114 @@
+"""MATLAB files of version 7.3, which are HDF5: read by h5py, within limits, following nothing out of the file."""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+import numpy as np
+
+from nonsmooth.errors import DataFileError
+from nonsmooth.recordings.limits import MAX_COLUMNS, MAX_DEPTH, inflation_limit
+from nonsmooth.recordings.reading import Source
+from nonsmooth.recordings.remarks import Remarks
+
+__all__ = ["load_v73"]
+
+
+def load_v73(data: bytes, source: Source, remarks: Remarks) -> dict[str, Any]:
+    """The variables of a file, as dicts (structs), lists (cells, arrays of structs), text and arrays."""
+    import h5py
+
+    try:
+        with h5py.File(io.BytesIO(data), "r") as opened:
+            return _Reader(h5py, opened, source, remarks, inflation_limit(len(data))).group(opened, 0)
+    except DataFileError:
+        raise
+    # A damaged file surfaces as almost any exception of the library.
+    except Exception as error:
+        message = f"cannot be read as HDF5, it is damaged or cut short ({type(error).__name__}: {error})"
+        raise source.error("", message[:300]) from error
+
+
+class _Reader:
+    def __init__(self, h5py: Any, opened: Any, source: Source, remarks: Remarks, limit: int) -> None:
+        self._h5py, self._file, self._source, self._remarks = h5py, opened, source, remarks
+        self._left = self._limit = limit
+        self._members = 16 * MAX_COLUMNS
+
+    def group(self, group: Any, depth: int) -> dict[str, Any]:
+        if depth > MAX_DEPTH:
+            raise self._source.error(str(group.name), f"is nested deeper than {MAX_DEPTH}")
+        found: dict[str, Any] = {}
+        for name in group:
+            place = f"{group.name.rstrip('/')}/{name}"
+            # What MATLAB keeps for itself is reached by references only.
+            if name.startswith("#"):
+                continue
+            if not isinstance(group.get(name, getlink=True), self._h5py.HardLink):
+                self._remarks.say(f"{place}: is a link; left out")
+                continue
+            found[name] = self._value(group[name], place, depth)
+        return found
+
+    def _value(self, item: Any, place: str, depth: int) -> Any:
+        self._members -= 1
+        if self._members < 0:
+            raise self._source.error(place, f"the file holds more than {16 * MAX_COLUMNS} arrays")
+        if isinstance(item, self._h5py.Group):
+            return _rows(self.group(item, depth + 1), item)
+        if not isinstance(item, self._h5py.Dataset):
+            self._remarks.say(f"{place}: is neither a group nor an array; left out")
+            return None
+        return self._array(item, place, depth)
+
+    def _array(self, item: Any, place: str, depth: int) -> Any:
+        kind = item.attrs.get("MATLAB_class", b"")
+        kind = kind.decode("ascii", "replace") if isinstance(kind, bytes) else str(kind)
+        if "MATLAB_empty" in item.attrs:
+            return "" if kind == "char" else np.empty(0)
+        if item.is_virtual or item.external:
+            self._remarks.say(f"{place}: its values are in other files; left out")
+            return None
+        refers = self._h5py.check_ref_dtype(item.dtype) is not None
+        compound = item.dtype.names is not None
+        if not refers and not compound and item.dtype.kind not in "fiub":
+            self._remarks.say(f"{place}: holds {item.dtype} values, no numbers; left out")
+            return None
+        if item.shape is None:
+            return np.empty(0)
+        self._left -= item.size * max(1, item.dtype.itemsize)
+        if self._left < 0 or item.size > max(4096, 1100 * item.id.get_storage_size()):
+            raise self._source.error(
+                place, f"says it holds {item.shape} values, more than a file of {self._source.size} bytes warrants"
+            )
+        values = item[()]
+        if refers:
+            flat = np.asarray(values).ravel()
+            members = [self._value(self._file[ref], f"{place}({k})", depth + 1) if ref else None
+                       for k, ref in enumerate(flat, 1)]  # fmt: skip
+            if depth > MAX_DEPTH:
+                raise self._source.error(place, f"is nested deeper than {MAX_DEPTH}")
+            return members if kind == "cell" else _Column(members)
+        values = np.asarray(values)
+        if compound:
+            if values.dtype.names != ("real", "imag"):
+                self._remarks.say(f"{place}: holds compound values; left out")
+                return None
+            values = values["real"] + 1j * values["imag"]
+        if kind == "char":
+            codes = values.T.ravel(order="F")
+            return codes.astype("<u2").tobytes().decode("utf-16-le", errors="replace")
+        return values.T  # MATLAB's order
+
+
+class _Column(list[Any]):
+    """One field of an array of structs: its values in each of them."""
+
+
+def _rows(fields: dict[str, Any], group: Any) -> Any:
+    """A struct, or an array of structs, which is stored by field."""
+    columns = list(fields.values())
+    if columns and all(isinstance(c, _Column) for c in columns) and len({len(c) for c in columns}) == 1:
+        return [{name: column[k] for name, column in fields.items()} for k in range(len(columns[0]))]
+    return fields

@@ -1,0 +1,222 @@
+"""Contacts with a soft support, found in a record.
+
+A soft contact lasts for several samples (82 ms, 8 samples at 100 Hz, for the support of Savi et al. 2007): it shows as
+a force that the free motion does not have.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from nonsmooth.errors import SolveError
+from nonsmooth.recordings.signals.checks import signal
+from nonsmooth.recordings.signals.smoothing import smooth
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["contacts"]
+
+_UNDECIDED = 0.01  # of the samples: at the edge of contact, of which none is used for the support
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+def contacts(
+    time: ArrayLike,
+    x: Any,
+    *,
+    resolution: float,
+    gap: float | None = None,
+    omega: float | None = None,
+    least_depth: float | None = None,
+) -> xr.Dataset:
+    """Intervals in which the motion is pushed back by a soft support that lies above, x > gap.
+
+    Without a gap given: the acceleration of the free motion is fitted, a = a_0 - p x - q v (and a forcing of the
+    frequency ``omega``), first where x is low, then wherever it holds. What is left over is the support's, and begins
+    at the gap: left(x) = -s (x - g), a straight line over x, whose zero is the gap found. The signal is then smoothed
+    again with these contacts, and all is repeated.
+
+    Parameters
+    ----------
+    time, x : array_like, shape (N,)
+        Seconds and position.
+    resolution : float
+        The step of the sensor, in the unit of ``x``.
+    gap : float, optional
+        Where the support begins, if known.
+    omega : float, optional
+        Angular frequency of the drive, which sharpens the free motion; without it, it is sought.
+    least_depth : float, optional
+        Shallower contacts are ``uncertain``; default is 3 resolutions.
+
+    Returns
+    -------
+    Dataset
+        Over ``contact``: ``begin``, ``end`` (where x passes the gap, interpolated; a damped support lets go
+        c_s / k_s before that, 0.5 ms in the paper's), ``begin_error``, ``end_error``, ``depth``, ``v_begin``, ``v_end``
+        and ``uncertain`` (shallow, cut off by the record's ends, or seen by fewer than two samples). Scalars: ``gap``,
+        ``gap_error``, ``stiffness`` (s, that of the support by the mass, 1/s^2). No contact: an empty dim and NaN.
+
+    Raises
+    ------
+    ValueError
+        If the record is too short.
+    """
+    t, values = signal(time, x, least=32, purpose="finding contacts")
+    found = smooth(t, values, resolution=resolution)
+    if gap is not None:
+        place = (float(gap), 0.0, math.nan)
+        found = smooth(t, values, resolution=resolution, contacts=_intervals(found, place[0])[:2])
+    else:
+        place = _support(found, omega, resolution)
+        for _ in range(2):
+            if math.isnan(place[0]):
+                break
+            inside = _intervals(found, place[0])[:2]
+            if len(inside[0]) == 0:
+                break
+            found = smooth(t, values, resolution=resolution, contacts=inside)
+            place = _support(found, omega, resolution)
+    return _labelled(found, place, 3.0 * resolution if least_depth is None else least_depth, x)
+
+
+def _support(found: xr.Dataset, omega: float | None, resolution: float) -> tuple[float, float, float]:
+    """Gap, its error, and stiffness by mass; NaN where nothing pushes."""
+    none = (math.nan, math.nan, math.nan)
+    t, x = found["time"].values, found["x"].values
+    free = x <= np.median(x)
+    left, free = _beside_the_free_motion(found, omega, free)
+    if omega is None and len(left):
+        drive = _drive(t, left, free)
+        if drive is not None:
+            left, free = _beside_the_free_motion(found, drive, x <= np.median(x))
+    if len(left) == 0:
+        return none
+    pushed = ~free & (x > np.median(x))
+    if np.count_nonzero(pushed) < 4:
+        return none
+    # A straight line over x, and of the samples near its zero none: there the smoother rounds the corner.
+    deep = pushed & (left < 0.25 * np.quantile(left[pushed], 0.05))
+    if np.count_nonzero(deep) < 4 or np.ptp(x[deep]) < 2.0 * resolution:
+        deep = pushed
+    B = np.column_stack([np.ones(np.count_nonzero(deep)), x[deep]])
+    line, *_ = np.linalg.lstsq(B, left[deep], rcond=None)
+    if line[1] >= 0:
+        return none
+    rest = left[deep] - B @ line
+    variance = float(rest @ rest) / max(len(rest) - 2, 1)
+    C = variance * np.linalg.inv(B.T @ B)
+    g = -line[0] / line[1]
+    along = np.array([1.0, g]) / line[1]
+    # Samples of one contact are not independent: some 4 of them say as much as one.
+    return float(g), 2.0 * math.sqrt(float(along @ C @ along)), float(-line[1])
+
+
+def _beside_the_free_motion(found: xr.Dataset, omega: float | None, free: Mask) -> tuple[Floats, Mask]:
+    """Acceleration that the free motion does not explain, and the samples that it does; empty if it fits nowhere."""
+    t, x, v, a = (found[name].values for name in ("time", "x", "v", "a"))
+    columns = [np.ones_like(x), x, v]
+    if omega is not None:
+        columns += [np.cos(omega * t), np.sin(omega * t)]
+    A = np.column_stack(columns)
+    left = a
+    for _ in range(30):
+        if np.count_nonzero(free) < 4 * len(columns):
+            return np.zeros(0), free
+        p, *_ = np.linalg.lstsq(A[free], a[free], rcond=None)
+        left = a - A @ p
+        spread = 1.4826 * float(np.median(np.abs(left[free] - np.median(left[free]))))
+        level = max(4.0 * spread, 3.0 * float(np.median(found["a_error"].values)))
+        again = left > -level
+        changed, free = int(np.count_nonzero(again != free)), again
+        if not changed:
+            break
+    else:
+        if changed > _UNDECIDED * len(free):
+            raise SolveError(
+                f"which samples are free of the support cannot be told: {changed} of {len(free)} change sides from "
+                "round to round; give the gap, or the drive's frequency"
+            )
+    return left, free
+
+
+def _drive(t: Floats, left: Floats, free: Mask) -> float | None:
+    """The frequency of a forcing in what is left of the free motion: its largest line, with zeros in the gaps."""
+    from scipy import fft
+
+    n = len(t)
+    held = np.where(free, left - left[free].mean(), 0.0)
+    even = np.interp(np.linspace(t[0], t[-1], n), t, held)
+    lines = np.abs(fft.rfft(even, 8 * n)) ** 2
+    low, high = 16, 2 * n  # two periods in the record; half of what the sample rate shows
+    best = low + int(np.argmax(lines[low:high]))
+    # The share of the variance that the line explains; white noise does not reach it.
+    share = 2.0 * lines[best] / (np.count_nonzero(free) * float(held @ held)) if held.any() else 0.0
+    if share < 0.05 or best in (low, high - 1):
+        return None
+    a, b, c = lines[best - 1 : best + 2]
+    place = best + 0.5 * (a - c) / (a - 2 * b + c)
+    return float(2 * np.pi * place * (n - 1) / (8 * n * (t[-1] - t[0])))
+
+
+def _intervals(found: xr.Dataset, gap: float) -> tuple[Floats, Floats, Mask]:
+    """Begin and end of each interval with x > gap, and whether the record cuts it off."""
+    from nonsmooth.recordings.signals.sections import poincare
+
+    t, x = found["time"].values, found["x"].values
+    motion = (t, found["x"], found["v"].values)
+    begin = poincare(*motion, level=gap, rising=True)["time"].values
+    end = poincare(*motion, level=gap, rising=False)["time"].values
+    cut_first, cut_last = bool(x[0] > gap), bool(x[-1] > gap)
+    begin = np.concatenate([[t[0]], begin]) if cut_first else begin
+    end = np.concatenate([end, [t[-1]]]) if cut_last else end
+    n = min(len(begin), len(end))
+    cut = np.zeros(n, np.bool_)
+    if n:
+        cut[0] |= cut_first
+        cut[-1] |= cut_last
+    keep = begin[:n] < end[:n]
+    return begin[:n][keep], end[:n][keep], cut[keep]
+
+
+def _labelled(found: xr.Dataset, place: tuple[float, float, float], least: float, x: Any) -> xr.Dataset:
+    import xarray as xr
+
+    gap, gap_error, stiffness = place
+    t, position = found["time"].values, found["x"].values
+    if math.isnan(gap):
+        begin, end, cut = np.zeros(0), np.zeros(0), np.zeros(0, np.bool_)
+    else:
+        begin, end, cut = _intervals(found, gap)
+    speed = [np.interp(at, t, found["v"].values) for at in (begin, end)]
+    own = [np.interp(at, t, found["x_error"].values) for at in (begin, end)]
+    errors = [np.hypot(e, gap_error) / np.maximum(np.abs(v), 1e-300) for e, v in zip(own, speed, strict=True)]
+    depth, seen = np.zeros(len(begin)), np.zeros(len(begin), np.int64)
+    for k, (b, e) in enumerate(zip(begin, end, strict=True)):
+        here = (t >= b) & (t <= e)
+        seen[k] = np.count_nonzero(here)
+        depth[k] = position[here].max() - gap if here.any() else 0.25 * (e - b) * abs(speed[0][k])
+    unit = str(getattr(x, "attrs", {}).get("units", "m"))
+    second, metre, rate = {"units": "s"}, {"units": unit}, {"units": f"{unit}/s"}
+    return xr.Dataset(
+        {
+            "begin": ("contact", begin, {"long_name": "begin of the contact", **second}),
+            "end": ("contact", end, {"long_name": "end of the contact", **second}),
+            "begin_error": ("contact", errors[0], second),
+            "end_error": ("contact", errors[1], second),
+            "depth": ("contact", depth, {"long_name": "depth of the contact", **metre}),
+            "v_begin": ("contact", speed[0], {"long_name": "velocity at the begin", **rate}),
+            "v_end": ("contact", speed[1], {"long_name": "velocity at the end", **rate}),
+            "uncertain": ("contact", (depth < least) | (seen < 2) | cut, {"long_name": "contact is uncertain"}),
+            "gap": ((), gap, metre),
+            "gap_error": ((), gap_error, metre),
+            "stiffness": ((), stiffness, {"long_name": "stiffness of the support by the mass", "units": "1/s^2"}),
+        }
+    )

@@ -1,0 +1,228 @@
+"""Least-squares fit of a mean and harmonics, with a covariance that knows when residuals are not independent."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from nonsmooth.errors import SolveError
+from nonsmooth.recordings.signals.checks import signal, whose
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["HarmonicFit", "fit"]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class HarmonicFit:
+    """x(t) = mean + sum over j of amplitudes[j-1] cos(j omega t - phases[j-1]).
+
+    Attributes
+    ----------
+    omega, omega_error : float
+        Angular frequency in rad/s; the error is 0 where it was given and not fitted.
+    mean : float
+    amplitudes, phases : ndarray, shape (n,)
+        Phases in rad, 0 to 2 pi. With ``subharmonic=p``, j counts p-ths of omega.
+    covariance : DataArray
+        Over ``parameter`` and ``parameter_2``: mean, cos_1, sin_1, ..., and omega where it was fitted.
+    residual : float
+        Standard deviation of what is left.
+    correlation : float
+        How many neighbouring residuals say as much as one (1: independent); the covariance holds this factor.
+    """
+
+    omega: float
+    omega_error: float
+    mean: float
+    amplitudes: Floats
+    phases: Floats
+    covariance: xr.DataArray = field(repr=False)
+    residual: float
+    correlation: float
+    subharmonic: int = 1
+
+    @property
+    def period(self) -> float:
+        """2 pi / omega in seconds."""
+        return 2.0 * math.pi / self.omega
+
+    @property
+    def mean_error(self) -> float:
+        """Standard error of the mean."""
+        return float(np.sqrt(self.covariance.values[0, 0]))
+
+    @property
+    def amplitude_errors(self) -> Floats:
+        """Standard errors of the amplitudes, to first order."""
+        return self._errors(np.cos(self.phases), np.sin(self.phases))
+
+    @property
+    def phase_errors(self) -> Floats:
+        """Standard errors of the phases in rad, to first order."""
+        size = np.maximum(self.amplitudes, np.finfo(float).tiny)
+        return self._errors(-np.sin(self.phases) / size, np.cos(self.phases) / size)
+
+    def _errors(self, by_cos: Floats, by_sin: Floats) -> Floats:
+        C, found = self.covariance.values, []
+        for j, (a, b) in enumerate(zip(by_cos, by_sin, strict=True)):
+            block = C[1 + 2 * j : 3 + 2 * j, 1 + 2 * j : 3 + 2 * j]
+            found.append(a * a * block[0, 0] + 2 * a * b * block[0, 1] + b * b * block[1, 1])
+        return np.sqrt(np.maximum(found, 0.0))
+
+    def evaluate(self, time: ArrayLike) -> Floats:
+        """The fitted signal at these times."""
+        t = np.asarray(time, np.float64)
+        j = np.arange(1, len(self.amplitudes) + 1)
+        angle = np.multiply.outer(t, j * self.omega / self.subharmonic) - self.phases
+        return np.asarray(self.mean + np.cos(angle) @ self.amplitudes)
+
+
+def fit(
+    time: ArrayLike, x: Any, omega: float, n: int = 3, *, refine: bool = False, subharmonic: int = 1
+) -> HarmonicFit:
+    """Fit a mean and ``n`` harmonics of ``omega`` to a signal; times may be uneven.
+
+    Parameters
+    ----------
+    time, x : array_like, shape (N,)
+        Seconds and values.
+    omega : float
+        Angular frequency of the drive in rad/s.
+    n : int
+        Harmonics.
+    refine : bool
+        Fit omega too (variable projection: the linear part is solved at each omega).
+    subharmonic : int
+        The motion repeats after so many periods of the drive: the harmonics are those of omega / subharmonic.
+
+    Returns
+    -------
+    HarmonicFit
+
+    Raises
+    ------
+    ValueError
+        If the record is shorter than one period, has too few samples, or too low a rate for the highest harmonic.
+    """
+    import xarray as xr
+
+    if not (math.isfinite(omega) and omega > 0) or n < 1 or subharmonic < 1:
+        raise ValueError(f"omega must be positive, n and subharmonic at least 1; got {omega!r}, {n!r}, {subharmonic!r}")
+    t, values = signal(time, x, least=2 * n + 4, purpose=f"a fit of {n} harmonics")
+    base = omega / subharmonic
+    length = t[-1] - t[0]
+    if base * length < 2 * math.pi:
+        raise ValueError(
+            f"{whose(x)}: lasts {length:.4g} s, less than one period of {2 * math.pi / base:.4g} s: record longer"
+        )
+    rate = (len(t) - 1) / length
+    if n * base > math.pi * rate:
+        raise ValueError(
+            f"{whose(x)}: harmonic {n} lies at {n * base / (2 * math.pi):.4g} Hz, above half the sample rate of "
+            f"{rate:.4g} Hz; fit fewer"
+        )
+    centre = 0.5 * (t[0] + t[-1])
+    tau = t - centre
+    if refine:
+        base = _best(tau, values, base, n, length)
+    A = _columns(tau, base, n)
+    solution, *_ = np.linalg.lstsq(A, values, rcond=None)
+    left = values - A @ solution
+    cos, sin = solution[1::2], solution[2::2]
+    names = ["mean"] + [f"{f}_{j}" for j in range(1, n + 1) for f in ("cos", "sin")]
+    if refine:
+        j = np.arange(1, n + 1)
+        slope = tau * ((A[:, 2::2] * -cos + A[:, 1::2] * sin) @ j)
+        A = np.column_stack([A, slope / subharmonic])
+        names.append("omega")
+    free = max(len(t) - A.shape[1], 1)
+    variance = float(left @ left) / free
+    correlation = _correlation(left)
+    R = np.linalg.qr(A, mode="r")
+    inverse = np.linalg.inv(R)
+    C = variance * correlation * inverse @ inverse.T
+    # From the record's middle, where frequency and phase are independent, to t = 0.
+    angle = np.arange(1, n + 1) * base * centre
+    turn = np.eye(len(C))
+    for k, a in enumerate(angle):
+        c, s = math.cos(a), math.sin(a)
+        turn[1 + 2 * k : 3 + 2 * k, 1 + 2 * k : 3 + 2 * k] = [[c, -s], [s, c]]
+        if refine:
+            rate_of = (k + 1) * centre / subharmonic
+            u, w = c * cos[k] - s * sin[k], s * cos[k] + c * sin[k]
+            turn[1 + 2 * k, -1], turn[2 + 2 * k, -1] = -rate_of * w, rate_of * u
+    phases = np.mod(np.arctan2(sin, cos) + angle, 2 * math.pi)
+    C = turn @ C @ turn.T
+    covariance = xr.DataArray(
+        C, {"parameter": names, "parameter_2": names}, ("parameter", "parameter_2"), name="covariance"
+    )
+    error = math.sqrt(C[-1, -1]) if refine else 0.0
+    return HarmonicFit(
+        base * subharmonic, error, float(solution[0]), np.hypot(cos, sin), phases, covariance, math.sqrt(variance),
+        correlation, subharmonic,
+    )  # fmt: skip
+
+
+def _columns(tau: Floats, omega: float, n: int) -> Floats:
+    angle = np.multiply.outer(tau, omega * np.arange(1, n + 1))
+    A = np.ones((len(tau), 2 * n + 1))
+    A[:, 1::2], A[:, 2::2] = np.cos(angle), np.sin(angle)
+    return A
+
+
+def _best(tau: Floats, values: Floats, omega: float, n: int, length: float) -> float:
+    """The frequency of the least squares near ``omega``: the sum has a valley about 2 pi / length wide there.
+
+    A few are tried, then Gauss-Newton steps change frequency and amplitudes together.
+    """
+
+    def fitted(w: float) -> tuple[Floats, Floats, Floats]:
+        A = _columns(tau, w, n)
+        p, *_ = np.linalg.lstsq(A, values, rcond=None)
+        return A, np.asarray(p, np.float64), values - A @ p
+
+    def squares(w: float) -> float:
+        left = fitted(w)[2]
+        return float(left @ left)
+
+    grid = omega + math.pi / length * np.linspace(-1.0, 1.0, 7)
+    best = float(grid[int(np.argmin([squares(w) for w in grid]))])
+    j = np.arange(1, n + 1)
+    for _ in range(20):
+        A, p, left = fitted(best)
+        slope = tau * ((A[:, 1::2] * p[2::2] - A[:, 2::2] * p[1::2]) @ j)
+        change, *_ = np.linalg.lstsq(np.column_stack([A, slope]), left, rcond=None)
+        step = float(np.clip(change[-1], -math.pi / length, math.pi / length))
+        best += step
+        if abs(step) < 1e-13 * omega:
+            break
+    else:
+        if abs(step) > 1e-6 * math.pi / length:
+            raise SolveError(
+                f"no frequency near {omega:.6g} rad/s fits best: the search still moves by {abs(step):.2g} rad/s after "
+                "20 steps; give one that is nearer, or a longer record"
+            )
+    return best
+
+
+def _correlation(left: Floats) -> float:
+    """The integrated autocorrelation of residuals, summed up to its first negative value; at least 1."""
+    n = len(left)
+    power = float(left @ left)
+    if power == 0.0:
+        return 1.0
+    total = 1.0
+    for lag in range(1, n // 4):
+        r = float(left[lag:] @ left[:-lag]) / power
+        if r <= 2.0 / math.sqrt(n):
+            break
+        total += 2.0 * r
+    return total

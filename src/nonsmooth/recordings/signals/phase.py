@@ -1,0 +1,197 @@
+"""The phase of the drive: from a photogate that sees each turn of the crank, or by a fit to what it moves."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from nonsmooth.recordings.signals.checks import signal, warn, whose
+
+__all__ = ["DrivePhase", "drive_phase"]
+
+Floats = NDArray[np.float64]
+TURN = 2.0 * math.pi
+
+
+@dataclass(frozen=True, eq=False)
+class DrivePhase:
+    """Phase of the drive over time.
+
+    Attributes
+    ----------
+    omega, omega_error : float
+        Mean angular frequency in rad/s with its standard error.
+    t_0, t_0_error : float
+        A time at which the phase is a multiple of 2 pi (the first turn, or the first maximum of the fundamental).
+    scatter : float
+        Root mean square of the turn times about the straight line through them, in seconds: the gate's resolution,
+        and how unevenly the motor runs from turn to turn. By fit: that of the signal about its fundamental, as a time.
+    method : {"photogate", "fit"}
+    turn_times : ndarray
+        The times at which the phase passed a multiple of 2 pi (by fit: computed ones).
+    turns : ndarray of int
+        Their numbers; a turn that the gate missed is a gap in them.
+    span : (float, float)
+        The first and the last time at which the phase is known.
+    """
+
+    omega: float
+    omega_error: float
+    t_0: float
+    t_0_error: float
+    scatter: float
+    method: str
+    turn_times: Floats = field(repr=False)
+    turns: NDArray[np.int64] = field(repr=False)
+    span: tuple[float, float]
+
+    @property
+    def period(self) -> float:
+        """Mean duration of a turn in seconds."""
+        return TURN / self.omega
+
+    def phase(self, time: ArrayLike) -> Floats:
+        """Unwrapped phase in rad, 0 at ``t_0``; straight between turns, and with the mean frequency beyond them."""
+        t = np.asarray(time, np.float64)
+        inside = TURN * np.interp(t, self.turn_times, self.turns)
+        before = TURN * self.turns[0] + self.omega * (t - self.turn_times[0])
+        after = TURN * self.turns[-1] + self.omega * (t - self.turn_times[-1])
+        return np.where(t < self.turn_times[0], before, np.where(t > self.turn_times[-1], after, inside))
+
+    @property
+    def coarser(self) -> DrivePhase:
+        """The same drive known from every other turn only: how far its phase differs is what a turn may hide."""
+        return replace(self, turn_times=self.turn_times[::2], turns=self.turns[::2])
+
+    def wander(self, resolution: float = 1e-4) -> tuple[float, bool]:
+        """Relative standard deviation of the frequency from turn to turn, and whether chance explains it.
+
+        The part that a gate of this ``resolution`` (s) makes is taken out. What repeats with every turn does not show.
+        """
+        from scipy.stats import chi2
+
+        steps = np.diff(self.turn_times) / np.diff(self.turns)
+        seen, gate = float(np.var(steps, ddof=1)), resolution**2 / 6
+        steady = bool(chi2.sf(seen / gate * (len(steps) - 1), len(steps) - 1) > 1e-4)
+        return float(np.sqrt(max(seen - gate, 0.0)) / np.mean(steps)), steady
+
+    def times(self, phase: float = 0.0) -> Floats:
+        """The instants within ``span`` at which the phase is ``phase`` (in turns, 0 to 1) plus a whole number."""
+        low, high = self.span
+        first, last = self.phase(np.array([low, high])) / TURN - phase
+        wanted = np.arange(math.ceil(first - 1e-12), math.floor(last + 1e-12) + 1) + phase
+        inside = np.interp(wanted, self.turns, self.turn_times)
+        before = self.turn_times[0] + (wanted - self.turns[0]) * self.period
+        after = self.turn_times[-1] + (wanted - self.turns[-1]) * self.period
+        found = np.where(wanted < self.turns[0], before, np.where(wanted > self.turns[-1], after, inside))
+        return np.asarray(np.clip(found, low, high))
+
+
+def drive_phase(
+    time: ArrayLike,
+    x: Any = None,
+    *,
+    omega: float | None = None,
+    resolution: float = 1e-4,
+    span: tuple[float, float] | None = None,
+) -> DrivePhase:
+    """Phase of the drive, from the times of its turns or, with ``x``, by a fit to the motion.
+
+    With a photogate the frequency is the slope of the straight line through turn number over time,
+    t_j = t_0 + 2 pi j / omega, and the phase itself runs straight from each turn to the next: a slow drift is
+    followed, an unevenness within a turn is not seen. By fit, omega is that which a mean, a fundamental and two
+    harmonics fit best, and the phase is 0 at the maxima of the fundamental of ``x``: it lags behind the drive's
+    own phase by the angle of the response.
+
+    Parameters
+    ----------
+    time : array_like
+        Times of the turns (a photogate's ``Turn`` channel: its axis); with ``x``, those of the samples.
+    x : array_like, optional
+        Position or force.
+    omega : float, optional
+        By fit: about the drive's angular frequency. Without it that of the largest peak of the spectrum is taken,
+        which is not the drive's where the motion is subharmonic or chaotic.
+    resolution : float
+        Of the photogate's times in seconds; it keeps the errors from being understated.
+    span : (float, float), optional
+        First and last time of the record; default is that of the first and last turn, or of the samples.
+
+    Returns
+    -------
+    DrivePhase
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than three turns, or the record holds fewer than three of them.
+    """
+    if x is None:
+        return _by_gate(time, resolution, span)
+    from nonsmooth.recordings.signals import harmonics, spectrum
+
+    t, values = signal(time, x, least=16, purpose="finding the drive's phase")
+    if omega is None:
+        even = np.linspace(t[0], t[-1], len(t))
+        lines = spectrum.spectrum(np.interp(even, t, values), (len(t) - 1) / (t[-1] - t[0]))
+        omega = spectrum.peak(lines).omega
+    if omega * (t[-1] - t[0]) < 3 * TURN:
+        raise ValueError(
+            f"{whose(x)}: {t[-1] - t[0]:.4g} s hold fewer than three turns at {omega:.4g} rad/s: record longer"
+        )
+    found = harmonics.fit(t, x, omega, 3, refine=True)
+    lag = float(found.phases[0])
+    t_0 = t[0] + ((lag - found.omega * t[0]) % TURN) / found.omega
+    turns = np.arange(math.floor((t[-1] - t_0) / found.period) + 1)
+    # Phase and frequency are correlated; the error of the phase is least in the middle of the record.
+    error = float(found.phase_errors[0]) / found.omega
+    scatter = found.residual / (found.omega * float(found.amplitudes[0]))
+    return DrivePhase(
+        found.omega, found.omega_error, t_0, error, scatter, "fit", t_0 + turns * found.period, turns,
+        (float(t[0]), float(t[-1])) if span is None else span,
+    )  # fmt: skip
+
+
+def _by_gate(time: Any, resolution: float, span: tuple[float, float] | None) -> DrivePhase:
+    times = np.asarray(time, np.float64)
+    # A channel over its own axis: its times are what counts.
+    if hasattr(time, "dims") and time.ndim == 1 and "time" in time.coords:
+        times = np.asarray(time["time"], np.float64)
+    if times.ndim != 1 or len(times) < 3:
+        raise ValueError(f"{whose(time)}: {times.size} turns are too few for a frequency; at least 3 are needed")
+    if not np.isfinite(times).all() or (np.diff(times) <= 0).any():
+        raise ValueError(f"{whose(time)}: the times of the turns must be finite and increase")
+    steps = np.diff(times)
+    typical = float(np.median(steps))
+    counts = np.maximum(np.rint(steps / typical), 1).astype(np.int64)
+    if (steps < 0.6 * typical).any():
+        i = int(np.argmax(steps < 0.6 * typical))
+        raise ValueError(
+            f"{whose(time)}: two turns only {steps[i]:.4g} s apart at t = {times[i]:.6g} s, where a turn takes "
+            f"{typical:.4g} s; if the motor's speed was changed there, split the record, else remove the false one"
+        )
+    if (counts > 1).any():
+        i = int(np.argmax(counts > 1))
+        warn(
+            time,
+            f"the gate missed {int((counts - 1).sum())} turns, the first after t = {times[i]:.6g} s; they are counted",
+        )
+    turns = np.concatenate([[0], np.cumsum(counts)])
+    n = len(times)
+    middle = turns - turns.mean()
+    period = float(middle @ times / (middle @ middle))
+    start = float(times.mean() - period * turns.mean())
+    residual = times - start - period * turns
+    scatter = float(np.sqrt(residual @ residual / max(n - 2, 1)))
+    s = max(scatter, resolution / math.sqrt(12.0))
+    period_error = s / math.sqrt(float(middle @ middle))
+    t_0_error = s * math.sqrt(1.0 / n + float(turns.mean()) ** 2 / float(middle @ middle))
+    omega = TURN / period
+    return DrivePhase(
+        omega, omega * period_error / period, float(times[0]), t_0_error, scatter, "photogate", times, turns,
+        (float(times[0]), float(times[-1])) if span is None else span,
+    )  # fmt: skip

@@ -1,0 +1,210 @@
+"""Impacts of a thrown body: the flights between them, and the restitution of each by fits to its two sides.
+
+A camera sees an impact smeared over a sample or two. So it is not searched for as a kink: a body in flight has the
+acceleration of gravity, and where the record does not, something touches it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from nonsmooth.recordings.signals.checks import even_rate, signal, whose
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["flights", "restitution"]
+
+Floats = NDArray[np.float64]
+
+
+def flights(time: ArrayLike, height: Any, *, threshold: float = 6.0, least: int = 4) -> xr.Dataset:
+    """Intervals of a record in which the height of a body's centre falls freely.
+
+    In flight the second differences of the height are gravity plus noise. Where a tenth of the record or more is
+    flight, their lower tail is: of those between half and one and a half of their 10 % quantile, the densest half gives
+    gravity by its median and the noise by its width.
+
+    Parameters
+    ----------
+    time, height : array_like, shape (N,)
+        Seconds at an even rate, and the height of the centre of mass.
+    threshold : float
+        How far from free fall, in standard deviations of a second difference, a sample may be; at most by 0.4 g.
+    least : int
+        The fewest samples of a flight.
+
+    Returns
+    -------
+    Dataset
+        Over ``flight``: ``first`` and ``last`` (indices of its first and last sample), ``begin`` and ``end`` (times).
+        Scalars: ``acceleration`` (with its error) of all flights, each fitted with a height and a velocity of its own,
+        and ``noise``, the standard deviation of a sample about them.
+
+    Raises
+    ------
+    ValueError
+        If the record is too short, its rate is not even, or it holds no flight.
+    """
+    import xarray as xr
+
+    t, z = signal(time, height, least=12, purpose="finding flights")
+    step = 1.0 / even_rate(t, height, "finding flights")
+    bend = np.diff(z, 2) / step**2
+    tail = float(np.quantile(bend, 0.1))
+    falling = bend[(bend < 0.5 * tail) & (bend > 1.5 * tail)]
+    fall, spread = _densest(falling) if len(falling) >= least else (0.0, 0.0)
+    spread = max(spread, 1e-9 * float(np.ptp(bend)))
+    tolerance = min(threshold * spread, 0.4 * abs(fall))  # at rest is never in flight, however great the noise
+    free = np.concatenate([[True], np.abs(bend - fall) < tolerance, [True]])
+    # The middle of a second difference is free where it is; a stretch of free ones is a flight.
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], free.astype(np.int8), [0]])))
+    # The first and the last sample have no second difference of their own: they belong to what lies beside them.
+    rows = [(a, b - 1) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= least]
+    if not rows or fall >= 0:
+        raise ValueError(
+            f"{whose(height)}: no interval of at least {least} samples falls freely; give the height of the centre of "
+            "mass, upwards, at a rate that shows its flights"
+        )
+    acceleration, error, noise = _common_fall(t, z, rows)
+    first, last = np.array(rows).T
+    return xr.Dataset(
+        {
+            "first": ("flight", first), "last": ("flight", last),
+            "begin": ("flight", t[first], {"units": "s"}), "end": ("flight", t[last], {"units": "s"}),
+            "acceleration": ((), acceleration, {"long_name": "acceleration in flight"}),
+            "acceleration_error": ((), error), "noise": ((), noise, {"long_name": "standard deviation of a sample"}),
+        }
+    )  # fmt: skip
+
+
+def restitution(
+    time: ArrayLike, height: Any, flights: xr.Dataset, *, window: int = 7, longest: float | None = None
+) -> xr.Dataset:
+    """Restitution of the impact between each flight and the next, e = -v_after / v_before.
+
+    A parabola is fitted to the last ``window`` samples of the flight before and to the first of that after; the impact
+    is the instant between them at which they meet (their middle, where they do not), and their slopes there are the
+    two velocities.
+
+    Parameters
+    ----------
+    time, height : array_like, shape (N,)
+        Seconds, and the height of the point that touches the ground (for a body that turns, not its centre).
+    flights : Dataset
+        As :func:`flights` finds them.
+    window : int
+        Samples on either side, at most; shorter flights are taken whole.
+    longest : float, optional
+        Seconds between two flights beyond which the contact between them is no single impact; default is 4 samples.
+
+    Returns
+    -------
+    Dataset
+        Over ``impact``: ``impact_time``, ``impact_height``, ``v_before``, ``v_after`` with errors, ``restitution`` and
+        ``restitution_error`` (to first order, from the scatter about the fits; NaN where the point does not come down
+        by three errors of v_before: something else was hit), ``duration`` (from the last free
+        sample to the next), ``flight`` (the number of the flight before).
+
+    Raises
+    ------
+    ValueError
+        If values are missing.
+    """
+    import xarray as xr
+
+    t, z = signal(time, height, least=12, purpose="restitution")
+    longest = 4.5 * float(np.median(np.diff(t))) if longest is None else longest
+    first, last = flights["first"].values, flights["last"].values
+    rows = []
+    for k in range(len(first) - 1):
+        i, j = int(last[k]), int(first[k + 1])
+        before = slice(max(int(first[k]), i - window + 1), i + 1)
+        after = slice(j, min(int(last[k + 1]), j + window - 1) + 1)
+        if t[j] - t[i] > longest or after.stop - after.start < 4 or before.stop - before.start < 4:
+            continue
+        left, right = _Side(t[before], z[before], t[i]), _Side(t[after], z[after], t[i])
+        when = _meeting(left.p - right.p, float(t[j] - t[i]))
+        (z0, v0), (_, v1) = left.at(when), right.at(when)
+        rows.append((t[i] + when, z0, v0, v1, t[j] - t[i], k, left, right, when))
+    freedom = sum(side.freedom for row in rows for side in row[6:8])
+    noise = math.sqrt(sum(side.squares for row in rows for side in row[6:8]) / freedom) if freedom else math.nan
+    table = np.array([row[:6] for row in rows], np.float64).reshape(-1, 6)
+    errors = np.array([[side.slope_error(row[8], noise) for side in row[6:8]] for row in rows]).reshape(-1, 2)
+    before_v, after_v = table[:, 2], table[:, 3]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        e = np.where(before_v < -3.0 * errors[:, 0], -after_v / before_v, np.nan)
+        e_error = np.hypot(errors[:, 1], e * errors[:, 0]) / np.abs(before_v)
+    return xr.Dataset(
+        {
+            "impact_time": ("impact", table[:, 0], {"long_name": "time of the impact", "units": "s"}),
+            "impact_height": ("impact", table[:, 1], {"long_name": "height at the impact"}),
+            "v_before": ("impact", before_v, {"long_name": "velocity before the impact"}),
+            "v_before_error": ("impact", errors[:, 0]),
+            "v_after": ("impact", after_v, {"long_name": "velocity after the impact"}),
+            "v_after_error": ("impact", errors[:, 1]),
+            "restitution": ("impact", e, {"long_name": "restitution"}),
+            "restitution_error": ("impact", e_error),
+            "duration": ("impact", table[:, 4], {"long_name": "from the last free sample to the next", "units": "s"}),
+            "flight": ("impact", table[:, 5].astype(np.int64)),
+        },
+        attrs={"noise": noise},
+    )
+
+
+def _densest(values: Floats) -> tuple[float, float]:
+    """Median of the shortest interval that holds half of the values, and the standard deviation that its width says."""
+    ordered = np.sort(values)
+    half = max(len(ordered) // 2, 1)
+    width = ordered[half:] - ordered[:-half]
+    k = int(np.argmin(width))
+    return float(np.median(ordered[k : k + half + 1])), float(width[k]) / (2 * 0.6745)
+
+
+def _common_fall(t: Floats, z: Floats, rows: list[tuple[int, int]]) -> tuple[float, float, float]:
+    """Acceleration common to all flights, its error, and the noise: each flight's line is taken out first."""
+    top = bottom = squares = 0.0
+    parts, freedom = [], -1
+    for a, b in rows:
+        s = t[a : b + 1] - t[a]
+        line = np.column_stack([np.ones_like(s), s])
+        Q, _ = np.linalg.qr(line)
+        q, y = 0.5 * s * s, z[a : b + 1]
+        q, y = q - Q @ (Q.T @ q), y - Q @ (Q.T @ y)
+        top, bottom = top + float(q @ y), bottom + float(q @ q)
+        parts.append((q, y))
+        freedom += len(s) - 2
+    fall = top / bottom
+    squares = sum(float((y - fall * q) @ (y - fall * q)) for q, y in parts)
+    noise = math.sqrt(squares / max(freedom, 1))
+    return fall, noise / math.sqrt(bottom), noise
+
+
+class _Side:
+    """A parabola fitted to the samples on one side, over the time since ``origin``."""
+
+    def __init__(self, t: Floats, z: Floats, origin: float) -> None:
+        A = np.vander(t - origin, 3, increasing=True)
+        self.p, *_ = np.linalg.lstsq(A, z, rcond=None)
+        left = z - A @ self.p
+        self.squares, self.freedom = float(left @ left), len(t) - 3
+        self.C = np.linalg.inv(A.T @ A)
+
+    def at(self, s: float) -> tuple[float, float]:
+        return float(self.p @ [1.0, s, s * s]), float(self.p @ [0.0, 1.0, 2.0 * s])
+
+    def slope_error(self, s: float, noise: float) -> float:
+        along = np.array([0.0, 1.0, 2.0 * s])
+        return noise * math.sqrt(float(along @ self.C @ along))
+
+
+def _meeting(d: Floats, length: float) -> float:
+    """Zero of the difference of two parabolas within (0, length); the middle if there is none."""
+    roots = np.roots(d[::-1])
+    real = np.real(roots[np.abs(np.imag(roots)) < 1e-9])
+    inside = real[(real >= 0.0) & (real <= length)]
+    return float(inside[0]) if len(inside) == 1 else 0.5 * length

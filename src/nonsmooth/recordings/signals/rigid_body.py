@@ -1,0 +1,226 @@
+r"""Corners of a tossed rigid body: where they are, how fast, and the restitution of the one that hits the ground.
+
+In flight the centre falls with the acceleration of gravity, and a body with three equal moments of inertia (a cube,
+a ball) keeps its angular velocity. Both sides of an impact are therefore known from several samples each, and the
+velocity of a corner at r from the centre follows, v = v_c + omega x r, at the instant of the impact itself. Its
+vertical part before and after gives the restitution, e = -v_after / v_before (Newton's, of the point of contact).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from nonsmooth.recordings.signals.checks import whose
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["corner_heights", "corner_restitution", "cube"]
+
+Floats = NDArray[np.float64]
+
+
+def cube(half_width: float = 1.0) -> Floats:
+    """The eight corners of a cube about its centre, shape (8, 3)."""
+    signs = np.array(np.meshgrid([-1.0, 1.0], [-1.0, 1.0], [-1.0, 1.0], indexing="ij"))
+    return np.asarray(half_width * signs.reshape(3, -1).T)
+
+
+def corner_heights(position: ArrayLike, orientation: ArrayLike, corners: ArrayLike) -> Floats:
+    """Heights of all corners over time.
+
+    Parameters
+    ----------
+    position : array_like, shape (N, 3)
+        The centre of mass; the third component points upwards.
+    orientation : array_like, shape (N, 4)
+        Unit quaternions (w, x, y, z) that turn the body's axes into those of ``position``.
+    corners : array_like, shape (V, 3)
+        Corners in the body's axes, about the centre of mass.
+
+    Returns
+    -------
+    array, shape (N, V)
+
+    Raises
+    ------
+    ValueError
+        If a quaternion is not of length 1 within 1 %: their order may be another, or they are no quaternions.
+    """
+    place, turned = np.asarray(position, np.float64), _turns(orientation).as_matrix()
+    return np.asarray(place[:, 2, None] + turned[:, 2, :] @ np.asarray(corners, np.float64).T)
+
+
+def corner_restitution(
+    time: ArrayLike,
+    position: Any,
+    orientation: ArrayLike,
+    corners: ArrayLike,
+    flights: xr.Dataset,
+    *,
+    window: int = 7,
+    longest: float | None = None,
+    near: float = 0.1,
+) -> xr.Dataset:
+    """Restitution of the corner that hits the ground between each flight and the next.
+
+    Parameters
+    ----------
+    time, position, orientation, corners
+        As in :func:`corner_heights`, with the times in seconds.
+    flights : Dataset
+        As :func:`~nonsmooth.recordings.signals.restitution.flights` finds them in the height of the centre.
+    window : int
+        Samples on either side, at most; shorter flights are taken whole.
+    longest : float, optional
+        Seconds between two flights beyond which the contact between them is no single impact; default is 4 samples.
+    near : float
+        A corner that is no higher than this over the lowest one at the impact touches too, as a part of the distance of
+        the farthest corner from the centre.
+
+    Returns
+    -------
+    Dataset
+        Over ``impact``: ``impact_time``, ``corner`` (its row), ``v_before``, ``v_after`` (vertical, of that corner)
+        with errors, ``restitution`` and ``restitution_error`` (to first order, from the scatter about the fits),
+        ``half_sample`` (how far the restitution moves with the impact half a sample earlier or later: what a contact
+        that lasts, or a camera that blurs, can do to it), ``height`` of the corner there, ``touching`` (corners at
+        the ground), ``duration`` (from the last free sample to the next), ``single``: one corner touches, before and
+        after the same one, and comes down by more than three errors of its velocity. Attribute ``left_out``: contacts
+        between flights that lasted too long.
+
+    Raises
+    ------
+    ValueError
+        If shapes do not agree or values are missing.
+    """
+    import xarray as xr
+
+    t = np.asarray(time, np.float64)
+    place, points = np.asarray(position, np.float64), np.asarray(corners, np.float64)
+    if place.shape != (len(t), 3) or np.shape(orientation) != (len(t), 4) or points.ndim != 2 or points.shape[1] != 3:
+        raise ValueError(
+            f"{whose(position)}: needs time (N,), position (N, 3), orientation (N, 4) and corners (V, 3); got "
+            f"{t.shape}, {place.shape}, {np.shape(orientation)} and {points.shape}"
+        )
+    if not (np.isfinite(t).all() and np.isfinite(place).all() and np.isfinite(np.asarray(orientation)).all()):
+        raise ValueError(f"{whose(position)}: values are missing; take the intervals of the record that are whole")
+    turns, fall = _turns(orientation), float(flights["acceleration"])
+    sample = float(np.median(np.diff(t)))
+    longest = 4.5 * sample if longest is None else longest
+    first, last = flights["first"].values, flights["last"].values
+    reach = near * float(np.max(np.linalg.norm(points, axis=1)))
+    rows, left_out = [], 0
+    for k in range(len(first) - 1):
+        i, j = int(last[k]), int(first[k + 1])
+        if t[j] - t[i] > longest:
+            left_out += 1
+            continue
+        before = _Flight(t, place, turns, slice(max(int(first[k]), i - window + 1), i + 1), fall)
+        after = _Flight(t, place, turns, slice(j, min(int(last[k + 1]), j + window - 1) + 1), fall)
+        corner = int(np.argmin(before.heights(0.5 * (t[i] + t[j]), points)))
+        grid = np.linspace(t[i], t[j], 41)
+        apart = np.array([before.heights(s, points)[corner] - after.heights(s, points)[corner] for s in grid])
+        when = _nearest_zero(grid, apart)
+        heights = before.heights(when, points)
+        v0, e0 = before.velocity(when, points[corner])
+        v1, e1 = after.velocity(when, points[corner])
+        late, early = (
+            -after.velocity(when + s, points[corner])[0] / before.velocity(when + s, points[corner])[0]
+            for s in (0.5 * sample, -0.5 * sample)
+        )
+        touching = int(np.count_nonzero(heights < heights[corner] + reach))
+        same = corner == int(np.argmin(after.heights(when, points)))
+        single = touching == 1 and same and v0 < -3.0 * e0
+        half = 0.5 * abs(late - early)
+        rows.append((when, corner, v0, e0, v1, e1, heights[corner], touching, t[j] - t[i], single, k, half))
+    table = np.array(rows, np.float64).reshape(-1, 12)
+    _, _, v0, e0, v1, e1 = table[:, :6].T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        e = np.where(v0 < -3.0 * e0, -v1 / v0, np.nan)
+        e_error = np.hypot(e1, e * e0) / np.abs(v0)
+    return xr.Dataset(
+        {
+            "impact_time": ("impact", table[:, 0], {"long_name": "time of the impact", "units": "s"}),
+            "corner": ("impact", table[:, 1].astype(np.int64)),
+            "v_before": ("impact", v0, {"long_name": "vertical velocity of the corner before"}),
+            "v_before_error": ("impact", e0),
+            "v_after": ("impact", v1, {"long_name": "vertical velocity of the corner after"}),
+            "v_after_error": ("impact", e1),
+            "restitution": ("impact", e, {"long_name": "restitution"}),
+            "restitution_error": ("impact", e_error),
+            "half_sample": ("impact", table[:, 11], {"long_name": "change of the restitution by half a sample"}),
+            "height": ("impact", table[:, 6], {"long_name": "height of the corner"}),
+            "touching": ("impact", table[:, 7].astype(np.int64), {"long_name": "corners at the ground"}),
+            "duration": ("impact", table[:, 8], {"long_name": "from the last free sample to the next", "units": "s"}),
+            "single": ("impact", table[:, 9].astype(np.bool_)),
+            "flight": ("impact", table[:, 10].astype(np.int64), {"long_name": "flight before"}),
+        },
+        attrs={"left_out": left_out},
+    )
+
+
+def _nearest_zero(t: Floats, y: Floats) -> float:
+    """Zero of y between two of its samples; where there is none, the sample nearest to zero."""
+    k = np.flatnonzero(np.sign(y[:-1]) != np.sign(y[1:]))
+    if len(k) == 0:
+        return float(t[int(np.argmin(np.abs(y)))])
+    i = int(k[0])
+    return float(t[i] + (t[i + 1] - t[i]) * y[i] / (y[i] - y[i + 1]))
+
+
+class _Flight:
+    """Centre and orientation on one side of an impact: a parabola of known acceleration, a constant spin."""
+
+    def __init__(self, t: Floats, place: Floats, turns: Any, here: slice, fall: float) -> None:
+        from scipy.spatial.transform import Rotation
+
+        self.origin = float(t[here].mean())
+        s = t[here] - self.origin
+        self.fall, self.spread, n = fall, float(s @ s), len(s)
+        z = place[here, 2] - 0.5 * fall * s * s
+        self.z, self.v = float(z.mean()), float(s @ z) / self.spread
+        left = z - self.z - self.v * s
+        self.v_error = math.sqrt(float(left @ left) / max(n - 2, 1) / self.spread)
+        middle = turns[here][n // 2]
+        vectors = (turns[here] * middle.inv()).as_rotvec()  # turns about the axes of the room
+        self.spin = s @ vectors / self.spread
+        left_turn = vectors - vectors.mean(axis=0) - np.outer(s, self.spin)
+        self.spin_error = math.sqrt(float(np.sum(left_turn**2)) / 3 / max(n - 2, 1) / self.spread)
+        self.middle = Rotation.from_rotvec(vectors.mean(axis=0)) * middle
+
+    def _arms(self, when: float, points: Floats) -> Floats:
+        """Corners about the centre, in the axes of the room."""
+        from scipy.spatial.transform import Rotation
+
+        turn = Rotation.from_rotvec(self.spin * (when - self.origin)) * self.middle
+        return np.asarray(turn.apply(points))
+
+    def heights(self, when: float, points: Floats) -> Floats:
+        """Heights of the corners, extrapolated."""
+        s = when - self.origin
+        return np.asarray(self.z + self.v * s + 0.5 * self.fall * s * s + self._arms(when, points)[:, 2])
+
+    def velocity(self, when: float, point: Floats) -> tuple[float, float]:
+        """Vertical velocity of a corner and its error."""
+        arm = self._arms(when, point[None, :])[0]
+        turning = float(np.cross(self.spin, arm)[2])
+        velocity = self.v + self.fall * (when - self.origin) + turning
+        return velocity, math.hypot(self.v_error, self.spin_error * math.hypot(arm[0], arm[1]))
+
+
+def _turns(orientation: ArrayLike) -> Any:
+    from scipy.spatial.transform import Rotation
+
+    q = np.asarray(orientation, np.float64)
+    length = np.linalg.norm(q, axis=-1)
+    if not np.all(np.abs(length - 1.0) < 0.01):
+        raise ValueError(
+            f"orientation must be unit quaternions (w, x, y, z); their lengths run from {length.min():.3g} to "
+            f"{length.max():.3g}"
+        )
+    return Rotation.from_quat(np.roll(q, -1, axis=-1))  # SciPy's order is x, y, z, w

@@ -1,0 +1,254 @@
+"""Section points of a sampled motion: stroboscopic by the drive's phase, Poincare by a surface, with their errors.
+
+Between two samples the motion is the polynomial that has their positions, velocities (and accelerations, where given):
+order 3 or 5. An impact between two samples is not interpolated across: each side is continued to it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from nonsmooth.recordings.signals.checks import signal, whose
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from nonsmooth.recordings.signals.phase import DrivePhase
+
+__all__ = ["poincare", "stroboscopic"]
+
+Floats = NDArray[np.float64]
+
+
+def stroboscopic(
+    time: ArrayLike,
+    x: Any,
+    v: ArrayLike,
+    drive_phase: DrivePhase,
+    phase: float = 0.0,
+    *,
+    a: ArrayLike | None = None,
+    x_error: ArrayLike | None = None,
+    v_error: ArrayLike | None = None,
+    impacts: ArrayLike = (),
+) -> xr.Dataset:
+    """Position and velocity once per turn of the drive.
+
+    Parameters
+    ----------
+    time, x, v : array_like, shape (N,)
+        A smoothed motion; ``a``, ``x_error`` and ``v_error`` where known, as ``smooth`` gives them.
+    drive_phase : DrivePhase
+    phase : float
+        In turns, 0 to 1, as in ``ns.Stroboscopic``.
+    impacts : array_like
+        Times at which v jumps.
+
+    Returns
+    -------
+    Dataset
+        ``section(iterate, state)`` with the states x and v, ``section_error`` likewise (that of the signal, and of
+        the phase times how fast the states change; NaN where not given), ``time(iterate)``.
+
+    Raises
+    ------
+    ValueError
+        If the record holds no instant of this phase.
+    """
+    if not 0.0 <= phase <= 1.0:
+        raise ValueError(f"phase must lie between 0 and 1 turns, got {phase!r}")
+    between = _Between(time, x, v, a, x_error, v_error, impacts)
+    instants = drive_phase.times(phase)
+    instants = instants[(instants >= between.t[0]) & (instants <= between.t[-1])]
+    if len(instants) == 0:
+        raise ValueError(
+            f"{whose(x)}: the record from {between.t[0]:.6g} to {between.t[-1]:.6g} s holds no instant of phase "
+            f"{phase:g}; the drive's phase is known from {drive_phase.span[0]:.6g} to {drive_phase.span[1]:.6g} s"
+        )
+    instant_error = np.full(len(instants), drive_phase.t_0_error)
+    return _points(between, instants, instant_error, {"section": f"stroboscopic, phase {phase:g}"}, along=True)
+
+
+def poincare(
+    time: ArrayLike,
+    x: Any,
+    v: ArrayLike,
+    *,
+    surface: str = "x",
+    level: float = 0.0,
+    rising: bool | None = True,
+    a: ArrayLike | None = None,
+    x_error: ArrayLike | None = None,
+    v_error: ArrayLike | None = None,
+    impacts: ArrayLike = (),
+) -> xr.Dataset:
+    """Position and velocity where x (or v) passes a level.
+
+    Parameters
+    ----------
+    time, x, v, a, x_error, v_error, impacts
+        As in :func:`stroboscopic`.
+    surface : {"x", "v"}
+    level : float
+    rising : bool or None
+        Upwards, downwards, or both.
+
+    Returns
+    -------
+    Dataset
+        As :func:`stroboscopic`, and ``time_error(iterate)``. It may hold no point.
+    """
+    if surface not in ("x", "v"):
+        raise ValueError(f"surface must be x or v, got {surface!r}")
+    between = _Between(time, x, v, a, x_error, v_error, impacts)
+    which = 0 if surface == "x" else 1
+    values = between.states[:, which] - level
+    # A sample on the level belongs to the side it goes to.
+    up = (values[:-1] < 0) & (values[1:] >= 0)
+    down = (values[:-1] > 0) & (values[1:] <= 0)
+    wanted = up | down if rising is None else up if rising else down
+    instants = between.passing(np.flatnonzero(wanted), which, level)
+    rate = np.abs(between.at(instants, derivative=1)[:, which])
+    own = between.error_at(instants)[:, which]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        instant_error = own / rate
+    result = _points(between, instants, instant_error, {"section": f"poincare, {surface} = {level:g}"}, along=False)
+    # On the surface itself the level is exact; what the signal is uncertain there is the time.
+    result["section_error"][:, which] = 0.0
+    result["time_error"] = ("iterate", instant_error, {"units": "s"})
+    return result
+
+
+class _Between:
+    """A motion between its samples."""
+
+    def __init__(
+        self, time: ArrayLike, x: Any, v: ArrayLike, a: ArrayLike | None, x_error: ArrayLike | None,
+        v_error: ArrayLike | None, impacts: ArrayLike,
+    ) -> None:  # fmt: skip
+        self.t, position = signal(time, x, least=4, purpose="section points")
+        columns: list[Floats] = [position]
+        for name, given in (("v", v), ("a", a), ("x_error", x_error), ("v_error", v_error)):
+            column = np.full(len(self.t), np.nan) if given is None else np.asarray(given, np.float64)
+            if column.shape != self.t.shape:
+                raise ValueError(f"{whose(x)}: {name} must have one value per time, got shape {column.shape}")
+            if given is not None and not np.isfinite(column).all():
+                raise ValueError(f"{whose(x)}: {name} holds values that are not finite numbers; cut the record there")
+            columns.append(column)
+        self.states = np.column_stack(columns[:2])
+        self.a = None if a is None else columns[2]
+        self.errors = np.column_stack(columns[3:])
+        self.unit = str(getattr(x, "attrs", {}).get("units", "m"))
+        self.hits = np.unique(np.asarray(impacts, np.float64).ravel())
+
+    def _interval(self, times: Floats) -> NDArray[np.intp]:
+        return np.clip(np.searchsorted(self.t, times, side="right") - 1, 0, len(self.t) - 2)
+
+    def at(self, times: Floats, derivative: int = 0) -> Floats:
+        """x and v (or their derivatives) at these times, shape (n, 2)."""
+        i = self._interval(times)
+        h = self.t[i + 1] - self.t[i]
+        s = (times - self.t[i]) / h
+        p = self._polynomial(i, h)
+        # An impact in this step: continue the sample on the same side of it.
+        hit = np.searchsorted(self.hits, self.t[i], side="right") < np.searchsorted(self.hits, self.t[i + 1])
+        if hit.any():
+            where = np.append(self.hits, np.inf)[np.searchsorted(self.hits, self.t[i], side="right")]
+            left = times <= where
+            one_sided = self._taylor(np.where(left, i, i + 1), np.where(left, 0.0, 1.0), h, p.shape[1])
+            p = np.where(hit[:, None], one_sided, p)
+        value, rate, bend = (_horner(p, s, k) for k in range(3))
+        if derivative == 0:
+            return np.column_stack([value, rate / h])
+        return np.column_stack([rate / h, bend / h**2])
+
+    def _polynomial(self, i: NDArray[np.intp], h: Floats) -> Floats:
+        """Coefficients in s = (t - t_i) / h: Hermite of order 3, or 5 with accelerations."""
+        x0, x1 = self.states[i, 0], self.states[i + 1, 0]
+        v0, v1 = self.states[i, 1] * h, self.states[i + 1, 1] * h
+        d = x1 - x0
+        if self.a is None:
+            return np.column_stack([x0, v0, 3 * d - 2 * v0 - v1, v0 + v1 - 2 * d])
+        a0, a1 = self.a[i] * h**2, self.a[i + 1] * h**2
+        return np.column_stack(
+            [
+                x0, v0, 0.5 * a0,
+                10 * d - 6 * v0 - 4 * v1 - 1.5 * a0 + 0.5 * a1,
+                -15 * d + 8 * v0 + 7 * v1 + 1.5 * a0 - a1,
+                6 * d - 3 * v0 - 3 * v1 - 0.5 * a0 + 0.5 * a1,
+            ]
+        )  # fmt: skip
+
+    def _taylor(self, k: NDArray[np.intp], origin: Floats, h: Floats, terms: int) -> Floats:
+        """x + v dt + a dt^2 / 2 about sample k, whose place in the step is ``origin`` (0 or 1)."""
+        x, v = self.states[k, 0], self.states[k, 1] * h
+        b = np.zeros(len(k)) if self.a is None else 0.5 * self.a[k] * h**2
+        p = np.zeros((len(k), terms))
+        p[:, 0] = x - v * origin + b * origin
+        p[:, 1] = v - 2 * b * origin
+        p[:, 2] = b
+        return p
+
+    def passing(self, i: NDArray[np.intp], which: int, level: float) -> Floats:
+        """The times in steps i at which x or v passes a level, by halving until no number lies between."""
+
+        def away(times: Floats) -> Floats:
+            return np.asarray(self.at(times)[:, which] - level)
+
+        low, high = self.t[i], np.nextafter(self.t[i + 1], self.t[i])
+        at_low, at_high = away(low), away(high)
+        # Only an impact in this step, or rounding at its end, leaves no root inside.
+        rootless = (at_low == 0) | (at_low * at_high > 0)
+        after = np.searchsorted(self.hits, low, side="right")
+        hit = np.append(self.hits, np.inf)[after]
+        end = np.where(hit < high, hit, np.where(np.abs(at_low) <= np.abs(at_high), low, high))
+        while True:
+            middle = low + 0.5 * (high - low)
+            inside = (middle > low) & (middle < high)
+            if not inside.any():
+                return np.where(rootless, end, high)
+            behind = inside & (np.sign(away(middle)) == np.sign(at_low))
+            low, high = np.where(behind, middle, low), np.where(inside & ~behind, middle, high)
+
+    def error_at(self, times: Floats) -> Floats:
+        """Errors of x and v between samples: the larger one of the two ends."""
+        i = self._interval(times)
+        return np.maximum(self.errors[i], self.errors[i + 1])
+
+
+def _horner(p: Floats, s: Floats, derivative: int) -> Floats:
+    q = p
+    for _ in range(derivative):
+        q = q[:, 1:] * np.arange(1, q.shape[1])
+    value = np.zeros(len(s))
+    for k in range(q.shape[1] - 1, -1, -1):
+        value = value * s + q[:, k]
+    return value
+
+
+def _points(
+    between: _Between, times: Floats, instant_error: Floats, attrs: dict[str, str], *, along: bool
+) -> xr.Dataset:
+    import xarray as xr
+
+    section = between.at(times)
+    error = between.error_at(times)
+    moved = np.abs(between.at(times, derivative=1)) * instant_error[:, None]
+    error = np.hypot(error, moved if along else np.nan_to_num(moved))
+    units = [between.unit, f"{between.unit}/s"]
+    return xr.Dataset(
+        {
+            "section": (("iterate", "state"), section, {"long_name": "section points"}),
+            "section_error": (("iterate", "state"), error, {"long_name": "standard error of the section points"}),
+            "time": ("iterate", times, {"long_name": "time", "units": "s"}),
+        },
+        {
+            "iterate": np.arange(len(times)),
+            "state": ("state", ["x", "v"]),
+            "state_unit": ("state", units, {"long_name": "unit"}),
+        },
+        attrs,
+    )

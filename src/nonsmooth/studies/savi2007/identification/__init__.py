@@ -1,0 +1,28 @@
+"""Identification of the paper's rig: its Section 3.1 and what lies beyond, from a session to parameters.
+
+:func:`identify` runs the whole chain; each procedure is a function of its own on the runs that :func:`gather` takes
+out of a session.
+"""
+
+from nonsmooth.studies.savi2007.identification.calibrations import crank_force, voltage_frequency
+from nonsmooth.studies.savi2007.identification.chain import identify
+from nonsmooth.studies.savi2007.identification.damping import amplitude_fit, viscous_bias
+from nonsmooth.studies.savi2007.identification.decay_damping import decay_damping
+from nonsmooth.studies.savi2007.identification.evidence import Evidence, Run, gather
+from nonsmooth.studies.savi2007.identification.free_decay import DecayFit, free_decay
+from nonsmooth.studies.savi2007.identification.gap import mean_of_drive, mean_shift
+from nonsmooth.studies.savi2007.identification.grazing import grazing_gap
+from nonsmooth.studies.savi2007.identification.half_power import half_power
+from nonsmooth.studies.savi2007.identification.multiple_shooting import ContactFit, shoot_contacts
+from nonsmooth.studies.savi2007.identification.natural_frequency import natural_frequency
+from nonsmooth.studies.savi2007.identification.receptance import receptance_fit
+from nonsmooth.studies.savi2007.identification.steady import Steady, steady
+from nonsmooth.studies.savi2007.identification.stiffness import stiffness
+from nonsmooth.studies.savi2007.identification.support_damping import support_damping
+
+__all__ = [
+    "ContactFit", "DecayFit", "Evidence", "Run", "Steady", "amplitude_fit", "crank_force", "decay_damping",
+    "free_decay", "gather", "grazing_gap", "half_power", "identify", "mean_of_drive", "mean_shift",
+    "natural_frequency", "receptance_fit", "shoot_contacts", "steady", "stiffness", "support_damping", "viscous_bias",
+    "voltage_frequency",
+]  # fmt: skip

@@ -1,0 +1,138 @@
+r"""Straight lines through points with errors in both axes, and linear laws with further terms.
+
+The effective variance of a point, :math:`\sigma_y^2 + b^2 \sigma_x^2`, depends on the slope b; York's solution moves
+each point along its error ellipse and so has no bias from the error in x.
+
+References: D. York, N.M. Evensen, M.L. Martinez, J. De Basabe Delgado, Am. J. Phys. 72 (2004) 367, Eqs. 13 and
+appendix; J. Orear, Am. J. Phys. 50 (1982) 912.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth import SolveError
+from nonsmooth.identification.uncertainty import correlated
+
+__all__ = ["LinearLaw", "StraightLine", "linear_law", "scattered_line", "york"]
+
+FloatArray = NDArray[np.float64]
+
+
+class StraightLine(NamedTuple):
+    """y = intercept + slope x, standard uncertainties, their covariance, and chi^2 per degree of freedom."""
+
+    slope: float
+    intercept: float
+    slope_error: float
+    intercept_error: float
+    covariance: float
+    reduced: float
+
+
+def york(x: Any, y: Any, x_error: Any, y_error: Any) -> StraightLine:
+    """The line through points with independent errors in both axes.
+
+    Parameters
+    ----------
+    x, y : array (n,)
+    x_error, y_error : array (n,) or float
+        Standard uncertainties; one of them may be zero.
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than two points, or a point has no error in either axis.
+    """
+    xs, ys = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
+    if len(xs) < 2 or xs.shape != ys.shape:
+        raise ValueError(f"a line needs two points or more with both coordinates, got {xs.shape} and {ys.shape}")
+    vx = np.broadcast_to(np.asarray(x_error, dtype=np.float64) ** 2, xs.shape)
+    vy = np.broadcast_to(np.asarray(y_error, dtype=np.float64) ** 2, ys.shape)
+    if np.any(vx + vy <= 0):
+        raise ValueError("every point needs a positive error in x or in y")
+    slope = float(np.polyfit(xs, ys, 1)[0])
+    for _ in range(100):
+        weight = 1.0 / (vy + slope**2 * vx)
+        x_mean, y_mean = np.average(xs, weights=weight), np.average(ys, weights=weight)
+        u, w = xs - x_mean, ys - y_mean
+        beta = weight * (u * vy + slope * w * vx)
+        new = float(np.sum(weight * beta * w) / np.sum(weight * beta * u))
+        change, slope = abs(new - slope), new
+        if change <= 1e-14 * abs(slope):
+            break
+    else:
+        if change > 1e-9 * abs(slope):
+            raise SolveError(
+                f"the slope of the line still changes by {change / abs(slope):.1g} of itself after 100 rounds: the "
+                "points do not lie along a line; look at them"
+            )
+    adjusted = x_mean + beta
+    centre = np.average(adjusted, weights=weight)
+    slope_var = 1.0 / float(np.sum(weight * (adjusted - centre) ** 2))
+    intercept = float(y_mean - slope * x_mean)
+    intercept_var = 1.0 / float(np.sum(weight)) + centre**2 * slope_var
+    chi2 = float(np.sum(weight * (ys - intercept - slope * xs) ** 2))
+    return StraightLine(
+        slope, intercept, float(np.sqrt(slope_var)), float(np.sqrt(intercept_var)), float(-centre * slope_var),
+        chi2 / max(len(xs) - 2, 1),
+    )  # fmt: skip
+
+
+def scattered_line(x: Any, y: Any, x_error: Any, y_error: Any) -> tuple[StraightLine, float]:
+    """The line through points that scatter more than their errors say: with the scatter that all have in common.
+
+    Returns the line and that scatter, the standard deviation s in y which, added to every error, brings chi^2 to its
+    expectation; 0 where the errors do. Widening all errors by one factor instead would leave the weight with the points
+    whose own errors are smallest.
+
+    References: R.C. Paule and J. Mandel, J. Res. Natl. Bur. Stand. 87 (1982) 377.
+    """
+    ys = np.asarray(y, dtype=np.float64)
+    own = np.broadcast_to(np.asarray(y_error, dtype=np.float64), ys.shape)
+
+    def fitted(s: float) -> StraightLine:
+        return york(x, ys, x_error, np.hypot(own, s))
+
+    line = fitted(0.0)
+    if len(ys) < 3 or line.reduced <= 1:
+        return line, 0.0
+    from scipy.optimize import brentq
+
+    high = float(np.std(ys - np.polyval(np.polyfit(x, ys, 1), x))) * np.sqrt(len(ys)) + float(own.max())
+    s = float(brentq(lambda s: fitted(s).reduced - 1.0, 0.0, high, xtol=1e-4 * high))
+    return fitted(s), s
+
+
+class LinearLaw(NamedTuple):
+    """Coefficients, their covariance and the residuals of a linear law; ``reduced`` is chi^2 per degree of freedom."""
+
+    values: FloatArray
+    covariance: FloatArray
+    residuals: FloatArray
+    reduced: float
+
+
+def linear_law(columns: Any, y: Any, variance: Any, pieces: Any) -> LinearLaw:
+    """Weighted least squares with the covariance of residuals that are correlated within each record.
+
+    Parameters
+    ----------
+    columns : array (n, p)
+    y : array (n,)
+    variance : float or array (n,)
+        Variance of y, with the effective part from an error in x.
+    pieces : sequence of int
+        Lengths of the records that follow one another.
+    """
+    a, b = np.asarray(columns, dtype=np.float64), np.asarray(y, dtype=np.float64)
+    weight = 1.0 / np.sqrt(np.broadcast_to(np.asarray(variance, dtype=np.float64), b.shape))
+    values, *_ = np.linalg.lstsq(a * weight[:, None], b * weight, rcond=None)
+    residuals = b - a @ values
+    weighted = residuals * weight
+    covariance = correlated(a * weight[:, None], weighted, pieces)
+    reduced = float(weighted @ weighted) / max(len(b) - a.shape[1], 1)
+    return LinearLaw(np.asarray(values, dtype=np.float64), covariance, residuals, reduced)

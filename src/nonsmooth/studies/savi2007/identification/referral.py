@@ -1,0 +1,218 @@
+"""The gap referred to the mean position: multiple shooting's gap in the sensor's count, and the car's own places.
+
+Where the car rests and about which place it swings comes from one function, :func:`places`, for `identify` and
+`compare` alike.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.identification import Estimate, Finding
+from nonsmooth.identification.uncertainty import uniform
+from nonsmooth.studies.savi2007.identification.adjustment import Adjusted
+from nonsmooth.studies.savi2007.identification.consistency import consistent
+from nonsmooth.studies.savi2007.identification.evidence import Evidence
+from nonsmooth.studies.savi2007.identification.free_decay import DecayFit
+from nonsmooth.studies.savi2007.identification.gap import MeanShift, mean_shift
+from nonsmooth.studies.savi2007.identification.multiple_shooting import ContactFit
+from nonsmooth.studies.savi2007.identification.receptance import crank_mark
+from nonsmooth.studies.savi2007.identification.steady import Steady
+
+__all__ = ["CountedGap", "Referred", "counted_gap", "mark_of", "places", "refer"]
+
+FloatArray = NDArray[np.float64]
+
+_MOUNTED = 0.15  # rad: within which a mark is taken as put where it should be
+_HELD = 1e-3  # m: half width within which dry friction may hold a car of which nothing is known
+
+
+class CountedGap(NamedTuple):
+    """The gap in the sensor's count at one reading of the screw, by the runs with contact there.
+
+    ``places`` and ``weight``: the places of the runs' gaps among the parameters of the contacts' fit, and how much each
+    counts; ``notes``: a sentence on each run that is left out.
+    """
+
+    value: float
+    error: float
+    places: list[int]
+    weight: FloatArray
+    notes: tuple[str, ...]
+
+
+def counted_gap(contacts: ContactFit, reading: float) -> CountedGap | None:
+    """Weighted mean of the gaps of the runs at a reading of the screw, without those that disagree; None of none."""
+    rows = [i for i, run in enumerate(contacts.runs) if float(run.settings["gap"]) == reading]
+    if not rows:
+        return None
+    index = [contacts.place(i, 0) for i in rows]
+    own = np.diag(contacts.covariance)[index]
+    apart = consistent(contacts.values[index][:, None], own[:, None, None])
+    notes = [
+        f"contact {contacts.runs[i].name}: left out of the gap, which differs there by "
+        f"{1e6 * (contacts.values[j] - apart.mean[0]):+.0f} µm ({apart.off(contacts.values[[j]], [[e]])[0]:+.1f} "
+        "uncertainties) from that of the other runs: see whether the string slipped on the wheel"
+        for i, j, e, keep in zip(rows, index, own, apart.used, strict=True) if not keep
+    ]  # fmt: skip
+    index = [j for j, keep in zip(index, apart.used, strict=True) if keep]
+    block = contacts.covariance[np.ix_(index, index)]
+    solved = np.linalg.solve(block, np.ones(len(index)))
+    weight: FloatArray = np.asarray(solved / solved.sum(), dtype=np.float64)
+    counted = float(weight @ contacts.values[index])
+    off = contacts.values[index] - counted
+    chi2 = float(off @ np.linalg.solve(block, off))
+    # the runs may differ by more than they say: then their scatter counts
+    square = max(chi2 / max(len(index) - 1, 1), 1.0) * (weight @ block @ weight)
+    if not apart.agree:
+        square += float(apart.scatter[0, 0])
+        notes.append(
+            f"the gaps of the {len(index)} runs with contact disagree (Birge ratio {apart.birge:.1f}) and no majority "
+            "agrees: the scatter between them is the uncertainty; see whether the string slips on the wheel"
+        )
+    return CountedGap(counted, float(np.sqrt(square)), index, weight, tuple(notes))
+
+
+@dataclass(frozen=True, eq=False)
+class Referred:
+    """The gap, and how it varies together with what else is identified.
+
+    Attributes
+    ----------
+    gap, at_rest, shift, rest : Estimate
+        Counted from the mean position under the drive, from where the car rests, the one less the other, and where the
+        car rests in the sensor's count (m).
+    covariance : array (4, 4)
+        Of gap, at_rest, shift and rest.
+    cross : array (4, p)
+        With the unknowns of the adjustment: the same records tell the gap and k_s/m, the same decays zero and omega_0.
+    crank_length, reading : float
+        The crank to which the gap is referred, and the screw's reading that it stands for (m).
+    counted : CountedGap
+        The gap in the sensor's count.
+    """
+
+    gap: Estimate
+    at_rest: Estimate
+    shift: Estimate
+    rest: Estimate
+    covariance: FloatArray
+    cross: FloatArray
+    crank_length: float
+    reading: float
+    counted: CountedGap
+    notes: tuple[str, ...] = ()
+
+    def finding(self, contacts: ContactFit) -> Finding:
+        """The gap as a finding."""
+        notes = [
+            f"counted from the mean position under the drive at a crank of {1e3 * self.crank_length:.2f} mm, "
+            f"{1e6 * self.shift.value:+.0f} µm from where the car rests (string and uneven turning); as read at rest, "
+            "the model would stand at another gap by as much",
+            f"stands for a reading of {1e3 * self.reading:.4g} mm at the screw, whose zero is off by "
+            f"{1e6 * (self.at_rest.value - self.reading):+.0f} µm",
+            *self.counted.notes,
+        ]
+        others = {"gap_at_rest": self.at_rest, "mean_shift": self.shift, "rest_position": self.rest}
+        return Finding(
+            "g", self.gap, "multiple shooting over records with contact, referred to the mean position",
+            contacts.fit.samples, tuple(run.name for run in contacts.runs), tuple(notes), others, self.covariance,
+        )  # fmt: skip
+
+
+def places(evidence: Evidence, decay: DecayFit | None, seen: Steady, *, held: float | None = None) -> MeanShift:
+    """Places about which the car rests and swings, in the sensor's count, from taps, steady runs and the string.
+
+    Parameters
+    ----------
+    decay : DecayFit, optional
+        Of taps with the same zero of the sensor. Without it the sensor's zero stands for the place of rest, as far as
+        friction holds the car off it.
+    seen : Steady
+        Steady runs without contact.
+    held : float, optional
+        Half width (m) of the range in which dry friction holds the car, F_C/2k; a millimetre where it is not known.
+    """
+    if decay is not None:
+        zero, error, dry = float(decay.values[3]), decay.error("x_e"), float(decay.values[2] / decay.values[0] ** 2)
+    else:
+        zero, dry = 0.0, held or 0.0
+        error = float(np.hypot(uniform(_HELD if held is None else held), uniform(evidence.resolution / 2)))
+    length = evidence.apparatus.get("string_length")
+    found = mean_shift(
+        seen, zero, error, string_length=length.value if length else None,
+        string_error=length.uncertainty if length else 0.0, dry=dry,
+    )  # fmt: skip
+    if decay is None or abs(found.rest) < evidence.resolution:
+        return found
+    said = (
+        f"the car rests at {1e3 * found.rest:+.3f} mm of the rotary sensor's count, and not where it was zeroed (dry "
+        f"friction holds it within ±{1e3 * dry:.2f} mm): gap and mean position count from where it rests"
+    )
+    return found._replace(notes=(said, *found.notes))
+
+
+def mark_of(seen: Steady, decay: DecayFit) -> tuple[float, str]:
+    """The crank's angle at the photogate (rad), and a sentence where it is far from 0; 0 where no run shows it.
+
+    A mark that is a few hundredths off, as gates are mounted, stays 0: fits with a free phase find it better.
+    """
+    if not len(seen):
+        return 0.0, ""
+    angle = crank_mark(seen, decay)
+    if abs(angle) < _MOUNTED:
+        return 0.0, ""
+    return angle, (
+        f"at the photogate's mark the crank stands {angle:+.2f} rad from where it pulls the car towards the support"
+        + (": the motor is on the other side, or the mark half a turn round" if abs(angle) > np.pi - _MOUNTED else "")
+        + "; phases are counted from there"
+    )
+
+
+def refer(
+    evidence: Evidence, decay: DecayFit, contacts: ContactFit, adjusted: Adjusted, seen: Steady,
+    crank_length: float | None,
+) -> Referred:  # fmt: skip
+    """The gap at the most frequent screw reading, referred to the mean position at ``crank_length``.
+
+    Parameters
+    ----------
+    seen : Steady
+        Steady runs without contact: their mean positions tell the shift.
+    crank_length : float, optional
+        The longest of the runs with contact where not given.
+    """
+    readings = [float(run.settings["gap"]) for run in contacts.runs]
+    reading = max(set(readings), key=readings.count)
+    counted = counted_gap(contacts, reading)
+    assert counted is not None
+    found = places(evidence, decay, seen)
+    longest = max(float(run.settings["crank_length"]) for run in contacts.runs)
+    crank = longest if crank_length is None else crank_length
+    moved = found.row(crank)
+    # gap = counted - rest - shift, at rest = counted - rest, of counted and (rest, alpha, beta)
+    rest = np.array([1.0, 0.0, 0.0])
+    rows = np.array([[1.0, *(-rest - moved)], [1.0, *-rest], [0.0, *moved], [0.0, *rest]])
+    known = np.zeros((4, 4))
+    known[0, 0], known[1:, 1:] = counted.error**2, found.covariance
+    covariance = rows @ known @ rows.T
+    values = rows @ [counted.value, found.rest, found.alpha, found.beta]
+    gap, at_rest, by, place = (
+        Estimate(float(value), float(np.sqrt(covariance[i, i])), "m") for i, value in enumerate(values)
+    )
+    with_counted = _cross(adjusted, ("kappa", "gamma"), contacts.covariance[3:5][:, counted.places] @ counted.weight)
+    with_zero = _cross(adjusted, ("omega_0", "b", "f"), decay.covariance[:3, 3])
+    cross = rows @ np.array([with_counted, *np.outer(found.by_zero, with_zero)])
+    return Referred(gap, at_rest, by, place, covariance, cross, crank, reading, counted, found.notes)
+
+
+def _cross(adjusted: Adjusted, labels: tuple[str, ...], shared: FloatArray) -> FloatArray:
+    """Covariance of the unknowns with something that varies with these observations."""
+    columns = [adjusted.labels.index(label) for label in labels if label in adjusted.labels]
+    if len(columns) != len(labels):
+        return np.zeros(len(adjusted.names))
+    return np.asarray(adjusted.influence[:, columns] @ shared)

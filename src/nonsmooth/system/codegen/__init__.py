@@ -1,0 +1,1 @@
+"""Code for the steppers: matrices of linear modes, Taylor jets, equations of variation."""

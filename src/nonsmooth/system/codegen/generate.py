@@ -1,0 +1,178 @@
+"""From traced expressions to machine code: a generated module with the field, the jet, the values and the jumps.
+
+The module is plain text with four functions of fixed signatures, compiled through the cache of
+``kernels.cache``; kernels take them as arguments of function type, so a new model compiles nothing but itself.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+from sympy import Basic, Expr
+
+from nonsmooth.system.codegen.jet import jet_code
+from nonsmooth.system.symbolic.printing import Printer, assignments
+from nonsmooth.system.symbolic.traced import Traced
+
+__all__ = ["MOST_MODELS", "SIGNATURES", "CompiledModel", "compile_model", "model_source"]
+
+MOST_MODELS = 32  # whose code is kept though nobody uses it: a third of a MB each
+# mode, [order,] t, u, q and what is written; q holds the parameters, then the memory.
+SIGNATURES = {
+    "field": "void(i8, f8, f8[::1], f8[::1], f8[::1])",
+    "jet": "void(i8, i8, f8, f8[::1], f8[::1], f8[:,::1], f8[:,::1])",
+    "values": "void(i8, f8, f8[::1], f8[::1], f8[::1])",
+    "jump": "void(i8, f8, f8[::1], f8[::1], f8[::1], f8[::1])",
+}
+_ARGUMENTS = {
+    "field": "mode, t, u, q, du",
+    "jet": "mode, order, t, u, q, C, W",
+    "values": "mode, t, u, q, out",
+    "jump": "transition, t, u, q, u_new, q_new",
+}
+_INLINED = {"cos": "cosine", "sin": "sine"}
+
+
+@dataclass(frozen=True)
+class CompiledModel:
+    """The functions of one model (see ``SIGNATURES``), to be passed to the kernels.
+
+    Attributes
+    ----------
+    field : ``field(mode, t, u, q, du)``
+        The vector field of a mode.
+    jet : ``jet(mode, order, t, u, q, C, W)``
+        Rows of C: Taylor coefficients 0..order (order >= 1) of the states, the indicators and the outputs along
+        the mode's flow from (t, u). C has at least order + 1 columns, W is scratch (n_scratch, >= order + 1).
+    values : ``values(mode, t, u, q, out)``
+        The indicators, then the outputs of that mode.
+    jump : ``jump(transition, t, u, q, u_new, q_new)``
+        State and parameters-with-memory after a transition; the new arrays must not be the old ones.
+    n_scratch : int
+        Rows of W; at least 1.
+    smooth_outputs : tuple of bool
+        False where an output has a corner in some mode: there its series is NaN from coefficient 1 on.
+    content_hash : str
+        Hash of the generated source.
+    """
+
+    field: Any
+    jet: Any
+    values: Any
+    jump: Any
+    n_scratch: int
+    smooth_outputs: tuple[bool, ...]
+    content_hash: str
+
+
+@lru_cache(maxsize=MOST_MODELS)
+def compile_model(traced: Traced) -> CompiledModel:
+    """Generate, compile (or load from the cache) and return the functions of a traced system.
+
+    Raises
+    ------
+    SystemDefinitionError
+        A field or an indicator has a corner, or an expression holds a function that is not supported.
+    """
+    from nonsmooth.kernels.compile.cache import load_module
+
+    source = model_source(traced)
+    module = load_module(source, "model", lasting=False)
+    return CompiledModel(
+        field=module.field,
+        jet=module.jet,
+        values=module.values,
+        jump=module.jump,
+        n_scratch=module.N_SCRATCH,
+        smooth_outputs=module.SMOOTH_OUTPUTS,
+        content_hash=hashlib.sha256(source.encode()).hexdigest(),
+    )
+
+
+@lru_cache(maxsize=16)
+def model_source(traced: Traced) -> str:
+    """The text of the generated module; the same for the same expressions, in every process."""
+    writers = {
+        "field": [_field(traced, mode) for mode in range(len(traced.fields))],
+        "values": [_values(traced, mode) for mode in range(len(traced.fields))],
+        "jump": [_jump(traced, i) for i in range(len(traced.transitions))],
+    }
+    jets = []
+    for mode, fields in enumerate(traced.fields):
+        outputs = [output[mode] for output in traced.outputs]
+        jets.append(jet_code(traced.t, traced.u, _constants(traced), fields, [*traced.indicators, *outputs]))
+    bodies = {name: [lines for lines, _ in parts] for name, parts in writers.items()}
+    bodies["jet"] = [jet.lines for jet in jets]
+    functions = {f for parts in writers.values() for _, used in parts for f in used}
+    functions |= {f for jet in jets for f in jet.functions}
+    inlined = sorted({_INLINED[f] for _, used in writers["field"] for f in used & _INLINED.keys()})
+    bodies["field"] = [_inlined(lines) for lines in bodies["field"]]
+    n_indicators = len(traced.indicators)
+    smooth = tuple(all(jet.smooth[n_indicators + i] for jet in jets) for i in range(len(traced.outputs)))
+    parts = [
+        "from nonsmooth.kernels.compile.cache import callback",
+        f"from math import {', '.join(sorted(functions))}" if functions else "",
+        f"from nonsmooth.kernels.circular import {', '.join(inlined)}" if inlined else "",
+        f"N_SCRATCH = {max([1, *(jet.n_scratch for jet in jets)])}",
+        f"SMOOTH_OUTPUTS = {smooth!r}",
+    ]
+    n_constants = len(traced.p) + len(traced.m)
+    constants = [f"q{i} = q[{i}]" for i in range(n_constants)]
+    copies = [f"for i in range({len(traced.u)}):", "    u_new[i] = u[i]"]
+    copies += [f"for i in range({n_constants}):", "    q_new[i] = q[i]"]
+    parts += [_function(name, bodies[name], constants, copies if name == "jump" else []) for name in SIGNATURES]
+    return "\n".join(part for part in parts if part) + "\n"
+
+
+def _inlined(lines: list[str]) -> list[str]:
+    """The same code with the cos and sin of ``kernels.circular``: for the field alone, which is called six times a step
+    and would wait for the library; elsewhere they would only lengthen the compile."""
+    return [re.sub(r"\b(cos|sin)\(", lambda found: f"{_INLINED[found[1]]}(", line) for line in lines]
+
+
+def _function(name: str, branches: list[list[str]], constants: list[str], always: list[str]) -> str:
+    selector = _ARGUMENTS[name].split(",")[0]
+    words = set(re.findall(r"\w+", "\n".join(line for branch in branches for line in branch)))
+    lines = [*(line for line in constants if line.split(" ")[0] in words), *always]
+    for i, branch in enumerate(branches):
+        lines.append(f"{'el' if i else ''}if {selector} == {i}:")
+        lines += [f"    {line}" for line in branch or ["pass"]]
+    body = "".join(f"    {line}\n" for line in lines or ["pass"])
+    return f'\n\n@callback("{SIGNATURES[name]}")\ndef {name}({_ARGUMENTS[name]}):\n{body}'.rstrip("\n")
+
+
+def _constants(traced: Traced) -> dict[Basic, str]:
+    return {symbol: f"q{i}" for i, symbol in enumerate([*traced.p, *traced.m])}
+
+
+def _scalar_code(traced: Traced, targets: Sequence[tuple[str, Expr]]) -> tuple[list[str], set[str]]:
+    """Straight code for some expressions at one point, and the functions of ``math`` that it uses."""
+    names = {**_constants(traced), traced.t: "t", **{symbol: f"x{i}" for i, symbol in enumerate(traced.u)}}
+    printer = Printer(names)
+    used = set().union(*(e.free_symbols for _, e in targets)) if targets else set()
+    lines = [f"x{i} = u[{i}]" for i, symbol in enumerate(traced.u) if symbol in used]
+    lines += assignments(targets, printer, "g")
+    return lines, printer.used
+
+
+def _field(traced: Traced, mode: int) -> tuple[list[str], set[str]]:
+    return _scalar_code(traced, [(f"du[{i}]", e) for i, e in enumerate(traced.fields[mode])])
+
+
+def _values(traced: Traced, mode: int) -> tuple[list[str], set[str]]:
+    rows = [*traced.indicators, *(output[mode] for output in traced.outputs)]
+    return _scalar_code(traced, [(f"out[{i}]", e) for i, e in enumerate(rows)])
+
+
+def _jump(traced: Traced, index: int) -> tuple[list[str], set[str]]:
+    """Code for what a transition changes; the rest has been copied before."""
+    transition = traced.transitions[index]
+    reset = traced.u if transition.reset is None else transition.reset
+    targets = [(f"u_new[{i}]", e) for i, e in enumerate(reset) if e != traced.u[i]]
+    targets += [(f"q_new[{len(traced.p) + i}]", e) for i, e in transition.writes]
+    return _scalar_code(traced, targets)

@@ -1,0 +1,306 @@
+r"""Is every mode linear with constant coefficients and harmonic forcing, and if so, with which matrices?
+
+    u' = A u + b + sum_h c_h cos(k_h omega t) + s_h sin(k_h omega t),    omega = 2 pi / period
+
+for each mode, with the same form for indicators, outputs and resets where they are affine in u. Memory counts as
+further states behind the others, at rest but for what transitions write. The decision is made by taking the expressions
+apart, once per system; the matrices of any number of parameter points then come from one generated NumPy function.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import sympy
+from numpy.typing import NDArray
+from sympy import Expr, Symbol
+
+from nonsmooth.system.symbolic.printing import Printer, assignments
+from nonsmooth.system.symbolic.traced import Traced, TracedTransition
+
+__all__ = ["LinearForm", "LinearTables", "linear_form"]
+
+FloatArray = NDArray[np.float64]
+Terms = dict[Hashable, Expr]  # "1", "t", ("u", i), ("cos", k) or ("sin", k) -> coefficient in the parameters
+
+
+@dataclass(frozen=True)
+class LinearTables:
+    """Matrices for P parameter points, M modes, n states with the memory behind them, H harmonics, I indicators, O
+    outputs, T transitions.
+
+    Names: ``?b`` the constant part, ``?c`` and ``?s`` the cosines' and sines' coefficients. Where the form says
+    that indicators, outputs or resets are not affine, their arrays are zero (identity for ``ra``).
+    """
+
+    omega: FloatArray  # (P,) base frequency 2 pi / period; 0 for an autonomous system
+    A: FloatArray  # (P, M, n, n)
+    b: FloatArray  # (P, M, n)
+    c: FloatArray  # (P, M, H, n)
+    s: FloatArray  # (P, M, H, n)
+    ia: FloatArray  # (P, I, n)
+    ib: FloatArray  # (P, I)
+    ic: FloatArray  # (P, I, H)
+    is_: FloatArray  # (P, I, H)
+    oa: FloatArray  # (P, O, M, n)
+    ob: FloatArray  # (P, O, M)
+    oc: FloatArray  # (P, O, M, H)
+    os: FloatArray  # (P, O, M, H)
+    ra: FloatArray  # (P, T, n, n)
+    rb: FloatArray  # (P, T, n)
+    rc: FloatArray  # (P, T, H, n)
+    rs: FloatArray  # (P, T, H, n)
+
+    @property
+    def period(self) -> FloatArray:
+        """Forcing periods, (P,); infinite for an autonomous system."""
+        with np.errstate(divide="ignore"):
+            return np.where(self.omega > 0.0, 2.0 * np.pi / self.omega, np.inf)
+
+
+@dataclass(frozen=True)
+class LinearForm:
+    """The linear form of a system whose modes are all linear.
+
+    Attributes
+    ----------
+    multiples : tuple of int
+        The harmonics k_h >= 1 that occur anywhere, ascending.
+    affine_indicators, affine_outputs, affine_resets : bool
+        Whether all of them have the form above.
+    source : str
+        The generated NumPy code.
+    """
+
+    multiples: tuple[int, ...]
+    affine_indicators: bool
+    affine_outputs: bool
+    affine_resets: bool
+    source: str
+    _shapes: dict[str, tuple[int, ...]] = field(repr=False)
+    _fill: Callable[..., None] = field(repr=False)
+
+    def evaluate(self, points: FloatArray) -> LinearTables:
+        """Evaluate all matrices.
+
+        Parameters
+        ----------
+        points : array (P, n_parameters)
+            Values of the parameters, in the system's order.
+
+        Returns
+        -------
+        LinearTables
+            C-contiguous arrays of doubles; not finite where a formula is not (a division by a zero parameter).
+        """
+        points = np.asarray(points, dtype=np.float64)
+        tables = {name: np.zeros((len(points), *shape)) for name, shape in self._shapes.items()}
+        with np.errstate(all="ignore"):
+            self._fill(np.ascontiguousarray(points.T), **tables)
+        return LinearTables(**tables)
+
+
+@lru_cache(maxsize=256)
+def linear_form(traced: Traced) -> LinearForm | None:
+    """Return the linear form, or None where some mode has none."""
+    taking = _TakingApart(traced)
+    fields = [taking.all_or_none(vector) for vector in traced.fields]
+    if any(vector is None for vector in fields):
+        return None
+    indicators = taking.all_or_none(traced.indicators)
+    outputs = [taking.all_or_none(row) for row in traced.outputs]
+    resets = [taking.all_or_none(_map_of(t, traced)) for t in traced.transitions]
+    affine_resets = all(r is not None for r in resets)
+
+    code = _TablesCode(traced, taking.base)
+    for mode, vector in enumerate(fields):
+        code.add(vector or [], "A", "b", "c", "s", (mode,), split=True)
+    code.add(indicators or [], "ia", "ib", "ic", "is_", (), split=False)
+    affine_outputs = all(row is not None for row in outputs)
+    for i, row in enumerate(outputs if affine_outputs else []):
+        code.add(row or [], "oa", "ob", "oc", "os", (i,), split=False)
+    for i, vector in enumerate(resets):
+        code.add((vector if affine_resets else None) or taking.identity(), "ra", "rb", "rc", "rs", (i,), split=True)
+    multiples, source, shapes = code.finished()
+    namespace: dict[str, Any] = {"np": np}
+    exec(compile(source, "<linear form>", "exec"), namespace)
+    return LinearForm(
+        multiples, indicators is not None, affine_outputs, affine_resets, source, shapes, namespace["fill"]
+    )
+
+
+def _map_of(transition: TracedTransition, traced: Traced) -> tuple[Expr, ...]:
+    """States and memory behind a transition."""
+    written = dict(transition.writes)
+    states = traced.u if transition.reset is None else transition.reset
+    return (*states, *(written.get(i, symbol) for i, symbol in enumerate(traced.m)))
+
+
+class _NotAffineError(Exception):
+    """The expression has no such form."""
+
+
+class _TakingApart:
+    """Writes expressions as a sum of coefficients times 1, u_i, cos(k omega t), sin(k omega t)."""
+
+    def __init__(self, traced: Traced) -> None:
+        self.t, self.u = traced.t, (*traced.u, *traced.m)
+        self.base: Expr | None = None if traced.period is None else 2 * sympy.pi / traced.period
+        self.variables: set[Symbol] = {traced.t, *self.u}
+
+    def all_or_none(self, expressions: tuple[Expr, ...]) -> list[Terms] | None:
+        try:
+            return [self.terms(e) for e in expressions]
+        except _NotAffineError:
+            return None
+
+    def identity(self) -> list[Terms]:
+        return [{("u", i): sympy.S.One} for i in range(len(self.u))]
+
+    def terms(self, expression: Expr) -> Terms:
+        """Raise where there is no such form; products are multiplied out only if need be."""
+        try:
+            terms = self._terms(expression)
+        except _NotAffineError:
+            terms = self._terms(sympy.expand(expression))
+        if sympy.expand(terms.get("t", sympy.S.Zero)) != 0:
+            raise _NotAffineError
+        return {key: c for key, c in terms.items() if key != "t" and c != 0}
+
+    def _terms(self, e: Expr) -> Terms:
+        if e in self.variables:
+            return {"t" if e == self.t else ("u", self.u.index(e)): sympy.S.One}
+        if not e.free_symbols & self.variables:
+            return {"1": e}
+        if e.is_Add:
+            total: Terms = {}
+            for part in e.args:
+                _accumulate(total, self._terms(part))
+            return total
+        if e.is_Mul:
+            product: Terms = {"1": sympy.S.One}
+            for part in e.args:
+                product = _multiplied(product, self._terms(part))
+            return product
+        if e.is_Pow and isinstance(e.exp, sympy.Integer) and e.exp > 1:
+            base = self._terms(e.base)
+            product = base
+            for _ in range(int(e.exp) - 1):
+                product = _multiplied(product, base)
+            return product
+        if isinstance(e, sympy.sin | sympy.cos):
+            return self._wave(e, self._terms(e.args[0]))
+        raise _NotAffineError
+
+    def _wave(self, e: Expr, argument: Terms) -> Terms:
+        """sin or cos of w t + phase, w a multiple of the base frequency."""
+        rate = argument.pop("t", sympy.S.Zero)
+        phase = argument.pop("1", sympy.S.Zero)
+        if argument:
+            raise _NotAffineError
+        k = self._multiple(rate)
+        sine, cosine = sympy.sin(phase), sympy.cos(phase)
+        if isinstance(e, sympy.cos):
+            return _harmonic(k, cosine, -sine)
+        return _harmonic(k, sine, cosine)
+
+    def _multiple(self, rate: Expr) -> int:
+        if self.base is None:
+            raise _NotAffineError
+        ratio = rate / self.base
+        if not ratio.is_number:
+            ratio = sympy.simplify(ratio)
+        if not (ratio.is_number and ratio.is_real):
+            raise _NotAffineError
+        k = round(float(ratio))
+        # A period typed in as a number need not divide the frequency to the last digit.
+        if abs(float(ratio) - k) > 1e-12 * max(1, abs(k)):
+            raise _NotAffineError
+        return k
+
+
+def _harmonic(k: int, cosine: Expr, sine: Expr) -> Terms:
+    """cosine * cos(k omega t) + sine * sin(k omega t) for any integer k."""
+    if k == 0:
+        return {"1": cosine}
+    return {("cos", abs(k)): cosine, ("sin", abs(k)): sine if k > 0 else -sine}
+
+
+def _accumulate(total: Terms, part: Terms) -> None:
+    for key, c in part.items():
+        total[key] = total.get(key, sympy.S.Zero) + c
+
+
+def _multiplied(a: Terms, b: Terms) -> Terms:
+    product: Terms = {}
+    for x, c in a.items():
+        for y, d in b.items():
+            if c != 0 and d != 0:
+                _accumulate(product, {key: c * d * factor for key, factor in _times(x, y).items()})
+    return product
+
+
+def _times(x: Hashable, y: Hashable) -> Terms:
+    if x == "1" or y == "1":
+        return {y if x == "1" else x: sympy.S.One}
+    if not (isinstance(x, tuple) and isinstance(y, tuple)) or "u" in (x[0], y[0]):
+        raise _NotAffineError
+    half = sympy.S.Half
+    (f, k), (g, m) = x, y
+    total: Terms = {}
+    if f == g:  # cos cos = (cos(k - m) + cos(k + m)) / 2, sin sin = (cos(k - m) - cos(k + m)) / 2
+        _accumulate(total, _harmonic(k - m, half, sympy.S.Zero))
+        _accumulate(total, _harmonic(k + m, half if f == "cos" else -half, sympy.S.Zero))
+    else:  # sin(k) cos(m) = (sin(k + m) + sin(k - m)) / 2
+        k, m = (k, m) if f == "sin" else (m, k)
+        _accumulate(total, _harmonic(k + m, sympy.S.Zero, half))
+        _accumulate(total, _harmonic(k - m, sympy.S.Zero, half))
+    return total
+
+
+class _TablesCode:
+    """Collects the entries of the tables and writes the NumPy function that fills them."""
+
+    def __init__(self, traced: Traced, base: Expr | None) -> None:
+        self.traced, self.base = traced, base
+        self.entries: list[tuple[str, tuple[int, ...], Hashable, bool, Expr]] = []
+
+    def add(self, rows: list[Terms], a: str, b: str, c: str, s: str, lead: tuple[int, ...], split: bool) -> None:
+        """Rows of one table: ``lead`` are the indices before the row's; ``split`` puts the harmonic before the row."""
+        for i, terms in enumerate(rows):
+            for key, coefficient in terms.items():
+                if key == "1":
+                    self.entries.append((b, (*lead, i), None, False, coefficient))
+                elif isinstance(key, tuple) and key[0] == "u":
+                    self.entries.append((a, (*lead, i, key[1]), None, False, coefficient))
+                elif isinstance(key, tuple):
+                    self.entries.append((c if key[0] == "cos" else s, (*lead, i), key[1], split, coefficient))
+
+    def finished(self) -> tuple[tuple[int, ...], str, dict[str, tuple[int, ...]]]:
+        """(multiples, source, shapes without the points' axis)."""
+        multiples = tuple(sorted({k for _, _, k, _, _ in self.entries if isinstance(k, int)}))
+        targets: list[tuple[str, Expr]] = [] if self.base is None else [("omega[:]", self.base)]
+        for table, index, k, split, coefficient in self.entries:
+            if isinstance(k, int):
+                h = multiples.index(k)
+                index = (*index[:-1], h, index[-1]) if split else (*index, h)
+            targets.append((f"{table}[{', '.join([':', *map(str, index)])}]", coefficient))
+        printer = Printer({symbol: f"p[{i}]" for i, symbol in enumerate(self.traced.p)}, arrays=True)
+        lines = assignments(targets, printer, "g") or ["pass"]
+        shapes = self._shapes(len(multiples))
+        source = f"def fill(p, {', '.join(shapes)}):\n" + "".join(f"    {line}\n" for line in lines)
+        return multiples, source, shapes
+
+    def _shapes(self, h: int) -> dict[str, tuple[int, ...]]:
+        t = self.traced
+        n, m, i, o, r = len(t.u) + len(t.m), len(t.fields), len(t.indicators), len(t.outputs), len(t.transitions)
+        return {
+            "omega": (), "A": (m, n, n), "b": (m, n), "c": (m, h, n), "s": (m, h, n),
+            "ia": (i, n), "ib": (i,), "ic": (i, h), "is_": (i, h),
+            "oa": (o, m, n), "ob": (o, m), "oc": (o, m, h), "os": (o, m, h),
+            "ra": (r, n, n), "rb": (r, n), "rc": (r, h, n), "rs": (r, h, n),
+        }  # fmt: skip

@@ -1,0 +1,215 @@
+r"""The equations of first variation of a traced system, as a generated module.
+
+Along a motion :math:`\dot u = f(t, u, p, m)` in one mode, small changes of the state, the memory and the parameters
+obey :math:`\dot X = f_u X + [0, f_m, f_p]`. The generated ``jet`` gives the Taylor coefficients of the states and of
+every entry of these Jacobians that is not zero; ``switch`` gives what a transition does to a state and all its first
+derivatives. ``touch_function`` writes an indicator, its first two Lie derivatives and their gradients as plain Python:
+they are needed one at a time.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from nonsmooth.system.codegen.generate import MOST_MODELS, SIGNATURES
+from nonsmooth.system.codegen.jet import jet_code
+from nonsmooth.system.symbolic.printing import Printer, assignments
+from nonsmooth.system.symbolic.traced import Traced, TracedTransition
+
+__all__ = ["VariationalModel", "touch_function", "variational_model"]
+
+ZERO, CONSTANT, VARYING = 0, 1, 2
+FOUR = 4  # columns in a vector (``kernels.lanes``)
+_JET = SIGNATURES["jet"][:-1] + ", f8[:,:,::1])"
+_SWITCH = "void(i8, f8, f8[::1], f8[::1], f8[::1])"
+
+
+@dataclass(frozen=True)
+class VariationalModel:
+    """Compiled functions and the pattern of the Jacobians.
+
+    Attributes
+    ----------
+    jet : ``jet(mode, order, t, u, q, C, W)``
+        Coefficients of the states, then of the entries below.
+    field : ``field(mode, t, u, q, du)``
+    switch : ``switch(transition, t, u, q, out)``
+        ``out``: the extended state z = (u, memory) after (n), R_z (n, n), R_t (n), R_p (n, n_active), and for each
+        row of the condition h, h_z (n), h_t, h_p (n_active).
+    entries : array (E, 2)
+        Row and column of each entry; columns: states, memory, active parameters.
+    kinds : array (n_modes, E)
+        0: zero in this mode, 1: constant, 2: varying.
+    n_scratch : int
+        Rows of W.
+    """
+
+    jet: Any
+    field: Any
+    switch: Any
+    entries: NDArray[np.int64]
+    kinds: NDArray[np.int64]
+    n_scratch: int
+
+
+@lru_cache(maxsize=MOST_MODELS)
+def variational_model(traced: Traced, active: tuple[int, ...]) -> VariationalModel:
+    """Generate and compile (or load from the cache) for some active parameters, given by index."""
+    from nonsmooth.kernels.compile.cache import load_module
+
+    wanted = [*traced.u, *traced.m, *(traced.p[i] for i in active)]
+    jacobians = [[[_derivative(e, s) for s in wanted] for e in field] for field in traced.fields]
+    n = len(traced.u)
+    entries = [(i, j) for i in range(n) for j in range(len(wanted)) if any(jac[i][j] != 0 for jac in jacobians)]
+    varying = {traced.t, *traced.u}
+    kinds = [
+        [ZERO if jac[i][j] == 0 else VARYING if jac[i][j].free_symbols & varying else CONSTANT for i, j in entries]
+        for jac in jacobians
+    ]
+    jets = [
+        jet_code(traced.t, traced.u, _constants(traced), field, [jac[i][j] for i, j in entries])
+        for field, jac in zip(traced.fields, jacobians, strict=True)
+    ]
+    fields = [_code(traced, [(f"du[{i}]", e) for i, e in enumerate(field)]) for field in traced.fields]
+    switches = [_code(traced, _switch(traced, jump, wanted)) for jump in traced.transitions]
+    functions = set().union(*(jet.functions for jet in jets), *(used for _, used in [*fields, *switches]))
+    parts = [
+        "from nonsmooth.kernels.compile.cache import callback",
+        "from nonsmooth.kernels.compile.lanes import load, plus, store, times",
+        f"from math import {', '.join(sorted(functions))}" if functions else "",
+        _function(
+            "jet",
+            _JET,
+            "mode, order, t, u, q, C, W, D",
+            traced,
+            [
+                [*jet.lines, *_small_changes(entries, kind, n, len(wanted))]
+                for jet, kind in zip(jets, kinds, strict=True)
+            ],
+        ),
+        _function("field", SIGNATURES["field"], "mode, t, u, q, du", traced, [lines for lines, _ in fields]),
+        _function("switch", _SWITCH, "transition, t, u, q, out", traced, [lines for lines, _ in switches]),
+    ]
+    module = load_module("\n".join(part for part in parts if part) + "\n", "variations", lasting=False)
+    return VariationalModel(
+        module.jet, module.field, module.switch,
+        np.array(entries, dtype=np.int64).reshape(-1, 2),
+        np.array(kinds, dtype=np.int64).reshape(len(kinds), len(entries)),
+        max([1, *(jet.n_scratch for jet in jets)]),
+    )  # fmt: skip
+
+
+def _small_changes(entries: list[tuple[int, int]], kinds: list[int], n: int, columns: int) -> list[str]:
+    """Lines that go on with the series D[k, number, column] of small changes, from D[0] and the entries' series in C:
+    X_(k+1) = sum_j A_j X_(k-j) / (k + 1), four columns at once."""
+    width = -(-columns // FOUR) * FOUR
+
+    def load(m: int, k: str = "k") -> str:
+        place = f"{m * width} + b" if k == "0" else f"{columns * width}*{k} + {m * width} + b"
+        return f"load(D, {place})"
+
+    rows: dict[int, list[str]] = {i: [] for i in range(n)}  # terms of each row: factor, vector
+    sums, used = [], set()
+    for e, ((i, m), kind) in enumerate(zip(entries, kinds, strict=True)):
+        if kind == VARYING and m < n:
+            sums.append((e, i, m))
+        elif kind != ZERO:
+            rows[i].append(f"C[{n + e}, k], {load(m, '0')}" if m >= n else f"C[{n + e}, 0], y{m}")
+            used |= {m} if m < n else set()
+    body = [f"y{m} = {load(m)}" for m in sorted(used)]
+    if sums:
+        body += [f"w{e} = times(0.0, {load(m, '0')})" for e, _, m in sums]
+        body += ["for j in range(k + 1):", *(f"    x{m} = {load(m, 'j')}" for m in sorted({m for _, _, m in sums}))]
+        body += [f"    w{e} = plus(w{e}, C[{n + e}, k - j], x{m})" for e, _, m in sums]
+    for i, terms in rows.items():
+        own = [f"w{e}" for e, row, _ in sums if row == i]
+        first = own[0] if own else f"times({terms.pop(0)})" if terms else f"times(0.0, {load(i, '0')})"
+        body.append(f"v{i} = {first}")
+        body += [f"v{i} = plus(v{i}, 1.0, {more})" for more in own[1:]]
+        body += [f"v{i} = plus(v{i}, {term})" for term in terms]
+        body.append(f"store(D, {columns * width}*(k + 1) + {i * width} + b, times(1.0/(k + 1), v{i}))")
+    return ["for k in range(order):", f"    for b in range(0, {width}, {FOUR}):", *(f"        {line}" for line in body)]
+
+
+def _derivative(e: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
+    """Expanded only where that can show that nothing but constants is left."""
+    return sp.expand(e.diff(symbol)) if symbol in e.free_symbols else sp.S.Zero
+
+
+def _switch(traced: Traced, jump: TracedTransition, wanted: list[sp.Symbol]) -> list[tuple[str, sp.Expr]]:
+    """Targets and expressions in the order of ``VariationalModel.switch``."""
+    reset = list(traced.u if jump.reset is None else jump.reset)
+    # A state that the next mode lacks is dropped: it is nothing that later motion could depend on.
+    reset = [sp.S.Zero if gone else e for e, gone in zip(reset, traced.lacking[jump.target], strict=True)]
+    memory = dict(jump.writes)
+    after = [*reset, *(memory.get(i, symbol) for i, symbol in enumerate(traced.m))]
+    n = len(after)
+    z, p = wanted[:n], wanted[n:]
+    values = [*after, *(_derivative(e, s) for e in after for s in z)]
+    values += [_derivative(e, traced.t) for e in after]
+    values += [_derivative(e, s) for e in after for s in p]
+    for row in jump.rows:
+        h = traced.indicators[row.indicator]
+        values += [h, *(_derivative(h, s) for s in z), _derivative(h, traced.t), *(_derivative(h, s) for s in p)]
+    return [(f"out[{i}]", e) for i, e in enumerate(values)]
+
+
+def touch_function(traced: Traced, active: tuple[int, ...], indicator: int, mode: int) -> Callable[..., Any]:
+    """``f(t, u, q) -> tuple``: h, h_z, h_t, h_p, L_f h, (L_f h)_z, (L_f h)_t, (L_f h)_p, L_f^2 h, all in a row."""
+    variables = [*traced.u, *traced.m, traced.t, *(traced.p[i] for i in active)]
+    flow = list(zip(traced.u, traced.fields[mode], strict=True))
+
+    def along(e: sp.Expr) -> sp.Expr:
+        return e.diff(traced.t) + sp.Add(*(e.diff(u) * f for u, f in flow))
+
+    h = traced.indicators[indicator]
+    slope = along(h)
+    values = [h, *(h.diff(s) for s in variables), slope, *(slope.diff(s) for s in variables), along(slope)]
+    lines, used = _code(traced, [(f"r{i}", e) for i, e in enumerate(values)])
+    constants = _unpacked(traced, lines)
+    result = ", ".join(f"r{i}" for i in range(len(values)))
+    body = "".join(f"    {line}\n" for line in [*constants, *lines, f"return ({result})"])
+    header = f"from math import {', '.join(sorted(used))}\n" if used else ""
+    namespace: dict[str, Any] = {}
+    exec(compile(f"{header}def touch(t, u, q):\n{body}", f"<touch {indicator} in mode {mode}>", "exec"), namespace)
+    found: Callable[..., Any] = namespace["touch"]
+    return found
+
+
+def _constants(traced: Traced) -> dict[sp.Basic, str]:
+    return {symbol: f"q{i}" for i, symbol in enumerate([*traced.p, *traced.m])}
+
+
+def _code(traced: Traced, targets: list[tuple[str, sp.Expr]]) -> tuple[list[str], set[str]]:
+    """Straight code for expressions at one point, and the functions of ``math`` that it uses."""
+    names = {**_constants(traced), traced.t: "t", **{symbol: f"x{i}" for i, symbol in enumerate(traced.u)}}
+    printer = Printer(names)
+    used: set[sp.Basic] = set().union(*(e.free_symbols for _, e in targets)) if targets else set()
+    lines = [f"x{i} = u[{i}]" for i, symbol in enumerate(traced.u) if symbol in used]
+    lines += assignments(targets, printer, "g")
+    return lines, printer.used
+
+
+def _unpacked(traced: Traced, lines: list[str]) -> list[str]:
+    """Lines that give the parameters and the memory used in ``lines`` their names."""
+    words = set(re.findall(r"\w+", "\n".join(lines)))
+    return [f"q{i} = q[{i}]" for i in range(len(traced.p) + len(traced.m)) if f"q{i}" in words]
+
+
+def _function(name: str, signature: str, arguments: str, traced: Traced, branches: list[list[str]]) -> str:
+    selector = arguments.split(",")[0]
+    lines = _unpacked(traced, [line for branch in branches for line in branch])
+    for i, branch in enumerate(branches):
+        lines.append(f"{'el' if i else ''}if {selector} == {i}:")
+        lines += [f"    {line}" for line in branch or ["pass"]]
+    body = "".join(f"    {line}\n" for line in lines or ["pass"])
+    decorator = f'@callback("{signature}", no_cpython_wrapper=True, no_cfunc_wrapper=True)'  # only kernels call it
+    return f"\n\n{decorator}\ndef {name}({arguments}):\n{body}".rstrip("\n")

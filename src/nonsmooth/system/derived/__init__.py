@@ -1,0 +1,1 @@
+"""Systems made from systems: elements, sliding, the smoothed switch, `mechanical`, maps."""

@@ -1,0 +1,271 @@
+r"""The rules by which elements (:mod:`nonsmooth.system.derived.elements`) come together in one combination of phases.
+
+The laws of the elements add to the field, ``f = f_0 + sum_e D_e F_e``, and the forces ``lambda`` of those that hold a
+rate ``g_i`` at zero solve
+
+    d g_i / dt = 0:   sum_j (grad g_i . D_j) lambda_j = -(g_i,t + grad g_i . f)
+
+one linear system for all contacts that rest and all that stick (the field has terms besides that vanish on the
+surface and bring a state back to it). Which rate vanishes where is known by construction; the states behind an impulse
+are projections onto it. What an element does in its phase it says itself, at its :class:`Place`.
+
+The rules are written once, over a calculus: sums and products of expressions, their derivatives, linear systems of
+them. A child of :class:`Assembler` brings one.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.system.derived.elements import Element
+from nonsmooth.system.derived.elements.element import Leaving
+
+__all__ = ["Assembler", "Part", "Pattern", "Place"]
+
+Pattern = tuple[int, ...]  # the phase of each element
+
+
+@dataclass(frozen=True)
+class Part:
+    """An element in a system, by its name; what it acts on and where it is, in the calculus of the assembler."""
+
+    name: str
+    element: Element
+    direction: Any  # what a unit force adds to the states' derivatives
+    where: Any  # gap, displacement or speed
+
+
+class Assembler(ABC):
+    """The fields, forces and impulses of combinations of phases, over a calculus."""
+
+    parts: list[Part]
+    struck: bool  # the system has resets of its own, which turn speeds
+
+    # The calculus
+
+    @abstractmethod
+    def base(self, mode: str) -> Any:
+        """The vector field without elements."""
+
+    @abstractmethod
+    def law(self, k: int, name: str, side: int | None = None) -> Any:
+        """An argument of element k by its name; at the magnitude ``side`` times its speed where it is a law of that."""
+
+    @abstractmethod
+    def along(self, expression: Any, field: Any) -> Any:
+        """The derivative in time along a vector field."""
+
+    @abstractmethod
+    def across(self, expression: Any, part: Part) -> Any:
+        """Change of the derivative of an expression by a unit force of an element."""
+
+    @abstractmethod
+    def moved(self, vector: Any, part: Part, amount: Any) -> Any:
+        """A vector of states, or field, with ``amount`` times the direction of an element added."""
+
+    @abstractmethod
+    def shifted_back(self, states: Any, expression: Any) -> Any:
+        """States moved onto the zero of an expression, the shortest way."""
+
+    @abstractmethod
+    def identity(self) -> Any:
+        """The states themselves."""
+
+    @abstractmethod
+    def solved(self, matrix: list[list[Any]], right: list[Any]) -> list[Any]:
+        """The solution of a linear system of expressions."""
+
+    @abstractmethod
+    def regular(self, matrix: list[list[Any]]) -> bool:
+        """Return whether a matrix of effects can be inverted."""
+
+    @abstractmethod
+    def vanishes(self, expression: Any) -> bool:
+        """Return whether an expression is zero whatever the state."""
+
+    @abstractmethod
+    def sign(self, effect: Any, one: Part, other: Part) -> int:
+        """The sign of what an impulse of the other does to the rate of one, the same in all states."""
+
+    @abstractmethod
+    def size(self, expression: Any) -> Any:
+        """The scale of the states that an expression involves."""
+
+    def tidy(self, states: Any) -> Any:
+        """States behind an impulse in the form in which they are kept."""
+        return states
+
+    # The rules
+
+    def approach(self, k: int, mode: str) -> Any:
+        """The derivative of an element's place, which no force changes at once."""
+        part = self.parts[k]
+        if any(not self.vanishes(self.across(part.where, other)) for other in self.parts):
+            raise SystemDefinitionError(
+                f"element {part.name!r}: a force changes its {part.element.kinematics} at once; it must depend on "
+                f"positions, whose derivatives are speeds, and forces act on speeds"
+            )
+        return self.along(part.where, self.base(mode))
+
+    def place(self, k: int, mode: str, pattern: Pattern) -> Place:
+        """The place of element k in a combination of phases."""
+        return Place(self, k, mode, pattern)
+
+    def places(self, mode: str, pattern: Pattern) -> list[Place]:
+        """Those of all elements."""
+        return [Place(self, k, mode, pattern) for k in range(len(self.parts))]
+
+    def held(self, pattern: Pattern) -> list[int]:
+        """Elements whose force is that of a constraint."""
+        elements = (part.element for part in self.parts)
+        return [k for k, (e, phase) in enumerate(zip(elements, pattern, strict=True)) if e.phases[phase] in e.held]
+
+    def rate(self, k: int, mode: str) -> Any:
+        """The rate that a constraint of element k holds at zero."""
+        return self.parts[k].element.rate(self.place(k, mode, (0,) * len(self.parts)))
+
+    def effects(self, some: Sequence[int], mode: str) -> list[list[Any]]:
+        """Changes of the derivatives of the rates of some elements by their unit forces."""
+        return [[self.across(self.rate(i, mode), self.parts[j]) for j in some] for i in some]
+
+    def may_hold(self, some: Sequence[int], mode: str) -> bool:
+        """Return whether the rates of some elements can be held at zero each by its own force."""
+        return not some or self.regular(self.effects(some, mode))
+
+    def flow(self, mode: str, pattern: Pattern) -> tuple[Any, dict[int, Any]]:
+        """The field of a combination of phases, and the force of each element in it."""
+        f, forces, held = self.base(mode), {}, self.held(pattern)
+        for here in self.places(mode, pattern):
+            if here.k in held:
+                continue
+            forces[here.k] = here.part.element.force(here)
+            f = self.moved(f, here.part, forces[here.k])
+        if held:
+            matrix = self.effects(held, mode)
+            needed = self.solved(matrix, [-self.along(self.rate(k, mode), f) for k in held])
+            back = self.solved(matrix, [self.parts[k].element.pull(self.place(k, mode, pattern)) for k in held])
+            for k, force, extra in zip(held, needed, back, strict=True):
+                forces[k] = force
+                f = self.moved(f, self.parts[k], force + extra)
+        return f, {k: forces[k] for k in sorted(forces)}
+
+    def impulse(self, k: int, factor: Any, held: Sequence[int], mode: str) -> Any:
+        """States behind an impulse of element k that takes its rate to -factor times it; what is held bears a part."""
+        wanted = [-(1 + factor) * self.rate(k, mode), *([0] * len(held))]
+        after = self.identity()
+        for j, amount in zip([k, *held], self.solved(self.effects([k, *held], mode), wanted), strict=True):
+            after = self.moved(after, self.parts[j], amount)
+        return self.tidy(after)
+
+    def leaving(self, k: int, mode: str, pattern: Pattern) -> list[Leaving]:
+        """The ways of element k out of its phase."""
+        return self.parts[k].element.leaving(self.place(k, mode, pattern))
+
+
+@dataclass(frozen=True)
+class Place:
+    """View of one element on the combination of phases in which it stands."""
+
+    make: Assembler
+    k: int
+    mode: str
+    pattern: Pattern
+
+    @property
+    def part(self) -> Part:
+        return self.make.parts[self.k]
+
+    @property
+    def name(self) -> str:
+        return self.part.name
+
+    @property
+    def element(self) -> Element:
+        return self.part.element
+
+    @property
+    def phase(self) -> str:
+        return self.element.phases[self.pattern[self.k]]
+
+    @property
+    def where(self) -> Any:
+        """Gap, displacement or speed."""
+        return self.part.where
+
+    def law(self, name: str, side: int | None = None) -> Any:
+        """An argument of the element; with ``side`` at the magnitude ``side`` times its speed."""
+        return self.make.law(self.k, name, side)
+
+    def rate(self) -> Any:
+        """The rate that its constraint holds at zero."""
+        return self.element.rate(self)
+
+    def approach(self) -> Any:
+        """The derivative of its place, which no force changes at once."""
+        return self.make.approach(self.k, self.mode)
+
+    def put(self, phase: str) -> Place:
+        """The same place with the element in another phase."""
+        pattern = (*self.pattern[: self.k], self.element.phases.index(phase), *self.pattern[self.k + 1 :])
+        return Place(self.make, self.k, self.mode, pattern)
+
+    def other(self, j: int) -> Place:
+        """The place of another element in the same combination."""
+        return Place(self.make, j, self.mode, self.pattern)
+
+    def named(self, name: Any) -> Place | None:
+        """That of an element by its name; None where there is none."""
+        found = [j for j, part in enumerate(self.make.parts) if part.name == name]
+        return self.other(found[0]) if found else None
+
+    def held(self) -> list[int]:
+        """Elements whose force is that of a constraint here."""
+        return self.make.held(self.pattern)
+
+    def may_hold(self, some: Sequence[int]) -> bool:
+        """Return whether the rates of some elements can be held at zero each by its own force."""
+        return self.make.may_hold(some, self.mode)
+
+    def holding(self) -> Any:
+        """The force of the element."""
+        return self.make.flow(self.mode, self.pattern)[1][self.k]
+
+    def free(self) -> Any:
+        """The derivative of its rate where it is open."""
+        field, _ = self.make.flow(self.mode, self.put("open").pattern)
+        return self.make.along(self.rate(), field)
+
+    def struck(self, factor: Any, held: Sequence[int]) -> Any:
+        """States behind an impulse of the element, see :meth:`Assembler.impulse`."""
+        return self.make.impulse(self.k, factor, held, self.mode)
+
+    def back_on(self, states: Any) -> Any:
+        """States moved onto the surface of the contact, the shortest way."""
+        return self.make.shifted_back(states, self.where)
+
+    def is_struck(self) -> bool:
+        """Return whether its speed may jump: by the impact of a stop, or by a reset of the system's own."""
+        make = self.make
+        strikes = (part for part in make.parts if part.element.strikes)
+        return make.struck or any(not make.vanishes(make.across(self.where, part)) for part in strikes)
+
+    def moves(self, j: int) -> bool:
+        """Return whether a force of the element changes the rate of element j."""
+        return not self.make.vanishes(self.make.across(self.make.rate(j, self.mode), self.part))
+
+    def effect_on(self, j: int) -> int:
+        """The sign of what an impulse of the element does to the rate of element j."""
+        effect = self.make.across(self.make.rate(j, self.mode), self.part)
+        return self.make.sign(effect, self.make.parts[j], self.part)
+
+    def vanishes(self, expression: Any) -> bool:
+        """Return whether an expression is zero whatever the state."""
+        return self.make.vanishes(expression)
+
+    def size(self, expression: Any) -> Any:
+        """The scale of the states that an expression involves."""
+        return self.make.size(expression)

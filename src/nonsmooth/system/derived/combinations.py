@@ -1,0 +1,317 @@
+"""All combinations of the phases of a system's elements, written out as modes, indicators and transitions.
+
+It is what a user would have written: each expression is one of SymPy, so that every verb, derivative and kernel knows
+the system without a line for elements.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from itertools import product
+from typing import Any
+
+import sympy as sp
+
+from nonsmooth.errors import SystemDefinitionError, shortened
+from nonsmooth.system.derived.assembly import Assembler, Part, Pattern
+from nonsmooth.system.derived.elements import Element
+from nonsmooth.system.derived.elements.element import Condition, Law
+from nonsmooth.system.mode import Mode
+from nonsmooth.system.names import unknown
+from nonsmooth.system.symbolic.scalar import Scalar, to_expression
+from nonsmooth.system.symbolic.tracing import Symbols, call_scalar, call_vector
+from nonsmooth.system.transition import Surface, Transition
+
+__all__ = ["SPEED", "assembled", "element_names"]
+
+MOST = 256  # modes that are written out
+SPEED = sp.Symbol("speed_", real=True)  # in a law of it
+
+
+class Expressions(Assembler):
+    """The calculus of expressions: a vector is a list of them, one for each state."""
+
+    def __init__(
+        self, symbols: Symbols, base: Mapping[str, tuple[sp.Expr, ...]], elements: Mapping[str, Element],
+        scale: Mapping[str, float], values: Mapping[sp.Symbol, float], struck: bool,
+    ) -> None:  # fmt: skip
+        self.symbols, self.fields, self.scale, self.values, self.struck = symbols, base, scale, values, struck
+        self.u = tuple(symbols.u.values())
+        self.parts = [self._part(name, element) for name, element in elements.items()]
+        self.indicators: dict[str, sp.Expr] = {}
+        self._known: dict[tuple[str, sp.Expr], str] = {}
+        self._laws: dict[tuple[int, str, int | None], sp.Expr] = {}
+        self._approaches: dict[tuple[int, str], sp.Expr] = {}
+        self._flows: dict[tuple[str, Pattern], tuple[list[sp.Expr], dict[int, sp.Expr]]] = {}
+
+    # What the user gave
+
+    def _call(self, function: Any, what: str) -> sp.Expr:
+        return call_scalar(function, (Scalar(self.symbols.t), self.symbols.states(), self.symbols.parameters()), what)
+
+    def _given(self, given: Law, what: str) -> sp.Expr:
+        """A number, the name of a parameter or of memory, or a function of t, u, p."""
+        if isinstance(given, str):
+            known = {**self.symbols.p, **self.symbols.m}
+            if given not in known:
+                raise SystemDefinitionError(f"{what}: {unknown(given, 'a parameter', 'this system', list(known))}")
+            return known[given]
+        return self._call(given if callable(given) else (lambda t, u, p: given), what)
+
+    def _part(self, name: str, element: Element) -> Part:
+        what, names = f"element {name!r}", list(self.symbols.u)
+        if not isinstance(element, Element):
+            raise SystemDefinitionError(f"{what} is one of nonsmooth.elements, not {shortened(element)}")
+        if element.on is None:
+            raise SystemDefinitionError(f"{what}: at= is for ns.mechanical; here give {element.kinematics}= and on=")
+        direction = {}
+        for state, given in element.on.items():
+            if state not in self.symbols.u:
+                raise SystemDefinitionError(f"{what}: {unknown(state, 'a state', 'this system', names)}")
+            direction[names.index(state)] = self._given(given, f"on[{state!r}] of {what}")
+        own = getattr(element, element.kinematics)
+        return Part(name, element, direction, self._call(own, f"{element.kinematics} of {what}"))
+
+    def law(self, k: int, name: str, side: int | None = None) -> sp.Expr:
+        key = k, name, side
+        if key not in self._laws:
+            part = self.parts[k]
+            given, what = getattr(part.element, name), f"{name} of element {part.name!r}"
+            if side is not None and callable(given) and _arguments(given) == 2:
+                of = Scalar(side * part.where), self.symbols.parameters()
+                self._laws[key] = call_scalar(given, of, what)
+            else:
+                self._laws[key] = self._given(given, what)
+        return self._laws[key]
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the states."""
+        return list(self.symbols.u)
+
+    def spoken(self, k: int, name: str) -> sp.Expr:
+        """A law as an expression; one of the speed's magnitude in the symbol ``SPEED``."""
+        given = getattr(self.parts[k].element, name)
+        if callable(given) and _arguments(given) == 2:
+            return call_scalar(given, (Scalar(SPEED), self.symbols.parameters()), name)
+        known = {part.name for part in self.parts}
+        return sp.Integer(0) if isinstance(given, str) and given in known else self.law(k, name)
+
+    # Calculus
+
+    def base(self, mode: str) -> list[sp.Expr]:
+        return list(self.fields[mode])
+
+    def identity(self) -> list[sp.Expr]:
+        return list(self.u)
+
+    def along(self, expression: sp.Expr, field: Sequence[sp.Expr]) -> sp.Expr:
+        total = sp.diff(expression, self.symbols.t)
+        for symbol, entry in zip(self.u, field, strict=True):
+            total += sp.diff(expression, symbol) * entry
+        return sp.expand(total)
+
+    def across(self, expression: sp.Expr, part: Part) -> sp.Expr:
+        return sp.Add(*[sp.diff(expression, self.u[i]) * d for i, d in part.direction.items()])
+
+    def moved(self, vector: Sequence[sp.Expr], part: Part, amount: sp.Expr) -> list[sp.Expr]:
+        return [entry + part.direction.get(i, 0) * amount for i, entry in enumerate(vector)]
+
+    def shifted_back(self, states: Sequence[sp.Expr], expression: sp.Expr) -> list[sp.Expr]:
+        slopes = [sp.diff(expression, symbol) for symbol in self.u]
+        length = sp.Add(*[slope**2 for slope in slopes])
+        return self.tidy([x - expression * s / length for x, s in zip(states, slopes, strict=True)])
+
+    def solved(self, matrix: list[list[sp.Expr]], right: list[Any]) -> list[sp.Expr]:
+        found = list(sp.Matrix(matrix).LUsolve(sp.Matrix(right)))
+        return [sp.cancel(value) for value in found] if len(found) > 1 else found
+
+    def regular(self, matrix: list[list[sp.Expr]]) -> bool:
+        return sp.simplify(sp.Matrix(matrix).det()) != 0
+
+    def vanishes(self, expression: Any) -> bool:
+        expanded = sp.expand(expression)
+        return expanded == 0 or (not expanded.is_number and sp.simplify(expanded) == 0)
+
+    def sign(self, effect: sp.Expr, one: Part, other: Part) -> int:
+        effect = sp.simplify(effect.subs(self.values))
+        for number, holds in ((-1, effect.is_negative), (0, effect.is_zero), (1, effect.is_positive)):
+            if holds:
+                return number
+        raise SystemDefinitionError(
+            f"elements {one.name!r} and {other.name!r}: whether an impact of one opens the other depends on the state "
+            f"({effect}), and that is decided once for all; give {one.name!r} rest=False"
+        )
+
+    def size(self, expression: sp.Expr) -> sp.Expr:
+        found = [self.scale[name] for name, symbol in self.symbols.u.items() if expression.has(symbol)]
+        return to_expression(max(found, default=1.0))
+
+    def tidy(self, states: Sequence[sp.Expr]) -> list[sp.Expr]:
+        return [sp.expand(sp.cancel(entry)) for entry in states]
+
+    def approach(self, k: int, mode: str) -> sp.Expr:
+        key = k, mode
+        if key not in self._approaches:
+            self._approaches[key] = super().approach(k, mode)
+        return self._approaches[key]
+
+    def flow(self, mode: str, pattern: Pattern) -> tuple[list[sp.Expr], dict[int, sp.Expr]]:
+        key = mode, pattern
+        if key not in self._flows:
+            field, forces = super().flow(mode, pattern)
+            expanded = {k: sp.expand(force) for k, force in forces.items()}
+            self._flows[key] = [sp.expand(entry) for entry in field], expanded
+        return self._flows[key]
+
+    # What a user would have written
+
+    def ranges(self, mode: str) -> list[tuple[sp.Expr, str]]:
+        """Expressions of the parameters that must not be negative, each with the sentence for where it is."""
+        known = set(self.symbols.p.values())
+        every = [row for here in self.places(mode, (0,) * len(self.parts)) for row in here.element.ranges(here)]
+        return [(e, text) for e, text in every if e.free_symbols and e.free_symbols <= known]
+
+    def condition(self, rows: Sequence[Condition], owner: str) -> str:
+        """The text of a condition; its expressions become indicators, equal ones of an element the same."""
+        words = []
+        for expression, sign, name in rows:
+            indicator = sp.expand(expression)
+            key = owner, indicator
+            if key not in self._known:
+                unique, n = f"{owner}_{name}", 1
+                while unique in self.indicators:
+                    n += 1
+                    unique = f"{owner}_{name}_{n}"
+                self._known[key] = unique
+                self.indicators[unique] = indicator
+            words.append(f"{self._known[key]} {'>' if sign > 0 else '<'} 0")
+        return " and ".join(words)
+
+
+def _arguments(function: Callable[..., Any]) -> int:
+    """Number of arguments that a function must be given: a law of the speed takes two, others three."""
+    kinds = inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD
+    try:
+        found = inspect.signature(function).parameters.values()
+    except (TypeError, ValueError):  # a function of C
+        return 3
+    return sum(one.kind in kinds and one.default is one.empty for one in found)
+
+
+def element_names(elements: Any) -> dict[str, Element]:
+    """Elements by name; those of a list are called after their kind."""
+    if isinstance(elements, Mapping):
+        return dict(elements)
+    if isinstance(elements, (str, Element)) or not isinstance(elements, Sequence):
+        raise SystemDefinitionError(
+            'elements= maps names to elements, {"stop": ns.elements.Stop(...)}, or is a list of them; not '
+            + shortened(elements)
+        )
+    found: dict[str, Element] = {}
+    for element in elements:
+        name = first = type(element).__name__.lower()
+        while name in found:
+            name = f"{first}_{sum(other.startswith(first) for other in found) + 1}"
+        found[name] = element
+    return found
+
+
+def assembled(
+    symbols: Symbols, modes: Mapping[str, Any], elements: Any, given: Mapping[str, Any], scale: Mapping[str, float],
+    values: Mapping[sp.Symbol, float],
+) -> dict[str, Any]:  # fmt: skip
+    """Modes, indicators, transitions and outputs of a system with elements, as a user would give them.
+
+    ``given`` are those without elements: its transitions go from each combination of phases to the same of the target.
+    """
+    parts = element_names(elements)
+    for key, mode in modes.items():
+        if isinstance(mode, Mode) and set(mode.states or symbols.u) != set(symbols.u):
+            raise SystemDefinitionError(f"mode {key!r}: a system with elements has all its states in every mode")
+    arguments = Scalar(symbols.t), symbols.states(), symbols.parameters()
+    base = {
+        key: call_vector(mode.field if isinstance(mode, Mode) else mode, arguments, tuple(symbols.u),
+                         f"the vector field of mode {key!r}")
+        for key, mode in modes.items()
+    }  # fmt: skip
+    resets = any(isinstance(item, Transition) and item.reset is not None for item in given["transitions"])
+    make = Expressions(symbols, base, parts, scale, values, resets)
+    counts = [len(part.element.phases) for part in make.parts]
+    number = len(base) * int(sp.prod(counts))
+    if number > MOST:
+        return _opened(make, parts, base, given)
+    every = product(base, product(*[range(count) for count in counts]))
+    pairs = [pair for pair in every if make.may_hold(make.held(pair[1]), pair[0])]
+
+    def name(mode: str, pattern: Pattern) -> str:
+        words = [f"{part.name}_{part.element.phases[k]}" for part, k in zip(make.parts, pattern, strict=True)]
+        return "_".join(words if len(base) == 1 else [mode, *words])
+
+    fields: dict[str, Any] = {}
+    forces: dict[str, dict[str, Any]] = {part.name: {} for part in make.parts}
+    transitions: list[Transition | Surface] = []
+    for mode, pattern in pairs:
+        here = name(mode, pattern)
+        f, found = make.flow(mode, pattern)
+        fields[here] = _returns(f)
+        for k, part in enumerate(make.parts):
+            forces[part.name][here] = _returns(found[k])
+        for k, part in enumerate(make.parts):
+            for way in make.leaving(k, mode, pattern):
+                there = make.place(k, mode, pattern).put(way.phase).pattern
+                if (mode, there) not in pairs:
+                    continue  # more contacts than can be held by forces of their own
+                reset = None if way.states is None else _returns(way.states)
+                when = make.condition(way.conditions, part.name)
+                transitions.append(Transition(here, name(mode, there), when=when, reset=reset))
+        for item in given["transitions"]:
+            if isinstance(item, Surface) and item.below == mode:
+                ends = name(item.below, pattern), name(item.above, pattern)
+                transitions.append(replace(item, below=ends[0], above=ends[1]))
+            elif isinstance(item, Transition) and item.source == mode:
+                ends = name(item.source, pattern), name(item.target, pattern)
+                transitions.append(Transition(*ends, item.when, item.at, item.reset, item.write))
+    outputs = {}
+    for key, output in (given["outputs"] or {}).items():
+        function, unit = output if isinstance(output, (tuple, list)) else (output, "")
+        if isinstance(function, Mapping):
+            function = {name(mode, pattern): function[mode] for mode, pattern in pairs}
+        outputs[key] = function, unit
+    return {
+        "modes": fields, "transitions": transitions,
+        "indicators": {**(given["indicators"] or {}), **{key: _returns(g) for key, g in make.indicators.items()}},
+        "outputs": {**outputs, **{f"{key}_force": (table, "") for key, table in forces.items()}},
+        "ranges": make.ranges(next(iter(base))),
+    }  # fmt: skip
+
+
+def _opened(
+    make: Expressions, parts: Mapping[str, Element], base: Mapping[str, tuple[sp.Expr, ...]], given: Mapping[str, Any]
+) -> dict[str, Any]:
+    """The system without its elements, with all that these need as indicators: modes are made when they are visited."""
+    from nonsmooth.system.derived.patterns import Patterns
+
+    if len(base) > 1 or any(given[key] for key in ("transitions", "indicators", "memory", "symmetry", "bands")):
+        raise SystemDefinitionError(
+            f"{len(parts)} elements have more than {MOST} combinations of phases, which are not written out but made "
+            "when they are visited: such a system has one mode and no indicators, transitions, memory, symmetry or "
+            "bands of its own"
+        )
+    patterns = Patterns(make, next(iter(base)))
+    return {
+        "modes": {key: _returns(list(field)) for key, field in base.items()}, "transitions": (),
+        "indicators": {key: _returns(e) for key, e in zip(patterns.labels, patterns.expressions, strict=True)},
+        "outputs": given["outputs"], "ranges": make.ranges(patterns.mode), "patterns": patterns,
+    }  # fmt: skip
+
+
+def _returns(found: Any) -> Callable[..., Any]:
+    """A function of t, u, p that gives these expressions."""
+    if isinstance(found, (list, tuple)):
+        entries = [Scalar(sp.sympify(one)) for one in found]
+        return lambda t, u, p: entries
+    value = Scalar(sp.sympify(found))
+    return lambda t, u, p: value

@@ -1,0 +1,8 @@
+"""Contacts and friction by name: rigid and elastic stops, backlash, dry friction, preloaded springs."""
+
+from nonsmooth.system.derived.elements.coulomb import Coulomb
+from nonsmooth.system.derived.elements.elastic import Backlash, ElasticStop, PreloadedSpring
+from nonsmooth.system.derived.elements.element import Element
+from nonsmooth.system.derived.elements.stop import Stop
+
+__all__ = ["Backlash", "Coulomb", "ElasticStop", "Element", "PreloadedSpring", "Stop"]

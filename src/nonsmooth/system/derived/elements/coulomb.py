@@ -1,0 +1,121 @@
+"""Dry friction with sticking."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.system.derived.elements.element import CREEP, SMALL, Condition, Element, Law, Leaving
+
+if TYPE_CHECKING:
+    from nonsmooth.system.derived.assembly import Place
+
+__all__ = ["Coulomb"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Coulomb(Element):
+    r"""Dry friction with sticking: F = -f(v) sgn v while it slips, what holds v = 0 while it sticks.
+
+    It sticks as long as the force that holds it stays below ``static``; Stribeck curves are functions ``friction(v)``
+    of the speed's magnitude.
+
+    Parameters
+    ----------
+    speed : callable
+        Relative speed ``v(t, u, p)``; a positive force drives it up. With ``at=`` the coordinate's own, less ``belt``.
+    belt : number, name of a parameter, or function
+        Speed of what the coordinate slides on (``at=`` only).
+    friction : number, name of a parameter, or function
+        The friction force while slipping, positive: a number, a parameter, ``f(t, u, p)``, or ``f(v, p)`` of the
+        magnitude of the speed. With ``normal``: the coefficient of friction.
+    static : number, name of a parameter, or function, optional
+        The largest force (coefficient) that holds; ``friction`` at v = 0 where not given.
+    normal : number, name of a parameter or of an elastic element, or function, optional
+        The normal force; the name of an :class:`ElasticStop` stands for its contact force.
+    at, on
+        See :class:`Element`.
+    """
+
+    speed: Callable[..., Any] | None = None
+    belt: Law = 0.0
+    friction: Law = 0.0
+    static: Law | None = None
+    normal: Law | None = None
+
+    kinematics: ClassVar[str] = "speed"
+    phases: ClassVar[tuple[str, ...]] = ("stick", "forward", "back")
+    laws: ClassVar[tuple[str, ...]] = ("friction", "static", "normal")
+    conditions: ClassVar[tuple[str, ...]] = (
+        "speed", "speed_above", "speed_below", "over", "under", "turned_forward", "turned_back",
+    )  # fmt: skip
+    held: ClassVar[tuple[str, ...]] = ("stick",)
+
+    def placed(self, q: Any, v: Any, law: Callable[[Law], Any]) -> Any:
+        return v - law(self.belt)
+
+    def needs(self, others: Collection[str]) -> list[tuple[str, int | None]]:
+        sides = (1, -1, 0) if self.static is None else (1, -1)
+        own = [("static", None)] if self.static is not None else []
+        pressed = [("normal", None)] if self.normal is not None and self.normal not in others else []
+        return [*(("friction", side) for side in sides), *own, *pressed]
+
+    def rate(self, here: Place) -> Any:
+        return here.where
+
+    def pull(self, here: Place) -> Any:
+        return -here.where
+
+    def force(self, here: Place) -> Any:
+        side = 1 if here.phase == "forward" else -1
+        return -side * here.law("friction", side) * self.pressure(here)
+
+    def pressure(self, here: Place) -> Any:
+        """The normal force; 1 where ``friction`` is a force itself."""
+        if self.normal is None:
+            return 1
+        other = here.named(self.normal)
+        if other is None:
+            return here.law("normal")
+        if not other.element.presses:
+            raise SystemDefinitionError(
+                f"element {here.name!r}: normal={self.normal!r} must name an ElasticStop; with the force of a rigid "
+                "contact, which friction changes in turn, a motion need not exist or be unique (Painleve)"
+            )
+        return other.element.force(other)
+
+    def bearing(self, here: Place) -> list[int]:
+        return [j for j in here.held() if here.moves(j)]
+
+    def leaving(self, here: Place) -> list[Leaving]:
+        v, stuck = here.where, here.put("stick")
+        if not here.may_hold(stuck.held()):
+            return []  # what rests and sticks leaves it no way to move
+        static = here.law("friction", 0) if self.static is None else here.law("static")
+        hold, most = stuck.holding(), static * self.pressure(here)
+        over, under = hold - most, hold + most
+        if here.phase == "stick":
+            off = SMALL * here.size(v)
+            return [
+                Leaving("forward", [Condition(v - off, 1, "speed_above")]),
+                Leaving("back", [Condition(v + off, -1, "speed_below")]),
+                Leaving("back", [Condition(over, 1, "over")]), Leaving("forward", [Condition(under, -1, "under")]),
+            ]  # fmt: skip
+        other, sign = ("back", -1) if here.phase == "forward" else ("forward", 1)
+        stopped = Condition(v, sign, "speed")
+        if here.vanishes(most):
+            return [Leaving(other, [stopped])]  # an open contact, which bears no friction
+        within = [Condition(over, -1, "over"), Condition(under, 1, "under")]
+        torn = Condition(over, 1, "over") if here.phase == "forward" else Condition(under, -1, "under")
+        still = here.struck(0, self.bearing(here))
+        if not here.is_struck():
+            return [Leaving("stick", [stopped, *within], still), Leaving(other, [stopped, torn])]
+        # An impact turns the speed round at once, and no finite force can stop it then.
+        off = -sign * CREEP * here.size(v)
+        slow, turned = (Condition(v + off, one * sign, f"turned_{here.phase}") for one in (-1, 1))
+        return [
+            Leaving("stick", [stopped, slow, *within], still), Leaving(other, [stopped, torn]),
+            Leaving(other, [turned]),
+        ]  # fmt: skip

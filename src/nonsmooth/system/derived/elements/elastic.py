@@ -1,0 +1,137 @@
+"""Contacts with springs: elastic stops, backlash, preloaded springs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from nonsmooth.system.derived.elements.element import Condition, Contact, Element, Law, Leaving
+
+if TYPE_CHECKING:
+    from nonsmooth.system.derived.assembly import Place
+
+__all__ = ["Backlash", "ElasticStop", "PreloadedSpring"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ElasticStop(Contact):
+    r"""A stop with a spring and a damper: F = -k \delta - c \dot\delta while the gap \delta is negative.
+
+    Parameters
+    ----------
+    gap, position, side
+        As for :class:`Stop`.
+    stiffness, damping : number, name of a parameter, or function
+    pulls : bool
+        True: in contact as long as the gap is negative, also where the damper pulls. False (a massless support that
+        relaxes at once): in contact while the gap is negative and the force pushes (Savi et al. 2007, Eq. (2)).
+    at, on
+        See :class:`Element`.
+    """
+
+    stiffness: Law = 0.0
+    damping: Law = 0.0
+    pulls: bool = False
+
+    phases: ClassVar[tuple[str, ...]] = ("open", "contact")
+    laws: ClassVar[tuple[str, ...]] = ("stiffness", "damping")
+    conditions: ClassVar[tuple[str, ...]] = ("gap", "push")
+    presses: ClassVar[bool] = True
+
+    def force(self, here: Place) -> Any:
+        return 0 if here.phase == "open" else -here.law("stiffness") * here.where + damped(here)
+
+    def leaving(self, here: Place) -> list[Leaving]:
+        inside, outside = Condition(here.where, -1, "gap"), Condition(here.where, 1, "gap")
+        if self.pulls or here.vanishes(here.law("damping")):
+            return [Leaving("contact", [inside])] if here.phase == "open" else [Leaving("open", [outside])]
+        push = self.force(here.put("contact"))
+        if here.phase == "open":
+            return [Leaving("contact", [inside, Condition(push, 1, "push")])]
+        return [Leaving("open", [Condition(push, -1, "push")])]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Displaced(Element):
+    """An element that says where it is by a displacement of its own."""
+
+    displacement: Callable[..., Any] | None = None
+
+    kinematics: ClassVar[str] = "displacement"
+
+    def placed(self, q: Any, v: Any, law: Callable[[Law], Any]) -> Any:
+        return q
+
+
+@dataclass(frozen=True, kw_only=True)
+class Backlash(Displaced):
+    r"""Play with elastic flanks: F = -k (s - b) - c \dot s above the half width b, its mirror image below -b.
+
+    Parameters
+    ----------
+    displacement : callable
+        ``s(t, u, p)``, zero in the middle of the play; a positive force drives it up.
+    half_width, stiffness, damping : number, name of a parameter, or function
+    at, on
+        See :class:`Element`.
+    """
+
+    half_width: Law = 0.0
+    stiffness: Law = 0.0
+    damping: Law = 0.0
+
+    phases: ClassVar[tuple[str, ...]] = ("free", "above", "below")
+    laws: ClassVar[tuple[str, ...]] = ("half_width", "stiffness", "damping")
+    conditions: ClassVar[tuple[str, ...]] = ("upper", "lower")
+
+    def force(self, here: Place) -> Any:
+        if here.phase == "free":
+            return 0
+        side = 1 if here.phase == "above" else -1
+        pressed = here.where - side * here.law("half_width")
+        return -here.law("stiffness") * pressed + damped(here)
+
+    def leaving(self, here: Place) -> list[Leaving]:
+        upper, lower = here.where - here.law("half_width"), here.where + here.law("half_width")
+        if here.phase == "free":
+            return [
+                Leaving("above", [Condition(upper, 1, "upper")]), Leaving("below", [Condition(lower, -1, "lower")]),
+            ]  # fmt: skip
+        back = Condition(upper, -1, "upper") if here.phase == "above" else Condition(lower, 1, "lower")
+        return [Leaving("free", [back])]
+
+
+@dataclass(frozen=True, kw_only=True)
+class PreloadedSpring(Displaced):
+    r"""A spring with preload P and stiffness k: F = -P - k s for s > 0, P - k s for s < 0.
+
+    Parameters
+    ----------
+    displacement : callable
+        ``s(t, u, p)``; a positive force drives it up.
+    preload, stiffness : number, name of a parameter, or function
+    at, on
+        See :class:`Element`.
+    """
+
+    preload: Law = 0.0
+    stiffness: Law = 0.0
+
+    phases: ClassVar[tuple[str, ...]] = ("above", "below")
+    laws: ClassVar[tuple[str, ...]] = ("preload", "stiffness")
+    conditions: ClassVar[tuple[str, ...]] = ("side",)
+
+    def force(self, here: Place) -> Any:
+        side = 1 if here.phase == "above" else -1
+        return -side * here.law("preload") - here.law("stiffness") * here.where
+
+    def leaving(self, here: Place) -> list[Leaving]:
+        to, sign = ("below", -1) if here.phase == "above" else ("above", 1)
+        return [Leaving(to, [Condition(here.where, sign, "side")])]
+
+
+def damped(here: Place) -> Any:
+    """The damper's force; without one no speed is asked for, and states need not have one."""
+    damping = here.law("damping")
+    return 0 if here.vanishes(damping) else -damping * here.rate()

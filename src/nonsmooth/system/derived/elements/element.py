@@ -1,0 +1,147 @@
+"""The ground of all elements: the place where one acts, its phases, what it says of itself in each.
+
+An element is in one of a few phases (open or at rest, slipping or sticking, ...). In each its force is a law, or it is
+whatever keeps a rate at zero: the approach of a contact that rests, the speed of one that sticks. A system with
+elements has a mode for each combination of their phases. An element knows its own rules and no other element; what
+stands around it is a :class:`nonsmooth.system.derived.assembly.Place`.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+
+from nonsmooth.errors import SystemDefinitionError, shortened
+
+if TYPE_CHECKING:
+    from nonsmooth.system.derived.assembly import Place
+
+__all__ = ["CREEP", "SMALL", "Condition", "Contact", "Element", "Law", "Leaving"]
+
+SMALL = 1e-4  # of the states' scale: what a rate or a gap that is held at zero may be off where a run begins
+CREEP = 1e-7  # of the same: the speed of approach below which impacts are not followed
+Law = float | str | Callable[..., Any]
+
+
+class Condition(NamedTuple):
+    """``sign * value > 0``, and the name by which logs call it behind the element's."""
+
+    value: Any
+    sign: int
+    name: str
+
+
+class Leaving(NamedTuple):
+    """A way out of a phase: the phase behind it, the conditions that must all hold, the states behind it."""
+
+    phase: str
+    conditions: list[Condition]
+    states: Any = None  # None: as they were
+
+
+@dataclass(frozen=True, kw_only=True)
+class Element(ABC):
+    """The place where an element acts, which all of them have.
+
+    Parameters
+    ----------
+    at : str, or mapping of str to float, optional
+        Of a system made by :func:`nonsmooth.mechanical`: the coordinate, or a combination such as
+        ``{"q1": 1, "q2": -1}`` for an element between two masses.
+    on : mapping of str to number, parameter or function, optional
+        Of any other system: what a unit force of the element adds to the derivatives of states,
+        ``{"v": lambda t, u, p: 1 / p.m}``.
+    """
+
+    at: str | Mapping[str, float] | None = None
+    on: Mapping[str, Law] | None = None
+
+    kinematics: ClassVar[str] = ""  # the field that says where the element is, where ``at`` does not
+    phases: ClassVar[tuple[str, ...]] = ()
+    laws: ClassVar[tuple[str, ...]] = ()  # its arguments that are numbers, parameters or functions
+    conditions: ClassVar[tuple[str, ...]] = ()  # names of the conditions on its ways out
+    held: ClassVar[tuple[str, ...]] = ()  # the phases in which its force is that of a constraint
+    strikes: ClassVar[bool] = False  # its impacts turn speeds at once
+    bears: ClassVar[bool] = False  # while it is held it bears its part of an impulse
+    presses: ClassVar[bool] = False  # its law is a normal force for friction
+
+    def __post_init__(self) -> None:
+        label = type(self).__name__
+        own = getattr(self, self.kinematics)
+        if self.at is None and (own is None or not self.on):
+            raise SystemDefinitionError(
+                f"{label}: give {self.kinematics}= (a function of t, u, p) and on= (what a unit force adds to which "
+                f"state's derivative), or at= (a coordinate) in ns.mechanical"
+            )
+        if self.at is not None and self.on is not None:
+            raise SystemDefinitionError(f"{label}: at= (a coordinate of ns.mechanical) and on= exclude each other")
+        if self.on is not None and not isinstance(self.on, Mapping):
+            raise SystemDefinitionError(
+                f'{label}: on= maps states to numbers or functions, {{"v": 1.0}}; not {shortened(self.on)}'
+            )
+
+    @property
+    def into(self) -> int:
+        """With ``at=``: the sign of what a positive force does to the coordinate."""
+        return 1
+
+    @abstractmethod
+    def force(self, here: Place) -> Any:
+        """The force by its law, in a phase that is not held."""
+
+    @abstractmethod
+    def leaving(self, here: Place) -> list[Leaving]:
+        """The ways out of the present phase, in the order in which they are tried."""
+
+    def needs(self, others: Collection[str]) -> list[tuple[str, int | None]]:
+        """Its laws by name, each with the sides of the speed at which it is asked for; ``others`` are the elements."""
+        return [(name, None) for name in self.laws]
+
+    def rate(self, here: Place) -> Any:
+        """The rate that a constraint of the element holds at zero."""
+        return here.approach()
+
+    def pull(self, here: Place) -> Any:
+        """The term that brings a state back onto the surface, which rounding leaves; zero there (Baumgarte 1972)."""
+        kappa = here.size(here.rate()) / here.size(here.where)
+        return -2 * kappa * here.rate() - kappa**2 * here.where
+
+    def bearing(self, here: Place) -> list[int]:
+        """Of what is held, the elements that take part in its own impulse."""
+        return []
+
+    def ranges(self, here: Place) -> list[tuple[Any, str]]:
+        """Expressions of the parameters that must not be negative, each with the sentence for where it is."""
+        return []
+
+    @abstractmethod
+    def placed(self, q: Any, v: Any, law: Callable[[Law], Any]) -> Any:
+        """The place of the element, by a coordinate ``q`` and its speed ``v`` (:func:`nonsmooth.mechanical`)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Contact(Element):
+    """A contact on one side, with a gap: the ground of rigid and elastic stops."""
+
+    gap: Callable[..., Any] | None = None
+    position: Law = 0.0
+    side: int = 1
+
+    kinematics: ClassVar[str] = "gap"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.side not in (1, -1):
+            raise SystemDefinitionError(
+                f"{type(self).__name__}: side is 1 (the stop lies above) or -1 (below), not {self.side!r}"
+            )
+
+    @property
+    def into(self) -> int:
+        """A positive force opens it, away from its side."""
+        return -self.side
+
+    def placed(self, q: Any, v: Any, law: Callable[[Law], Any]) -> Any:
+        return self.side * (law(self.position) - q)

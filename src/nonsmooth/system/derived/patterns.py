@@ -1,0 +1,344 @@
+"""Patterns of phases of a system with many elements: a mode is made when it is first visited.
+
+Twenty-five contacts have more combinations of phases than can be written out, and a motion visits few of them. Where
+every expression is affine in the states, a combination needs no algebra: a force, an indicator, a component of a reset
+is a :class:`Row` of numbers over w = (u, 1, cos k_1 w t, sin k_1 w t, ...), the vector that the exact flow moves, and
+the rules of :mod:`nonsmooth.system.derived.assembly` are sums of such rows and one small linear system. The phases
+visited so far are numbered in the order of their first visit; that numbering is shared by all copies of a system.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.system.derived.assembly import Assembler, Part, Pattern
+from nonsmooth.system.symbolic.traced import Row as Condition
+from nonsmooth.system.symbolic.traced import Traced, TracedTransition
+
+if TYPE_CHECKING:
+    from nonsmooth.system.codegen.linear import LinearForm, LinearTables
+    from nonsmooth.system.derived.combinations import Expressions
+
+__all__ = ["Patterns", "Row", "Rows"]
+
+FloatArray = NDArray[np.float64]
+ROUNDING = 1e-12  # of the terms of a sum: below it the sum is zero
+REGULAR = 1e-9  # least singular value of effects in units of their diagonal, above which forces are determined
+
+
+class Row:
+    """An affine function of the states with harmonics in time: numbers over w."""
+
+    __slots__ = ("one", "values")
+    __array_ufunc__ = None  # numbers of NumPy leave sums and products to this class
+
+    def __init__(self, values: FloatArray, one: int) -> None:
+        self.values, self.one = values, one
+
+    @property
+    def number(self) -> float | None:
+        """Its value where it is a constant."""
+        return None if np.count_nonzero(self.values) > (self.values[self.one] != 0) else float(self.values[self.one])
+
+    def __add__(self, other: Row | float) -> Row:
+        if isinstance(other, Row):
+            return Row(self.values + other.values, self.one)
+        values = self.values.copy()
+        values[self.one] += other
+        return Row(values, self.one)
+
+    __radd__ = __add__
+
+    def __neg__(self) -> Row:
+        return Row(-self.values, self.one)
+
+    def __sub__(self, other: Row | float) -> Row:
+        return self + -other
+
+    def __rsub__(self, other: float) -> Row:
+        return -self + other
+
+    def __mul__(self, other: Row | float) -> Row:
+        if not isinstance(other, Row):
+            return Row(self.values * other, self.one)
+        a, b = self.number, other.number
+        if b is not None:
+            return Row(self.values * b, self.one)
+        if a is not None:
+            return Row(other.values * a, self.one)
+        raise SystemDefinitionError(
+            "a product of two quantities that depend on states or time is not affine: elements with such a law "
+            "(friction that depends on the speed under a normal force that varies) combine as long as all combinations "
+            "of phases can be written out"
+        )
+
+    __rmul__ = __mul__
+
+
+class Rows(Assembler):
+    """The calculus of rows at one parameter point: a vector of states is an array (n, M)."""
+
+    def __init__(self, patterns: Patterns, tables: LinearTables, i: int) -> None:
+        self.n, harmonics = tables.A.shape[-1], tables.c.shape[-2]
+        self.rates = tables.omega[i] * np.array(patterns.form.multiples, dtype=float)
+        self.struck, self.scale = False, patterns.scale
+        self.field = np.zeros((self.n, self.n + 1 + 2 * harmonics))
+        self._fill(self.field, tables.A[i, 0], tables.b[i, 0], tables.c[i, 0].T, tables.s[i, 0].T)
+        every = np.zeros((len(tables.ib[i]), self.field.shape[1]))
+        self._fill(every, tables.ia[i], tables.ib[i], tables.ic[i], tables.is_[i])
+        self._every, self._at = every, patterns.at
+        self.parts = [self._part(k, name, patterns) for k, name in enumerate(patterns.elements)]
+        self._approaches: dict[int, Row] = {}
+        self._flows: dict[Pattern, tuple[FloatArray, dict[int, Any]]] = {}
+
+    def _fill(self, into: FloatArray, a: FloatArray, b: FloatArray, c: FloatArray, s: FloatArray) -> None:
+        n = self.n
+        into[:, :n], into[:, n], into[:, n + 1 :: 2], into[:, n + 2 :: 2] = a, b, c, s
+
+    def _part(self, k: int, name: str, patterns: Patterns) -> Part:
+        direction = np.zeros(self.n)
+        for i in patterns.acts_on[k]:
+            number = Row(self._every[self._at[k, "on", i]], self.n).number
+            if number is None:
+                raise SystemDefinitionError(
+                    f"element {name!r}: what its force adds to a state's derivative depends on states or time; with so "
+                    "many elements it must be a number or a function of parameters"
+                )
+            direction[i] = number
+        return Part(name, patterns.elements[name], direction, Row(self._every[self._at[k, "where", None]], self.n))
+
+    def base(self, mode: str) -> FloatArray:
+        return self.field
+
+    def law(self, k: int, name: str, side: int | None = None) -> Row:
+        return Row(self._every[self._at[k, name, side]], self.n)
+
+    def along(self, expression: Row, field: FloatArray) -> Row:
+        n, e = self.n, expression.values
+        values = e[:n] @ field
+        values[n + 1 :: 2] += self.rates * e[n + 2 :: 2]
+        values[n + 2 :: 2] -= self.rates * e[n + 1 :: 2]
+        return Row(values, n)
+
+    def across(self, expression: Row, part: Part) -> float:
+        terms = expression.values[: self.n] * part.direction
+        total = float(terms.sum())
+        return total if abs(total) > ROUNDING * float(np.abs(terms).sum()) else 0.0
+
+    def identity(self) -> FloatArray:
+        return np.eye(self.n, self.field.shape[1])
+
+    def moved(self, vector: FloatArray, part: Part, amount: Any) -> FloatArray:
+        return vector + np.outer(part.direction, amount.values) if isinstance(amount, Row) else vector
+
+    def shifted_back(self, states: FloatArray, expression: Row) -> FloatArray:
+        slopes = expression.values[: self.n]
+        return states - np.outer(slopes / (slopes @ slopes), expression.values)
+
+    def solved(self, matrix: list[list[float]], right: list[Any]) -> list[Row]:
+        rows = [one.values if isinstance(one, Row) else np.zeros(self.field.shape[1]) for one in right]
+        return [Row(values, self.n) for values in np.linalg.solve(np.array(matrix), np.array(rows))]
+
+    def regular(self, matrix: list[list[float]]) -> bool:
+        sizes = np.sqrt(np.abs(np.diag(matrix)))
+        if not (sizes > 0).all():
+            return False
+        return bool(np.linalg.svd(np.array(matrix) / np.outer(sizes, sizes), compute_uv=False)[-1] > REGULAR)
+
+    def vanishes(self, expression: Any) -> bool:
+        return not (expression.values.any() if isinstance(expression, Row) else expression)
+
+    def sign(self, effect: float, one: Part, other: Part) -> int:
+        return int(np.sign(effect))
+
+    def size(self, expression: Row) -> float:
+        return float(max(self.scale[expression.values[: self.n] != 0], default=1.0))
+
+    def approach(self, k: int, mode: str) -> Row:
+        if k not in self._approaches:
+            self._approaches[k] = super().approach(k, mode)
+        return self._approaches[k]
+
+    def flow(self, mode: str, pattern: Pattern) -> tuple[FloatArray, dict[int, Any]]:
+        if pattern not in self._flows:
+            self._flows[pattern] = super().flow(mode, pattern)
+        return self._flows[pattern]
+
+    def forget(self) -> None:
+        """Let go of the fields that were kept for one pattern's neighbours."""
+        self._flows.clear()
+
+
+@dataclass(eq=False)
+class Patterns:
+    """The elements of a system whose patterns are made when they are visited, and those visited so far.
+
+    ``expressions`` are all that the elements need of the equations, ``at`` the place there of each: (element, "where" |
+    "on" | name of a law, state | side).
+    """
+
+    make: Expressions
+    mode: str
+    expressions: list[sp.Expr] = field(default_factory=list)
+    at: dict[tuple[int, str, int | None], int] = field(default_factory=dict)
+    visited: list[Pattern] = field(default_factory=list)
+    jumps: list[TracedTransition] = field(default_factory=list)
+    equations: Traced = field(init=False)  # without elements; the expressions are its indicators
+
+    def __post_init__(self) -> None:
+        self.scale = np.array(list(self.make.scale.values()))
+        self.acts_on = [[i for i, d in part.direction.items() if d != 0] for part in self.make.parts]
+        for k, part in enumerate(self.make.parts):
+            self._keep((k, "where", None), part.where)
+            for i in self.acts_on[k]:
+                self._keep((k, "on", i), part.direction[i])
+            for name, side in part.element.needs(set(self.elements)):
+                self._keep((k, name, side), self.make.law(k, name, side))
+        self._lock = threading.Lock()
+        self._known: dict[Pattern, int] = {}
+        self._jumped: dict[tuple[int, int, str], int] = {}
+        self.number(self._first())
+
+    def _first(self) -> Pattern:
+        """The first phase of each element, or the first that is not held where its rate could not be held as well."""
+        pattern: Pattern = (0,) * len(self.make.parts)
+        for k, part in enumerate(self.make.parts):
+            held = part.element.phases[0] in part.element.held
+            if held and not self.make.may_hold([j for j in self.make.held(pattern) if j <= k], self.mode):
+                free = next(i for i, phase in enumerate(part.element.phases) if phase not in part.element.held)
+                pattern = (*pattern[:k], free, *pattern[k + 1 :])
+        return pattern
+
+    def _keep(self, key: tuple[int, str, int | None], expression: Any) -> None:
+        self.at[key] = len(self.expressions)
+        self.expressions.append(sp.sympify(expression))
+
+    @property
+    def labels(self) -> list[str]:
+        """A name for each of the expressions, for messages."""
+        sides = {None: "", 1: "_forward", -1: "_back", 0: "_still"}
+        names, parts = self.make.names, self.make.parts
+        return [
+            f"{parts[k].name}_{what}" + (f"_{names[i]}" if what == "on" and i is not None else sides[i])
+            for k, what, i in self.at
+        ]  # fmt: skip
+
+    @cached_property
+    def elements(self) -> dict[str, Any]:
+        """The elements by name."""
+        return {part.name: part.element for part in self.make.parts}
+
+    @cached_property
+    def conditions(self) -> tuple[str, ...]:
+        """Names of the conditions of all elements, the indicators of the system."""
+        return tuple(f"{name}_{one}" for name, element in self.elements.items() for one in element.conditions)
+
+    @cached_property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the elements' forces."""
+        return tuple(f"{name}_force" for name in self.elements)
+
+    def bind(self, traced: Traced) -> Traced:
+        """The equations, which from here on know their patterns."""
+        self.equations = traced
+        return replace(traced, patterns=self)
+
+    @cached_property
+    def plain(self) -> Traced:
+        """The equations without elements."""
+        return replace(self.equations, indicators=(), indicator_names=())
+
+    @cached_property
+    def form(self) -> LinearForm:
+        """The matrices of the equations without elements and the rows of all expressions, at parameter points."""
+        from nonsmooth.system.codegen.linear import linear_form
+
+        form = linear_form(self.equations)
+        if form is None or not form.affine_indicators:
+            raise SystemDefinitionError(
+                f"{self.equations.name!r}: its {len(self.elements)} elements have more combinations of phases than can "
+                "be written out, and a mode can be made when it is first visited only where everything is affine in "
+                "the states with harmonics in time; take fewer elements or write the nonlinear ones as modes"
+            )
+        return form
+
+    def rows(self, tables: LinearTables, i: int) -> Rows:
+        """The calculus at one parameter point."""
+        return Rows(self, tables, i)
+
+    def number(self, pattern: Pattern) -> int:
+        """The number of a pattern; the next one where it is visited for the first time."""
+        with self._lock:
+            if pattern not in self._known:
+                self._known[pattern] = len(self.visited)
+                self.visited.append(pattern)
+            return self._known[pattern]
+
+    def transition(self, source: int, target: int, element: str, rows: Sequence[tuple[int, int]]) -> int:
+        """The number of a transition between numbered patterns."""
+        with self._lock:
+            key = source, target, f"{element} {rows}"
+            if key not in self._jumped:
+                names = self.name(self.visited[source]), self.name(self.visited[target])
+                conditions = tuple(Condition(indicator, sign) for indicator, sign in rows)
+                self._jumped[key] = len(self.jumps)
+                self.jumps.append(TracedTransition(source, target, conditions, label=" -> ".join(names)))
+            return self._jumped[key]
+
+    def described(self) -> dict[str, dict[str, Any]]:
+        """The elements as data: kind, options, and expressions of where they are, what they act on, and their laws."""
+        found = {}
+        for k, part in enumerate(self.make.parts):
+            e, others = part.element, set(self.elements) - {part.name}
+            known = {"at", "on", e.kinematics, "position", "belt", *e.laws}
+            options = {one.name: getattr(e, one.name) for one in fields(e) if one.name not in known}
+            named = {name: getattr(e, name) for name in e.laws if isinstance(getattr(e, name), str)}
+            options |= {name: value for name, value in named.items() if value in others}
+            laws = {name: self.make.spoken(k, name) for name in e.laws if getattr(e, name) is not None}
+            found[part.name] = {
+                "kind": type(e).__name__, "options": options, e.kinematics: part.where,
+                "on": {self.make.names[i]: part.direction[i] for i in self.acts_on[k]},
+                "laws": {name: law for name, law in laws.items() if name not in options},
+            }  # fmt: skip
+        return found
+
+    def name(self, pattern: Pattern) -> str:
+        """The phases of all elements as one name."""
+        phases = zip(self.elements.items(), pattern, strict=True)
+        return "_".join(f"{name}_{element.phases[k]}" for (name, element), k in phases)
+
+    def seen(self) -> Traced:
+        """The equations as far as they are known: names and transitions of the patterns visited, no expressions."""
+        traced, modes = self.equations, list(self.visited)
+        names = (*traced.output_names, *self.outputs)
+        unknown = sp.nan
+        return replace(
+            traced, patterns=self, mode_names=tuple(map(self.name, modes)), indicator_names=self.conditions,
+            indicators=(unknown,) * len(self.conditions), transitions=tuple(self.jumps), output_names=names,
+            outputs=((unknown,) * len(modes),) * len(names), fields=((unknown,) * len(traced.u),) * len(modes),
+            lacking=(traced.lacking[0],) * len(modes),
+        )  # fmt: skip
+
+    def forces(self, parameters: FloatArray, time: FloatArray, u: FloatArray, mode: Any) -> FloatArray:
+        """Forces (N, elements) at N samples, each in the pattern of its mode."""
+        rows = self.rows(self.form.evaluate(parameters[None, :]), 0)
+        angles = time[:, None] * rows.rates
+        waves = np.stack([np.cos(angles), np.sin(angles)], axis=-1).reshape(len(time), -1)
+        w = np.hstack([u, np.ones((len(time), 1)), waves])
+        found = np.zeros((len(time), len(self.elements)))
+        for m in np.unique(mode):
+            here = np.flatnonzero(mode == m)
+            for k, force in rows.flow(self.mode, self.visited[int(m)])[1].items():
+                if isinstance(force, Row):
+                    found[here, k] = w[here] @ force.values
+            rows.forget()
+        return found

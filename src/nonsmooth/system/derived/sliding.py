@@ -1,0 +1,381 @@
+r"""Sliding along surfaces (Filippov 1988) as further modes of a derived hybrid system.
+
+A surface h = 0 with the fields :math:`f_-` (h < 0) and :math:`f_+` (h > 0) attracts where
+
+    L_- h > 0 > L_+ h,    L h = h_t + h_u f.
+
+There motion goes on in a mode of its own, with the convex combination
+
+    f_s = (1 - a) f_- + a f_+,    a = (L_- h + kappa h) / (L_- h - L_+ h),
+
+so that dh/dt = -kappa h: on the surface this is Filippov's field, and what rounding takes off it decays (kappa is the
+forcing frequency, 1 without forcing). Where :math:`f_+ - f_-` has a constant direction e, as with friction and relays,
+its length cancels, :math:`f_s = f_- - e (L_- h + \kappa h) / (h_u e)`: linear wherever the rest of the field is.
+
+Sliding ends where L_+ h rises or L_- h falls through zero, never by the quotient a. Behind such an end h and its rate
+vanish together; a return to the surface therefore also needs the rate of h in its own mode, whose sign is known there.
+A state beyond the surface (a start, a reset) changes sides without sliding.
+
+Where L_- h - L_+ h vanishes in sliding (a two-fold) both fields turn away at once and motion is not unique: a
+transition leads to a mode whose name ends in ``NOT_UNIQUE``, and there the run ends with that status.
+
+Two surfaces that both pairs of modes share give sliding along both: the same construction, with sliding modes in the
+places of the two modes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from nonsmooth.errors import SystemDefinitionError, shortened
+from nonsmooth.system.equations import TracedSurface
+from nonsmooth.system.symbolic.scalar import as_written
+from nonsmooth.system.symbolic.traced import NOT_UNIQUE, Row, Traced, TracedTransition
+
+__all__ = ["repelled", "slide"]
+
+if TYPE_CHECKING:
+    from nonsmooth.system.system import System
+
+FloatArray = NDArray[np.float64]
+BEYOND = 10**9  # a state farther from the surface than the indicator's scale over this is not on it
+ON_SURFACE = 1e-12  # of the indicator's size: a start so near lies on the surface
+SEEDS = 3  # random points at which the orders of two surfaces are compared
+
+Field = tuple[sp.Expr, ...]
+
+
+@dataclass(frozen=True)
+class _Pair:
+    """A surface between two modes, which may slide along other surfaces themselves."""
+
+    indicator: int
+    below: int
+    above: int
+    mode: str  # "": named after its indicators
+    static: sp.Expr | None = None
+    field: Field | None = None
+
+
+def slide(traced: Traced, surfaces: Sequence[TracedSurface], scale: Mapping[str, float]) -> Traced:
+    """Return the system with its sliding modes and, at each surface, the transitions between below, above and sliding.
+
+    Parameters
+    ----------
+    traced : Traced
+        With two plain transitions for each surface, one each way; they are replaced.
+    surfaces : sequence of TracedSurface
+    scale : mapping of state to float
+
+    Raises
+    ------
+    SystemDefinitionError
+        A transition that the two modes of a surface have with different resets or targets.
+    """
+    build = _Builder(traced, scale)
+    declared = [_Pair(s.indicator, s.below, s.above, s.mode, s.static, s.field) for s in surfaces]
+    pairs, level = list(declared), declared
+    while level:
+        build.add_modes(level)
+        level = [pair for pair in dict.fromkeys(build.meetings(pairs)) if pair not in pairs]
+        pairs += level
+    build.inherit(declared)
+    for pair in pairs:
+        build.add_transitions(pair)
+    return replace(
+        traced,
+        mode_names=tuple(build.modes), fields=tuple(build.fields), lacking=tuple(build.lacking),
+        indicator_names=tuple(build.indicator_names), indicators=tuple(build.indicators),
+        transitions=tuple(build.jumps), outputs=tuple(tuple(row) for row in build.outputs),
+    )  # fmt: skip
+
+
+@lru_cache(maxsize=256)
+def _both_rates(traced: Traced, surface: TracedSurface, scale: tuple[float, ...]) -> Callable[..., Any]:
+    """Function of t, u, m, p: the indicator, its size, its rates below and above."""
+    build = _Builder(traced, dict(zip(traced.state_names, scale, strict=True)))
+    pair = _Pair(surface.indicator, surface.below, surface.above, surface.mode)
+    rates = (build.rate(pair, mode) for mode in (pair.below, pair.above))
+    found = [traced.indicators[pair.indicator], build.size(pair), *rates]
+    return sp.lambdify([traced.t, list(traced.u), list(traced.m), list(traced.p)], found, modules="numpy")
+
+
+def repelled(system: System, states: FloatArray) -> tuple[str, int] | None:
+    """Return the surface on which a start lies where both fields point away from it, and which start; else None.
+
+    Parameters
+    ----------
+    system : System
+    states : array (S, n)
+        Starts at t = 0.
+    """
+    traced, scale = system.declared, tuple(system.scale.values())
+    for surface in system.surfaces:
+        both = _both_rates(traced, surface, scale)
+        with np.errstate(all="ignore"):
+            h, size, below, above = both(0.0, list(states.T), system.memory_vector(), system.parameter_vector())
+            found = (np.abs(h) <= ON_SURFACE * size) & (np.asarray(below) < 0) & (np.asarray(above) > 0)
+        found = np.broadcast_to(found, len(states))
+        if found.any():
+            return traced.indicator_names[surface.indicator], int(np.argmax(found))
+    return None
+
+
+class _Builder:
+    """Collects what is added to the declared system."""
+
+    def __init__(self, traced: Traced, scale: Mapping[str, float]) -> None:
+        self.traced = traced
+        self.scale = [sp.Float(scale[name]) for name in traced.state_names]
+        self.moving = {traced.t, *traced.u, *traced.m}
+        self.kappa = sp.Integer(1) if traced.period is None else 2 * sp.pi / traced.period
+        self.modes, self.fields = list(traced.mode_names), list(traced.fields)
+        self.lacking = list(traced.lacking)
+        self.outputs = [list(row) for row in traced.outputs]
+        self.indicator_names, self.indicators = list(traced.indicator_names), list(traced.indicators)
+        self.jumps: list[TracedTransition] = []
+        self.sliding: dict[_Pair, int] = {}  # the mode in which motion slides along a surface; none where it cannot
+        self.cells = [frozenset({mode}) for mode in range(len(self.modes))]  # declared modes that meet in each mode
+        self.along = [frozenset[int]() for _ in self.modes]  # the indicators that each mode keeps at zero
+
+    # Expressions
+
+    def rate(self, pair: _Pair, mode: int) -> sp.Expr:
+        """Lie derivative of the pair's indicator in a mode."""
+        h = self.indicators[pair.indicator]
+        flow = sum(h.diff(u) * f for u, f in zip(self.traced.u, self.fields[mode], strict=True))
+        return sp.expand(h.diff(self.traced.t) + flow)
+
+    def at_surface(self, pair: _Pair, expression: sp.Expr) -> sp.Expr:
+        """The expression without a state that the surface determines: a field may have no value far beyond it."""
+        h = self.indicators[pair.indicator]
+        slopes = {u: sp.expand(h.diff(u)) for u in self.traced.u}
+        usable = [u for u, slope in slopes.items() if slope != 0 and not slope.free_symbols & self.moving]
+        if not usable:
+            return expression
+        u = min(usable, key=lambda u: len(slopes[u].free_symbols))
+        return sp.expand(expression.subs(u, sp.expand(u - h / slopes[u])))
+
+    def size(self, pair: _Pair) -> sp.Expr:
+        """Typical size of the indicator, from the states' scales."""
+        h, at = self.indicators[pair.indicator], dict(zip(self.traced.u, self.scale, strict=True))
+        at |= {self.traced.t: sp.Integer(0)}
+        size = sum(sp.Abs(h.diff(u).subs(at)) * s for u, s in zip(self.traced.u, self.scale, strict=True))
+        usable = size != 0 and size.is_finite is not False and not size.free_symbols & self.moving
+        return size if usable else sp.Integer(1)
+
+    def ratio(self, a: sp.Expr, b: sp.Expr) -> sp.Expr:
+        """a / b, reduced where that may free it of the state and the time."""
+        quotient = a / b
+        return sp.cancel(quotient) if quotient.free_symbols & self.moving else quotient
+
+    def direction(self, pair: _Pair) -> tuple[Field, sp.Expr, sp.Expr] | None:
+        """(e, h_u e, length) of the difference of both fields, length * e with e constant; None where it turns."""
+        below, above = self.fields[pair.below], self.fields[pair.above]
+        d = [sp.expand(a - b) for a, b in zip(above, below, strict=True)]
+        length = min((entry for entry in d if entry != 0), key=sp.count_ops)
+        e = tuple(sp.Integer(0) if entry == 0 else self.ratio(entry, length) for entry in d)
+        if any(entry.free_symbols & self.moving for entry in e):
+            return None
+        h = self.indicators[pair.indicator]
+        return e, sp.expand(sum(h.diff(u) * x for u, x in zip(self.traced.u, e, strict=True))), length
+
+    # Modes
+
+    def add_modes(self, pairs: Sequence[_Pair]) -> None:
+        """Add the modes in which motion slides along the surfaces of pairs, where their fields differ in crossing them.
+
+        Sliding along the same surfaces in another order is the same mode; where the order matters there is none.
+        """
+        found: dict[tuple[frozenset[int], frozenset[int]], list[tuple[_Pair, Field, list[sp.Expr]]]] = {}
+        for pair in pairs:
+            below, above = self.rate(pair, pair.below), self.rate(pair, pair.above)
+            if sp.expand(below - above) == 0:
+                continue
+            key = self.cells[pair.below] | self.cells[pair.above], self.along[pair.below] | {pair.indicator}
+            field, shown = self._filippov(pair, below, above)
+            if pair.field is not None:
+                field = self._given(pair, pair.field)
+            found.setdefault(key, []).append((pair, field, shown))
+        for (cell, along), ways in found.items():
+            first, field, shown = ways[0]
+            if not all(_agree(field, other) for _, other, _ in ways[1:]):
+                continue
+            name = first.mode or "_".join(self.indicator_names[i] for i in sorted(along)) + "_sliding"
+            if name in self.modes:
+                name += "".join(f"_{self.modes[mode]}" for mode in sorted(cell))
+            self.sliding |= {pair: len(self.modes) for pair, _, _ in ways}
+            self.modes.append(name)
+            self.fields.append(field)
+            self.lacking.append(self.lacking[first.below])
+            self.cells.append(cell)
+            self.along.append(along)
+            for row, entry in zip(self.outputs, shown, strict=True):
+                row.append(entry)
+
+    def _filippov(self, pair: _Pair, below: sp.Expr, above: sp.Expr) -> tuple[Field, list[sp.Expr]]:
+        """The convex combination that stays on the surface: vector field, outputs."""
+        first, second = self.fields[pair.below], self.fields[pair.above]
+        ends = [(row[pair.below], row[pair.above]) for row in self.outputs]
+        off = self.kappa * self.indicators[pair.indicator]
+        found = self.direction(pair)
+        if found is None:
+            a, b = (below + off) / (below - above), below / (below - above)
+            field = tuple(x if x == y else x + a * (y - x) for x, y in zip(first, second, strict=True))
+            return field, [x if x == y else x + b * (y - x) for x, y in ends]
+        e, slope, length = found
+        field = tuple(
+            x if along == 0 else sp.expand(x - along * (below + off) / slope) for x, along in zip(first, e, strict=True)
+        )
+        shown = [x if x == y else sp.expand(x - self.ratio(y - x, length) * below / slope) for x, y in ends]
+        return field, shown
+
+    def _given(self, pair: _Pair, given: Field) -> Field:
+        """The field that was given for the surface, with the same decay beside it."""
+        h = self.indicators[pair.indicator]
+        slopes = [h.diff(u) for u in self.traced.u]
+        rate = sp.expand(h.diff(self.traced.t) + sum(s * f for s, f in zip(slopes, given, strict=True)))
+        remainder = sp.simplify(self.at_surface(pair, rate))
+        if remainder != 0 and sp.fraction(sp.cancel(rate / h))[1].free_symbols & self.moving:
+            raise SystemDefinitionError(
+                f"{self.traced.name!r}: the field given for {pair.mode!r} leaves the surface "
+                f"{self.indicator_names[pair.indicator]!r}: along it the indicator has the rate "
+                f"{shortened(as_written(remainder))}, which must vanish on the surface"
+            )
+        norm = sum(s * s for s in slopes)
+        off = self.kappa * h
+        return tuple(f if s == 0 else f - off * s / norm for f, s in zip(given, slopes, strict=True))
+
+    def meetings(self, pairs: Sequence[_Pair]) -> Iterator[_Pair]:
+        """Surfaces between two sliding modes: where both sides of one surface slide along another."""
+        known = {(pair.indicator, pair.below, pair.above): pair for pair in pairs}
+        slid = [pair for pair in pairs if pair in self.sliding]
+        for one in slid:
+            for two in slid:
+                if one.indicator != two.indicator or one is two:
+                    continue
+                for other in pairs:
+                    if (other.below, other.above) != (one.below, two.below) or other.indicator == one.indicator:
+                        continue
+                    if (other.indicator, one.above, two.above) not in known:
+                        continue
+                    ends = self.sliding[one], self.sliding[two]
+                    if (other.indicator, *ends) not in known and ends[0] != ends[1]:
+                        yield _Pair(other.indicator, *ends, "", other.static)
+
+    # Transitions
+
+    def indicator(self, expression: sp.Expr, name: str) -> int:
+        """Index of a derived indicator, added where it is new."""
+        if name not in self.indicator_names:
+            self.indicator_names.append(name)
+            self.indicators.append(expression)
+        return self.indicator_names.index(name)
+
+    def jump(self, source: int, target: int, *rows: Row) -> None:
+        label = f"{self.modes[source]} -> {self.modes[target]}"
+        self.jumps.append(TracedTransition(source, target, rows, contact=source == 0, label=label))
+
+    def add_transitions(self, pair: _Pair) -> None:
+        """Add the transitions between below, above and sliding."""
+        h, name = pair.indicator, self.indicator_names[pair.indicator]
+        size, value = self.size(pair), BEYOND * self.indicators[pair.indicator]
+        beyond = {
+            1: Row(self.indicator(value - size, f"{name} beyond"), 1),
+            -1: Row(self.indicator(value + size, f"{name} behind"), -1),
+        }
+        mode = {-1: pair.below, 1: pair.above}
+        rates = {s: self.at_surface(pair, self.rate(pair, mode[s])) for s in mode}
+        rate = {s: self.indicator(rates[s], f"{name} rate in {self.modes[mode[s]]}") for s in mode}
+        leave = dict(rate)
+        if pair.static is not None:
+            middle, half = (rates[1] + rates[-1]) / 2, (rates[1] - rates[-1]) / 2
+            leave = {
+                s: self.indicator(
+                    sp.expand(middle + s * pair.static * half), f"{name} static rate in {self.modes[mode[s]]}"
+                )
+                for s in mode
+            }
+        slid = self.sliding.get(pair)
+        for s in (1, -1):  # upward: from below; and the other way round
+            source, target = mode[-s], mode[s]
+            self.jump(source, target, beyond[s])
+            if slid is None:
+                self.jump(source, target, Row(h, s))
+                continue
+            self.jump(source, target, Row(h, s), Row(leave[s], s))
+            # Behind the end of sliding the rate in its own mode vanishes, and its sign is known.
+            self.jump(source, slid, Row(h, s), Row(leave[s], -s), Row(rate[-s], s))
+            self.jump(slid, target, Row(leave[s], s))
+        attraction = sp.expand(rates[-1] - rates[1])
+        if slid is not None and attraction.free_symbols & self.moving:
+            least = self.size(pair) * self.kappa / BEYOND
+            gone = Row(self.indicator(attraction - least, f"{name} attraction between {self._names(mode)}"), -1)
+            self.jump(slid, self.undetermined(slid), gone)
+
+    def _names(self, mode: Mapping[int, int]) -> str:
+        return f"{self.modes[mode[-1]]} and {self.modes[mode[1]]}"
+
+    def undetermined(self, slid: int) -> int:
+        """The mode that says that motion is not unique behind the end of a sliding mode."""
+        name = self.modes[slid] + NOT_UNIQUE
+        if name not in self.modes:
+            self.modes.append(name)
+            self.fields.append(self.fields[slid])
+            self.lacking.append(self.lacking[slid])
+            for row in self.outputs:
+                row.append(row[slid])
+        return self.modes.index(name)
+
+    def inherit(self, pairs: Sequence[_Pair]) -> None:
+        """Keep the transitions of the declared system and give the sliding modes those of the modes that meet there."""
+        surfaces = {(pair.below, pair.above, Row(pair.indicator, 1)) for pair in pairs}
+        surfaces |= {(pair.above, pair.below, Row(pair.indicator, -1)) for pair in pairs}
+        self.jumps = [
+            jump for jump in self.traced.transitions if (jump.source, jump.target, *jump.rows) not in surfaces
+        ]
+        plain = list(self.jumps)
+        for slid in range(len(self.traced.mode_names), len(self.modes)):
+            alike: dict[tuple[tuple[Row, ...], float | None], list[TracedTransition]] = {}
+            for jump in plain:
+                if jump.source in self.cells[slid]:
+                    alike.setdefault((jump.rows, jump.at), []).append(jump)
+            for group in alike.values():
+                self.jumps.append(self._inherited(slid, group))
+
+    def _inherited(self, slid: int, group: Sequence[TracedTransition]) -> TracedTransition:
+        """The transition out of a sliding mode that the modes meeting there have, all with the same condition.
+
+        Without a reset what slides goes on sliding, between the targets; behind one the first target finds its side."""
+        first, targets = group[0], frozenset(jump.target for jump in group)
+        other = [jump for jump in group if (jump.reset, jump.writes) != (first.reset, first.writes)]
+        if targets not in self.cells:
+            other = other or [jump for jump in group if jump.target != first.target]
+        if other:
+            raise SystemDefinitionError(
+                f"{self.traced.name!r}: {first.label} and {other[0].label} have the same condition, but other resets "
+                f"or targets, so that nothing says what happens while {self.modes[slid]!r} slides between their modes; "
+                "give both the same, or different conditions"
+            )
+        target = self.cells.index(targets) if first.reset is None else first.target
+        label = f"{self.modes[slid]} -> {self.modes[target]}"
+        return replace(first, source=slid, target=target, label=label, contact=first.reset is not None)
+
+
+def _agree(one: Field, two: Field) -> bool:
+    """Return whether two vector fields are the same, by their values at fixed pseudo-random points."""
+    symbols = sorted(set().union(*(entry.free_symbols for entry in (*one, *two))), key=str)
+    both = sp.lambdify(symbols, [*one, *two], modules="numpy")
+    random = np.random.default_rng(11)
+    for _ in range(SEEDS):
+        values = np.array(both(*random.uniform(0.5, 1.5, len(symbols))), dtype=float).reshape(2, -1)
+        if not np.allclose(values[0], values[1], rtol=1e-9, atol=1e-9):
+            return False
+    return True

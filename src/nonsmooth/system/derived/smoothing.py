@@ -1,0 +1,368 @@
+r"""The smoothed switch (Savi et al. 2007, Eqs. 6-10, and its general form) as a derived hybrid system.
+
+A pair of modes P and Q, Q where all the rows g_r > 0 of a condition hold, gets one more mode for each
+row: its band, where g_r is the least of the rows and \|g_r\| < eta. With q = (g_r + eta) / (2 eta) the
+field there is (1-q) f_P + q f_Q, or the one the model prescribes (`Band`). The regions
+
+    P: min g <= -eta      band r: |g_r| < eta, g_r least      Q: min g >= eta
+
+are a true partition; a tie of two rows belongs to the first (with c_s = 0 in the paper's system the
+two rows are equal everywhere, hence the non-strict rows). The band's half width is a parameter of the
+derived system, so that a change of it compiles nothing.
+
+That is the linear band. With q = (1 + tanh(g_r / eta)) / 2 the band is `REACH` half widths wide, where q is 0 or 1 to
+rounding. With q = 1/2 + arctan(g_r / eta) / pi it has no end: one field, the mean of all weighted with products of the
+q, holds in every mode, and the declared transitions only say on which side the state is.
+
+Dry friction has a band too: a mode that sticks to the surface between two others is left out, and its friction is that
+of the two fields in the band.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import sympy as sp
+
+from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.system.derived.sticking import without_sticking
+from nonsmooth.system.description import Description
+from nonsmooth.system.equations import TracedBand
+from nonsmooth.system.symbolic.traced import Row, Traced, TracedTransition
+
+__all__ = ["BANDS", "Smoothed", "smooth", "smoothed_indicators"]
+
+BANDS = ("linear", "tanh", "arctan")
+REACH = 19  # half widths beyond which tanh is 1 to rounding
+
+
+@dataclass(frozen=True)
+class Smoothed:
+    """The derived system; ``etas`` are its additional parameters and their indicators (None: all),
+    ``memory`` the (name, unit) of what the bands remember, and ``apart`` (expression, message) what must
+    not be negative for the bands not to overlap."""
+
+    traced: Traced
+    etas: tuple[tuple[str, str | None], ...]
+    memory: tuple[tuple[str, str], ...]
+    apart: tuple[tuple[sp.Expr, str], ...]
+
+
+@dataclass(frozen=True)
+class _Pair:
+    outer: int  # P
+    inner: int  # Q, where all rows hold
+    rows: tuple[Row, ...]
+
+
+def _label(traced: Traced, a: int, b: int) -> str:
+    return f"{traced.mode_names[a]!r} and {traced.mode_names[b]!r}"
+
+
+def _pairs(traced: Traced) -> list[_Pair]:
+    """Group the transitions into pairs of modes, or say which pair cannot be smoothed."""
+    remaining = list(traced.transitions)
+    if not remaining:
+        raise SystemDefinitionError(f"{traced.name!r} has no transitions: there is nothing to smooth")
+    pairs = []
+    while remaining:
+        a, b = sorted((remaining[0].source, remaining[0].target))
+        both = [jump for jump in remaining if {jump.source, jump.target} == {a, b}]
+        remaining = [jump for jump in remaining if jump not in both]
+        what = f"{traced.name!r} cannot be smoothed between {_label(traced, a, b)}"
+        for jump in both:
+            if jump.reset is not None:
+                raise SystemDefinitionError(
+                    f"{what}: {jump.label} has a reset, and a jump has no band; give a rigid stop a stiffness "
+                    "(ns.elements.ElasticStop)"
+                )
+            if jump.at is not None:
+                raise SystemDefinitionError(f"{what}: {jump.label} happens at a given time, not at an indicator")
+            if jump.writes:
+                raise SystemDefinitionError(f"{what}: {jump.label} writes memory, at an instant a band does not have")
+        if any(any(traced.lacking[mode]) for mode in (a, b)):
+            raise SystemDefinitionError(f"{what}: a mode with fewer states has no field to interpolate")
+        pair = _oriented(a, b, both) or _oriented(b, a, both)
+        if pair is None:
+            raise SystemDefinitionError(
+                f"{what}: the smoothed switch needs one condition for one of the two modes and, for the way back, only "
+                f"transitions that each reverse one sign of it (hysteresis has no band)"
+            )
+        pairs.append(pair)
+    return pairs
+
+
+def _oriented(outer: int, inner: int, jumps: Sequence[TracedTransition]) -> _Pair | None:
+    """The pair if ``inner`` is entered by one condition and left by reversals of its rows."""
+    enter = [jump for jump in jumps if jump.source == outer]
+    leave = [jump for jump in jumps if jump.source == inner]
+    if len(enter) != 1 or not leave:
+        return None
+    rows = enter[0].rows
+    for jump in leave:
+        if len(jump.rows) != 1 or Row(jump.rows[0].indicator, -jump.rows[0].sign) not in rows:
+            return None
+    return _Pair(outer, inner, rows)
+
+
+def smoothed_indicators(description: Description) -> tuple[str, ...]:
+    """Names of the indicators that get a band, in order of their use."""
+    traced, _ = without_sticking(description.traced)
+    names = traced.indicator_names
+    return tuple(dict.fromkeys(names[row.indicator] for pair in _pairs(traced) for row in pair.rows))
+
+
+class _Builder:
+    """Collects what is added to the sharp system."""
+
+    def __init__(self, description: Description, names: Mapping[str, sp.Symbol], shape: str) -> None:
+        self.description, self.traced, self.eta_of, self.shape = description, description.traced, names, shape
+        self.modes = list(self.traced.mode_names)
+        self.fields = list(self.traced.fields)
+        self.outputs = [list(row) for row in self.traced.outputs]
+        self.indicator_names = list(self.traced.indicator_names)
+        self.indicators = list(self.traced.indicators)
+        self.memory: list[tuple[str, str]] = []
+        self.m = list(self.traced.m)
+        self.jumps: list[TracedTransition] = []
+        self.reach = REACH if shape == "tanh" else 1
+
+    def eta(self, row: Row) -> sp.Symbol:
+        return self.eta_of[self.traced.indicator_names[row.indicator]]
+
+    def share(self, row: Row) -> sp.Expr:
+        """The share q of the field behind a row, at a distance from it."""
+        margin, eta = self.margin(row), self.eta(row)
+        if self.shape == "tanh":
+            return (1 + sp.tanh(margin / eta)) / 2
+        if self.shape == "arctan":
+            return sp.Rational(1, 2) + sp.atan(margin / eta) / sp.pi
+        return (margin + eta) / (2 * eta)
+
+    def margin(self, row: Row) -> sp.Expr:
+        return row.sign * self.traced.indicators[row.indicator]
+
+    def indicator(self, expression: sp.Expr, name: str) -> int:
+        """Index of a derived indicator, added where it is new."""
+        if name not in self.indicator_names:
+            self.indicator_names.append(name)
+            self.indicators.append(expression)
+        return self.indicator_names.index(name)
+
+    def beyond(self, row: Row, side: int, upward: int) -> Row:
+        """The row ``upward * (g - side * eta) > 0``."""
+        eta, times = self.eta(row), f"{self.reach}*" if self.reach > 1 else ""
+        name = self.traced.indicator_names[row.indicator]
+        shift = -side * row.sign * self.reach  # g - side eta = sign * (h - side * sign * eta)
+        label = f"{name} {'+' if shift > 0 else '-'} {times}{str(eta)[2:]}"
+        return Row(self.indicator(self.traced.indicators[row.indicator] + shift * eta, label), row.sign * upward)
+
+    def least(self, pair: _Pair, r: int) -> tuple[Row, ...]:
+        """Rows saying that row r of the pair is the least; ties go to the first."""
+        found = []
+        for s in range(len(pair.rows)):
+            if s == r:
+                continue
+            first, second = (r, s) if r < s else (s, r)
+            a, b = pair.rows[first], pair.rows[second]
+            ratio = self.eta(a) / self.eta(b)
+            names = self.traced.indicator_names
+            label = f"{'' if a.sign > 0 else '-'}{names[a.indicator]} {'-' if b.sign > 0 else '+'} {names[b.indicator]}"
+            if ratio != 1:
+                label += f"*{str(self.eta(a))[2:]}/{str(self.eta(b))[2:]}"
+            index = self.indicator(sp.expand(self.margin(a) - ratio * self.margin(b)), label)
+            found.append(Row(index, -1, strict=False) if r < s else Row(index, 1))
+        return tuple(found)
+
+    def band(self, pair: _Pair, row: Row) -> tuple[int, tuple[tuple[int, sp.Expr], ...]]:
+        """Add the band's mode; return its index and what is written at an entry."""
+        name = self.traced.indicator_names[row.indicator]
+        label = f"{name}_band"
+        if label in self.modes:
+            label = f"{name}_band_{self.modes[pair.outer]}_{self.modes[pair.inner]}"
+        eta, q = self.eta(row), self.share(row)
+        given = self.description.bands if self.shape == "linear" else ()
+        own: TracedBand | None = next((band for band in given if band.indicator == row.indicator), None)
+        writes = []
+        if own is None:
+            mixed = zip(self.traced.fields[pair.outer], self.traced.fields[pair.inner], strict=True)
+            field = tuple(a if a == b else (1 - q) * a + q * b for a, b in mixed)
+        else:
+            field = tuple(entry.subs(own.eta, eta) for entry in own.field)
+            for key, unit, symbol, value in own.memory:
+                if symbol not in self.m:
+                    self.m.append(symbol)
+                    self.memory.append((key, unit))
+                writes.append((self.m.index(symbol), value.subs(own.eta, eta)))
+        for index, row_of in enumerate(self.outputs):
+            a, b = row_of[pair.outer], row_of[pair.inner]
+            if own is not None and index in own.outputs:
+                row_of.append(own.outputs[index].subs(own.eta, eta))
+            else:
+                row_of.append(a if a == b else (1 - q) * a + q * b)
+        self.modes.append(label)
+        self.fields.append(field)
+        return len(self.modes) - 1, tuple(writes)
+
+    def jump(
+        self, source: int, target: int, rows: tuple[Row, ...], writes: tuple[tuple[int, sp.Expr], ...] = ()
+    ) -> None:
+        label = f"{self.modes[source]} -> {self.modes[target]}"
+        self.jumps.append(TracedTransition(source, target, rows, None, None, writes, source == 0, label))
+
+    def add(self, pair: _Pair) -> None:
+        """Add the bands of a pair and the transitions over their borders."""
+        kept = [r for r, row in enumerate(pair.rows) if not self._repeats(pair, r)]
+        bands = {r: self.band(pair, pair.rows[r]) for r in kept}
+        least = {r: tuple(self.least(_Pair(0, 0, tuple(pair.rows[s] for s in kept)), k)) for k, r in enumerate(kept)}
+        # Between bands first: after a change of a parameter the band must be right before its border is.
+        for r in kept:
+            for s in kept:
+                if r != s:
+                    self.jump(bands[r][0], bands[s][0], least[s], bands[s][1])
+        for r in kept:
+            row = pair.rows[r]
+            self.jump(bands[r][0], pair.outer, (self.beyond(row, -1, -1),))
+            self.jump(bands[r][0], pair.inner, (self.beyond(row, 1, 1),))
+            self.jump(pair.outer, bands[r][0], (self.beyond(row, -1, 1), *least[r]), bands[r][1])
+            self.jump(pair.inner, bands[r][0], (self.beyond(row, 1, -1), *least[r]), bands[r][1])
+
+    def mix(self, pairs: Sequence[_Pair]) -> None:
+        """Give every mode the mean of all fields, weighted with the product of what each pair says of its mode.
+
+        The weights sum to 1 where the regions are those of one pair or of pairs that cross; else they are divided by
+        their sum."""
+        known = [sp.Dummy() for _ in pairs]
+        weights = [
+            sp.Mul(*[q if mode == pair.inner else 1 - q for q, pair in zip(known, pairs, strict=True)
+                     if mode in (pair.inner, pair.outer)])
+            for mode in range(len(self.modes))
+        ]  # fmt: skip
+        shares = {q: sp.Mul(*[self.share(row) for row in pair.rows]) for q, pair in zip(known, pairs, strict=True)}
+        total = sp.expand(sum(weights)).subs(shares)
+        first, others = 0, [weight.subs(shares) / total for weight in weights[1:]]
+
+        def mean(entries: Sequence[sp.Expr]) -> sp.Expr:
+            rest = [w * sp.expand(e - entries[first]) for w, e in zip(others, entries[1:], strict=True)]
+            return entries[first] + sp.Add(*rest)
+
+        field = tuple(mean(entries) for entries in zip(*self.fields, strict=True))
+        self.fields = [field] * len(self.modes)
+        self.outputs = [[mean(row)] * len(self.modes) for row in self.outputs]
+        self.jumps = list(self.traced.transitions)
+
+    def _repeats(self, pair: _Pair, r: int) -> bool:
+        """Return whether an earlier row is the same function of the state."""
+        row = pair.rows[r]
+        return any(sp.expand(self.margin(row) - self.margin(earlier)) == 0 for earlier in pair.rows[:r])
+
+
+def smooth(description: Description, single: bool, shape: str = "linear") -> Smoothed:
+    """Derive the smoothed system.
+
+    Parameters
+    ----------
+    description : Description
+    single : bool
+        One half width ``eta`` for all indicators; else one for each, ``eta_<indicator>``.
+    shape : str
+        One of `BANDS`.
+
+    Raises
+    ------
+    SystemDefinitionError
+        Transitions with a reset, at a time, without a way back, or bands that overlap: the pair is named.
+    """
+    wanted = smoothed_indicators(description)
+    etas = (("eta", None),) if single else tuple((f"eta_{name}", name) for name in wanted)
+    taken = {*description.parameters, *description.states, *description.memory}
+    for name, _ in etas:
+        if name in taken:
+            raise SystemDefinitionError(
+                f"{description.name!r} cannot be smoothed: {name!r} is the width of the band and already names "
+                f"something else; rename that"
+            )
+    symbols = {name: sp.Symbol(f"p_{name}", real=True) for name, _ in etas}
+    of = {name: symbols["eta" if single else f"eta_{name}"] for name in wanted}
+    old, apart = without_sticking(description.traced)
+    apart += _check_surfaces(description)
+    pairs = _pairs(old)
+    build = _Builder(replace(description, traced=old), of, shape)
+    if shape == "arctan":
+        if alone := [name for i, name in enumerate(old.mode_names) if all(i not in (p.outer, p.inner) for p in pairs)]:
+            raise SystemDefinitionError(f"{old.name!r} cannot be smoothed: no transition leads to or from {alone[0]!r}")
+        build.mix(pairs)
+    else:
+        apart += _check_apart(build, pairs)
+        for pair in pairs:
+            build.add(pair)
+    n_bands = len(build.modes) - len(old.mode_names)
+    traced = replace(
+        old,
+        p=old.p + tuple(symbols.values()), parameter_names=old.parameter_names + tuple(symbols),
+        m=tuple(build.m), memory_names=old.memory_names + tuple(name for name, _ in build.memory),
+        mode_names=tuple(build.modes), fields=tuple(build.fields),
+        lacking=old.lacking + (((False,) * len(old.u)),) * n_bands,
+        indicator_names=tuple(build.indicator_names), indicators=tuple(build.indicators),
+        transitions=tuple(build.jumps), outputs=tuple(tuple(row) for row in build.outputs),
+    )  # fmt: skip
+    return Smoothed(traced, etas, tuple(build.memory), tuple(apart))
+
+
+def _check_surfaces(description: Description) -> list[tuple[sp.Expr, str]]:
+    """A band has neither static friction nor a field of its own: (expression, message) that must not be negative."""
+    found = []
+    for surface in description.surfaces:
+        modes = _label(description.traced, surface.below, surface.above)
+        what = f"{description.name!r} cannot be smoothed between {modes}"
+        if surface.field is not None:
+            raise SystemDefinitionError(f"{what}: the surface has a `field` of its own, and a band interpolates")
+        if surface.static is None:
+            continue
+        above = f"{what}: the static value exceeds the kinetic one, which a band cannot; make them equal"
+        excess = surface.static - 1
+        if excess.is_positive or not excess.free_symbols <= set(description.traced.p):
+            raise SystemDefinitionError(above)
+        found.append((-excess, above))
+    return found
+
+
+def _check_apart(build: _Builder, pairs: Sequence[_Pair]) -> list[tuple[sp.Expr, str]]:
+    """Bands of two pairs that share a mode must be parallel, and then a distance apart."""
+    found = []
+    for i, one in enumerate(pairs):
+        for two in pairs[i + 1 :]:
+            if not {one.outer, one.inner} & {two.outer, two.inner}:
+                continue
+            what = f"the bands between {_label(build.traced, one.outer, one.inner)} and between " + _label(
+                build.traced, two.outer, two.inner
+            )
+            for a in one.rows:
+                for b in two.rows:
+                    ratio, distance = _distance(build, a, b)
+                    if distance is None:
+                        raise SystemDefinitionError(
+                            f"{build.traced.name!r} cannot be smoothed: {what} overlap where the indicators "
+                            f"{build.traced.indicator_names[a.indicator]!r} and "
+                            f"{build.traced.indicator_names[b.indicator]!r} vanish together; bands may do so with "
+                            'band="arctan"'
+                        )
+                    room = sp.Abs(distance) - build.reach * (build.eta(a) + sp.Abs(ratio) * build.eta(b))
+                    half = f"{1 / (2 * build.reach):.2g} of" if build.reach > 1 else "half"
+                    found.append((room, f"{what} overlap; make eta smaller than {half} their distance"))
+    return found
+
+
+def _distance(build: _Builder, a: Row, b: Row) -> tuple[sp.Expr, sp.Expr | None]:
+    """Return (ratio, distance) with h_a = ratio * h_b + distance for all states, or distance None."""
+    traced = build.traced
+    first, second = traced.indicators[a.indicator], traced.indicators[b.indicator]
+    symbol = next(iter(sorted(second.free_symbols & set(traced.u), key=str)))
+    slope = sp.diff(second, symbol)
+    ratio = sp.cancel(sp.diff(first, symbol) / slope)
+    distance = sp.expand(first - ratio * second)
+    moving = {traced.t, *traced.u, *traced.m}
+    if (ratio.free_symbols | distance.free_symbols) & moving or ratio == 0:
+        return ratio, None
+    return ratio, distance

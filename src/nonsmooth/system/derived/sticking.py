@@ -1,0 +1,85 @@
+"""Dry friction in a band: the system without the modes that stick to a surface."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import sympy as sp
+
+from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.system.symbolic.traced import Row, Traced, TracedTransition
+
+__all__ = ["without_sticking"]
+
+LEVEL = 1e-9  # of 1: by how much a static friction may differ from the kinetic one, given as another number
+
+
+def without_sticking(traced: Traced) -> tuple[Traced, list[tuple[sp.Expr, str]]]:
+    """The system without the modes that stick to a surface, and (expression, message) that must not be negative.
+
+    A mode sticks to h = 0 between P and Q where a transition from P when h rises and one from Q when h falls lead to
+    it. There P and Q change into each other then, whatever else is asked for today."""
+    rising: dict[tuple[int, int], dict[int, int]] = {}  # (mode, indicator) -> sign of the row -> source
+    for jump in traced.transitions:
+        if jump.reset is not None and jump.source != jump.target:
+            for row in jump.rows:
+                rising.setdefault((jump.target, row.indicator), {}).setdefault(row.sign, jump.source)
+    sticks = {key: found for key, found in rising.items() if len(found) == 2 and found[1] != found[-1]}
+    dropped = sorted({mode for mode, _ in sticks})
+    if not dropped:
+        return traced, []
+    apart = [needed for (mode, h), ends in sticks.items() for needed in _equal_friction(traced, mode, h, ends)]
+    between = {frozenset(ends.values()): h for (_, h), ends in sticks.items() if not set(ends.values()) & set(dropped)}
+    kept = [mode for mode in range(len(traced.mode_names)) if mode not in dropped]
+    jumps: dict[tuple[int, int, tuple[Row, ...]], TracedTransition] = {}
+    for jump in traced.transitions:
+        if jump.source in dropped or jump.target in dropped:
+            continue
+        rows, h = jump.rows, between.get(frozenset((jump.source, jump.target)))
+        if h is not None and jump.reset is None:
+            rows = tuple(row for row in rows if row.indicator == h)
+            if not rows:
+                continue
+        source, target = kept.index(jump.source), kept.index(jump.target)
+        jumps.setdefault((source, target, rows), replace(
+            jump, source=source, target=target, rows=rows, contact=source == 0 or jump.reset is not None,
+        ))  # fmt: skip
+    return replace(
+        traced, mode_names=tuple(traced.mode_names[i] for i in kept), fields=tuple(traced.fields[i] for i in kept),
+        lacking=tuple(traced.lacking[i] for i in kept), transitions=tuple(jumps.values()),
+        outputs=tuple(tuple(row[i] for i in kept) for row in traced.outputs),
+    ), apart  # fmt: skip
+
+
+def _equal_friction(traced: Traced, mode: int, h: int, ends: Mapping[int, int]) -> list[tuple[sp.Expr, str]]:
+    """Conditions, with their messages, under which the friction that holds is the kinetic one: not negative.
+
+    Then the rate of h in the mode behind, on the surface, vanishes just where sticking ends."""
+    surface, moving = traced.indicators[h], {traced.t, *traced.u}
+    symbol = next(u for u in traced.u if surface.diff(u) != 0)
+    (at,) = sp.solve(surface, symbol)
+    names = traced.mode_names
+    says = (
+        f"{traced.name!r} cannot be smoothed between {names[ends[1]]!r} and {names[ends[-1]]!r}: the friction that "
+        f"holds in {names[mode]!r} is not the kinetic one, and a band has no other; make them equal"
+    )
+    found = []
+    for jump in traced.transitions:
+        if jump.source != mode or jump.target not in ends.values() or len(jump.rows) != 1:
+            continue
+        end = traced.indicators[jump.rows[0].indicator]
+        field = traced.fields[jump.target]
+        rate = surface.diff(traced.t) + sum(surface.diff(u) * f for u, f in zip(traced.u, field, strict=True))
+        rate, end = (sp.expand(e.subs(symbol, at)) for e in (rate, end))
+        shared = sorted(rate.free_symbols & end.free_symbols, key=lambda s: (s not in moving, str(s)))
+        if not shared:
+            continue  # a state beyond the surface
+        ratio = sp.cancel(rate.diff(shared[0]) / end.diff(shared[0]))
+        excess = sp.simplify(rate - ratio * end)
+        if excess == 0:
+            continue
+        if excess.free_symbols & moving or (excess.is_number and abs(excess) > LEVEL):
+            raise SystemDefinitionError(says)
+        found.append((LEVEL - sp.Abs(excess), says))
+    return found

@@ -1,0 +1,100 @@
+"""Expressions of a user's system, from calling its functions with symbols.
+
+Everything below the system room reads this record and nothing else: the linearity test, the
+derivatives, the code generator, the smoothed switch and the text form.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from sympy import Expr, Symbol
+
+    from nonsmooth.system.derived.patterns import Patterns
+
+__all__ = ["NOT_UNIQUE", "Row", "Traced", "TracedTransition"]
+
+NOT_UNIQUE = "_not_unique"  # ends the name of a derived mode from which motion has no unique way on
+
+
+@dataclass(frozen=True)
+class Row:
+    """One sign condition: ``sign * indicator > 0`` (``>= 0`` where not strict).
+
+    A non-strict row settles a tie in derived systems (the smoothed switch, the regions of a map): it also holds where
+    the indicator vanishes identically.
+    """
+
+    indicator: int
+    sign: int
+    strict: bool = True
+
+
+@dataclass(frozen=True)
+class TracedTransition:
+    """An allowed jump from mode ``source`` to mode ``target``.
+
+    It fires at the instant all ``rows`` hold (``rows``), or at the forcing phase ``at`` (in periods, 0..1: a number,
+    or an expression of the parameters); one of the two is empty. ``reset`` has one expression per state, or is None
+    (identity). ``writes`` are (memory index, expression) pairs, evaluated with the state just before the jump.
+    ``contact`` marks the transitions counted as contacts: those with a reset, and those that leave the first mode.
+    """
+
+    source: int
+    target: int
+    rows: tuple[Row, ...]
+    at: float | Expr | None = None
+    reset: tuple[Expr, ...] | None = None
+    writes: tuple[tuple[int, Expr], ...] = ()
+    contact: bool = False
+    label: str = ""
+
+
+@dataclass(frozen=True)
+class Traced:
+    """The expressions of a system in its symbols ``t``, ``u``, ``p`` (parameters) and ``m`` (memory).
+
+    ``fields[mode][state]`` is du/dt (0 where ``lacking[mode][state]``: the mode does not have that state),
+    ``indicators[i]``, ``outputs[i][mode]``. ``period`` is the forcing period in ``p`` (None: autonomous).
+    """
+
+    name: str
+    t: Symbol
+    u: tuple[Symbol, ...]
+    p: tuple[Symbol, ...]
+    m: tuple[Symbol, ...]
+    state_names: tuple[str, ...]
+    parameter_names: tuple[str, ...]
+    memory_names: tuple[str, ...]
+    mode_names: tuple[str, ...]
+    indicator_names: tuple[str, ...]
+    output_names: tuple[str, ...]
+    fields: tuple[tuple[Expr, ...], ...]
+    lacking: tuple[tuple[bool, ...], ...]
+    indicators: tuple[Expr, ...]
+    transitions: tuple[TracedTransition, ...]
+    outputs: tuple[tuple[Expr, ...], ...]
+    period: Expr | None
+    patterns: Patterns | None = field(default=None, compare=False, repr=False)  # modes are made when they are visited
+
+    def phase_text(self, jump: TracedTransition) -> str:
+        """The phase of a transition as it was written."""
+        if isinstance(jump.at, int | float):
+            return f"{jump.at:g}"
+        from nonsmooth.system.symbolic.expressions import write_expression
+
+        assert jump.at is not None
+        return write_expression(jump.at, dict(zip(self.p, self.parameter_names, strict=True)))
+
+    def ends(self, jump: TracedTransition) -> bool:
+        """Return whether motion is not unique behind a transition, so that a run ends there."""
+        return self.mode_names[jump.target].endswith(NOT_UNIQUE)
+
+    def keeps(self, jump: TracedTransition) -> bool:
+        """Return whether a transition leaves every state of its source as it is; states that it lacks may begin."""
+        if jump.reset is None:
+            return True
+        both = zip(jump.reset, self.u, self.lacking[jump.source], self.lacking[jump.target], strict=True)
+        return all(before or (new == old and not after) for new, old, before, after in both)

@@ -1,0 +1,202 @@
+"""Recordings in the page: files read or refused, the distance from the model, and the fit of its parameters."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from tests.explorer.conftest import FEW
+
+import nonsmooth as ns
+from nonsmooth.explorer.bench import frequency_of
+from nonsmooth.explorer.measured import read, strand_distance
+from nonsmooth.explorer.recorded import LARGEST, matched, samples_of
+from nonsmooth.identification.compare.fold import fold
+from nonsmooth.recordings import Recording, write_cap, write_capstone_csv
+
+TRUTH = {"k": 8.0, "c": 0.8, "g": -0.004}
+TRAVEL = 0.0789 / (2 * np.pi)  # m per rad, of the rotary sensor
+COUNT = 0.0789 / 1440  # m
+NAME = "rig.csv"
+
+
+@pytest.fixture(scope="session")
+def rig(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A steady record of a rig with other parameters than the page's: an encoder's counts, and turns of the crank."""
+    system = ns.models.discontinuous_support(**TRUTH)
+    period = system.period()
+    time = np.arange(0.0, 14 * period, 0.02)[:-1]
+    run = ns.simulate(system, transient=400, periods=14, samples=400 * period + time)
+    x = np.interp(400 * period + time, *run["u"].sel(state="x").groupby("time").last().pipe(lambda u: (u.time, u)))
+    step = 2 * np.pi / 1440
+    sensors = {
+        "Angle": xr.Dataset({"Angle": ("time", np.rint(x / TRAVEL / step) * step, {"units": "rad"})},
+                            {"time": ("time", time + 0.3, {"units": "s"})}),
+        "Turn": xr.Dataset({"Turn": ("time", np.arange(14.0), {"units": "turns"})},
+                           {"time": ("time", np.arange(14) * period + 0.3, {"units": "s"})}),
+    }  # fmt: skip
+    folder = tmp_path_factory.mktemp("rig")
+    recording = Recording.from_runs({"Run #1": sensors}, synthetic=True)
+    write_cap(recording, folder / "rig.cap")
+    return write_capstone_csv(recording, folder / NAME)
+
+
+def drop(page: Any, name: str, content: bytes) -> None:
+    """Drop a file into the page, as from a folder on the desktop."""
+    transfer = page.tab.evaluate_handle(
+        """([name, content]) => {
+            const bytes = Uint8Array.from(atob(content), letter => letter.charCodeAt(0)), transfer = new DataTransfer();
+            transfer.items.add(new File([bytes], name));
+            return transfer;
+        }""",
+        [name, base64.b64encode(content).decode()],
+    )
+    page.tab.dispatch_event("#upper", "drop", {"dataTransfer": transfer})
+
+
+def distance(page: Any) -> float:
+    """The distance in the read-out, in mm."""
+    value, unit = page.readout()["distance of the recording"].split()[:2]
+    return float(value) * {"mm": 1.0, "µm": 1e-3}[unit]
+
+
+def test_a_dropped_recording_lies_over_the_model_and_its_parameters_are_found(page: Any, rig: Path) -> None:
+    page.until_done()
+    drop(page, NAME, rig.read_bytes())
+    page.tab.wait_for_selector("#recording-body:visible")
+    page.until_done()
+    assert "Angle is in rad, x in m: give the factor" in page.tab.inner_text("#recording-remarks")
+    page.write("factor-x", repr(TRAVEL))
+    page.until('document.getElementById("recording-remarks").textContent.includes("13 forcing periods compared")')
+    page.until_done()
+    far = distance(page)
+    for name, value in TRUTH.items():
+        page.write(f"v-p.{name}", repr(value))
+    page.until_done()
+    near = distance(page)
+    assert near == pytest.approx(1000 * COUNT / np.sqrt(12), rel=0.2)  # the steps of the encoder are left
+    for _ in TRUTH:
+        page.tab.click("#undo")
+    page.until_done()
+    assert distance(page) == far > 100 * near
+    drawn = page.tab.evaluate(
+        '["curve", "history", "portrait", "section", "diagram"].map(key =>'
+        ' Bokeh.documents[0].get_model_by_name("recorded " + key).data.x.length)'
+    )
+    assert min(drawn) >= 13
+    page.tab.click("#recording-fit")
+    page.until('document.getElementById("recording-found").textContent.includes("fitted to")')
+    page.until_done()
+    told = page.tab.inner_text("#recording-found")
+    print(f"distance {far} mm, {near} mm at the truth, {distance(page)} mm after the fit\n{told}")
+    for name, value in TRUTH.items():
+        assert page.value(name) == pytest.approx(value, rel=0.01)
+    assert "k 8.0" in told
+    assert "±" in told
+    assert distance(page) < 1.1 * near
+    page.picture("recording")
+    page.tab.click("#undo")
+    page.until_done()
+    assert page.value("k") == 8.47
+    assert page.notes() == ""
+
+
+def test_a_file_that_is_no_recording_is_refused_and_nothing_is_lost(page: Any, rig: Path) -> None:
+    page.until_done()
+    page.write("v-p.rho", "0.3")
+    drop(page, "rig.cap", rig.with_name("rig.cap").read_bytes())
+    page.tab.wait_for_selector("#recording-body:visible")
+    for name, content in {
+        "notes.csv": b"import os\nos.abort()\n", "picture.mat": b"\x89PNG\r\n\x1a\n\0\0\0", "empty.lvm": b"",
+    }.items():  # fmt: skip
+        drop(page, name, content)
+        page.until(f'document.getElementById("wrong-recording").textContent.includes("{name}")')
+        assert page.tab.inner_text("#recording-name") == "rig.cap (synthetic)"
+        assert page.value("rho") == 0.3
+    page.tab.set_input_files("#recording-file", rig)
+    page.until('document.getElementById("recording-name").textContent === "rig.csv (synthetic)"')
+    assert page.tab.inner_text("#wrong-recording") == ""
+    page.tab.click("#recording-remove")
+    page.tab.wait_for_selector("#recording-body", state="hidden")
+    page.until_done()
+    assert "distance of the recording" not in page.readout()
+
+
+def test_a_fit_is_cancelled(page: Any, rig: Path) -> None:
+    page.until_done()
+    drop(page, NAME, rig.read_bytes())
+    page.tab.wait_for_selector("#recording-body:visible")
+    page.write("factor-x", repr(TRAVEL))
+    page.until_done()
+    page.tab.click("#recording-fit")
+    page.tab.click("#recording-cancel")
+    page.tab.wait_for_selector("#recording-doing", state="hidden")
+    page.until_done()
+    assert page.tab.inner_text("#recording-found") == ""
+    assert page.value("k") == 8.47
+
+
+def test_a_file_beyond_the_limit_is_refused_with_its_size(server: Any, new_page: Callable[..., Any]) -> None:
+    page = new_page()
+    page.open(f"{server.address}&{FEW}")
+    page.tab.evaluate(
+        """size => {
+            const transfer = new DataTransfer();
+            transfer.items.add(new File([new Uint8Array(size)], "long.csv"));
+            document.body.dispatchEvent(new DragEvent("drop", {dataTransfer: transfer, bubbles: true}));
+        }""",
+        LARGEST + 1,
+    )
+    page.until('document.getElementById("wrong-recording").textContent.includes("the page takes 64 MiB")')
+
+
+@pytest.mark.parametrize("lead", [0.0, 0.37, -0.2])
+def test_distance_of_harmonic_motions(lead: float) -> None:
+    """Of two cosines with amplitudes a and b it is |a - b| / sqrt 2, and the shift is the lead."""
+    phase = np.linspace(0.0, 9.0, 900)
+    recorded = fold(phase, 3.0 * np.cos(2 * np.pi * (phase - lead))[:, None], 64)
+    turns = np.linspace(100.0, 101.0, 200)
+    motion = turns, 2.0 * np.cos(2 * np.pi * turns)[:, None]
+    far, shift = strand_distance(recorded, motion, np.ones(1), closed=True)
+    assert far[0] == pytest.approx(1 / np.sqrt(2), rel=1e-4)
+    assert shift == pytest.approx(lead, abs=1e-4)
+
+
+def test_distance_between_period_numbers_counts_both_ways() -> None:
+    """A record of 1 and 3 in turn from a motion of 1 alone: half of the record is 2 away, and none of the motion."""
+    phase = np.linspace(0.0, 8.0, 1600)
+    wave = np.sin(2 * np.pi * phase) * np.where(np.floor(phase) % 2, 3.0, 1.0)
+    recorded = fold(phase, wave[:, None], 64)
+    turns = np.linspace(0.0, 1.0, 200)
+    far, _ = strand_distance(recorded, (turns, np.sin(2 * np.pi * turns)[:, None]), np.ones(1), closed=True)
+    assert far[0] == pytest.approx(np.sqrt(0.5 * 0.5 * 2.0**2 / 2), rel=1e-3)
+
+
+def test_channels_are_matched_by_name_and_unit_and_scaled() -> None:
+    table = b"t (s),pos (mm),v (mm/s)\n" + b"".join(b"%g,%g,%g\n" % (k, 1 + k, 10 * k) for k in range(20))
+    recorded = read({"content": table, "name": "table.csv"})["recorded"]
+    system = ns.models.discontinuous_support()
+    setup = matched(recorded, system)
+    assert setup.channels == {"v": "v", "x": "pos"}
+    samples = samples_of(recorded, setup)
+    assert samples is not None
+    np.testing.assert_allclose(samples.columns["x"][:3], [1e-3, 2e-3, 3e-3])
+    np.testing.assert_allclose(samples.columns["v"][:3], [0.0, 0.01, 0.02])
+    moved = setup.changed("shift.x", "0.5", recorded, system).changed("begin", 4, recorded, system)
+    samples = samples_of(recorded, moved)
+    assert samples is not None
+    np.testing.assert_allclose([samples.time[0], samples.columns["x"][0]], [4.0, 0.505])
+    for name, value in {"channel.x": "__class__", "factor.x": "0", "run": "Run #9", "gain.x": 1, "end": -1}.items():
+        with pytest.raises(ValueError, match=r"no channel|every reading equal|no run|is nothing|is empty"):
+            setup.changed(name, value, recorded, system)
+
+
+def test_a_recorded_drive_sets_the_frequency_of_the_model() -> None:
+    system = ns.models.discontinuous_support()
+    assert frequency_of(system, system.values, 2.0) == {"omega": pytest.approx(np.pi)}
+    assert frequency_of(ns.models.border_collision(), {"mu": 1.0}, 2.0) == {}

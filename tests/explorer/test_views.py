@@ -1,0 +1,224 @@
+"""Views that are chosen as tabs or laid over others, in a real browser.
+
+With ``NONSMOOTH_PICTURES=docs/pictures`` the tests also take the screenshots of the guide.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.explorer.conftest import FEW
+
+import nonsmooth as ns
+
+TIPS = """(() => { const found = [], walk = node => { for (const one of node.querySelectorAll("*")) {
+    if (one.classList.contains("bk-Tooltip")) found.push((one.shadowRoot || one).textContent);
+    if (one.shadowRoot) walk(one.shadowRoot); } }; walk(document); return found.join(" | "); })()"""
+
+
+def data(page: Any, name: str) -> dict[str, np.ndarray]:
+    """Columns of a source of the page."""
+    found = page.tab.evaluate(
+        f'Object.entries(Bokeh.documents[0].get_model_by_name("{name}").data).map(([k, v]) => [k, Array.from(v)])'
+    )
+    return {key: np.array([np.nan if v is None else v for v in values]) for key, values in found}
+
+
+def click(page: Any, figure: str, x: float, y: float) -> None:
+    """Click at a point of a figure, and wait until all is shown that changes by it."""
+    before = page.tab.evaluate("location.search")
+    page.tab.mouse.click(*page.place(figure, x, y))
+    page.until(f"location.search !== {json.dumps(before)}")
+    page.until_done()
+
+
+def until_tip(page: Any, words: str) -> str:
+    """The text of the tooltip, once it holds some words."""
+    page.until(f"{TIPS}.includes({json.dumps(words)})", 20)
+    return str(page.tab.evaluate(TIPS))
+
+
+def test_branches_lie_over_the_diagram_and_special_points_say_what_they_are(page: Any) -> None:
+    page.tab.select_option('[id="branches.show"]', "yes")
+    page.until_done()
+    special = data(page, "special points")
+    flips = [k for k, words in enumerate(special["words"]) if words.startswith("flip") and "period 1," in words]
+    (first,) = flips
+    value = special["x"][first]
+    for step, stable in ((-5e-4, False), (5e-4, True)):  # the multiplier passes through -1 there
+        orbit = ns.find_orbit(ns.models.discontinuous_support(rho=value + step), period_number=1, progress=False)
+        assert orbit.stable is stable
+        assert np.isclose(np.sort(orbit.floquet_multipliers.real)[0], -1.0, atol=0.01)
+    unstable, stable = data(page, "unstable branches"), data(page, "stable branches")
+    assert np.nanmin(unstable["x"]) == 0.2  # the orbit of period 1 is followed beyond its flip
+    assert np.nanmax(stable["x"]) == 0.5
+    page.tab.mouse.move(*page.place("diagram", value, special["y"][first]))
+    assert "multipliers" in until_tip(page, "flip (period doubling) at 0.401")
+    page.picture("branches")
+    page.tab.select_option("#shown", "x")
+    page.until_done()
+    assert abs(np.nanmean(data(page, "stable branches")["y"])) < 0.02  # m, where it was m/s
+    page.tab.select_option("#over", "omega")
+    page.until("Bokeh.documents[0].get_model_by_name('special points').data.x.length === 0")
+    page.until_done()
+    assert page.notes() == ""
+
+
+def test_branches_that_nobody_waits_for_are_cancelled_and_the_worker_stays(page: Any, server: Any) -> None:
+    page.until_done()
+    workers = server.workers()
+    page.write("transient", "20000")
+    page.tab.select_option('[id="branches.show"]', "yes")
+    page.until('document.documentElement.dataset.busy === "branches"')
+    page.write("transient", "100")
+    page.until_done()
+    assert len(data(page, "special points")["x"]) > 0
+    assert server.workers() == workers
+    assert page.notes() == ""
+
+
+def test_the_spectrum_of_a_motion_without_contact_is_one_line_of_the_linear_amplitude(page: Any) -> None:
+    page.write("v-p.g", "1")
+    page.tab.click("#tab-spectrum")
+    page.until_done()
+    p = {one["name"]: one["value"] for one in page.ui()["parameters"]}
+    known = p["rho"] / p["m"] / np.hypot(2 * p["k"] / p["m"] - p["omega"] ** 2, p["c"] * p["omega"] / p["m"])
+    lines = data(page, "lines")
+    assert list(lines["x"]) == [1.0]
+    assert lines["y"][0] == pytest.approx(known, rel=1e-6)
+
+
+def test_a_period_4_motion_has_lines_at_quarters(page: Any) -> None:
+    page.write("v-p.rho", "0.26")
+    page.tab.focus("#tab-history")
+    page.tab.keyboard.press("ArrowRight")  # tabs are reached by keys
+    page.until('location.search.includes("lower=spectrum")')
+    page.until_done()
+    lines = data(page, "lines")
+    np.testing.assert_allclose(4 * lines["x"], np.round(4 * lines["x"]), atol=1e-9)
+    assert {0.25, 0.5, 0.75, 1.0} <= set(np.round(lines["x"], 9))
+    page.tab.mouse.move(*page.place("spectrum", 1.0, float(lines["y"].max()) / 30))
+    until_tip(page, "1 · ")
+    page.picture("spectrum")
+
+
+def test_the_response_without_contact_is_the_linear_resonance_curve(page: Any) -> None:
+    page.write("v-p.g", "1")
+    page.tab.click("#tab-response")
+    page.write("response.low", "3")
+    page.write("response.high", "7")
+    page.tab.select_option("#shown", "x")
+    page.until_done()
+    p = {one["name"]: one["value"] for one in page.ui()["parameters"]}
+    for word in ("up", "down"):
+        drawn = data(page, f"response {word}")
+        omega = drawn["x"]
+        assert (omega[0], omega[-1], len(omega)) == (3.0, 7.0, 401)
+        known = p["rho"] / p["m"] / np.hypot(2 * p["k"] / p["m"] - omega**2, p["c"] * omega / p["m"])
+        np.testing.assert_allclose(drawn["y"], known, rtol=1e-5)
+    click(page, "response", 5.0, 0.02)
+    assert page.value("omega") == 5.0
+
+
+def test_a_jump_of_figure_9_and_the_orbit_of_a_click_on_its_upper_branch(page: Any) -> None:
+    page.tab.select_option("#preset", "Fig. 9")
+    page.tab.click("#tab-response")
+    page.until_done()
+    up, down = data(page, "response up"), data(page, "response down")
+    apart = np.flatnonzero(np.abs(up["y"] - down["y"]) > 1e-4)
+    assert len(apart)
+    at = apart[len(apart) // 2]
+    for curve in (up, down):  # the orbit shown is that of the curve that was clicked
+        click(page, "response", up["x"][at], curve["y"][at])
+        low, high = (float(end.split()[0].replace("\u2212", "-")) for end in page.readout()["x"].split(" … "))
+        assert (high - low) / 2000 == pytest.approx(curve["y"][at], rel=2e-3)
+    page.picture("response")
+
+
+def test_a_chart_gets_finer_and_a_click_shows_the_orbit_of_that_cell(page: Any) -> None:
+    stage = 'Bokeh.documents[0].get_model_by_name("chart cells").data.stage[0]'
+    page.tab.click("#tab-chart")
+    page.until(f'{stage} === "first chart"')
+    page.until(f'{stage} === "chart"')
+    page.until('document.documentElement.dataset.busy === "fine chart"')
+    place = page.tab.evaluate("""(() => {
+        const data = Bokeh.documents[0].get_model_by_name("chart cells").data, image = data.image[0];
+        const [rows, columns] = image.shape, at = (i, j) => image[i * columns + j];
+        for (let i = 2; i < rows - 2; i++) for (let j = 2; j < columns - 2; j++)  // amid cells of period 3
+            if ([-2, -1, 0, 1, 2].every(k => at(i + k, j) === 2 && at(i, j + k) === 2))
+                return [data.x[0] + (j + 0.5) * data.dw[0] / columns, data.y[0] + (i + 0.5) * data.dh[0] / rows];
+    })()""")
+    place = page.place("chart", *place)
+    page.tab.mouse.move(*place)
+    assert "exponent near \u2212" in until_tip(page, ": period 3,")
+    page.tab.mouse.click(*place)
+    page.until('JSON.parse(Bokeh.documents[0].get_model_by_name("readout").value)[0][1] === "period 3"')
+    page.picture("chart")
+    low, high = (page.ui()["state"][end] for end in ("low", "high"))
+    page.tab.mouse.wheel(0, -240)
+    page.until('JSON.parse(Bokeh.documents[0].get_model_by_name("ui").value).query.includes("chart.low")')
+    page.until(f'{stage} === "first chart"')
+    state = page.ui()["state"]
+    assert high - low > state["high"] - state["low"]
+    cells = data(page, "chart cells")
+    assert cells["dw"][0] == pytest.approx((state["high"] - state["low"]) * 40 / 39)
+    page.tab.click("#tab-diagram")
+    page.until_done()
+    assert page.notes() == ""
+
+
+def test_a_click_in_a_basin_starts_there_and_reaches_its_attractor(page: Any) -> None:
+    page.write("v-p.rho", "0.323")
+    page.tab.click("#tab-basins")
+    page.until('Bokeh.documents[0].get_model_by_name("basins cells").data.stage[0] === "basins"')
+    legend = page.ui()["legends"]["basins"]
+    assert [words.split(":")[0] for words, _ in legend] == ["period 2 (a)", "period 2 (b)"]
+    marks = data(page, "basins points")
+    kinds = list(dict.fromkeys(marks["marker"]))
+    assert len(kinds) == 2
+    for label, kind in ((2, kinds[0]), (3, kinds[1])):
+        place = page.tab.evaluate(
+            """label => {
+                const data = Bokeh.documents[0].get_model_by_name("basins cells").data, image = data.image[0];
+                const [n, m] = image.shape, at = (i, j) => image[i * m + j];
+                for (let i = 2; i < n - 2; i++) for (let j = 2; j < m - 2; j++)
+                    if ([-2, -1, 0, 1, 2].every(k => at(i + k, j) === label && at(i, j + k) === label))
+                        return [data.x[0] + (j + 0.5) * data.dw[0] / m, data.y[0] + (i + 0.5) * data.dh[0] / n];
+            }""",
+            label,
+        )
+        click(page, "basins", *place)
+        reached = sorted(data(page, "section points")["x"])
+        known = sorted(marks["x"][marks["marker"] == kind])
+        np.testing.assert_allclose(reached, known, rtol=1e-3)
+    page.tab.mouse.move(*page.place("basins", *place))
+    assert "NaN" not in until_tip(page, "period 2 (b)")
+    page.picture("basins")
+
+
+def test_a_first_visit_is_shown_round_in_three_steps_by_keys_alone(server: Any, new_page: Any) -> None:
+    page = new_page(first_visit=True)
+    page.open(f"{server.address}&{FEW}")
+    seen = []
+    for part in ("parameters", "upper", "plane"):
+        assert page.tab.evaluate(f'document.getElementById("{part}").classList.contains("toured")')
+        box = page.tab.locator("#tour").bounding_box()
+        assert box["x"] >= 0
+        assert box["x"] + box["width"] <= 1280
+        assert box["y"] + box["height"] <= 800
+        seen.append(page.tab.inner_text("#tour-title"))
+        if part == "upper":
+            page.picture("tour")
+            page.tab.locator("#tour-next").focus()
+        page.tab.keyboard.press("Enter")
+    assert [title[:5] for title in seen] == ["1 / 3", "2 / 3", "3 / 3"]
+    assert not page.tab.is_visible("#tour")
+    page.open(f"{server.address}&{FEW}")
+    assert not page.tab.is_visible("#tour")  # a second visit
+    page.tab.click("#help")
+    page.tab.keyboard.press("Escape")
+    assert not page.tab.is_visible("#tour")
+    assert page.tab.locator(".toured").count() == 0

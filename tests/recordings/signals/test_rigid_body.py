@@ -1,0 +1,121 @@
+"""A cube that falls, spins and bounces on a corner, in closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from nonsmooth.recordings.signals.restitution import flights, restitution
+from nonsmooth.recordings.signals.rigid_body import corner_heights, corner_restitution, cube
+
+G, E, RATE = 187.0, 0.3, 148.0
+
+
+def tossed(seed: int, noise: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, float, float]:
+    """Centre, quaternions (w first) of a cube with one impact at its lowest corner, frictionless, restitution E."""
+    rng = np.random.default_rng(seed)
+    corners = cube()
+    at_impact = Rotation.random(random_state=seed)
+    arms = at_impact.apply(corners)
+    k = int(np.argmin(arms[:, 2]))
+    spin, v = 4 * rng.standard_normal(3), -18 + rng.standard_normal()
+    n = np.array([0, 0, 1.0])
+    arm = arms[k]
+    before = v + np.cross(spin, arm)[2]
+    # Impulse J n at the arm: mass 1, moment of inertia 2/3 of a cube of half-width 1.
+    inertia = 2.0 / 3.0
+    J = -(1 + E) * before / (1 + np.cross(np.cross(arm, n), arm)[2] / inertia)
+    v_after, spin_after = v + J, spin + np.cross(arm, n) * J / inertia
+    when = (12 + rng.random()) / RATE
+    t = np.arange(26) / RATE
+    s = t - when
+    centre = np.where(s < 0, v, v_after) * s - G / 2 * s**2 - arm[2]
+    turns = [Rotation.from_rotvec((spin if u < 0 else spin_after) * u) * at_impact for u in s]
+    q = np.roll([r.as_quat() for r in turns], 1, axis=1)
+    place = np.column_stack([3 * t, -2 * t, centre + noise * rng.standard_normal(len(t))])
+    return t, place, q, when, before
+
+
+def test_the_corner_and_its_restitution() -> None:
+    used = 0
+    for seed in range(12):
+        t, place, q, when, before = tossed(seed, 0.0)
+        free = flights(t, place[:, 2])
+        if free.sizes["flight"] != 2:
+            continue
+        assert float(free.acceleration) == pytest.approx(-G, rel=1e-6)
+        found = corner_restitution(t, place, q, cube(), free)
+        assert found.sizes["impact"] == 1
+        used += 1
+        one = found.isel(impact=0)
+        assert float(one.impact_time) == pytest.approx(when, abs=2e-4)
+        assert float(one.v_before) == pytest.approx(before, abs=0.1)
+        assert float(one.restitution) == pytest.approx(E, abs=5e-3)
+        assert abs(float(one.height)) < 0.02
+    assert used >= 8
+
+
+def test_errors_cover_noise() -> None:
+    z = []
+    for seed in range(30):
+        t, place, q, _, _ = tossed(seed % 10, 0.0)
+        rng = np.random.default_rng(100 + seed)
+        place[:, 2] += 5e-4 * rng.standard_normal(len(t))
+        free = flights(t, place[:, 2])
+        if free.sizes["flight"] != 2:
+            continue
+        found = corner_restitution(t, place, q, cube(), free)
+        for one in (found.isel(impact=k) for k in range(found.sizes["impact"])):
+            z.append((float(one.restitution) - E) / np.hypot(one.restitution_error, one.half_sample / 7))
+    assert len(z) > 20 and np.sqrt(np.mean(np.square(z))) < 2
+
+
+def test_a_ball_needs_its_height_only() -> None:
+    t = np.arange(170) / RATE  # the bounces end at 1.43 s
+    times, speeds = [0.0], [40.0]
+    while times[-1] < t[-1]:
+        times.append(times[-1] + 2 * speeds[-1] / G)
+        speeds.append(0.7 * speeds[-1])
+    k = np.searchsorted(times, t, side="right") - 1
+    s, u = t - np.array(times)[k], np.array(speeds)[k]
+    z = u * s - G / 2 * s**2
+    found = restitution(t, z, flights(t, z))
+    assert found.sizes["impact"] >= 3
+    np.testing.assert_allclose(found.restitution, 0.7, atol=1e-6)
+    np.testing.assert_allclose(found.impact_time, times[1 : 1 + found.sizes["impact"]], atol=1e-7)
+
+
+def test_errors_of_a_balls_restitution_are_as_stated() -> None:
+    z, z_speed, z_fall, rng = [], [], [], np.random.default_rng(0)
+    for _ in range(120):
+        v, e, g = rng.uniform(2.5, 3.5), rng.uniform(0.4, 0.9), 9.81
+        when = 0.2 + rng.uniform(0, 0.01)
+        t = np.arange(45) / 100
+        s = t - when
+        z0 = np.where(s < 0, -v * s, e * v * s) - g / 2 * s**2 + rng.normal(0, 3e-5, len(t))
+        free = flights(t, z0)
+        if free.sizes["flight"] != 2:
+            continue
+        z_fall.append((float(free.acceleration) + g) / float(free.acceleration_error))
+        one = restitution(t, z0, free).isel(impact=0)
+        z.append((float(one.restitution) - e) / float(one.restitution_error))
+        # before and after are those at the instant of the impact, which is a sample long
+        z_speed.append((float(one.v_after) - e * v) / float(one.v_after_error))
+    assert len(z) > 80
+    for values in (z, z_speed, z_fall):
+        assert 0.7 < np.sqrt(np.mean(np.square(values))) < 1.4
+
+
+def test_doors() -> None:
+    t, place, q, _, _ = tossed(1, 0.0)
+    with pytest.raises(ValueError, match="no interval of at least 4 samples falls freely"):
+        flights(t, np.ones(len(t)))
+    with pytest.raises(ValueError, match="unit quaternions"):
+        corner_heights(place, 2 * q, cube())
+    free = flights(t, place[:, 2])
+    with pytest.raises(ValueError, match="needs time"):
+        corner_restitution(t, place[:, :2], q, cube(), free)
+    place[3, 0] = np.nan
+    with pytest.raises(ValueError, match="values are missing"):
+        corner_restitution(t, place, q, cube(), free)

@@ -1,0 +1,99 @@
+"""Tables of any origin."""
+
+from __future__ import annotations
+
+import pytest
+
+from nonsmooth.errors import DataFileError
+from nonsmooth.recordings.load import load_recording, parse_recording
+from nonsmooth.recordings.reading import Options
+
+TABLE = b"# a comment\n# another\nt_s, x [mm], force (N), note\n0.0, 1, 10, 7\n0.5, 2, , 7\n1.0, 3, 30, 8\n"
+
+
+def test_header_with_units_and_comments() -> None:
+    recording = parse_recording(TABLE, "x.csv")
+    assert recording.units == {"x": "mm", "note": "", "force": "N"}
+    assert recording.channel("x")["time"].values.tolist() == [0, 0.5, 1]
+    assert recording.channel("force").values.tolist() == [10, 30]
+    assert recording.channel("force")["time"].values.tolist() == [0, 1]
+    assert recording.source["header"]["comments"] == ["# a comment", "# another"]
+    assert any("'force': 1 blank fields dropped" in w for w in recording.warnings)
+
+
+def test_column_mapping_with_runs() -> None:
+    options = Options(columns={"time": "t_s", "run": "note", "position": ("x [mm]", "m")})
+    recording = parse_recording(TABLE, "x.csv", options)
+    assert recording.runs == ("Run #7", "Run #8") and recording.units == {"position": "m"}
+    assert recording.channel("position", "Run #7").values.tolist() == [1, 2]
+    assert recording.channel("position", "Run #8")["time"].values.tolist() == [1.0]
+    assert any("not asked for are left out: 'force (N)'" in w for w in recording.warnings)
+
+
+def test_no_header_needs_places() -> None:
+    data = b"0 1.5\n0.1 2.5\n0.2 3.5\n"
+    with pytest.raises(DataFileError, match=r"line 1: the table has no header.*columns=\{'time': 0"):
+        parse_recording(data, "x.txt")
+    recording = parse_recording(data, "x.txt", Options(columns={"time": 0, "x": (1, "m")}))
+    assert recording.channel("x").values.tolist() == [1.5, 2.5, 3.5]
+
+
+def test_no_time_column() -> None:
+    data = b"x;y\n1,5;2\n2,5;3\n"
+    with pytest.raises(DataFileError, match=r"no time column among 'x', 'y'; name it, .* rate=\.\.\."):
+        parse_recording(data, "x.csv")
+    recording = parse_recording(data, "x.csv", Options(rate=100))
+    assert recording.channel("x").values.tolist() == [1.5, 2.5]
+    assert recording.channel("x")["time"].values.tolist() == [0, 0.01]
+
+
+def test_another_axis_need_not_rise() -> None:
+    """The unstable middle part of a response runs back in frequency."""
+    data = b"frequency (Hz)\tamplitude (m)\n1\t1\n3\t2\n2\t3\n4\t1\n"
+    recording = parse_recording(data, "x.tsv", Options(axis="frequency"))
+    assert recording.channel("amplitude")["frequency"].values.tolist() == [1, 3, 2, 4]
+    assert recording.channel("amplitude")["frequency"].attrs["units"] == "Hz"
+
+
+@pytest.mark.parametrize(
+    ("data", "options", "message"),
+    [
+        (TABLE, Options(columns={"time": "when", "x": 1}), r"no column 'when'; the columns are 't_s', 'x \[mm\]'"),
+        (TABLE, Options(columns={"time": 9, "x": 1}), r"there is no column 9"),
+        (TABLE, Options(columns={"x": 1}), r"no time column"),
+        (TABLE, Options(units={"z": "m"}), r"units names 'z', which is no channel; there are: 'force'"),
+        (b"t,x\n0,1\n1,2\n0,3\n", Options(), r"line 4: .* time goes back .* columns=\{'run': \.\.\.\}"),
+        (b"t,x\n0,abc\n", Options(), r"line 2: column 2 \('x'\) holds 'abc'"),
+        (b"# only\n", Options(), r"no table, only blank lines or comments"),
+        (b"t,x,x\n0,1,2\n", Options(columns={"time": "t", "x": "x"}), r"2 columns are called 'x'"),
+        (b"t,x\n0,1\n,5\n", Options(), r"line 3: .* has a value where there is no time"),
+        ((",".join(["t"] + ["c"] * 5000) + "\n").encode(), Options(), r"has 5001 columns; at most 4096"),
+    ],
+)
+def test_bad_files_say_where(data: bytes, options: Options, message: str) -> None:
+    with pytest.raises(DataFileError, match=message):
+        parse_recording(data, "bad.csv", options)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"format": "xls"}, "format must be one of capstone-csv"),
+        ({"rate": -1}, "rate must be a positive number"),
+        ({"rate": 1.0, "columns": {"time": 0}}, "rate makes a time axis"),
+        ({"decimal": ";"}, "decimal must be"),
+        ({"decimal": ",", "delimiter": ","}, "cannot both"),
+        ({"delimiter": "ab"}, "delimiter must be one character"),
+        ({"axis": "two words"}, "axis must be a name"),
+    ],
+)
+def test_wrong_arguments_at_the_door(given: dict[str, object], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        load_recording("absent.csv", **given)
+
+
+def test_wrong_columns_at_the_door() -> None:
+    with pytest.raises(TypeError, match="columns must be a mapping"):
+        load_recording("absent.csv", columns=["t"])
+    with pytest.raises(TypeError, match=r"columns\['x'\] must be a header"):
+        load_recording("absent.csv", columns={"x": 1.5})
