@@ -18,8 +18,8 @@ from numba.core import cgutils, types
 from numba.extending import intrinsic, models, register_model
 
 __all__ = [
-    "FOUR", "LANES", "dot", "load", "plain", "plus", "sizes", "spread", "store", "sum_columns", "sum_rows",
-    "sum_some_rows", "times",
+    "FOUR", "LANES", "add_products", "dot", "load", "plain", "plus", "sizes", "spread", "store", "sum_columns",
+    "sum_rows", "sum_some_rows", "sum_terms", "times",
 ]  # fmt: skip
 
 LANES = 8
@@ -102,9 +102,25 @@ def _sizes(total: Any, row: Any, at: Any, w: Any, n: Any) -> Any:
     return total
 
 
+def _add_products(rows: Any, k: Any, bands: Any, mode: Any, d: Any, offset: Any, first: Any, last: Any) -> None:
+    """rows[k, r] += bands[mode, d, r] rows[k - 1, r + offset] for first <= r < last."""
+    for r in range(first, last):
+        rows[k, r] += bands[mode, d, r] * rows[k - 1, r + offset]
+
+
+def _sum_terms(out: Any, rows: Any, first: Any, last: Any, x: Any, sized: Any, m: Any) -> None:
+    """out[j] = sum_k x^(k - first) / (k - first)! rows[k, j] for first <= k <= last and j < m; ``sized``: of |rows|."""
+    for j in range(m):
+        total = abs(rows[last, j]) if sized else rows[last, j]
+        for k in range(last - 1, first - 1, -1):
+            total = total * x / (k + 1 - first) + (abs(rows[k, j]) if sized else rows[k, j])
+        out[j] = total
+
+
 plain = SimpleNamespace(
-    sum_rows=_sum_rows, sum_some_rows=_sum_some_rows, sum_columns=_sum_columns, dot=_dot, sizes=_sizes, spread=_spread
-)
+    sum_rows=_sum_rows, sum_some_rows=_sum_some_rows, sum_columns=_sum_columns, dot=_dot, sizes=_sizes, spread=_spread,
+    add_products=_add_products, sum_terms=_sum_terms,
+)  # fmt: skip
 
 
 class _Array:
@@ -348,6 +364,76 @@ def _spread_in_lanes(typing: Any, total: Any, row: Any, at: Any, w: Any, about: 
     return signature, generate
 
 
+@intrinsic
+def _add_products_in_lanes(
+    typing: Any, rows: Any, k: Any, bands: Any, mode: Any, d: Any, offset: Any, first: Any, last: Any
+) -> Any:  # fmt: skip
+    whole = types.int64
+    signature = types.void(rows, whole, bands, whole, whole, whole, whole, whole)
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        rows_, k_, bands_, mode_, d_, offset_, first_, last_ = arguments
+        values, factors = _Array(context, builder, rows, rows_), _Array(context, builder, bands, bands_)
+        index = ir.IntType(64)
+        before = builder.sub(k_, ir.Constant(index, 1))
+        size = builder.sub(last_, first_)
+        middle = builder.add(first_, builder.and_(size, ir.Constant(index, -LANES)))
+        for begin, end, width in ((first_, middle, LANES), (middle, last_, 1)):
+            vector = ir.VectorType(ir.DoubleType(), width) if width > 1 else None
+            step = ir.Constant(index, width)
+            with cgutils.for_range_slice(builder, begin, end, step, intp=index) as (r, _):
+                product = builder.fmul(
+                    factors.get(vector, mode_, d_, r), values.get(vector, before, builder.add(r, offset_)),
+                    flags=_CONTRACT,
+                )  # fmt: skip
+                total = builder.fadd(values.get(vector, k_, r), product, flags=_CONTRACT)
+                if vector is None:
+                    values.put(total, k_, r)
+                else:
+                    values.store(total, k_, r)
+        return context.get_dummy_value()
+
+    return signature, generate
+
+
+@intrinsic(prefer_literal=True)
+def _sum_terms_in_lanes(
+    typing: Any, out: Any, rows: Any, first: Any, last: Any, x: Any, sized: Any, m: Any
+) -> Any:  # fmt: skip
+    signature = types.void(out, rows, first, last, types.float64, sized, m)
+    begin, end, whole, width = first.literal_value, last.literal_value, m.literal_value, sized.literal_value
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        target, source = _Array(context, builder, out, arguments[0]), _Array(context, builder, rows, arguments[1])
+        x_ = arguments[4]
+
+        def term(vector: Any, k: int, at: int) -> Any:
+            value = source.get(vector, k, at)
+            return _size(builder, value) if width else value
+
+        factors = [
+            builder.fmul(x_, ir.Constant(ir.DoubleType(), 1.0 / (k + 1 - begin)), flags=_CONTRACT)
+            for k in range(begin, end)
+        ]
+        at = 0
+        while at < whole:
+            lanes = next(size for size in (WIDEST, LANES, 1) if at + size <= whole)
+            vector = ir.VectorType(ir.DoubleType(), lanes) if lanes > 1 else None
+            total = term(vector, end, at)
+            for k in range(end - 1, begin - 1, -1):
+                factor = factors[k - begin]
+                scaled = _scaled(builder, total, factor) if lanes > 1 else builder.fmul(total, factor, flags=_CONTRACT)
+                total = builder.fadd(scaled, term(vector, k, at), flags=_CONTRACT)
+            if vector is None:
+                target.put(total, at)
+            else:
+                target.store(total, at)
+            at += lanes
+        return context.get_dummy_value()
+
+    return signature, generate
+
+
 class _Four(types.Type):
     """Four numbers in a vector register."""
 
@@ -409,6 +495,8 @@ def _choose(compiled: Any, loops: Callable[..., Any]) -> Any:
 sum_rows = _choose(_sum_rows_in_lanes, _sum_rows)
 sum_columns = _choose(_sum_columns_in_lanes, _sum_columns)
 sum_some_rows = _choose(_sum_some_rows_in_lanes, _sum_some_rows)
+sum_terms = _choose(_sum_terms_in_lanes, _sum_terms)
+add_products = _choose(_add_products_in_lanes, _add_products)
 dot = _choose(_dot_in_lanes, _dot)
 sizes = _choose(_sizes_in_lanes, _sizes)
 spread = _choose(_spread_in_lanes, _spread)

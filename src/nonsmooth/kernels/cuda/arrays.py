@@ -104,6 +104,8 @@ def arrays_of_thread(packed, multiples, i):
     field = cuda.local.array((N_MODES, 2, M), float64)
     info = cuda.local.array((N_MODES, 4), float64)
     some = cuda.local.array((1, 1, 1, 1), int64)
+    bands = cuda.local.array((1, 1, 1), float64)
+    lines = cuda.local.array((1, 1, 1), int64)
     row = cuda.local.array((N_TERMS, M), float64)
     w = cuda.local.array(M, float64)
     w1 = cuda.local.array(M, float64)
@@ -131,4 +133,4 @@ def arrays_of_thread(packed, multiples, i):
     work = Work(
         w, w1, wn, wp, wq, end, there, before, row, scr, points, rates, zero, found, visited, twin, built, tally, memo,
     )  # fmt: skip
-    return form, (Tables(prop, rot, fun, tay, field, info, some), work)
+    return form, (Tables(prop, rot, fun, tay, field, info, some, bands, lines), work)

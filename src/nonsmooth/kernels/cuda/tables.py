@@ -7,7 +7,8 @@ numbers; where all have one point, as for basins, a read serves a whole warp.
 
 from nonsmooth.kernels.cuda.arrays import N_INDICATORS, N_MODES, arrays_of_thread
 from nonsmooth.kernels.cuda.target import cuda, device, entry, local
-from nonsmooth.kernels.linear.tables import HARMONICS, build, twin_of
+from nonsmooth.kernels.linear.build import build, twin_of
+from nonsmooth.kernels.linear.tables import HARMONICS
 
 
 @device

@@ -18,8 +18,8 @@ from numba import config, cuda
 from nonsmooth.kernels.compile.lanes import plain
 
 __all__ = [
-    "REGISTERS", "THREADS", "callback", "cuda", "device", "dot", "entry", "inline", "kernel", "local", "once", "sizes",
-    "spread", "sum_columns", "sum_rows", "sum_some_rows",
+    "REGISTERS", "THREADS", "add_products", "callback", "cuda", "device", "dot", "entry", "inline", "kernel", "local",
+    "once", "sizes", "spread", "sum_columns", "sum_rows", "sum_some_rows", "sum_terms",
 ]  # fmt: skip
 
 THREADS = 64  # in a block: few, because a trajectory fills a thread's registers
@@ -38,6 +38,7 @@ inline = once = device
 sum_rows, sum_columns = device(plain.sum_rows), device(plain.sum_columns)
 dot, sizes, spread = device(plain.dot), device(plain.sizes), device(plain.spread)
 sum_some_rows = device(plain.sum_some_rows)
+add_products, sum_terms = device(plain.add_products), device(plain.sum_terms)
 
 
 def local(function: Callable[..., Any]) -> Any:

@@ -13,9 +13,10 @@ from nonsmooth.kernels.hybrid.codes import OK, PAUSED
 from nonsmooth.kernels.hybrid.loop import leave, march
 from nonsmooth.kernels.hybrid.places import DONE, JUMPS, MODE, NO_END, PERIODS, RETURNS, TIME, WAITED
 from nonsmooth.kernels.hybrid.records import GOAL, GROWTH, MOTION, NET, SECTION
-from nonsmooth.kernels.linear.search import slope_of
+from nonsmooth.kernels.linear.bands import carry
 from nonsmooth.kernels.linear.stepper import STEPPER
-from nonsmooth.kernels.linear.tables import DEGREE, HARMONICS, NODES, STATES, WAVE, M
+from nonsmooth.kernels.linear.tables import BANDED, DEGREE, HARMONICS, NODES, STATES, WAVE, M
+from nonsmooth.kernels.linear.values import slope_of
 from nonsmooth.kernels.tangent.frame import log_determinant, multiply, saltation, straighten
 
 OPEN_RUN, CLOSED = 0, 2
@@ -51,9 +52,17 @@ def remaining(section, goal, work):
 
 @once
 def observe(i, step, stop, triggered, form, net, section, goal, seen, tables, work):
-    """Carry the frame over the segment: X = exp(A tau), from the nearest node and the Taylor rows of the states."""
+    """Carry the frame over the segment: X = exp(A tau), from the nearest node and the Taylor rows of the states.
+
+    (Of many states with few entries by its columns' own series.)"""
     prop, tay, X, scale = tables.prop, tables.tay, seen.step, seen.scale
     mode, n_i = work.tally[MODE], work.zero.shape[0]
+    for r in range(STATES):
+        seen.sums[0] += tables.field[mode, r, r] * step
+    if BANDED:
+        if tables.lines[mode, 0, 0] > 0:
+            carry(tables, work, mode, step / tables.info[mode, 0], scale, seen.frame)
+            return OPEN_RUN
     spacing, full = tables.info[mode, 1], step == tables.info[mode, 0]
     node = NODES if full else min(int(step / spacing + 0.5), NODES)
     local = step - node * spacing
@@ -69,7 +78,6 @@ def observe(i, step, stop, triggered, form, net, section, goal, seen, tables, wo
                 for c in range(STATES):
                     X[r, c] += a * prop[mode, node, c, q]
     for r in range(STATES):
-        seen.sums[0] += tables.field[mode, r, r] * step
         for c in range(STATES):
             X[r, c] *= scale[c] / scale[r]
     multiply(X, seen.frame, STATES, STATES, seen.scratch)
@@ -123,7 +131,7 @@ def approach(mode, fired, seen, tables, work):
 
 
 @once
-def cross(i, t, mode, jumps, form, net, goal, seen, tables, work):
+def cross(i, t, mode, jumps, form, net, section, goal, seen, tables, work):
     """Saltation of a transition, from the mode in which it was taken to ``mode``."""
     before, f, R = work.wp, seen.fields, seen.reset
     slope_along(tables.field, work.tally[MODE], before, f[0])

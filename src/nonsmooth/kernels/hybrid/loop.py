@@ -157,7 +157,7 @@ def transit(i, t, short, form, net, section, goal, seen, tables, work):
             tally[WAITS], tally[TAKEN], tally[CLOSELY] = t + 1, jumps, 1 if short else 0
             return PAUSED, 0
         mode = take(i, t, fired if jumps == 0 else -1, form, tables, net, work)
-        cross(i, t, mode, jumps, form, net, goal, seen, tables, work)
+        cross(i, t, mode, jumps, form, net, section, goal, seen, tables, work)
         tally[MODE] = mode
         jumps += 1
         if net.transitions[t, 2] == DEAD_END:
@@ -201,14 +201,14 @@ def march(i, form, net, section, goal, motion, seen, tables, work):
             tally[WAITS] = 0
             short, state = tally[CLOSELY] != 0, tally[NOTED]
         else:
-            ready, clear = False, False
+            ready, first = False, 0
             if strides:
-                ready, clear, patience = hurry(i, form, net, section, goal, seen, tables, work, patience)
+                ready, first, patience = hurry(i, form, net, section, goal, seen, tables, work, patience)
             stop, timed = NO_END, -1
             if not strides:
                 stop, timed = next_stop(i, form, net, section, goal, work)
             wait, rest = stop - memo[TIME], remaining(section, goal, work)
-            step, t, full, sense = leg(i, form, net, section, goal, tables, work, min(wait, rest), ready, clear)
+            step, t, full, sense = leg(i, form, net, section, goal, tables, work, min(wait, rest), ready, first)
             if not step >= 0.0:
                 code = DIVERGED
                 break

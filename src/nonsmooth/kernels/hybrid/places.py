@@ -12,7 +12,8 @@ N_TALLY = 17
 
 # times
 TIME, PERIODS, SINCE, WAITED, DONE = 0, 1, 2, 3, 4  # in the period, since a crossing, since a pass, since the start
-N_MEMO = 5
+LONGEST_STEP = 5  # of the modes visited so far
+N_MEMO = 6
 
 MOST_CROSSINGS = 1000  # within one section return, period or unit of time
 MOST_AT_ONCE = 60  # at one instant: a log has room for 64 more when a step begins

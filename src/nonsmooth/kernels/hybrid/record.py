@@ -97,7 +97,7 @@ def approach(mode, fired, seen, tables, work):
 
 
 @once
-def cross(i, t, mode, jumps, form, net, goal, seen, tables, work):
+def cross(i, t, mode, jumps, form, net, section, goal, seen, tables, work):
     """Log a transition."""
     n = work.tally[CROSSINGS]
     seen.crossing_time[n] = work.memo[DONE]

@@ -62,6 +62,8 @@ class Tables(NamedTuple):
     field: Any
     info: Any
     some: Any
+    bands: Any
+    lines: Any
 
 
 class Net(NamedTuple):
@@ -264,7 +266,7 @@ class Flow(NamedTuple):
 FORM = type_of(
     Form, _f4, _f3, _f4, _f4, _i1, _f1, _f1, _f3, _f2, _f3, _f3, _f4, _f3, _f4, _f4, _f4, _f3, _f4, _f4, _i2
 )  # fmt: skip
-TABLES = type_of(Tables, _f4, _f3, _f3, _f4, _f3, _f2, _i[:, :, :, ::1])
+TABLES = type_of(Tables, _f4, _f3, _f3, _f4, _f3, _f2, _i[:, :, :, ::1], _f3, _i[:, :, ::1])
 NET = type_of(Net, _i2, _i2, _i1, _i1, _i1, _f1, _i2)
 WORK = type_of(Work, *[_f1] * 8, _f2, _f2, _f1, _f1, *[_i1] * 6, _f1)
 GENERATED = type_of(Generated, _i1, _f2, _f1, _f2, _i2, _i1, _f1, _f1, _f, _f, *[_i] * 8)

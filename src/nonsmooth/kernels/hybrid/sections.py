@@ -112,14 +112,14 @@ def next_is_edge(section, goal, work):
 @once
 def hurry(i, form, net, section, goal, seen, tables, work, patience):
     """Whole steps without crossings, where extremes need not be seen. Returns (w1 stands at the end of the step that is
-    next, that step is clear, patience left)."""
+    next, the place of the first transition that may fire on it or -1, patience left)."""
     tally, memo = work.tally, work.memo
     returns = tally[RETURNS]
     if not (returns < goal.transient or section.extremes == 0):
-        return False, False, patience
+        return False, 0, patience
     T = form.period[i]
     began, turns = memo[TIME], memo[PERIODS]
-    s, whole, counted, clear, patience = stride(
+    s, whole, counted, first, patience = stride(
         tables, net, work, tally[MODE], began, turns, section.phase * T, T, returns,
         goal.transient if returns < goal.transient else 0, patience,
     )  # fmt: skip
@@ -131,7 +131,7 @@ def hurry(i, form, net, section, goal, seen, tables, work, patience):
         if counted >= goal.transient:
             seen.elapsed[i] += (whole - turns) * T + (s - began)
         memo[TIME], memo[PERIODS] = s, whole
-    return True, clear, patience
+    return True, first, patience
 
 
 @inline
@@ -196,12 +196,13 @@ def approach(mode, fired, seen, tables, work):
 
 
 @once
-def cross(i, t, mode, jumps, form, net, goal, seen, tables, work):
+def cross(i, t, mode, jumps, form, net, section, goal, seen, tables, work):
     """Count a transition in the kept window."""
     if work.tally[RETURNS] >= goal.transient:
         seen.crossings[i] += 1
         seen.contacts[i] += net.transitions[t, 2]
-        include(i, mode, form, tables, work, seen)
+        if section.extremes != 0:
+            include(i, mode, form, tables, work, seen)
 
 
 @once

@@ -4,24 +4,24 @@ A step that certainly does not leave the extremes so far costs a dozen multiplic
 is halved down to two node spacings, where the polynomial's critical points decide.
 """
 
-from nonsmooth.kernels.compile.cache import device, inline, once
+from nonsmooth.kernels.compile.cache import inline, once
 from nonsmooth.kernels.hybrid.places import MODE
 from nonsmooth.kernels.linear.polynomial import NEVER, THIRD, classify, critical_points, horner
-from nonsmooth.kernels.linear.search import bound_at, compose, slope_of, to_node, value_of
 from nonsmooth.kernels.linear.tables import MEMORY, NODES, ONE, OWN, STATES
+from nonsmooth.kernels.linear.values import bound_at, compose, slope_of, to_node, value_of
 
 
-@device
+@once
 def locate_maximum(tables, work, mode, f, sign, a, b, best):
     """The larger of ``best`` and the maximum of sign * functional over [a, b] of the step, piece by piece."""
     spacing = tables.info[mode, 1]
     w, wn, wq, scr, points = work.w, work.wn, work.wq, work.scr, work.points
-    bound = bound_at(tables, mode, f, w)
+    bound = bound_at(tables, work.row, mode, f, w)
     size = NODES // 4
     node = min(int(a / spacing) // size * size, NODES - size)
     while node < NODES and node * spacing <= b:
-        to_node(tables, mode, node, w, wn)
-        to_node(tables, mode, node + size, w, wq)
+        to_node(tables, work.row, mode, node, w, wn)
+        to_node(tables, work.row, mode, node + size, w, wq)
         g0 = sign * value_of(tables, mode, f, wn) - best
         g1 = sign * value_of(tables, mode, f, wq) - best
         s0 = sign * slope_of(tables, mode, f, wn)
@@ -30,7 +30,7 @@ def locate_maximum(tables, work, mode, f, sign, a, b, best):
             if size > 2:
                 size //= 2
                 continue
-            to_node(tables, mode, node + 1, w, wn)
+            to_node(tables, work.row, mode, node + 1, w, wn)
             compose(tables, mode, f, wn, scr, 0)
             lo = max(a - (node + 1) * spacing, -spacing)
             hi = min(b - (node + 1) * spacing, spacing)
@@ -46,7 +46,7 @@ def locate_maximum(tables, work, mode, f, sign, a, b, best):
 
 
 @inline
-def exceeds(tables, mode, f, w, w1, lowest, highest):
+def exceeds(tables, row, mode, f, w, w1, lowest, highest):
     """Return whether functional f may leave [lowest, highest] on the step from w to w1: (below, above)."""
     g0 = value_of(tables, mode, f, w)
     g1 = value_of(tables, mode, f, w1)
@@ -57,7 +57,7 @@ def exceeds(tables, mode, f, w, w1, lowest, highest):
     c2 = 0.5 * (b1 + b2)
     c3 = 0.25 * (3.0 * b2 + g1)
     h2 = h * h
-    wide = bound_at(tables, mode, f, w) * h2 * h2 * (1.0 / 144.0)
+    wide = bound_at(tables, row, mode, f, w) * h2 * h2 * (1.0 / 144.0)
     below = min(min(min(g0, g1), min(c1, c3)), c2 - wide) < lowest
     above = max(max(max(g0, g1), max(c1, c3)), c2 + wide) > highest
     return below, above
@@ -83,11 +83,15 @@ def widen(i, a, b, form, tables, work, kept):
         if MEMORY > 0 and n_i + OWN <= f < n_i + STATES:
             continue
         hi, lo, k = extremes_of(f, kept, n_i)
-        below, above = exceeds(tables, mode, f, work.w, work.w1, lo[i, k], hi[i, k])
-        if above:
-            hi[i, k] = locate_maximum(tables, work, mode, f, 1.0, a, b, hi[i, k])
-        if below:
-            lo[i, k] = -locate_maximum(tables, work, mode, f, -1.0, a, b, -lo[i, k])
+        below, above = exceeds(tables, work.row, mode, f, work.w, work.w1, lo[i, k], hi[i, k])
+        for side in range(2):
+            if above if side == 0 else below:
+                sign = 1.0 if side == 0 else -1.0
+                found = sign * locate_maximum(tables, work, mode, f, sign, a, b, hi[i, k] if side == 0 else -lo[i, k])
+                if side == 0:
+                    hi[i, k] = found
+                else:
+                    lo[i, k] = found
 
 
 @once

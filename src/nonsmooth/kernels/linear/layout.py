@@ -6,7 +6,7 @@ from nonsmooth.kernels.compile.block import one_block
 from nonsmooth.kernels.hybrid.places import N_MEMO, N_TALLY
 from nonsmooth.kernels.hybrid.records import Tables, Work
 from nonsmooth.kernels.linear.search import WIDTH
-from nonsmooth.kernels.linear.tables import DEGREE, HARMONICS, MANY, NODES, STATES, TERMS, M
+from nonsmooth.kernels.linear.tables import BANDED, DEGREE, HARMONICS, MANY, NODES, STATES, TERMS, M
 
 
 def scratch(n_modes, n_indicators, n_outputs, n_rows):
@@ -28,6 +28,8 @@ def _tables(n_modes, n_f):
         np.zeros((n_modes, n_f, 2 * (M + STATES + 1))), np.zeros((n_modes, n_f, M, DEGREE + 1)),
         np.zeros((n_modes, STATES, M)), np.zeros((n_modes, 2 + STATES)),
         np.zeros((n_modes, n_f, 2, M + 1) if STATES >= MANY else (1, 1, 1, 1), dtype=np.int64),
+        np.zeros((n_modes, STATES + M, STATES) if BANDED else (1, 1, 1)),
+        np.zeros((n_modes, STATES + M, 3) if BANDED else (1, 1, 1), dtype=np.int64),
     )  # fmt: skip
 
 

@@ -4,7 +4,7 @@ from numba import types
 
 from nonsmooth.kernels.compile.cache import kernel
 from nonsmooth.kernels.hybrid.records import FORM, TABLES, WORK
-from nonsmooth.kernels.linear.tables import build
+from nonsmooth.kernels.linear.build import build
 
 
 @kernel(types.int64(FORM, TABLES, WORK))

@@ -11,7 +11,10 @@ from nonsmooth.kernels.compile.cache import load_module
 
 __all__ = ["STEPPER", "linear_module", "modes_module", "settle_module"]
 
-STEPPER = ("linear.tables", "linear.polynomial", "linear.search", "linear.stepper", "linear.layout", "hybrid.loop")
+STEPPER = (
+    "linear.tables", "linear.bands", "linear.build", "linear.polynomial", "linear.values", "linear.search",
+    "linear.limits", "linear.stepper", "linear.layout", "hybrid.loop",
+)  # fmt: skip
 OBSERVERS = {
     "sections": ("linear.extremes", "hybrid.sections"),
     "record": ("linear.touches", "hybrid.every_step", "hybrid.record"),
@@ -37,7 +40,7 @@ def linear_module(
 def modes_module(states: int, harmonics: int) -> ModuleType:
     """The module with ``stand``, which adds modes to the tables of those numbers of states and harmonics."""
     numbers = {"STATES": states, "HARMONICS": harmonics, "MEMORY": 0}
-    text = with_numbers(joined(("linear.tables", "linear.modes")), numbers)
+    text = with_numbers(joined(("linear.tables", "linear.bands", "linear.build", "linear.modes")), numbers)
     return load_module(text, f"linear_modes_{states}_{harmonics}")
 
 

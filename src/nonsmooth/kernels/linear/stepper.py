@@ -1,4 +1,4 @@
-"""The stepper of the exact flow: segments of linear modes with harmonic forcing, landing, jumps and after-limits.
+"""The stepper of the exact flow: segments of linear modes with harmonic forcing and landing.
 
 A segment is one step of the mode, or its part up to the first crossing, section return or stop. ``work.w`` holds
 (u_1, ..., u_n, 1, cos k_1 w t, sin k_1 w t, ...); times count from the start of the forcing period.
@@ -6,27 +6,15 @@ A segment is one step of the mode, or its part up to the first crossing, section
 
 from math import cos, fabs, isfinite, sin
 
-from nonsmooth.kernels.compile.cache import device, inline, once
-from nonsmooth.kernels.compile.lanes import dot
+from nonsmooth.kernels.compile.cache import inline, once
 from nonsmooth.kernels.hybrid.places import FIRED, MODE, NO_END, TIME
 from nonsmooth.kernels.hybrid.records import FORM, TABLES, WORK
-from nonsmooth.kernels.linear.search import (
-    EPS,
-    FUNCTIONAL,
-    NEVER,
-    NODE,
-    SIDE,
-    bound_at,
-    classify,
-    dense,
-    rounding,
-    search,
-    slope_of,
-    to_node,
-    turn,
-    value_of,
-)
-from nonsmooth.kernels.linear.tables import HARMONICS, MANY, MEMORY, NODES, ONE, OWN, STATES, WAVE, M, build
+from nonsmooth.kernels.linear.build import build
+from nonsmooth.kernels.linear.limits import sign_after
+from nonsmooth.kernels.linear.polynomial import NEVER, classify
+from nonsmooth.kernels.linear.search import FUNCTIONAL, SIDE, search
+from nonsmooth.kernels.linear.tables import HARMONICS, MEMORY, NODES, ONE, OWN, STATES, WAVE, M
+from nonsmooth.kernels.linear.values import NODE, bound_at, dense, slope_of, turn, value_of, whole_step
 
 STEPPER = FORM, TABLES, WORK  # the types of this stepper's records: model, tables, work
 
@@ -53,85 +41,6 @@ def wrap_phase(tables, work, mode, s):
         w[WAVE + 1 + 2 * h] = s_
 
 
-@inline
-def flat(tables, mode, f, w):
-    """Return whether the slope of functional f is zero within rounding at w."""
-    return fabs(slope_of(tables, mode, f, w)) <= rounding(tables, mode, f, M, w)
-
-
-@device
-def vanishing(tables, mode, f, w):
-    """(k, sign): the first derivative of functional f from the second on that is not zero within rounding at w.
-
-    Of those up to the fourth; (5, 0) where they vanish all. A harmonic's rounding is that of its phase, whatever its
-    value: a force that presses may be nothing else."""
-    tay = tables.tay
-    for k in range(2, 5):
-        total = tay[mode, f, ONE, k]
-        size = fabs(total)
-        for j in range(M):
-            if j != ONE:
-                total += tay[mode, f, j, k] * w[j]
-                size += fabs(tay[mode, f, j, k]) * (fabs(w[j]) if j < WAVE else 1.0)
-        if fabs(total) > 64.0 * EPS * size:
-            return k, 1 if total > 0.0 else -1
-    return 5, 0
-
-
-@inline
-def mark_zeros(tables, work, mode):
-    """Of each indicator, how many of its value, slope and further derivatives vanish within rounding at w.
-
-    Two where a stick ends, three where a contact lifts off: what is rounding there must not decide. At a crossing w
-    carries the rounding of the step that led there: it decides where an indicator has no constant part, such as that of
-    a stop at x = 0."""
-    w, zero = work.w, work.zero
-    step = 0.0
-    for k in range(tables.info.shape[0]):
-        step = max(step, tables.info[k, 0])
-    for f in range(zero.shape[0]):
-        noise = rounding(tables, mode, f, 0, w) + 0.25 * step * rounding(tables, mode, f, M, w)
-        zero[f] = 1 if fabs(value_of(tables, mode, f, w)) <= noise else 0
-        if zero[f] != 0 and flat(tables, mode, f, w):
-            zero[f], _ = vanishing(tables, mode, f, w)
-
-
-@inline
-def sign_after(tables, work, mode, f):
-    """Sign (-1, 0, 1) of functional f just after w along the mode: its value's, or its first non-zero derivative's."""
-    w, zero = work.w, work.zero
-    if f >= zero.shape[0] or zero[f] == 0:
-        return 1 if value_of(tables, mode, f, w) > 0.0 else -1
-    if not flat(tables, mode, f, w):
-        return 1 if slope_of(tables, mode, f, w) > 0.0 else -1
-    _, sign = vanishing(tables, mode, f, w)
-    return sign
-
-
-@inline
-def holds(t, mode, tables, net, work):
-    """Return whether all rows of transition t hold just after the present instant."""
-    rows = net.rows
-    lo = net.row_start[t]
-    hi = net.row_start[t + 1]
-    holds = lo < hi
-    for r in range(lo, hi):
-        sign = sign_after(tables, work, mode, rows[r, 0]) * rows[r, 1]
-        if sign < 0 or (sign == 0 and rows[r, 2] != 0):
-            holds = False
-            break
-    return holds
-
-
-@once
-def lies_beyond(t, form, net, work):
-    """Return whether no indicator of transition t is zero at the present instant."""
-    beyond = True
-    for r in range(net.row_start[t], net.row_start[t + 1]):
-        beyond = beyond and work.zero[net.rows[r, 0]] == 0
-    return beyond
-
-
 @once
 def prepare(i, form, motion, tables, work):
     """Tables of point i, and where the motion is."""
@@ -145,68 +54,10 @@ def prepare(i, form, motion, tables, work):
     set_phase(work, motion.clock[0])
 
 
-@inline
-def look(i, form, tables, work, mode):
-    """Prepare to judge the conditions just after the present instant."""
-    mark_zeros(tables, work, mode)
-
-
 @once
 def start_on_section(form, section, tables, work):
     """The sign of the section's functional where a run begins."""
     work.found[SIDE] = sign_after(tables, work, work.tally[MODE], section.indicator)
-
-
-@inline
-def mapped(i, m, r, form, w):
-    """State r behind the map m."""
-    total = form.rb[i, m, r]
-    if STATES >= MANY:
-        total = dot(total, form.ra[i, m, r], 0, w, STATES)
-    else:
-        for j in range(STATES):
-            total += form.ra[i, m, r, j] * w[j]
-    for h in range(HARMONICS):
-        total += form.rc[i, m, h, r] * w[WAVE + 2 * h] + form.rs[i, m, h, r] * w[WAVE + 1 + 2 * h]
-    return total
-
-
-@inline
-def apply_map(i, t, form, net, work):
-    """The states behind transition t, into w; of many only those that it changes are looked at."""
-    w, wn, m = work.w, work.wn, net.transitions[t, 3]
-    if STATES >= MANY:
-        for q in range(1, net.changed[m, 0] + 1):
-            wn[net.changed[m, q]] = mapped(i, m, net.changed[m, q], form, w)
-        for q in range(1, net.changed[m, 0] + 1):
-            w[net.changed[m, q]] = wn[net.changed[m, q]]
-    else:
-        for r in range(STATES):
-            wn[r] = mapped(i, m, r, form, w)
-        for r in range(STATES):
-            w[r] = wn[r]
-
-
-@inline
-def take(i, t, fired, form, tables, net, work):
-    """Take transition t (its functional ``fired`` has just crossed; -1: a time trigger). Returns the new mode.
-
-    What has crossed is zero, also behind a reset that leaves it where it was. ``work.wp`` keeps w just before."""
-    w, wp, zero = work.w, work.wp, work.zero
-    for j in range(M):
-        wp[j] = w[j]
-    mode = net.transitions[t, 0]
-    if net.transitions[t, 1] != 0:
-        off = fabs(value_of(tables, mode, fired, w)) if fired >= 0 else 0.0
-        apply_map(i, t, form, net, work)
-        if fired >= 0 and fabs(value_of(tables, mode, fired, w)) > 2.0 * off:
-            fired = -1
-    mark_zeros(tables, work, mode)
-    if fired >= 0:
-        zero[fired] = 1
-        if flat(tables, mode, fired, w):
-            zero[fired], _ = vanishing(tables, mode, fired, w)
-    return mode
 
 
 @once
@@ -227,52 +78,70 @@ def next_stop(i, form, net, section, goal, work):
     return stop, which
 
 
-@once
-def clear_step(tables, net, work, mode):
-    """Return whether no transition can fire on the step from w to w1: each has a row that certainly stays <= 0."""
-    w, w1, zero, rows = work.w, work.w1, work.zero, net.rows
-    clear = True
-    for k in range(net.mode_start[mode], net.mode_start[mode + 1]):
-        t = net.mode_list[k]
-        blocked = False
-        for r in range(net.row_start[t], net.row_start[t + 1]):
-            f = rows[r, 0]
-            sign = float(rows[r, 1])
-            g0 = sign * value_of(tables, mode, f, w)
-            if zero[f] != 0:
-                g0 = 0.0
-            g1 = sign * value_of(tables, mode, f, w1)
-            s0 = sign * slope_of(tables, mode, f, w)
-            s1 = sign * slope_of(tables, mode, f, w1)
+@inline
+def blocked(tables, work, mode, rows, lo, hi, h, w1):
+    """Return the first of the rows lo..hi that certainly stays <= 0 for a time h, behind which w is w1; -1: none."""
+    w, zero = work.w, work.zero
+    found = -1
+    for r in range(lo, hi):
+        f = rows[r, 0]
+        sign = float(rows[r, 1])
+        g0 = sign * value_of(tables, mode, f, w)
+        g1 = sign * value_of(tables, mode, f, w1)
+        s0 = sign * slope_of(tables, mode, f, w)
+        s1 = sign * slope_of(tables, mode, f, w1)
+        if f < zero.shape[0] and zero[f] != 0:
+            g0 = 0.0
             if zero[f] >= 2:
                 s0 = 0.0
-            if classify(g0, s0, g1, s1, tables.info[mode, 0], bound_at(tables, mode, f, w)) == NEVER:
-                blocked = True
-                break
-        if not blocked:
-            clear = False
+        if classify(g0, s0, g1, s1, h, bound_at(tables, work.row, mode, f, w)) == NEVER:
+            found = r
             break
-    return clear
+    return found
+
+
+@inline
+def begins_with(rows, lo, hi, r):
+    """Return whether the first of the rows lo..hi is the condition of row r (-1: none)."""
+    return r >= 0 and lo < hi and rows[lo, 0] == rows[r, 0] and rows[lo, 1] == rows[r, 1]
+
+
+@once
+def first_open(tables, net, work, mode):
+    """The place in the mode's list of the first transition that may fire on the step from w to w1; -1: none may."""
+    place, low = -1, -1
+    for k in range(net.mode_start[mode], net.mode_start[mode + 1]):
+        lo, hi = net.row_start[net.mode_list[k]], net.row_start[net.mode_list[k] + 1]
+        if begins_with(net.rows, lo, hi, low):
+            continue
+        low = blocked(tables, work, mode, net.rows, lo, hi, tables.info[mode, 0], work.w1)
+        if low < 0:
+            place = k - net.mode_start[mode]
+            break
+    return place
 
 
 @once
 def stride(tables, net, work, mode, s, whole, target, period, returns, most, patience):
     """Whole steps without crossings, past section phases, as long as ``returns`` < ``most``; ``patience`` of them.
 
-    Returns (s, whole, returns, clear, patience left); w1 then stands at the end of the step that is not clear, or that
-    would be one return too many (``clear``: no transition on it)."""
+    Returns (s, whole, returns, first, patience left); w1 then stands at the end of the next step, on which the mode's
+    transition at the place ``first`` may fire, or none (-1; the step would be one return too many)."""
     w, w1 = work.w, work.w1
     step = tables.info[mode, 0]
-    to_node(tables, mode, NODES, w, w1)
-    clear = False
-    while patience > 0 and clear_step(tables, net, work, mode):
+    whole_step(tables, work, mode)
+    first = 0
+    while patience > 0:
+        first = first_open(tables, net, work, mode)
+        if first >= 0:
+            break
         patience -= 1
         after = s + step
         if (s < target and target <= after) or (s < target + period and target + period <= after):
             if returns + 1 >= most:
-                clear = True
                 break
             returns += 1
+        first = 0
         s = after
         for j in range(M):
             w[j] = w1[j]
@@ -287,8 +156,8 @@ def stride(tables, net, work, mode, s, whole, target, period, returns, most, pat
                 break
         for f in range(work.zero.shape[0]):
             work.zero[f] = 0
-        to_node(tables, mode, NODES, w, w1)
-    return s, whole, returns, clear, patience
+        whole_step(tables, work, mode)
+    return s, whole, returns, first, patience
 
 
 @once
@@ -301,30 +170,32 @@ def steps_at_a_stride(i, form, net, section):
 
 
 @once
-def leg(i, form, net, section, goal, tables, work, r_max, ready, clear):
+def leg(i, form, net, section, goal, tables, work, r_max, ready, first):
     """March one step of the mode, or less: to r_max, or to the first crossing or section return.
 
-    w1 stands at the end of the whole step (``ready``: it does so already; ``clear``: and nothing happens on it),
-    ``end`` at the segment's end where that is shorter (the third number returned tells). Returns (time marched,
+    w1 stands at the end of the whole step (``ready``: it does so already). Of the mode's transitions only those from
+    place ``first`` on may fire on it (-1: none may, and nothing else happens).
+    ``end`` stands at the segment's end where that is shorter (the third number returned tells). Returns (time marched,
     transition or -1, whole step or not, section direction or 0).
     """
-    w, w1, end, there, found, rows = work.w, work.w1, work.end, work.there, work.found, net.rows
+    end, there, found, rows = work.end, work.there, work.found, net.rows
     mode = work.tally[MODE]
     found[NODE] = -1
     step = tables.info[mode, 0]
-    if clear:
+    if first < 0:
         return step, -1, True, 0
     if not ready:
-        to_node(tables, mode, NODES, w, w1)
+        whole_step(tables, work, mode)
     best = min(step, r_max)
     fired = -1
     crossed = 0
     functional = -1
+    low = -1
     n_rows = rows.shape[0]
     start = net.mode_start[mode]
     n_own = net.mode_start[mode + 1] - start
     n_all = n_own + 2 if section.indicator >= 0 and (section.mode < 0 or section.mode == mode) else n_own
-    for k in range(n_all):
+    for k in range(first, n_all):
         t = -1
         sense = 0
         if k < n_own:
@@ -337,6 +208,12 @@ def leg(i, form, net, section, goal, tables, work, r_max, ready, clear):
             hi = lo + 1
         if lo == hi or section.rising * sense < 0:
             continue
+        if fired >= 0 or crossed != 0:  # what counts still must happen before
+            if begins_with(rows, lo, hi, low):
+                continue
+            low = blocked(tables, work, mode, rows, lo, hi, best, end)
+            if low >= 0:
+                continue
         tau = search(tables, work, mode, rows, lo, hi, sense * found[SIDE] > 0, best)
         if tau >= 0.0 and (tau < best or (fired < 0 and crossed == 0 and tau <= best)):
             best = tau

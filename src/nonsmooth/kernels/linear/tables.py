@@ -2,24 +2,29 @@
 
 In a mode u' = A u + b + sum_h (c_h cos k_h w t + s_h sin k_h w t). With w = (u_1, ..., u_n, 1, cos k_1 w t,
 sin k_1 w t, ...) this is w' = M w, whose flow exp(M tau) needs no eigenvectors: singular, defective and resonant
-matrices are no special case. ``build`` sums the Taylor series of the upper n rows of exp(M tau) at 33 equidistant
+matrices are no special case. ``build.build`` sums the Taylor series of the upper n rows of exp(M tau) at 33 equidistant
 nodes of a step that is a quarter of the mode's fastest period.
 
 These files become one generated module for each number of states and of harmonics (``linear.module``), so that
 every inner loop has constant bounds. Arrays (M columns of w, functionals = indicators, states, affine outputs):
     prop[mode, node, M, n]         columns of the states' rows at the node, to be applied to w at the step's start
     rot[mode, node, 2 H + 1]       cos and sin of k_h w tau
-    fun[mode, functional, 2 (M + n + 1)]  row of the value, row of the slope, then k_1, ..., k_n, k (and scratch): on a
-                                   step that starts at u the fourth derivative is below sum_j k_j |u_j - u_eq_j| + k
+    fun[mode, functional, 2 (M + n + 1)]  row of the value, row of the slope, then k_1, ..., k_n, k: on a step that
+                                   starts at u the fourth derivative is below sum_j k_j |u_j - u_eq_j| + k; last
+                                   (before it scratch) the sums of value and slope row without signs
     tay[mode, functional, M, 8]    columns of the normalised Taylor coefficients of the functional: coefficient k
                                    at w is the sum over j of tay[mode, f, j, k] w[j]
     field[mode, n, M]              rows of u'
     info[mode, 2 + n]              step, node spacing, u_eq
+    bands[mode, STATES + M, n]     of many states with few entries, which have no propagators: from place 1 on the
+                                   diagonals of A, from 2 n on the columns of what is not a state; see ``bands``
+    lines[mode, STATES + M, 3]     how many diagonals (0: propagators); of each its offset, its first row and the row
+                                   behind its last; of each column these two
     some[mode, functional, 2, M + 1]  of many states: how many columns of the Taylor rows are not zero, and which; and
                                    of the states in value and slope
 """
 
-from math import cos, fabs, isnan, nan, sin, sqrt
+from math import cos, fabs, sin, sqrt
 
 from nonsmooth.kernels.compile.cache import device, inline
 from nonsmooth.kernels.compile.lanes import dot
@@ -38,6 +43,8 @@ FEWER_TERMS = 18  # enough within the first GROUP nodes
 DEGREE = 7  # of the Taylor polynomials: within 3/4 of a node spacing the remainder is below 1e-16 of the amplitude
 STEP_ANGLE = 1.5707963267948966  # 2 pi / 4: longer is faster, but the polynomials of degree 7 would not reach
 MANY = 8  # states from which on sums over them go in vectors (``lanes``)
+BANDED = STATES >= 4 * MANY  # and from which on few entries make a series shorter than a propagator (``bands``)
+SIZES = 2 * (M + STATES)  # the place in fun of the sums of value and slope row without signs
 FREE_STEP = 1.0  # a mode without a time scale of its own moves on polynomials: any step is exact
 
 
@@ -169,7 +176,16 @@ def fill_mode(i, given, mode, form, tables, rates, row):
         step = min(step, 0.3 * period)
     info[mode, 0] = step
     info[mode, 1] = step / NODES
-    find_equilibrium(form.A[i, given], form.b[i, given], row, info[mode])
+
+
+@device
+def fill_turns(mode, rates, spacing, rot):
+    """Cosines and sines of the forcing's phase at the nodes."""
+    for node in range(NODES + 1):
+        for h in range(HARMONICS):
+            angle = rates[h] * node * spacing
+            rot[mode, node, 2 * h] = cos(angle)
+            rot[mode, node, 2 * h + 1] = sin(angle)
 
 
 @device
@@ -195,16 +211,7 @@ def fill_propagators(mode, field, rates, spacing, prop, rot, row):
         first = node % GROUP
         base = node - first
         if first == 0 or base == 0:
-            for h in range(HARMONICS):
-                angle = rates[h] * node * spacing
-                rot[mode, node, 2 * h] = cos(angle)
-                rot[mode, node, 2 * h + 1] = sin(angle)
             continue
-        for h in range(HARMONICS):
-            c, s = rot[mode, base, 2 * h], rot[mode, base, 2 * h + 1]
-            c1, s1 = rot[mode, first, 2 * h], rot[mode, first, 2 * h + 1]
-            rot[mode, node, 2 * h] = c * c1 - s * s1
-            rot[mode, node, 2 * h + 1] = s * c1 + c * s1
         for j in range(M):
             for r in range(STATES):
                 prop[mode, node, j, r] = prop[mode, base, 0, r] * prop[mode, first, j, 0]
@@ -253,115 +260,3 @@ def bound_of(row, k, mode, every, tables, out, at):
             es = column(row, k, prop, mode, node, WAVE + 1 + 2 * h) - bc * sin_ + bs * cos_
             rest += sqrt(ec * ec + es * es)
         out[at + STATES] = max(out[at + STATES], rest)
-
-
-@device
-def fill_functional(mode, f, tables, rates, row):
-    """Taylor rows, slope row and fourth-derivative bound of the functional whose value row stands in fun[mode, f]."""
-    fun = tables.fun
-    for j in range(M):
-        row[0, j] = fun[mode, f, j]
-    scale = 1.0
-    for k in range(DEGREE + 1):
-        for j in range(M):
-            tables.tay[mode, f, j, k] = scale * row[k, j]
-        times_generator(row, k, tables.field, mode, rates, 1.0)
-        scale /= k + 1
-    for j in range(M):
-        fun[mode, f, M + j] = row[1, j]
-    at = 2 * M
-    bound_of(row, 4, mode, 1, tables, fun[mode, f], at)
-    bound_of(row, 5, mode, 4, tables, fun[mode, f], at + STATES + 1)
-    for j in range(STATES + 1):  # between two nodes the entries move by at most half a spacing times their slope
-        fun[mode, f, at + j] += 0.7 * tables.info[mode, 1] * fun[mode, f, at + STATES + 1 + j]
-
-
-@device
-def list_columns(mode, f, tables):
-    """List the columns of a functional's Taylor rows, and the states of its value and slope, that are not zero: few
-    where a state moves with few others."""
-    every, few = 0, 0
-    for j in range(M):
-        moved = False
-        for k in range(DEGREE + 1):
-            moved = moved or tables.tay[mode, f, j, k] != 0.0
-        if moved:
-            every += 1
-            tables.some[mode, f, 0, every] = j
-        if j < STATES and (tables.fun[mode, f, j] != 0.0 or tables.fun[mode, f, M + j] != 0.0):
-            few += 1
-            tables.some[mode, f, 1, few] = j
-    tables.some[mode, f, 0, 0] = every
-    tables.some[mode, f, 1, 0] = few
-
-
-@device
-def hide_lacking(form, tables, work):
-    """No value for a state that a mode lacks, and for memory: NaN takes no part in extremes."""
-    n_i = work.zero.shape[0]
-    for mode in range(form.lacking.shape[0]):
-        for j in range(form.lacking.shape[1]):
-            if form.lacking[mode, j] != 0:
-                tables.fun[mode, n_i + j, ONE] = nan
-                for f in range(n_i):
-                    if work.twin[f] == j:
-                        work.twin[f] = -1
-
-
-@device
-def build(i, form, tables, work):
-    """Fill the tables for parameter point ``i``, where they do not stand there already.
-
-    The modes of ``form`` go behind the first ``work.built[1]``, which stand."""
-    if work.built[0] == i + 1:
-        return
-    first = work.built[1]
-    n_i, fun, rates = form.ia.shape[1], tables.fun, work.rates
-    for h in range(HARMONICS):
-        rates[h] = form.multiples[h] * form.omega[i]
-    for given in range(form.A.shape[1]):
-        mode = first + given
-        fill_mode(i, given, mode, form, tables, rates, work.row)
-        fill_propagators(mode, tables.field, rates, tables.info[mode, 1], tables.prop, tables.rot, work.row)
-        for f in range(fun.shape[1]):
-            for j in range(M):
-                fun[mode, f, j] = 0.0
-            if f < n_i:
-                for j in range(STATES):
-                    fun[mode, f, j] = form.ia[i, f, j]
-                fun[mode, f, ONE] = form.ib[i, f]
-                for h in range(HARMONICS):
-                    fun[mode, f, WAVE + 2 * h] = form.ic[i, f, h]
-                    fun[mode, f, WAVE + 1 + 2 * h] = form.is_[i, f, h]
-            elif f < n_i + STATES:
-                fun[mode, f, f - n_i] = 1.0
-            else:
-                o = f - n_i - STATES
-                for j in range(STATES):
-                    fun[mode, f, j] = form.oa[i, o, given, j]
-                fun[mode, f, ONE] = form.ob[i, o, given]
-                for h in range(HARMONICS):
-                    fun[mode, f, WAVE + 2 * h] = form.oc[i, o, given, h]
-                    fun[mode, f, WAVE + 1 + 2 * h] = form.os[i, o, given, h]
-            if isnan(fun[mode, f, ONE]):  # not asked for in this mode
-                continue
-            fill_functional(mode, f, tables, rates, work.row)
-            if STATES >= MANY:
-                list_columns(mode, f, tables)
-    for f in range(n_i):
-        work.twin[f] = twin_of(f, n_i, fun)
-    hide_lacking(form, tables, work)
-    work.built[0] = i + 1
-
-
-@device
-def twin_of(f, n_i, fun):
-    """The state that indicator f is but for a constant, so that its extremes follow from the state's; -1: none."""
-    twin = -1
-    for k in range(STATES):
-        same = fun[0, f, k] == 1.0
-        for j in range(M):
-            same = same and (j == k or j == ONE or fun[0, f, j] == 0.0)
-        if same:
-            twin = k
-    return twin

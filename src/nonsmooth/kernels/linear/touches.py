@@ -3,8 +3,8 @@
 from nonsmooth.kernels.compile.cache import once
 from nonsmooth.kernels.hybrid.places import DONE, MODE, TOUCHES
 from nonsmooth.kernels.linear.polynomial import critical_points, curvature_at, horner
-from nonsmooth.kernels.linear.search import compose, to_node
 from nonsmooth.kernels.linear.tables import NODES, OWN
+from nonsmooth.kernels.linear.values import compose, to_node
 
 
 @once
@@ -18,7 +18,7 @@ def log_touches(step, form, net, seen, tables, work):
     for node in range(1, nodes, 2):  # pieces of two spacings, with their polynomial in the middle
         if (node - 1) * spacing >= step:
             break
-        to_node(tables, mode, node, work.w, wn)
+        to_node(tables, work.row, mode, node, work.w, wn)
         for j in range(net.mode_start[mode], net.mode_start[mode + 1]):
             t = net.mode_list[j]
             for r in range(net.row_start[t], net.row_start[t + 1]):

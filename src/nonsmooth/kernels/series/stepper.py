@@ -184,7 +184,7 @@ def steps_at_a_stride(i, form, net, section):
 @once
 def stride(tables, net, work, mode, s, whole, target, period, returns, most, patience):
     """Every step is a segment."""
-    return s, whole, returns, False, patience
+    return s, whole, returns, 0, patience
 
 
 @once
@@ -217,7 +217,7 @@ def next_pass(form, section, work):
 
 
 @once
-def leg(i, form, net, section, goal, tables, work, r_max, ready, clear):
+def leg(i, form, net, section, goal, tables, work, r_max, ready, first):
     """March to the next pass of a section, transition or end of a step, not beyond r_max; ``work.end`` is the state
     there. Returns (time marched, transition or -1, False, section direction or 0); a negative time: it diverges."""
     tally, memo, C, n = work.tally, work.memo, work.C, work.w.shape[0]

@@ -1,0 +1,155 @@
+"""Just after an instant: which conditions hold there, by limits, and where a transition puts the motion."""
+
+from math import fabs
+
+from nonsmooth.kernels.compile.cache import device, inline, once
+from nonsmooth.kernels.compile.lanes import dot
+from nonsmooth.kernels.hybrid.places import LONGEST_STEP
+from nonsmooth.kernels.linear.tables import HARMONICS, MANY, ONE, SIZES, STATES, WAVE, M
+from nonsmooth.kernels.linear.values import EPS, rounding, slope_of, value_of
+
+
+@inline
+def flat(tables, mode, f, w):
+    """Return whether the slope of functional f is zero within rounding at w."""
+    return fabs(slope_of(tables, mode, f, w)) <= rounding(tables, mode, f, M, w)
+
+
+@device
+def vanishing(tables, mode, f, w):
+    """(k, sign): the first derivative of functional f from the second on that is not zero within rounding at w.
+
+    Of those up to the fourth; (5, 0) where they vanish all. A harmonic's rounding is that of its phase, whatever its
+    value: a force that presses may be nothing else."""
+    tay = tables.tay
+    for k in range(2, 5):
+        total = tay[mode, f, ONE, k]
+        size = fabs(total)
+        for j in range(M):
+            if j != ONE:
+                total += tay[mode, f, j, k] * w[j]
+                size += fabs(tay[mode, f, j, k]) * (fabs(w[j]) if j < WAVE else 1.0)
+        if fabs(total) > 64.0 * EPS * size:
+            return k, 1 if total > 0.0 else -1
+    return 5, 0
+
+
+@inline
+def mark_zeros(tables, work, mode):
+    """Of each indicator, how many of its value, slope and further derivatives vanish within rounding at w.
+
+    Two where a stick ends, three where a contact lifts off: what is rounding there must not decide. At a crossing w
+    carries the rounding of the step that led there: it decides where an indicator has no constant part, such as that of
+    a stop at x = 0."""
+    w, zero, fun, memo = work.w, work.zero, tables.fun, work.memo
+    step = max(memo[LONGEST_STEP], tables.info[mode, 0])
+    memo[LONGEST_STEP] = step
+    largest = 1.0
+    for r in range(STATES):
+        largest = max(largest, fabs(w[r]))
+    most = 17.0 * EPS * largest  # noise is below this with every state as large as the largest
+    for f in range(zero.shape[0]):
+        zero[f] = 0
+        if fun[mode, f, SIZES] < 0.0:  # not asked for in this mode
+            continue
+        value = fabs(value_of(tables, mode, f, w))
+        if not value <= most * (fun[mode, f, SIZES] + 0.25 * step * fun[mode, f, SIZES + 1]):
+            continue
+        if value <= rounding(tables, mode, f, 0, w) + 0.25 * step * rounding(tables, mode, f, M, w):
+            zero[f] = 1
+        if zero[f] != 0 and flat(tables, mode, f, w):
+            zero[f], _ = vanishing(tables, mode, f, w)
+
+
+@inline
+def sign_after(tables, work, mode, f):
+    """Sign (-1, 0, 1) of functional f just after w along the mode: its value's, or its first non-zero derivative's."""
+    w, zero = work.w, work.zero
+    if f >= zero.shape[0] or zero[f] == 0:
+        return 1 if value_of(tables, mode, f, w) > 0.0 else -1
+    if not flat(tables, mode, f, w):
+        return 1 if slope_of(tables, mode, f, w) > 0.0 else -1
+    _, sign = vanishing(tables, mode, f, w)
+    return sign
+
+
+@inline
+def holds(t, mode, tables, net, work):
+    """Return whether all rows of transition t hold just after the present instant."""
+    rows = net.rows
+    lo = net.row_start[t]
+    hi = net.row_start[t + 1]
+    holds = lo < hi
+    for r in range(lo, hi):
+        sign = sign_after(tables, work, mode, rows[r, 0]) * rows[r, 1]
+        if sign < 0 or (sign == 0 and rows[r, 2] != 0):
+            holds = False
+            break
+    return holds
+
+
+@once
+def lies_beyond(t, form, net, work):
+    """Return whether no indicator of transition t is zero at the present instant."""
+    beyond = True
+    for r in range(net.row_start[t], net.row_start[t + 1]):
+        beyond = beyond and work.zero[net.rows[r, 0]] == 0
+    return beyond
+
+
+@inline
+def look(i, form, tables, work, mode):
+    """Prepare to judge the conditions just after the present instant."""
+    mark_zeros(tables, work, mode)
+
+
+@inline
+def mapped(i, m, r, form, w):
+    """State r behind the map m."""
+    total = form.rb[i, m, r]
+    if STATES >= MANY:
+        total = dot(total, form.ra[i, m, r], 0, w, STATES)
+    else:
+        for j in range(STATES):
+            total += form.ra[i, m, r, j] * w[j]
+    for h in range(HARMONICS):
+        total += form.rc[i, m, h, r] * w[WAVE + 2 * h] + form.rs[i, m, h, r] * w[WAVE + 1 + 2 * h]
+    return total
+
+
+@inline
+def apply_map(i, t, form, net, work):
+    """The states behind transition t, into w; of many only those that it changes are looked at."""
+    w, wn, m = work.w, work.wn, net.transitions[t, 3]
+    if STATES >= MANY:
+        for q in range(1, net.changed[m, 0] + 1):
+            wn[net.changed[m, q]] = mapped(i, m, net.changed[m, q], form, w)
+        for q in range(1, net.changed[m, 0] + 1):
+            w[net.changed[m, q]] = wn[net.changed[m, q]]
+    else:
+        for r in range(STATES):
+            wn[r] = mapped(i, m, r, form, w)
+        for r in range(STATES):
+            w[r] = wn[r]
+
+
+@inline
+def take(i, t, fired, form, tables, net, work):
+    """Take transition t (its functional ``fired`` has just crossed; -1: a time trigger). Returns the new mode.
+
+    What has crossed is zero, also behind a reset that leaves it where it was. ``work.wp`` keeps w just before."""
+    w, wp, zero = work.w, work.wp, work.zero
+    for j in range(M):
+        wp[j] = w[j]
+    mode = net.transitions[t, 0]
+    if net.transitions[t, 1] != 0:
+        off = fabs(value_of(tables, mode, fired, w)) if fired >= 0 else 0.0
+        apply_map(i, t, form, net, work)
+        if fired >= 0 and fabs(value_of(tables, mode, fired, w)) > 2.0 * off:
+            fired = -1
+    mark_zeros(tables, work, mode)
+    if fired >= 0:
+        zero[fired] = 1
+        if flat(tables, mode, fired, w):
+            zero[fired], _ = vanishing(tables, mode, fired, w)
+    return mode
