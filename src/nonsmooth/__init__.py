@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from nonsmooth.continuation.find import find_orbit as find_orbit
     from nonsmooth.continuation.manifolds.manifolds import manifolds as manifolds
     from nonsmooth.continuation.special import special_points as special_points
+    from nonsmooth.control.continuation import control_based_continuation as control_based_continuation
+    from nonsmooth.control.simulated_rig import SimulatedRig as SimulatedRig
     from nonsmooth.diagrams.chart import chart as chart
     from nonsmooth.diagrams.correlation_dimension import correlation_dimension as correlation_dimension
     from nonsmooth.diagrams.lyapunov import lyapunov as lyapunov
@@ -98,6 +100,8 @@ _WHERE = {
     "continue_equilibrium": "continuation.continue_equilibrium",
     "special_points": "continuation.special",
     "manifolds": "continuation.manifolds.manifolds",
+    "control_based_continuation": "control.continuation",
+    "SimulatedRig": "control.simulated_rig",
     "smoothing_report": "smoothing.report",
     "load_recording": "recordings.load",
     "Recording": "recordings.recording",

@@ -71,7 +71,7 @@ def solved_at(branch: xr.Dataset, omega: float) -> list[np.ndarray]:
         if a.signature == b.signature:
             starts.append((a, a.X + (omega - a.value) / (b.value - a.value) * (b.X - a.X)))
         for point, X in starts:
-            curve, _ = resumed_at(system, record, point, "omega", 4.0)
+            curve, _ = resumed_at(system, record.period_number, point, "omega", 4.0)
             solved = curve.at_parameter(X / curve.scale, omega)
             if solved is not None:
                 found.append(solved.X[:2])

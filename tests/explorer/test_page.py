@@ -140,6 +140,35 @@ def test_a_worker_that_dies_is_replaced_and_nothing_is_lost(page: Any, server: A
     page.until('JSON.parse(Bokeh.documents[0].get_model_by_name("readout").value)[0][1] === "period 1"')
 
 
+def test_a_motion_that_diverges_is_said_and_no_number_of_another_one_stays(page: Any) -> None:
+    page.until_done()
+    assert page.readout()["motion"] == "period 1"
+    page.write("v-p.c", "-0.9")  # of a damper
+    page.until('document.getElementById("portrait-note").textContent.includes("grew beyond")')
+    page.until_done()
+    assert page.tab.inner_text("#readout") == ""
+    assert page.value("c") == -0.9
+    page.write("v-p.c", "0.87")
+    page.until_done()
+    assert page.readout()["motion"] == "period 1"
+    assert page.readout()["section points"] == "1"
+    assert page.notes() == ""
+
+
+def test_a_diagram_of_one_direction_stays_drawn_while_another_is_computed(page: Any) -> None:
+    page.tab.select_option("#direction", "up")
+    page.until_done()
+    page.tab.evaluate("""() => {
+        for (const [id, value] of [["direction", "both"], ["shown", "x"]]) {
+            document.getElementById(id).value = value;
+            document.getElementById(id).dispatchEvent(new Event("change"));
+        }
+    }""")
+    page.until('Bokeh.documents[0].get_model_by_name("diagram").left[0].axis_label === "x (mm)"')
+    page.until_done()
+    assert [word for word, _ in page.ui()["legend"]] == ["up", "down"]
+
+
 def test_two_tabs_do_not_disturb_each_other(page: Any, server: Any, new_page: Callable[..., Any]) -> None:
     other = new_page()
     other.open(f"{server.address}&{FEW}")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import base64
+import os
+import signal
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -10,12 +12,11 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from tests.explorer.conftest import FEW
+from tests.explorer.conftest import FEW, wait_until
 
 import nonsmooth as ns
-from nonsmooth.explorer.bench import frequency_of
 from nonsmooth.explorer.measured import read, strand_distance
-from nonsmooth.explorer.recorded import LARGEST, matched, samples_of
+from nonsmooth.explorer.recorded import LARGEST, frequency_of, matched, response_points, samples_of
 from nonsmooth.identification.compare.fold import fold
 from nonsmooth.recordings import Recording, write_cap, write_capstone_csv
 
@@ -104,6 +105,18 @@ def test_a_dropped_recording_lies_over_the_model_and_its_parameters_are_found(pa
     page.until_done()
     assert page.value("k") == 8.47
     assert page.notes() == ""
+    page.tab.click("#redo")
+    page.tab.click("#tab-response")
+    page.tab.select_option("#shown", "x")
+    page.until('Bokeh.documents[0].get_model_by_name("recorded response").data.x.length === 1')
+    page.until_done()
+    measured, model = page.tab.evaluate("""(() => {
+        const of = name => Bokeh.documents[0].get_model_by_name(name).data, point = of("recorded response");
+        const curve = of("response up"), away = [...curve.x].map(x => Math.abs(x - point.x[0]));
+        return [[point.x[0], point.y[0]], curve.y[away.indexOf(Math.min(...away))]];
+    })()""")
+    np.testing.assert_allclose([measured[0], measured[1]], [3.69, model], rtol=0.02)
+    page.picture("recorded_response")
 
 
 def test_a_file_that_is_no_recording_is_refused_and_nothing_is_lost(page: Any, rig: Path) -> None:
@@ -127,17 +140,25 @@ def test_a_file_that_is_no_recording_is_refused_and_nothing_is_lost(page: Any, r
     assert "distance of the recording" not in page.readout()
 
 
-def test_a_fit_is_cancelled(page: Any, rig: Path) -> None:
+def test_a_fit_is_cancelled_and_a_crash_of_it_is_said(page: Any, server: Any, rig: Path) -> None:
     page.until_done()
     drop(page, NAME, rig.read_bytes())
     page.tab.wait_for_selector("#recording-body:visible")
     page.write("factor-x", repr(TRAVEL))
     page.until_done()
+    before = len(server.workers())
     page.tab.click("#recording-fit")
     page.tab.click("#recording-cancel")
     page.tab.wait_for_selector("#recording-doing", state="hidden")
     page.until_done()
+    wait_until(lambda: len(server.workers()) <= before)
+    page.tab.click("#recording-fit")
+    wait_until(lambda: len(server.workers()) > before)
+    os.kill(max(server.workers()), signal.SIGKILL)
+    page.until('document.getElementById("wrong-recording").textContent.includes("ended unexpectedly (code -9)")')
+    page.until_done()
     assert page.tab.inner_text("#recording-found") == ""
+    assert page.tab.inner_text("#recording-name") == "rig.csv (synthetic)"
     assert page.value("k") == 8.47
 
 
@@ -199,4 +220,31 @@ def test_channels_are_matched_by_name_and_unit_and_scaled() -> None:
 def test_a_recorded_drive_sets_the_frequency_of_the_model() -> None:
     system = ns.models.discontinuous_support()
     assert frequency_of(system, system.values, 2.0) == {"omega": pytest.approx(np.pi)}
+    assert frequency_of(system, {**system.values, "omega": 0.0}, 2.0) == {}  # nothing is forced there
     assert frequency_of(ns.models.border_collision(), {"mu": 1.0}, 2.0) == {}
+
+
+def test_measured_responses_of_runs_and_of_a_table_over_frequency(tmp_path: Path) -> None:
+    system = ns.models.discontinuous_support()
+    runs = {}
+    for k, omega in enumerate((3.0, 5.0), 1):
+        time, turns = np.linspace(0.0, 20.0, 2001), np.arange(8) * 2 * np.pi / omega
+        runs[f"Run #{k}"] = {
+            "Position": xr.Dataset({"Position": ("time", 10.0 * k * np.cos(omega * time), {"units": "mm"})},
+                                   {"time": ("time", time, {"units": "s"})}),
+            "Turn": xr.Dataset({"Turn": ("time", np.arange(8.0), {"units": "turns"})},
+                               {"time": ("time", turns, {"units": "s"})}),
+        }  # fmt: skip
+    file = write_capstone_csv(Recording.from_runs(runs, synthetic=True), tmp_path / "steps.csv")
+    recorded = read({"content": file.read_bytes(), "name": "steps.csv"})["recorded"]
+    omega, height = response_points(recorded, matched(recorded, system), system, system.values, "omega", "x")
+    np.testing.assert_allclose(omega, [3.0, 5.0], rtol=1e-6)
+    np.testing.assert_allclose(height, [0.01, 0.02], rtol=1e-3)
+    still = {**system.values, "omega": 0.0}
+    for values, over in ((system.values, "rho"), (still, "omega")):
+        assert not len(response_points(recorded, matched(recorded, system), system, values, over, "x")[0])
+    table = b"frequency (Hz),amplitude (mm)\n" + b"".join(b"%g,%g\n" % (0.5 * k, k) for k in range(1, 12))
+    recorded = read({"content": table, "name": "table.csv"})["recorded"]
+    omega, height = response_points(recorded, matched(recorded, system), system, system.values, "omega", "x")
+    np.testing.assert_allclose(omega, np.pi * np.arange(1, 12))
+    np.testing.assert_allclose(height, 1e-3 * np.arange(1, 12))

@@ -75,9 +75,9 @@ def test_branches_that_nobody_waits_for_are_cancelled_and_the_worker_stays(page:
     page.until('document.documentElement.dataset.busy === "branches"')
     page.write("transient", "100")
     page.until_done()
+    assert page.notes() == ""
     assert len(data(page, "special points")["x"]) > 0
     assert server.workers() == workers
-    assert page.notes() == ""
 
 
 def test_the_spectrum_of_a_motion_without_contact_is_one_line_of_the_linear_amplitude(page: Any) -> None:
@@ -156,6 +156,7 @@ def test_a_chart_gets_finer_and_a_click_shows_the_orbit_of_that_cell(page: Any) 
     assert "exponent near \u2212" in until_tip(page, ": period 3,")
     page.tab.mouse.click(*place)
     page.until('JSON.parse(Bokeh.documents[0].get_model_by_name("readout").value)[0][1] === "period 3"')
+    page.until_done()
     page.picture("chart")
     low, high = (page.ui()["state"][end] for end in ("low", "high"))
     page.tab.mouse.wheel(0, -240)

@@ -13,6 +13,7 @@ import pytest
 import xarray as xr
 
 from nonsmooth import plot
+from nonsmooth.plot import style
 from nonsmooth.plot.labels import column, name_and_unit
 from nonsmooth.plot.segments import with_gaps
 
@@ -186,3 +187,19 @@ def test_a_falling_sweep_does_not_hide_the_rising_one(swept: xr.Dataset) -> None
     assert len({handle.get_markersize() for handle in ax.get_legend().legend_handles}) == 1
     alone = plot.bifurcation(swept.isel(direction=[0]), plt.figure().add_subplot(), y="v")
     assert alone.lines[0].get_markersize() == down.get_markersize()
+
+
+@pytest.mark.parametrize(("crowded", "outside"), [(False, False), (True, True)])
+def test_a_legend_covers_nothing(crowded: bool, outside: bool) -> None:
+    """It stands in the axes where there is room, and above them where lines run everywhere."""
+    x = np.linspace(0.0, 1.0, 400)
+    with style.axes(None) as ax:
+        ax.plot(x, 0.2 * x, label="a branch of orbits")
+        if crowded:
+            ax.plot(x, np.sin(200 * x), label="another")
+        legend = style.clear_legend(ax)
+    ax.figure.draw_without_rendering()
+    box = legend.get_window_extent()
+    assert (box.y0 >= ax.bbox.y1) == outside
+    for line in ax.lines:
+        assert not box.count_contains(line.get_transform().transform(line.get_xydata()))

@@ -9,23 +9,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.continuation.branches.files import branch_dataset
+from nonsmooth.continuation.branches.following import Asked
 from nonsmooth.continuation.branches.orbit import Orbit
 from nonsmooth.continuation.branches.other_branches import born, straight_on, switched
 from nonsmooth.continuation.branches.reading import read_branch
-from nonsmooth.continuation.branches.records import (
-    BranchRecord,
-    PointRecord,
-    SpecialRecord,
-    from_march,
-    joined,
-    point_record,
-)
-from nonsmooth.continuation.march.begin import Asked, curve_of, largest_step, limits, resumed_at, sentence
+from nonsmooth.continuation.branches.records import SpecialRecord, point_record
+from nonsmooth.continuation.march.begin import curve_of, largest_step, resumed_at
 from nonsmooth.continuation.march.event import BESIDE, Crossing
-from nonsmooth.continuation.march.march import march
-from nonsmooth.continuation.march.marches import ENDINGS, March, in_turn
-from nonsmooth.continuation.march.physical import allowed_range
+from nonsmooth.continuation.march.marches import March, in_turn
 from nonsmooth.continuation.problems.orbit_events import NeimarkSacker
 from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
 from nonsmooth.errors import SolveError
@@ -38,7 +29,6 @@ if TYPE_CHECKING:
 __all__ = ["continue_orbit"]
 
 FloatArray = NDArray[np.float64]
-Records = tuple[list[PointRecord], list[SpecialRecord]]
 ZERO = 1e-6  # of the numbers beside it: the first orbit is a special point
 
 
@@ -95,56 +85,46 @@ def continue_orbit(
     Pseudo-arclength continuation of the multiple-shooting equations in scaled unknowns. Special points are zeros of
     functions along the branch, found by Brent's method on orbits corrected to rounding.
     """
-    asked = Asked(largest_step(step), whole_number(points, "points", 1), bool(virtual))
+    asked = Asked(range, largest_step(step), whole_number(points, "points", 1), bool(virtual))
     if isinstance(start, Orbit):
-        return _from_orbit(start, parameter, range, asked)
+        return _from_orbit(start, parameter, asked)
     if hasattr(start, "data_vars"):
         if "special_point" in start:
-            return _go_on(start, parameter, range, asked)
+            return _go_on(start, parameter, asked)
         if "kind" in start and "eigenvalues" in start:
-            return born(start, parameter, range, asked)
+            return born(start, parameter, asked)
         if "kind" in start and "unknowns" in start:
             if virtual and str(np.squeeze(start["kind"].values)) in ("grazing", "corner"):
-                return straight_on(start, parameter, range, asked)
-            return switched(start, parameter, range, asked)
+                return straight_on(start, parameter, asked)
+            return switched(start, parameter, asked)
     raise TypeError(
         "continue_orbit takes an Orbit (of find_orbit), a branch (of continue_orbit), or one row of special_points, "
         f"not {type(start).__name__}"
     )
 
 
-def _from_orbit(orbit: Orbit, name: str | None, given: Any, asked: Asked) -> xr.Dataset:
+def _from_orbit(orbit: Orbit, name: str | None, asked: Asked) -> xr.Dataset:
+    """The branch through an orbit, both ways."""
     system = orbit.system
-    if name is None or given is None:
+    if name is None or asked.range is None:
         raise ValueError(
             'continue_orbit(orbit, parameter, range): say which parameter, and its range: "rho", (0.2, 0.5)'
         )
-    low, high = limits(system, name, given, system.values.get(name))
+    branch = asked.follow(system, name, here=system.values.get(name))
     if orbit.virtual:
         raise ValueError("this orbit is virtual: its path goes through a boundary that it should obey")
-    curve, X = curve_of(orbit, name, high - low)
+    curve, X = curve_of(orbit, name, branch.width)
     first = curve.at_parameter(X / curve.scale, system.values[name]) or _near(curve, X)
     if first is None:
         raise SolveError("Newton's method did not converge at the orbit itself: give its parameter another value",
                          status="no_convergence")  # fmt: skip
     first = first.facing(1.0)
-    bounds = allowed_range(system, name, low, high)
-    up, down = _both_ways(curve, first, bounds, asked)
-    points, special = joined(from_march(down), [point_record(curve, first)], from_march(up))
-    special += [SpecialRecord(kind, len(down.rows)) for kind in _at_the_start(curve, first, down, up)]
-    special.sort(key=lambda one: one.place)
-    sentences = (sentence(down, bounds, name, (low, high)), sentence(up, bounds, name, (low, high)))
-    record = BranchRecord(name, (low, high), orbit.period_number, points, special, (down.ending, up.ending), sentences)
-    return branch_dataset(system, record, asked.options(name, (low, high)))
-
-
-def _both_ways(curve: Orbits, first: OrbitPoint, bounds: tuple[float, float], asked: Asked) -> tuple[March, March]:
-    """Marches with rising and with falling parameter; a closed branch needs only one."""
-    up, down = in_turn(
-        lambda: march(curve, first, asked.limits(bounds, (curve.shooting.signature, first.X))),
-        lambda: march(curve, first.facing(-1.0), asked.limits(bounds)),
+    up, down = in_turn(  # a closed branch needs only one
+        lambda: branch.march(curve, first, (curve.word(), first.X)),
+        lambda: branch.march(curve, first.facing(-1.0)),
     )
-    return up, down
+    marks = [SpecialRecord(kind, 0) for kind in _at_the_start(curve, first, down, up)]
+    return branch.result(orbit.period_number, down, [point_record(curve, first)], up, marks)
 
 
 def _at_the_start(curve: Orbits, first: OrbitPoint, down: March, up: March) -> list[str]:
@@ -175,45 +155,29 @@ def _near(curve: Orbits, X: FloatArray) -> OrbitPoint | None:
     return curve.near(Y, null[-1], most=20)
 
 
-def _go_on(start: xr.Dataset, name: str | None, given: Any, asked: Asked) -> xr.Dataset:
+def _go_on(start: xr.Dataset, name: str | None, asked: Asked) -> xr.Dataset:
     """Extend a branch at its open ends."""
     system, record = read_branch(start)
     if name is not None and name != record.parameter:
         raise ValueError(f"this branch was followed in {record.parameter!r}, not in {name!r}")
-    name = record.parameter
-    low, high = limits(system, name, record.range if given is None else given, None)
-    bounds = allowed_range(system, name, low, high)
-    ends: list[Records] = [([], []), ([], [])]
+    branch = asked.follow(system, record.parameter, record.range)
+    low, high = branch.bounds
+    ends = [March(ending=ending, said=said) for ending, said in zip(record.endings, record.sentences, strict=True)]
     begun: dict[int, Callable[[], March]] = {}
-    endings, sentences = list(record.endings), list(record.sentences)
     for side, point in ((0, record.points[0]), (1, record.points[-1])):
-        open_end = record.endings[side] in ("points", "interrupted") or (
-            record.endings[side] in ("range", "physical") and bounds[0] < point.value < bounds[1]
-        )
-        if not open_end and not (asked.virtual and record.endings[side] in ("grazing", "corner")):
+        ending = record.endings[side]
+        open_end = ending in ("points", "interrupted") or (ending in ("range", "physical") and low < point.value < high)
+        if not open_end and not (asked.virtual and ending in ("grazing", "corner")):
             continue
-        curve, X = resumed_at(system, record, point, name, high - low)
+        curve, X = resumed_at(system, record.period_number, point, branch.name, branch.width)
         border = point.tangent / curve.scale * (1.0 if side else -1.0)
-        border /= np.linalg.norm(border)
-        Y = X / curve.scale
-        begin = curve.near(Y, border)
+        begin = curve.near(X / curve.scale, border / np.linalg.norm(border))
         if begin is None:
-            endings[side], sentences[side] = "no_convergence", ENDINGS["no_convergence"]
+            ends[side] = March(ending="no_convergence")
             continue
         other = record.points[-1 if side == 0 else 0]
         closed = (other.signature, other.X) if len(record.points) > 1 else None
-        begun[side] = partial(march, curve, begin, asked.limits(bounds, closed))
+        begun[side] = partial(branch.march, curve, begin, closed)
     for side, more in zip(begun, in_turn(*begun.values()), strict=True):
-        ends[side] = from_march(more)
-        sentences[side] = sentence(more, bounds, name, (low, high))
-        endings[side] = more.ending
-    middle = record.points
-    n = len(ends[0][0])
-    points, special = joined(ends[0], middle, ends[1])
-    for one in record.special:
-        one.place += n
-    record = BranchRecord(
-        name, (low, high), record.period_number, points, sorted([*special, *record.special], key=lambda s: s.place),
-        (endings[0], endings[1]), (sentences[0], sentences[1]),
-    )  # fmt: skip
-    return branch_dataset(system, record, asked.options(name, (low, high)))
+        ends[side] = more
+    return branch.result(record.period_number, ends[0], record.points, ends[1], record.special)

@@ -10,7 +10,18 @@ from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
 from nonsmooth.explorer.labels import html_of, number, plain_of, symbols_of
-from nonsmooth.explorer.recorded import LARGEST, Recorded, Samples, Setup, matched, samples_of, unlike
+from nonsmooth.explorer.recorded import (
+    LARGEST,
+    Recorded,
+    Samples,
+    Setup,
+    forcing_period,
+    frequency_of,
+    matched,
+    response_points,
+    samples_of,
+    unlike,
+)
 from nonsmooth.explorer.work import periods_shown
 from nonsmooth.explorer.worker import Answer, Worker
 
@@ -80,6 +91,8 @@ class Bench:
     def _fit(self, name: str, value: Any) -> None:
         samples, state = self.samples(), self.page.state
         ticked = [one for one in self.page.system.parameters if one not in self._unticked]
+        if self.recorded is not None and self.recorded.axis != "time":
+            raise ValueError("a table over frequency holds no motion to fit; drop a record over time")
         if samples is None:
             raise ValueError("there is nothing to fit to: choose the channel of a state")
         if not ticked:
@@ -168,7 +181,7 @@ class Bench:
         self._told = []
         self.page.work.done.pop("recording", None)
         system = self.page.system
-        period = system.period()
+        period = forcing_period(system, self.page.state.values)
         times = {} if period is None else frequency_of(system, self.page.state.values, 2 * period)
         self._unticked = set(times) | {name for name, one in system.parameters.items() if one.unit == "kg"}
         self.setup = None if self.recorded is None else matched(self.recorded, system)
@@ -191,6 +204,13 @@ class Bench:
             **orbit, "view": "recording", "samples": samples, "period": period, "periods": periods_shown(period),
             "phase": state.phase, "shown": state.x,
         }  # fmt: skip
+
+    def response(self, over: str, state: str) -> tuple[Any, Any]:
+        """Measured points of the frequency response; see :func:`nonsmooth.explorer.recorded.response_points`."""
+        if self.recorded is None or self.setup is None:
+            return (), ()
+        page = self.page
+        return response_points(self.recorded, self.setup, page.system, page.state.values, over, state)
 
     def put(self, found: Mapping[str, Any]) -> None:
         """Take in what the worker found of the recording beside the motion."""
@@ -218,18 +238,20 @@ class Bench:
         channels, setup = self.recorded.runs[self.setup.run], self.setup
         laid = self.laid or {"distance": None, "why": "", "curve": {}}
         remarks = [*unlike(self.recorded, setup, system), *([laid["why"]] if laid["why"] else [])]
+        if self.recorded.axis != "time":
+            remarks.append("a table over frequency: it lies over the frequency response")
         if laid["distance"] is not None:
             far = laid["distance"]
             remarks.append(
                 f"{far['periods']} forcing periods compared; "
-                f"the record's phase leads the model's by {far['shift']:.3f} of a period"
+                f"the record's phase leads the model's by {round(far['shift'], 3) + 0.0:.3f} of a period"
             )
         drive = laid.get("drive")
         return {
             **busy, "file": self.recorded.file + (" (synthetic)" if self.recorded.synthetic else ""),
             "run": setup.run, "runs": list(self.recorded.runs), "turns": setup.turns,
             "channels": [[name, f"{name} ({one.unit})" if one.unit else name] for name, one in channels.items()],
-            "begin": setup.begin, "end": setup.end,
+            "begin": setup.begin, "end": setup.end, "unit": "s" if self.recorded.axis == "time" else "Hz",
             "rows": [
                 {"name": name, "html": html_of(symbols[name]), "unit": unit, "channel": setup.channels.get(name, ""),
                  "factor": setup.factors.get(name, 1.0), "shift": setup.shifts.get(name, 0.0)}
@@ -246,18 +268,3 @@ class Bench:
 
 def _too_large(file: str, size: int) -> str:
     return f"{file} has {size / (1 << 20):.0f} MiB; the page takes {LARGEST >> 20} MiB: export fewer runs"
-
-
-def frequency_of(system: Any, values: Mapping[str, float], period: float) -> dict[str, float]:
-    """The parameter that alone sets the forcing period, at the value that makes it this long; empty where none does.
-
-    Frequencies, whose period is inversely proportional to them, and periods themselves are found.
-    """
-    now = system.period_at(values)
-    if now is None:
-        return {}
-    for name, value in values.items():
-        for other in (value * now / period, value * period / now):
-            if value and abs(system.period_at({**values, name: other}) - period) < 1e-9 * period and period != now:
-                return {name: other}
-    return {}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from typing import Any
 
@@ -129,13 +130,14 @@ class Diagram(Panel):
         self.here = Span(dimension="height", line_color=COLORS["third"], line_width=1.5, line_dash="dashed")
         self.plot.add_layout(self.here)
         self.result: Any = None
-        self.stage = ""
+        self.stage = self._cloud = ""
         self.pixels = _HEIGHT
         self._fitted: tuple[str, str] | None = None
 
     def put(self, result: Any, stage: str, state: Any, of: str, unit: str) -> None:
         """Draw a sweep; ``stage`` is "first look" or "judged", ``of`` says of which request."""
         self.result, self.stage = result, stage
+        self._cloud = json.loads(of).get("direction", "")  # the state may have another one by now
         self.redraw(state, of)
         if stage != "judged":
             return
@@ -204,7 +206,7 @@ class Diagram(Panel):
         if "direction" in points.dims:
             words = [str(word) for word in points["direction"].values]
             return [(flat(points.isel(direction=k)), *CLOUDS[word]) for k, word in enumerate(words)]
-        return [(flat(points), *CLOUDS[state.direction])]
+        return [(flat(points), *CLOUDS[self._cloud])]
 
     def nearest(self, x: float, y: float, state: Any) -> tuple[float, tuple[float, ...] | None]:
         """The column next to a place, and the section point of it next to that place."""

@@ -39,16 +39,14 @@ def read(job: Mapping[str, Any]) -> dict[str, Any]:
             recording = parse_recording(data, name, Options(axis="frequency"))
         except (ns.DataFileError, ValueError):
             raise ValueError(f"no recording was found in it. {error}") from None
-        raise ValueError(
-            f"{name} is a table over frequency ({', '.join(recording.channels[:4])}); the page takes records over time"
-        ) from None
+    axis = next(str(dim) for node in recording.tree.leaves for dim in node.dims)
     runs: dict[str, dict[str, Channel]] = {}
     for run, node in recording.tree.children.items():
         runs[str(run)] = {
             str(channel): Channel(str(array.attrs["units"]), array[array.dims[0]].values, array.values)
             for leaf in node.children.values() for channel, array in leaf.to_dataset().data_vars.items()
         }  # fmt: skip
-    return {"recorded": Recorded(name, runs, tuple(recording.warnings), recording.synthetic)}
+    return {"recorded": Recorded(name, runs, tuple(recording.warnings), recording.synthetic, axis)}
 
 
 def laid_over(

@@ -61,7 +61,7 @@ def _opened(system: System, options: Mapping[str, Any], output: Mapping[str, str
     section = options.get("section")
     if isinstance(phase := getattr(section, "phase", None) or _item(section, "phase"), int | float):
         state = state.but("phase", float(phase) % 1.0)
-    start = options.get("start")
+    start: Any = options.get("start")
     if isinstance(start, Mapping) and set(start) <= set(states):
         start = [start.get(one, 0.0) for one in states]
     if start is not None and np.shape(start) == (len(states),) and np.isfinite(np.asarray(start, dtype=float)).all():

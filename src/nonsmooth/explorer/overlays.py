@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     from nonsmooth.explorer.figures import Diagram, History, Portrait, Section
     from nonsmooth.explorer.state import State
 
-__all__ = ["Overlay"]
+__all__ = ["INK", "PALE", "Overlay"]
 
-_INK, _PALE = "#4A4A4A", "#D0D0D0"  # on a light, and on a dark ground
+INK, PALE = "#4A4A4A", "#D0D0D0"  # on a light, and on a dark ground
 
 
 class Overlay:
@@ -42,7 +42,7 @@ class Overlay:
     def paint(self, dark: bool) -> None:
         """Take the colour that shows on a light or a dark ground."""
         for renderer in (*self._lines, *self._rings):
-            renderer.glyph.line_color = _PALE if dark else _INK
+            renderer.glyph.line_color = PALE if dark else INK
 
     @property
     def is_empty(self) -> bool:

@@ -98,7 +98,7 @@
   function render(ui) {
     last = ui;
     root.dataset.heard = ui.heard;
-    fill($("model"), Object.entries(ui.models), ui.state.model);
+    fill($("model"), [...Object.entries(ui.models), ["", "build one …"]], ui.state.model);
     fill($("preset"), [["", "choose …"], ...ui.presets.map(one => [one, one])], "");
     $("preset-label").hidden = !ui.presets.length;
     for (const name of ["method", "direction"]) fill($(name), Object.entries(ui.choices[name]), ui.state[name]);
@@ -174,7 +174,7 @@
     const channel = doc && doc.get_model_by_name("act");
     if (!channel) return setTimeout(connect, 30);
     send = text => { channel.value = text; };
-    const parts = (window.parts || []).map(part => part({act, field, put, fill, short}));
+    const parts = (window.parts || []).map(part => part({act, field, put, fill, short, file}));
     for (const [name, hear] of Object.entries(Object.assign({ui: render, readout, busy, notes, file}, ...parts))) {
       const model = doc.get_model_by_name(name);
       const told = () => { if (model.value) hear(JSON.parse(model.value)); };
@@ -197,7 +197,11 @@
         next.click();
       });
     }
-    $("model").addEventListener("change", () => act("model", "", $("model").value));
+    $("model").addEventListener("change", () => {
+      if ($("model").value) return act("model", "", $("model").value);
+      $("model").value = last.state.model;
+      document.dispatchEvent(new Event("build"));
+    });
     $("preset").addEventListener("change", () => { if ($("preset").value) act("preset", "", $("preset").value); });
     $("phase-slider").addEventListener("input", () => { held = $("phase-slider"); act("set", "phase", Number(held.value)); });
     $("phase-slider").addEventListener("change", () => { held = null; act("end"); });

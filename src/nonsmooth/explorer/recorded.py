@@ -16,7 +16,10 @@ from nonsmooth.explorer.state import number_of
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["LARGEST", "Channel", "Recorded", "Samples", "Setup", "matched", "samples_of", "unlike"]
+__all__ = [
+    "LARGEST", "Channel", "Recorded", "Samples", "Setup", "forcing_period", "frequency_of", "matched",
+    "response_points", "samples_of", "unlike",
+]  # fmt: skip
 
 FloatArray = NDArray[np.float64]
 LARGEST = 64 << 20  # bytes of a file that the page takes
@@ -36,12 +39,19 @@ class Channel:
 
 @dataclass(frozen=True, eq=False)
 class Recorded:
-    """A file that was dropped into the page, as the worker has read it."""
+    """A file that was dropped into the page, as the worker has read it.
+
+    Attributes
+    ----------
+    axis : str
+        ``"time"``, or ``"frequency"`` of a table of amplitudes, whose ``Channel.time`` are then frequencies in Hz.
+    """
 
     file: str
     runs: Mapping[str, Mapping[str, Channel]]
     remarks: tuple[str, ...]
     synthetic: bool
+    axis: str = "time"
 
 
 @dataclass(frozen=True)
@@ -149,7 +159,8 @@ def matched(recorded: Recorded, system: System, run: str = "") -> Setup:
         if state not in found and alike:
             found[state] = alike[0]
     if not found and free:
-        found[next(iter(system.states))] = free[0]
+        likely = [name for name in free if recorded.axis != "time" and "amplitude" in name.casefold()]
+        found[next(iter(system.states))] = (likely or free)[0]
     factors = {state: _factor(channels[name].unit, system.states[state]) or 1.0 for state, name in found.items()}
     times = [channels[name].time for name in found.values()]
     begin, end = (min(t[0] for t in times), max(t[-1] for t in times)) if times else (0.0, 1.0)
@@ -159,7 +170,7 @@ def matched(recorded: Recorded, system: System, run: str = "") -> Setup:
 def samples_of(recorded: Recorded, setup: Setup, most: int = _MOST) -> Samples | None:
     """The piece in use, in the states' units; at most ``most`` samples, the last ones. None where no state is shown."""
     channels = recorded.runs[setup.run]
-    if not setup.channels:
+    if not setup.channels or recorded.axis != "time":
         return None
     clocks = {state: channels[name].time for state, name in setup.channels.items()}
     every = np.unique(np.concatenate(list(clocks.values())))
@@ -172,6 +183,65 @@ def samples_of(recorded: Recorded, setup: Setup, most: int = _MOST) -> Samples |
         column[np.searchsorted(time, own[inside])] = setup.factors.get(state, 1.0) * values + setup.shifts.get(state, 0)
         columns[state] = column
     return Samples(time, columns, channels[setup.turns].time if setup.turns else np.empty(0))
+
+
+def response_points(
+    recorded: Recorded, setup: Setup, system: System, values: Mapping[str, float], over: str, state: str
+) -> tuple[FloatArray, FloatArray]:
+    """Measured response of a state: values of the parameter that sets the forcing period, and amplitudes.
+
+    Each run with turns of the drive is one point, half its peak-to-peak value at the mean period of its turns; the run
+    in use without them is a point at the model's own period. A table over frequency holds its points. Where ``over``
+    does not set the forcing period, or the state was not recorded, there are none.
+    """
+    nothing = np.empty(0), np.empty(0)
+    name = setup.channels.get(state)
+    now = forcing_period(system, values)
+    if name is None or now is None:
+        return nothing
+    factor = abs(setup.factors.get(state, 1.0))
+    points: list[tuple[float, float]] = []
+    for run, channels in recorded.runs.items():
+        if name not in channels:
+            continue
+        one = channels[name]
+        inside = (one.time >= setup.begin) & (one.time <= setup.end) if run == setup.run else slice(None)
+        axis, readings = one.time[inside], one.values[inside]
+        turns = channels[setup.turns].time if setup.turns in channels else ()
+        if recorded.axis != "time":
+            points += [(1 / f, factor * a) for f, a in zip(axis, readings, strict=True) if f > 0 and np.isfinite(a)]
+        elif len(readings) and (len(turns) >= 3 or run == setup.run):
+            period = float(np.diff(turns).mean()) if len(turns) >= 3 else now
+            points.append((period, 0.5 * factor * float(np.nanmax(readings) - np.nanmin(readings))))
+    found = [(frequency_of(system, values, period).get(over), height) for period, height in points]
+    there = [(place, height) for place, height in found if place is not None]
+    return (np.array([place for place, _ in there]), np.array([height for _, height in there])) if there else nothing
+
+
+def frequency_of(system: System, values: Mapping[str, float], period: float) -> dict[str, float]:
+    """The parameter that alone sets the forcing period, at the value that makes it this long; empty where none does.
+
+    Frequencies, whose period is inversely proportional to them, and periods themselves are found.
+    """
+    now = forcing_period(system, values)
+    if now is None:
+        return {}
+    for name, value in values.items():
+        if not value or forcing_period(system, {**values, name: 1.01 * value}) == now:
+            continue
+        for other in (value * now / period, value * period / now):
+            if abs((forcing_period(system, {**values, name: other}) or 0.0) - period) < 1e-9 * period:
+                return {name: other}
+    return {}
+
+
+def forcing_period(system: System, values: Mapping[str, float]) -> float | None:
+    """The forcing period; None where there is none, as at the frequency 0."""
+    try:
+        period = system.period_at(values)
+    except ZeroDivisionError:
+        return None
+    return period if period is not None and 0 < period < math.inf else None
 
 
 def unlike(recorded: Recorded, setup: Setup, system: System) -> list[str]:

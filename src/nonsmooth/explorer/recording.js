@@ -83,6 +83,7 @@
     fill($("recording-turns"), [["", "not recorded"], ...told.channels], told.turns);
     put($("recording-begin"), short(told.begin));
     put($("recording-end"), short(told.end));
+    $("recording-unit").textContent = told.unit;
     rows(told);
     $("recording-fit").disabled = Boolean(told.doing);
     $("recording-drive-box").hidden = !told.drive;

@@ -124,6 +124,7 @@ class Schedule:
         if kind == "error":
             self._failed[running.view] = running.key
             self.page.notes[place] = str(content)
+            self.page.failed(running.view)
         elif kind == "done":
             found, warned = content
             self.done[running.view] = running.key

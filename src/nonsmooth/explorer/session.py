@@ -18,6 +18,7 @@ from bokeh.models import TextInput
 from jinja2 import DictLoader, Environment
 
 from nonsmooth.explorer.bench import Bench
+from nonsmooth.explorer.building import KINDS, LINK
 from nonsmooth.explorer.controls import controls
 from nonsmooth.explorer.export import exported
 from nonsmooth.explorer.figures import MOST, Diagram, History, Portrait, Section, theme
@@ -31,6 +32,7 @@ from nonsmooth.explorer.state import History as Past
 from nonsmooth.explorer.state import State, changed, from_query
 from nonsmooth.explorer.views import PANELS, VIEWS, View
 from nonsmooth.explorer.worker import Answer
+from nonsmooth.explorer.workshop import Workshop
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
@@ -38,9 +40,11 @@ if TYPE_CHECKING:
 __all__ = ["Session", "models_of"]
 
 #: To the browser, each one line of JSON; what comes from it is ``act``.
-CHANNELS = ("ui", "readout", "busy", "notes", "file", "recording")
+CHANNELS = ("ui", "readout", "busy", "notes", "file", "recording", "building")
 #: Files that make the page; what a part of the page does comes before the page itself.
-TEXTS = ("page.html", "recording.html", "page.css", "recording.js", "tour.js", "page.js")
+TEXTS = (
+    "page.html", "recording.html", "building.html", "page.css", "recording.js", "building.js", "tour.js", "page.js",
+)  # fmt: skip
 Models = Mapping[str, Callable[[], "System"]]
 
 
@@ -65,7 +69,7 @@ class Session:
     """
 
     def __init__(self, document: Any, models: Models, query: str = "") -> None:
-        self.document, self.models = document, models
+        self.document, self.models = document, dict(models)
         self.dark = self.large = False
         self._systems: dict[str, System] = {}
         self._texts: dict[str, str] = {}
@@ -77,6 +81,7 @@ class Session:
         self.history, self.section = History(), Section()
         self.views: list[View] = [view() for view in VIEWS]
         self.overlay, self.bench = Overlay(self.diagram, self.portrait, self.history, self.section), Bench(self)
+        self.workshop = Workshop(self)
         self._say = {name: TextInput(name=name) for name in CHANNELS}
         self._act = TextInput(name="act")
         self.past = Past(self._first(query))
@@ -132,6 +137,7 @@ class Session:
         folder = files("nonsmooth.explorer")
         texts = {name: folder.joinpath(name).read_text(encoding="utf-8") for name in TEXTS}
         document.template = Environment(loader=DictLoader(texts)).get_template("page.html")
+        document.template_variables.update(link=LINK, kinds=KINDS)
         document.template_variables["style"] = texts["page.css"]
         document.template_variables["program"] = "\n".join(text for name, text in texts.items() if name.endswith(".js"))
         document.template_variables["panels"] = PANELS
@@ -187,6 +193,7 @@ class Session:
                 "set": self._set, "model": self._model, "preset": self._preset, "end": self._end_step,
                 "undo": lambda *_: self.past.undo(), "redo": lambda *_: self.past.redo(), "look": self._look,
                 "reset": self._reset, "begin": self._begin, "save": self._save, **self.bench.actions,
+                **self.workshop.actions,
             }  # fmt: skip
             if action not in known:
                 raise ValueError(f"the page asked for {str(action)[:40]!r}, which does not exist")
@@ -214,6 +221,15 @@ class Session:
     def _model(self, name: str, value: Any) -> None:
         if value not in self.models:
             raise ValueError(f"{str(value)[:40]!r} is no model of this page")
+        self.show_model(value)
+
+    def add_model(self, name: str, system: System) -> str:
+        """Offer a model that was made in the page; returns its name."""
+        self.models[name] = lambda: system
+        return name
+
+    def show_model(self, value: str) -> None:
+        """Go on to a model, at its own parameters."""
         self.past.put(first_state(value, _system(self.models, self._systems, value)))
 
     def _preset(self, name: str, value: Any) -> None:
@@ -363,6 +379,15 @@ class Session:
                         self.results[one.name] = found[one.saved[0]]
             self._tell_ui()
 
+    def failed(self, view: str) -> None:
+        """Take back what is said of a motion that could not be computed; its note says why."""
+        if view == "orbit":
+            for key in ("judged", "run", "section", "stability"):
+                self.results.pop(key, None)
+            for key in ("orbit", "section", "stability", "recording"):
+                self.work.done.pop(key, None)
+            self.tell("readout", [])
+
     def _axes_of_diagram(self) -> None:
         state, system, symbols = self.state, self.system, symbols_of(self.system)
         self.diagram.x.name(symbols[state.over], system.parameters[state.over].unit)
@@ -457,6 +482,7 @@ class Session:
         self.tell("notes", self.notes)
         self.work.go_on()  # before the page hears that its message has been taken in
         self.bench.tell()
+        self.workshop.tell()
         self._tell_ui()
 
 

@@ -20,6 +20,7 @@ from nonsmooth.plot.comparison_motion import (
     comparison_time,
 )
 from nonsmooth.plot.comparison_response import comparison_response
+from nonsmooth.plot.controlled_branch import controlled_branch
 from nonsmooth.plot.curve import curve
 from nonsmooth.plot.density import density
 from nonsmooth.plot.frequency_response import frequency_response
@@ -49,6 +50,7 @@ __all__ = [
     "comparison_response",
     "comparison_section",
     "comparison_time",
+    "controlled_branch",
     "curve",
     "density",
     "frequency_response",

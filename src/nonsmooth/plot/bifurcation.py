@@ -73,12 +73,12 @@ def bifurcation(
             )  # fmt: skip
         for k, one in enumerate(branches):
             draw_branch(drawn, one, y=name, color=style.COLORS[_LINES[k % len(_LINES)]], behind=True)
-        if len(directions) > 1 or branches:
-            style.even_dots(drawn.legend(loc="best"))
         # The whole sweep shows, its ends too where every point diverged.
         drawn.dataLim.update_from_data_x(result[parameter].values, ignore=False)
         drawn.margins(x=0)
         name_axes(drawn, name_and_unit(result, parameter), name_and_unit(result, name))
+        if len(directions) > 1 or branches:
+            style.even_dots(style.clear_legend(drawn))
     return drawn
 
 

@@ -52,10 +52,10 @@ def bifurcation_diagram(
         )  # fmt: skip
         for k in range(result.sizes["branch_id"]):
             draw_branch(drawn, one_branch(result, k), y=name, special=special)
-        style.even_dots(drawn.legend(loc="best"))
         drawn.dataLim.update_from_data_x(result["swept_value"].values, ignore=False)
         drawn.margins(x=0)
         name_axes(drawn, name_and_unit(result, parameter), name_and_unit(result, name))
+        style.even_dots(style.clear_legend(drawn))
     return drawn
 
 

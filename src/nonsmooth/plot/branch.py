@@ -70,7 +70,7 @@ def branch(
         parameter = _parameter(result)
         (name,) = only_states(result, y)
         name_axes(drawn, name_and_unit(result, parameter), _ordinate(result, name, quantity))
-        drawn.legend(loc="best")
+        style.clear_legend(drawn)
     return drawn
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from nonsmooth.plot import style
+from nonsmooth.plot.style import ABOVE
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -14,9 +15,6 @@ __all__ = ["ABOVE", "MEASURED", "THEORY", "check_kind", "measured_label"]
 #: Theory is a blue line or cloud with a pale band, the experiment black points.
 THEORY = style.COLORS["first"]
 MEASURED = style.COLORS["section"]
-
-#: A legend above the axes, for pictures that fill theirs.
-ABOVE: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.2}
 
 
 def measured_label(result: xr.Dataset | Any, word: str = "measured") -> str:

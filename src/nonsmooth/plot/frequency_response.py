@@ -75,9 +75,9 @@ def frequency_response(
                         _mark(drawn, curve, i, values[0] <= values[-1], place, direction, digits)
         for behind in branches:
             draw_branch(drawn, behind, y=name, quantity=quantity, color=style.COLORS["section"], width=0.7, behind=True)
-        drawn.legend(loc="best")
         drawn.margins(x=0)
         name_axes(drawn, name_and_unit(result, parameter), _ordinate(result, name, quantity))
+        style.clear_legend(drawn)
     return drawn
 
 

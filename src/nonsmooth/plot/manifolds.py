@@ -66,5 +66,5 @@ def manifolds(
             label=None if "saddle" in drawn.get_legend_handles_labels()[1] else "saddle",
         )  # fmt: skip
         name_axes(drawn, name_and_unit(result, names[0]), name_and_unit(result, names[1]))
-        drawn.legend(loc="best")
+        style.clear_legend(drawn)
     return drawn

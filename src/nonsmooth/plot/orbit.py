@@ -47,7 +47,7 @@ def orbit(result: Any, ax: Axes | None = None, *, x: str | None = None, y: str |
             words = f"least clearance {near[1]:.2g}"
             at = [run["touch_u"].sel(state=name).values[near[0]] for name in names]
             drawn.plot(*at, "x", color=style.COLORS["fourth"], markersize=5, markeredgewidth=1.1, zorder=6, label=words)
-        drawn.legend(loc="best")
+        style.clear_legend(drawn)
     return drawn
 
 

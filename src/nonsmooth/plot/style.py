@@ -9,7 +9,7 @@ get the whole style.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.legend import Legend
 
-__all__ = ["COLORS", "COLUMN", "PAGE", "axes", "even_dots", "halo", "journal", "save_figure", "small"]
+__all__ = [
+    "ABOVE", "COLORS", "COLUMN", "PAGE", "axes", "clear_legend", "even_dots", "halo", "journal", "save_figure", "small",
+]  # fmt: skip
 
 #: Widths of one column (84 mm) and of the page (174 mm), in inches.
 COLUMN = 84 / 25.4
@@ -37,6 +39,9 @@ COLORS = {
     "zone": "#E69F00",  # filled areas only, drawn pale
     "muted": "#7F7F7F",
 }
+
+#: A legend above the axes, for pictures that fill theirs.
+ABOVE: Mapping[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.2}
 
 _DOT = 7.0  # of a point cloud in a legend, in points; the mark "." is half of it wide
 
@@ -135,6 +140,22 @@ def even_dots(legend: Legend) -> None:
     for shown in legend.legend_handles:
         if isinstance(shown, Line2D) and shown.get_marker() == ".":
             shown.set_markersize(_DOT)
+
+
+def clear_legend(ax: Axes) -> Legend:
+    """Place the legend in the axes where it covers nothing, else above them; call it when all is drawn."""
+    legend = ax.legend(loc="best")
+    whole: Any = ax.figure.canvas.figure  # of a figure within a figure too
+    whole.draw_without_rendering()
+    box = legend.get_window_extent()
+    for line in ax.lines:
+        path = line.get_path().transformed(line.get_transform())
+        joined = line.get_linestyle() not in ("None", "none", " ", "")
+        if box.count_contains(path.vertices) or (
+            joined and path.cleaned(remove_nans=True).intersects_bbox(box, filled=False)
+        ):
+            return ax.legend(**ABOVE, ncols=2, columnspacing=1.0)
+    return legend
 
 
 def save_figure(figure: Figure | Axes, path: str | os.PathLike[str]) -> Path:

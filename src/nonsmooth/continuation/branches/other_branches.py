@@ -3,26 +3,17 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.continuation.branches.files import branch_dataset
+from nonsmooth.continuation.branches.following import Asked
 from nonsmooth.continuation.branches.reading import hopf_row, one_row, special_row
-from nonsmooth.continuation.branches.records import (
-    BranchRecord,
-    PointRecord,
-    SpecialRecord,
-    from_march,
-    joined,
-    point_record,
-)
-from nonsmooth.continuation.march.begin import Asked, limits, resumed_at, sentence
+from nonsmooth.continuation.branches.records import PointRecord, SpecialRecord, point_record
+from nonsmooth.continuation.march.begin import resumed_at
 from nonsmooth.continuation.march.crossing import other_direction
-from nonsmooth.continuation.march.march import march
 from nonsmooth.continuation.march.marches import March, in_turn
-from nonsmooth.continuation.march.physical import allowed_range
 from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
 from nonsmooth.continuation.problems.shooting import Shooting
 from nonsmooth.errors import SolveError
@@ -36,83 +27,59 @@ FloatArray = NDArray[np.float64]
 AWAY = (1e-3, 3e-3, 3e-4, 1e-2, 1e-4)  # from a crossing of branches
 
 
-def switched(start: xr.Dataset, name: str | None, given: Any, asked: Asked) -> xr.Dataset:
+def switched(start: xr.Dataset, name: str | None, asked: Asked) -> xr.Dataset:
     """The other branch through a special point."""
     system, kind, own, point, period_number, before = special_row(start, "continue_orbit")
     _check_parameter(name, own)
-    low, high = limits(system, own, before if given is None else given, None)
-    bounds = allowed_range(system, own, low, high)
+    branch = asked.follow(system, own, before)
     if kind not in ("flip", "pitchfork", "branch_point"):
         raise ValueError(
             f"no other branch passes through a {kind}: switching is possible at a flip, a pitchfork or a branch_point "
             "(with virtual=True a grazing or corner row goes straight on)"
         )
-    record = BranchRecord(own, (low, high), period_number, [point], [])
-    curve, X = resumed_at(system, record, point, own, high - low)
+    curve, X = resumed_at(system, period_number, point, own, branch.width)
     ways = emanating(curve, X, point.tangent / curve.scale, kind)
     begun: list[tuple[Orbits, OrbitPoint]] = []
     for fresh, Y, direction in ways:
         for away in AWAY:
-            guess = Y + away * direction
-            first = fresh.near(guess, direction)
+            first = fresh.near(Y + away * direction, direction)
             if first is not None and not first.virtual:
                 begun.append((fresh, first))
                 break
     if not begun:
         raise SolveError(f"no other branch was found at this {kind}", status="no_convergence")
-    closed = (ways[0][0].shooting.signature, ways[0][1] * ways[0][0].scale)
-    marches = in_turn(*(partial(march, *point, asked.limits(bounds, closed)) for point in begun))
+    closed = (ways[0][0].word(), ways[0][1] * ways[0][0].scale)
+    ahead, *others = in_turn(*(partial(branch.march, *one, closed) for one in begun))
+    middle, mark = [_origin(*ways[0]), point_record(*begun[0])], SpecialRecord(kind, 0)
+    back = March(ending="branching", said=f"The branch begins at the {kind}.")
+    if others:
+        back, mark.place = others[0], 1
+        middle.insert(0, point_record(begun[1][0], begun[1][1].turned()))
     number = begun[0][0].shooting.period_number
-    sentences = [sentence(one, bounds, own, (low, high)) for one in marches]
-    forward = from_march(marches[0])
-    last = [point_record(*begun[0])]
-    origin = [_origin(*ways[0])]
-    mark = SpecialRecord(kind, 0)
-    if len(begun) == 1:
-        points, special = joined(([], []), [*origin, *last], forward)
-        said = (f"The branch begins at the {kind}.", sentences[0])
-        endings = ("branching", marches[0].ending)
-    else:
-        back = from_march(marches[1])
-        mark.place = len(back[0]) + 1
-        middle = [point_record(*begun[1])]
-        middle[0].tangent = -middle[0].tangent
-        points, special = joined(back, [*middle, *origin, *last], forward)
-        endings, said = (marches[1].ending, marches[0].ending), (sentences[1], sentences[0])
-    special = sorted([*special, mark], key=lambda one: one.place)
-    record = BranchRecord(own, (low, high), number, points, special, endings, said)
-    return branch_dataset(system, record, asked.options(own, (low, high), **{"from": kind}))
+    return branch.result(number, back, middle, ahead, [mark], origin=kind)
 
 
-def straight_on(start: xr.Dataset, name: str | None, given: Any, asked: Asked) -> xr.Dataset:
+def straight_on(start: xr.Dataset, name: str | None, asked: Asked) -> xr.Dataset:
     """The branch through a graze or a corner with the signature of the row, both ways."""
     system, kind, own, point, period_number, before = special_row(start, "continue_orbit")
     _check_parameter(name, own)
-    low, high = limits(system, own, before if given is None else given, point.value)
-    bounds = allowed_range(system, own, low, high)
-    curve, X = resumed_at(system, BranchRecord(own, (low, high), period_number, [point], []), point, own, high - low)
+    branch = asked.follow(system, own, before, point.value)
+    curve, X = resumed_at(system, period_number, point, own, branch.width)
     border = point.tangent / curve.scale
-    border /= np.linalg.norm(border)
-    first = curve.near(X / curve.scale, border)
+    first = curve.near(X / curve.scale, border / np.linalg.norm(border))
     if first is None:
         raise SolveError(f"Newton's method did not converge at this {kind}", status="no_convergence")
-    both = (first.turned(), first)
-    marches = in_turn(*(partial(march, curve, one, asked.limits(bounds)) for one in both))
-    points, special = joined(from_march(marches[0]), [point_record(curve, first)], from_march(marches[1]))
+    back, ahead = in_turn(*(partial(branch.march, curve, one) for one in (first.turned(), first)))
     here = one_row(start, "continue_orbit")
     mark = SpecialRecord(
-        kind, len(marches[0].rows), ["", *system.indicators].index(str(here["touched"].values)) - 1,
+        kind, 0, ["", *system.indicators].index(str(here["touched"].values)) - 1,
         str(here["grazing"].values), bool(here["bounded"]), bool(here["doubled"]),
         here["contact_multipliers"].values, here["determinant"].values,
     )  # fmt: skip
-    special = sorted([*special, mark], key=lambda one: one.place)
-    ends = (sentence(marches[0], bounds, own, (low, high)), sentence(marches[1], bounds, own, (low, high)))
-    endings = (marches[0].ending, marches[1].ending)
-    record = BranchRecord(own, (low, high), period_number, points, special, endings, ends)
-    return branch_dataset(system, record, asked.options(own, (low, high), **{"from": kind}))
+    return branch.result(period_number, back, [point_record(curve, first)], ahead, [mark], origin=kind)
 
 
-def born(start: xr.Dataset, name: str | None, given: Any, asked: Asked) -> xr.Dataset:
+def born(start: xr.Dataset, name: str | None, asked: Asked) -> xr.Dataset:
     """The cycles that emanate from a Hopf point, or from a focus-centre."""
     from nonsmooth.continuation.branches.born import cycle_about_a_centre, first_cycle
 
@@ -122,22 +89,17 @@ def born(start: xr.Dataset, name: str | None, given: Any, asked: Asked) -> xr.Da
         raise ValueError(f"no cycle emanates from a {kind}: that happens at a hopf point or a focus_centre")
     system, own, value, mode, u, before = hopf_row(start)
     _check_parameter(name, own)
-    low, high = limits(system, own, before if given is None else given, value)
-    bounds = allowed_range(system, own, low, high)
-    begun = (first_cycle if kind == "hopf" else cycle_about_a_centre)(system, own, value, mode, u, high - low)
+    branch = asked.follow(system, own, before, value)
+    begun = (first_cycle if kind == "hopf" else cycle_about_a_centre)(system, own, value, mode, u, branch.width)
     if begun is None:
         raise SolveError(f"no cycle was found at this {kind}", status="no_convergence")
     curve, first = begun
     # The first cycle of a Hopf point is small; about a centre the one that touches the boundary is followed back to.
-    back = March(ending="branching")
+    back = March(ending="branching", said="The branch begins at the Hopf point.")
     if kind == "focus_centre":
-        back = march(curve, first.turned(), asked.limits(bounds))
-    found = march(curve, first, asked.limits(bounds))
-    words = "The branch begins at the Hopf point." if kind == "hopf" else sentence(back, bounds, own, (low, high))
-    points, special = joined(from_march(back), [point_record(curve, first)], from_march(found))
-    sentences = (words, sentence(found, bounds, own, (low, high)))
-    record = BranchRecord(own, (low, high), 0, points, special, (back.ending, found.ending), sentences)
-    return branch_dataset(system, record, asked.options(own, (low, high), **{"from": kind}))
+        back = branch.march(curve, first.turned())
+    ahead = branch.march(curve, first)
+    return branch.result(0, back, [point_record(curve, first)], ahead, origin=kind)
 
 
 def _check_parameter(name: str | None, own: str) -> None:

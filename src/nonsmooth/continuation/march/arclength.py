@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.continuation.problems.solve import determinant, solve
+from nonsmooth.continuation.problems.solve import Factored, solve
 from nonsmooth.errors import SystemDefinitionError
 
 if TYPE_CHECKING:
@@ -208,19 +208,18 @@ class Curve(ABC, Generic[P]):
 
     def tangent(self, solved: Any, border: FloatArray) -> tuple[FloatArray, float] | None:
         """Unit tangent with a positive component along ``border``, and the sign of the bordered determinant."""
-        matrix = self.bordered(solved, border)
         right = np.zeros(self.n)
         right[-1] = 1.0
         try:
-            t = solve(matrix, right)
+            factored = Factored(self.bordered(solved, border))
         except np.linalg.LinAlgError:
             return None
+        t = factored.solve(right)
         length = np.sqrt(t @ t)
         if not np.isfinite(length):
             return None
-        t /= length
-        matrix[-1] = t
-        return t, determinant(matrix)[0]
+        # The determinant has the same sign with t itself as the last row: it is a multiple of (last row) . t.
+        return t / length, factored.determinant()[0]
 
     def null_vectors(self, solved: Any, tolerance: float = 1e-7) -> FloatArray:
         """Orthonormal vectors (k, n) that the scaled Jacobian takes to zero."""

@@ -1,16 +1,14 @@
-"""Beginning of a march: the curve through an orbit or a recorded point, its range, and its ending in words."""
+"""Beginning of a march: the curve through an orbit or a recorded point, and its range."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.continuation.branches.orbit import Orbit
-from nonsmooth.continuation.branches.records import BranchRecord, PointRecord
-from nonsmooth.continuation.march.marches import ENDINGS, Limits, March
+from nonsmooth.continuation.branches.records import PointRecord
 from nonsmooth.continuation.problems.anchor import anchor_at
 from nonsmooth.continuation.problems.orbits import Orbits
 from nonsmooth.continuation.problems.shooting import Shooting
@@ -21,27 +19,9 @@ from nonsmooth.flow.arguments import real_number
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["Asked", "curve_of", "largest_step", "limits", "resumed_at", "sentence", "size_of"]
+__all__ = ["curve_of", "largest_step", "limits", "resumed_at", "size_of"]
 
 FloatArray = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Asked:
-    """Options of ``continue_orbit`` that every march shares."""
-
-    step: float
-    points: int
-    virtual: bool
-
-    def limits(self, bounds: tuple[float, float], closed: Any = None) -> Limits:
-        """Return the limits of a march within ``bounds``."""
-        return Limits(((-1, *bounds),), self.step, self.points, closed, self.virtual)
-
-    def options(self, name: str, given: tuple[float, float], **more: Any) -> dict[str, Any]:
-        """The record of the options in the result."""
-        return {"parameter": name, "range": given, "step": self.step, "points": self.points, "virtual": self.virtual,
-                **more}  # fmt: skip
 
 
 def largest_step(step: Any) -> float:
@@ -93,22 +73,11 @@ def curve_of(orbit: Orbit, name: str, width: float) -> tuple[Orbits, FloatArray]
     return Orbits(shooting, size, orbit.period, (width,)), X
 
 
-def sentence(found: March, bounds: tuple[float, float], name: str, asked: tuple[float, float]) -> str:
-    """Return the end of a march in words; where the range was cut, that is the reason."""
-    if found.ending == "range" and found.rows:
-        value = float(found.rows[-1].point.X[-1])
-        side = 0 if abs(value - bounds[0]) < abs(value - bounds[1]) else 1
-        if bounds[side] != asked[side]:
-            found.ending = "physical"
-            return f"{name} = {value:.6g}: {ENDINGS['physical']}"
-    return ENDINGS[found.ending]
-
-
 def resumed_at(
-    system: System, record: BranchRecord, point: PointRecord, name: str, width: float
+    system: System, period_number: int, point: PointRecord, name: str, width: float
 ) -> tuple[Orbits, FloatArray]:
     """The curve through a recorded point."""
-    shooting = Shooting(system, point.signature, record.period_number, (name,))
+    shooting = Shooting(system, point.signature, period_number, (name,))
     size = size_of(point.maximum, point.minimum, system)
     anchor_at(shooting, shooting.parameters(point.X), point.X[: shooting.n], size)
     look_at_surfaces(shooting, point.X)

@@ -110,11 +110,14 @@ class Special:
 
 @dataclass
 class March:
-    """Rows in the order of the march, special points, and the ending (a key of the curve's ``endings``)."""
+    """Rows in the order of the march, special points, and the ending (a key of the curve's ``endings``).
+
+    ``said`` is the sentence for the ending, where it is not that of ``endings``."""
 
     rows: list[Row] = field(default_factory=list)
     special: list[Special] = field(default_factory=list)
     ending: str = "points"
+    said: str = ""
 
     def add(self, curve: Curve[Any], point: Point) -> None:
         """Append a point."""

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.continuation.march.event import Event, Step, locate
-from nonsmooth.continuation.problems.multipliers import product_of_pairs, without_own
+from nonsmooth.continuation.problems.multipliers import pairs, product_of_pairs, without_own
 from nonsmooth.continuation.problems.normal_form import flip_coefficient, torus_coefficient
 from nonsmooth.continuation.signature.change import inserted
 from nonsmooth.continuation.signature.grazing import both_sides
@@ -195,7 +195,7 @@ def _rest(sign: float) -> Number:
 def _pair(locus: Locus, place: OrbitPoint) -> tuple[int, int]:
     """The two multipliers whose product is 1."""
     mu = place.multipliers
-    i, j = np.triu_indices(len(mu), 1)
+    i, j = pairs(len(mu))
     far = np.abs(mu[i] * mu[j] - 1.0)
     if not locus.shooting.forced:  # the own multiplier 1 is none of them, unless it has become double
         own = int(np.abs(mu - 1.0).argmin())

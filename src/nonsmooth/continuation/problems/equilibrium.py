@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from nonsmooth.continuation.march.arclength import Curve, Point
 from nonsmooth.continuation.march.event import Crossing, Event, Fold, Met, Step
 from nonsmooth.continuation.march.marches import INTERRUPTED
+from nonsmooth.continuation.problems.multipliers import pairs
 from nonsmooth.flow.equilibria import ModeField, sorted_eigenvalues
 
 if TYPE_CHECKING:
@@ -64,7 +65,7 @@ class Hopf(Event):
         """The product of all sums of two eigenvalues."""
         if len(point.eigenvalues) < 2:
             return 1.0
-        i, j = np.triu_indices(len(point.eigenvalues), 1)
+        i, j = pairs(len(point.eigenvalues))
         return float(np.prod(point.eigenvalues[i] + point.eigenvalues[j]).real)
 
     def named(self, step: Step, point: Any) -> tuple[str, str | None] | None:

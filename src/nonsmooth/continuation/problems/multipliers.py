@@ -6,11 +6,13 @@ and is left out where ``forced`` is False.
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
-    "EDGE", "multipliers_of", "nearest_to_one", "product_of_pairs", "stability", "stable_by", "without_own",
+    "EDGE", "multipliers_of", "nearest_to_one", "pairs", "product_of_pairs", "stability", "stable_by", "without_own",
 ]  # fmt: skip
 
 FloatArray = NDArray[np.float64]
@@ -64,5 +66,11 @@ def product_of_pairs(mu: ComplexArray) -> float:
     r""":math:`\prod_{i<j} (\mu_i \mu_j - 1)`, zero where a pair reaches the unit circle; NaN where there is no pair."""
     if len(mu) < 2:
         return np.nan
-    i, j = np.triu_indices(len(mu), 1)
+    i, j = pairs(len(mu))
     return float(np.prod(mu[i] * mu[j] - 1.0).real)
+
+
+@cache
+def pairs(n: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Places i < j of all pairs among n."""
+    return np.triu_indices(n, 1)

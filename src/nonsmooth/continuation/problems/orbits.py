@@ -101,7 +101,9 @@ class Orbits(Curve[OrbitPoint]):
         X = fresh.join(times, states, period, parameters)
         anchor_at(fresh, fresh.parameters(X), states[0], self.size)
         look_at_surfaces(fresh, X)
-        return Orbits(fresh, self.size, self.period, self.widths), X
+        curve = Orbits(fresh, self.size, self.period, self.widths)
+        curve.rounds = self.rounds  # of the same system
+        return curve, X
 
     def evaluate(self, Y: FloatArray) -> Solved:
         """The equations of multiple shooting."""

@@ -176,13 +176,16 @@ class Shooting:
         t, z = self.split(X)
         T, dT = self.flow.period(values) if self.forced else (float(X[size - 1]), np.zeros(self.n_active))
         end = self.period_number * T if self.forced else T
-        times = np.concatenate([[0.0], t, [end]])
-        lengths = np.diff(times)
+        times = np.empty(m + 2)
+        times[0], times[1:-1], times[-1] = 0.0, t, end
+        lengths = times[1:] - times[:-1]
         lengths[np.abs(lengths) < ROUNDING * abs(end)] = 0.0  # the step of the next visit is not begun from rounding
         segments = self.flow.segments(values, self.modes, times[:-1], lengths, z)
         # The states before the transitions, differentiated in t_(i-1), z_i, t_i (neighbours in X) and the parameters
         pull = np.matmul(segments.Phi, segments.f_begin[:, :, None])
-        D = np.concatenate([-pull, segments.Phi, segments.f_end[:, :, None], segments.P], axis=2)
+        D = np.empty((m + 1, n, n + 2 + self.n_active))
+        np.negative(pull[:, :, 0], out=D[:, :, 0])
+        D[:, :, 1 : n + 1], D[:, :, n + 1], D[:, :, n + 2 :] = segments.Phi, segments.f_end, segments.P
         F, J = np.zeros(size), np.zeros((size, len(X)))
         jumps = []
         for i, (k, row, at, turn) in enumerate(self.jumps):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["determinant", "solve"]
+__all__ = ["Factored", "determinant", "solve"]
 
 FloatArray = NDArray[np.float64]
 LARGE = 64  # unknowns; beyond, the blocks of the visits fill a small part of the matrix
@@ -13,40 +13,65 @@ LARGE = 64  # unknowns; beyond, the blocks of the visits fill a small part of th
 
 def solve(matrix: FloatArray, right: FloatArray) -> FloatArray:
     """x with matrix x = right; LinAlgError where there is none."""
-    if len(matrix) <= LARGE:
-        return np.asarray(np.linalg.solve(matrix, right))
-    return _Factored(matrix).solve(right)
-
-
-class _Factored:
-    """An LU factorisation: solutions, and the sign and the logarithm of the determinant."""
-
-    def __init__(self, matrix: FloatArray) -> None:
-        from scipy.sparse import csc_matrix
-        from scipy.sparse.linalg import splu
-
-        try:
-            self._lu = splu(csc_matrix(matrix))
-        except (RuntimeError, ValueError) as error:
-            raise np.linalg.LinAlgError(str(error)) from None
-
-    def solve(self, right: FloatArray) -> FloatArray:
-        """x with matrix x = right."""
-        return np.asarray(self._lu.solve(right))
-
-    def determinant(self) -> tuple[float, float]:
-        """Sign of the determinant and the logarithm of its size."""
-        diagonal = self._lu.U.diagonal()
-        sign = float(np.prod(np.sign(diagonal))) * _parity(self._lu.perm_r) * _parity(self._lu.perm_c)
-        return sign, float(np.log(np.abs(diagonal)).sum())
+    return Factored(matrix).solve(right)
 
 
 def determinant(matrix: FloatArray) -> tuple[float, float]:
     """Sign of the determinant and the logarithm of its size."""
-    if len(matrix) <= LARGE:
-        sign, size = np.linalg.slogdet(matrix)
-        return float(sign), float(size)
-    return _Factored(matrix).determinant()
+    try:
+        return Factored(matrix).determinant()
+    except np.linalg.LinAlgError:
+        return 0.0, -np.inf
+
+
+class Factored:
+    """An LU factorisation: solutions, and the sign and the logarithm of the determinant.
+
+    Raises
+    ------
+    LinAlgError
+        The matrix is singular.
+    """
+
+    def __init__(self, matrix: FloatArray) -> None:
+        if len(matrix) > LARGE:
+            from scipy.sparse import csc_matrix
+            from scipy.sparse.linalg import splu
+
+            try:
+                self._sparse = splu(csc_matrix(matrix))
+            except (RuntimeError, ValueError) as error:
+                raise np.linalg.LinAlgError(str(error)) from None
+            return
+        from scipy.linalg.lapack import dgetrf
+
+        self._sparse = None
+        self._dense, self._exchanged, info = dgetrf(matrix)
+        if info:
+            raise np.linalg.LinAlgError("the matrix is singular")
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """x with matrix x = right."""
+        if self._sparse is not None:
+            return np.asarray(self._sparse.solve(right))
+        from scipy.linalg.lapack import dgetrs
+
+        return np.asarray(dgetrs(self._dense, self._exchanged, right)[0])
+
+    def determinant(self) -> tuple[float, float]:
+        """Sign of the determinant and the logarithm of its size."""
+        if self._sparse is not None:
+            diagonal = self._sparse.U.diagonal()
+            parity = _parity(self._sparse.perm_r) * _parity(self._sparse.perm_c)
+        else:
+            diagonal = self._dense.diagonal()
+            parity = _sign(self._exchanged != np.arange(len(diagonal)))
+        return parity * _sign(diagonal < 0.0), float(np.log(np.abs(diagonal)).sum())
+
+
+def _sign(odd: NDArray[np.bool_]) -> float:
+    """-1 where an odd number of entries is true, else 1."""
+    return -1.0 if np.count_nonzero(odd) % 2 else 1.0
 
 
 def _parity(permutation: NDArray[np.int32]) -> float:

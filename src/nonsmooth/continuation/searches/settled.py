@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.continuation.signature.signature import AT_ONCE, Signature, Visit
-from nonsmooth.flow.engines.engine import Chain, Log, SectionPlan, State
+from nonsmooth.continuation.searches.visits import visits_of
+from nonsmooth.continuation.signature.signature import Signature, Visit
+from nonsmooth.flow.engines.engine import Chain, SectionPlan, State
 from nonsmooth.flow.variational import VariationalFlow
 from nonsmooth.kernels.hybrid import codes
 
@@ -18,13 +19,12 @@ if TYPE_CHECKING:
     from nonsmooth.flow.engines.engine import Engine
     from nonsmooth.system.system import System
 
-__all__ = ["CLOSED", "NEAR", "Guess", "fired_row", "forced_guesses", "settle_forced", "touching"]
+__all__ = ["CLOSED", "NEAR", "Guess", "forced_guesses", "settle_forced", "touching"]
 
 FloatArray = NDArray[np.float64]
 CHOICE = 6  # candidates tried: period numbers, or returning points for a given one
 CLOSED = 1e-8  # a return nearer than this has closed: the shortest such period comes first
 TOUCH = 1e-6  # of the period, of the motion's size: a contact as short, an impact as weak as this may be a touch
-BEHIND = 1e-9  # of an indicator's size: nearer to a boundary than this is on it
 NEAR = 0.2  # of the motion's size: a return farther off than this is no candidate
 
 
@@ -131,10 +131,11 @@ def _read_round(system: System, settled: Settled, p: int, i: int, gaps: FloatArr
     log = settled.engine.record(settled.tables, state, p * period, np.empty(0))
     if log.status not in (codes.OK, codes.NOT_GUARANTEED):
         return None
-    states = np.concatenate([np.nan_to_num(log.u_after), log.memory_after], axis=1)
-    signature = _signature(system, log, start, mode)
-    if signature.visits[-1].mode != mode:
+    flow, values = VariationalFlow.of(system), system.parameter_vector()
+    visits, states = visits_of(flow, values, log, start[len(state.u) :])
+    if visits and system.traced.transitions[visits[-1].transition].target != mode:
         return None
+    signature = Signature((*visits, Visit(mode)))
     kicks = np.abs(np.nan_to_num(log.u_after - log.u_before) / settled.size).max(axis=1, initial=0.0)
     if len(states):  # the memory returns too, or the round is a longer one
         begun, ended = start[len(state.u) :], states[-1, len(state.u) :]
@@ -173,31 +174,3 @@ def touching(guess: Guess, system: System) -> list[Guess]:
     if len(times) == len(guess.times):
         return []
     return [replace(guess, signature=signature, times=times, states=states)]
-
-
-def fired_row(flow: VariationalFlow, values: FloatArray, k: int, t: float, z: FloatArray, same: bool) -> int:
-    """The row of transition k that is zero; AT_ONCE where one at the ``same`` instant has led behind them all.
-
-    So it is in a mode in which the indicator stands still: none is reached there."""
-    found = flow.jump(values, k, t, z)
-    size = float(np.abs(found.h_z) @ flow.scale) + abs(float(found.h_z @ z))
-    return AT_ONCE if same and (found.rate == 0.0 or abs(found.h) > BEHIND * size) else found.row
-
-
-def _signature(system: System, log: Log, start: FloatArray, mode: int) -> Signature:
-    """The signature of a logged round; the row of each condition that became true last is the one that is zero."""
-    traced, flow, values = system.traced, VariationalFlow.of(system), system.parameter_vector()
-    period = float(system.period() or 1.0)
-    memory = start[len(traced.u) :]
-    visits = []
-    for i, k in enumerate(log.crossing_transition):
-        jump, t = traced.transitions[k], float(log.crossing_time[i])
-        if jump.at is not None:
-            visits.append(Visit(jump.source, int(k), -1, round(t / period - flow.phase(values, int(k))[0])))
-        else:
-            z = np.concatenate([np.nan_to_num(log.u_before[i]), memory])
-            same = i > 0 and t == log.crossing_time[i - 1]
-            visits.append(Visit(jump.source, int(k), fired_row(flow, values, int(k), t, z, same)))
-        memory = log.memory_after[i]
-    last = traced.transitions[log.crossing_transition[-1]].target if visits else mode
-    return Signature((*visits, Visit(int(last))))

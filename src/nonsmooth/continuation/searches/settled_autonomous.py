@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.continuation.problems.anchor import anchored
-from nonsmooth.continuation.searches.settled import NEAR, Guess, fired_row
+from nonsmooth.continuation.searches.settled import NEAR, Guess
+from nonsmooth.continuation.searches.visits import visits_of
 from nonsmooth.continuation.signature.signature import Signature, Visit
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.engines.engine import Log, State
@@ -141,19 +142,10 @@ def _by_transitions(system: System, log: Log, most: int, given: int | None) -> l
         gap = float(np.abs((after[last] - after[last - length]) / size).max())
         if gap > NEAR:
             continue
-        part = slice(last - length + 1, last + 1)
         begin = float(log.crossing_time[last - length])
         period = float(log.crossing_time[last]) - begin
-        times = log.crossing_time[part] - begin
-        visits = []
-        memory = log.memory_after[last - length]
-        for i in range(last - length + 1, last + 1):
-            z = np.concatenate([np.nan_to_num(log.u_before[i]), memory])
-            t = float(log.crossing_time[i])
-            row = fired_row(flow, values, int(k[i]), t, z, t == log.crossing_time[i - 1])
-            visits.append(Visit(traced.transitions[k[i]].source, int(k[i]), row))
-            memory = log.memory_after[i]
-        states = np.concatenate([after[part], log.memory_after[part]], axis=1)
+        times = log.crossing_time[last - length + 1 :] - begin
+        visits, states = visits_of(flow, values, log, log.memory_after[last - length], last - length + 1)
         signature = Signature((*visits, Visit(traced.transitions[k[last]].target)))
         signature, times, states = anchored(flow, values, signature, times, np.vstack([states[-1:], states]), period)
         guesses.append(Guess(0, period, signature, times, states, gap, size))

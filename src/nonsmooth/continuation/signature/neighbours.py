@@ -63,7 +63,7 @@ def _at(
     values = point.solved.values.copy()
     here = float(point.X[-1])
     values[shooting.places] = there = np.array([here + side * aside * curve.width])
-    rounds = Rounds(shooting)
+    rounds = curve.rounds
     tried = Counter({shooting.signature.cycle: AGAIN})
     for guess in _guesses(curve, point, common, rounds, values, side, aside):
         for _ in range(ROUNDS):

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,15 +66,12 @@ class Walk:
     """Walks along orbits of one system with one signature."""
 
     def __init__(self, shooting: Shooting) -> None:
-        from nonsmooth.flow.engines.loop import pack_net
         from nonsmooth.kernels.compile.pointers import addresses
-        from nonsmooth.system.codegen.generate import compile_model
 
         self.shooting, system = shooting, shooting.system
         traced: Traced = system.traced
-        self.model = compile_model(traced)
+        self.model, self.net = _compiled(traced)
         self.functions = addresses(self.model.jet)
-        self.net = pack_net(traced)
         n_t = len(traced.transitions)
         n, m = len(traced.u), shooting.m + 1
         visits = shooting.signature.visits
@@ -118,10 +115,15 @@ class Walk:
                 self.crossed[i] = self.crossed[i - 1]
             elif self.fired_row[i - 1] >= 0:
                 self.crossed[i, self.net.rows[self.fired_row[i - 1], 0]] = True
+        for i in map(int, np.flatnonzero(shooting.divided)):  # the exit lies in the surface of the entry
+            self.crossed[i, self.net.rows[self.fired_row[i], 0]] = True
         for i in range(m):  # of conditions that hold together the first is taken
             if self.at_once[i]:
                 self.elsewhere[i, self.fired[i] :] = False
-        self.inside = np.array([(i, self.fired[i]) for i in self.conditional], dtype=np.int64).reshape(-1, 2).T
+        self.inside = self.conditional, self.fired[self.conditional]
+        self.alone = np.array(shooting.alone, dtype=bool)[self.conditional]  # no corner to watch
+        self.instants = np.flatnonzero(self.at_once)
+        self.every = np.arange(m)
 
     def along(self, solved: Solved, states: FloatArray) -> Path | None:
         """Walk along the visits of a solved orbit; ``states`` (m + 1, n_z) begin them.
@@ -131,9 +133,9 @@ class Walk:
 
         m, n_t = self.shape
         extremes = np.empty((2, self.n))
-        inner, place, begin, size, end = (np.empty((m, n_t)) for _ in range(5))
-        begin_row = np.empty((m, n_t), dtype=np.int64)
-        which, slope = np.empty((m, n_t), dtype=np.int64), np.empty((m, 2))
+        inner, place, begin, size, end = np.empty((5, m, n_t))
+        begin_row, which = np.empty((2, m, n_t), dtype=np.int64)
+        slope = np.empty((m, 2))
         tau = np.where(self.at_once, 0.0, solved.times[1:] - solved.times[:-1])
         status = follow(
             self.functions, ORDER, RTOL, self.weight, self.lacking, self.net, solved.values,
@@ -147,35 +149,33 @@ class Walk:
         inner[begun & (np.maximum(np.abs(inner), np.abs(begin)) <= ROUNDING * size)] = -np.inf
         at = int(inner.argmax()) if n_t else 0
         touched = (at // n_t, at % n_t) if n_t else (0, 0)
-        own = end[self.inside[0], self.inside[1]]
-        own[np.array(self.shooting.alone, dtype=bool)[self.conditional]] = np.inf  # no corner to watch
+        own = end[self.inside]
+        own[self.alone] = np.inf
         if n_t and m > 1:
             rest = np.where(self.elsewhere[:-1], end[:-1], -np.inf)
             other = rest.argmax(axis=1)
-            others = rest[np.arange(m - 1), other]
+            others = rest[self.every[:-1], other]
         else:
             other, others = np.zeros(m - 1, dtype=np.int64), np.full(m - 1, -np.inf)
-        held = self._held(begin, begin_row, size) if len(self.net.rows) > 2 else np.full((m, 1), -np.inf)
+        watched = m > 1 and len(self.net.rows) > 2  # the section is passed, nothing has led there
+        held = self._held(begin, begin_row, size) if watched else np.full((m, 1), -np.inf)
         landing = held.argmax(axis=1)
         extremes[~np.isfinite(extremes)] = np.nan  # states that no visit has
         return Path(
             extremes[0], extremes[1], inner, place, which, float(inner[touched]) if n_t else -np.inf, touched,
             own, others, other, slope[self.conditional, 0], np.where(self.fixed, np.inf, tau),
-            held[np.arange(m), landing], landing,
+            held[self.every, landing], landing,
         )  # fmt: skip
 
     def _held(self, begin: FloatArray, row: NDArray[np.int64], size: FloatArray) -> FloatArray:
         """Margins where the visits begin; -inf for those that are zero there.
 
         Beside a boundary that has just been crossed only what is solved for tells which side is meant."""
-        crossed = self.crossed.copy()
-        for i in np.flatnonzero(self.shooting.divided):  # the exit lies in the surface of the entry
-            crossed[i, self.net.rows[self.fired_row[i], 0]] = True
-        near = np.where(np.take_along_axis(crossed, self.net.rows[row, 0], axis=1), SOLVED, ROUNDING)
+        near = np.where(self.crossed[self.every[:, None], self.net.rows[row, 0]], SOLVED, ROUNDING)
         zero = np.abs(begin) <= near * size
         held = np.where(self.armed & ~zero, begin, -np.inf)
-        held[0] = -np.inf  # the section is passed, nothing has led there
-        for i in np.flatnonzero(self.at_once):  # what happens at once must hold; the others: ``elsewhere``
+        held[0] = -np.inf
+        for i in self.instants:  # what happens at once must hold; the others: ``elsewhere``
             k = self.fired[i]
             held[i], held[i, k] = -np.inf, 0.0 if zero[i, k] else -begin[i, k]
         return held
@@ -189,3 +189,12 @@ class Walk:
             if not found[i] <= distance:
                 found[i] = distance
         return found
+
+
+@lru_cache(maxsize=32)
+def _compiled(traced: Traced) -> tuple[Any, Any]:
+    """The model and the transition table of a system."""
+    from nonsmooth.flow.engines.loop import pack_net
+    from nonsmooth.system.codegen.generate import compile_model
+
+    return compile_model(traced), pack_net(traced)

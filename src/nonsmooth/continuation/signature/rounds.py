@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.continuation.problems.anchor import anchored
-from nonsmooth.continuation.searches.settled import Guess, fired_row
+from nonsmooth.continuation.searches.settled import Guess
+from nonsmooth.continuation.searches.visits import visits_of
 from nonsmooth.continuation.signature.signature import Signature, Visit
 from nonsmooth.flow.engines.engine import State
 from nonsmooth.flow.engines.methods import engine_for
@@ -101,7 +102,8 @@ class Rounds:
         log = self._run(values, z, mode, begin, begin + period, [period])
         if log is None:
             return None
-        visits, instants, after = self._visits(values, log, z, begin)
+        visits, after = visits_of(self.flow, values, log, z[len(self.system.states) :])
+        instants = log.crossing_time
         last = self.system.traced.transitions[visits[-1].transition].target if visits else mode
         if last != mode:
             return None
@@ -134,7 +136,8 @@ class Rounds:
         log = self._run(values, z, mode, 0.0, (1.5 + LATE) * period, [])
         if log is None:
             return None
-        visits, instants, after = self._visits(values, log, z, 0.0)
+        visits, after = visits_of(self.flow, values, log, z[len(self.system.states) :])
+        instants = log.crossing_time
         if not visits:
             return Guess(0, period, Signature((Visit(mode),)), np.empty(0), z[None, :])
         again = [
@@ -149,24 +152,3 @@ class Rounds:
         states = np.vstack([z[None, :], after[:j]])
         found = anchored(self.flow, values, signature, instants[:j], states, period)
         return Guess(0, period, *found)
-
-    def _visits(
-        self, values: FloatArray, log: Log, z: FloatArray, begin: float
-    ) -> tuple[list[Visit], FloatArray, FloatArray]:
-        """Visits in the order of the log, their ends, and the states after them."""
-        traced, n = self.system.traced, len(self.system.states)
-        memory = z[n:]
-        visits = []
-        T = self.flow.period(values)[0]
-        for i, k in enumerate(log.crossing_transition):
-            jump, t = traced.transitions[k], float(log.crossing_time[i])
-            if jump.at is not None:
-                turn = round(t / T - self.flow.phase(values, int(k))[0])
-                visits.append(Visit(jump.source, int(k), -1, turn))
-            else:
-                before = np.concatenate([np.nan_to_num(log.u_before[i]), memory])
-                same = i > 0 and t == float(log.crossing_time[i - 1])
-                visits.append(Visit(jump.source, int(k), fired_row(self.flow, values, int(k), t, before, same)))
-            memory = log.memory_after[i]
-        after = np.concatenate([np.nan_to_num(log.u_after), log.memory_after], axis=1).reshape(len(visits), len(z))
-        return visits, np.asarray(log.crossing_time, dtype=float).copy(), after

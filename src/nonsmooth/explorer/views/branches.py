@@ -35,8 +35,8 @@ class Branches(View):
 
     @staticmethod
     def depends(old: tuple[str, str], new: tuple[str, str]) -> bool:
-        """Return True: branches lie over the diagram's parameter."""
-        return True
+        """Return whether either changed: branches lie over the diagram's parameter."""
+        return old != new
 
     def shown(self, system: System, state: State) -> bool:
         """Return whether the diagram is shown, and its branches asked for."""

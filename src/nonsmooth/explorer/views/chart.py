@@ -61,8 +61,8 @@ class Chart(View):
 
     @staticmethod
     def depends(old: tuple[str, str], new: tuple[str, str]) -> bool:
-        """Return True: the chart's abscissa is the diagram's."""
-        return True
+        """Return whether either changed: the chart's abscissa is the diagram's."""
+        return old != new
 
     def requests(self, system: System, state: State, base: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
         """Each finer than the one before it, and exponents on a grid of their own."""

@@ -88,6 +88,7 @@ class Response(View):
         from bokeh.models import ColumnDataSource, HoverTool, Span
 
         from nonsmooth.explorer.figures import TIP, Panel
+        from nonsmooth.explorer.overlays import INK
         from nonsmooth.plot.style import COLORS
 
         self._panel = Panel("response")
@@ -105,6 +106,11 @@ class Response(View):
         plot.add_tools(HoverTool(renderers=lines, mode="vline", tooltips=TIP))
         self._here = Span(dimension="height", line_color=COLORS["third"], line_width=1.5, line_dash="dashed")
         plot.add_layout(self._here)
+        self._bench = page.bench
+        self._measured = ColumnDataSource(name="recorded response", data={"x": [], "y": []})
+        self._rings = plot.scatter(
+            "x", "y", source=self._measured, size=8, fill_color=None, line_color=INK, line_width=1.3
+        )
         return plot
 
     def redraw(self, system: System, state: State) -> None:
@@ -112,22 +118,19 @@ class Response(View):
         result = self.results.get("response")
         if result is None:
             return
-        from nonsmooth.explorer.figures import extent
-
         over = str(result["maximum"].dims[0])
         unit, units = system.parameters[over].unit, system.states[state.shown]
         values = result[over].values
-        heights = []
         for word, source in self._curves.items():
             one = result.sel(direction=word)
             amplitude = one["amplitude"].sel(state=state.shown).values
-            heights.append(amplitude)
             source.data = {"x": values, "y": amplitude, "words": [
                 f"{word}, {number(float(value), unit)}: {number(float(height), units)}, "
                 + (f"period {period}" if period else "no period")
                 for value, height, period in zip(values, amplitude, one["period_number"].values, strict=True)
             ]}  # fmt: skip
-        self._panel.show((float(values[0]), float(values[-1])), (0.0, extent(np.concatenate(heights))[1]))
+        self._panel.show((float(values[0]), float(values[-1])))
+        self._fit()
         symbols = symbols_of(system)
         self._panel.x.name(symbols[over], unit)
         self._panel.y.name(symbols[state.shown], units)
@@ -136,7 +139,19 @@ class Response(View):
 
     def place(self, system: System, state: State) -> None:
         """Mark the value that the page is at."""
-        self._here.location = state.values[self.value("over", system, state)]
+        over = self.value("over", system, state)
+        self._here.location = state.values[over]
+        measured = self._bench.response(over, state.shown)
+        if not all(np.array_equal(self._measured.data[key], one) for key, one in zip("xy", measured, strict=True)):
+            self._measured.data = dict(zip("xy", measured, strict=True))
+            self._fit()
+
+    def _fit(self) -> None:
+        """Show all amplitudes, those of a recording too."""
+        from nonsmooth.explorer.figures import extent
+
+        drawn = [source.data["y"] for source in (*self._curves.values(), self._measured)]
+        self._panel.show(y=(0.0, extent(np.concatenate(drawn))[1]))
 
     def clear(self) -> None:
         """Show no curve."""
@@ -145,10 +160,12 @@ class Response(View):
             source.data = {key: [] for key in source.data}
 
     def paint(self, dark: bool) -> None:
-        """Take the colour that shows on a light or a dark ground."""
+        """Take the colours that show on a light or a dark ground."""
+        from nonsmooth.explorer.overlays import INK, PALE
         from nonsmooth.plot.style import COLORS
 
         self._up.glyph.line_color = COLORS["pale" if dark else "first"]
+        self._rings.glyph.line_color = PALE if dark else INK
 
     def legend(self, system: System, state: State) -> list[tuple[str, str]]:
         """Directions of the sweep."""

@@ -160,6 +160,9 @@ class Engine(Protocol):
         A point that fails gets its status; the next carried one then starts from the last finite state of
         the previous good point."""
 
-    def record(self, tables: Any, state: State, until: float, samples: FloatArray) -> Log:
+    def room(self, tables: Any) -> Any:
+        """Memory of ``record`` for many short runs with these tables."""
+
+    def record(self, tables: Any, state: State, until: float, samples: FloatArray, room: Any = None) -> Log:
         """Point 0: march ``state`` to the time ``until``, with dense samples at the increasing absolute
         times ``samples`` (a sample exactly at a crossing is the limit after it)."""

@@ -44,15 +44,13 @@ def table_bytes(states: int, harmonics: int, modes: int) -> int:
 
 @dataclass
 class Tables:
-    """Arrays of the kernel for P parameter points, and scratch memory for each thread that asks for it."""
+    """Arrays of the kernel for P parameter points."""
 
     points: FloatArray
     form: Any  # ``kernels.records.Form``
     period: FloatArray
     sizes: tuple[int, int, int, int]
     harmonics: int
-
-    local: threading.local = field(default_factory=threading.local)
 
 
 @dataclass
@@ -64,6 +62,7 @@ class LinearEngine(LoopEngine):
     scale: FloatArray  # (n,)
     name: str = "exact"
     net: Any = field(init=False)  # ``kernels.records.Net``
+    _local: threading.local = field(default_factory=threading.local, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         self.net = pack_net(self.traced)
@@ -105,9 +104,12 @@ class LinearEngine(LoopEngine):
 
     def given(self, tables: Tables, observer: str) -> tuple[Any, Any, Any]:
         """The present thread's tables and work; the kernel keeps the tables of the last point in them."""
-        if not hasattr(tables.local, "work"):
-            tables.local.work = self.module(tables, observer).scratch(*tables.sizes)
-        return tables.form, *tables.local.work
+        local = self._local
+        if not hasattr(local, "work"):
+            local.work, local.last = self.module(tables, observer).scratch(*tables.sizes), tables
+        if local.last is not tables:  # the same place among other points
+            local.work[1].built[0], local.last = 0, tables
+        return tables.form, *local.work
 
     def touches_of_a_leg(self) -> int:
         return 64 * len(self.net.rows)

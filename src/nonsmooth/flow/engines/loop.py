@@ -101,7 +101,14 @@ class LoopEngine(ABC):
             if state.clock[2] == 0.0 and tables.period[last - 1] < np.inf:
                 state.clock[:] = clock  # failed at the first point: nothing was written
 
-    def record(self, tables: Any, state: State, until: float, samples: FloatArray) -> Log:
+    def room(self, tables: Any) -> Any:
+        """Memory of :meth:`record` for many short runs with the same tables, which it would else make each time."""
+        n_u, n_m = len(self.scale), len(self.traced.m)
+        return [self.given(tables, "record"), _crossings(1024, n_u, n_m), _touches(1024, n_u)]
+
+    def record(
+        self, tables: Any, state: State, until: float, samples: FloatArray, room: Any = None
+    ) -> Log:
         """See :class:`nonsmooth.flow.engines.engine.Engine`. A state that a mode lacks is NaN."""
         from nonsmooth.kernels.hybrid import records
 
@@ -111,10 +118,9 @@ class LoopEngine(ABC):
             np.ascontiguousarray(samples, dtype=float), np.full((n, n_u), np.nan), np.full((n, n_m), np.nan),
             np.full(n, -1, dtype=np.int64), np.zeros(n, dtype=np.int64),
         )  # fmt: skip
-        crossings, touches = _crossings(1024, n_u, n_m), _touches(1024, n_u)
+        (model, own, work), crossings, touches = LoopEngine.room(self, tables) if room is None else room
         kernel = self.module(tables, "record").record
         spare, code = self.touches_of_a_leg(), codes.LOG_FULL
-        model, own, work = self.given(tables, "record")
         work.tally[BEGUN] = 0
         while code in (codes.LOG_FULL, codes.PAUSED):
             log = records.Log(*(*sampled, *crossings, *touches, spare))

@@ -90,7 +90,10 @@ class PatternEngine(LoopEngine):
             if out.status[i] in (codes.OK, codes.NOT_GUARANTEED):
                 out.section_mode[i] = numbers[out.section_mode[i]]
 
-    def record(self, tables: Points, state: State, until: float, samples: FloatArray) -> Log:
+    def room(self, tables: Points) -> None:
+        """None: a pattern that is met for the first time changes the memory."""
+
+    def record(self, tables: Points, state: State, until: float, samples: FloatArray, room: Any = None) -> Log:
         here = self._at(tables, 0)
         here.enter(state)
         log = super().record(here, state, until, samples)

@@ -20,7 +20,7 @@ from nonsmooth.identification.fit.first_windows import first_windows, states_fro
 from nonsmooth.identification.fit.windows import Window, Windows
 from nonsmooth.identification.pieces import State
 
-__all__ = ["LEAST", "level", "settle_first"]
+__all__ = ["LEAST", "level", "misfits", "settle_first", "settle_soft"]
 
 FloatArray = NDArray[np.float64]
 LEAST = 1e-13  # eigenvalue of the scaled normal matrix from which a direction counts as determined
@@ -51,16 +51,15 @@ def settle_first(
     for _ in range(_ROUNDS):
         noise = np.maximum(problem.noise, _PART * _sizes(now, state))
         theta, starts, state = level(_soft(now, noise), theta, starts, used)
-        each = _each(now, state)
+        each = misfits(now, state)
         bad = each > _FAR * max(float(np.median(each)), 1.0)
         changed = not np.array_equal(bad, ~used)
         if np.mean(bad) <= 0.5 and _mend(now, theta, starts, each, np.flatnonzero(bad), rng):
             state, changed = now.residuals(theta, starts), True
-            each = _each(now, state)
+            each = misfits(now, state)
             bad = each > _FAR * max(float(np.median(each)), 1.0)
         used = ~bad
-        smaller = (_PART * _sizes(now, state) < 0.8 * noise) & (noise > problem.noise)
-        if not changed and not smaller.any():
+        if not changed and not _smaller(now, state, noise):
             break
     theta, starts, state = level(now, theta, starts, used)
     moves = [bool(np.isfinite(r).all()) for r in state.residuals]
@@ -81,6 +80,22 @@ def level(
     used = np.ones(len(starts), dtype=bool) if used is None else used
     found = settle(problem, theta, starts, 0.0, used, u.centre, u.precision, 30, True, (u.low, u.high), LEAST)
     return found[0], found[1], found[2]
+
+
+def settle_soft(problem: Windows, theta: FloatArray, starts: FloatArray) -> tuple[FloatArray, FloatArray, State]:
+    """Unknowns, starts and residuals of a fit from far off, over the windows as they are."""
+    state = problem.residuals(theta, starts)
+    for _ in range(_ROUNDS):
+        noise = np.maximum(problem.noise, _PART * _sizes(problem, state))
+        theta, starts, state = level(_soft(problem, noise), theta, starts)
+        if not _smaller(problem, state, noise):
+            break
+    return theta, starts, state
+
+
+def _smaller(problem: Windows, state: State, noise: FloatArray) -> bool:
+    """Return whether the residuals have fallen, so that the noise may be taken for less."""
+    return bool(((_PART * _sizes(problem, state) < 0.8 * noise) & (noise > problem.noise)).any())
 
 
 def _soft(problem: Windows, noise: FloatArray) -> Windows:
@@ -112,7 +127,7 @@ def _sizes(problem: Windows, state: State) -> FloatArray:
     return found
 
 
-def _each(problem: Windows, state: State) -> FloatArray:
+def misfits(problem: Windows, state: State) -> FloatArray:
     """Mean squared residual over the noise, of each window."""
     return np.array([float(np.mean((r / problem.noise[w.readings[1]]) ** 2)) for w, r in _rows(problem, state)])
 
@@ -128,14 +143,14 @@ def _mend(
         trials = []
         for window, start in _others(problem, theta, starts, int(i), rng):
             one = replace(problem, pieces=[window], unknowns=fixed)
-            trials.append((float(_each(one, one.residuals(theta, start[None, :]))[0]), window, start))
+            trials.append((float(misfits(one, one.residuals(theta, start[None, :]))[0]), window, start))
         for _, window, start in sorted(trials, key=lambda row: row[0])[:3]:
             one = replace(problem, pieces=[replace(window, start=start)], unknowns=fixed)
             try:
                 _, moved, state = level(one, theta, start[None, :])
             except SolveError:
                 continue
-            if (now := float(_each(one, state)[0])) < cost:
+            if (now := float(misfits(one, state)[0])) < cost:
                 best, cost = (one.pieces[0], moved[0]), now
         if best is not None:
             problem.pieces[i], starts[i], found = best[0], best[1], True

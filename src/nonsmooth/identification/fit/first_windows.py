@@ -61,12 +61,12 @@ def first_windows(
 
     Parameters
     ----------
-    start : array (n,), optional
+    start : array (records, n_u), optional
         First guess of the states at the beginning of each record, or their values where not ``free``.
     """
     found: list[Window] = []
     for i, record in enumerate(problem.records):
-        found += _of_record(problem, theta, i, record, length, start, free)
+        found += _of_record(problem, theta, i, record, length, None if start is None else start[i], free)
     return found
 
 

@@ -14,7 +14,7 @@ from nonsmooth.flow.arguments import check_system, real_number, whole_number, ye
 from nonsmooth.flow.starts import is_one_start, start_states
 from nonsmooth.identification.blas import one_blas_thread
 from nonsmooth.results.progress import Progress, progress
-from nonsmooth.system.names import by_name
+from nonsmooth.system.names import by_name, unknown
 
 if TYPE_CHECKING:
     from nonsmooth.identification.fit.growth import Grown
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 __all__ = ["best_of", "fit", "problem_of"]
 
 FloatArray = NDArray[np.float64]
-_SPREAD = 0.5  # other first guesses lie within this factor, exp(+-0.5), of the one that was given
 _PHASES = 8  # first guesses of an unknown phase
 _LONGER = 3.3  # the other length of first windows, in every second try
 _MORE = 3  # guesses that are looked at, for each that is fitted
@@ -46,6 +45,7 @@ def fit(
     runs: Sequence[str] | None = None,
     time: str = "time",
     window: float | None = None,
+    profile: Sequence[str] = (),
     tries: int = 8,
     seed: int = 0,
     progress: Progress = True,
@@ -89,6 +89,9 @@ def fit(
         Name of the column or coordinate that holds the time.
     window : float, optional
         The longest window, in units of time, for motions that the model can be followed along only so far.
+    profile : sequence of str
+        Unknowns whose profile likelihood is computed, where the sum of squares may be no parabola within the
+        uncertainty: a finding ``"<name>, profile"`` and a note give the 95 % limits.
     tries : int
         First guesses to try, the given one and others around it (or within the bounds), while none fits.
     seed : int
@@ -132,17 +135,24 @@ def fit(
     problem = problem_of(system, recording, parameters, measured, priors, settings, runs, time)
     if start is not None and not is_one_start(start):
         raise ValueError("fit takes one first guess of the start, for all runs; settings= differ from run to run")
-    begin = None if start is None else start_states(system, start)[0]
+    begin = None if start is None else np.tile(start_states(system, start)[0], (len(problem.records), 1))
     if not yes_or_no(free_start, "free_start") and begin is None:
         raise ValueError("free_start=False says that the start is known: give start=, the states at the first sample")
     longest = np.inf if window is None else real_number(window, "window")
     if not longest > 0:
         raise ValueError(f"window = {window!r}: the longest window is a positive time; leave it out for none")
+    profiles = [profile] if isinstance(profile, str) else list(profile)
+    for name in profiles:
+        if name not in problem.unknowns.names:
+            raise ValueError(f"profile: {unknown(name, 'an unknown', 'this fit', list(problem.unknowns.names))}")
     tried = whole_number(tries, "tries", 1)
     best = best_of(problem, begin, bool(free_start), longest, tried, whole_number(seed, "seed", 0), progress)
     options = {"parameters": list(problem.unknowns.names), "window": window, "tries": tries, "seed": seed}
     given = recording if isinstance(recording, list | tuple) else [recording]
-    return outcome(best, options, synthetic=any(getattr(one, "synthetic", False) for one in given))
+    return outcome(
+        best, options, synthetic=any(getattr(one, "synthetic", False) for one in given), profiles=profiles,
+        watched=progress,
+    )  # fmt: skip
 
 
 def problem_of(
@@ -186,7 +196,7 @@ def best_of(
     why: SolveError | None = None
     levels = 12
     with progress(levels * tries, "fit", watched) as advance:
-        for guess, times in islice(_guesses(problem, start, free, length, tries, seed), tries):
+        for guess, times, begin in islice(_guesses(problem, start, free, length, tries, seed), tries):
             left = [levels]
 
             def told(left: list[int] = left) -> None:
@@ -195,7 +205,7 @@ def best_of(
                 advance(step)
 
             try:
-                found = grow(problem, guess, min(times * length, longest), start, free, longest, told)
+                found = grow(problem, guess, min(times * length, longest), begin, free, longest, told)
             except SolveError as reason:
                 why = reason
             else:
@@ -215,11 +225,15 @@ def best_of(
 
 def _guesses(
     problem: Windows, start: FloatArray | None, free: bool, length: float, tries: int, seed: int
-) -> Iterator[tuple[FloatArray, float]]:
-    """First guesses, and how much longer their first windows are: the given guess, then others, the nearest first.
+) -> Iterator[tuple[FloatArray, float, FloatArray | None]]:
+    """First guesses, how much longer their first windows are, and starts: the given guess, then others.
 
-    The nearest are those whose first windows fit best before any step. Longer windows hold what hidden states do.
+    Of those the nearest first: whose first windows fit best before any step. Longer windows hold what hidden states do;
+    where there are such, every second guess comes from the beginnings of the records.
     """
+    from nonsmooth.identification.fit.beginnings import beginnings, drawn
+    from nonsmooth.identification.fit.first_windows import states_from_samples
+
     u = problem.unknowns
 
     def far(guess: FloatArray) -> FloatArray:
@@ -234,18 +248,22 @@ def _guesses(
         every = np.array([far(np.append(guess[:shared], np.full(u.phases, phase))) for phase in phases])
         return np.append(guess[:shared], phases[np.argmin(every, axis=0)])
 
-    given = with_phases(u.guess)
-    yield given, 1.0
-    yield given, _LONGER
-    rng = np.random.default_rng(seed)
-    drawn = []
-    for _ in range(_MORE * max(tries - 2, 1)):
-        other = u.guess * np.exp(rng.uniform(-_SPREAD, _SPREAD, len(u.guess)))
-        bounded = np.isfinite(u.low) & np.isfinite(u.high)
-        other[bounded] = rng.uniform(u.low[bounded], u.high[bounded])
-        drawn.append(with_phases(np.clip(other, u.low, u.high)))
-    order = np.argsort([float(np.sum(far(guess))) for guess in drawn], kind="stable")
-    yield from ((drawn[i], _LONGER if k % 2 else 1.0) for k, i in enumerate(order))
+    given, rng = with_phases(u.guess), np.random.default_rng(seed)
+    hidden = free and any(
+        np.isnan(states_from_samples(problem, given, record, slice(0, 1))).any() for record in problem.records
+    )
+
+    def others() -> Iterator[tuple[FloatArray, float, FloatArray | None]]:
+        yield given, _LONGER, start
+        guesses = [with_phases(drawn(problem, rng)) for _ in range(_MORE * max(tries - 2, 1))]
+        order = np.argsort([float(np.sum(far(guess))) for guess in guesses], kind="stable")
+        yield from ((guesses[i], _LONGER if k % 2 else 1.0, start) for k, i in enumerate(order))
+
+    yield given, 1.0, start
+    for other in others():
+        if hidden and (begun := beginnings(problem, length, start, rng)) is not None:
+            yield begun[0], _LONGER, begun[1]
+        yield other
 
 
 def _distances(problem: Windows, guess: FloatArray, start: FloatArray | None, free: bool, length: float) -> FloatArray:

@@ -20,14 +20,15 @@ from nonsmooth.identification.fit.first_level import LEAST, level, settle_first
 from nonsmooth.identification.fit.windows import Window, Windows
 from nonsmooth.identification.pieces import State
 
-__all__ = ["Grown", "grow"]
+__all__ = ["POOR", "SHORT", "Grown", "grow"]
 
 FloatArray = NDArray[np.float64]
-_POOR = 50.0  # chi^2 per degree of freedom of the first windows, from which there is no use in longer ones
+POOR = 50.0  # chi^2 per degree of freedom of the first windows, from which there is no use in longer ones
 _CHAOS = 1e3  # growth of a start's change within a window, from which neighbouring motions are not followed
 _REGULAR = 10.0  # that growth, below which a motion is regular enough to be followed over twice the time
 _WORSE = 1.5  # chi^2 per degree of freedom against that of the level before: a longer window does not fit
 _GOOD, _WHITE = 1.3, 5.0  # residuals over irregularity, and readings that share an error, of a fit that needs no other
+SHORT = 0.05  # standard uncertainties from the minimum, beyond which a fit is said not to have come to its end
 _ROUNDS = 12  # of noise from residuals and residuals from noise
 
 
@@ -68,9 +69,9 @@ class Grown:
         return given - sum(len(window.readings[0]) for window in self.problem.pieces)
 
     @property
-    def rank(self) -> tuple[bool, bool, float]:
+    def rank(self) -> tuple[bool, bool, bool, float]:
         """Order of fits, the better one first."""
-        return self.unused > 0, self.stuck, self.rms
+        return self.unused > 0, self.stuck, self.short > SHORT, self.rms
 
     @property
     def good(self) -> bool:
@@ -81,7 +82,8 @@ class Grown:
         """
         tau = [w.correlation(r) for w, r in zip(self.problem.pieces, self.state.residuals, strict=True)]
         whole = len(self.problem.pieces) == len(self.problem.records)
-        return self.rms <= _GOOD and not self.stuck and not self.unused and (whole or float(np.median(tau)) < _WHITE)
+        ends = not self.stuck and not self.unused and self.short <= SHORT
+        return self.rms <= _GOOD and ends and (whole or float(np.median(tau)) < _WHITE)
 
 
 def grow(
@@ -109,7 +111,7 @@ def grow(
     """
     now, theta, starts, state = settle_first(problem, theta, length, start, free)
     told()
-    wide, poor, stuck = length, _reduced(now, state) > _POOR, False
+    wide, poor, stuck = length, _reduced(now, state) > POOR, False
     while not poor and len(now.pieces) > len(problem.records) and wide < longest:
         for factor in (4.0, 2.0):
             longer = _longer_windows(now, theta, starts, state, min(factor * wide, longest))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 from nonsmooth.identification.arrow import inverted, reduced
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.fit.first_level import LEAST
-from nonsmooth.identification.fit.growth import Grown
+from nonsmooth.identification.fit.growth import SHORT, Grown
+from nonsmooth.identification.fit.profile import profiled
 from nonsmooth.identification.fit.residuals import by_place, residual_data
 from nonsmooth.identification.parameter_set import ParameterSet
 from nonsmooth.identification.sandwich import Sandwich, sandwich
+from nonsmooth.results.progress import Progress
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,7 +33,10 @@ METHOD = (
 )
 
 
-def outcome(grown: Grown, options: Mapping[str, Any], synthetic: bool = False) -> ParameterSet:
+def outcome(
+    grown: Grown, options: Mapping[str, Any], synthetic: bool = False, profiles: Sequence[str] = (),
+    watched: Progress = False,
+) -> ParameterSet:  # fmt: skip
     """The parameters, with what is known of how well."""
     problem, theta = grown.problem, grown.theta
     u, used = problem.unknowns, np.ones(len(problem.pieces), dtype=bool)
@@ -61,13 +66,15 @@ def outcome(grown: Grown, options: Mapping[str, Any], synthetic: bool = False) -
     estimates = dict(zip(u.active, rows[:a], strict=True))
     extra = {**dict(zip([*u.names[a:], *starts.names], rows[a:], strict=True)), **noise}
     data = residual_data(grown, options).assign_attrs(synthetic="yes" if synthetic else "no")
-    notes = _notes(grown, found, data)
+    known = [name for name in profiles if np.isfinite(rows[u.names.index(name)].uncertainty)]
+    beside = profiled(grown, known, normal + u.precision, found.covariance, synthetic, watched)
+    notes = _notes(grown, found, data) + [note for finding in beside for note in finding.notes]
     finding = Finding(
         "fit", next(iter({**estimates, **extra}.values())), METHOD, data.sizes["sample"],
         tuple(record.name for record in problem.records), tuple(notes), data=data, plot="fit_residuals",
     )  # fmt: skip
     return ParameterSet(
-        estimates, covariance, extra=extra, findings=[finding],
+        estimates, covariance, extra=extra, findings=[finding, *beside],
         identifiability=_sentences(grown, covariance[:m, :m], loose, data), notes=notes,
         anomalies=_anomalies(grown, data), synthetic=synthetic,
     )  # fmt: skip
@@ -197,7 +204,7 @@ def _anomalies(grown: Grown, data: xr.Dataset) -> list[str]:
             f"the model follows this record over windows of {length:.3g} only, though neighbouring motions do not "
             "separate faster: it does not describe the record over longer times, or another first guess does"
         )
-    if grown.short > 0.05:
+    if grown.short > SHORT:
         found.append(
             f"the fit stands {grown.short:.2g} standard uncertainties short of its minimum: the sum of squares has "
             "corners (grazes, rest), where no step leads on; what is left of the way is in the uncertainties"

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from nonsmooth import Recording, System
+    from nonsmooth.studies.savi2007.rig.live import LiveRig
 
 __all__ = ["IDENTIFICATION", "VirtualRig"]
 
@@ -178,6 +179,27 @@ class VirtualRig:
             source=record,
             run_attrs={name: {"procedure": procedure, **stated} for name, _, stated in runs},
         )
+
+    def live(self, *, gap: float, crank_length: float, omega: float = 4.5, run: int = 0) -> LiveRig:
+        """The rig as the three methods that :func:`nonsmooth.control_based_continuation` takes.
+
+        Parameters
+        ----------
+        gap : float
+            Gap (m) from the car's mean position under a crank of this length.
+        crank_length, omega : float
+            The drive at the beginning (m, rad/s).
+        run : int
+            Number of the run, which has noise of its own.
+
+        Raises
+        ------
+        ValueError
+            A motor that wanders: it has no phase to which a reference could be tied.
+        """
+        from nonsmooth.studies.savi2007.rig.live import LiveRig
+
+        return LiveRig(self, gap=gap, crank_length=crank_length, omega=omega, run=run)
 
     # Procedures
 

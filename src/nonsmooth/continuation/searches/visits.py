@@ -1,0 +1,51 @@
+"""The transitions of a simulation's log, read as visits of a signature."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.continuation.signature.signature import AT_ONCE, Visit
+
+if TYPE_CHECKING:
+    from nonsmooth.flow.engines.engine import Log
+    from nonsmooth.flow.variational import VariationalFlow
+
+__all__ = ["visits_of"]
+
+FloatArray = NDArray[np.float64]
+BEHIND = 1e-9  # of an indicator's size: nearer to a boundary than this is on it
+
+
+def visits_of(
+    flow: VariationalFlow, values: FloatArray, log: Log, memory: FloatArray, first: int = 0
+) -> tuple[list[Visit], FloatArray]:
+    """Visits that end with the transitions of a log from ``first`` on, and the states (m, n_z) just after these.
+
+    ``memory`` is that before the first of them. The row of each condition is the one that is zero."""
+    traced = flow.traced
+    visits = []
+    for i in range(first, len(log.crossing_transition)):
+        k, t = int(log.crossing_transition[i]), float(log.crossing_time[i])
+        jump = traced.transitions[k]
+        if jump.at is not None:
+            turn = round(t / flow.period(values)[0] - flow.phase(values, k)[0])
+            visits.append(Visit(jump.source, k, -1, turn))
+        else:
+            before = np.concatenate([np.nan_to_num(log.u_before[i]), memory])
+            same = i > 0 and t == float(log.crossing_time[i - 1])
+            visits.append(Visit(jump.source, k, _fired_row(flow, values, k, t, before, same)))
+        memory = log.memory_after[i]
+    after = np.concatenate([np.nan_to_num(log.u_after[first:]), log.memory_after[first:]], axis=1)
+    return visits, after.reshape(len(visits), flow.n)
+
+
+def _fired_row(flow: VariationalFlow, values: FloatArray, k: int, t: float, z: FloatArray, same: bool) -> int:
+    """The row of transition k that is zero; AT_ONCE where one at the ``same`` instant has led behind them all.
+
+    So it is in a mode in which the indicator stands still: none is reached there."""
+    found = flow.jump(values, k, t, z)
+    size = float(np.abs(found.h_z) @ flow.scale) + abs(float(found.h_z @ z))
+    return AT_ONCE if same and (found.rate == 0.0 or abs(found.h) > BEHIND * size) else found.row

@@ -1,0 +1,74 @@
+"""One measurement of a motion that is held to a reference: its harmonics, and those of the control force."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from nonsmooth.control.controller import Controller, Samples
+from nonsmooth.control.harmonics import ComplexArray, Series, fitted, mean_square
+from nonsmooth.control.rig import Rig
+
+__all__ = ["Held", "Holder"]
+
+
+@dataclass(frozen=True)
+class Held:
+    """A held motion. ``reference`` is what the controller aimed at."""
+
+    frequency: float
+    amplitude: float
+    reference: ComplexArray
+    position: Series
+    force: Series
+    force_rms: float
+
+    @property
+    def effort(self) -> float:
+        """Root mean square of the control force that repeats with each turn."""
+        return float(np.sqrt(mean_square(self.force.c)))
+
+    @property
+    def effort_noise(self) -> float:
+        """The same of noise alone."""
+        return float(np.sqrt(np.sum(self.force.u**2)))
+
+
+@dataclass
+class Holder:
+    """A rig with the rule for its gains, and for how long a run settles and is recorded (turns of the drive)."""
+
+    rig: Rig
+    gains: tuple[float, float] | None  # K_p, K_d; None: by the mass
+    mass: float
+    harmonics: int
+    settle: int
+    record: int
+    turns: int = 0  # so far
+
+    def stiffness(self, frequency: float) -> float:
+        """Force per displacement of the controller at the drive's frequency."""
+        proportional, derivative = self.gains_at(frequency)
+        return float(np.hypot(proportional, frequency * derivative))
+
+    def gains_at(self, frequency: float) -> tuple[float, float]:
+        """Gains: K_d = m omega, K_p = 0 where none were given."""
+        return (0.0, self.mass * frequency) if self.gains is None else self.gains
+
+    def run(self, frequency: float, reference: ComplexArray | None, turns: int) -> Samples:
+        """March for whole turns, held to the reference or free."""
+        controller = Controller(self.rig, *self.gains_at(frequency), smoothing=1.0 / (5.0 * frequency))
+        self.turns += turns
+        return controller.run(reference, frequency, turns)
+
+    def hold(self, frequency: float, amplitude: float, reference: ComplexArray | None) -> Held:
+        """Set the drive, wait, record."""
+        frequency, amplitude = self.rig.set_drive(frequency, amplitude)
+        samples = self.run(frequency, reference, self.settle + self.record)
+        kept = samples.phase >= samples.phase[0] + self.settle
+        phase, position, force = (column[kept] for column in samples)
+        shown = fitted(phase, position, self.harmonics)
+        aimed = shown.c if reference is None else reference
+        pushed = fitted(phase, force, self.harmonics)
+        return Held(frequency, amplitude, aimed, shown, pushed, float(np.sqrt(np.mean(force**2))))

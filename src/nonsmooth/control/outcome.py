@@ -1,0 +1,218 @@
+"""The branch of an experiment as a Dataset: the schema of ``continue_orbit``, as far as an experiment knows it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.control.harmonics import values_at
+from nonsmooth.control.march import March, Point
+from nonsmooth.control.release import STABLE, UNKNOWN, UNSTABLE
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Names", "branch_dataset"]
+
+FloatArray = NDArray[np.float64]
+TURN = np.linspace(0.0, 1.0, 2048, endpoint=False)
+SIGNIFICANT = 4.0  # standard uncertainties
+MISFIT = 4.0  # mean square of the normalised differences from a parabola
+#: Ways in which such a branch ends.
+ENDINGS = {
+    "range": "The branch reached the edge of the range.",
+    "points": "The largest number of points was reached.",
+    "lost": "No motion was found on which the control force vanishes, however small the step.",
+    "interrupted": "Interrupted: what was measured until then stands.",
+}
+
+
+@dataclass(frozen=True)
+class Names:
+    """Names and units of a rig's quantities."""
+
+    frequency: str = "drive_frequency"
+    amplitude: str = "drive_amplitude"
+    position: str = "x"
+    velocity: str = "v"
+    units: Mapping[str, str] | None = None
+
+    def unit(self, name: str) -> str:
+        """Unit of a quantity; ``1`` where the rig does not say."""
+        return (self.units or {}).get(name) or "1"
+
+
+def branch_dataset(
+    march: March, points: Sequence[Point], released: Sequence[tuple[int, float]], names: Names, parameter: str,
+    ending: str, record: Mapping[str, Any],
+) -> xr.Dataset:  # fmt: skip
+    """The points in the order in which they were measured."""
+    import xarray as xr
+
+    from nonsmooth.results.provenance import attribute
+    from nonsmooth.results.schema import strings
+    from nonsmooth.results.statuses import flag_attributes
+
+    other = names.amplitude if parameter == names.frequency else names.frequency
+    held = [point.held for point in points]
+    omega = np.array([one.frequency for one in held])
+    level = np.array([one.amplitude for one in held])
+    along, fixed = (omega, level) if parameter == names.frequency else (level, omega)
+    rows = [_motion(one.position.seen, one.frequency) for one in held]
+    section, maximum, minimum = (np.array([row[i] for row in rows]).reshape(-1, 2) for i in range(3))
+    uncertainty, across = np.array([_uncertainties(march, point) for point in points]).reshape(-1, 2).T
+    unit = names.unit(names.position)
+    force = names.unit("force")
+    kind = np.array([one[0] for one in released], dtype=np.int8)
+    folds = _folds(march, points, along, across)
+    attrs = attribute(record) | {"parameter": parameter}
+
+    def over(values: Any, words: str, units: str = "1", **more: Any) -> tuple[str, Any, dict[str, Any]]:
+        return "point", np.asarray(values), {"long_name": words, "units": units, **more}
+
+    variables: dict[str, Any] = {
+        "section": (("point", "state"), section, {"long_name": "state at phase 0 of the drive"}),
+        "maximum": (("point", "state"), maximum, {"long_name": "largest value along the orbit"}),
+        "minimum": (("point", "state"), minimum, {"long_name": "smallest value along the orbit"}),
+        "amplitude": over(0.5 * (maximum - minimum)[:, 0], "half the peak-to-peak value", unit),
+        "amplitude_uncertainty": over(uncertainty, "standard uncertainty of the amplitude at this parameter", unit),
+        "parameter_uncertainty": over(
+            across, "standard uncertainty of the parameter at this amplitude", names.unit(parameter)
+        ),
+        "period": over(2 * np.pi / omega, "period of the drive", "s"),
+        "stability": over(
+            kind, "motion that was let go: came back, left, or not known", **flag_attributes(
+                ["not_known", "unstable", "stable"], [UNKNOWN, UNSTABLE, STABLE])),
+        "growth": over([one[1] for one in released], "mean factor by which the distance changed per turn when let go"),
+        "control_effort": over([p.held.effort for p in points], "rms of the control force that repeats", force),
+        "control_effort_noise": over([p.held.effort_noise for p in points], "the same of noise alone", force),
+        "control_effort_first": over([p.first_effort for p in points], "the same before the first correction", force),
+        "control_rms": over([p.held.force_rms for p in points], "rms of the whole control force", force),
+        "measurements": over([p.measurements for p in points], "measurements until the control force vanished"),
+        "position_cosine": (("point", "harmonic"), np.array([p.held.position.c.real for p in points]), {
+            "long_name": "cosine coefficients of the motion", "units": unit}),
+        "position_sine": (("point", "harmonic"), np.array([-p.held.position.c.imag for p in points]), {
+            "long_name": "sine coefficients of the motion", "units": unit}),
+        "special_kind": ("special", strings(["fold"] * len(folds)), {"long_name": "kind of the special point"}),
+        "special_point": ("special", np.array([one[2] for one in folds], dtype=np.int64), {
+            "long_name": "nearest of the points"}),
+        "special_value": ("special", np.array([one[0] for one in folds]), {
+            "long_name": f"{parameter} at the special point", "units": names.unit(parameter)}),
+        "special_value_uncertainty": ("special", np.array([one[1] for one in folds]), {
+            "long_name": "its standard uncertainty", "units": names.unit(parameter)}),
+        "turns": ((), np.int64(march.holder.turns), {"long_name": "turns of the drive in all"}),
+        "ended_because": ((), ENDINGS[ending], {"long_name": "how the branch ends"}),
+    }  # fmt: skip
+    coords: dict[str, Any] = {
+        parameter: over(along, parameter, names.unit(parameter)),
+        other: ((), float(np.mean(fixed)), {"long_name": other, "units": names.unit(other)}),
+        "state": ("state", strings([names.position, names.velocity]), {"long_name": "state"}),
+        "state_unit": ("state", strings([unit, names.unit(names.velocity)]), {"long_name": "unit"}),
+        "harmonic": ("harmonic", np.arange(march.holder.harmonics + 1), {"long_name": "harmonic of the drive"}),
+    }
+    return xr.Dataset(variables, coords, attrs)
+
+
+def _motion(c: Any, frequency: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """State at phase 0, and the extremes of position and velocity."""
+    x, v = values_at(c, TURN), frequency * values_at(c, TURN, 1)
+    return np.array([x[0], v[0]]), np.array([x.max(), v.max()]), np.array([x.min(), v.min()])
+
+
+def _uncertainties(march: March, point: Point) -> tuple[float, float]:
+    """Standard uncertainties of the amplitude at this parameter, and of the parameter at this amplitude.
+
+    What is left of the mismatch, and the noise of the measured harmonics, through the measured derivatives. At a fold
+    the first is large and the second is not.
+    """
+    c, u = point.held.position.seen, point.held.position.u
+    x = values_at(c, TURN)
+    order = np.arange(len(c))
+    ends = [np.exp(2j * np.pi * order * TURN[int(pick(x))]) for pick in (np.argmax, np.argmin)]
+    wave = 0.5 * (ends[0] - ends[1]) * march.size
+    slope = np.concatenate([wave.real, -wave.imag[1:]])  # of the amplitude by the scaled series
+    noise = np.concatenate([u, u[1:]]) / march.size
+    variance = point.mismatch**2 + noise**2
+    n = len(noise)
+    parameter, size = np.eye(n + 1)[0], np.concatenate([[0.0], slope / march.size])
+    spread = []
+    for held, seen, scale in ((parameter, size, march.size), (size, parameter, march.scale)):
+        try:
+            effect = seen @ np.linalg.inv(np.vstack([point.J, held]))[:, :n]
+        except np.linalg.LinAlgError:
+            spread.append(float("inf"))
+            continue
+        direct = float(np.sum((slope * noise) ** 2)) if seen is size else 0.0
+        spread.append(float(np.sqrt(scale**2 * np.sum(effect**2 * variance) + direct)))
+    return spread[0], spread[1]
+
+
+def _folds(
+    march: March, points: Sequence[Point], along: FloatArray, across: FloatArray
+) -> list[tuple[float, float, int]]:
+    """Turning points of the parameter: value, standard uncertainty, nearest point.
+
+    The vertex of a parabola over the length of the branch, by least squares through five points; where they lie on
+    none, the corner of the straight lines through two points on each side. A turn that noise may have made is none.
+    """
+    place = np.array([march.plane @ point.y for point in points]).reshape(-1, 3)
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(place, axis=0), axis=1))])
+    found = []
+    for i in _turns(along, across):
+        if not 0 < i < len(points) - 1:
+            continue
+        near = slice(max(i - 2, 0), i + 3)
+        s, weight = length[near] - length[i], 1.0 / across[near]
+        fit, covariance = np.polyfit(s, along[near], 2, w=weight, cov="unscaled")
+        misfit = float(np.sum((weight * (along[near] - np.polyval(fit, s))) ** 2)) / max(len(s) - 3, 1)
+        if len(s) > 3 and misfit < MISFIT:
+            at = -fit[1] / (2 * fit[0])
+            slope = np.array([at**2, at, 1.0])  # of the vertex by the coefficients, which moves with none of them
+            spread = float(np.sqrt(max(misfit, 1.0) * slope @ covariance @ slope))
+            found.append((float(np.polyval(fit, at)), spread, i))
+            continue
+        value, spread = _corner(place, i)
+        near_by = 0.5 * float(np.min(np.abs(np.diff(along[i - 1 : i + 2]))))
+        found.append((value * march.scale, float(np.linalg.norm([across[i], spread * march.scale, near_by])), i))
+    return found
+
+
+def _corner(place: FloatArray, i: int) -> tuple[float, float]:
+    """Parameter (scaled) where the lines through the points before and after a turn are nearest; its uncertainty.
+
+    The outermost point itself lies on one of the lines: the nearer of both ways to say so counts, and by how far they
+    differ is the uncertainty.
+    """
+    found = []
+    for before, after in (((i - 1, i), (i + 1, i + 2)), ((i - 2, i - 1), (i, i + 1))):
+        if min(before) < 0 or max(after) >= len(place):
+            continue
+        a, b = place[before[1]] - place[before[0]], place[after[0]] - place[after[1]]
+        along, *_ = np.linalg.lstsq(np.column_stack([a, -b]), place[after[0]] - place[before[1]], rcond=None)
+        meeting = (place[before[1]] + along[0] * a, place[after[0]] + along[1] * b)
+        apart = float(np.linalg.norm(meeting[0] - meeting[1]))
+        found.append((apart, 0.5 * float(meeting[0][0] + meeting[1][0])))
+    if not found:
+        return float(place[i][0]), float(np.ptp(place[i - 1 : i + 2, 0]))
+    values = [value for _, value in sorted(found)]
+    return values[0], max(abs(values[0] - values[-1]), 0.5 * abs(values[0] - float(place[i][0])))
+
+
+def _turns(values: FloatArray, uncertainty: FloatArray) -> list[int]:
+    """Places of the extremes from which the values go back significantly, in turn maxima and minima."""
+    found: list[int] = []
+    extreme, sign = 0, 0.0
+    for i in range(1, len(values)):
+        away = values[i] - values[extreme]
+        significant = abs(away) > SIGNIFICANT * np.hypot(uncertainty[i], uncertainty[extreme])
+        if sign * away > 0:
+            extreme = i
+        elif significant:
+            if sign:
+                found.append(extreme)
+            extreme, sign = i, float(np.sign(away))
+    return found

@@ -1,0 +1,41 @@
+"""Stability, seen: a held motion is displaced a little and let go, and either comes back or leaves."""
+
+from __future__ import annotations
+
+from nonsmooth.control.harmonics import fitted
+from nonsmooth.control.held import Held, Holder
+
+__all__ = ["STABLE", "UNKNOWN", "UNSTABLE", "release"]
+
+STABLE, UNSTABLE, UNKNOWN = 1, 0, -1
+PUSH = 0.01  # of the motion's first harmonic
+FAR = 3.0  # times the displacement
+
+
+def release(holder: Holder, held: Held, turns: int) -> tuple[int, float]:
+    """Hold a reference that is 1 % larger, let go, and watch the first harmonic for some turns of the drive.
+
+    Returns
+    -------
+    int
+        ``UNSTABLE`` where its distance from the held motion grew to three times the displacement, ``STABLE`` where it
+        ended below a third of it, else ``UNKNOWN``.
+    float
+        Mean factor by which the distance changed per turn.
+    """
+    pushed = held.reference.copy()
+    pushed[1] *= 1.0 + PUSH
+    holder.run(held.frequency, pushed, holder.settle)
+    here = held.position.c[1]
+    displacement = PUSH * float(abs(here))
+    distances: list[float] = []
+    for _ in range(turns):
+        seen = holder.run(held.frequency, None, 1)
+        distances.append(float(abs(fitted(seen.phase, seen.position, holder.harmonics).c[1] - here)))
+        if distances[-1] > FAR * displacement:
+            break  # it has left; how far it goes, the rig need not suffer
+    last = distances[-1]
+    factor = (last / distances[0]) ** (1.0 / (len(distances) - 1)) if len(distances) > 1 else float("inf")
+    if last > FAR * displacement:
+        return UNSTABLE, factor
+    return (STABLE if last < displacement / FAR else UNKNOWN), factor

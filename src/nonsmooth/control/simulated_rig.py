@@ -1,0 +1,164 @@
+"""``SimulatedRig``: any driven ``System`` as a rig, with a sampled, noisy, stepped position sensor."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.control.actuated import FORCE, actuated
+from nonsmooth.flow.arguments import check_system, real_number, whole_number
+from nonsmooth.kernels.hybrid import codes
+from nonsmooth.system.names import by_name, unknown
+
+if TYPE_CHECKING:
+    from nonsmooth.system.system import System
+
+__all__ = ["SimulatedRig"]
+
+_NO_SAMPLES = np.empty(0)
+
+
+class SimulatedRig:
+    r"""A driven system as a rig: a force acts on its mass, a sensor samples its position.
+
+    .. math:: y_k = q \left\lfloor \frac{x(t_k) + n_k}{q} + \tfrac12 \right\rfloor
+
+    with the steps q (``resolution``) and the noise n of the sensor. The force stays constant between samples.
+
+    Parameters
+    ----------
+    system : System
+        Its parameters are those of the rig; those of the drive are set by :meth:`set_drive`.
+    position, velocity : str
+        The state that is measured, and the one on whose rate the force acts.
+    mass : str or float
+        A parameter of the system, or a number: the rate of ``velocity`` gets force / mass.
+    frequency, amplitude : str
+        The drive's parameters; the frequency is angular.
+    rate : float
+        Samples per unit of time. They are not tied to the period of the drive.
+    resolution, noise, jitter : float
+        Steps of the sensor, standard deviation of its readings, and of the instants of sampling.
+    seed : int
+        Of noise and jitter.
+    start : state, optional
+        Where the motion begins.
+    method : str
+        Of the simulation; see :func:`nonsmooth.simulate`.
+
+    Raises
+    ------
+    ValueError, TypeError
+        Names that the system does not have, values that cannot be.
+    SystemDefinitionError
+        A system on which no such force can act: no forcing period, a mode that holds the velocity.
+
+    Examples
+    --------
+    >>> import nonsmooth as ns
+    >>> rig = ns.SimulatedRig(ns.models.discontinuous_support(), noise=1e-5)
+    >>> rig.set_drive(4.5, 0.14)
+    (4.5, 0.14)
+    >>> rig.apply_force(0.01)
+    >>> phase, position = rig.read()
+    """
+
+    @by_name
+    def __init__(
+        self,
+        system: System,
+        *,
+        position: str = "x",
+        velocity: str = "v",
+        mass: str | float = "m",
+        frequency: str = "omega",
+        amplitude: str = "rho",
+        rate: float = 100.0,
+        resolution: float = 0.0,
+        noise: float = 0.0,
+        jitter: float = 0.0,
+        seed: int = 0,
+        start: Any = None,
+        method: str = "auto",
+    ) -> None:
+        from nonsmooth.flow.engines.methods import engine_for
+        from nonsmooth.flow.starts import first_state
+
+        check_system(system, "SimulatedRig")
+        if position not in system.states:
+            raise ValueError(unknown(position, "a state", repr(system.name), system.states))
+        for name in (frequency, amplitude):
+            if name not in system.parameters:
+                known = {key: one.unit for key, one in system.parameters.items()}
+                raise ValueError(unknown(name, "a parameter", repr(system.name), known))
+        for word, number in (("resolution", resolution), ("noise", noise), ("jitter", jitter)):
+            if real_number(number, word) < 0:
+                raise ValueError(f"{word} = {number!r} must not be negative")
+        if real_number(rate, "rate") <= 0:
+            raise ValueError(f"rate = {rate!r}: samples per unit of time, more than 0")
+        self.names = {"frequency": frequency, "amplitude": amplitude, "position": position, "velocity": velocity}
+        self.units = {name: system.parameters[name].unit for name in (frequency, amplitude)} | dict(system.states)
+        self.mass = float(system.values[mass]) if isinstance(mass, str) and mass in system.values else mass
+        self.rate, self.resolution, self.noise, self.jitter = float(rate), resolution, noise, jitter
+        self.system = system
+        self._system = actuated(system, velocity=velocity, mass=mass)
+        self._engine = engine_for(self._system, method)
+        self._state = first_state(self._system, start)
+        self._place = list(system.states).index(position)
+        self._memory = list(self._system.memory).index(FORCE)
+        self._rng = np.random.default_rng(whole_number(seed, "seed", 0))
+        self._tables: Any = None
+        self._due = 1.0 / self.rate  # until the next sample
+        self._late = 0.0  # of the last sample, by jitter
+        self.set_drive(system.values[frequency], system.values[amplitude])
+
+    def set_drive(self, frequency: float, amplitude: float) -> tuple[float, float]:
+        """Set the drive; the motion goes on from where it is, at equal phase."""
+        values = {
+            self.names["frequency"]: real_number(frequency, "frequency"),
+            self.names["amplitude"]: real_number(amplitude, "amplitude"),
+        }
+        self._system = self._system.with_parameters(values)
+        self._tables = self._engine.prepare(self._system.parameter_vector()[None, :])
+        self._room = self._engine.room(self._tables)
+        period = self._system.period()
+        assert period is not None  # `actuated` refuses systems without
+        self._period = period
+        self._state.keep_phase(period, -1.0)
+        return values[self.names["frequency"]], values[self.names["amplitude"]]
+
+    def apply_force(self, force: float) -> None:
+        """Set the force on the mass; it stays until it is set again."""
+        self._state.memory[self._memory] = force
+
+    def read(self) -> tuple[float, float]:
+        """Go on to the next sample; return the drive's phase in turns, and the position that the sensor shows.
+
+        Raises
+        ------
+        SolveError
+            The simulation could not go on.
+        """
+        clock = self._state.clock
+        late = self.jitter * float(np.clip(self._rng.standard_normal(), -3.0, 3.0)) if self.jitter else 0.0
+        wait = max(self._due + late - self._late, 0.0)
+        self._late = late
+        until = clock[1] * self._period + clock[0] + wait
+        log = self._engine.record(self._tables, self._state, until, _NO_SAMPLES, self._room)
+        if log.status != codes.OK:
+            from nonsmooth.flow.failure import solve_error
+
+            names = list(self._system.states)
+            raise solve_error(
+                log.status, time=float(clock[1] * self._period + clock[0]),
+                state={name: float(value) for name, value in zip(names, self._state.u, strict=True)},
+                mode=self._system.modes[int(self._state.counters[0])],
+            )  # fmt: skip
+        phase = clock[1] + (clock[0] - late) / self._period  # by the even clock of the interface
+        return float(phase), self.reading(float(self._state.u[self._place]))
+
+    def reading(self, position: float) -> float:
+        """Return what the sensor shows at a position."""
+        shown = position + (self.noise * float(self._rng.standard_normal()) if self.noise else 0.0)
+        return self.resolution * float(np.floor(shown / self.resolution + 0.5)) if self.resolution else shown

@@ -1,0 +1,117 @@
+"""First guesses with their starts, from the beginnings of the records: where states are hidden, which no sample shows.
+
+A short window shows little of a hidden state, and a long one has many minima. So unknowns and starts are drawn, those
+that follow the first swing of each record best are fitted to it, and the fits that succeed are taken on over longer and
+longer beginnings, which few wrong ones survive.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.errors import SolveError
+from nonsmooth.identification.fit.first_level import misfits, settle_soft
+from nonsmooth.identification.fit.first_windows import WIDE, first_windows, states_from_samples
+from nonsmooth.identification.fit.growth import POOR
+from nonsmooth.identification.fit.windows import Window, Windows
+
+__all__ = ["beginnings", "drawn"]
+
+FloatArray = NDArray[np.float64]
+_SPREAD = 0.5  # other first guesses lie within this factor, exp(+-0.5), of the one that was given
+_GUESSES, _STARTS = 128, 8  # drawn; starts for each guess
+_FITTED = 24  # of these guesses
+_SWING, _LAST, _LONGER = 3.3, 16.0, 1.3  # the first beginning and the longest, in first windows; by how much they grow
+_SAME = 1e-4  # of a start's spread: two fits nearer than that are one
+_BEHIND = 10.0  # mean squared residual over that of the best, beyond which a fit is given up
+
+
+def drawn(problem: Windows, rng: np.random.Generator) -> FloatArray:
+    """Another first guess: around the given one, or within the bounds; phases at random."""
+    u = problem.unknowns
+    other = u.guess * np.exp(rng.uniform(-_SPREAD, _SPREAD, len(u.guess)))
+    bounded = np.isfinite(u.low) & np.isfinite(u.high)
+    other[bounded] = rng.uniform(u.low[bounded], u.high[bounded])
+    other[len(other) - u.phases :] = rng.uniform(size=u.phases)
+    return np.clip(other, u.low, u.high)
+
+
+def beginnings(
+    problem: Windows, length: float, start: FloatArray | None, rng: np.random.Generator
+) -> tuple[FloatArray, FloatArray] | None:
+    """Unknowns and starts (records, n_u) that follow the beginning of every record; None where none were found.
+
+    Parameters
+    ----------
+    length : float
+        Of first windows.
+    start : array (records, n_u), optional
+        First guess of the starts.
+    """
+    first: dict[int, Window] = {}
+    for window in first_windows(problem, problem.unknowns.guess, length, start, True):
+        first.setdefault(window.record, window)
+    windows = [window for window in first.values() if window.first == 0]
+    if len(windows) < len(problem.records):
+        return None
+    times = _SWING
+    tried = _best_drawn(_cut(problem, windows, times * length), rng)
+    while tried:
+        now = _cut(problem, windows, times * length)
+        fitted: list[tuple[float, FloatArray, FloatArray]] = []
+        size = np.array([np.where(window.spread > 0, window.spread, np.inf) for window in now.pieces])
+        for theta, starts in tried:
+            try:
+                found, moved, state = settle_soft(_from(now, starts), theta, starts)
+            except SolveError:
+                continue
+            cost = float(np.mean(misfits(now, state)))
+            if all(np.max(np.abs(moved - others) / size) > _SAME for _, _, others in fitted):
+                fitted.append((cost, found, moved))
+        least = min((cost for cost, _, _ in fitted), default=np.inf)
+        tried = [(theta, z) for cost, theta, z in fitted if cost < _BEHIND * max(least, 1.0)]
+        if times > _LAST or all(w.last == len(r.time) for w, r in zip(now.pieces, problem.records, strict=True)):
+            best = min(fitted, key=lambda one: one[0], default=None)
+            return None if best is None or best[0] > POOR else (best[1], best[2][:, : len(problem.system.states)])
+        times *= _LONGER
+    return None
+
+
+def _cut(problem: Windows, windows: list[Window], length: float) -> Windows:
+    """The problem with one window at the beginning of each record."""
+    pieces = []
+    for window, record in zip(windows, problem.records, strict=True):
+        last = max(int(np.searchsorted(record.time, record.time[0] + length, "right")), window.last)
+        pieces.append(replace(window, last=last, time=record.time[:last], values=record.values[:last]))
+    return problem.of(pieces)
+
+
+def _from(problem: Windows, starts: FloatArray) -> Windows:
+    return problem.of([replace(window, start=z) for window, z in zip(problem.pieces, starts, strict=True)])
+
+
+def _best_drawn(problem: Windows, rng: np.random.Generator) -> list[tuple[FloatArray, FloatArray]]:
+    """Guesses and starts (records, n), of those drawn, that follow the beginnings best before any fit."""
+    found = []
+    for k in range(_GUESSES):
+        theta = drawn(problem, rng) if k else problem.unknowns.guess
+        total, starts = 0.0, np.empty_like(problem.starts)
+        for i, window in enumerate(problem.pieces):
+            told = states_from_samples(problem, theta, problem.records[i], slice(0, 1))[0]
+            told = np.append(told, np.full(len(window.start) - len(told), np.nan))
+            known, least = np.isfinite(told), np.inf
+            size = np.where(known, 0.0, window.spread / WIDE)
+            for j in range(_STARTS):
+                z = np.where(known, told, window.start) + (size * rng.standard_normal(len(size)) if k or j else 0.0)
+                one = problem.of([replace(window, start=z)])
+                cost = float(misfits(one, one.residuals(theta, z[None, :]))[0])
+                if not cost >= least:
+                    least, starts[i] = cost, z
+            total += least
+        if np.isfinite(total):
+            found.append((total, theta, starts))
+    found.sort(key=lambda one: one[0])
+    return [(theta, starts) for _, theta, starts in found[:_FITTED]]

@@ -1,0 +1,110 @@
+"""Profiles of unknowns of a fit: each held beside its best value while all others, and the starts, follow."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.identification.arrow import Unsettled, inverted, settle
+from nonsmooth.identification.finding import Estimate, Finding
+from nonsmooth.identification.fit.first_level import LEAST
+from nonsmooth.identification.fit.growth import Grown
+from nonsmooth.identification.profiles import Profile, profile_of
+from nonsmooth.results.progress import Progress, progress
+
+__all__ = ["profiled"]
+
+FloatArray = NDArray[np.float64]
+_STEP = 0.5  # of a standard uncertainty
+_STEPS = 16  # on either side, at most
+_ENOUGH = 5.0  # rise of chi^2 beyond which no limit at 95 % lies
+METHOD = (
+    "profile likelihood: the unknown is held while all others and the starts follow; the limits are where chi^2, over "
+    "the residuals' own correlation, has risen by 3.84 (Wilks 1938)"
+)
+
+
+def profiled(
+    grown: Grown, names: list[str], normal: FloatArray, covariance: FloatArray, synthetic: bool, watched: Progress
+) -> list[Finding]:  # fmt: skip
+    """A finding for each of these unknowns.
+
+    Parameters
+    ----------
+    normal : array (p, p)
+        The normal matrix, priors included; its inverse would be the covariance of white residuals.
+    covariance : array (p, p)
+        That of the fit, by which the rise of chi^2 is scaled.
+    """
+    u, white, found = grown.problem.unknowns, np.diag(inverted(normal, LEAST)[0]), []
+    with progress(2 * len(names), "profiles", watched) as advance:
+        for name in names:
+            i = u.names.index(name)
+            error = float(np.sqrt(covariance[i, i]))
+            above: list[tuple[float, float]] = []
+            for sign in (-1.0, 1.0):
+                above += _side(grown, i, sign * error, float(white[i] / covariance[i, i]))
+                advance()
+            rows = np.array(sorted([*above, (float(grown.theta[i]), 0.0)]))
+            least = int(np.argmin(rows[:, 1]))  # a better fit than the best, where the sum of squares has corners
+            profile = profile_of(rows[:, 0], rows[:, 1] - rows[least, 1], rows[least, 0])
+            estimate = Estimate(float(grown.theta[i]), error, u.units[i])
+            found.append(_finding(grown, name, profile, estimate, synthetic))
+    return found
+
+
+def _side(grown: Grown, i: int, step: float, scale: float) -> list[tuple[float, float]]:
+    """Values of an unknown on one side and the rise of chi^2 there, up to where it is enough."""
+    problem, u = grown.problem, grown.problem.unknowns
+    theta, starts, least = grown.theta, grown.starts, _cost(grown, grown.theta, grown.starts)
+    rows: list[tuple[float, float]] = []
+    for k in range(1, _STEPS + 1):
+        value = grown.theta[i] + k * _STEP * step
+        if not u.low[i] <= value <= u.high[i]:
+            break
+        low, high, theta = u.low.copy(), u.high.copy(), theta.copy()
+        low[i] = high[i] = theta[i] = value
+        try:
+            theta, starts, _, _ = settle(
+                replace(problem, unknowns=replace(u, low=low, high=high)), theta, starts, 0.0, [True] * len(starts),
+                u.centre, u.precision, 50, False, (low, high), LEAST,
+            )  # fmt: skip
+        except Unsettled as reason:
+            theta, starts = reason.values, reason.starts
+        rise = (_cost(grown, theta, starts) - least) * scale
+        if not np.isfinite(rise):
+            break
+        rows.append((float(value), rise))
+        if rise > _ENOUGH:
+            break
+    return rows
+
+
+def _cost(grown: Grown, theta: FloatArray, starts: FloatArray) -> float:
+    problem, u = grown.problem, grown.problem.unknowns
+    state = problem.residuals(theta, starts)
+    data = sum(float(np.sum((r * w) ** 2)) for r, w in zip(state.residuals, problem.weights(state, 0.0), strict=True))
+    return data + float((theta - u.centre) @ u.precision @ (theta - u.centre))
+
+
+def _finding(grown: Grown, name: str, profile: Profile, estimate: Estimate, synthetic: bool) -> Finding:
+    import xarray as xr
+
+    ends = {"low": profile.low, "high": profile.high}
+    low, high = (f"{end:.4g}" if np.isfinite(end) else "no limit" for end in ends.values())
+    by_error = " to ".join(f"{end:.4g}" for end in estimate.interval())
+    note = f"{name}: 95 % limits {low} to {high} by its profile; {by_error} by its standard uncertainty"
+    if not np.isfinite(list(ends.values())).all():
+        note += "; the record does not bound it on both sides"
+    readings = sum(len(window.readings[0]) for window in grown.problem.pieces)
+    return Finding(
+        f"{name}, profile", estimate, METHOD, readings, tuple(record.name for record in grown.problem.records), (note,),
+        data=xr.Dataset(
+            {"cost": ("value", profile.cost), "best": ((), profile.best), **{k: ((), v) for k, v in ends.items()}},
+            {"value": ("value", profile.values, {"units": estimate.unit})},
+            {"parameter": name, "units": estimate.unit, "synthetic": "yes" if synthetic else "no"},
+        ),
+        plot="profile",
+    )  # fmt: skip

@@ -1,0 +1,151 @@
+"""The march itself, on curves with a closed form: no orbit, no kernel."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+
+from nonsmooth.continuation.march.arclength import Curve, Point
+from nonsmooth.continuation.march.event import Crossing, Event, Fold, Met, Step
+from nonsmooth.continuation.march.march import march
+from nonsmooth.continuation.march.marches import Limits, March
+from nonsmooth.continuation.problems.equilibrium import Equilibria
+from nonsmooth.continuation.problems.locus import Locus
+from nonsmooth.continuation.problems.orbits import Orbits
+
+Array = np.ndarray
+
+
+@dataclass
+class Solved:
+    X: Array
+    F: Array
+    J: Array
+
+
+class Zero(Event):
+    """The state passes zero."""
+
+    name = "zero"
+
+    def number(self, curve: Any, point: Any) -> float:
+        return float(point.X[0])
+
+
+class Half(Event):
+    """A boundary at x = 1/2, behind which another equation holds."""
+
+    name = "half"
+
+    def number(self, curve: Any, point: Any) -> float:
+        return float(curve.margins(point)[0])
+
+    def happened(self, step: Step, was: float, now: float) -> bool:
+        return now < 0.0 <= was
+
+
+class Plane(Curve[Point]):
+    """f(x, p) = 0, in units that differ."""
+
+    kinds = (Fold(), Crossing(), Zero())
+
+    def __init__(self, f: Callable[[float, float], tuple[float, float, float]], beyond: Any = None) -> None:
+        self.f, self.next, self.scale = f, beyond, np.array([2.0, 0.5])
+        self.boundaries = (Half(),) if beyond else ()
+
+    def evaluate(self, Y: Array) -> Solved:
+        f, f_x, f_p = self.f(*(Y * self.scale))
+        return Solved(Y * self.scale, np.array([f]), np.array([[f_x, f_p]]) * self.scale)
+
+    def fill(self, solved: Solved, matrix: Array) -> None:
+        matrix[:] = solved.J
+
+    def residual(self, solved: Solved) -> Array:
+        return solved.F
+
+    def moved(self, solved: Solved, Y: Array) -> Solved:
+        return self.evaluate(Y)
+
+    def described(self, Y: Array, tangent: Array, orientation: float, iterations: int, solved: Solved) -> Point:
+        return Point(Y, tangent, orientation, iterations, solved)
+
+    def margins(self, point: Point) -> Array:
+        return np.array([point.X[0] - 0.5]) if self.boundaries else np.empty(0)
+
+    def behind(self, found: March, met: list[Met]) -> tuple[Plane, Point] | None:
+        found.mark(met[0].name, self, met[0].point)
+        point = self.next.at_parameter(met[0].point.X / self.scale, met[0].point.value)
+        return self.next, point.facing(met[0].point.tangent[-1])
+
+
+def circle() -> Plane:
+    return Plane(lambda x, p: (x * x + p * p - 1.0, 2 * x, 2 * p))
+
+
+def run(curve: Plane, x: float, p: float, way: float, *, low: float = -4.0, high: float = 4.0, **more: Any) -> March:
+    first = curve.at_parameter(np.array([x, p]) / curve.scale, p)
+    assert first is not None
+    first = first.facing(way)
+    closed = (curve.word(), first.X) if more.pop("closes", False) else None
+    return march(curve, first, Limits(((-1, low, high),), 0.05, more.pop("points", 500), closed))
+
+
+def test_a_circle_closes_with_two_folds() -> None:
+    """x^2 + p^2 = 1: folds at p = 1 and -1, where x passes zero too; the last point is the first."""
+    found = run(circle(), -0.8, 0.6, 1.0, closes=True)
+    assert found.ending == "closed"
+    assert sorted((one.kind, round(one.point.value)) for one in found.special) == [
+        ("fold", -1), ("fold", 1), ("zero", -1), ("zero", 1),
+    ]  # fmt: skip
+    for one in found.special:
+        assert one.point.X == pytest.approx([0.0, np.sign(one.point.value)], abs=1e-9)
+    X = np.array([row.point.X for row in found.rows])
+    assert np.hypot(*X.T) == pytest.approx(1.0, abs=1e-14)
+    assert X[-1] == pytest.approx([-0.8, 0.6], abs=1e-12)
+
+
+def test_a_range_ends_exactly_at_its_edge() -> None:
+    """The last value is the edge itself; nothing beyond it is listed."""
+    found = run(circle(), 0.8, 0.6, 1.0, high=0.9)
+    assert found.ending == "range" and found.rows[-1].point.value == 0.9 and not found.special
+    assert found.rows[-1].point.X[0] == pytest.approx(np.sqrt(0.19), abs=1e-15)
+    assert run(circle(), 0.8, 0.6, 1.0, points=3).ending == "points"
+
+
+def test_another_branch_crosses() -> None:
+    """x (x - p) = 0: along x = 0 the line x = p is met at the origin, which is no fold."""
+    found = run(Plane(lambda x, p: (x * (x - p), 2 * x - p, -x)), 0.0, -1.0, 1.0, high=1.0)
+    assert [one.kind for one in found.special if one.kind != "zero"] == ["branch_point"]
+    (origin,) = (one.point for one in found.special if one.kind == "branch_point")
+    assert origin.X == pytest.approx([0.0, 0.0], abs=1e-12)
+    assert found.ending == "range"
+
+
+def test_a_branch_goes_on_behind_a_boundary() -> None:
+    """x = p above 1/2, 2 x = p + 1/2 below it: both meet at the boundary, and the end is that of the second."""
+    below = Plane(lambda x, p: (2 * x - p - 0.5, 2.0, -1.0))
+    found = run(Plane(lambda x, p: (x - p, 1.0, -1.0), below), 1.0, 1.0, -1.0, low=-0.1)
+    assert [one.kind for one in found.special] == ["half"] and found.ending == "range"
+    assert found.special[0].point.X == pytest.approx([0.5, 0.5], abs=1e-14)
+    assert found.rows[-1].point.X == pytest.approx([0.2, -0.1], abs=1e-14)
+
+
+def test_no_point_follows_where_the_curve_ends() -> None:
+    """x = sqrt(p), not defined below p = 0.01: Newton's method fails however small the step."""
+
+    def f(x: float, p: float) -> tuple[float, float, float]:
+        return (x - np.sqrt(p) if p >= 0.01 else np.nan), 1.0, -0.5 / np.sqrt(max(p, 0.01))
+
+    found = run(Plane(f), 1.0, 1.0, -1.0)
+    assert found.ending == "no_convergence" and found.rows[-1].point.value == pytest.approx(0.01, abs=1e-7)
+
+
+@pytest.mark.parametrize("problem", [Orbits, Equilibria, Locus])
+@pytest.mark.parametrize("step", ["predicted", "correct", "tangent", "step", "between", "at_edge"])
+def test_problems_share_predictor_and_corrector(problem: type, step: str) -> None:
+    """A second one would have limits of its own."""
+    assert getattr(problem, step) is getattr(Curve, step)
