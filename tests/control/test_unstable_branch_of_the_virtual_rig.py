@@ -117,7 +117,7 @@ def test_the_unstable_branch_lies_in_the_models_band(measured, branch, model):
     unstable = unstable.isel(point=(omega > lower + 0.01) & (omega < upper - 0.01))  # where the amplitude has a value
     part = branch.isel(point=slice(first, last + 1))
     rows = []
-    print("rad/s    held mm  model mm  away um  u_held  u_model  95 %  frictionless  effort mN  noise mN  stability")
+    print("  rad/s  held mm  model mm  away um  u_held  u_model  95 %  frictionless  effort mN  noise mN  stability")
     for k in range(unstable.sizes["point"]):
         one = unstable.isel(point=k)
         near = part.isel(point=int(np.argmin(np.abs(part["omega"].values - float(one["omega"])))))
@@ -128,11 +128,11 @@ def test_the_unstable_branch_lies_in_the_models_band(measured, branch, model):
         away, band = held - size, 1.96 * np.hypot(u_held, u_model)
         rows.append((abs(away) / band, effort / noise, int(one["stability"]), abs(bare) / band, abs(away) / u_model))
         print(
-            f"{w:.5f}  {1e3 * held:7.4f}  {1e3 * size:8.4f}  {1e6 * away:7.1f}  {1e6 * u_held:6.1f}  {1e6 * u_model:7.1f}"
-            f"  {1e6 * band:4.1f}  {1e6 * bare:12.1f}  {1e3 * effort:9.3f}  {1e3 * noise:8.3f}  {rows[-1][2]:9d}"
+            f"{w:.5f}  {1e3 * held:7.4f}  {1e3 * size:8.4f}  {1e6 * away:7.1f}  {1e6 * u_held:6.1f}"
+            f"  {1e6 * u_model:7.1f}  {1e6 * band:4.1f}  {1e6 * bare:12.1f}  {1e3 * effort:9.3f}  {1e3 * noise:8.3f}  {rows[-1][2]:9d}"
         )
     outside, effort, stability, without_friction, in_model = np.array(rows).T
-    print(f"within both uncertainties: {(outside < 1).sum()} of {len(rows)}; the model's only: {(in_model < 1.96).sum()}")
+    print(f"within the band: {(outside < 1).sum()} of {len(rows)}; within the model's part: {(in_model < 1.96).sum()}")
     assert len(rows) >= 10
     np.testing.assert_allclose([folds[begin], folds[end]], [upper, lower], rtol=0.01)
     assert (effort < 2).all()
