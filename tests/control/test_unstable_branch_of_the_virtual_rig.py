@@ -129,7 +129,8 @@ def test_the_unstable_branch_lies_in_the_models_band(measured, branch, model):
         rows.append((abs(away) / band, effort / noise, int(one["stability"]), abs(bare) / band, abs(away) / u_model))
         print(
             f"{w:.5f}  {1e3 * held:7.4f}  {1e3 * size:8.4f}  {1e6 * away:7.1f}  {1e6 * u_held:6.1f}"
-            f"  {1e6 * u_model:7.1f}  {1e6 * band:4.1f}  {1e6 * bare:12.1f}  {1e3 * effort:9.3f}  {1e3 * noise:8.3f}  {rows[-1][2]:9d}"
+            f"  {1e6 * u_model:7.1f}  {1e6 * band:4.1f}  {1e6 * bare:12.1f}"
+            f"  {1e3 * effort:9.3f}  {1e3 * noise:8.3f}  {rows[-1][2]:9d}"
         )
     outside, effort, stability, without_friction, in_model = np.array(rows).T
     print(f"within the band: {(outside < 1).sum()} of {len(rows)}; within the model's part: {(in_model < 1.96).sum()}")
