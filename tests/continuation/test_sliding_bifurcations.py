@@ -1,7 +1,7 @@
 """Sliding bifurcations of a dry-friction oscillator and of a relay against their defining conditions at 30 digits.
 
 The conditions (di Bernardo, Budd, Champneys, Kowalczyk 2008, Chapter 8) are equations for instants and states of the
-events of a periodic orbit, with motion between them in closed form. They are solved from guesses of two or three digits.
+events of a periodic orbit, with motion between them in closed form, solved from guesses of two or three digits.
 """
 
 from __future__ import annotations
@@ -127,9 +127,12 @@ def test_a_fast_belt_from_crossing_to_no_contact() -> None:
     switching = Belt(*case, STICK, BACKWARD).edge(0, FORWARD, 2.16, 5.62, -0.60, 6.06, 0.35)
     grazing = Belt(*case).without_contact()
     same(branch, "v_b", [("crossing_sliding", crossing)])
-    same(ns.continue_orbit(branch, range=(0.05, 3.0)), "v_b", [
+    branch = ns.continue_orbit(branch, range=(0.05, 3.0))
+    same(branch, "v_b", [
         ("crossing_sliding", crossing), ("switching_sliding", switching), ("grazing_sliding", grazing),
     ])  # fmt: skip
+    straight_on = ns.continue_orbit(ns.special_points(branch).isel(special=1), "v_b", (2.0, 2.2), virtual=True)
+    same(straight_on, "v_b", [("switching_sliding", switching)])
 
 
 def test_a_slow_belt_from_two_slips_to_no_contact() -> None:
