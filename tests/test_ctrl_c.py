@@ -55,7 +55,7 @@ def test_ctrl_c_while_a_study_follows_a_branch(
         return step(*arguments)
 
     monkeypatch.setattr(Curve, "step", interrupted)
-    arguments = ["reproduce", "savi2007", "--quick", "--quiet", "--figure", "13", "--out", str(tmp_path)]
+    arguments = ["reproduce", "savi2007", "--quick", "--quiet", "--figure", "fig13", "--out", str(tmp_path)]
     assert cli.main(arguments) == 130
     assert capsys.readouterr().err.splitlines()[-1] == "nonsmooth: interrupted"
     assert next(steps, None) is None  # it was a branch that was interrupted

@@ -32,7 +32,9 @@ def special_points(branch: Any) -> xr.Dataset:
         branch_point, hopf, boundary_equilibrium): ``u``, ``eigenvalues``, ``stable``, ``mode``. At a graze
         ``floquet_multipliers`` are those without the contact, ``contact_multipliers`` those with it in the limit,
         ``grazing`` says ``persistence`` or ``non_smooth_fold``, ``determinant`` holds det(I - M-), det(I - M+),
-        det(I + M-), det(I + M+). One row, ``.isel(special=0)``, can be given to ``continue_orbit``.
+        det(I + M-), det(I + M+). ``sliding`` names the bifurcation where a visit of a sliding mode begins, ends or
+        is split: ``grazing_sliding``, ``crossing_sliding``, ``switching_sliding``, ``adding_sliding``; else it is
+        empty. One row, ``.isel(special=0)``, can be given to ``continue_orbit``.
 
     Raises
     ------
@@ -53,7 +55,7 @@ def special_points(branch: Any) -> xr.Dataset:
     table = orbits.reset_coords(name)
     marks = {
         stem: branch[f"special_{stem}"]
-        for stem in ("kind", "point", "indicator", "grazing", "bounded", "doubled", "contact_multipliers",
+        for stem in ("kind", "point", "indicator", "grazing", "sliding", "bounded", "doubled", "contact_multipliers",
                      "determinant")
     }  # fmt: skip
     # The touched indicator is a word of each row, beside the dim of the clearances.

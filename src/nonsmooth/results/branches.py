@@ -40,6 +40,7 @@ _MARKS: dict[str, tuple[str, tuple[str, ...], str]] = {
     "place": ("special_point", (), "its place among the points"),
     "indicator": ("special_indicator", (), "indicator that is touched"),
     "grazing": ("special_grazing", (), "what happens at the graze (Feigin)"),
+    "sliding": ("special_sliding", (), "sliding bifurcation"),
     "bounded": ("special_bounded", (), "multipliers stay bounded at the graze"),
     "doubled": ("special_doubled", (), "an orbit of twice the period branches off at the graze"),
     "contact": ("special_contact_multipliers", ("multiplier",), "multipliers with the contact, in the limit"),
@@ -83,7 +84,7 @@ def branch(
     variables["status"] = ("point", np.zeros(len(along), np.int8), status_attributes())
     for name, (stem, dims, long_name) in _MARKS.items():
         column = marks[name]
-        array = strings(column) if name in ("kind", "indicator", "grazing") else np.asarray(column)
+        array = strings(column) if name in ("kind", "indicator", "grazing", "sliding") else np.asarray(column)
         variables[stem] = (("special", *dims), array, {"long_name": long_name})
     variables["special_value"] = _special_value(d, parameter, along, marks["place"])
     variables["period_number"] = ((), np.int64(period_number), {"long_name": f"{d.turn}s (0: autonomous)"})

@@ -77,6 +77,7 @@ def branch_dataset(system: System, record: BranchRecord, options: dict[str, Any]
         "place": np.array([s.place for s in special], dtype=np.int64),
         "indicator": [names[s.indicator + 1] for s in special],
         "grazing": [s.grazing for s in special],
+        "sliding": [s.sliding for s in special],
         "bounded": np.array([s.bounded for s in special], dtype=bool),
         "doubled": np.array([s.doubled for s in special], dtype=bool),
         "contact": np.array(

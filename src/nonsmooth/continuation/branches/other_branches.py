@@ -73,7 +73,7 @@ def straight_on(start: xr.Dataset, name: str | None, asked: Asked) -> xr.Dataset
     here = one_row(start, "continue_orbit")
     mark = SpecialRecord(
         kind, 0, ["", *system.indicators].index(str(here["touched"].values)) - 1,
-        str(here["grazing"].values), bool(here["bounded"]), bool(here["doubled"]),
+        str(here["grazing"].values), str(here["sliding"].values), bool(here["bounded"]), bool(here["doubled"]),
         here["contact_multipliers"].values, here["determinant"].values,
     )  # fmt: skip
     return branch.result(period_number, back, [point_record(curve, first)], ahead, [mark], origin=kind)

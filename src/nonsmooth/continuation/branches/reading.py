@@ -210,8 +210,8 @@ def _special(row: xr.Dataset, system: System, points: int) -> SpecialRecord:
     contact = get("contact_multipliers")
     return SpecialRecord(
         str(get("kind")), _place(int(get("point")), points, "point"),
-        ["", *system.indicators].index(str(get("indicator"))) - 1, str(get("grazing")), bool(get("bounded")),
-        bool(get("doubled")), None if np.isnan(contact).all() else contact, get("determinant"),
+        ["", *system.indicators].index(str(get("indicator"))) - 1, str(get("grazing")), str(get("sliding")),
+        bool(get("bounded")), bool(get("doubled")), None if np.isnan(contact).all() else contact, get("determinant"),
     )  # fmt: skip
 
 

@@ -47,6 +47,7 @@ class SpecialRecord:
     place: int
     indicator: int = -1
     grazing: str = ""
+    sliding: str = ""
     bounded: bool = True
     doubled: bool = False
     contact: NDArray[np.complex128] | None = None  # multipliers with the contact, in the limit
@@ -80,7 +81,7 @@ def point_record(curve: Orbits, point: OrbitPoint, virtual: bool = False) -> Poi
 
 def special_record(special: Special) -> SpecialRecord:
     """Record of a special point."""
-    record = SpecialRecord(special.kind, special.row, special.indicator)
+    record = SpecialRecord(special.kind, special.row, special.indicator, sliding=special.sliding)
     g = special.graze
     if g is not None:
         one = np.eye(len(g.M_free))

@@ -106,6 +106,7 @@ class Special:
     row: int = -1
     indicator: int = -1
     graze: Graze | None = None
+    sliding: str = ""
 
 
 @dataclass

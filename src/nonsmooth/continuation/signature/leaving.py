@@ -14,6 +14,7 @@ from nonsmooth.continuation.problems.symmetry import is_doubled
 from nonsmooth.continuation.signature.change import Change, common_point, past_the_section
 from nonsmooth.continuation.signature.grazing import graze
 from nonsmooth.continuation.signature.neighbours import beside
+from nonsmooth.continuation.signature.sliding import sliding_bifurcation
 
 if TYPE_CHECKING:
     from nonsmooth.continuation.march.marches import March
@@ -70,11 +71,12 @@ def contacts_of(curve: Orbits, met: list[Met]) -> list[tuple[Change, OrbitPoint]
 def mark(found: March, curve: Orbits, met: list[Met], beyond: tuple[Orbits, OrbitPoint] | None) -> str:
     """Record the end of a signature, by the contact that begins or ends there where one does; its name."""
     kind, point = met[0].kind, met[0].point
+    sliding = "" if beyond is None else sliding_bifurcation(curve, point, *beyond)
     if beyond is not None:
         cycle = beyond[0].shooting.signature.cycle
         for change, there in contacts_of(curve, met):
             if change.signature.cycle == cycle:
-                _mark_graze(found, curve, there, change, beyond)
+                _mark_graze(found, curve, there, change, beyond, sliding)
                 return "grazing"
         end = _from_behind(point, *beyond)
         if end is not None and _is_better(curve, met[0], beyond[0], end.point):
@@ -82,7 +84,7 @@ def mark(found: March, curve: Orbits, met: list[Met], beyond: tuple[Orbits, Orbi
     own = kind.contacts(curve, point)
     name = "grazing" if own else kind.name
     indicator = own[0].indicator if own else kind.surface(curve, point, beyond and beyond[0])
-    found.mark(name, curve, point, indicator=indicator)
+    found.mark(name, curve, point, indicator=indicator, sliding=sliding)
     return name
 
 
@@ -113,13 +115,13 @@ def _condition(curve: Orbits, point: OrbitPoint) -> float:
 
 
 def _mark_graze(
-    found: March, curve: Orbits, point: OrbitPoint, change: Change, after: tuple[Orbits, OrbitPoint]
+    found: March, curve: Orbits, point: OrbitPoint, change: Change, after: tuple[Orbits, OrbitPoint], sliding: str
 ) -> None:
     """Record a graze: the orbit without the contact, whichever side the branch came from."""
     fresh, first = after
     judged = graze(curve, point, first, change)
     free = (curve, point) if change.gained else (fresh, common_point(curve, point, change) or first)
-    found.mark("grazing", *free, indicator=change.indicator, graze=judged)
+    found.mark("grazing", *free, indicator=change.indicator, graze=judged, sliding=sliding)
 
 
 def gained(curve: Orbits, fresh: Orbits) -> int:
