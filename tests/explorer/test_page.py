@@ -166,7 +166,7 @@ def test_a_diagram_of_one_direction_stays_drawn_while_another_is_computed(page: 
     }""")
     page.until('Bokeh.documents[0].get_model_by_name("diagram").left[0].axis_label === "x (mm)"')
     page.until_done()
-    assert [word for word, _ in page.ui()["legend"]] == ["up", "down"]
+    assert [word for word, _ in page.ui()["legends"]["diagram"]] == ["up", "down"]
 
 
 def test_two_tabs_do_not_disturb_each_other(page: Any, server: Any, new_page: Callable[..., Any]) -> None:

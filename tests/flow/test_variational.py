@@ -397,7 +397,7 @@ def scaled_differences(system, state, duration, active):
     return np.stack([one for one, _ in found], axis=1), [error for _, error in found]
 
 
-@pytest.mark.parametrize("name", ["P", "end", "parameter", "trace_defect"])
+@pytest.mark.parametrize("name", ["P", "end", "parameter", "log_det"])
 def test_a_parameter_may_have_the_name_of_a_variable_of_the_result(name: str) -> None:
     """x'' = -P x from x = 1: x(t) = cos(sqrt(P) t), and its derivative in P is -t sin(sqrt(P) t) / (2 sqrt(P))."""
     system = ns.System(

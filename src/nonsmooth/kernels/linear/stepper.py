@@ -90,7 +90,8 @@ def blocked(tables, work, mode, rows, lo, hi, h, w1):
         g1 = sign * value_of(tables, mode, f, w1)
         s0 = sign * slope_of(tables, mode, f, w)
         s1 = sign * slope_of(tables, mode, f, w1)
-        if f < zero.shape[0] and zero[f] != 0:
+        if f < zero.shape[0] and zero[f] != 0:  # what it is not zero by is rounding, all the time
+            g1 -= g0
             g0 = 0.0
             if zero[f] >= 2:
                 s0 = 0.0
