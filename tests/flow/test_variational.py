@@ -418,3 +418,25 @@ def test_errors_at_the_door() -> None:
         sensitivity(system)
     with pytest.raises(SolveError, match="beyond"):
         sensitivity(ns.models.impact_oscillator(), periods=1, start={"x": 5.0})
+
+
+def test_a_steep_layer_in_the_middle_of_a_step_is_not_passed_over() -> None:
+    """Friction F tanh(v / s) turns over within 1 mm/s: nothing of that shows in a series begun far from v = 0."""
+    from scipy.integrate import solve_ivp
+
+    F, s, w = 0.3, 1e-3, 0.7
+    system = ns.System(
+        states=["x", "v"], parameters={"F": F, "s": s, "w": w},
+        modes={"one": lambda t, u, p: (u.v, np.cos(p.w * t) - u.x - 0.05 * u.v - p.F * np.tanh(u.v / p.s))},
+    )  # fmt: skip
+
+    def rates(t, z):
+        x, v, *Phi = z
+        bend = -0.05 - F / s / np.cosh(min(abs(v) / s, 300.0)) ** 2
+        Phi = np.reshape(Phi, (2, 2))
+        return [v, np.cos(w * t) - x - 0.05 * v - F * np.tanh(v / s), *(np.array([[0, 1], [-1, bend]]) @ Phi).ravel()]
+
+    true = solve_ivp(rates, (0, 9.0), [2.0, 0.5, 1, 0, 0, 1], method="DOP853", rtol=1e-12, atol=1e-14, max_step=2e-3)
+    found = ns.sensitivity(system, duration=9.0, start={"x": 2.0, "v": 0.5})
+    assert found.end.values == pytest.approx(true.y[:2, -1], abs=1e-8)
+    assert found.Phi.values.ravel() == pytest.approx(true.y[2:, -1], rel=1e-6, abs=1e-9)

@@ -27,6 +27,8 @@ __all__ = ["ORDER", "Crossing", "Ends", "Equations", "Steps", "cross", "follow",
 ORDER = 24
 ACCURACY = 1e-17  # of the last two terms of a series against its largest one
 MOST_STEPS = 100_000  # in one leg
+AGREES = 1e-11  # of a state's size: by how much its series may miss the equations on a step
+PLACES = 3  # on a step where they are compared
 
 _i, _f = types.int64, types.float64
 _f1, _f2, _f3, _i1, _i2 = _f[::1], _f[:, ::1], _f[:, :, ::1], _i[::1], _i[:, ::1]
@@ -167,10 +169,39 @@ def step_end(C, D, equations, mode, order, s, u, X):
 
 
 @device
-def march_one(jet, mode, t0, tau, equations, work, guess):
+def fits(field, mode, t, s, work):
+    """Return whether the series of the states satisfy the equations on a step s, where they are asked.
+
+    A layer (of a steep tanh) that the step reaches far from its begin shows in none of their terms."""
+    C, at, f = work.C, work.X[0], work.Y[0]
+    n_u, order = work.u.shape[0], C.shape[1] - 1
+    for place in range(1, PLACES + 1):
+        x = s * place / PLACES
+        for i in range(n_u):
+            v = C[i, order]
+            for k in range(order - 1, -1, -1):
+                v = v * x + C[i, k]
+            at[i] = v
+        field(mode, t + x, at, work.q, f)
+        for i in range(n_u):
+            slope, top = 0.0, 0.0
+            for k in range(order, 0, -1):
+                slope = slope * x + k * C[i, k]
+            for k in range(order // 2):
+                top = max(top, fabs(C[i, k]) * work.powers[k])
+            if not (fabs((slope - f[i]) * s) <= AGREES * top):
+                return False
+    return True
+
+
+@device
+def march_one(jet, field, mode, t0, tau, equations, work, guess):
     """March u over the time tau; ``total`` is multiplied up. Returns (status, integral of div f, next guess)."""
     C, D, X, Y, total, u = work.C, work.D, work.X, work.Y, work.total, work.u
     n_u, n_c, order = X.shape[0], X.shape[1], C.shape[1] - 1
+    curved = False
+    for e in range(equations.entries.shape[0]):
+        curved = curved or equations.kinds[mode, e] == 2
     for i in range(n_u):
         for c in range(n_c):
             total[i, c] = 1.0 if i == c else 0.0
@@ -191,6 +222,11 @@ def march_one(jet, mode, t0, tau, equations, work, guess):
         if h < remaining:
             guess = h
             h = remaining / float(int(remaining / h) + 1)  # equal steps to the end, were all alike
+        while curved and not fits(field, mode, t0 + sign * done, sign * h, work):
+            h *= 0.5
+            guess = h
+            if not (h > 1e-15 * length):
+                return DIVERGED, divergence, guess
         s = sign * h
         divergence += step_end(C, D, equations, mode, order, s, u, X)
         for i in range(n_u):
@@ -234,7 +270,7 @@ def march_legs(equations, modes, t0, tau, z0, values, ends, work):
         field(mode, t0[leg], u, q, ends.f_begin[leg])
         if guess == inf or guess == 0.0:  # a leg of no length says nothing of the next
             guess = fabs(tau[leg])
-        ends.status[leg], ends.divergence[leg], guess = march_one(jet, mode, t0[leg], tau[leg], equations, work, guess)
+        ends.status[leg], ends.divergence[leg], guess = march_one(jet, field, mode, t0[leg], tau[leg], equations, work, guess)
         field(mode, t0[leg] + tau[leg], u, q, ends.f_end[leg])
         for i in range(n):
             ends.z[leg, i] = u[i] if i < n_u else z0[leg, i]
