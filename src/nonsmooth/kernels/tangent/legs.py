@@ -270,7 +270,9 @@ def march_legs(equations, modes, t0, tau, z0, values, ends, work):
         field(mode, t0[leg], u, q, ends.f_begin[leg])
         if guess == inf or guess == 0.0:  # a leg of no length says nothing of the next
             guess = fabs(tau[leg])
-        ends.status[leg], ends.divergence[leg], guess = march_one(jet, field, mode, t0[leg], tau[leg], equations, work, guess)
+        ends.status[leg], ends.divergence[leg], guess = march_one(
+            jet, field, mode, t0[leg], tau[leg], equations, work, guess
+        )
         field(mode, t0[leg] + tau[leg], u, q, ends.f_end[leg])
         for i in range(n):
             ends.z[leg, i] = u[i] if i < n_u else z0[leg, i]
