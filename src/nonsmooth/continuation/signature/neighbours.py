@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,6 +30,7 @@ FloatArray = NDArray[np.float64]
 ASIDE = (1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4)  # of the range: how far beyond the boundary orbits are looked for
 NEARER = 0.1  # once more at this part of it: an orbit that the branch goes on with comes nearer
 SHRINKS = 0.5  # by at least this factor (a square root: 0.32)
+CHAIN = 3  # distances over which orbits of other signatures are seen to come nearer
 NEAR = 0.05  # of the orbit's size
 PERTURBED = 12  # rounds from about the orbit, on each side
 POWERS = (2.0, 1.0, 0.5)  # of the distance in the parameter: how far from it, beside a square root as beside a kink
@@ -46,23 +48,30 @@ def beside(
     ``contacts`` are those that may begin or end there. Its tangent leads away from there. None where there is none, or
     no simulated round shows it."""
     common = [end for change, there in contacts if (end := common_orbit(curve, there, change)) is not None]
-    forward = float(np.sign(point.tangent[-1])) or 1.0
+    forward, here = float(np.sign(point.tangent[-1])) or 1.0, float(point.X[-1])
+    nearest: dict[float, list[float]] = {forward: [], -forward: []}  # of those found, at each distance
     for aside in ASIDE:
-        for side in (forward, -forward):
-            found = _at(curve, point, common, side, aside)
-            if found is not None:
-                return found
+        for side, before in nearest.items():
+            least = np.inf
+            for other, found in _found(curve, point, common, side, aside):
+                apart = _apart(curve, point, found)
+                if (_arrives(curve, point, other, found, here) or _shrink([*before, apart])) and not _leads_back(
+                    curve, point, found
+                ):
+                    facing = side * float(found.tangent[-1]) >= 0.0
+                    return other, found if facing else found.turned()
+                least = min(least, apart)
+            before.append(least)
     return None
 
 
-def _at(
+def _found(
     curve: Orbits, point: OrbitPoint, common: list[tuple[Orbits, Solved, FloatArray]], side: float, aside: float
-) -> tuple[Orbits, OrbitPoint] | None:
-    """The orbit at one distance on one side of the parameter."""
+) -> Iterator[tuple[Orbits, OrbitPoint]]:
+    """Orbits at one distance on one side of the parameter that simulated rounds show, on curves of their own."""
     shooting = curve.shooting
     values = point.solved.values.copy()
-    here = float(point.X[-1])
-    values[shooting.places] = there = np.array([here + side * aside * curve.width])
+    values[shooting.places] = there = np.array([float(point.X[-1]) + side * aside * curve.width])
     rounds = curve.rounds
     tried = Counter({shooting.signature.cycle: AGAIN})
     for guess in _guesses(curve, point, common, rounds, values, side, aside):
@@ -75,12 +84,9 @@ def _at(
             if found is None or not _apart(curve, point, found) < NEAR:
                 break
             if not found.virtual and rounds.shows(other.shooting, found.X, values):
-                if not _arrives(curve, point, other, found, here) or _leads_back(curve, point, found):
-                    break
-                facing = side * float(found.tangent[-1]) >= 0.0
-                return other, found if facing else found.turned()
+                yield other, found
+                break
             guess = rounds.read(other.shooting, found.X, values)  # no orbit of the system: what its round shows is next
-    return None
 
 
 def _guesses(
@@ -125,6 +131,14 @@ def _arrives(curve: Orbits, point: OrbitPoint, other: Orbits, found: OrbitPoint,
     value = here + NEARER * (float(found.X[-1]) - here)
     nearer = other.at_parameter(found.Y, value)
     return nearer is not None and _apart(curve, point, nearer) <= SHRINKS * _apart(curve, point, found) + 1e-9
+
+
+def _shrink(distances: list[float]) -> bool:
+    """Return whether orbits of whatever signature come nearer and nearer: the last one belongs to the branch.
+
+    Where impacts accumulate no signature lasts from one distance to the next."""
+    last = distances[-CHAIN:]
+    return len(last) == CHAIN and all(a <= SHRINKS * b for a, b in pairwise(last))
 
 
 def _leads_back(curve: Orbits, point: OrbitPoint, found: OrbitPoint) -> bool:

@@ -144,9 +144,12 @@ class Walk:
         )  # fmt: skip
         if status:
             return None
+        # Beside a boundary that has just been crossed only what is solved for tells which side is meant.
+        near = np.where(self.crossed[self.every[:, None], self.net.rows[begin_row, 0]], SOLVED, ROUNDING)
+        zero = np.abs(begin) <= near * size
         # Where several rows vanish as a visit begins, a lift-off, rounding of one is no maximum of another.
         begun = place - solved.times[:-1, None] <= BEGUN * float(solved.times[-1])
-        inner[begun & (np.maximum(np.abs(inner), np.abs(begin)) <= ROUNDING * size)] = -np.inf
+        inner[begun & zero & (np.abs(inner) <= ROUNDING * size)] = -np.inf
         at = int(inner.argmax()) if n_t else 0
         touched = (at // n_t, at % n_t) if n_t else (0, 0)
         own = end[self.inside]
@@ -158,7 +161,7 @@ class Walk:
         else:
             other, others = np.zeros(m - 1, dtype=np.int64), np.full(m - 1, -np.inf)
         watched = m > 1 and len(self.net.rows) > 2  # the section is passed, nothing has led there
-        held = self._held(begin, begin_row, size) if watched else np.full((m, 1), -np.inf)
+        held = self._held(begin, zero) if watched else np.full((m, 1), -np.inf)
         landing = held.argmax(axis=1)
         extremes[~np.isfinite(extremes)] = np.nan  # states that no visit has
         return Path(
@@ -167,12 +170,8 @@ class Walk:
             held[self.every, landing], landing,
         )  # fmt: skip
 
-    def _held(self, begin: FloatArray, row: NDArray[np.int64], size: FloatArray) -> FloatArray:
-        """Margins where the visits begin; -inf for those that are zero there.
-
-        Beside a boundary that has just been crossed only what is solved for tells which side is meant."""
-        near = np.where(self.crossed[self.every[:, None], self.net.rows[row, 0]], SOLVED, ROUNDING)
-        zero = np.abs(begin) <= near * size
+    def _held(self, begin: FloatArray, zero: NDArray[np.bool_]) -> FloatArray:
+        """Margins where the visits begin; -inf for those that are ``zero`` there."""
         held = np.where(self.armed & ~zero, begin, -np.inf)
         held[0] = -np.inf
         for i in self.instants:  # what happens at once must hold; the others: ``elsewhere``
