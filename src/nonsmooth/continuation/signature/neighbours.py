@@ -30,6 +30,7 @@ FloatArray = NDArray[np.float64]
 ASIDE = (1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4)  # of the range: how far beyond the boundary orbits are looked for
 NEARER = 0.1  # once more at this part of it: an orbit that the branch goes on with comes nearer
 SHRINKS = 0.5  # by at least this factor (a square root: 0.32)
+LINEAR = 0.2  # by at least this factor, orbits of other signatures
 CHAIN = 3  # distances over which orbits of other signatures are seen to come nearer
 NEAR = 0.05  # of the orbit's size
 PERTURBED = 12  # rounds from about the orbit, on each side
@@ -138,7 +139,7 @@ def _shrink(distances: list[float]) -> bool:
 
     Where impacts accumulate no signature lasts from one distance to the next."""
     last = distances[-CHAIN:]
-    return len(last) == CHAIN and all(a <= SHRINKS * b for a, b in pairwise(last))
+    return len(last) == CHAIN and all(a <= LINEAR * b for a, b in pairwise(last))
 
 
 def _leads_back(curve: Orbits, point: OrbitPoint, found: OrbitPoint) -> bool:
