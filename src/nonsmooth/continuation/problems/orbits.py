@@ -34,7 +34,6 @@ __all__ = ["OrbitPoint", "Orbits"]
 
 FloatArray = NDArray[np.float64]
 AHEAD = 1e-6  # of the range
-NOTHING = 1e-12  # of the period: so short a visit has no length
 
 
 @dataclass
@@ -131,11 +130,6 @@ class Orbits(Curve[OrbitPoint]):
         if path is None or not np.isfinite(M).all():
             return None
         return OrbitPoint(Y, tangent, orientation, iterations, solved, M, multipliers_of(M), path)
-
-    def step(self, point: OrbitPoint, ds: float, before: OrbitPoint | None = None) -> OrbitPoint | None:
-        """The orbit at distance ds; None too where a visit has no length: a flight has that root where it begins."""
-        new = super().step(point, ds, before)
-        return None if new is None or abs(float(new.path.tau.min())) < NOTHING * float(new.solved.times[-1]) else new
 
     def word(self) -> Signature:
         """The signature."""

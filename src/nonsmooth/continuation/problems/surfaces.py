@@ -40,11 +40,13 @@ def look_at_surfaces(shooting: Shooting, X: FloatArray) -> None:
     for i in range(1, shooting.m):
         k, row, at, _ = shooting.jumps[i]
         k0, row0, at0, _ = shooting.jumps[i - 1]
-        if at is not None or at0 is not None or shooting.at_once[i] or visits[i].mode == visits[i - 1].mode:
+        if at is not None or at0 is not None or shooting.at_once[i]:
             continue
         entry = shooting.flow.jump(values, k0, float(times[i - 1]), z[i], row0)
         leave = shooting.flow.jump(values, k, float(times[i - 1]), z[i], row)
-        shooting.divided[i] = _coincide(entry.h_z, entry.h, -leave.h_z, -leave.h, z[i])
+        side = 1.0 if visits[i].mode == visits[i - 1].mode else -1.0  # from impact to impact, or in and out
+        kept = _coincide(entry.h_z, entry.h, entry.h_z @ entry.R[: shooting.n, : shooting.n], entry.h, z[i])
+        shooting.divided[i] = kept and _coincide(entry.h_z, entry.h, side * leave.h_z, side * leave.h, z[i])
 
 
 def divide(
