@@ -131,6 +131,15 @@ class Slow(Boundary):
 class Own(Boundary):
     """Two rows of the condition that fires vanish together."""
 
+    def contacts(self, curve: Any, point: Any) -> list[Change]:
+        """The orbit without the last impacts before rest: the one that is as slow as impacts are followed, and all after."""
+        visits, i = curve.shooting.signature.visits, self.crossing(curve, point)[0]
+        rests = i
+        while visits[rests].transition == visits[i].transition:
+            rests += 1
+        is_impact = visits[rests].mode == visits[i].mode and visits[rests].row >= 0
+        return [without(curve, point, i, rests - i)] if is_impact else []
+
     def crossing(self, curve: Any, point: Any) -> tuple[int, int, Any, int]:
         """The crossing with the least other row."""
         visit = int(curve.walk.conditional[int(point.path.own.argmin())])

@@ -22,6 +22,7 @@ ORDER = 20
 RTOL = 1e-15
 ROUNDING = 1e-13  # of an indicator's size
 BEGUN = 1e-10  # of the period
+SHORT = 1e-6  # of the period
 SOLVED = 1e-6  # of its size: as near to a boundary just crossed as an orbit is solved for
 
 
@@ -150,6 +151,9 @@ class Walk:
         # Where several rows vanish as a visit begins, a lift-off, rounding of one is no maximum of another.
         begun = place - solved.times[:-1, None] <= BEGUN * float(solved.times[-1])
         inner[begun & zero & (np.abs(inner) <= ROUNDING * size)] = -np.inf
+        # In a flight as short as those before rest an indicator does not rise above what it is solved for.
+        flown = tau < SHORT * float(solved.times[-1])
+        inner[flown[:, None] & (np.abs(inner) <= ROUNDING * size.max(axis=0))] = -np.inf
         at = int(inner.argmax()) if n_t else 0
         touched = (at // n_t, at % n_t) if n_t else (0, 0)
         own = end[self.inside]
