@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from nonsmooth.continuation.march.event import Event, Met, Step
     from nonsmooth.continuation.march.marches import March
 
-__all__ = ["Curve", "Point", "passes_through"]
+__all__ = ["Curve", "Point", "passing"]
 
 FloatArray = NDArray[np.float64]
 DONE = 1e-9  # a step this small is followed by one of its square
@@ -132,6 +132,10 @@ class Curve(ABC, Generic[P]):
     def word(self) -> Any:
         """Return what tells curves of one branch apart."""
         return None
+
+    def seen(self, X: FloatArray) -> FloatArray:
+        """What unknowns of all curves of one branch have in common and determines the others, scaled."""
+        return X / self.scale
 
     def margins(self, point: P) -> FloatArray:
         """The numbers that turn negative beyond the boundaries."""
@@ -312,8 +316,8 @@ class Curve(ABC, Generic[P]):
         return point
 
 
-def passes_through(Y: FloatArray, a: FloatArray, b: FloatArray) -> bool:
-    """Return whether the step from a to b goes through Y, as nearly as a chord follows a curve."""
+def passing(Y: FloatArray, a: FloatArray, b: FloatArray) -> float | None:
+    """The part of the step from a to b after which it goes through Y, as nearly as a chord follows a curve, or None."""
     step = b - a
     x = float(step @ (Y - a)) / float(step @ step)
-    return 1e-9 < x <= 1.0 and float(np.abs(Y - a - x * step).max()) < 0.3 * float(np.abs(step).max())
+    return x if 1e-9 < x <= 1.0 and float(np.abs(Y - a - x * step).max()) < 0.3 * float(np.abs(step).max()) else None

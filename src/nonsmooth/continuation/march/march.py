@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.continuation.march.arclength import Curve, passes_through
+from nonsmooth.continuation.march.arclength import Curve, passing
 from nonsmooth.continuation.march.event import Step, first_met, special_on
 from nonsmooth.continuation.march.marches import Limits, March, Place
 
@@ -185,8 +185,9 @@ def _easy(iterations: int, bend: float, spread: float) -> float:
 
 def came_back(place: Place | None, step: Step) -> float | None:
     """Distance along the step at which the branch comes back to a place; None where it does not."""
-    a, b = step.a, step.b
-    if place is None or place[0] != step.curve.word() or float(np.abs(b.Y - a.Y).max()) >= 0.2:
+    if place is None or float(np.abs(step.b.Y - step.a.Y).max()) >= 0.2:
         return None
-    Y = place[1] / step.curve.scale
-    return float(a.tangent @ (Y - a.Y)) if passes_through(Y, a.Y, b.Y) else None
+    word, X = place
+    seen = (lambda X: X / step.curve.scale) if word == step.curve.word() else step.curve.seen
+    x = passing(seen(X), seen(step.a.X), seen(step.b.X))
+    return None if x is None else x * step.end

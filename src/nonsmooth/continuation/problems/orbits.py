@@ -135,6 +135,10 @@ class Orbits(Curve[OrbitPoint]):
         """The signature."""
         return self.shooting.signature
 
+    def seen(self, X: FloatArray) -> FloatArray:
+        """The state at the section and the parameters: how many impacts are completed as rest may differ."""
+        return np.append(X[: self.shooting.n] / self.size, X[-len(self.widths) :] / self.widths)
+
     def margins(self, point: OrbitPoint) -> FloatArray:
         """The margins of the path, in the order of the boundaries."""
         return point.path.margins
