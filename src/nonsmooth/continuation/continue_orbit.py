@@ -120,7 +120,7 @@ def _from_orbit(orbit: Orbit, name: str | None, asked: Asked) -> xr.Dataset:
                          status="no_convergence")  # fmt: skip
     first = first.facing(1.0)
     up, down = in_turn(  # a closed branch needs only one
-        lambda: branch.march(curve, first, (curve.word(), first.X)),
+        lambda: branch.march(curve, first, curve.place(first)),
         lambda: branch.march(curve, first.facing(-1.0)),
     )
     marks = [SpecialRecord(kind, 0) for kind in _at_the_start(curve, first, down, up)]
@@ -176,7 +176,8 @@ def _go_on(start: xr.Dataset, name: str | None, asked: Asked) -> xr.Dataset:
             ends[side] = March(ending="no_convergence")
             continue
         other = record.points[-1 if side == 0 else 0]
-        closed = (other.signature, other.X) if len(record.points) > 1 else None
+        shape = curve.shape(other.maximum, other.minimum, other.X)
+        closed = (other.signature, other.X, shape) if len(record.points) > 1 else None
         begun[side] = partial(branch.march, curve, begin, closed)
     for side, more in zip(begun, in_turn(*begun.values()), strict=True):
         ends[side] = more

@@ -48,9 +48,10 @@ def switched(start: xr.Dataset, name: str | None, asked: Asked) -> xr.Dataset:
                 break
     if not begun:
         raise SolveError(f"no other branch was found at this {kind}", status="no_convergence")
-    closed = (ways[0][0].word(), ways[0][1] * ways[0][0].scale)
+    here = _origin(*ways[0])
+    closed = (here.signature, here.X, ways[0][0].shape(here.maximum, here.minimum, here.X))
     ahead, *others = in_turn(*(partial(branch.march, *one, closed) for one in begun))
-    middle, mark = [_origin(*ways[0]), point_record(*begun[0])], SpecialRecord(kind, 0)
+    middle, mark = [here, point_record(*begun[0])], SpecialRecord(kind, 0)
     back = March(ending="branching", said=f"The branch begins at the {kind}.")
     if others:
         back, mark.place = others[0], 1

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from typing import Self
 
     from nonsmooth.continuation.march.event import Event, Met, Step
-    from nonsmooth.continuation.march.marches import March
+    from nonsmooth.continuation.march.marches import March, Place
 
 __all__ = ["Curve", "Point", "passing"]
 
@@ -133,9 +133,13 @@ class Curve(ABC, Generic[P]):
         """Return what tells curves of one branch apart."""
         return None
 
-    def seen(self, X: FloatArray) -> FloatArray:
-        """What unknowns of all curves of one branch have in common and determines the others, scaled."""
-        return X / self.scale
+    def seen(self, point: P) -> FloatArray:
+        """What points of all curves of one branch have, whatever their word, scaled."""
+        return point.Y
+
+    def place(self, point: P) -> Place:
+        """What tells that a branch comes back to a point."""
+        return self.word(), point.X, self.seen(point)
 
     def margins(self, point: P) -> FloatArray:
         """The numbers that turn negative beyond the boundaries."""
@@ -186,7 +190,8 @@ class Curve(ABC, Generic[P]):
         right = np.empty(self.n)
         last = np.inf
         for i in range(most or self.most):
-            solved = self.evaluate(Y)
+            with np.errstate(over="ignore", invalid="ignore"):  # of a guess that leads nowhere
+                solved = self.evaluate(Y)
             right[:-1] = self.residual(solved)
             right[-1] = border @ Y - level
             try:

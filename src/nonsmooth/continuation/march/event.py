@@ -173,7 +173,7 @@ def locate(step: Step, number: Callable[[Any], float]) -> tuple[float, Any] | No
         if x != x:
             raise ArithmeticError
         if x == 0.0 == s:  # begun where another one of its kind has been passed: not met once more
-            return -float(np.copysign(nothing, at_ends[1]))
+            return float(np.clip(-at_ends[1], -LARGEST, LARGEST))
         return 0.0 if abs(x) < nothing and 0.0 < s < step.end else min(max(x, -LARGEST), LARGEST)
 
     try:

@@ -165,7 +165,7 @@ class _Marching:
             found.ending = ending
             return True
         if len(found.rows) >= 2 * self.again:
-            self.circle, self.again = (curve.word(), new.X), len(found.rows)
+            self.circle, self.again = curve.place(new), len(found.rows)
         self.ds = min(self.ds * self.easy, self.limits.largest)
         anchored = curve.passed(new)
         self.before, self.point = (self.point, new) if anchored is None else (None, anchored)
@@ -187,7 +187,9 @@ def came_back(place: Place | None, step: Step) -> float | None:
     """Distance along the step at which the branch comes back to a place; None where it does not."""
     if place is None or float(np.abs(step.b.Y - step.a.Y).max()) >= 0.2:
         return None
-    word, X = place
-    seen = (lambda X: X / step.curve.scale) if word == step.curve.word() else step.curve.seen
-    x = passing(seen(X), seen(step.a.X), seen(step.b.X))
+    word, X, seen = place
+    if word == step.curve.word():
+        x = passing(X / step.curve.scale, step.a.Y, step.b.Y)
+    else:
+        x = passing(seen, step.curve.seen(step.a), step.curve.seen(step.b))
     return None if x is None else x * step.end

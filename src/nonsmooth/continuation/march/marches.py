@@ -83,8 +83,8 @@ def unless_interrupted(result: xr.Dataset, endings: Sequence[str]) -> xr.Dataset
     )
 
 
-#: The word of a curve (of orbits: the signature), and the unknowns.
-Place = tuple[Any, NDArray[np.float64]]
+#: The word of a curve (of orbits: the signature), the unknowns, and what other curves of the branch have of them.
+Place = tuple[Any, NDArray[np.float64], NDArray[np.float64]]
 
 
 @dataclass

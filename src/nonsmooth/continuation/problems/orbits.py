@@ -135,9 +135,16 @@ class Orbits(Curve[OrbitPoint]):
         """The signature."""
         return self.shooting.signature
 
-    def seen(self, X: FloatArray) -> FloatArray:
-        """The state at the section and the parameters: how many impacts are completed as rest may differ."""
-        return np.append(X[: self.shooting.n] / self.size, X[-len(self.widths) :] / self.widths)
+    def seen(self, point: OrbitPoint) -> FloatArray:
+        """The extremes and the parameters.
+
+        A branch may come back with another count of completed impacts, or forcing periods later in the orbit."""
+        return self.shape(point.path.maximum, point.path.minimum, point.X)
+
+    def shape(self, maximum: FloatArray, minimum: FloatArray, X: FloatArray) -> FloatArray:
+        """The extremes and the parameters of an orbit, scaled."""
+        size = self.size[: len(maximum)]
+        return np.nan_to_num(np.concatenate([maximum / size, minimum / size, X[-len(self.widths) :] / self.widths]))
 
     def margins(self, point: OrbitPoint) -> FloatArray:
         """The margins of the path, in the order of the boundaries."""

@@ -37,7 +37,7 @@ def behind(found: March, curve: Orbits, met: list[Met]) -> tuple[Orbits, OrbitPo
             return after
     first = met[0]
     beyond = beside(curve, first.point, contacts_of(curve, met))
-    if beyond is not None and _is_tolerance(curve, first.kind.surface(curve, first.point, beyond[0])):
+    if beyond is not None and any(_is_tolerance(curve, one.kind.surface(curve, one.point, beyond[0])) for one in met):
         return beyond
     name = mark(found, curve, met, beyond)
     if beyond is None and _is_centre(curve, first):

@@ -23,6 +23,7 @@ RTOL = 1e-15
 ROUNDING = 1e-13  # of an indicator's size
 BEGUN = 1e-10  # of the period
 SHORT = 1e-6  # of the period
+NOTHING = 1e-13  # of the period: where a crossing has passed the section its visit has no length, not a negative one
 SOLVED = 1e-6  # of its size: as near to a boundary just crossed as an orbit is solved for
 
 
@@ -137,7 +138,8 @@ class Walk:
         inner, place, begin, size, end = np.empty((5, m, n_t))
         begin_row, which = np.empty((2, m, n_t), dtype=np.int64)
         slope = np.empty((m, 2))
-        tau = np.where(self.at_once, 0.0, solved.times[1:] - solved.times[:-1])
+        tau = solved.times[1:] - solved.times[:-1]
+        tau[self.at_once | ((tau < 0.0) & (tau > -NOTHING * float(solved.times[-1])))] = 0.0
         status = follow(
             self.functions, ORDER, RTOL, self.weight, self.lacking, self.net, solved.values,
             Visits(self.modes, solved.times[:-1], tau, np.ascontiguousarray(states), self.fired, self.fired_row),
