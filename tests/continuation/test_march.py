@@ -90,7 +90,7 @@ def run(curve: Plane, x: float, p: float, way: float, *, low: float = -4.0, high
     first = curve.at_parameter(np.array([x, p]) / curve.scale, p)
     assert first is not None
     first = first.facing(way)
-    closed = (curve.word(), first.X) if more.pop("closes", False) else None
+    closed = curve.landmark(first) if more.pop("closes", False) else None
     return march(curve, first, Limits(((-1, low, high),), 0.05, more.pop("points", 500), closed))
 
 

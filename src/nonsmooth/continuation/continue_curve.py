@@ -83,7 +83,7 @@ def continue_curve(
     if first is None:
         raise SolveError(f"the curve of the {kind} could not be begun at this point", status="no_convergence")
     allowed = tuple((i - 2, *allowed_range(start, names[i], *ends)) for i, ends in enumerate(box))
-    closed = locus.place(first)
+    closed = locus.landmark(first)
     ahead, back = in_turn(
         lambda: march(locus, first, Limits(allowed, largest, most, closed)),
         lambda: march(locus, first.turned(), Limits(allowed, largest, most)),

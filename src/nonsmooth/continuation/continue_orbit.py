@@ -120,7 +120,7 @@ def _from_orbit(orbit: Orbit, name: str | None, asked: Asked) -> xr.Dataset:
                          status="no_convergence")  # fmt: skip
     first = first.facing(1.0)
     up, down = in_turn(  # a closed branch needs only one
-        lambda: branch.march(curve, first, curve.place(first)),
+        lambda: branch.march(curve, first, curve.landmark(first)),
         lambda: branch.march(curve, first.facing(-1.0)),
     )
     marks = [SpecialRecord(kind, 0) for kind in _at_the_start(curve, first, down, up)]

@@ -137,7 +137,7 @@ class Curve(ABC, Generic[P]):
         """What points of all curves of one branch have, whatever their word, scaled."""
         return point.Y
 
-    def place(self, point: P) -> Place:
+    def landmark(self, point: P) -> Place:
         """What tells that a branch comes back to a point."""
         return self.word(), point.X, self.seen(point)
 

@@ -165,7 +165,7 @@ class _Marching:
             found.ending = ending
             return True
         if len(found.rows) >= 2 * self.again:
-            self.circle, self.again = curve.place(new), len(found.rows)
+            self.circle, self.again = curve.landmark(new), len(found.rows)
         self.ds = min(self.ds * self.easy, self.limits.largest)
         anchored = curve.passed(new)
         self.before, self.point = (self.point, new) if anchored is None else (None, anchored)
@@ -189,7 +189,8 @@ def came_back(place: Place | None, step: Step) -> float | None:
         return None
     word, X, seen = place
     if word == step.curve.word():
-        x = passing(X / step.curve.scale, step.a.Y, step.b.Y)
-    else:
-        x = passing(seen, step.curve.seen(step.a), step.curve.seen(step.b))
+        Y = X / step.curve.scale
+        along = float(step.a.tangent @ (Y - step.a.Y))
+        return along if passing(Y, step.a.Y, step.b.Y) is not None else None
+    x = passing(seen, step.curve.seen(step.a), step.curve.seen(step.b))
     return None if x is None else x * step.end

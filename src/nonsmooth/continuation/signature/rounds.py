@@ -73,7 +73,7 @@ class Rounds:
     def _told(self, transitions: list[int], times: FloatArray, period: float) -> list[int]:
         """The transitions but for impacts that another one follows at once: rounding decides how many come before rest."""
         jumps = self.system.traced.transitions
-        follows = np.append(np.diff(times) < SHORT * period, False)
+        follows = np.diff(times, append=np.inf) < SHORT * period
         return [k for k, at_once in zip(transitions, follows, strict=True)
                 if not (at_once and jumps[k].source == jumps[k].target)]  # fmt: skip
 
