@@ -13,7 +13,7 @@ from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qsl
 
-from bokeh.events import RangesUpdate, Reset, Tap
+from bokeh.events import DoubleTap, RangesUpdate, Reset, Tap
 from bokeh.models import TextInput
 from jinja2 import DictLoader, Environment
 
@@ -142,17 +142,17 @@ class Session:
         document.template_variables["program"] = "\n".join(text for name, text in texts.items() if name.endswith(".js"))
         document.template_variables["panels"] = PANELS
         document.template_variables["views"] = VIEWS
-        self.diagram.plot.on_event(Tap, self._tap_diagram)
+        self._on_click(self.diagram.plot, self._tap_diagram)
         self.diagram.plot.on_event(RangesUpdate, self._zoom_diagram)
         self.diagram.plot.on_change("inner_height", lambda attr, old, new: self._resized(int(new)))
         for one in (self.portrait, self.section):
-            one.plot.on_event(Tap, self._tap_plane)
+            self._on_click(one.plot, self._tap_plane)
         own = []
         for view in self.views:
             plot = view.build(self)
             if plot is not None:
                 own.append(plot)
-                plot.on_event(Tap, partial(self._tap_view, view))
+                self._on_click(plot, partial(self._tap_view, view))
                 plot.on_event(RangesUpdate, partial(self._zoom_view, view))
                 plot.on_event(Reset, partial(self._reset_view, view))
         for plot in (*(one.plot for one in (self.diagram, self.portrait, self.history, self.section)), *own):
@@ -161,6 +161,12 @@ class Session:
             document.add_root(channel)
         document.theme = theme(self.dark, self.large)
         self._act.on_change("value", lambda attr, old, new: self._told(new))
+
+    @staticmethod
+    def _on_click(plot: Any, act: Callable[[Any], None]) -> None:
+        """Hear clicks; a second one soon after the first is a double click to Bokeh, wherever it lies."""
+        for kind in (Tap, DoubleTap):
+            plot.on_event(kind, act)
 
     def _begin(self, name: str, value: Any) -> None:
         """The page is there: work can begin."""
