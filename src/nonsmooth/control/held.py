@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from nonsmooth.arrays import ComplexArray
 from nonsmooth.control.controller import Controller, Samples
-from nonsmooth.control.harmonics import ComplexArray, Series, fitted, mean_square
+from nonsmooth.control.harmonics import Series, fitted, mean_square
 from nonsmooth.control.rig import Rig
 
 __all__ = ["Held", "Holder"]

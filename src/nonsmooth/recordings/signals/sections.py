@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings.signals.checks import signal, whose
 
 if TYPE_CHECKING:
@@ -19,8 +20,6 @@ if TYPE_CHECKING:
     from nonsmooth.recordings.signals.phase import DrivePhase
 
 __all__ = ["poincare", "stroboscopic"]
-
-Floats = NDArray[np.float64]
 
 
 def stroboscopic(
@@ -130,7 +129,7 @@ class _Between:
         v_error: ArrayLike | None, impacts: ArrayLike,
     ) -> None:  # fmt: skip
         self.t, position = signal(time, x, least=4, purpose="section points")
-        columns: list[Floats] = [position]
+        columns: list[FloatArray] = [position]
         for name, given in (("v", v), ("a", a), ("x_error", x_error), ("v_error", v_error)):
             column = np.full(len(self.t), np.nan) if given is None else np.asarray(given, np.float64)
             if column.shape != self.t.shape:
@@ -144,10 +143,10 @@ class _Between:
         self.unit = str(getattr(x, "attrs", {}).get("units", "m"))
         self.hits = np.unique(np.asarray(impacts, np.float64).ravel())
 
-    def _interval(self, times: Floats) -> NDArray[np.intp]:
+    def _interval(self, times: FloatArray) -> NDArray[np.intp]:
         return np.clip(np.searchsorted(self.t, times, side="right") - 1, 0, len(self.t) - 2)
 
-    def at(self, times: Floats, derivative: int = 0) -> Floats:
+    def at(self, times: FloatArray, derivative: int = 0) -> FloatArray:
         """x and v (or their derivatives) at these times, shape (n, 2)."""
         i = self._interval(times)
         h = self.t[i + 1] - self.t[i]
@@ -165,7 +164,7 @@ class _Between:
             return np.column_stack([value, rate / h])
         return np.column_stack([rate / h, bend / h**2])
 
-    def _polynomial(self, i: NDArray[np.intp], h: Floats) -> Floats:
+    def _polynomial(self, i: NDArray[np.intp], h: FloatArray) -> FloatArray:
         """Coefficients in s = (t - t_i) / h: Hermite of order 3, or 5 with accelerations."""
         x0, x1 = self.states[i, 0], self.states[i + 1, 0]
         v0, v1 = self.states[i, 1] * h, self.states[i + 1, 1] * h
@@ -182,7 +181,7 @@ class _Between:
             ]
         )  # fmt: skip
 
-    def _taylor(self, k: NDArray[np.intp], origin: Floats, h: Floats, terms: int) -> Floats:
+    def _taylor(self, k: NDArray[np.intp], origin: FloatArray, h: FloatArray, terms: int) -> FloatArray:
         """x + v dt + a dt^2 / 2 about sample k, whose place in the step is ``origin`` (0 or 1)."""
         x, v = self.states[k, 0], self.states[k, 1] * h
         b = np.zeros(len(k)) if self.a is None else 0.5 * self.a[k] * h**2
@@ -192,10 +191,10 @@ class _Between:
         p[:, 2] = b
         return p
 
-    def passing(self, i: NDArray[np.intp], which: int, level: float) -> Floats:
+    def passing(self, i: NDArray[np.intp], which: int, level: float) -> FloatArray:
         """The times in steps i at which x or v passes a level, by halving until no number lies between."""
 
-        def away(times: Floats) -> Floats:
+        def away(times: FloatArray) -> FloatArray:
             return np.asarray(self.at(times)[:, which] - level)
 
         low, high = self.t[i], np.nextafter(self.t[i + 1], self.t[i])
@@ -213,13 +212,13 @@ class _Between:
             behind = inside & (np.sign(away(middle)) == np.sign(at_low))
             low, high = np.where(behind, middle, low), np.where(inside & ~behind, middle, high)
 
-    def error_at(self, times: Floats) -> Floats:
+    def error_at(self, times: FloatArray) -> FloatArray:
         """Errors of x and v between samples: the larger one of the two ends."""
         i = self._interval(times)
         return np.maximum(self.errors[i], self.errors[i + 1])
 
 
-def _horner(p: Floats, s: Floats, derivative: int) -> Floats:
+def _horner(p: FloatArray, s: FloatArray, derivative: int) -> FloatArray:
     q = p
     for _ in range(derivative):
         q = q[:, 1:] * np.arange(1, q.shape[1])
@@ -230,7 +229,7 @@ def _horner(p: Floats, s: Floats, derivative: int) -> Floats:
 
 
 def _points(
-    between: _Between, times: Floats, instant_error: Floats, attrs: dict[str, str], *, along: bool
+    between: _Between, times: FloatArray, instant_error: FloatArray, attrs: dict[str, str], *, along: bool
 ) -> xr.Dataset:
     import xarray as xr
 

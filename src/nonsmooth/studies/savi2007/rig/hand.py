@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.studies.savi2007.rig import sensors
 from nonsmooth.studies.savi2007.rig.physics import friction
 
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 __all__ = ["pull_car", "push_support"]
 
-FloatArray = NDArray[np.float64]
 Run = tuple[str, Mapping[str, Any], Mapping[str, Any]]
 _TREMOR = 1e-4  # m, with the frequencies below in Hz
 _TREMBLING = (1.1, 1.7, 2.6)

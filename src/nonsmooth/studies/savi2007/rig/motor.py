@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.studies.savi2007.rig import sensors
 from nonsmooth.studies.savi2007.rig.physics import Wander, crank_angle, drive
 
@@ -56,7 +56,7 @@ def mean_position(rig: VirtualRig, crank_length: float) -> float:
     return rig.truth["motor_side"] * moved
 
 
-def passages(rig: VirtualRig, omega: float, begin: float, end: float, wander: Wander = ()) -> NDArray[np.float64]:
+def passages(rig: VirtualRig, omega: float, begin: float, end: float, wander: Wander = ()) -> FloatArray:
     """The times in [begin, end] at which the crank's angle is a multiple of 2 pi."""
     if wander:
         return _uneven(rig, omega, begin, end, wander)
@@ -72,7 +72,7 @@ def passages(rig: VirtualRig, omega: float, begin: float, end: float, wander: Wa
     return first + period * n
 
 
-def _uneven(rig: VirtualRig, omega: float, begin: float, end: float, wander: Wander) -> NDArray[np.float64]:
+def _uneven(rig: VirtualRig, omega: float, begin: float, end: float, wander: Wander) -> FloatArray:
     """The same for a motor that wanders: each passage by Newton's method from where even turning has it."""
     p = rig.named_parameters(omega=omega)
     first, last = crank_angle(np.array([begin, end]), p, wander) / (2 * np.pi)
