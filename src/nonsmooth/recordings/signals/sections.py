@@ -6,7 +6,7 @@ order 3 or 5. An impact between two samples is not interpolated across: each sid
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,28 +22,30 @@ if TYPE_CHECKING:
 __all__ = ["poincare", "stroboscopic"]
 
 
+class Known(TypedDict, total=False):
+    """Of a motion, beside its positions and velocities; ``impacts`` are times at which the velocity jumps."""
+
+    a: ArrayLike | None
+    x_error: ArrayLike | None
+    v_error: ArrayLike | None
+    impacts: ArrayLike
+
+
 def stroboscopic(
-    time: ArrayLike,
-    x: Any,
-    v: ArrayLike,
-    drive_phase: DrivePhase,
-    phase: float = 0.0,
-    *,
-    a: ArrayLike | None = None,
-    x_error: ArrayLike | None = None,
-    v_error: ArrayLike | None = None,
-    impacts: ArrayLike = (),
+    time: ArrayLike, x: Any, v: ArrayLike, drive_phase: DrivePhase, phase: float = 0.0, **known: Unpack[Known]
 ) -> xr.Dataset:
     """Position and velocity once per turn of the drive.
 
     Parameters
     ----------
     time, x, v : array_like, shape (N,)
-        A smoothed motion; ``a``, ``x_error`` and ``v_error`` where known, as ``smooth`` gives them.
+        A smoothed motion.
     drive_phase : DrivePhase
     phase : float
         In turns, 0 to 1, as in ``ns.Stroboscopic``.
-    impacts : array_like
+    a, x_error, v_error : array_like, shape (N,), optional
+        As ``smooth`` gives them.
+    impacts : array_like, optional
         Times at which v jumps.
 
     Returns
@@ -59,7 +61,7 @@ def stroboscopic(
     """
     if not 0.0 <= phase <= 1.0:
         raise ValueError(f"phase must lie between 0 and 1 turns, got {phase!r}")
-    between = _Between(time, x, v, a, x_error, v_error, impacts)
+    between = _Between(time, x, v, **known)
     instants = drive_phase.times(phase)
     instants = instants[(instants >= between.t[0]) & (instants <= between.t[-1])]
     if len(instants) == 0:
@@ -72,18 +74,9 @@ def stroboscopic(
 
 
 def poincare(
-    time: ArrayLike,
-    x: Any,
-    v: ArrayLike,
-    *,
-    surface: str = "x",
-    level: float = 0.0,
-    rising: bool | None = True,
-    a: ArrayLike | None = None,
-    x_error: ArrayLike | None = None,
-    v_error: ArrayLike | None = None,
-    impacts: ArrayLike = (),
-) -> xr.Dataset:
+    time: ArrayLike, x: Any, v: ArrayLike, *, surface: str = "x", level: float = 0.0, rising: bool | None = True,
+    **known: Unpack[Known],
+) -> xr.Dataset:  # fmt: skip
     """Position and velocity where x (or v) passes a level.
 
     Parameters
@@ -102,7 +95,7 @@ def poincare(
     """
     if surface not in ("x", "v"):
         raise ValueError(f"surface must be x or v, got {surface!r}")
-    between = _Between(time, x, v, a, x_error, v_error, impacts)
+    between = _Between(time, x, v, **known)
     which = 0 if surface == "x" else 1
     values = between.states[:, which] - level
     # A sample on the level belongs to the side it goes to.
@@ -125,8 +118,8 @@ class _Between:
     """A motion between its samples."""
 
     def __init__(
-        self, time: ArrayLike, x: Any, v: ArrayLike, a: ArrayLike | None, x_error: ArrayLike | None,
-        v_error: ArrayLike | None, impacts: ArrayLike,
+        self, time: ArrayLike, x: Any, v: ArrayLike, a: ArrayLike | None = None, x_error: ArrayLike | None = None,
+        v_error: ArrayLike | None = None, impacts: ArrayLike = (),
     ) -> None:  # fmt: skip
         self.t, position = signal(time, x, least=4, purpose="section points")
         columns: list[FloatArray] = [position]

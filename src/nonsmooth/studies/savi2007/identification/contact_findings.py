@@ -37,10 +37,8 @@ def contact_finding(found: ContactFit, mass: Quantity, *, resolution: float) -> 
     ----------
     found : ContactFit
         Outcome of `shoot_contacts`.
-    mass : Quantity
-        Mass (kg) with its standard uncertainty.
-    resolution : float
-        Length of a count (m).
+    mass, resolution
+        As in `decay_damping`.
 
     Returns
     -------

@@ -24,7 +24,7 @@ def impulse(
     rig: VirtualRig, *, velocities: tuple[float, ...] = (0.5, -0.5, 0.35, -0.35, 0.2, -0.2, 0.1, -0.1),
     duration: float = 20.0,
 ) -> Recording:  # fmt: skip
-    """Tap the resting car, no support, and let it stop: about these velocities (m/s), one run each."""
+    """Tap the resting car, no support, and let it stop: about these velocities (m/s), one run each: Fig. 5."""
     system = rig.system().with_parameters(rig.parameters(crank_length=0.0, g=NO_SUPPORT))
     runs = []
     for i, velocity in enumerate(velocities):
@@ -47,7 +47,7 @@ def _stuck(rig: VirtualRig, run: int) -> dict[str, float]:
 
 
 def drop(rig: VirtualRig, *, n: int = 6, duration: float = 20.0) -> Recording:
-    """Hang the test mass on the support's spring, drop it from where the spring is unloaded, or nearly; ``n`` runs."""
+    """Drop the test mass on the support's spring from where the spring is unloaded, or nearly; ``n`` runs: Fig. 7."""
     p = {name: rig.truth[name] for name in ("k_s", "c_s", "test_mass")}
     system = hanging_mass().with_parameters(p)
     sag = p["test_mass"] * GRAVITY / p["k_s"]

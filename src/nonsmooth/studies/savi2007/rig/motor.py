@@ -89,7 +89,7 @@ def _uneven(rig: VirtualRig, omega: float, begin: float, end: float, wander: Wan
 def voltage(
     rig: VirtualRig, *, voltages: Sequence[float] = (2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12), turns: int = 40
 ) -> Recording:
-    """The motor alone, at one voltage (V) per run, for about ``turns`` passages of the photogate."""
+    """The motor alone, at one voltage (V) per run, for about ``turns`` passages of the photogate: Fig. 8a."""
     runs = []
     for i, setting in enumerate(voltages):
         rng = rig.generator("voltage", i)
@@ -105,7 +105,7 @@ def crank(
     rig: VirtualRig, *, lengths: Sequence[float] = (0.01, 0.015, 0.02, 0.025, 0.03, 0.04, 0.05, 0.06),
     voltage: float = 4.0, duration: float = 20.0,
 ) -> Recording:  # fmt: skip
-    """The car held at x = 0 by the force sensor, at one crank length (m) per run: it feels k d(phi)."""
+    """The car held at x = 0 by the force sensor, at one crank length (m) per run, feels k d(phi): Fig. 8b."""
     runs = []
     omega = frequency(rig, voltage)
     for i, length in enumerate(lengths):
