@@ -155,7 +155,7 @@ def control_based_continuation(
 
 @dataclass
 class _Branch:
-    """What has been measured of a branch, point by point."""
+    """A branch as far as it has been measured, point by point."""
 
     holder: Holder
     course: Course

@@ -41,7 +41,7 @@ class Course:
 def course_of(
     names: Names, parameter: Any, range: Any, frequency: float, amplitude: float, direction: str
 ) -> Course:
-    """What was asked for, checked.
+    """The course that was asked for, checked.
 
     Raises
     ------
