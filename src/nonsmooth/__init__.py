@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from nonsmooth.continuation.manifolds.manifolds import manifolds as manifolds
     from nonsmooth.continuation.special import special_points as special_points
     from nonsmooth.control.continuation import control_based_continuation as control_based_continuation
+    from nonsmooth.control.holding import Holding as Holding
     from nonsmooth.control.simulated_rig import SimulatedRig as SimulatedRig
     from nonsmooth.diagrams.amplitude_spectrum import amplitude_spectrum as amplitude_spectrum
     from nonsmooth.diagrams.chart import chart as chart
@@ -103,6 +104,7 @@ _WHERE = {
     "special_points": "continuation.special",
     "manifolds": "continuation.manifolds.manifolds",
     "control_based_continuation": "control.continuation",
+    "Holding": "control.holding",
     "SimulatedRig": "control.simulated_rig",
     "smoothing_report": "smoothing.report",
     "load_recording": "recordings.load",
