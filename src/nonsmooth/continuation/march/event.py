@@ -7,6 +7,7 @@ zero is bracketed by the ends of a step and found by Brent's method, every trial
 from __future__ import annotations
 
 import warnings
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
@@ -70,7 +71,7 @@ class Step:
         self.cause, self.stop, self.last = cause, s, point
 
 
-class Event:
+class Event(ABC):
     """A kind of event.
 
     Attributes
@@ -84,9 +85,9 @@ class Event:
     name = ""
     certain = True
 
+    @abstractmethod
     def number(self, curve: Any, point: Any) -> float:
         """The number that vanishes at the event."""
-        raise NotImplementedError
 
     def happened(self, step: Step, was: float, now: float) -> bool:
         """Return whether the event lies on the step."""

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from typing import Any
 
 import numpy as np
 
 from nonsmooth.continuation.march.event import BESIDE, Event, Met, Step
 from nonsmooth.continuation.signature.change import Change, inserted, without
-from nonsmooth.continuation.signature.leaving import contacts_of, gained, mark
+from nonsmooth.continuation.signature.leaving import contacts_of, gained, is_tolerance, mark
 from nonsmooth.continuation.signature.neighbours import beside
 from nonsmooth.continuation.signature.signature import AT_ONCE
 
@@ -62,14 +63,26 @@ class Boundary(Event):
         """Return whether a branch that goes straight on passes the boundary here."""
         return True
 
-    def crossing(self, curve: Any, point: Any) -> tuple[int, int, Any, int]:
-        """Visit, transition, state, and the row that fires: where the surface is that is reached."""
-        raise NotImplementedError
-
+    @abstractmethod
     def surface(self, curve: Any, point: Any, beyond: Any = None) -> int:
-        """The indicator of the surface that is reached: of the row that is nearest to zero (-1: of none).
+        """The indicator of the surface that is reached (-1: of none).
 
         ``beyond`` is the curve on which the branch goes on."""
+
+    def record(self, found: Any, step: Step, met: Met) -> None:
+        """List a boundary that a branch passes with its signature."""
+        mark(found, step.curve, [met], beside(step.curve, met.point, contacts_of(step.curve, [met])))
+
+
+class Crossed(Boundary):
+    """A margin of a crossing, or of the visit that begins or ends there: the surface is that of the row nearest to zero."""
+
+    @abstractmethod
+    def crossing(self, curve: Any, point: Any) -> tuple[int, int, Any, int]:
+        """Visit, transition, state, and the row that fires: where the surface is that is reached."""
+
+    def surface(self, curve: Any, point: Any, beyond: Any = None) -> int:
+        """The indicator of the row that is nearest to zero (-1: of none)."""
         visit, k, z, fires = self.crossing(curve, point)
         times, _ = curve.shooting.split(point.X)
         t = float(times[min(visit, len(times) - 1)])
@@ -78,12 +91,8 @@ class Boundary(Event):
                 for r, row in enumerate(rows) if r != fires]  # fmt: skip
         return min(near)[1] if near else -1
 
-    def record(self, found: Any, step: Step, met: Met) -> None:
-        """List a boundary that a branch passes with its signature."""
-        mark(found, step.curve, [met], beside(step.curve, met.point, contacts_of(step.curve, [met])))
 
-
-class Short(Boundary):
+class Short(Crossed):
     """A visit shrinks to nothing."""
 
     def at_section(self, curve: Any, point: Any) -> bool:
@@ -108,7 +117,7 @@ class Short(Boundary):
         return visit, curve.shooting.signature.visits[visit].transition, point.solved.segments.z[visit], -1
 
 
-class Slow(Boundary):
+class Slow(Crossed):
     """A crossing becomes a touch."""
 
     name = "grazing"
@@ -128,17 +137,18 @@ class Slow(Boundary):
         return visit, curve.shooting.signature.visits[visit].transition, point.solved.segments.z[visit], -1
 
 
-class Own(Boundary):
+class Own(Crossed):
     """Two rows of the condition that fires vanish together."""
 
     def contacts(self, curve: Any, point: Any) -> list[Change]:
-        """The orbit without the last impacts before rest: the one that is as slow as impacts are followed, and all after."""
+        """The orbit without the last impacts before rest, from one as slow as impacts are followed."""
         visits, i = curve.shooting.signature.visits, self.crossing(curve, point)[0]
         rests = i
         while visits[rests].transition == visits[i].transition:
             rests += 1
-        is_impact = visits[rests].mode == visits[i].mode and visits[rests].row >= 0
-        return [without(curve, point, i, rests - i)] if is_impact else []
+        if visits[rests].mode != visits[i].mode or visits[rests].row < 0:
+            return []
+        return [without(curve, point, i, rests - i)] if is_tolerance(curve, self.surface(curve, point)) else []
 
     def crossing(self, curve: Any, point: Any) -> tuple[int, int, Any, int]:
         """The crossing with the least other row."""
@@ -168,7 +178,7 @@ class Touch(Boundary):
         return int(curve.walk.net.rows[point.path.which[point.path.touched], 0])
 
 
-class Others(Boundary):
+class Others(Crossed):
     """The condition of another transition holds too at the end of a visit."""
 
     def crossing(self, curve: Any, point: Any) -> tuple[int, int, Any, int]:
@@ -177,7 +187,7 @@ class Others(Boundary):
         return visit, int(point.path.other[visit]), point.solved.segments.z[visit], -1
 
 
-class Landed(Boundary):
+class Landed(Crossed):
     """A reset leads onto the boundary of another transition."""
 
     ending = "landing"

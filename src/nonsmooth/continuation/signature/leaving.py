@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from nonsmooth.continuation.march.marches import March
     from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
 
-__all__ = ["behind", "contacts_of", "gained", "mark"]
+__all__ = ["behind", "contacts_of", "gained", "is_tolerance", "mark"]
 
 FARTHEST = 0.1  # along the branch: the end of a signature is not looked for from farther behind it
 WITHIN = 1e-9  # of the range: as near as an event is located that only simulations show
@@ -37,7 +37,7 @@ def behind(found: March, curve: Orbits, met: list[Met]) -> tuple[Orbits, OrbitPo
             return after
     first = met[0]
     beyond = beside(curve, first.point, contacts_of(curve, met))
-    if beyond is not None and any(_is_tolerance(curve, one.kind.surface(curve, one.point, beyond[0])) for one in met):
+    if beyond is not None and any(is_tolerance(curve, one.kind.surface(curve, one.point, beyond[0])) for one in met):
         return beyond
     name = mark(found, curve, met, beyond)
     if beyond is None and _is_centre(curve, first):
@@ -133,7 +133,7 @@ def gained(curve: Orbits, fresh: Orbits) -> int:
     return rows[0] if rows else -1
 
 
-def _is_tolerance(curve: Orbits, indicator: int) -> bool:
+def is_tolerance(curve: Orbits, indicator: int) -> bool:
     """Return whether an indicator only sets a tolerance: below the creep of a stop impacts are completed as rest.
 
     It differs from another one of its condition, with the other sign, by a small number."""
