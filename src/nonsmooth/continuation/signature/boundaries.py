@@ -75,7 +75,7 @@ class Boundary(Event):
 
 
 class Crossed(Boundary):
-    """A margin of a crossing, or of the visit that begins or ends there: the surface is that of the row nearest to zero."""
+    """A margin of a crossing, or of a visit that begins or ends with one: its row nearest to zero tells the surface."""
 
     @abstractmethod
     def crossing(self, curve: Any, point: Any) -> tuple[int, int, Any, int]:

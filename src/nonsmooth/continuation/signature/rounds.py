@@ -71,7 +71,7 @@ class Rounds:
         return False
 
     def _told(self, transitions: list[int], times: FloatArray, period: float) -> list[int]:
-        """The transitions but for impacts that another one follows at once: rounding decides how many come before rest."""
+        """The transitions but for impacts that another one follows at once: how many come before rest is rounding."""
         jumps = self.system.traced.transitions
         follows = np.diff(times, append=np.inf) < SHORT * period
         return [k for k, at_once in zip(transitions, follows, strict=True)
