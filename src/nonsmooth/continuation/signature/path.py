@@ -148,8 +148,8 @@ class Walk:
         if status:
             return None
         # Beside a boundary that has just been crossed only what is solved for tells which side is meant.
-        near = np.where(self.crossed[self.every[:, None], self.net.rows[begin_row, 0]], SOLVED, ROUNDING)
-        zero = np.abs(begin) <= near * size
+        crossed = self.crossed[self.every[:, None], self.net.rows[begin_row, 0]] if self.crossed.size else False
+        zero = np.abs(begin) <= np.where(crossed, SOLVED, ROUNDING) * size
         # Where several rows vanish as a visit begins, a lift-off, rounding of one is no maximum of another.
         begun = place - solved.times[:-1, None] <= BEGUN * float(solved.times[-1])
         inner[begun & zero & (np.abs(inner) <= ROUNDING * size)] = -np.inf
