@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from nonsmooth.continuation.march.arclength import Curve, Point
-from nonsmooth.continuation.march.event import Crossing, Event, Fold, Met, Step
+from nonsmooth.continuation.march.event import Crossing, Event, Fold, Met, Step, locate
 from nonsmooth.continuation.march.march import march
 from nonsmooth.continuation.march.marches import Limits, March
 from nonsmooth.continuation.problems.equilibrium import Equilibria
@@ -106,6 +106,25 @@ def test_a_circle_closes_with_two_folds() -> None:
     X = np.array([row.point.X for row in found.rows])
     assert np.hypot(*X.T) == pytest.approx(1.0, abs=1e-14)
     assert X[-1] == pytest.approx([-0.8, 0.6], abs=1e-12)
+
+
+def test_a_branch_that_comes_back_in_another_word_closes() -> None:
+    """What all words have in common tells it: the last point lies beside the first, to the order of the chord's arc."""
+    curve = circle()
+    first = curve.at_parameter(np.array([-0.8, 0.6]) / curve.scale, 0.6).facing(1.0)
+    found = march(curve, first, Limits(((-1, -4.0, 4.0),), 0.05, 500, ("another word", np.empty(0), first.Y)))
+    assert found.ending == "closed"
+    assert found.rows[-1].point.X == pytest.approx([-0.8, 0.6], abs=1e-3)
+
+
+def test_a_zero_at_the_beginning_is_not_met_once_more() -> None:
+    """(p - p_a) (p_m - p) vanishes where the step begins and at p_m: the second one is the next."""
+    line = Plane(lambda x, p: (x, 1.0, 0.0))
+    a = line.at_parameter(np.array([0.0, 0.1]) / line.scale, 0.1).facing(1.0)
+    b = line.step(a, 0.5)
+    step = Step(line, a, b, ([], []), (np.empty(0), np.empty(0)))
+    s, there = locate(step, lambda point: (point.value - a.value) * (0.2 - point.value))
+    assert there.value == pytest.approx(0.2, abs=1e-14) and s == pytest.approx(0.2, abs=1e-14)
 
 
 def test_a_range_ends_exactly_at_its_edge() -> None:

@@ -1,0 +1,60 @@
+"""Branches of orbits with impacts that accumulate: what rounding decides in the last impacts before rest ends nothing."""
+
+from __future__ import annotations
+
+import brute_force
+import numpy as np
+import pytest
+import random_templates as templates
+import xarray as xr
+from test_random_branches import endings
+
+import nonsmooth as ns
+
+
+def followed(template: str, seed: int, low: float, high: float, **begin: float) -> xr.Dataset:
+    """The branch of a system of the campaign over part of its range, from the orbit at the values ``begin``.
+
+    It goes through that part, and its last orbits are those of a simulation."""
+    system, name, _, start = templates.TEMPLATES[template](np.random.default_rng([seed, len(template)]))
+    at = system.with_parameters(begin)
+    orbit = ns.find_orbit(at, start=start, max_period=4, progress=False)
+    branch = ns.continue_orbit(orbit, name, (low, high))
+    assert endings(branch) == ["range", "range"]
+    assert brute_force.misses(system, branch.isel(point=[0, -1], special=[]), name) < 1e-9
+    return branch
+
+
+def test_lift_off_that_is_only_solved_for_is_no_graze() -> None:
+    """Where rest ends, gap, speed and push vanish together: the path begins behind it by what the orbit is solved for."""
+    branch = followed("rest", 8, 1.05, 1.7)
+    assert branch.sizes["special"] == 0
+
+
+def test_beyond_the_end_of_rest_every_distance_has_another_signature() -> None:
+    """Where rest ends impacts accumulate: orbits beyond come nearer in proportion, each with another count of them."""
+    followed("rest", 3, 1.58, 1.58215, a=1.581)
+
+
+def test_flights_do_not_take_their_other_root() -> None:
+    """A flight from impact to impact has no length too: beside the end of rest Newton's method went there.
+
+    The orbits are those of a simulation, with thirteen impacts, rest and four more in three periods."""
+    system, name, _, _ = templates.rest(np.random.default_rng([1, 4]))
+    at = system.with_parameters(a=2.37719246)
+    orbit = ns.find_orbit(at, start=[0.21236, 0.72233], max_period=4, progress=False)
+    branch = ns.continue_orbit(orbit, name, (2.377192455, 2.3773))
+    assert endings(branch) == ["range", "range"]
+    assert branch.sizes["special"] == 0
+    run = ns.simulate(at.with_parameters(a=2.3773), duration=60 * np.pi, start=branch["section"].values[-1])
+    assert run["u"].values[-1] == pytest.approx(branch["section"].values[-1], abs=1e-11)
+
+
+def test_impacts_as_slow_as_they_are_followed() -> None:
+    """The speed at which impacts are completed is passed where a stop at 0.9 leaves it nine digits fewer."""
+    followed("two_stops", 1, 0.74, 0.83, w=0.8)
+
+
+def test_two_impacts_pass_the_section_in_one_step() -> None:
+    """Behind the first one the search for the second one began at its zero, and ended there again and again."""
+    followed("two_stops", 2, 0.57, 0.6, w=0.59)
