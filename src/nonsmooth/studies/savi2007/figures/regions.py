@@ -1,0 +1,45 @@
+"""Figure 2: the regions of the sharp and of the smoothed system in the plane of the states."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from nonsmooth import plot
+from nonsmooth.plot.labels import name_axes
+from nonsmooth.studies.savi2007.figures.figure import Figure, sheet
+from nonsmooth.studies.savi2007.flows import ETA, EXACT, SMOOTHED, Settings
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure as Canvas
+
+__all__ = ["FIGURES"]
+
+
+def _compute(settings: Settings) -> dict[str, xr.Dataset]:
+    return {}
+
+
+def _draw(data: Mapping[str, xr.Dataset]) -> Canvas:
+    with plot.journal():
+        canvas = sheet(plot.PAGE, 0.42 * plot.PAGE)
+        left, right = canvas.subplots(1, 2)
+        for ax, flow in ((left, EXACT), (right, SMOOTHED)):
+            plot.regions(flow.system(g=0.0), ax, xlim=(-5 * ETA, 5 * ETA), ylim=(-0.12, 0.12))
+        left.set_title("(a) non-smooth system, Eqs. 4-5")
+        right.set_title(r"(b) smoothed system, $\eta = 10$ µm, Eqs. 9-10")
+        for ax in (left, right):
+            name_axes(ax, ("$x - g$", "m"), ("$v$", "m/s"))
+    return canvas
+
+
+def _caption(data: Mapping[str, xr.Dataset]) -> str:
+    return (
+        "Regions of the state plane with Table 1's support, near x = g: (a) without contact (white) and in contact "
+        "(blue), parted by the surfaces S_a (x = g) and S_b (the support's force vanishes); (b) the bands of half "
+        "width eta of the smoothed system in their place. Drawn from the system's own conditions."
+    )
+
+
+FIGURES = (Figure("fig02", 2, "Regions and surfaces", _compute, _draw, _caption),)
