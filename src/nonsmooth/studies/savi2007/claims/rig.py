@@ -72,7 +72,7 @@ def _words(numbers: Mapping[int, int]) -> str:
     return " and ".join("no period" if n == APERIODIC else f"period {n}" for n in numbers)
 
 
-def _at_all(data: Mapping[str, xr.Dataset], shown: Mapping[float, int]) -> Cell:
+def _at_all(data: dict[str, xr.Dataset], shown: Mapping[float, int]) -> Cell:
     """All of the periods wanted, each at its value."""
     met = [period in measured_periods_at(data, value) for value, period in shown.items()]
     text = "; ".join(f"{value:g}: {_words(measured_periods_at(data, value))}" for value in shown)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 __all__ = ["Cell", "Data", "Row", "against_closed_form", "against_printed", "printed_cell"]
 
 #: Datasets by figure and key.
-Data: TypeAlias = "Mapping[str, Mapping[str, xr.Dataset]]"
+Data: TypeAlias = "Mapping[str, dict[str, xr.Dataset]]"
 
 
 @dataclass(frozen=True)

@@ -2,29 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
 from nonsmooth.studies.savi2007.figures.branches import branches
 from nonsmooth.studies.savi2007.figures.diagrams import ABOUT_BRANCHES, diagrams, draw_both, how
-from nonsmooth.studies.savi2007.figures.figure import Figure
+from nonsmooth.studies.savi2007.figures.figure import Datasets, Figure
 from nonsmooth.studies.savi2007.figures.portraits import describe, draw_portraits, portraits
 from nonsmooth.studies.savi2007.flows import Settings
 from nonsmooth.studies.savi2007.printed import FIGURE_11, FIGURE_12, NUMBERS
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 __all__ = ["FIGURES", "PRINTED"]
 
 PRINTED = {NUMBERS[key].value: NUMBERS[key].text for key in ("period 4 from", "period 2 from", "period 1 from")}
 
 
-def _compute_11(settings: Settings) -> dict[str, xr.Dataset]:
+def _compute_11(settings: Settings) -> Datasets:
     return diagrams(settings, FIGURE_11, "rho", 0.2, 0.5, (600, 300), tuple(FIGURE_12)) | branches("fig11")
 
 
-def _caption_11(data: Mapping[str, xr.Dataset]) -> str:
+def _caption_11(data: Datasets) -> str:
     return (
         "Bifurcation diagram over the forcing amplitude, omega = 3.69 rad/s, g = -4.5 mm: velocity at the section. "
         "Dotted: the paper's printed ends of chaos (0.26 N), period 4 (0.28 N) and period 2 (0.406 N). "
@@ -33,11 +27,11 @@ def _caption_11(data: Mapping[str, xr.Dataset]) -> str:
     )
 
 
-def _compute_12(settings: Settings) -> dict[str, xr.Dataset]:
+def _compute_12(settings: Settings) -> Datasets:
     return portraits(settings, FIGURE_11, "rho", FIGURE_12)
 
 
-def _caption_12(data: Mapping[str, xr.Dataset]) -> str:
+def _caption_12(data: Datasets) -> str:
     return (
         "Phase portraits with section points (black) at four amplitudes of Fig. 11; contact zone x > g shaded, orbit "
         "in contact in vermilion. " + describe(data, FIGURE_12)

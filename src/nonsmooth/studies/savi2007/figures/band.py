@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
@@ -13,13 +11,10 @@ from nonsmooth import System, plot, poincare, simulate
 from nonsmooth.results.labels import labels_of
 from nonsmooth.results.provenance import provenance
 from nonsmooth.studies.savi2007.figures.diagrams import shared_legend
-from nonsmooth.studies.savi2007.figures.figure import Figure, sheet
+from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Figure, sheet
 from nonsmooth.studies.savi2007.flows import ETA, EXACT, SMOOTHED, Settings
 from nonsmooth.studies.savi2007.grazing import grazing_frequencies, steady_state
 from nonsmooth.studies.savi2007.printed import FIGURE_9, FIGURE_11, FIGURE_13
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure as Canvas
 
 __all__ = ["FIGURES", "order_in_eta"]
 
@@ -42,7 +37,7 @@ def general_form(system: System) -> System:
     return System.from_text(json.dumps({key: value for key, value in content.items() if key != "bands"}))
 
 
-def _compute(settings: Settings) -> dict[str, xr.Dataset]:
+def _compute(settings: Settings) -> Datasets:
     return {"error": _errors(settings), "grazing": _grazing(settings)}
 
 
@@ -117,7 +112,7 @@ def order_in_eta(errors: xr.Dataset, form: str) -> np.ndarray:
     )
 
 
-def _draw(data: Mapping[str, xr.Dataset]) -> Canvas:
+def _draw(data: Datasets) -> Canvas:
     errors, grazing = data["error"], data["grazing"]
     with plot.journal():
         canvas = sheet(plot.PAGE, 0.52 * plot.PAGE)
@@ -160,7 +155,7 @@ def _draw(data: Mapping[str, xr.Dataset]) -> Canvas:
     return canvas
 
 
-def _caption(data: Mapping[str, xr.Dataset]) -> str:
+def _caption(data: Datasets) -> str:
     errors = data["error"]
     orders = ", ".join(f"{order:.3f}" for order in order_in_eta(errors, "paper"))
     speed = float(errors["slowest_contact"].min())

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth import SolveError, continue_orbit, find_orbit, poincare, special_points
+from nonsmooth.studies.savi2007.figures.figure import Datasets
 from nonsmooth.studies.savi2007.flows import EXACT
 from nonsmooth.studies.savi2007.printed import FIGURE_9, FIGURE_10, FIGURE_11, FIGURE_13, FIGURE_17
 
@@ -47,7 +48,7 @@ BEGINNINGS = {
 }
 
 
-def branches(figure: str) -> dict[str, xr.Dataset]:
+def branches(figure: str) -> Datasets:
     """The branches of a figure by key: ``branch`` (period 1), ``branch_2`` (period 2), ...; of several ``branch_2b``.
 
     Each has, beside what :func:`nonsmooth.continue_orbit` gives, ``returns(point, iterate, state)``: all section points
@@ -64,7 +65,7 @@ def branches(figure: str) -> dict[str, xr.Dataset]:
     return {key: with_returns(system, one) for key, one in found.items()}
 
 
-def _follow(found: dict[str, xr.Dataset], flip: xr.Dataset, begin: Beginning, period: int, cascade: bool) -> None:
+def _follow(found: Datasets, flip: xr.Dataset, begin: Beginning, period: int, cascade: bool) -> None:
     """The branch of twice the period at a flip, unless another one arrives there; its own first flip in a cascade."""
     value = float(flip[begin.parameter])
     same = [key for key in found if key.startswith(f"branch_{period}")]
@@ -95,7 +96,7 @@ def rows_of(branch: xr.Dataset) -> xr.Dataset:
     return special_points(branch).isel(special=np.flatnonzero(~at_ends(branch)))
 
 
-def branches_of(data: Mapping[str, xr.Dataset]) -> list[xr.Dataset]:
+def branches_of(data: Datasets) -> list[xr.Dataset]:
     """The branches among the datasets of a figure, those of the shortest period first."""
     found = [one for key, one in data.items() if key.startswith("branch")]
     return sorted(found, key=lambda one: int(one["period_number"]))

@@ -6,7 +6,7 @@ curves of folds, flips and grazing that pass through the special points of these
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -16,13 +16,12 @@ from nonsmooth import SolveError, chart, continue_curve, continue_orbit, find_or
 from nonsmooth.plot.curve import KINDS
 from nonsmooth.results.statuses import by_code
 from nonsmooth.studies.savi2007.figures.branches import BEGINNINGS, branches, rows_of
-from nonsmooth.studies.savi2007.figures.figure import Figure, sheet
+from nonsmooth.studies.savi2007.figures.figure import Canvas, Compute, Datasets, Figure, sheet
 from nonsmooth.studies.savi2007.flows import EXACT, Settings
 from nonsmooth.studies.savi2007.printed import FIGURE_9, FIGURE_13
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.figure import Figure as Canvas
 
 __all__ = ["CHARTS", "FIGURES", "Plane", "curves", "grid_of"]
 
@@ -55,8 +54,8 @@ def grid_of(plane: Plane, n: int) -> dict[str, np.ndarray]:
     return {name: np.linspace(*ends, n) for name, ends in plane.ranges.items()}
 
 
-def _compute(name: str) -> Callable[[Settings], dict[str, xr.Dataset]]:
-    def compute(settings: Settings) -> dict[str, xr.Dataset]:
+def _compute(name: str) -> Compute:
+    def compute(settings: Settings) -> Datasets:
         plane = CHARTS[name]
         grid = grid_of(plane, _QUICK if settings.quick else _FULL)
         store = None if settings.folder is None else settings.folder / f"{name}_store.zarr"
@@ -111,7 +110,7 @@ def _on(curve: xr.Dataset, row: xr.Dataset, parameter: str) -> bool:
     return False
 
 
-def _draw(data: Mapping[str, xr.Dataset]) -> Canvas:
+def _draw(data: Datasets) -> Canvas:
     found = data["chart"]
     with plot.journal():
         canvas = sheet(plot.PAGE, 0.42 * plot.PAGE)
@@ -137,7 +136,7 @@ def _ends(found: xr.Dataset, axis: int) -> tuple[float, float]:
     return float(values[0]), float(values[-1])
 
 
-def _caption(data: Mapping[str, xr.Dataset]) -> str:
+def _caption(data: Datasets) -> str:
     found = data["chart"]
     first, second = (str(dim) for dim in found["status"].dims)
     codes, counts = np.unique(found["status"].values, return_counts=True)

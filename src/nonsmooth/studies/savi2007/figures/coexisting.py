@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,13 +15,12 @@ from nonsmooth.plot.basins import section_mark
 from nonsmooth.plot.palette import attractor_color
 from nonsmooth.plot.phase_portrait import ZONE, shade_zone
 from nonsmooth.plot.units import prefixed
-from nonsmooth.studies.savi2007.figures.figure import Figure, sheet
+from nonsmooth.studies.savi2007.figures.figure import Canvas, Compute, Datasets, Figure, sheet
 from nonsmooth.studies.savi2007.flows import EXACT, Settings
 from nonsmooth.studies.savi2007.printed import FIGURE_13, FIGURE_17
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.figure import Figure as Canvas
 
 __all__ = ["BASINS", "FIGURES", "names_of"]
 
@@ -33,8 +31,8 @@ _POINTS, _FULL, _QUICK = 160, 500, 40  # along each side
 _WANDERING = 60  # periods drawn of an attractor that is no cycle
 
 
-def _compute(name: str) -> Callable[[Settings], dict[str, xr.Dataset]]:
-    def compute(settings: Settings) -> dict[str, xr.Dataset]:
+def _compute(name: str) -> Compute:
+    def compute(settings: Settings) -> Datasets:
         n = _QUICK if settings.quick else _FULL if settings.full else _POINTS
         system = EXACT.system(**BASINS[name])
         found = basins(
@@ -60,7 +58,7 @@ def names_of(found: xr.Dataset) -> list[str]:
     return words
 
 
-def _draw(data: Mapping[str, xr.Dataset]) -> Canvas:
+def _draw(data: Datasets) -> Canvas:
     found = data["basins"]
     with plot.journal():
         canvas = sheet(plot.PAGE, 0.5 * plot.PAGE)
@@ -92,7 +90,7 @@ def _draw(data: Mapping[str, xr.Dataset]) -> Canvas:
     return canvas
 
 
-def _caption(data: Mapping[str, xr.Dataset]) -> str:
+def _caption(data: Datasets) -> str:
     found = data["basins"]
     lost = int((found["label"].values < 0).sum())
     at = ", ".join(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,13 +12,12 @@ from nonsmooth.plot.branch import draw_branch
 from nonsmooth.plot.style import even_dots, halo, small
 from nonsmooth.results.provenance import read_provenance
 from nonsmooth.studies.savi2007.figures.branches import branches_of
-from nonsmooth.studies.savi2007.figures.figure import only_outer, sheet
+from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Draw, only_outer, sheet
 from nonsmooth.studies.savi2007.flows import EXACT, FLOWS, Settings, starts
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Canvas
 
 __all__ = [
     "ABOUT_BRANCHES", "diagrams", "draw_both", "draw_branches", "draw_diagram", "how", "mark_grazing", "mark_values",
@@ -43,7 +42,7 @@ def diagrams(
     steps: tuple[int, int],
     also: tuple[float, ...],
     patience: int = 600,
-) -> dict[str, xr.Dataset]:
+) -> Datasets:
     """Sweeps up and down (``exact``, ``smoothed``) and from several starts (``exact_starts``, ``smoothed_starts``).
 
     ``steps``: of the exact and of the smoothed sweep; the starts are tried at a half or a quarter of them.
@@ -73,7 +72,7 @@ def _grid(low: float, high: float, steps: int, also: tuple[float, ...]) -> np.nd
 
 
 def draw_diagram(
-    ax: Axes, data: Mapping[str, xr.Dataset], key: str, y: str, *, values: Mapping[float, str], words: str
+    ax: Axes, data: Datasets, key: str, y: str, *, values: Mapping[float, str], words: str
 ) -> None:
     """One diagram: up, down over it, and in grey what other starts lead to; ``values`` of the paper as dotted lines.
 
@@ -95,10 +94,10 @@ def draw_diagram(
     mark_values(ax, values, words)
 
 
-def draw_both(values: Mapping[float, str], words: str) -> Callable[[Mapping[str, xr.Dataset]], Canvas]:
+def draw_both(values: Mapping[float, str], words: str) -> Draw:
     """The sheet: the velocity at the section, of each flow; ``values`` and ``words`` as in `draw_diagram`."""
 
-    def draw(data: Mapping[str, xr.Dataset]) -> Canvas:
+    def draw(data: Datasets) -> Canvas:
         with plot.journal():
             canvas = sheet(plot.PAGE, 0.5 * plot.PAGE)
             grid = canvas.subplots(1, 2, sharey=True)
@@ -147,7 +146,7 @@ def mark_grazing(ax: Axes, places: Sequence[float]) -> None:
         )  # fmt: skip
 
 
-def draw_branches(ax: Axes, data: Mapping[str, xr.Dataset], *, y: str) -> None:
+def draw_branches(ax: Axes, data: Datasets, *, y: str) -> None:
     """The branches of a figure in black, where there are any; marks on those of period 1 and 2."""
     for one in branches_of(data):
         few = int(one["period_number"]) <= 2
@@ -165,7 +164,7 @@ def shared_legend(canvas: Canvas, columns: int = 5) -> None:
     even_dots(canvas.legend(list(entries.values()), list(entries), loc="outside lower center", ncols=columns))
 
 
-def how(data: Mapping[str, xr.Dataset]) -> str:
+def how(data: Datasets) -> str:
     """Settings of the sweeps, for a caption."""
     words = []
     for flow in FLOWS:

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from nonsmooth.studies.savi2007.flows import Settings
-
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.figure import Figure as Canvas
+    from matplotlib.figure import Figure as MatplotlibFigure
 
-__all__ = ["Figure", "only_outer", "sheet"]
+    from nonsmooth.studies.savi2007.flows import Settings
 
+__all__ = ["Canvas", "Compute", "Datasets", "Draw", "Figure", "only_outer", "sheet"]
+
+Canvas: TypeAlias = "MatplotlibFigure"
+Datasets: TypeAlias = "dict[str, xr.Dataset]"  # of a figure, by key
+Compute: TypeAlias = "Callable[[Settings], Datasets]"
+Draw: TypeAlias = "Callable[[Datasets], Canvas]"
 
 #: The procedures on which those parameters rest with which records of the rig are laid over the model.
 RESTS_ON = ("springs", "support", "impulse", "response", "drop", "contact")
@@ -51,9 +55,9 @@ class Figure:
     name: str
     number: int | None
     title: str
-    compute: Callable[[Settings], dict[str, xr.Dataset]]
-    draw: Callable[[Mapping[str, xr.Dataset]], Canvas]
-    caption: Callable[[Mapping[str, xr.Dataset]], str]
+    compute: Compute
+    draw: Draw
+    caption: Callable[[Datasets], str]
     rig: bool = False
     beside: int | None = None
     full: bool = False

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,7 +17,7 @@ from nonsmooth.studies.savi2007.figures.diagrams import (
     mark_grazing,
     shared_legend,
 )
-from nonsmooth.studies.savi2007.figures.figure import Figure, only_outer, sheet
+from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Figure, only_outer, sheet
 from nonsmooth.studies.savi2007.figures.portraits import chosen_start, describe, draw_portraits, portraits
 from nonsmooth.studies.savi2007.figures.resonance import grazing_of
 from nonsmooth.studies.savi2007.figures.twins import twins
@@ -26,9 +25,7 @@ from nonsmooth.studies.savi2007.flows import EXACT, FLOWS, Settings, starts
 from nonsmooth.studies.savi2007.printed import FIGURE_17, FIGURE_18
 
 if TYPE_CHECKING:
-    import xarray as xr
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Canvas
 
 __all__ = ["FIGURES", "SHOWN"]
 
@@ -37,7 +34,7 @@ _JUST_ABOVE = 9.8  # rad/s, above the grazing frequency
 SHOWN = {omega: f"{omega:.2f}" for omega in FIGURE_18}
 
 
-def _compute_17(settings: Settings) -> dict[str, xr.Dataset]:
+def _compute_17(settings: Settings) -> Datasets:
     data = diagrams(settings, FIGURE_17, "omega", 8.4, 10.4, (800, 300), tuple(FIGURE_18), patience=4000)
     for word, transient in {"short": 600, "long": 50_000}.items():  # how long chaos lasts just above grazing
         data[f"exact_{word}"] = sweep(
@@ -47,7 +44,7 @@ def _compute_17(settings: Settings) -> dict[str, xr.Dataset]:
     return data | branches("fig17")
 
 
-def _draw_17(data: Mapping[str, xr.Dataset]) -> Canvas:
+def _draw_17(data: Datasets) -> Canvas:
     with plot.journal():
         canvas = sheet(plot.PAGE, 0.76 * plot.PAGE)
         grid = canvas.subplots(2, 2, sharex=True, sharey="row")
@@ -65,7 +62,7 @@ def _draw_17(data: Mapping[str, xr.Dataset]) -> Canvas:
     return canvas
 
 
-def _windows(data: Mapping[str, xr.Dataset]) -> dict[int, tuple[float, float]]:
+def _windows(data: Datasets) -> dict[int, tuple[float, float]]:
     """Periods above 1 that starts reach at frequencies above grazing, each with its lowest and highest frequency."""
     above = data["exact_starts"].sel(omega=slice(_JUST_ABOVE, None))
     periods = above["period_number"]
@@ -76,7 +73,7 @@ def _windows(data: Mapping[str, xr.Dataset]) -> dict[int, tuple[float, float]]:
     return found
 
 
-def _name_windows(ax: Axes, data: Mapping[str, xr.Dataset], state: str) -> None:
+def _name_windows(ax: Axes, data: Datasets, state: str) -> None:
     """The period of each window, above the highest of its points."""
     many = data["exact_starts"]
     for period, (low, high) in _windows(data).items():
@@ -87,7 +84,7 @@ def _name_windows(ax: Axes, data: Mapping[str, xr.Dataset], state: str) -> None:
         )  # fmt: skip
 
 
-def _caption_17(data: Mapping[str, xr.Dataset]) -> str:
+def _caption_17(data: Datasets) -> str:
     grazing = ", ".join(f"{omega:.5f}" for omega in grazing_of(data["exact"]))
     return (
         "Bifurcation diagram over the forcing frequency, rho = 0.23 N, g = 3.6 mm: displacement (above) and "
@@ -100,7 +97,7 @@ def _caption_17(data: Mapping[str, xr.Dataset]) -> str:
     )
 
 
-def _about_windows(data: Mapping[str, xr.Dataset]) -> str:
+def _about_windows(data: Datasets) -> str:
     ends = {n: sorted({f"{low:.2f}", f"{high:.2f}"}) for n, (low, high) in _windows(data).items()}
     if not ends:
         return ""
@@ -111,7 +108,7 @@ def _about_windows(data: Mapping[str, xr.Dataset]) -> str:
     )
 
 
-def _compute_18(settings: Settings) -> dict[str, xr.Dataset]:
+def _compute_18(settings: Settings) -> Datasets:
     data = portraits(settings, FIGURE_17, "omega", FIGURE_18)
     for flow in FLOWS:
         begin = starts(data[flow.key].sizes["start"])[chosen_start(data[flow.key], _CHAOTIC, FIGURE_18[_CHAOTIC])]
@@ -121,7 +118,7 @@ def _compute_18(settings: Settings) -> dict[str, xr.Dataset]:
     return data
 
 
-def _caption_18(data: Mapping[str, xr.Dataset]) -> str:
+def _caption_18(data: Datasets) -> str:
     return (
         "Phase portraits at three frequencies of Fig. 17; section points black, contact zone shaded. Where motions "
         "coexist, the first start that ends in the paper's is drawn. " + describe(data, FIGURE_18)

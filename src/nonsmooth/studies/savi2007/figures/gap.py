@@ -2,22 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
 from nonsmooth import Stroboscopic, plot, poincare
 from nonsmooth.plot.units import prefixed
 from nonsmooth.studies.savi2007.figures.branches import branches
 from nonsmooth.studies.savi2007.figures.diagrams import ABOUT_BRANCHES, diagrams, draw_both, how
-from nonsmooth.studies.savi2007.figures.figure import Figure, only_outer, sheet
+from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Figure, only_outer, sheet
 from nonsmooth.studies.savi2007.figures.portraits import describe, draw_portraits, portraits
 from nonsmooth.studies.savi2007.figures.twins import twins
 from nonsmooth.studies.savi2007.flows import FLOWS, Settings
 from nonsmooth.studies.savi2007.printed import FIGURE_13, FIGURE_14, FIGURE_14_TEXT
-
-if TYPE_CHECKING:
-    import xarray as xr
-    from matplotlib.figure import Figure as Canvas
 
 __all__ = ["FIGURES", "GAPS", "PHASES"]
 
@@ -27,11 +20,11 @@ _CHAOTIC = 0.0018
 GAPS = {g: prefixed(g, "m")[0] for g in FIGURE_14}
 
 
-def _compute_13(settings: Settings) -> dict[str, xr.Dataset]:
+def _compute_13(settings: Settings) -> Datasets:
     return diagrams(settings, FIGURE_13, "g", -0.0015, 0.002, (700, 280), tuple(FIGURE_14)) | branches("fig13")
 
 
-def _caption_13(data: Mapping[str, xr.Dataset]) -> str:
+def _caption_13(data: Datasets) -> str:
     return (
         "Bifurcation diagram over the gap, omega = 11.15 rad/s, rho = 0.33 N: velocity at the section. Dotted: the "
         "four gaps of Fig. 14. Grey shows motions that coexist with what the sweeps follow. "
@@ -40,18 +33,18 @@ def _caption_13(data: Mapping[str, xr.Dataset]) -> str:
     )
 
 
-def _compute_14(settings: Settings) -> dict[str, xr.Dataset]:
+def _compute_14(settings: Settings) -> Datasets:
     return portraits(settings, FIGURE_13, "g", FIGURE_14, others=tuple(FIGURE_14_TEXT))
 
 
-def _caption_14(data: Mapping[str, xr.Dataset]) -> str:
+def _caption_14(data: Datasets) -> str:
     return (
         "Phase portraits at the gaps of the paper's caption; section points black, contact zone shaded. Where motions "
         "coexist, the first start that ends in the paper's is drawn. " + describe(data, FIGURE_14)
     )
 
 
-def _compute_15(settings: Settings) -> dict[str, xr.Dataset]:
+def _compute_15(settings: Settings) -> Datasets:
     data = {}
     for flow in FLOWS:
         system = flow.system(g=_CHAOTIC, **FIGURE_13)
@@ -64,7 +57,7 @@ def _compute_15(settings: Settings) -> dict[str, xr.Dataset]:
     return data
 
 
-def _draw_15(data: Mapping[str, xr.Dataset]) -> Canvas:
+def _draw_15(data: Datasets) -> Canvas:
     with plot.journal():
         canvas = sheet(plot.PAGE, 0.56 * plot.PAGE)
         grid = canvas.subplots(2, 4, sharex="col", sharey="col")
@@ -78,7 +71,7 @@ def _draw_15(data: Mapping[str, xr.Dataset]) -> Canvas:
     return canvas
 
 
-def _caption_15(data: Mapping[str, xr.Dataset]) -> str:
+def _caption_15(data: Datasets) -> str:
     sizes = " and ".join(f"{data[f'{flow.key}_0'].sizes['iterate']} ({flow.key})" for flow in FLOWS)
     return (
         "Strange attractor at g = 1.8 mm, omega = 11.15 rad/s, rho = 0.33 N: sections at four phases of the "

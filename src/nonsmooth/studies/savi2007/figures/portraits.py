@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,13 +10,12 @@ import numpy as np
 from nonsmooth import plot, simulate, sweep
 from nonsmooth.plot.units import prefixed
 from nonsmooth.studies.savi2007.figures.diagrams import shared_legend
-from nonsmooth.studies.savi2007.figures.figure import only_outer, sheet
+from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Draw, only_outer, sheet
 from nonsmooth.studies.savi2007.flows import FLOWS, Settings, starts
 from nonsmooth.studies.savi2007.measure import APERIODIC, periods_reached
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.figure import Figure as Canvas
 
 __all__ = ["chosen_start", "describe", "draw_portraits", "portraits", "setting"]
 
@@ -25,12 +24,12 @@ CHAOTIC_PERIODS = 40  # drawn of an orbit without a period
 
 def portraits(
     settings: Settings, parameters: Mapping[str, float], parameter: str, shown: Mapping[float, int], others: tuple = ()
-) -> dict[str, xr.Dataset]:
+) -> Datasets:
     """Survey each value from several starts, then record one orbit of the regime in ``shown`` (value -> period).
 
     ``<flow>`` holds the survey (a ``sweep`` from the starts, ``others`` surveyed too), ``<flow>_<value>`` the orbit.
     """
-    data: dict[str, xr.Dataset] = {}
+    data: Datasets = {}
     for flow in FLOWS:
         transient = settings.of(flow, exact=1000, smoothed=1000, quick=150)
         first = starts(settings.of(flow, exact=16, smoothed=16, quick=8))
@@ -58,10 +57,10 @@ def chosen_start(survey: xr.Dataset, value: float, wanted: int) -> int:
 
 def draw_portraits(
     parameter: str, unit: str, symbol: str, shown: Mapping[float, int]
-) -> Callable[[Mapping[str, xr.Dataset]], Canvas]:
+) -> Draw:
     """The sheet: columns are values, rows are flows."""
 
-    def draw(data: Mapping[str, xr.Dataset]) -> Canvas:
+    def draw(data: Datasets) -> Canvas:
         with plot.journal():
             canvas = sheet(plot.PAGE, 0.62 * plot.PAGE * 2 / max(len(shown) - 1, 2) + 0.5)
             grid = canvas.subplots(2, len(shown), sharex="col", sharey=True, squeeze=False)
@@ -96,7 +95,7 @@ def setting(symbol: str, value: float, unit: str) -> str:
     return f"${symbol} = {number}$ {prefix}"
 
 
-def describe(data: Mapping[str, xr.Dataset], shown: Mapping[float, int]) -> str:
+def describe(data: Datasets, shown: Mapping[float, int]) -> str:
     """Regimes that the starts reached at each value, by the exact flow."""
     survey = data["exact"]
     name = _parameter(survey)

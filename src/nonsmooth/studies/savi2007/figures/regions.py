@@ -2,26 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
 from nonsmooth import plot
 from nonsmooth.plot.labels import name_axes
-from nonsmooth.studies.savi2007.figures.figure import Figure, sheet
+from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Figure, sheet
 from nonsmooth.studies.savi2007.flows import ETA, EXACT, SMOOTHED, Settings
-
-if TYPE_CHECKING:
-    import xarray as xr
-    from matplotlib.figure import Figure as Canvas
 
 __all__ = ["FIGURES"]
 
 
-def _compute(settings: Settings) -> dict[str, xr.Dataset]:
+def _compute(settings: Settings) -> Datasets:
     return {}
 
 
-def _draw(data: Mapping[str, xr.Dataset]) -> Canvas:
+def _draw(data: Datasets) -> Canvas:
     with plot.journal():
         canvas = sheet(plot.PAGE, 0.42 * plot.PAGE)
         left, right = canvas.subplots(1, 2)
@@ -34,7 +27,7 @@ def _draw(data: Mapping[str, xr.Dataset]) -> Canvas:
     return canvas
 
 
-def _caption(data: Mapping[str, xr.Dataset]) -> str:
+def _caption(data: Datasets) -> str:
     return (
         "Regions of the state plane with Table 1's support, near x = g: (a) without contact (white) and in contact "
         "(blue), parted by the surfaces S_a (x = g) and S_b (the support's force vanishes); (b) the bands of half "

@@ -11,7 +11,7 @@ from nonsmooth import frequency_response, plot
 from nonsmooth.plot.style import small
 from nonsmooth.studies.savi2007.figures.branches import branches, branches_of
 from nonsmooth.studies.savi2007.figures.diagrams import mark_grazing, shared_legend
-from nonsmooth.studies.savi2007.figures.figure import Figure, only_outer, sheet
+from nonsmooth.studies.savi2007.figures.figure import Canvas, Compute, Datasets, Draw, Figure, only_outer, sheet
 from nonsmooth.studies.savi2007.flows import EXACT, FLOWS, Settings
 from nonsmooth.studies.savi2007.grazing import grazing_frequencies
 from nonsmooth.studies.savi2007.printed import FIGURE_9, FIGURE_10, NUMBERS
@@ -19,7 +19,6 @@ from nonsmooth.studies.savi2007.printed import FIGURE_9, FIGURE_10, NUMBERS
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Canvas
 
 __all__ = ["FIGURES", "grazing_of", "mark_printed"]
 
@@ -33,8 +32,8 @@ def grazing_of(response: xr.Dataset) -> list[float]:
 
 def _compute(
     name: str, parameters: Mapping[str, float], low: float, high: float
-) -> Callable[[Settings], dict[str, xr.Dataset]]:
-    def compute(settings: Settings) -> dict[str, xr.Dataset]:
+) -> Compute:
+    def compute(settings: Settings) -> Datasets:
         data = {}
         for flow in FLOWS:
             step = settings.of(flow, exact=0.0025, smoothed=0.005, quick=0.02)
@@ -48,8 +47,8 @@ def _compute(
     return compute
 
 
-def _draw(printed: Mapping[str, float]) -> Callable[[Mapping[str, xr.Dataset]], Canvas]:
-    def draw(data: Mapping[str, xr.Dataset]) -> Canvas:
+def _draw(printed: Mapping[str, float]) -> Draw:
+    def draw(data: Datasets) -> Canvas:
         with plot.journal():
             canvas = sheet(plot.PAGE, 0.5 * plot.PAGE)
             grid = canvas.subplots(1, 2, sharey=True)
@@ -93,8 +92,8 @@ def mark_printed(ax: Axes, printed: Mapping[str, float]) -> None:
         )  # fmt: skip
 
 
-def _caption(name: str) -> Callable[[Mapping[str, xr.Dataset]], str]:
-    def caption(data: Mapping[str, xr.Dataset]) -> str:
+def _caption(name: str) -> Callable[[Datasets], str]:
+    def caption(data: Datasets) -> str:
         exact, smoothed = data["exact"], data["smoothed"]
         grazing = " and ".join(f"{omega:.5f}" for omega in grazing_of(exact))
         return (

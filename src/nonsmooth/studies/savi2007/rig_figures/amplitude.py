@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,14 +10,13 @@ from nonsmooth import plot
 from nonsmooth.plot import comparison_diagram
 from nonsmooth.studies.savi2007.figures.amplitude import PRINTED
 from nonsmooth.studies.savi2007.figures.diagrams import mark_values, shared_legend
-from nonsmooth.studies.savi2007.figures.figure import Figure, sheet
+from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Figure, sheet
 from nonsmooth.studies.savi2007.flows import Settings
 from nonsmooth.studies.savi2007.printed import FIGURE_12
 from nonsmooth.studies.savi2007.rig_figures.motions import GRID, compared, draw_pairs, motions, said
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.figure import Figure as Canvas
 
 __all__ = ["FIGURES", "RISES", "flip_of", "flips_said", "rate_of", "slowest"]
 
@@ -26,7 +24,7 @@ RISES = (450.0, 900.0, 1800.0)  # s, from 0.2 to 0.5 N; the one in the middle is
 _SHORT = (300.0,)
 
 
-def _compute_11(settings: Settings) -> dict[str, xr.Dataset]:
+def _compute_11(settings: Settings) -> Datasets:
     bench, data = settings.bench, {}
     for duration in _SHORT if settings.quick else RISES:
         session = bench.record(f"fig11_{duration:g}_s", bench.rig.figure(11, duration=duration))
@@ -38,7 +36,7 @@ def _compute_11(settings: Settings) -> dict[str, xr.Dataset]:
     return data
 
 
-def _draw_11(data: Mapping[str, xr.Dataset]) -> Canvas:
+def _draw_11(data: Datasets) -> Canvas:
     with plot.journal():
         canvas = sheet(0.72 * plot.PAGE, 0.56 * plot.PAGE)
         ax = canvas.subplots()
@@ -49,7 +47,7 @@ def _draw_11(data: Mapping[str, xr.Dataset]) -> Canvas:
     return canvas
 
 
-def _drawn(data: Mapping[str, xr.Dataset]) -> xr.Dataset:
+def _drawn(data: Datasets) -> xr.Dataset:
     return list(data.values())[len(data) // 2]
 
 
@@ -58,7 +56,7 @@ def rate_of(rise: xr.Dataset) -> float:
     return 0.3 / float(rise.attrs["rise"].split()[0])
 
 
-def _caption_11(data: Mapping[str, xr.Dataset]) -> str:
+def _caption_11(data: Datasets) -> str:
     read = [f"{1e3 * rate_of(one):.3f} mN/s: {flips_said(one, 'measured_flip_read')}" for one in data.values()]
     found = [flips_said(one, "measured_flip") for one in data.values()]
     drawn = _drawn(data)
@@ -73,7 +71,7 @@ def _caption_11(data: Mapping[str, xr.Dataset]) -> str:
     )
 
 
-def slowest(data: Mapping[str, xr.Dataset]) -> xr.Dataset:
+def slowest(data: Datasets) -> xr.Dataset:
     """The rise that took longest."""
     return min(data.values(), key=rate_of)
 
@@ -90,12 +88,12 @@ def flips_said(result: xr.Dataset, name: str) -> str:
     return ", ".join(f"{flip} at {value:.4f}" for flip, value in rows if np.isfinite(value)) or "none found"
 
 
-def _compute_12(settings: Settings) -> dict[str, xr.Dataset]:
+def _compute_12(settings: Settings) -> Datasets:
     periods = 60 if settings.quick else 200
     return compared(settings.bench, motions(settings.bench, 12, tuple(FIGURE_12), periods=periods), grid=GRID)
 
 
-def _caption_12(data: Mapping[str, xr.Dataset]) -> str:
+def _caption_12(data: Datasets) -> str:
     return (
         "State space with section points at four amplitudes of Fig. 11, the model with the parameters identified "
         "(above) and the virtual rig (synthetic, below); crosses: the model's section points; contact zone shaded. "

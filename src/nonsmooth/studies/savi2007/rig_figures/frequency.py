@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from nonsmooth import plot
 from nonsmooth.plot import comparison_diagram, comparison_phase_portrait
 from nonsmooth.studies.savi2007.figures.diagrams import mark_values, shared_legend
-from nonsmooth.studies.savi2007.figures.figure import Figure, only_outer, sheet
+from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Figure, only_outer, sheet
 from nonsmooth.studies.savi2007.figures.frequency import SHOWN
 from nonsmooth.studies.savi2007.flows import Settings
 from nonsmooth.studies.savi2007.printed import FIGURE_18
@@ -25,17 +22,13 @@ from nonsmooth.studies.savi2007.rig_figures.motions import (
     without_flips,
 )  # fmt: skip
 
-if TYPE_CHECKING:
-    import xarray as xr
-    from matplotlib.figure import Figure as Canvas
-
 __all__ = ["FIGURES"]
 
 
 _PATIENCE = 4000  # periods: above grazing the model's chaos is a transient, which is no motion to compare with
 
 
-def _compute_17(settings: Settings) -> dict[str, xr.Dataset]:
+def _compute_17(settings: Settings) -> Datasets:
     from nonsmooth.studies.savi2007.rig.figures import SECTIONS
 
     bench = settings.bench
@@ -47,7 +40,7 @@ def _compute_17(settings: Settings) -> dict[str, xr.Dataset]:
     return {"compared": result, "runs": runs_of(found, "omega")}
 
 
-def _draw_17(data: Mapping[str, xr.Dataset]) -> Canvas:
+def _draw_17(data: Datasets) -> Canvas:
     with plot.journal():
         canvas = sheet(plot.PAGE, 0.5 * plot.PAGE)
         for ax, state, letter in zip(canvas.subplots(1, 2), "xv", "ab", strict=True):
@@ -58,7 +51,7 @@ def _draw_17(data: Mapping[str, xr.Dataset]) -> Canvas:
     return canvas
 
 
-def _caption_17(data: Mapping[str, xr.Dataset]) -> str:
+def _caption_17(data: Datasets) -> str:
     result = data["compared"]
     steps = np.unique(result["measured_omega"].values)
     return (
@@ -68,14 +61,14 @@ def _caption_17(data: Mapping[str, xr.Dataset]) -> str:
     )
 
 
-def _compute_18(settings: Settings) -> dict[str, xr.Dataset]:
+def _compute_18(settings: Settings) -> Datasets:
     return compared(
         settings.bench, motions(settings.bench, 18, tuple(FIGURE_18), periods=60 if settings.quick else 200),
         grid=GRID, transient=600 if settings.quick else _PATIENCE,
     )  # fmt: skip
 
 
-def _draw_18(data: Mapping[str, xr.Dataset]) -> Canvas:
+def _draw_18(data: Datasets) -> Canvas:
     with plot.journal():
         canvas = sheet(plot.PAGE, 0.44 * plot.PAGE)
         grid = canvas.subplots(1, 3, sharey=True)
@@ -88,7 +81,7 @@ def _draw_18(data: Mapping[str, xr.Dataset]) -> Canvas:
     return canvas
 
 
-def _caption_18(data: Mapping[str, xr.Dataset]) -> str:
+def _caption_18(data: Datasets) -> str:
     return (
         "State space at three frequencies of Fig. 17: the virtual rig (synthetic, dashed, section points black) "
         "over the model with the parameters identified; the contact zone is shaded. "

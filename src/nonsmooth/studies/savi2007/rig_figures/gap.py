@@ -12,7 +12,7 @@ from nonsmooth.plot import comparison_diagram
 from nonsmooth.plot.comparison import MEASURED, THEORY
 from nonsmooth.plot.labels import name_and_unit, name_axes
 from nonsmooth.studies.savi2007.figures.diagrams import mark_values, shared_legend
-from nonsmooth.studies.savi2007.figures.figure import Figure, only_outer, sheet
+from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Figure, only_outer, sheet
 from nonsmooth.studies.savi2007.figures.gap import GAPS, PHASES
 from nonsmooth.studies.savi2007.flows import EXACT, Settings, starts
 from nonsmooth.studies.savi2007.printed import FIGURE_14
@@ -32,7 +32,6 @@ from nonsmooth.studies.savi2007.rig_figures.motions import (
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.figure import Figure as Canvas
 
     from nonsmooth.studies.savi2007.laboratory import Laboratory
 
@@ -46,7 +45,7 @@ def _records(bench: Laboratory) -> Motions:
     return bench.once("fig14", lambda: motions(bench, 14, tuple(FIGURE_14), periods=60 if bench.quick else 100))
 
 
-def _compute_13(settings: Settings) -> dict[str, xr.Dataset]:
+def _compute_13(settings: Settings) -> Datasets:
     found = _records(settings.bench)
     measured, set_ = diagram_of(found, "g")
     fine = 71 if settings.quick else 351
@@ -65,7 +64,7 @@ def _coexisting(settings: Settings, set_: Mapping[str, Any]) -> xr.Dataset:
     )  # fmt: skip
 
 
-def _draw_13(data: Mapping[str, xr.Dataset]) -> Canvas:
+def _draw_13(data: Datasets) -> Canvas:
     with plot.journal():
         canvas = sheet(0.72 * plot.PAGE, 0.56 * plot.PAGE)
         ax = canvas.subplots()
@@ -93,7 +92,7 @@ def transient_points(compared: xr.Dataset, runs: xr.Dataset) -> np.ndarray:
     return np.repeat(over, compared.sizes["sample"] // runs.sizes["run"])  # as many points of each run, run by run
 
 
-def _caption_13(data: Mapping[str, xr.Dataset]) -> str:
+def _caption_13(data: Datasets) -> str:
     gaps = ", ".join(f"{1e3 * g:.2f}" for g in np.unique(data["compared"]["measured_g"].values))
     return (
         "Velocity at the section over the gap: the virtual rig (synthetic) at four settings of the support, let go "
@@ -104,7 +103,7 @@ def _caption_13(data: Mapping[str, xr.Dataset]) -> str:
     )
 
 
-def _compute_14(settings: Settings) -> dict[str, xr.Dataset]:
+def _compute_14(settings: Settings) -> Datasets:
     """At each gap the first record of each period number that its starts lead to."""
     found = _records(settings.bench)
     runs = runs_of(found, "g")
@@ -114,7 +113,7 @@ def _compute_14(settings: Settings) -> dict[str, xr.Dataset]:
     return compared(settings.bench, {key: found[key] for key in first.values()}, grid=GRID)
 
 
-def _caption_14(data: Mapping[str, xr.Dataset]) -> str:
+def _caption_14(data: Datasets) -> str:
     return (
         "State space at the gaps of the paper's caption, the model with the parameters identified (above) and the "
         "virtual rig (synthetic, below); crosses are the model's section points, the contact zone is shaded. "
@@ -123,14 +122,14 @@ def _caption_14(data: Mapping[str, xr.Dataset]) -> str:
     )
 
 
-def _compute_16(settings: Settings) -> dict[str, xr.Dataset]:
+def _compute_16(settings: Settings) -> Datasets:
     bench = settings.bench
     found = motions(bench, 16, (0.0018,), periods=300 if settings.quick else 1500)
     measured, set_ = found["0.0018"]
     return {"attractor": bench.compare(measured, set_, section_phase=list(PHASES.values()))}
 
 
-def _draw_16(data: Mapping[str, xr.Dataset]) -> Canvas:
+def _draw_16(data: Datasets) -> Canvas:
     result = data["attractor"]
     with plot.journal():
         canvas = sheet(plot.PAGE, 0.56 * plot.PAGE)
@@ -148,7 +147,7 @@ def _draw_16(data: Mapping[str, xr.Dataset]) -> Canvas:
     return canvas
 
 
-def _caption_16(data: Mapping[str, xr.Dataset]) -> str:
+def _caption_16(data: Datasets) -> str:
     result = data["attractor"]
     far, halves = result["energy_distance_matched"].values, result["measured_halves_p95"].values
     words = ", ".join(f"{a:.3f} ({a / b:.2f})" for a, b in zip(far, halves, strict=True))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -14,7 +14,7 @@ from nonsmooth.plot.labels import name_and_unit, name_axes
 from nonsmooth.plot.phase_portrait import shade_zone
 from nonsmooth.plot.units import prefixed
 from nonsmooth.studies.savi2007.figures.diagrams import shared_legend
-from nonsmooth.studies.savi2007.figures.figure import only_outer, sheet
+from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Draw, only_outer, sheet
 from nonsmooth.studies.savi2007.figures.portraits import setting
 from nonsmooth.studies.savi2007.laboratory import as_result
 from nonsmooth.studies.savi2007.measure import APERIODIC
@@ -22,7 +22,6 @@ from nonsmooth.studies.savi2007.measure import APERIODIC
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Canvas
 
     from nonsmooth import System
     from nonsmooth.studies.savi2007.laboratory import Laboratory
@@ -55,7 +54,7 @@ def motions(bench: Laboratory, number: int, values: Sequence[float], **options: 
     return found
 
 
-def compared(bench: Laboratory, found: Motions, **options: Any) -> dict[str, xr.Dataset]:
+def compared(bench: Laboratory, found: Motions, **options: Any) -> Datasets:
     """Each motion over the model's."""
     return {key: bench.compare(motion, settings, **options) for key, (motion, settings) in found.items()}
 
@@ -111,25 +110,25 @@ def without_flips(result: xr.Dataset) -> xr.Dataset:
     return result.isel(flip=slice(0, 0)) if "flip" in result.dims else result
 
 
-def runs_at(data: Mapping[str, xr.Dataset], value: float) -> list[xr.Dataset]:
+def runs_at(data: Datasets, value: float) -> list[xr.Dataset]:
     """The comparisons of all runs at one value, in the order in which they were recorded."""
     key = f"{value:g}"
     return [result for name, result in data.items() if name == key or name.startswith(f"{key}_")]
 
 
-def measured_periods_at(data: Mapping[str, xr.Dataset], value: float) -> dict[int, int]:
+def measured_periods_at(data: Datasets, value: float) -> dict[int, int]:
     """The period numbers measured at a value (0: none found), each with how many of the runs here have it."""
     numbers = [int(result["measured_period_number"]) for result in runs_at(data, value)]
     return {number: numbers.count(number) for number in sorted(set(numbers))}
 
 
-def chosen(data: Mapping[str, xr.Dataset], value: float, wanted: int) -> xr.Dataset:
+def chosen(data: Datasets, value: float, wanted: int) -> xr.Dataset:
     """The first run with the wanted period number; the first of all where none has it."""
     runs = runs_at(data, value)
     return next((run for run in runs if int(run["measured_period_number"]) == wanted), runs[0])
 
 
-def said(data: Mapping[str, xr.Dataset], shown: Mapping[float, int], unit: str) -> str:
+def said(data: Datasets, shown: Mapping[float, int], unit: str) -> str:
     """Motions of the rig at each value, beside those of the model."""
     words = []
     for value in shown:
@@ -143,10 +142,10 @@ def _name(period: int) -> str:
     return "no period" if period == APERIODIC else f"period {period}"
 
 
-def draw_pairs(unit: str, symbol: str, shown: Mapping[float, int]) -> Callable[[Mapping[str, xr.Dataset]], Canvas]:
+def draw_pairs(unit: str, symbol: str, shown: Mapping[float, int]) -> Draw:
     """The sheet: columns are values; the model above, the rig below, in the same axes."""
 
-    def draw(data: Mapping[str, xr.Dataset]) -> Canvas:
+    def draw(data: Datasets) -> Canvas:
         with plot.journal():
             canvas = sheet(plot.PAGE, 0.62 * plot.PAGE * 2 / max(len(shown) - 1, 2) + 0.5)
             grid = canvas.subplots(2, len(shown), sharex="col", sharey=True, squeeze=False)

@@ -10,7 +10,7 @@ import numpy as np
 from nonsmooth import plot
 from nonsmooth.plot import identification as pictures
 from nonsmooth.plot.comparison import ABOVE
-from nonsmooth.studies.savi2007.figures.figure import Figure, sheet
+from nonsmooth.studies.savi2007.figures.figure import Canvas, Compute, Datasets, Draw, Figure, sheet
 from nonsmooth.studies.savi2007.findings import Number, estimates_of, found_in, kept, the_finding
 from nonsmooth.studies.savi2007.flows import Settings
 from nonsmooth.studies.savi2007.printed import NUMBERS, TABLE_1
@@ -19,7 +19,6 @@ from nonsmooth.studies.savi2007.rig import IDENTIFICATION
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Canvas
 
 __all__ = ["FIGURES", "NAMES", "table_rows"]
 
@@ -31,8 +30,8 @@ NAMES = {
 }  # fmt: skip
 
 
-def _findings(names: Mapping[str, str]) -> Callable[[Settings], dict[str, xr.Dataset]]:
-    def compute(settings: Settings) -> dict[str, xr.Dataset]:
+def _findings(names: Mapping[str, str]) -> Compute:
+    def compute(settings: Settings) -> Datasets:
         identified = settings.bench.identified
         return {key: kept(the_finding(identified, name)) for key, name in names.items()}
 
@@ -41,10 +40,10 @@ def _findings(names: Mapping[str, str]) -> Callable[[Settings], dict[str, xr.Dat
 
 def _side_by_side(
     *parts: tuple[str, Callable[..., Any], str], width: float = plot.PAGE, height: float = 0.42
-) -> Callable[[Mapping[str, xr.Dataset]], Canvas]:
+) -> Draw:
     """A sheet of pictures in a row: key of the dataset, what draws it, title."""
 
-    def draw(data: Mapping[str, xr.Dataset]) -> Canvas:
+    def draw(data: Datasets) -> Canvas:
         with plot.journal():
             canvas = sheet(width, height * plot.PAGE)
             axes = np.atleast_1d(canvas.subplots(1, len(parts)))
@@ -72,7 +71,7 @@ def _spectrum(data: xr.Dataset, ax: Axes) -> None:
     ax.legend(**ABOVE, ncols=2, handlelength=1.6, columnspacing=1.0)
 
 
-def _caption_4(data: Mapping[str, xr.Dataset]) -> str:
+def _caption_4(data: Datasets) -> str:
     car, support = found_in(data["oscillator"]), found_in(data["support"])
     return (
         f"Force against displacement, {car.runs} pulls of the car and {support.runs} pushes of the support's spring by "
@@ -82,7 +81,7 @@ def _caption_4(data: Mapping[str, xr.Dataset]) -> str:
     )
 
 
-def _caption_5(data: Mapping[str, xr.Dataset]) -> str:
+def _caption_5(data: Datasets) -> str:
     found = found_in(data["tap"])
     return (
         "Impulsive response of the car and the magnitude of its DFT. (a) Tap and free decay with the fitted motion. "
@@ -90,7 +89,7 @@ def _caption_5(data: Mapping[str, xr.Dataset]) -> str:
     )
 
 
-def _caption_6(data: Mapping[str, xr.Dataset]) -> str:
+def _caption_6(data: Datasets) -> str:
     viscous, both = found_in(data["viscous"]), found_in(data["amplitudes"])
     return (
         f"Amplitude over frequency without the support, {viscous.runs} runs, and the fitted model. Viscous damping "
@@ -99,7 +98,7 @@ def _caption_6(data: Mapping[str, xr.Dataset]) -> str:
     )
 
 
-def _caption_7(data: Mapping[str, xr.Dataset]) -> str:
+def _caption_7(data: Datasets) -> str:
     found = found_in(data["drop"])
     return (
         f"Free decay of the support with 1.33 kg on it. (a) One of {found.runs} runs. (b) Logarithm of its turning "
@@ -108,7 +107,7 @@ def _caption_7(data: Mapping[str, xr.Dataset]) -> str:
     )
 
 
-def _caption_8(data: Mapping[str, xr.Dataset]) -> str:
+def _caption_8(data: Datasets) -> str:
     motor, crank = found_in(data["voltage"]), found_in(data["crank"])
     return (
         f"Calibrations of the drive with fitted lines and what they leave. (a) Frequency over motor voltage, "
@@ -117,7 +116,7 @@ def _caption_8(data: Mapping[str, xr.Dataset]) -> str:
     )
 
 
-def _compute_table(settings: Settings) -> dict[str, xr.Dataset]:
+def _compute_table(settings: Settings) -> Datasets:
     import xarray as xr
 
     from nonsmooth.studies.savi2007.laboratory import TRUTH, as_result
@@ -137,7 +136,7 @@ def _compute_table(settings: Settings) -> dict[str, xr.Dataset]:
     }  # fmt: skip
 
 
-def table_rows(data: Mapping[str, xr.Dataset]) -> dict[str, tuple[str, Number, float]]:
+def table_rows(data: Datasets) -> dict[str, tuple[str, Number, float]]:
     """Of each quantity of ``NAMES``: as the paper prints it ("" where it does not), as identified, and the truth."""
     found, truth = estimates_of(data["identified"]), data["truth"]
     rows = {}
@@ -148,7 +147,7 @@ def table_rows(data: Mapping[str, xr.Dataset]) -> dict[str, tuple[str, Number, f
     return rows
 
 
-def _draw_table(data: Mapping[str, xr.Dataset]) -> Canvas:
+def _draw_table(data: Datasets) -> Canvas:
     rows = table_rows(data)
     with plot.journal():
         canvas = sheet(plot.PAGE, 0.36 * plot.PAGE)
@@ -174,7 +173,7 @@ def _draw_table(data: Mapping[str, xr.Dataset]) -> Canvas:
     return canvas
 
 
-def _caption_table(data: Mapping[str, xr.Dataset]) -> str:
+def _caption_table(data: Datasets) -> str:
     rows = table_rows(data)
     inside = sum(number.low <= truth <= number.high for _, number, truth in rows.values())
     return (

@@ -2,30 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
 from nonsmooth import plot
 from nonsmooth.plot import comparison_response
 from nonsmooth.studies.savi2007.figures.diagrams import shared_legend
-from nonsmooth.studies.savi2007.figures.figure import Figure, sheet
+from nonsmooth.studies.savi2007.figures.figure import Canvas, Compute, Datasets, Draw, Figure, sheet
 from nonsmooth.studies.savi2007.figures.resonance import mark_printed
 from nonsmooth.studies.savi2007.flows import Settings
 from nonsmooth.studies.savi2007.laboratory import as_result
 from nonsmooth.studies.savi2007.measure import measured_jumps, measured_periods
 from nonsmooth.studies.savi2007.printed import NUMBERS
 
-if TYPE_CHECKING:
-    import xarray as xr
-    from matplotlib.figure import Figure as Canvas
-
 __all__ = ["FIGURES"]
 
 
-def _compute(number: int) -> Callable[[Settings], dict[str, xr.Dataset]]:
-    def compute(settings: Settings) -> dict[str, xr.Dataset]:
+def _compute(number: int) -> Compute:
+    def compute(settings: Settings) -> Datasets:
         bench = settings.bench
         session = bench.record(f"fig{number:02d}", bench.rig.figure(number, **_steps(settings, number)))
         measured, set_ = bench.measured(session, "response", bench.with_support(session, "response"))
@@ -49,8 +45,8 @@ def _steps(settings: Settings, number: int) -> dict[str, Any]:
     return {"voltages": [voltage_for(settings.bench.rig, float(omega)) for omega in omegas], **options}
 
 
-def _draw(printed: Mapping[str, float]) -> Callable[[Mapping[str, xr.Dataset]], Canvas]:
-    def draw(data: Mapping[str, xr.Dataset]) -> Canvas:
+def _draw(printed: Mapping[str, float]) -> Draw:
+    def draw(data: Datasets) -> Canvas:
         with plot.journal():
             canvas = sheet(0.72 * plot.PAGE, 0.6 * plot.PAGE)
             ax = canvas.subplots()
@@ -62,7 +58,7 @@ def _draw(printed: Mapping[str, float]) -> Callable[[Mapping[str, xr.Dataset]], 
     return draw
 
 
-def _caption(data: Mapping[str, xr.Dataset]) -> str:
+def _caption(data: Datasets) -> str:
     runs, compared = data["runs"], data["compared"]
     words = []
     for direction, word in (("up", "rising"), ("down", "falling")):
