@@ -21,6 +21,14 @@ if TYPE_CHECKING:
 __all__ = ["compare"]
 
 DRAWS = 60
+READINGS = (
+    "where some states were not measured, nonsmooth.fit(system, recording, [...]) lays the others over the model, and "
+    "its `residuals` show where they part"
+)
+FORMS = (
+    "nonsmooth.identification.compare.motion_of(time, x, phase) makes one of a sampled position, and measured_motion "
+    f"of a rig with a rotary sensor and a photogate; {READINGS}"
+)
 NEGLIGIBLE = 1e-4  # relative uncertainties of settings below this ask for no band
 
 
@@ -51,8 +59,8 @@ def compare(
     What is compared follows from what ``measured`` holds:
 
     - a **motion**: ``u(time, state)`` with ``phase(time)`` in forcing periods (and ``u_error``), as
-      :func:`nonsmooth.identification.compare.measured_motion` makes it from a recording; or its section points alone,
-      ``section(iterate, state)``;
+      :func:`nonsmooth.identification.compare.motion_of` makes it of a sampled position, and ``measured_motion`` of a
+      recording of the paper's rig; or its section points alone, ``section(iterate, state)``;
     - a **response**: ``amplitude`` over ``run`` with the parameter (``omega``) and ``direction`` of each, or a result
       of ``frequency_response``;
     - a **diagram**: ``section(<parameter>, iterate, state)`` of steady runs, or ``section(iterate, state)`` with the
@@ -138,8 +146,7 @@ def compare(
 
     if not isinstance(measured, xr.Dataset):
         raise TypeError(
-            f"compare takes a Dataset of measured signals, not {type(measured).__name__}; make one from a recording "
-            "with nonsmooth.identification.compare.measured_motion"
+            f"compare takes a Dataset of measured signals, not {type(measured).__name__}: {FORMS}"
         )
     from nonsmooth.system.system import System
 
@@ -210,7 +217,7 @@ def _kind(measured: xr.Dataset, parameter: str | None) -> str:
         if "phase" not in measured:
             raise ValueError(
                 "a measured motion needs `phase` (of the drive, in forcing periods) over time beside `u`; see "
-                "nonsmooth.identification.compare.measured_motion"
+                "nonsmooth.identification.compare.motion_of"
             )
         return "motion"
     if "section" in measured:
@@ -219,7 +226,7 @@ def _kind(measured: xr.Dataset, parameter: str | None) -> str:
         return "motion"
     raise ValueError(
         "nothing here can be compared: a motion holds `u` over time with `phase`, or `section` over iterate; a "
-        f"response `amplitude`; this Dataset holds {', '.join(map(str, measured.data_vars)) or 'nothing'}"
+        f"response `amplitude`; this Dataset holds {', '.join(map(str, measured.data_vars)) or 'nothing'}; {FORMS}"
     )
 
 
@@ -231,7 +238,10 @@ def _states(measured: xr.Dataset, theory: Any) -> list[str]:
         raise ValueError(f"`state` must name the measured states; the theory has {', '.join(known)}")
     held = [str(name) for name in np.atleast_1d(measured["state"].values)]
     if held != known and not ("amplitude" in measured and held[0] in known):
-        raise ValueError(f"the measured states are {', '.join(held)}, those of the theory {', '.join(known)}")
+        raise ValueError(
+            f"the measured states are {', '.join(held)}, those of the theory {', '.join(known)}: name them so; "
+            f"{READINGS}"
+        )
     return held
 
 
