@@ -2,13 +2,8 @@
 
 import numpy as np
 import pytest
-
-import nonsmooth as ns
-from nonsmooth.identification.finding import Estimate, Finding
-from nonsmooth.identification.parameter_set import ParameterSet
-from nonsmooth.identification.report import report
-from nonsmooth.studies.savi2007.identification.coverage import drive_mean
-from nonsmooth.studies.savi2007.identification.coverage_tables import (
+from tests.studies.identification.coverage import drive_mean
+from tests.studies.identification.coverage_tables import (
     ASKED,
     BESIDE,
     misses,
@@ -17,6 +12,11 @@ from nonsmooth.studies.savi2007.identification.coverage_tables import (
     to_dataset,
     unnamed,
 )
+
+import nonsmooth as ns
+from nonsmooth.identification.finding import Estimate, Finding
+from nonsmooth.identification.parameter_set import ParameterSet
+from nonsmooth.identification.report import report
 from nonsmooth.studies.savi2007.identification.gap import mean_of_drive
 from nonsmooth.studies.savi2007.identification.statements import for_model, require
 

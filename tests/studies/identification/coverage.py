@@ -1,6 +1,6 @@
 """Coverage: do the stated intervals hold the truth as often as they say? Forty virtual rigs, two tables.
 
-``python -m nonsmooth.studies.savi2007.identification.coverage --seeds 0-39 --out docs/measured_coverage.md``
+``python -m tests.studies.identification.coverage --seeds 0-39 --out docs/measured_coverage.md``
 
 With ``--awkward`` the rigs are those on which much goes wrong at once (``VirtualRig.awkward``), and a third table
 counts whether the notes of ``identify`` name each thing that does, and nothing that does not.
@@ -22,8 +22,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-from nonsmooth.studies.savi2007.identification.coverage_tables import ASKED, BESIDE, COMPARED, page, to_dataset
+from tests.studies.identification.coverage_tables import ASKED, BESIDE, COMPARED, page, to_dataset
 
 __all__ = ["campaign", "main", "one_rig"]
 
@@ -146,7 +145,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         title, flag = ("Measured coverage", "")
         if options.awkward:
             title, flag = "Measured coverage on awkward rigs", " --awkward"
-        program = "nonsmooth.studies.savi2007.identification.coverage"
+        program = "tests.studies.identification.coverage"
         head = f"# {title}\n\nPrinted by `python -m {program}{flag}`: synthetic rigs.\n\n"
         options.out.write_text(head + MEANING + "\n" + text, encoding="utf-8")
     return 0
