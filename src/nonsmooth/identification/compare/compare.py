@@ -9,7 +9,8 @@ import numpy as np
 
 from nonsmooth.flow.arguments import real_number, whole_number
 from nonsmooth.identification.blas import one_blas_thread
-from nonsmooth.identification.compare.draws import nominal, read_settings
+from nonsmooth.identification.compare.draws import read_settings
+from nonsmooth.identification.compare.model import Model
 from nonsmooth.system.names import unknown
 
 if TYPE_CHECKING:
@@ -166,16 +167,13 @@ def compare(
         raise ValueError(f"level = {level!r} must lie between 0 and 1, as 0.95")
     kind = _kind(measured, parameter)
     states = _states(measured, theory)
-    shared: dict[str, Any] = {
-        "parameters": parameters, "settings": set_, "transient": whole_number(transient, "transient", 0),
-        "draws": draws, "level": level, "seed": seed, "options": options,
-    }  # fmt: skip
+    model = Model(theory, parameters, set_, whole_number(transient, "transient", 0), draws, level, seed, options)
     squeeze: tuple[str, ...] = ()
     if kind == "response":
         from nonsmooth.identification.compare.response import compare_response
 
         name = _parameter(parameter or "omega", theory)
-        variables = compare_response(measured, theory, name=name, state=states[0], **shared)
+        variables = compare_response(measured, model, name=name, state=states[0])
     elif kind == "diagram":
         from nonsmooth.identification.compare.diagram import compare_diagram
 
@@ -183,8 +181,8 @@ def compare(
         if direction not in ("up", "down", "both"):
             raise ValueError(f"direction = {direction!r}; allowed: 'up', 'down', 'both'")
         variables = compare_diagram(
-            measured, theory, name=name, noise=_noise(measured, noise, states), direction=direction, values=values,
-            phase=real_number(section_phase, "section_phase"), max_period=max_period, **shared,
+            measured, model, name=name, noise=_noise(measured, noise, states), direction=direction, values=values,
+            phase=real_number(section_phase, "section_phase"), max_period=max_period,
         )  # fmt: skip
     else:
         from nonsmooth.identification.compare.motion import compare_motion
@@ -194,9 +192,9 @@ def compare(
             raise ValueError("measured section points are of one phase: give section_phase as one number")
         squeeze = ("section_phase",) if np.ndim(section_phase) == 0 else ()
         variables = compare_motion(
-            measured, theory, noise=_noise(measured, noise, states), states=states, start=start, phases=phases,
+            measured, model, noise=_noise(measured, noise, states), states=states, start=start, phases=phases,
             grid=whole_number(grid, "grid", 8), max_period=whole_number(max_period, "max_period", 1),
-            splits=whole_number(splits, "splits", 20), **shared,
+            splits=whole_number(splits, "splits", 20),
         )  # fmt: skip
         variables["section_phase"] = (("section_phase",), np.array(phases), {
             "long_name": "phase of the section", "units": "forcing periods"})  # fmt: skip
@@ -206,7 +204,7 @@ def compare(
         "section_phase": section_phase, "grid": grid, "transient": transient, "max_period": max_period,
         "draws": draws, "level": level, "splits": splits, "seed": seed, **options,
     }  # fmt: skip
-    result = _dataset(variables, measured, theory, parameters, set_, kind, given, seed)
+    result = _dataset(variables, measured, model, kind, given)
     return result.squeeze([dim for dim in squeeze if dim in result.dims])
 
 
@@ -284,9 +282,8 @@ def _swept(measured: xr.Dataset, theory: Any) -> str:
 
 
 def _dataset(
-    variables: dict[str, Any], measured: xr.Dataset, theory: Any, parameters: Any, settings: Any, kind: str,
-    given: dict[str, Any], seed: int,
-) -> xr.Dataset:  # fmt: skip
+    variables: dict[str, Any], measured: xr.Dataset, model: Model, kind: str, given: dict[str, Any]
+) -> xr.Dataset:
     import xarray as xr
 
     from nonsmooth.results.labels import labels_of
@@ -299,14 +296,14 @@ def _dataset(
         with_short_record,
     )
 
-    if hasattr(theory, "data_vars"):
-        record = read_provenance(theory) | {"verb": "compare", "options": options_as_data(given), "seed": seed}
+    theory = model.theory
+    if model.system is None:
+        record = read_provenance(theory) | {"verb": "compare", "options": options_as_data(given), "seed": model.seed}
         states = {str(n): str(u) for n, u in zip(theory["state"].values, theory["state_unit"].values, strict=True)}
     else:
-        system = nominal(theory, parameters, settings)
-        labels = labels_of(system)
+        labels = labels_of(model.system)
         method = str(given.get("method", "auto"))
-        record = read_provenance(xr.Dataset(attrs=provenance(labels, "compare", given, method=method, seed=seed)))
+        record = read_provenance(xr.Dataset(attrs=provenance(labels, "compare", given, method=method, seed=model.seed)))
         states = {name: quantity.unit for name, quantity in labels.states.items()}
         for name, quantity in labels.parameters.items():
             if name not in variables:
