@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from nonsmooth.control.continuation import control_based_continuation as control_based_continuation
     from nonsmooth.control.holding import Holding as Holding
     from nonsmooth.control.simulated_rig import SimulatedRig as SimulatedRig
+    from nonsmooth.diagrams.amplitude_spectrum import amplitude_spectrum as amplitude_spectrum
     from nonsmooth.diagrams.chart import chart as chart
     from nonsmooth.diagrams.correlation_dimension import correlation_dimension as correlation_dimension
     from nonsmooth.diagrams.lyapunov import lyapunov as lyapunov
@@ -85,6 +86,7 @@ _WHERE = {
     "Stroboscopic": "flow.sections",
     "Poincare": "flow.sections",
     "random_starts": "flow.starts",
+    "amplitude_spectrum": "diagrams.amplitude_spectrum",
     "sweep": "diagrams.sweep",
     "frequency_response": "diagrams.response",
     "lyapunov": "diagrams.lyapunov",

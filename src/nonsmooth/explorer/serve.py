@@ -14,6 +14,7 @@ from nonsmooth.errors import not_installed
 
 if TYPE_CHECKING:
     from nonsmooth.explorer.catalogue import Catalogue
+    from nonsmooth.explorer.session import Session
     from nonsmooth.system.system import System
 
 __all__ = ["PORT", "explore"]
@@ -67,7 +68,7 @@ def explore(
     catalogue = Catalogue.of(system)
     catalogue.state_of(parse_qsl(query))  # a query that does not fit is refused before anything is served
     access, number = Access(), _free(port)
-    application = Application(FunctionHandler(partial(_open, catalogue, query)))
+    application = Application(FunctionHandler(partial(_open, catalogue, query, [])))
     server: Any = Server(
         application, port=number, address="127.0.0.1", auth_provider=access, index=None,
         allow_websocket_origin=[f"127.0.0.1:{number}", f"localhost:{number}"],
@@ -89,10 +90,10 @@ def explore(
         server.stop()
 
 
-def _open(catalogue: Catalogue, query: str, document: Any) -> None:
+def _open(catalogue: Catalogue, query: str, tabs: list[Session], document: Any) -> None:
     from nonsmooth.explorer.session import Session
 
-    Session(document, catalogue.copy(), query)
+    Session(document, catalogue.copy(), query, tabs)
 
 
 def _free(port: int | None) -> int:

@@ -53,10 +53,12 @@ class Session:
         The models that it offers.
     query : str
         The view to begin with, where the page's own address holds none.
+    tabs : list of Session
+        The pages that are open, for each to say how many share the machine.
     """
 
-    def __init__(self, document: Any, catalogue: Catalogue, query: str = "") -> None:
-        self.document, self.catalogue = document, catalogue
+    def __init__(self, document: Any, catalogue: Catalogue, query: str, tabs: list[Session]) -> None:
+        self.document, self.catalogue, self.tabs = document, catalogue, tabs
         self.dark = self.large = False
         self._saved = 0
         self._heard = 0  # number of the page's last message
@@ -145,6 +147,8 @@ class Session:
     def _begin(self, name: str, value: Any) -> None:
         """The page is there: work can begin."""
         if self.work.begin(self._hear):
+            self.tabs.append(self)
+            self._tell_tabs()
             self.document.add_periodic_callback(self.work.watch, 500)
 
     def _hear(self, answer: Answer) -> None:
@@ -156,7 +160,14 @@ class Session:
         with suppress(AttributeError):  # the tab has been closed, and its document taken apart
             self.document.add_next_tick_callback(partial(act, *given))
 
+    def _tell_tabs(self) -> None:
+        for one in self.tabs:
+            one.later(one.tell_ui)
+
     def _close(self) -> None:
+        if self in self.tabs:
+            self.tabs.remove(self)
+            self._tell_tabs()
         self.work.close()
         self.bench.close()
 
@@ -322,7 +333,7 @@ class Session:
         """The controls as the state has them."""
         found = controls(self.system, self.state, self.catalogue, self.sheet.diagram.stage, self.sheet.views)
         look = {"dark": self.dark, "large": self.large}
-        self.tell("ui", {**found, **look, "heard": self._heard, "can": self.past.can})
+        self.tell("ui", {**found, **look, "heard": self._heard, "can": self.past.can, "tabs": len(self.tabs)})
 
     def refresh(self) -> None:
         """The page as the state has it, and work for what that lacks."""
