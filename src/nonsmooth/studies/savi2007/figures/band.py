@@ -11,7 +11,7 @@ from nonsmooth import System, plot, poincare, simulate
 from nonsmooth.results.labels import labels_of
 from nonsmooth.results.provenance import provenance
 from nonsmooth.studies.savi2007.figures.diagrams import shared_legend
-from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Figure, sheet
+from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Figure, drawn
 from nonsmooth.studies.savi2007.flows import ETA, EXACT, SMOOTHED, Settings
 from nonsmooth.studies.savi2007.grazing import grazing_frequencies, steady_state
 from nonsmooth.studies.savi2007.printed import FIGURE_9, FIGURE_11, FIGURE_13
@@ -112,47 +112,45 @@ def order_in_eta(errors: xr.Dataset, form: str) -> np.ndarray:
     )
 
 
-def _draw(data: Datasets) -> Canvas:
+@drawn(1.0, 0.52)
+def _draw(canvas: Canvas, data: Datasets) -> None:
     errors, grazing = data["error"], data["grazing"]
-    with plot.journal():
-        canvas = sheet(plot.PAGE, 0.52 * plot.PAGE)
-        left, right = canvas.subplots(1, 2)
-        eta = 1e6 * errors["eta"].values  # in micrometres, as the axes
-        colors = [plot.COLORS[name] for name in ("first", "second", "third")]
-        for color, orbit in zip(colors, errors["orbit"].values, strict=True):
-            one = errors["error"].sel(orbit=orbit)
-            left.loglog(eta, one.sel(form="paper"), "o-", color=color, label=str(orbit), markersize=3.5)
-            left.loglog(eta, one.sel(form="paper, coarse"), "s", color=color, markerfacecolor="none", markersize=6)
-            left.loglog(eta, one.sel(form="general"), ":", color=color)
-        guide = 4 * float(errors["error"].sel(form="paper").max())
-        left.loglog(eta, guide * (eta / eta.max()) ** 2, color=plot.COLORS["muted"], linewidth=0.8, label=r"$\eta^2$")
-        hollow = {"color": "black", "markerfacecolor": "none", "markersize": 6}
-        left.plot([], [], "s", label="rtol $10^{-6}$, as in the figures", **hollow)
-        left.plot([], [], ":", color="black", label="general form")
-        left.axvline(1e6 * ETA, color="black", linewidth=0.6, linestyle="--", zorder=0, label=_PAPERS)
-        left.set(
-            xlabel=_AXIS, title="(a) error of the smoothed switch after 4 periods",
-            ylabel=r"$[(\Delta x / 1\,\mathrm{mm})^2 + (\Delta v / 10\,\mathrm{mm/s})^2]^{1/2}$",
-        )  # fmt: skip
-        at = grazing["eta"].values > 0
-        base = float(grazing["closed_form"][0])
-        fine = np.geomspace(grazing["eta"].values[at].min() / 2, grazing["eta"].values[at].max() * 2, 50)
-        sharp = EXACT.system(**FIGURE_9).values
-        closed = [grazing_frequencies({**sharp, "g": FIGURE_9["g"] - e})[-1] - base for e in fine]
-        right.loglog(1e6 * fine, closed, color=plot.COLORS["third"], label=r"closed form, gap $g - \eta$")
-        right.loglog(
-            1e6 * grazing["eta"].values[at], grazing["grazing"].values[at] - base, "o", color=plot.COLORS["first"],
-            label="smoothed model, bisected",
-        )  # fmt: skip
-        right.axvline(1e6 * ETA, color="black", linewidth=0.6, linestyle="--", zorder=0, label=_PAPERS)
-        right.set(
-            xlabel=_AXIS, ylabel="shift of the grazing frequency (rad/s)",
-            title="(b) grazing of Fig. 9, falling frequency",
-        )  # fmt: skip
-        for ax in (left, right):
-            ax.xaxis.set_major_formatter("{x:g}")
-        shared_legend(canvas, columns=4)
-    return canvas
+    left, right = canvas.subplots(1, 2)
+    eta = 1e6 * errors["eta"].values  # in micrometres, as the axes
+    colors = [plot.COLORS[name] for name in ("first", "second", "third")]
+    for color, orbit in zip(colors, errors["orbit"].values, strict=True):
+        one = errors["error"].sel(orbit=orbit)
+        left.loglog(eta, one.sel(form="paper"), "o-", color=color, label=str(orbit), markersize=3.5)
+        left.loglog(eta, one.sel(form="paper, coarse"), "s", color=color, markerfacecolor="none", markersize=6)
+        left.loglog(eta, one.sel(form="general"), ":", color=color)
+    guide = 4 * float(errors["error"].sel(form="paper").max())
+    left.loglog(eta, guide * (eta / eta.max()) ** 2, color=plot.COLORS["muted"], linewidth=0.8, label=r"$\eta^2$")
+    hollow = {"color": "black", "markerfacecolor": "none", "markersize": 6}
+    left.plot([], [], "s", label="rtol $10^{-6}$, as in the figures", **hollow)
+    left.plot([], [], ":", color="black", label="general form")
+    left.axvline(1e6 * ETA, color="black", linewidth=0.6, linestyle="--", zorder=0, label=_PAPERS)
+    left.set(
+        xlabel=_AXIS, title="(a) error of the smoothed switch after 4 periods",
+        ylabel=r"$[(\Delta x / 1\,\mathrm{mm})^2 + (\Delta v / 10\,\mathrm{mm/s})^2]^{1/2}$",
+    )  # fmt: skip
+    at = grazing["eta"].values > 0
+    base = float(grazing["closed_form"][0])
+    fine = np.geomspace(grazing["eta"].values[at].min() / 2, grazing["eta"].values[at].max() * 2, 50)
+    sharp = EXACT.system(**FIGURE_9).values
+    closed = [grazing_frequencies({**sharp, "g": FIGURE_9["g"] - e})[-1] - base for e in fine]
+    right.loglog(1e6 * fine, closed, color=plot.COLORS["third"], label=r"closed form, gap $g - \eta$")
+    right.loglog(
+        1e6 * grazing["eta"].values[at], grazing["grazing"].values[at] - base, "o", color=plot.COLORS["first"],
+        label="smoothed model, bisected",
+    )  # fmt: skip
+    right.axvline(1e6 * ETA, color="black", linewidth=0.6, linestyle="--", zorder=0, label=_PAPERS)
+    right.set(
+        xlabel=_AXIS, ylabel="shift of the grazing frequency (rad/s)",
+        title="(b) grazing of Fig. 9, falling frequency",
+    )  # fmt: skip
+    for ax in (left, right):
+        ax.xaxis.set_major_formatter("{x:g}")
+    shared_legend(canvas, columns=4)
 
 
 def _caption(data: Datasets) -> str:

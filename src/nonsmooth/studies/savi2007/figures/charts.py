@@ -16,7 +16,7 @@ from nonsmooth import SolveError, chart, continue_curve, continue_orbit, find_or
 from nonsmooth.plot.curve import KINDS
 from nonsmooth.results.statuses import by_code
 from nonsmooth.studies.savi2007.figures.branches import BEGINNINGS, branches, rows_of
-from nonsmooth.studies.savi2007.figures.figure import Canvas, Compute, Datasets, Figure, sheet
+from nonsmooth.studies.savi2007.figures.figure import Canvas, Compute, Datasets, Figure, drawn
 from nonsmooth.studies.savi2007.flows import EXACT, Settings
 from nonsmooth.studies.savi2007.printed import FIGURE_9, FIGURE_13
 
@@ -110,25 +110,23 @@ def _on(curve: xr.Dataset, row: xr.Dataset, parameter: str) -> bool:
     return False
 
 
-def _draw(data: Datasets) -> Canvas:
+@drawn(1.0, 0.42)
+def _draw(canvas: Canvas, data: Datasets) -> None:
     found = data["chart"]
-    with plot.journal():
-        canvas = sheet(plot.PAGE, 0.42 * plot.PAGE)
-        left, right = canvas.subplots(1, 2, sharey=True)
-        simple = "omega" in found.dims  # few periods; what tells regions apart there is whether there is contact
-        plot.chart(found, left, show="contacts_per_period" if simple else "period_number")
-        plot.chart(found, right)
-        for key, one in data.items():
-            if key.startswith("curve"):
-                plot.curve(one, right, special=False)
-        if not simple:
-            left.get_legend().remove()
-        right.set_ylabel("")
-        titles = ("(a) contacts per period" if simple else "(a) period", "(b) period, with folds, flips and grazing")
-        for ax, words in zip((left, right), titles, strict=True):
-            ax.set_title(words, y=1.0, pad=9)
-            ax.set(xlim=_ends(found, 0), ylim=_ends(found, 1))
-    return canvas
+    left, right = canvas.subplots(1, 2, sharey=True)
+    simple = "omega" in found.dims  # few periods; what tells regions apart there is whether there is contact
+    plot.chart(found, left, show="contacts_per_period" if simple else "period_number")
+    plot.chart(found, right)
+    for key, one in data.items():
+        if key.startswith("curve"):
+            plot.curve(one, right, special=False)
+    if not simple:
+        left.get_legend().remove()
+    right.set_ylabel("")
+    titles = ("(a) contacts per period" if simple else "(a) period", "(b) period, with folds, flips and grazing")
+    for ax, words in zip((left, right), titles, strict=True):
+        ax.set_title(words, y=1.0, pad=9)
+        ax.set(xlim=_ends(found, 0), ylim=_ends(found, 1))
 
 
 def _ends(found: xr.Dataset, axis: int) -> tuple[float, float]:

@@ -15,7 +15,7 @@ from nonsmooth.plot.basins import section_mark
 from nonsmooth.plot.palette import attractor_color
 from nonsmooth.plot.phase_portrait import ZONE, shade_zone
 from nonsmooth.plot.units import prefixed
-from nonsmooth.studies.savi2007.figures.figure import Canvas, Compute, Datasets, Figure, sheet
+from nonsmooth.studies.savi2007.figures.figure import Canvas, Compute, Datasets, Figure, drawn
 from nonsmooth.studies.savi2007.flows import EXACT, Settings
 from nonsmooth.studies.savi2007.printed import FIGURE_13, FIGURE_17
 
@@ -58,36 +58,34 @@ def names_of(found: xr.Dataset) -> list[str]:
     return words
 
 
-def _draw(data: Datasets) -> Canvas:
+@drawn(1.0, 0.5)
+def _draw(canvas: Canvas, data: Datasets) -> None:
     found = data["basins"]
-    with plot.journal():
-        canvas = sheet(plot.PAGE, 0.5 * plot.PAGE)
-        left, right = canvas.subplots(1, 2)
-        plot.basins(found, left)
-        left.get_legend().remove()
-        left.set_title("(a) basins, section at phase 0", y=1.0, pad=9)
-        handles: list[Any] = []
-        for k in range(found.sizes["attractor"]):
-            cycle = int(found["period_number"][k]) > 0
-            begun = len(right.get_lines())
-            plot.phase_portrait(data[f"orbit_{k}"], right)
-            for line in right.get_lines()[begun:]:
-                line.set(color=attractor_color(k), linewidth=1.1 if cycle else 0.3, zorder=3 if cycle else 2)
-            points = found["section_points"].values[found["point_attractor"].values == k]
-            mark = section_mark(found, k, 3.6 if cycle else 2.4)
-            right.plot(points[:, 0], points[:, 1], linestyle="", **mark)
-            patch = Patch(facecolor=attractor_color(k), edgecolor="black", linewidth=0.4)
-            handles.append((patch, Line2D([], [], linestyle="", **{**mark, "markersize": 3.6 if cycle else 2.4})))
-        limits = right.get_xlim()
-        shade_zone(right, float(found["g"]))
-        right.set_xlim(limits)
-        right.set_title("(b) attractors", y=1.0, pad=9)
-        zone = Patch(facecolor=plot.COLORS["zone"], alpha=0.18, linewidth=0)
-        canvas.legend(
-            [*handles, zone], [*names_of(found), ZONE], loc="outside lower center", ncols=4,
-            handler_map={tuple: HandlerTuple(ndivide=1)}, title="attractors with their section points, and basins",
-        )  # fmt: skip
-    return canvas
+    left, right = canvas.subplots(1, 2)
+    plot.basins(found, left)
+    left.get_legend().remove()
+    left.set_title("(a) basins, section at phase 0", y=1.0, pad=9)
+    handles: list[Any] = []
+    for k in range(found.sizes["attractor"]):
+        cycle = int(found["period_number"][k]) > 0
+        begun = len(right.get_lines())
+        plot.phase_portrait(data[f"orbit_{k}"], right)
+        for line in right.get_lines()[begun:]:
+            line.set(color=attractor_color(k), linewidth=1.1 if cycle else 0.3, zorder=3 if cycle else 2)
+        points = found["section_points"].values[found["point_attractor"].values == k]
+        mark = section_mark(found, k, 3.6 if cycle else 2.4)
+        right.plot(points[:, 0], points[:, 1], linestyle="", **mark)
+        patch = Patch(facecolor=attractor_color(k), edgecolor="black", linewidth=0.4)
+        handles.append((patch, Line2D([], [], linestyle="", **{**mark, "markersize": 3.6 if cycle else 2.4})))
+    limits = right.get_xlim()
+    shade_zone(right, float(found["g"]))
+    right.set_xlim(limits)
+    right.set_title("(b) attractors", y=1.0, pad=9)
+    zone = Patch(facecolor=plot.COLORS["zone"], alpha=0.18, linewidth=0)
+    canvas.legend(
+        [*handles, zone], [*names_of(found), ZONE], loc="outside lower center", ncols=4,
+        handler_map={tuple: HandlerTuple(ndivide=1)}, title="attractors with their section points, and basins",
+    )  # fmt: skip
 
 
 def _caption(data: Datasets) -> str:

@@ -12,7 +12,7 @@ from nonsmooth.plot.branch import draw_branch
 from nonsmooth.plot.style import even_dots, halo, small
 from nonsmooth.results.provenance import read_provenance
 from nonsmooth.studies.savi2007.figures.branches import branches_of
-from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Draw, only_outer, sheet
+from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Draw, drawn, only_outer
 from nonsmooth.studies.savi2007.flows import EXACT, FLOWS, Settings, starts
 
 if TYPE_CHECKING:
@@ -97,16 +97,14 @@ def draw_diagram(
 def draw_both(values: Mapping[float, str], words: str) -> Draw:
     """The sheet: the velocity at the section, of each flow; ``values`` and ``words`` as in `draw_diagram`."""
 
-    def draw(data: Datasets) -> Canvas:
-        with plot.journal():
-            canvas = sheet(plot.PAGE, 0.5 * plot.PAGE)
-            grid = canvas.subplots(1, 2, sharey=True)
-            for ax, flow, letter in zip(grid, FLOWS, "ab", strict=True):
-                draw_diagram(ax, data, flow.key, "v", values=values, words=words)
-                ax.set_title(f"({letter}) {flow.title}")
-            only_outer(grid)
-            shared_legend(canvas)
-        return canvas
+    @drawn(1.0, 0.5)
+    def draw(canvas: Canvas, data: Datasets) -> None:
+        grid = canvas.subplots(1, 2, sharey=True)
+        for ax, flow, letter in zip(grid, FLOWS, "ab", strict=True):
+            draw_diagram(ax, data, flow.key, "v", values=values, words=words)
+            ax.set_title(f"({letter}) {flow.title}")
+        only_outer(grid)
+        shared_legend(canvas)
 
     return draw
 

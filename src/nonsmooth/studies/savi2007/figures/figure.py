@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import wraps
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
+
+from nonsmooth import plot
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -14,7 +17,7 @@ if TYPE_CHECKING:
 
     from nonsmooth.studies.savi2007.flows import Settings
 
-__all__ = ["Canvas", "Compute", "Datasets", "Draw", "Figure", "only_outer", "sheet"]
+__all__ = ["Canvas", "Compute", "Datasets", "Draw", "Figure", "drawn", "only_outer"]
 
 Canvas: TypeAlias = "MatplotlibFigure"
 Datasets: TypeAlias = "dict[str, xr.Dataset]"  # of a figure, by key
@@ -81,8 +84,19 @@ def only_outer(grid: Any) -> None:
         ax.yaxis.label.set_visible(False)
 
 
-def sheet(width: float, height: float) -> Canvas:
-    """An empty figure in inches, outside pyplot's list of open figures."""
-    from matplotlib.figure import Figure as Canvas
+def drawn(width: float, height: float) -> Callable[[Callable[[Canvas, Datasets], None]], Draw]:
+    """Give what a function draws on an empty sheet, which pyplot does not list; lengths in widths of a page."""
 
-    return Canvas(figsize=(width, height))
+    def decorated(draw: Callable[[Canvas, Datasets], None]) -> Draw:
+        @wraps(draw)
+        def framed(data: Datasets) -> Canvas:
+            from matplotlib.figure import Figure as Sheet
+
+            with plot.journal():
+                canvas = Sheet(figsize=(width * plot.PAGE, height * plot.PAGE))
+                draw(canvas, data)
+            return canvas
+
+        return framed
+
+    return decorated

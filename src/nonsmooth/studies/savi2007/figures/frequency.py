@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nonsmooth import plot, poincare, sweep
+from nonsmooth import poincare, sweep
 from nonsmooth.plot.style import halo, small
 from nonsmooth.studies.savi2007.figures.branches import branches
 from nonsmooth.studies.savi2007.figures.diagrams import (
@@ -17,7 +17,7 @@ from nonsmooth.studies.savi2007.figures.diagrams import (
     mark_grazing,
     shared_legend,
 )
-from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Figure, only_outer, sheet
+from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Figure, drawn, only_outer
 from nonsmooth.studies.savi2007.figures.portraits import chosen_start, describe, draw_portraits, portraits
 from nonsmooth.studies.savi2007.figures.resonance import grazing_of
 from nonsmooth.studies.savi2007.figures.twins import twins
@@ -44,22 +44,20 @@ def _compute_17(settings: Settings) -> Datasets:
     return data | branches("fig17")
 
 
-def _draw_17(data: Datasets) -> Canvas:
-    with plot.journal():
-        canvas = sheet(plot.PAGE, 0.76 * plot.PAGE)
-        grid = canvas.subplots(2, 2, sharex=True, sharey="row")
-        for j, flow in enumerate(FLOWS):
-            for i, state in enumerate("xv"):
-                ax = grid[i, j]
-                draw_diagram(ax, data, flow.key, state, values=SHOWN, words="frequencies of Fig. 18 (rad/s)")
-                ends = data[flow.key]["omega"].values[[0, -1]]
-                mark_grazing(ax, [omega for omega in grazing_of(data[flow.key]) if ends[0] < omega < ends[1]])
-                if flow is EXACT and state == "v":  # above each other in x
-                    _name_windows(ax, data, state)
-            grid[0, j].set_title(f"({'ab'[j]}) {flow.title}")
-        only_outer(grid)
-        shared_legend(canvas)
-    return canvas
+@drawn(1.0, 0.76)
+def _draw_17(canvas: Canvas, data: Datasets) -> None:
+    grid = canvas.subplots(2, 2, sharex=True, sharey="row")
+    for j, flow in enumerate(FLOWS):
+        for i, state in enumerate("xv"):
+            ax = grid[i, j]
+            draw_diagram(ax, data, flow.key, state, values=SHOWN, words="frequencies of Fig. 18 (rad/s)")
+            ends = data[flow.key]["omega"].values[[0, -1]]
+            mark_grazing(ax, [omega for omega in grazing_of(data[flow.key]) if ends[0] < omega < ends[1]])
+            if flow is EXACT and state == "v":  # above each other in x
+                _name_windows(ax, data, state)
+        grid[0, j].set_title(f"({'ab'[j]}) {flow.title}")
+    only_outer(grid)
+    shared_legend(canvas)
 
 
 def _windows(data: Datasets) -> dict[int, tuple[float, float]]:

@@ -6,7 +6,7 @@ from nonsmooth import Stroboscopic, plot, poincare
 from nonsmooth.plot.units import prefixed
 from nonsmooth.studies.savi2007.figures.branches import branches
 from nonsmooth.studies.savi2007.figures.diagrams import ABOUT_BRANCHES, diagrams, draw_both, how
-from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Figure, only_outer, sheet
+from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Figure, drawn, only_outer
 from nonsmooth.studies.savi2007.figures.portraits import describe, draw_portraits, portraits
 from nonsmooth.studies.savi2007.figures.twins import twins
 from nonsmooth.studies.savi2007.flows import FLOWS, Settings
@@ -57,18 +57,16 @@ def _compute_15(settings: Settings) -> Datasets:
     return data
 
 
-def _draw_15(data: Datasets) -> Canvas:
-    with plot.journal():
-        canvas = sheet(plot.PAGE, 0.56 * plot.PAGE)
-        grid = canvas.subplots(2, 4, sharex="col", sharey="col")
-        for row, flow in zip(grid, FLOWS, strict=True):
-            for i, (ax, key) in enumerate(zip(row, PHASES, strict=True)):
-                plot.section(data[f"{flow.key}_{key}"], ax, size=0.7)
-                ax.set_ylabel(f"{flow.short}\n{ax.get_ylabel()}")
-                if flow is FLOWS[0]:
-                    ax.set_title(f"({'abcd'[i]}) phase ${_ANGLES[i]}$", y=1.0, pad=9)
-        only_outer(grid)
-    return canvas
+@drawn(1.0, 0.56)
+def _draw_15(canvas: Canvas, data: Datasets) -> None:
+    grid = canvas.subplots(2, 4, sharex="col", sharey="col")
+    for row, flow in zip(grid, FLOWS, strict=True):
+        for i, (ax, key) in enumerate(zip(row, PHASES, strict=True)):
+            plot.section(data[f"{flow.key}_{key}"], ax, size=0.7)
+            ax.set_ylabel(f"{flow.short}\n{ax.get_ylabel()}")
+            if flow is FLOWS[0]:
+                ax.set_title(f"({'abcd'[i]}) phase ${_ANGLES[i]}$", y=1.0, pad=9)
+    only_outer(grid)
 
 
 def _caption_15(data: Datasets) -> str:

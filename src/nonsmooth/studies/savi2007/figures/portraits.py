@@ -10,7 +10,7 @@ import numpy as np
 from nonsmooth import plot, simulate, sweep
 from nonsmooth.plot.units import prefixed
 from nonsmooth.studies.savi2007.figures.diagrams import shared_legend
-from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Draw, only_outer, sheet
+from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Draw, drawn, only_outer
 from nonsmooth.studies.savi2007.flows import FLOWS, Settings, starts
 from nonsmooth.studies.savi2007.measure import APERIODIC, periods_reached
 
@@ -60,31 +60,29 @@ def draw_portraits(
 ) -> Draw:
     """The sheet: columns are values, rows are flows."""
 
-    def draw(data: Datasets) -> Canvas:
-        with plot.journal():
-            canvas = sheet(plot.PAGE, 0.62 * plot.PAGE * 2 / max(len(shown) - 1, 2) + 0.5)
-            grid = canvas.subplots(2, len(shown), sharex="col", sharey=True, squeeze=False)
-            for row, flow in zip(grid, FLOWS, strict=True):
-                for i, (ax, (value, wanted)) in enumerate(zip(row, shown.items(), strict=True)):
-                    orbit, survey = data[f"{flow.key}_{value:g}"], data[flow.key]
-                    points = survey.sel({parameter: value}, method="nearest").isel(
-                        start=chosen_start(survey, value, wanted)
-                    )
-                    plot.phase_portrait(orbit, ax, section=points if wanted != APERIODIC else None, zone="g")
-                    if wanted == APERIODIC:
-                        for line in ax.get_lines():
-                            line.set(linewidth=0.35)
-                        plot.section(points, ax, size=3.0)
-                        ax.get_lines()[-1].set(zorder=4, label="section points")
+    @drawn(1.0, 1.24 / max(len(shown) - 1, 2) + 0.5 / plot.PAGE)
+    def draw(canvas: Canvas, data: Datasets) -> None:
+        grid = canvas.subplots(2, len(shown), sharex="col", sharey=True, squeeze=False)
+        for row, flow in zip(grid, FLOWS, strict=True):
+            for i, (ax, (value, wanted)) in enumerate(zip(row, shown.items(), strict=True)):
+                orbit, survey = data[f"{flow.key}_{value:g}"], data[flow.key]
+                points = survey.sel({parameter: value}, method="nearest").isel(
+                    start=chosen_start(survey, value, wanted)
+                )
+                plot.phase_portrait(orbit, ax, section=points if wanted != APERIODIC else None, zone="g")
+                if wanted == APERIODIC:
                     for line in ax.get_lines():
-                        if str(line.get_label()).endswith("band"):
-                            line.set_label("_")  # 2 eta wide: not to be seen
-                    ax.set_ylabel(f"{flow.short}\n{ax.get_ylabel()}")
-                    if flow is FLOWS[0]:
-                        ax.set_title(f"({'abcd'[i]}) {setting(symbol, value, unit)}", y=1.0, pad=9)
-            only_outer(grid)
-            shared_legend(canvas)
-        return canvas
+                        line.set(linewidth=0.35)
+                    plot.section(points, ax, size=3.0)
+                    ax.get_lines()[-1].set(zorder=4, label="section points")
+                for line in ax.get_lines():
+                    if str(line.get_label()).endswith("band"):
+                        line.set_label("_")  # 2 eta wide: not to be seen
+                ax.set_ylabel(f"{flow.short}\n{ax.get_ylabel()}")
+                if flow is FLOWS[0]:
+                    ax.set_title(f"({'abcd'[i]}) {setting(symbol, value, unit)}", y=1.0, pad=9)
+        only_outer(grid)
+        shared_legend(canvas)
 
     return draw
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from nonsmooth import plot
 from nonsmooth.plot.labels import name_axes
-from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Figure, sheet
+from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Figure, drawn
 from nonsmooth.studies.savi2007.flows import ETA, EXACT, SMOOTHED, Settings
 
 __all__ = ["FIGURES"]
@@ -14,17 +14,15 @@ def _compute(settings: Settings) -> Datasets:
     return {}
 
 
-def _draw(data: Datasets) -> Canvas:
-    with plot.journal():
-        canvas = sheet(plot.PAGE, 0.42 * plot.PAGE)
-        left, right = canvas.subplots(1, 2)
-        for ax, flow in ((left, EXACT), (right, SMOOTHED)):
-            plot.regions(flow.system(g=0.0), ax, xlim=(-5 * ETA, 5 * ETA), ylim=(-0.12, 0.12))
-        left.set_title("(a) non-smooth system, Eqs. 4-5")
-        right.set_title(r"(b) smoothed system, $\eta = 10$ µm, Eqs. 9-10")
-        for ax in (left, right):
-            name_axes(ax, ("$x - g$", "m"), ("$v$", "m/s"))
-    return canvas
+@drawn(1.0, 0.42)
+def _draw(canvas: Canvas, data: Datasets) -> None:
+    left, right = canvas.subplots(1, 2)
+    for ax, flow in ((left, EXACT), (right, SMOOTHED)):
+        plot.regions(flow.system(g=0.0), ax, xlim=(-5 * ETA, 5 * ETA), ylim=(-0.12, 0.12))
+    left.set_title("(a) non-smooth system, Eqs. 4-5")
+    right.set_title(r"(b) smoothed system, $\eta = 10$ µm, Eqs. 9-10")
+    for ax in (left, right):
+        name_axes(ax, ("$x - g$", "m"), ("$v$", "m/s"))
 
 
 def _caption(data: Datasets) -> str:

@@ -11,7 +11,7 @@ from nonsmooth import frequency_response, plot
 from nonsmooth.plot.style import small
 from nonsmooth.studies.savi2007.figures.branches import branches, branches_of
 from nonsmooth.studies.savi2007.figures.diagrams import mark_grazing, shared_legend
-from nonsmooth.studies.savi2007.figures.figure import Canvas, Compute, Datasets, Draw, Figure, only_outer, sheet
+from nonsmooth.studies.savi2007.figures.figure import Canvas, Compute, Datasets, Draw, Figure, drawn, only_outer
 from nonsmooth.studies.savi2007.flows import EXACT, FLOWS, Settings
 from nonsmooth.studies.savi2007.grazing import grazing_frequencies
 from nonsmooth.studies.savi2007.printed import FIGURE_9, FIGURE_10, NUMBERS
@@ -48,19 +48,17 @@ def _compute(
 
 
 def _draw(printed: Mapping[str, float]) -> Draw:
-    def draw(data: Datasets) -> Canvas:
-        with plot.journal():
-            canvas = sheet(plot.PAGE, 0.5 * plot.PAGE)
-            grid = canvas.subplots(1, 2, sharey=True)
-            for ax, flow, letter in zip(grid, FLOWS, "ab", strict=True):
-                response = data[flow.key]
-                found = branches_of(data) if flow is EXACT else []
-                plot.frequency_response(response, *found, ax)
-                _mark(ax, response, printed)
-                ax.set_title(f"({letter}) {flow.title}", y=1.0, pad=14 if printed else 6)
-            only_outer(grid)
-            shared_legend(canvas)
-        return canvas
+    @drawn(1.0, 0.5)
+    def draw(canvas: Canvas, data: Datasets) -> None:
+        grid = canvas.subplots(1, 2, sharey=True)
+        for ax, flow, letter in zip(grid, FLOWS, "ab", strict=True):
+            response = data[flow.key]
+            found = branches_of(data) if flow is EXACT else []
+            plot.frequency_response(response, *found, ax)
+            _mark(ax, response, printed)
+            ax.set_title(f"({letter}) {flow.title}", y=1.0, pad=14 if printed else 6)
+        only_outer(grid)
+        shared_legend(canvas)
 
     return draw
 

@@ -6,11 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nonsmooth import plot
 from nonsmooth.plot import comparison_diagram
 from nonsmooth.studies.savi2007.figures.amplitude import PRINTED
 from nonsmooth.studies.savi2007.figures.diagrams import mark_values, shared_legend
-from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Figure, sheet
+from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Figure, drawn
 from nonsmooth.studies.savi2007.flows import Settings
 from nonsmooth.studies.savi2007.printed import FIGURE_12
 from nonsmooth.studies.savi2007.rig_figures.motions import GRID, compared, draw_pairs, motions, said
@@ -36,15 +35,13 @@ def _compute_11(settings: Settings) -> Datasets:
     return data
 
 
-def _draw_11(data: Datasets) -> Canvas:
-    with plot.journal():
-        canvas = sheet(0.72 * plot.PAGE, 0.56 * plot.PAGE)
-        ax = canvas.subplots()
-        comparison_diagram(_drawn(data), ax, y="v")
-        ax.margins(y=0.14)  # the marks of flips above
-        mark_values(ax, PRINTED, "printed in the paper (N)", foot=True)
-        shared_legend(canvas, columns=3)
-    return canvas
+@drawn(0.72, 0.56)
+def _draw_11(canvas: Canvas, data: Datasets) -> None:
+    ax = canvas.subplots()
+    comparison_diagram(_drawn(data), ax, y="v")
+    ax.margins(y=0.14)  # the marks of flips above
+    mark_values(ax, PRINTED, "printed in the paper (N)", foot=True)
+    shared_legend(canvas, columns=3)
 
 
 def _drawn(data: Datasets) -> xr.Dataset:

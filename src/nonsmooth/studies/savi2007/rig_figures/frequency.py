@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from nonsmooth import plot
 from nonsmooth.plot import comparison_diagram, comparison_phase_portrait
 from nonsmooth.studies.savi2007.figures.diagrams import mark_values, shared_legend
-from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Figure, only_outer, sheet
+from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Figure, drawn, only_outer
 from nonsmooth.studies.savi2007.figures.frequency import SHOWN
 from nonsmooth.studies.savi2007.flows import Settings
 from nonsmooth.studies.savi2007.printed import FIGURE_18
@@ -40,15 +39,13 @@ def _compute_17(settings: Settings) -> Datasets:
     return {"compared": result, "runs": runs_of(found, "omega")}
 
 
-def _draw_17(data: Datasets) -> Canvas:
-    with plot.journal():
-        canvas = sheet(plot.PAGE, 0.5 * plot.PAGE)
-        for ax, state, letter in zip(canvas.subplots(1, 2), "xv", "ab", strict=True):
-            comparison_diagram(without_flips(data["compared"]), ax, y=state, size=2.6)
-            mark_values(ax, SHOWN, "frequencies of Fig. 18 (rad/s)")
-            ax.set_title(f"({letter})", loc="left")
-        shared_legend(canvas)
-    return canvas
+@drawn(1.0, 0.5)
+def _draw_17(canvas: Canvas, data: Datasets) -> None:
+    for ax, state, letter in zip(canvas.subplots(1, 2), "xv", "ab", strict=True):
+        comparison_diagram(without_flips(data["compared"]), ax, y=state, size=2.6)
+        mark_values(ax, SHOWN, "frequencies of Fig. 18 (rad/s)")
+        ax.set_title(f"({letter})", loc="left")
+    shared_legend(canvas)
 
 
 def _caption_17(data: Datasets) -> str:
@@ -68,17 +65,15 @@ def _compute_18(settings: Settings) -> Datasets:
     )  # fmt: skip
 
 
-def _draw_18(data: Datasets) -> Canvas:
-    with plot.journal():
-        canvas = sheet(plot.PAGE, 0.44 * plot.PAGE)
-        grid = canvas.subplots(1, 3, sharey=True)
-        for ax, letter, (omega, wanted) in zip(grid, "abc", FIGURE_18.items(), strict=True):
-            comparison_phase_portrait(chosen(data, omega, wanted), ax, zone="g")
-            ax.set_title(rf"({letter}) $\omega = {omega:g}$ rad/s", loc="left")
-        grid[0].autoscale(axis="y")  # no room for legends of their own
-        only_outer(grid)
-        shared_legend(canvas)
-    return canvas
+@drawn(1.0, 0.44)
+def _draw_18(canvas: Canvas, data: Datasets) -> None:
+    grid = canvas.subplots(1, 3, sharey=True)
+    for ax, letter, (omega, wanted) in zip(grid, "abc", FIGURE_18.items(), strict=True):
+        comparison_phase_portrait(chosen(data, omega, wanted), ax, zone="g")
+        ax.set_title(rf"({letter}) $\omega = {omega:g}$ rad/s", loc="left")
+    grid[0].autoscale(axis="y")  # no room for legends of their own
+    only_outer(grid)
+    shared_legend(canvas)
 
 
 def _caption_18(data: Datasets) -> str:

@@ -12,7 +12,7 @@ from nonsmooth.plot import comparison_diagram
 from nonsmooth.plot.comparison import MEASURED, THEORY
 from nonsmooth.plot.labels import name_and_unit, name_axes
 from nonsmooth.studies.savi2007.figures.diagrams import mark_values, shared_legend
-from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Figure, only_outer, sheet
+from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Figure, drawn, only_outer
 from nonsmooth.studies.savi2007.figures.gap import GAPS, PHASES
 from nonsmooth.studies.savi2007.flows import EXACT, Settings, starts
 from nonsmooth.studies.savi2007.printed import FIGURE_14
@@ -64,24 +64,22 @@ def _coexisting(settings: Settings, set_: Mapping[str, Any]) -> xr.Dataset:
     )  # fmt: skip
 
 
-def _draw_13(data: Datasets) -> Canvas:
-    with plot.journal():
-        canvas = sheet(0.72 * plot.PAGE, 0.56 * plot.PAGE)
-        ax = canvas.subplots()
-        plot.bifurcation(data["starts"], ax, y="v", color="#B4B4B4", size=1.8)
-        ax.get_lines()[0].set(label="theory, several starts", zorder=0.5)
-        compared, over = without_flips(data["compared"]), transient_points(data["compared"], data["runs"])
-        comparison_diagram(compared.isel(sample=~over), ax, y="v", size=2.8)
-        if over.any():
-            points = compared.isel(sample=over)
-            ax.plot(
-                points["measured_g"].values, points["measured_section"].sel(state="v").values, "_", markersize=4,
-                color=plot.COLORS["muted"], markeredgewidth=0.3, rasterized=True, zorder=1,
-                label="virtual rig (synthetic), transient",
-            )  # fmt: skip
-        mark_values(ax, GAPS, "gaps of Fig. 14 (mm)")
-        shared_legend(canvas, columns=3)
-    return canvas
+@drawn(0.72, 0.56)
+def _draw_13(canvas: Canvas, data: Datasets) -> None:
+    ax = canvas.subplots()
+    plot.bifurcation(data["starts"], ax, y="v", color="#B4B4B4", size=1.8)
+    ax.get_lines()[0].set(label="theory, several starts", zorder=0.5)
+    compared, over = without_flips(data["compared"]), transient_points(data["compared"], data["runs"])
+    comparison_diagram(compared.isel(sample=~over), ax, y="v", size=2.8)
+    if over.any():
+        points = compared.isel(sample=over)
+        ax.plot(
+            points["measured_g"].values, points["measured_section"].sel(state="v").values, "_", markersize=4,
+            color=plot.COLORS["muted"], markeredgewidth=0.3, rasterized=True, zorder=1,
+            label="virtual rig (synthetic), transient",
+        )  # fmt: skip
+    mark_values(ax, GAPS, "gaps of Fig. 14 (mm)")
+    shared_legend(canvas, columns=3)
 
 
 def transient_points(compared: xr.Dataset, runs: xr.Dataset) -> np.ndarray:
@@ -129,22 +127,20 @@ def _compute_16(settings: Settings) -> Datasets:
     return {"attractor": bench.compare(measured, set_, section_phase=list(PHASES.values()))}
 
 
-def _draw_16(data: Datasets) -> Canvas:
+@drawn(1.0, 0.56)
+def _draw_16(canvas: Canvas, data: Datasets) -> None:
     result = data["attractor"]
-    with plot.journal():
-        canvas = sheet(plot.PAGE, 0.56 * plot.PAGE)
-        grid = canvas.subplots(2, 4, sharex="col", sharey="col")
-        for row, side, color in zip(grid, SIDES, (THEORY, MEASURED), strict=True):
-            for i, ax in enumerate(row):
-                points = result[f"{side}_section"].isel(section_phase=i).values
-                looks = {"color": color, "markersize": 1.4, "markeredgewidth": 0, "rasterized": True}
-                ax.plot(points[:, 0], points[:, 1], ".", **looks)
-                name_axes(ax, name_and_unit(result, "x"), name_and_unit(result, "v"))
-                ax.set_ylabel(f"{SIDES[side]}\n{ax.get_ylabel()}")
-                if side == "theory":
-                    ax.set_title(f"({'abcd'[i]}) phase ${_ANGLES[i]}$", y=1.0, pad=9)
-        only_outer(grid)
-    return canvas
+    grid = canvas.subplots(2, 4, sharex="col", sharey="col")
+    for row, side, color in zip(grid, SIDES, (THEORY, MEASURED), strict=True):
+        for i, ax in enumerate(row):
+            points = result[f"{side}_section"].isel(section_phase=i).values
+            looks = {"color": color, "markersize": 1.4, "markeredgewidth": 0, "rasterized": True}
+            ax.plot(points[:, 0], points[:, 1], ".", **looks)
+            name_axes(ax, name_and_unit(result, "x"), name_and_unit(result, "v"))
+            ax.set_ylabel(f"{SIDES[side]}\n{ax.get_ylabel()}")
+            if side == "theory":
+                ax.set_title(f"({'abcd'[i]}) phase ${_ANGLES[i]}$", y=1.0, pad=9)
+    only_outer(grid)
 
 
 def _caption_16(data: Datasets) -> str:

@@ -14,7 +14,7 @@ from nonsmooth.plot.labels import name_and_unit, name_axes
 from nonsmooth.plot.phase_portrait import shade_zone
 from nonsmooth.plot.units import prefixed
 from nonsmooth.studies.savi2007.figures.diagrams import shared_legend
-from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Draw, only_outer, sheet
+from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Draw, drawn, only_outer
 from nonsmooth.studies.savi2007.figures.portraits import setting
 from nonsmooth.studies.savi2007.laboratory import as_result
 from nonsmooth.studies.savi2007.measure import APERIODIC
@@ -145,19 +145,17 @@ def _name(period: int) -> str:
 def draw_pairs(unit: str, symbol: str, shown: Mapping[float, int]) -> Draw:
     """The sheet: columns are values; the model above, the rig below, in the same axes."""
 
-    def draw(data: Datasets) -> Canvas:
-        with plot.journal():
-            canvas = sheet(plot.PAGE, 0.62 * plot.PAGE * 2 / max(len(shown) - 1, 2) + 0.5)
-            grid = canvas.subplots(2, len(shown), sharex="col", sharey=True, squeeze=False)
-            for i, (value, wanted) in enumerate(shown.items()):
-                result = chosen(data, value, wanted)
-                for ax, side in zip(grid[:, i], ("theory", "measured"), strict=True):
-                    _portrait(ax, result, side)
-                    ax.set_ylabel(f"{SIDES[side]}\n{ax.get_ylabel()}")
-                grid[0, i].set_title(f"({'abcd'[i]}) {setting(symbol, value, unit)}", y=1.0, pad=9)
-            only_outer(grid)
-            shared_legend(canvas)
-        return canvas
+    @drawn(1.0, 1.24 / max(len(shown) - 1, 2) + 0.5 / plot.PAGE)
+    def draw(canvas: Canvas, data: Datasets) -> None:
+        grid = canvas.subplots(2, len(shown), sharex="col", sharey=True, squeeze=False)
+        for i, (value, wanted) in enumerate(shown.items()):
+            result = chosen(data, value, wanted)
+            for ax, side in zip(grid[:, i], ("theory", "measured"), strict=True):
+                _portrait(ax, result, side)
+                ax.set_ylabel(f"{SIDES[side]}\n{ax.get_ylabel()}")
+            grid[0, i].set_title(f"({'abcd'[i]}) {setting(symbol, value, unit)}", y=1.0, pad=9)
+        only_outer(grid)
+        shared_legend(canvas)
 
     return draw
 

@@ -10,7 +10,7 @@ import numpy as np
 from nonsmooth import plot
 from nonsmooth.plot import identification as pictures
 from nonsmooth.plot.comparison import ABOVE
-from nonsmooth.studies.savi2007.figures.figure import Canvas, Compute, Datasets, Draw, Figure, sheet
+from nonsmooth.studies.savi2007.figures.figure import Canvas, Compute, Datasets, Draw, Figure, drawn
 from nonsmooth.studies.savi2007.findings import Number, estimates_of, found_in, kept, the_finding
 from nonsmooth.studies.savi2007.flows import Settings
 from nonsmooth.studies.savi2007.printed import NUMBERS, TABLE_1
@@ -39,18 +39,16 @@ def _findings(names: Mapping[str, str]) -> Compute:
 
 
 def _side_by_side(
-    *parts: tuple[str, Callable[..., Any], str], width: float = plot.PAGE, height: float = 0.42
+    *parts: tuple[str, Callable[..., Any], str], width: float = 1.0, height: float = 0.42
 ) -> Draw:
     """A sheet of pictures in a row: key of the dataset, what draws it, title."""
 
-    def draw(data: Datasets) -> Canvas:
-        with plot.journal():
-            canvas = sheet(width, height * plot.PAGE)
-            axes = np.atleast_1d(canvas.subplots(1, len(parts)))
-            for ax, (key, picture, title) in zip(axes, parts, strict=True):
-                picture(data[key], ax)
-                ax.set_title(title, loc="left", pad=6 + _legend_above(ax))
-        return canvas
+    @drawn(width, height)
+    def draw(canvas: Canvas, data: Datasets) -> None:
+        axes = np.atleast_1d(canvas.subplots(1, len(parts)))
+        for ax, (key, picture, title) in zip(axes, parts, strict=True):
+            picture(data[key], ax)
+            ax.set_title(title, loc="left", pad=6 + _legend_above(ax))
 
     return draw
 
@@ -147,30 +145,28 @@ def table_rows(data: Datasets) -> dict[str, tuple[str, Number, float]]:
     return rows
 
 
-def _draw_table(data: Datasets) -> Canvas:
+@drawn(1.0, 0.36)
+def _draw_table(canvas: Canvas, data: Datasets) -> None:
     rows = table_rows(data)
-    with plot.journal():
-        canvas = sheet(plot.PAGE, 0.36 * plot.PAGE)
-        ax = canvas.subplots()
-        ax.axvline(0, color=plot.COLORS["muted"], linewidth=0.6, zorder=0)
-        for i, (name, (printed, number, truth)) in enumerate(rows.items()):
-            middle, half = (100 * (v / truth) for v in (number.value - truth, number.expanded))
+    ax = canvas.subplots()
+    ax.axvline(0, color=plot.COLORS["muted"], linewidth=0.6, zorder=0)
+    for i, (name, (printed, number, truth)) in enumerate(rows.items()):
+        middle, half = (100 * (v / truth) for v in (number.value - truth, number.expanded))
+        ax.errorbar(
+            middle, i + 0.12, xerr=half, fmt="o", color=plot.COLORS["first"], markersize=3, capsize=1.5,
+            elinewidth=0.8, label="identified on the virtual rig (synthetic), 95 %" if i == 0 else None,
+        )  # fmt: skip
+        if printed:
+            value, rounding = TABLE_1[name].value, TABLE_1[name].rounding
             ax.errorbar(
-                middle, i + 0.12, xerr=half, fmt="o", color=plot.COLORS["first"], markersize=3, capsize=1.5,
-                elinewidth=0.8, label="identified on the virtual rig (synthetic), 95 %" if i == 0 else None,
+                100 * (value / truth - 1), i - 0.2, xerr=100 * rounding / truth, fmt="s", markersize=3,
+                color="black", markerfacecolor="white", capsize=1.5, elinewidth=0.6,
+                label="printed in the paper, with its rounding" if i == 0 else None,
             )  # fmt: skip
-            if printed:
-                value, rounding = TABLE_1[name].value, TABLE_1[name].rounding
-                ax.errorbar(
-                    100 * (value / truth - 1), i - 0.2, xerr=100 * rounding / truth, fmt="s", markersize=3,
-                    color="black", markerfacecolor="white", capsize=1.5, elinewidth=0.6,
-                    label="printed in the paper, with its rounding" if i == 0 else None,
-                )  # fmt: skip
-        ax.set_yticks(range(len(rows)), [NAMES[name][1] for name in rows])
-        ax.set_ylim(len(rows) - 0.5, -0.5)
-        ax.set_xlabel("difference from the rig's truth (%)")
-        ax.legend(loc="lower right")
-    return canvas
+    ax.set_yticks(range(len(rows)), [NAMES[name][1] for name in rows])
+    ax.set_ylim(len(rows) - 0.5, -0.5)
+    ax.set_xlabel("difference from the rig's truth (%)")
+    ax.legend(loc="lower right")
 
 
 def _caption_table(data: Datasets) -> str:
@@ -201,7 +197,7 @@ FIGURES = (
     Figure(
         "fig06", 6, "Damping from the amplitude over frequency",
         _findings({"viscous": "c_viscous_only", "amplitudes": "c_response"}),
-        _side_by_side(("amplitudes", pictures.amplitude_fit, ""), width=0.62 * plot.PAGE, height=0.5), _caption_6,
+        _side_by_side(("amplitudes", pictures.amplitude_fit, ""), width=0.62, height=0.5), _caption_6,
         rig=True, procedures=("impulse", "response"),
     ),
     Figure(

@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth import plot
 from nonsmooth.plot import comparison_response
 from nonsmooth.studies.savi2007.figures.diagrams import shared_legend
-from nonsmooth.studies.savi2007.figures.figure import Canvas, Compute, Datasets, Draw, Figure, sheet
+from nonsmooth.studies.savi2007.figures.figure import Canvas, Compute, Datasets, Draw, Figure, drawn
 from nonsmooth.studies.savi2007.figures.resonance import mark_printed
 from nonsmooth.studies.savi2007.flows import Settings
 from nonsmooth.studies.savi2007.laboratory import as_result
@@ -46,14 +45,12 @@ def _steps(settings: Settings, number: int) -> dict[str, Any]:
 
 
 def _draw(printed: Mapping[str, float]) -> Draw:
-    def draw(data: Datasets) -> Canvas:
-        with plot.journal():
-            canvas = sheet(0.72 * plot.PAGE, 0.6 * plot.PAGE)
-            ax = canvas.subplots()
-            comparison_response(data["compared"], ax)
-            mark_printed(ax, printed)
-            shared_legend(canvas, columns=2)
-        return canvas
+    @drawn(0.72, 0.6)
+    def draw(canvas: Canvas, data: Datasets) -> None:
+        ax = canvas.subplots()
+        comparison_response(data["compared"], ax)
+        mark_printed(ax, printed)
+        shared_legend(canvas, columns=2)
 
     return draw
 
