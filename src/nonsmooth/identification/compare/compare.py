@@ -177,7 +177,7 @@ def compare(
     elif kind == "diagram":
         from nonsmooth.identification.compare.diagram import compare_diagram
 
-        name = _parameter(parameter or _swept(measured, theory), theory)
+        name = _parameter(parameter or _swept(measured), theory)
         if direction not in ("up", "down", "both"):
             raise ValueError(f"direction = {direction!r}; allowed: 'up', 'down', 'both'")
         variables = compare_diagram(
@@ -274,7 +274,7 @@ def _parameter(name: str, theory: Any) -> str:
     return name
 
 
-def _swept(measured: xr.Dataset, theory: Any) -> str:
+def _swept(measured: xr.Dataset) -> str:
     others = [str(dim) for dim in measured["section"].dims if dim not in ("iterate", "state")]
     if len(others) != 1:
         raise ValueError(f"which parameter the sections lie along is not clear ({others}): give parameter=")

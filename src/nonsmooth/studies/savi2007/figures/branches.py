@@ -60,7 +60,7 @@ def branches(figure: str) -> Datasets:
     first = continue_orbit(orbit, begin.parameter, begin.range)
     found = {"branch": first}
     if begin.longest > 1:
-        for i, flip in enumerate(_flips(first, begin.parameter)):
+        for i, flip in enumerate(_flips(first)):
             _follow(found, flip, begin, 2, cascade=i == 0)
     return {key: with_returns(system, one) for key, one in found.items()}
 
@@ -75,11 +75,11 @@ def _follow(found: Datasets, flip: xr.Dataset, begin: Beginning, period: int, ca
     doubled = continue_orbit(flip)
     found[f"branch_{period}" + ("bcdef"[len(same) - 1] if same else "")] = doubled
     if cascade and 2 * period <= begin.longest:
-        for further in _flips(doubled, begin.parameter)[:1]:
+        for further in _flips(doubled)[:1]:
             _follow(found, further, begin, 2 * period, cascade)
 
 
-def _flips(branch: xr.Dataset, parameter: str) -> list[xr.Dataset]:
+def _flips(branch: xr.Dataset) -> list[xr.Dataset]:
     """The flips of a branch but for those at its ends, where it leaves another one."""
     table = rows_of(branch)
     return [table.isel(special=i) for i in np.flatnonzero(table["kind"].values == "flip")]
