@@ -233,7 +233,7 @@ def test_legs_are_exponentials_of_linear_modes() -> None:
 
 
 def test_a_short_leg_from_balanced_forces_ends() -> None:
-    """Where friction lets a mass go its speed is all rounding: v(tau) = a' tau^2 / 2, and steps are not to shrink."""
+    """A speed that is all rounding, as where friction lets a mass go, shrinks no steps: v(tau) = a' tau^2 / 2."""
     system = ns.models.discontinuous_support()
     flow, v = VariationalFlow.of(system, ("omega",)), system.values
     t, tau = 0.8, np.array([5e-8, -5e-8, 3e-10])
