@@ -10,7 +10,8 @@ import pytest
 from numba import njit
 from scipy.linalg import expm
 
-from nonsmooth.kernels.compile.lanes import LANES, add_products, plain
+from nonsmooth.kernels.compile.lanes import LANES
+from nonsmooth.kernels.compile.long_sums import add_products, plain
 from nonsmooth.kernels.hybrid.records import Form
 from nonsmooth.kernels.linear.module import linear_module
 
