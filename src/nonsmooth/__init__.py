@@ -27,7 +27,9 @@ if TYPE_CHECKING:
     from nonsmooth.continuation.manifolds.manifolds import manifolds as manifolds
     from nonsmooth.continuation.special import special_points as special_points
     from nonsmooth.control.continuation import control_based_continuation as control_based_continuation
+    from nonsmooth.control.holding import Holding as Holding
     from nonsmooth.control.simulated_rig import SimulatedRig as SimulatedRig
+    from nonsmooth.diagrams.amplitude_spectrum import amplitude_spectrum as amplitude_spectrum
     from nonsmooth.diagrams.chart import chart as chart
     from nonsmooth.diagrams.correlation_dimension import correlation_dimension as correlation_dimension
     from nonsmooth.diagrams.lyapunov import lyapunov as lyapunov
@@ -84,6 +86,7 @@ _WHERE = {
     "Stroboscopic": "flow.sections",
     "Poincare": "flow.sections",
     "random_starts": "flow.starts",
+    "amplitude_spectrum": "diagrams.amplitude_spectrum",
     "sweep": "diagrams.sweep",
     "frequency_response": "diagrams.response",
     "lyapunov": "diagrams.lyapunov",
@@ -101,6 +104,7 @@ _WHERE = {
     "special_points": "continuation.special",
     "manifolds": "continuation.manifolds.manifolds",
     "control_based_continuation": "control.continuation",
+    "Holding": "control.holding",
     "SimulatedRig": "control.simulated_rig",
     "smoothing_report": "smoothing.report",
     "load_recording": "recordings.load",

@@ -39,7 +39,8 @@ def measured(theory):
     model = ns.models.discontinuous_support(g=0.02, rho=0.14, omega=5.72)
     rig = ns.SimulatedRig(model, start=start.tolist(), **CONTROLLED)
     return ns.control_based_continuation(
-        rig, "frequency", (5.5, 5.9), frequency=5.72, amplitude=0.14, step=0.25, transient=20, progress=False
+        rig, "frequency", (5.5, 5.9), frequency=5.72, amplitude=0.14, step=0.25, holding=ns.Holding(transient=20),
+        progress=False,
     )
 
 
@@ -98,13 +99,15 @@ def free_motion(**options):
     return ns.SimulatedRig(ns.models.discontinuous_support(g=0.02, rho=0.05, omega=6.5), **{**CONTROLLED, **options})
 
 
-WITHOUT_CONTACT = {"frequency": 6.5, "amplitude": 0.05, "transient": 15, "release": 0, "progress": False}
+WITHOUT_CONTACT = {"frequency": 6.5, "amplitude": 0.05, "progress": False}
+BRIEFLY = {"transient": 15, "release": 0}
 
 
 def test_three_methods_are_enough_and_motion_without_contact_is_that_of_the_formula():
     found = ns.control_based_continuation(
-        Bare(free_motion()), "frequency", (6.3, 6.8), mass=0.838, direction="down", step=0.3, **WITHOUT_CONTACT
-    )
+        Bare(free_motion()), "frequency", (6.3, 6.8), direction="down", step=0.3,
+        holding=ns.Holding(mass=0.838, **BRIEFLY), **WITHOUT_CONTACT,
+    )  # fmt: skip
     m, k, c, rho, omega = 0.838, 8.47, 0.87, 0.05, found["drive_frequency"].values
     formula = rho / np.hypot(2 * k - m * omega**2, c * omega)
     spread = np.abs(found["amplitude"].values - formula) / found["amplitude_uncertainty"].values
@@ -115,7 +118,9 @@ def test_three_methods_are_enough_and_motion_without_contact_is_that_of_the_form
 def test_ctrl_c_leaves_the_rig_without_a_force_and_keeps_the_points():
     rig = Bare(free_motion(), calls=25_000)
     with pytest.raises(ns.Interrupted) as caught:
-        ns.control_based_continuation(rig, "frequency", (3.0, 6.8), mass=0.838, step=0.01, **WITHOUT_CONTACT)
+        ns.control_based_continuation(
+            rig, "frequency", (3.0, 6.8), step=0.01, holding=ns.Holding(mass=0.838, **BRIEFLY), **WITHOUT_CONTACT
+        )
     assert caught.value.result.sizes["point"] >= 1 and "nterrupted" in str(caught.value.result["ended_because"].values)
     assert rig.force == 0.0
 
@@ -127,15 +132,29 @@ def test_ctrl_c_leaves_the_rig_without_a_force_and_keeps_the_points():
         ({"range": (7.0, 6.0)}, "lower end"),
         ({"range": (4.0, 5.0)}, "begin within it"),
         ({"direction": "left"}, "'up', 'down'"),
-        ({"gains": (1.0, 0.0)}, "without damping"),
-        ({"harmonics": 90}, "at most"),
+        ({"holding": ns.Holding(harmonics=90, transient=0)}, "at most"),
         ({"step": 0.0}, "positive"),
     ],
 )
 def test_wrong_arguments_are_answered(changed, message):
-    given = {"parameter": "frequency", "range": (6.0, 7.0), **WITHOUT_CONTACT, "transient": 0, **changed}
+    given = {"parameter": "frequency", "range": (6.0, 7.0), **WITHOUT_CONTACT, **changed}
     with pytest.raises(ValueError, match=message):
         ns.control_based_continuation(free_motion(), **given)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"gains": (1.0, 0.0)}, "without damping"),
+        ({"gains": 3.0}, "two numbers"),
+        ({"mass": -0.8}, "positive"),
+        ({"tolerance": 0.0}, "positive"),
+        ({"record": 2}, "record"),
+    ],
+)
+def test_holdings_that_hold_nothing_are_answered(given, message):
+    with pytest.raises(ValueError, match=message):
+        ns.Holding(**given)
 
 
 def test_what_is_no_rig_is_told_how_to_become_one():

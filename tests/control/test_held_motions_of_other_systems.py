@@ -40,7 +40,7 @@ def held(noise, seed):
         stopped_duffing(), mass="M", frequency="w", amplitude="A", rate=12.0, noise=noise, seed=seed
     )  # fmt: skip
     return ns.control_based_continuation(
-        rig, "w", (1.0, 1.35), frequency=1.06, amplitude=0.22, step=0.15, release=0, progress=False
+        rig, "w", (1.0, 1.35), frequency=1.06, amplitude=0.22, step=0.15, holding=ns.Holding(release=0), progress=False
     )
 
 

@@ -82,13 +82,17 @@ def test_a_system_of_ones_own_and_a_smoothed_one_are_written_whole(results: dict
         exported("history", "toml", {"run": run}, own)
 
 
-def test_branches_are_saved_as_the_script_that_makes_them(tmp_path: Path) -> None:
-    shown = ns.bifurcation_diagram(SYSTEM, "rho", (0.26, 0.3), start=[0.0, 0.0], transient=100, progress=False)
-    script = write(tmp_path, "branches", "py", {"branches": shown})
+@pytest.mark.parametrize("view", ["branches", "spectrum"])
+def test_what_has_no_table_in_a_study_file_is_saved_as_the_script_that_makes_it(view: str, tmp_path: Path) -> None:
+    shown = ns.bifurcation_diagram(
+        SYSTEM, "rho", (0.26, 0.3), start=[0.0, 0.0], transient=100, progress=False
+    ) if view == "branches" else ns.amplitude_spectrum(SYSTEM, **SHORT)  # fmt: skip
+    script = write(tmp_path, view, "py", {view: shown})
     subprocess.run([sys.executable, script.name], cwd=tmp_path, check=True)
     same(script.with_suffix(".nc"), shown)
+    assert script.with_suffix(".pdf").read_bytes().startswith(b"%PDF")
     with pytest.raises(ValueError, match="no table in a study file"):
-        exported("branches", "toml", {"branches": shown}, STATE)
+        exported(view, "toml", {view: shown}, STATE)
 
 
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind not in ("py", "toml")])

@@ -11,8 +11,8 @@ import pytest
 import nonsmooth as ns
 from nonsmooth.cli.main import main
 from nonsmooth.cli.study import read_study
+from nonsmooth.explorer.catalogue import Catalogue
 from nonsmooth.explorer.opening import opened_result, opened_study
-from nonsmooth.explorer.session import Session, models_of
 
 STUDY = """
 [system]
@@ -48,7 +48,7 @@ def test_a_study_opens_on_its_model_range_and_start(tmp_path: Path) -> None:
         "start": "0.0 0.01", "shown": "x",
     }  # fmt: skip
     assert [float(found[key]) for key in ("p.k", "low", "high")] == [9.0, -0.001, 0.002]
-    Session.check(models_of(system), query)
+    Catalogue.of(system).state_of(parse_qsl(query))
 
 
 def test_a_result_opens_on_the_system_in_its_record(tmp_path: Path) -> None:
@@ -64,7 +64,7 @@ def test_a_result_opens_on_the_system_in_its_record(tmp_path: Path) -> None:
     found = view(query)
     assert system == own
     assert (found["model"], found["start"]) == ("given", "-0.01 0.0")
-    Session.check(models_of(system), query)
+    Catalogue.of(system).state_of(parse_qsl(query))
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import statistics
 import time
@@ -177,6 +178,10 @@ def test_two_tabs_do_not_disturb_each_other(page: Any, server: Any, new_page: Ca
     page.until_done()
     other.until_done()
     assert (page.readout()["motion"], other.readout()["motion"]) == ("period 4", "period 1")
+    for one in (page, other):
+        assert re.fullmatch(r"\d+ tabs share this machine", one.tab.inner_text("#tabs"))
+    other.tab.context.close()
+    page.until("document.getElementById('tabs').hidden")
 
 
 def test_a_view_is_saved_as_a_figure_and_as_the_script_that_makes_it(page: Any) -> None:

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import importlib
 import queue
+import signal
+import sys
 import time
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 import nonsmooth as ns
 from nonsmooth.explorer.presets import first_state
-from nonsmooth.explorer.worker import Answer, Worker
+from nonsmooth.explorer.worker import Answer, Worker, _Cancelled
 
 SYSTEM = ns.models.discontinuous_support()
 
@@ -72,6 +76,24 @@ def test_work_that_does_not_ask_is_interrupted_and_the_process_stays(
     worker.ask(6, job("orbit"))
     assert last_of(answers, 6)[0] == "done"
     assert worker._process is process
+
+
+def test_a_package_is_loaded_whole_before_its_work_is_interrupted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "slow_to_load.py").write_text("import time\nfor _ in range(60):\n    time.sleep(0.01)\nwhole = True\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr("nonsmooth.explorer.worker._SILENT", 0.1)
+    before = signal.getsignal(signal.SIGINT)
+    try:
+        cancelled = _Cancelled()
+        cancelled.at_work = 7
+        cancelled.add(7)
+        with pytest.raises(KeyboardInterrupt):  # while it is loaded, or behind it
+            time.sleep(20 if importlib.import_module("slow_to_load").whole else 0)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert sys.modules["slow_to_load"].whole
 
 
 def test_an_error_is_a_sentence(worker: Worker, answers: queue.Queue[Answer]) -> None:

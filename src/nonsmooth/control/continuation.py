@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from nonsmooth.control.course import Course, course_of
 from nonsmooth.control.held import Held, Holder
+from nonsmooth.control.holding import Holding
 from nonsmooth.control.march import March, Point
 from nonsmooth.control.outcome import Names, branch_dataset
 from nonsmooth.control.release import UNKNOWN
@@ -16,7 +20,7 @@ from nonsmooth.flow.arguments import real_number, whole_number
 from nonsmooth.results.progress import Progress
 from nonsmooth.results.progress import progress as bar
 from nonsmooth.results.provenance import options_as_data, package_version
-from nonsmooth.system.names import by_name, unknown
+from nonsmooth.system.names import by_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -37,16 +41,9 @@ def control_based_continuation(
     frequency: float,
     amplitude: float,
     direction: str = "up",
-    mass: float | None = None,
-    gains: tuple[float, float] | None = None,
-    harmonics: int | None = None,
-    transient: int = 50,
-    settle: int = 5,
-    record: int = 10,
-    release: int = 12,
     step: float = 0.1,
-    tolerance: float = 1e-3,
     points: int = 100,
+    holding: Holding = Holding(),  # noqa: B008  it is frozen
     progress: Progress = True,
 ) -> xr.Dataset:
     r"""Follow the periodic motions of an experiment in a parameter of its drive, through folds, stable or not.
@@ -72,25 +69,13 @@ def control_based_continuation(
         not the parameter stays.
     direction : {"up", "down"}
         Direction of the parameter at the beginning.
-    mass : float, optional
-        The moving mass, from which the gains follow; where not given, the rig's attribute ``mass``.
-    gains : (K_p, K_d), optional
-        In place of the rule :math:`K_p = 0`, :math:`K_d = m \omega`.
-    harmonics : int, optional
-        H; 20 where not given, fewer where the rig is read fewer than 50 times per turn.
-    transient : int
-        Turns of the drive before the first measurement.
-    settle, record : int
-        Turns of the drive to wait and to record in each measurement.
-    release : int
-        Turns of the drive for which each motion found is let go, to see whether it is stable; 0: that is not done.
     step : float
         The largest step along the branch, in units of the range and of the first motion.
-    tolerance : float
-        Largest control force at convergence, over that which would move the reference by the size of the motion; the
-        force may be larger where its noise is.
     points : int
         The largest number of points.
+    holding : Holding
+        Gains of the controller, harmonics of the reference, and the turns that each measurement takes:
+        :class:`nonsmooth.Holding`.
     progress : bool or callable
         A bar of the points, or a function that hears the fraction done and may return False to cancel.
 
@@ -141,71 +126,85 @@ def control_based_continuation(
     ...     rig, "frequency", (4.9, 6.0), frequency=5.0, amplitude=0.14)  # doctest: +SKIP
     """
     names = _names(rig)
-    follow = _which(parameter, names)
-    low, high = _limits(range)
-    begin = {"frequency": real_number(frequency, "frequency"), "amplitude": real_number(amplitude, "amplitude")}
-    if begin["frequency"] <= 0:
-        raise ValueError(f"frequency = {frequency!r}: the angular frequency of the drive is positive")
-    if not low <= begin[follow] <= high:
-        raise ValueError(f"{follow} = {begin[follow]!r} lies outside the range {low:g} ... {high:g}: begin within it")
-    if direction not in ("up", "down"):
-        raise ValueError(f"direction = {direction!r}; allowed: 'up', 'down'")
-    if real_number(step, "step") <= 0 or real_number(tolerance, "tolerance") <= 0:
-        raise ValueError(f"step = {step!r} and tolerance = {tolerance!r} must be positive")
-    turns = {"settle": whole_number(settle, "settle", 1), "record": whole_number(record, "record", 3)}
+    course = course_of(names, parameter, range, frequency, amplitude, direction)
+    if real_number(step, "step") <= 0:
+        raise ValueError(f"step = {step!r} must be positive")
     most = whole_number(points, "points", 1)
-    watched = whole_number(release, "release", 0)
-    holder = Holder(rig, _gains(gains), _mass(rig, mass, gains), 3, **turns)
-    options = {
-        "parameter": parameter, "range": [low, high], **begin, "direction": direction, "mass": mass, "gains": gains,
-        "harmonics": harmonics, "transient": transient, **turns, "release": release, "step": step,
-        "tolerance": tolerance, "points": points,
-    }  # fmt: skip
-    record_of = {
+    if not isinstance(holding, Holding):
+        raise TypeError(f"holding = {shortened(holding)}: give Holding(mass=..., gains=..., ...)")
+    branch = _Branch(Holder(rig, holding, holding.mass_of(rig)), course, names)
+    options = {**asdict(course), "step": step, "points": points, "holding": asdict(holding)}
+    record = {
         "version": package_version(), "verb": "control_based_continuation", "rig": type(rig).__name__,
         "options": options_as_data(options),
     }  # fmt: skip
-    found: list[Point] = []
-    seen: list[tuple[int, float]] = []
-    march: March | None = None
-    ending = "points"
     try:
-        free = _first(holder, begin, harmonics, whole_number(transient, "transient", 0))
-        march = _march(holder, follow, begin, high - low, free, tolerance)
-        way = march.points(march.start(free), step, lambda value: low <= value <= high, direction == "up")
+        branch.begin()
         with bar(most, "control-based continuation", progress) as advance:
-            while len(found) < most:
-                try:
-                    point = next(way)
-                except StopIteration as last:
-                    ending = last.value
-                    break
-                found.append(point)
-                seen.append((UNKNOWN, float("nan")))
-                if watched:
-                    seen[-1] = let_go(holder, point.held, watched)
-                advance()
+            ending = branch.follow(step, most, advance)
     except KeyboardInterrupt as error:
-        if march is None or not found:
+        if not branch.points:
             raise
-        part = branch_dataset(march, found, seen, names, getattr(names, follow), "interrupted", record_of)
-        raise Interrupted(f"interrupted: {len(found)} points were measured", part) from error
+        words = f"interrupted: {len(branch.points)} points were measured"
+        raise Interrupted(words, branch.dataset("interrupted", record)) from error
     finally:
         with suppress(Exception):  # what went wrong before is what is said
             rig.apply_force(0.0)
-    return branch_dataset(march, found, seen, names, getattr(names, follow), ending, record_of)
+    return branch.dataset(ending, record)
 
 
-def _first(holder: Holder, begin: dict[str, float], harmonics: int | None, transient: int) -> Held:
+@dataclass
+class _Branch:
+    """A branch as far as it has been measured, point by point."""
+
+    holder: Holder
+    course: Course
+    names: Names
+    points: list[Point] = field(default_factory=list)
+    released: list[tuple[int, float]] = field(default_factory=list)
+    free: Held = field(init=False)
+    march: March = field(init=False)
+
+    def begin(self) -> None:
+        """Measure the motion at the beginning, without control."""
+        self.free = _first(self.holder, self.course)
+        size, width = float(abs(self.free.position.c[1])), self.course.high - self.course.low
+        tolerance = self.holder.holding.tolerance
+        self.march = March(self.holder, self.course.setting, self.course.of, width, size, tolerance)
+
+    def follow(self, step: float, most: int, advance: Callable[[], None]) -> str:
+        """Measure points until the branch ends or there are enough; returns how it ended."""
+        march, turns = self.march, self.holder.holding.release
+        way = march.points(march.start(self.free), step, self.course.inside, self.course.rising)
+        while len(self.points) < most:
+            try:
+                point = next(way)
+            except StopIteration as last:
+                return str(last.value)
+            self.points.append(point)
+            self.released.append((UNKNOWN, float("nan")))
+            if turns:
+                self.released[-1] = let_go(self.holder, point.held, turns)
+            advance()
+        return "points"
+
+    def dataset(self, ending: str, record: dict[str, Any]) -> xr.Dataset:
+        """The points as a result."""
+        parameter = getattr(self.names, self.course.parameter)
+        return branch_dataset(self.march, self.points, self.released, self.names, parameter, ending, record)
+
+
+def _first(holder: Holder, course: Course) -> Held:
     """The motion at the beginning, measured without control; the number of harmonics follows from the samples."""
-    frequency, amplitude = holder.rig.set_drive(begin["frequency"], begin["amplitude"])
-    if transient:
-        holder.run(frequency, None, transient)
+    holding = holder.holding
+    frequency, amplitude = holder.rig.set_drive(course.frequency, course.amplitude)
+    if holding.transient:
+        holder.run(frequency, None, holding.transient)
     per_turn = len(holder.run(frequency, None, 4).phase) / 4
     allowed = int(per_turn / PER_HARMONIC)
     if allowed < 1:
         raise ValueError(f"the rig is read {per_turn:.3g} times per turn of the drive: at least 3 are needed")
-    asked = min(MOST_HARMONICS, allowed) if harmonics is None else whole_number(harmonics, "harmonics", 1)
+    asked = holding.harmonics or min(MOST_HARMONICS, allowed)
     if asked > allowed:
         raise ValueError(
             f"harmonics = {asked} cannot be told apart by {per_turn:.3g} samples per turn of the drive: at most "
@@ -224,20 +223,6 @@ def _first(holder: Holder, begin: dict[str, float], harmonics: int | None, trans
     return free
 
 
-def _march(
-    holder: Holder, follow: str, begin: dict[str, float], width: float, free: Held, tolerance: float
-) -> March:
-    if follow == "frequency":
-        return March(
-            holder, lambda value: (value, begin["amplitude"]), lambda held: held.frequency, width,
-            abs(free.position.c[1]), tolerance,
-        )  # fmt: skip
-    return March(
-        holder, lambda value: (begin["frequency"], value), lambda held: held.amplitude, width,
-        abs(free.position.c[1]), tolerance,
-    )  # fmt: skip
-
-
 def _names(rig: Any) -> Names:
     """Names and units of the rig's quantities; TypeError for what is no rig."""
     missing = [name for name in ("set_drive", "apply_force", "read") if not callable(getattr(rig, name, None))]
@@ -252,45 +237,3 @@ def _names(rig: Any) -> Names:
             f"{shortened(rig)} has no {' and no '.join(missing)}{hint}"
         )
     return Names(**getattr(rig, "names", {}), units=getattr(rig, "units", None))
-
-
-def _which(parameter: Any, names: Names) -> str:
-    own = {"frequency": "frequency", "amplitude": "amplitude"}
-    known = own | {names.frequency: "frequency", names.amplitude: "amplitude"}
-    if parameter not in known:
-        raise ValueError(unknown(parameter, "a parameter", "the drive", known))
-    return known[parameter]
-
-
-def _limits(given: Any) -> tuple[float, float]:
-    try:
-        low, high = given
-    except (TypeError, ValueError):
-        raise ValueError(f"range = {shortened(given)}: give (low, high)") from None
-    low, high = real_number(low, "the lower end of the range"), real_number(high, "the upper end of the range")
-    if not low < high:
-        raise ValueError(f"range = ({low:g}, {high:g}): the lower end comes first")
-    return low, high
-
-
-def _gains(given: Any) -> tuple[float, float] | None:
-    if given is None:
-        return None
-    try:
-        proportional, derivative = (real_number(one, "gains") for one in given)
-    except (TypeError, ValueError):
-        raise ValueError(f"gains = {shortened(given)}: give (K_p, K_d), two numbers") from None
-    if derivative <= 0:
-        raise ValueError(f"K_d = {derivative:g}: without damping the controller holds nothing; give more than 0")
-    return proportional, derivative
-
-
-def _mass(rig: Any, given: Any, gains: Any) -> float:
-    if gains is not None:
-        return 1.0
-    mass = getattr(rig, "mass", None) if given is None else given
-    if mass is None:
-        raise ValueError("the gains follow from the moving mass: give mass=..., roughly, or gains=(K_p, K_d)")
-    if real_number(mass, "mass") <= 0:
-        raise ValueError(f"mass = {mass!r} must be positive")
-    return float(mass)

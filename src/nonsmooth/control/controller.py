@@ -14,14 +14,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from nonsmooth.control.harmonics import ComplexArray
+from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.control.rig import Rig
 
 __all__ = ["Controller", "Samples"]
-
-FloatArray = NDArray[np.float64]
 
 
 class Samples(NamedTuple):

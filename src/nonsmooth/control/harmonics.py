@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from nonsmooth.arrays import ComplexArray, FloatArray
 
 __all__ = ["Series", "fitted", "mean_square", "values_at"]
 
 SEEN = 4.0  # standard uncertainties
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from nonsmooth.arrays import ComplexArray
 from nonsmooth.control.controller import Controller, Samples
-from nonsmooth.control.harmonics import ComplexArray, Series, fitted, mean_square
+from nonsmooth.control.harmonics import Series, fitted, mean_square
+from nonsmooth.control.holding import Holding
 from nonsmooth.control.rig import Rig
 
 __all__ = ["Held", "Holder"]
@@ -37,15 +39,13 @@ class Held:
 
 @dataclass
 class Holder:
-    """A rig with the rule for its gains, and for how long a run settles and is recorded (turns of the drive)."""
+    """A rig that is held as `Holding` says, with the mass by which its gains go."""
 
     rig: Rig
-    gains: tuple[float, float] | None  # K_p, K_d; None: by the mass
+    holding: Holding
     mass: float
-    harmonics: int
-    settle: int
-    record: int
-    turns: int = 0  # so far
+    harmonics: int = 3
+    turns: int = 0  # of the drive, so far
 
     def stiffness(self, frequency: float) -> float:
         """Force per displacement of the controller at the drive's frequency."""
@@ -54,7 +54,7 @@ class Holder:
 
     def gains_at(self, frequency: float) -> tuple[float, float]:
         """Gains: K_d = m omega, K_p = 0 where none were given."""
-        return (0.0, self.mass * frequency) if self.gains is None else self.gains
+        return self.holding.gains or (0.0, self.mass * frequency)
 
     def run(self, frequency: float, reference: ComplexArray | None, turns: int) -> Samples:
         """March for whole turns, held to the reference or free."""
@@ -65,8 +65,9 @@ class Holder:
     def hold(self, frequency: float, amplitude: float, reference: ComplexArray | None) -> Held:
         """Set the drive, wait, record."""
         frequency, amplitude = self.rig.set_drive(frequency, amplitude)
-        samples = self.run(frequency, reference, self.settle + self.record)
-        kept = samples.phase >= samples.phase[0] + self.settle
+        settle = self.holding.settle
+        samples = self.run(frequency, reference, settle + self.holding.record)
+        kept = samples.phase >= samples.phase[0] + settle
         phase, position, force = (column[kept] for column in samples)
         shown = fitted(phase, position, self.harmonics)
         aimed = shown.c if reference is None else reference

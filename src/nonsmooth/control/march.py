@@ -14,14 +14,12 @@ from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-from nonsmooth.control.harmonics import ComplexArray
+from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.control.held import Held, Holder
 
 __all__ = ["March", "Point"]
 
-FloatArray = NDArray[np.float64]
 PROBE = 0.02  # displacement of a reference for a derivative, over the size of the motion
 LONGEST = 0.1  # correction of the first point in one go
 SEEN = 1e-3  # the least displacement that says something about derivatives, over the size of the motion

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.control.harmonics import values_at
 from nonsmooth.control.march import March, Point
 from nonsmooth.control.release import STABLE, UNKNOWN, UNSTABLE
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Names", "branch_dataset"]
 
-FloatArray = NDArray[np.float64]
 TURN = np.linspace(0.0, 1.0, 2048, endpoint=False)
 SIGNIFICANT = 4.0  # standard uncertainties
 MISFIT = 4.0  # mean square of the normalised differences from a parabola

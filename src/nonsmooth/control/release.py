@@ -25,7 +25,7 @@ def release(holder: Holder, held: Held, turns: int) -> tuple[int, float]:
     """
     pushed = held.reference.copy()
     pushed[1] *= 1.0 + PUSH
-    holder.run(held.frequency, pushed, holder.settle)
+    holder.run(held.frequency, pushed, holder.holding.settle)
     here = held.position.c[1]
     displacement = PUSH * float(abs(here))
     distances: list[float] = []

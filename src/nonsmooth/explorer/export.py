@@ -95,7 +95,7 @@ def study_of(result: Any, axes: Mapping[str, str], model: str, stem: str) -> str
     if model not in ns.models.names():
         raise ValueError("a study file names a model of nonsmooth.models or a file; save the Python script instead")
     record, system = read_provenance(result), ns.system_of(result)
-    if record["verb"] == "bifurcation_diagram":
+    if record["verb"] in ("bifurcation_diagram", "amplitude_spectrum"):
         raise ValueError(f"{record['verb']} has no table in a study file; save the Python script instead")
     lines = ["[system]", f'model = "{model}"', f"parameters = {_toml(_values(system, record))}"]
     if system.is_smoothed:

@@ -119,6 +119,8 @@
         dot.style.background = color;
         return [dot, text];
       }));
+    $("tabs").hidden = ui.tabs < 2;
+    $("tabs").textContent = `${ui.tabs} tabs share this machine`;
     tabs(ui);
     parameters(ui);
     root.classList.toggle("dark", ui.dark);

@@ -124,7 +124,7 @@ class Schedule:
         if kind == "error":
             self._failed[running.view] = running.key
             self.page.notes[place] = str(content)
-            self.page.failed(running.view)
+            self.page.sheet.forget(running.view)
         elif kind == "done":
             found, warned = content
             self.done[running.view] = running.key
@@ -132,7 +132,7 @@ class Schedule:
             self.page.notes.pop(place, None)
             if warned:
                 self.page.notes[place] = warned[0]
-            self.page.show(running, found)
+            self.page.sheet.show(running, found)
         self.page.tell("notes", self.page.notes)
         self.go_on()
 

@@ -5,13 +5,16 @@ from __future__ import annotations
 import socket
 import sys
 import webbrowser
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
+from urllib.parse import parse_qsl
 
 from nonsmooth.errors import not_installed
 
 if TYPE_CHECKING:
+    from nonsmooth.explorer.catalogue import Catalogue
+    from nonsmooth.explorer.session import Session
     from nonsmooth.system.system import System
 
 __all__ = ["PORT", "explore"]
@@ -60,12 +63,12 @@ def explore(
 
     mpl.use("Agg")  # figures are made for files, in threads
     from nonsmooth.explorer.access import Access
-    from nonsmooth.explorer.session import Session, models_of
+    from nonsmooth.explorer.catalogue import Catalogue
 
-    models = models_of(system)
-    Session.check(models, query)
+    catalogue = Catalogue.of(system)
+    catalogue.state_of(parse_qsl(query))  # a query that does not fit is refused before anything is served
     access, number = Access(), _free(port)
-    application = Application(FunctionHandler(partial(_open, models, query)))
+    application = Application(FunctionHandler(partial(_open, catalogue, query, [])))
     server: Any = Server(
         application, port=number, address="127.0.0.1", auth_provider=access, index=None,
         allow_websocket_origin=[f"127.0.0.1:{number}", f"localhost:{number}"],
@@ -87,10 +90,10 @@ def explore(
         server.stop()
 
 
-def _open(models: Mapping[str, Any], query: str, document: Any) -> None:
+def _open(catalogue: Catalogue, query: str, tabs: list[Session], document: Any) -> None:
     from nonsmooth.explorer.session import Session
 
-    Session(document, models, query)
+    Session(document, catalogue.copy(), query, tabs)
 
 
 def _free(port: int | None) -> int:

@@ -18,6 +18,7 @@ import time
 import warnings
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from types import FrameType
 from typing import Any
 
 __all__ = ["Answer", "Worker"]
@@ -106,7 +107,10 @@ class _Cancelled:
     def add(self, number: int) -> None:
         """Cancel a request; in a while as Ctrl-C does, should its verb not hear of it."""
         self.numbers.add(number)
-        late = threading.Timer(_SILENT, self._interrupt, (number,))
+        self._later(_SILENT, number)
+
+    def _later(self, seconds: float, number: int) -> None:
+        late = threading.Timer(seconds, self._interrupt, (number,))
         late.daemon = True
         late.start()
 
@@ -118,9 +122,21 @@ class _Cancelled:
         else:
             _thread.interrupt_main()
 
-    def _interrupted(self, signum: int, frame: Any) -> None:
-        if self.at_work in self.numbers:
-            raise KeyboardInterrupt
+    def _interrupted(self, signum: int, frame: FrameType | None) -> None:
+        if self.at_work not in self.numbers:
+            return
+        if _is_importing(frame):  # a package that is loaded by half stays so for the rest of the process
+            self._later(_OFTEN, self.at_work)
+            return
+        raise KeyboardInterrupt
+
+
+def _is_importing(frame: FrameType | None) -> bool:
+    while frame is not None:
+        if frame.f_code.co_filename.startswith("<frozen importlib"):
+            return True
+        frame = frame.f_back
+    return False
 
 
 def main() -> None:

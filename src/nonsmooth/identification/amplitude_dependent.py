@@ -24,8 +24,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.blas import one_blas_thread
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.nonlinear_mode import NonlinearMode, interpolation
@@ -38,7 +39,6 @@ if TYPE_CHECKING:
 
 __all__ = ["ResponseCurve", "amplitude_dependent", "response_curves"]
 
-FloatArray = NDArray[np.float64]
 
 _POWERS = {"m": 0, "m/s": 1, "m/s^2": 2, "m/s²": 2}
 _METHOD = "forced responses fitted along their curves by one mode with amplitude-dependent frequency and damping"

@@ -12,14 +12,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.identification.pieces import Fittable, State
 
 __all__ = ["Unsettled", "inverted", "reduced", "settle"]
 
-FloatArray = NDArray[np.float64]
 _SETTLED = 1e-3  # of a standard uncertainty
 _RIDGE = 1e-13  # of a start's column: what keeps a start that is known or not seen from being divided by
 _LITTLE = 1e-4  # of the sum of squares: what a rough fit leaves to be gained

@@ -29,15 +29,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from nonsmooth.arrays import ComplexArray, FloatArray
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["NonlinearMode", "interpolation"]
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,8 +7,8 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.results.representation import cut, html_table, text_table
 
@@ -48,7 +48,7 @@ class ParameterSet(Mapping[str, float]):
     notes: tuple[str, ...]
     anomalies: tuple[str, ...]
     synthetic: bool
-    _covariance: NDArray[np.float64]
+    _covariance: FloatArray
 
     def __init__(
         self,
@@ -120,7 +120,7 @@ class ParameterSet(Mapping[str, float]):
         raise ValueError("this set holds no residuals: they are those of a fit, ns.fit(...), made in this session")
 
     @staticmethod
-    def _labelled(names: list[str], matrix: NDArray[np.float64]) -> xr.DataArray:
+    def _labelled(names: list[str], matrix: FloatArray) -> xr.DataArray:
         import xarray as xr
 
         return xr.DataArray(matrix, coords={"parameter": names, "other": names}, dims=("parameter", "other"))
@@ -156,7 +156,7 @@ class ParameterSet(Mapping[str, float]):
             anomalies=self.anomalies, synthetic=self.synthetic,
         )  # fmt: skip
 
-    def draw(self, n: int, seed: int = 0) -> dict[str, NDArray[np.float64]]:
+    def draw(self, n: int, seed: int = 0) -> dict[str, FloatArray]:
         """``n`` sets of the model's parameters, correlated as known; those known to a factor are log-normal."""
         names = list(self.estimates)
         centre = np.array([self[name] for name in names])

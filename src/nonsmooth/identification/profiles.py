@@ -9,11 +9,10 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+
+from nonsmooth.arrays import FloatArray
 
 __all__ = ["Profile", "profile_of"]
-
-FloatArray = NDArray[np.float64]
 
 
 class Profile(NamedTuple):

@@ -11,14 +11,14 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.identification.nonlinear_mode import NonlinearMode, interpolation
 
 __all__ = ["FEWEST_CURVES", "ResponseFit"]
 
-FloatArray = NDArray[np.float64]
 _ROUNDS = 40
 FEWEST_CURVES = 4  # curves: how far they differ cannot be told from fewer
 

@@ -8,13 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.arrow import inverted, reduced
 from nonsmooth.identification.pieces import Fittable, State
 from nonsmooth.identification.uncertainty import newey_west
 
 __all__ = ["Sandwich", "sandwich"]
-
-FloatArray = NDArray[np.float64]
 
 
 class Sandwich(NamedTuple):

@@ -12,13 +12,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from nonsmooth.arrays import FloatArray
 
 __all__ = [
     "correlated", "correlation_times", "coverage_factor", "factor_interval", "interval", "newey_west", "uniform",
 ]  # fmt: skip
-
-FloatArray = NDArray[np.float64]
 
 
 def uniform(half_width: float) -> float:

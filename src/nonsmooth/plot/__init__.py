@@ -6,6 +6,7 @@ Those of identified parameters stand in ``plot.identification``. Matplotlib is l
 from typing import Any
 
 from nonsmooth.plot import identification
+from nonsmooth.plot.amplitude_spectrum import amplitude_spectrum
 from nonsmooth.plot.basin_fractions import basin_fractions
 from nonsmooth.plot.basins import basins
 from nonsmooth.plot.bifurcation import bifurcation
@@ -38,6 +39,7 @@ __all__ = [
     "COLORS",
     "COLUMN",
     "PAGE",
+    "amplitude_spectrum",
     "basin_fractions",
     "basins",
     "bifurcation",

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import DataFileError
 from nonsmooth.recordings.remarks import Remarks
 
@@ -72,8 +73,8 @@ class Trace:
     run: str
     name: str
     unit: str
-    axis: NDArray[np.float64]
-    values: NDArray[np.float64]
+    axis: FloatArray
+    values: FloatArray
     origin: str
     axis_unit: str = "s"
     lines: NDArray[np.int64] | None = None
@@ -105,7 +106,7 @@ def is_axis_name(name: str, axis: str) -> bool:
     return axis == "time" and (word in TIME_WORDS or word.removesuffix("_s") in TIME_WORDS)
 
 
-def scaled_time(values: NDArray[np.float64], unit: str) -> NDArray[np.float64] | None:
+def scaled_time(values: FloatArray, unit: str) -> FloatArray | None:
     """Times in seconds; None if ``unit`` is no unit of time."""
     scale = 1.0 if unit == "" else TIME_SCALES.get(unit.strip())
     if scale is None:

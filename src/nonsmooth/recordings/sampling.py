@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from nonsmooth.arrays import FloatArray
 
 __all__ = ["Sampling", "examine", "missing_runs"]
 
@@ -25,7 +26,7 @@ class Sampling:
     change: tuple[int, float, float] | None  # index, rate before, rate after
 
 
-def examine(time: NDArray[np.float64]) -> Sampling:
+def examine(time: FloatArray) -> Sampling:
     """Judge times that do not decrease, in seconds."""
     steps = np.diff(time)
     repeated = int(np.count_nonzero(steps == 0))
@@ -49,7 +50,7 @@ def examine(time: NDArray[np.float64]) -> Sampling:
     return Sampling(rate, regular, repeated, gaps, change)
 
 
-def missing_runs(values: NDArray[np.float64]) -> tuple[int, int, int]:
+def missing_runs(values: FloatArray) -> tuple[int, int, int]:
     """Number of values that are not finite, and the first index and length of the longest run of them."""
     bad = ~np.isfinite(values)
     total = int(np.count_nonzero(bad))
@@ -61,7 +62,7 @@ def missing_runs(values: NDArray[np.float64]) -> tuple[int, int, int]:
     return total, int(starts[longest]), int(ends[longest] - starts[longest])
 
 
-def _change_of_rate(steps: NDArray[np.float64]) -> tuple[int, float, float] | None:
+def _change_of_rate(steps: FloatArray) -> tuple[int, float, float] | None:
     """The first place where the mean step of whole blocks leaves that of the blocks before it, and stays away."""
     block = _BLOCK if len(steps) >= 4 * _BLOCK else 4
     threshold = _CHANGE if block == _BLOCK else 5 * _CHANGE

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.branches.orbit import Orbit
 from nonsmooth.continuation.find import find_orbit
 from nonsmooth.diagrams.lyapunov import lyapunov
@@ -28,8 +29,6 @@ if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
 __all__ = ["smoothing_report"]
-
-FloatArray = NDArray[np.float64]
 
 
 @by_name
@@ -134,50 +133,78 @@ def smoothing_report(
         raise ValueError("the orbit belongs to another system, or to other values of its parameters")
     for shape in bands:  # overlapping bands are refused before anything is computed
         system.smoothed(widths[-1], shape)
-    orbit = orbit or _reference(system, start)
-    length = {"periods": periods, "duration": duration}
-    if orbit is None and periods is None and duration is None:
-        length["periods"] = 1000
-    begin = start if orbit is None else orbit.u
-    exponents = _exponents(system, orbit, begin, length)
-    search: Box | None = None
-    own: list[Found] = []
+    sharp = _sharp(system, orbit or _reference(system, start), start, transient, periods, duration)
+    reference = ({} if sharp.orbit is None else sharp.of(sharp.orbit)) | {"exponents": sharp.exponents()}
     if n_starts:
-        search = Box(n_starts, dict(box) if box else _box(system, orbit), section, seed)
-        own = attractors_of(system, search, *_any_parameter(system))
+        sharp.search = Box(n_starts, dict(box) if box else _box(system, sharp.orbit), section, seed)
+        sharp.own = attractors_of(system, sharp.search, *_any_parameter(system))
+        reference["n_attractors"] = len(sharp.own)
     rows: dict[tuple[int, int], dict[str, Any]] = {}
     with bar(len(bands) * len(widths), "smoothing report", progress) as advance:
         for i, shape in enumerate(bands):
-            near = begin
-            for j, eta in enumerate(widths):
-                smooth = system.smoothed(float(eta), shape)
-                row: dict[str, Any] = {"status": codes.OK, "note": ""}
-                found = None
-                if orbit is not None:
-                    found, row = _near(smooth, orbit, near, transient)
-                    near = near if found is None else found.u
-                try:
-                    row["exponents"] = _exponents(smooth, found, near, length)[: len(system.states)]
-                except SolveError as error:
-                    row |= {"status": _code(error), "note": str(error)}
-                if search is not None:
-                    others = attractors_of(smooth, search, "eta", float(eta))
-                    row["n_attractors"], row["missing"], row["spurious"] = len(others), *matched(own, others)
-                rows[i, j] = row | ({} if found is None else _of(found, len(system.states)))
+            near = sharp.begin
+            for j, eta in enumerate(widths.tolist()):
+                rows[i, j], near = sharp.row(system.smoothed(eta, shape), eta, near)
                 advance()
     options = {
-        "etas": widths, "band": bands, "orbit": None if orbit is None else orbit.u, "transient": transient,
+        "etas": widths, "band": bands, "orbit": None if sharp.orbit is None else sharp.orbit.u, "transient": transient,
         "start": plain_start(system, start), "n_starts": n_starts, "box": box and dict(box), "section": section,
-        "seed": seed, **length,
+        "seed": seed, **sharp.length,
     }  # fmt: skip
     labels = labels_of(system)
-    reference = ({} if orbit is None else _of(orbit, len(system.states))) | {"exponents": exponents}
-    if search is not None:
-        reference["n_attractors"] = len(own)
     return report(
         labels, provenance(labels, "smoothing_report", options, method="events", seed=seed), bands, widths, reference,
         rows, scale=system.scale_vector(), forced=system.period() is not None,
     )  # fmt: skip
+
+
+@dataclass
+class _Sharp:
+    """The event-driven system, and by what its smoothed counterparts are compared with it."""
+
+    system: System
+    orbit: Orbit | None
+    begin: Any  # of runs, and of the search of smoothed orbits
+    transient: int
+    length: Mapping[str, Any]  # of the runs that give exponents
+    search: Box | None = None
+    own: list[Found] = field(default_factory=list)
+
+    def exponents(self) -> FloatArray:
+        """Its Lyapunov exponents."""
+        return _exponents(self.system, self.orbit, self.begin, self.length)
+
+    def of(self, orbit: Orbit) -> dict[str, Any]:
+        """The compared parts of an orbit; multipliers of memory, which only a band has, are the least and left out."""
+        return {
+            "section": orbit.u, "maximum": orbit.maximum, "minimum": orbit.minimum, "period": orbit.period,
+            "floquet_multipliers": orbit.floquet_multipliers[: len(self.system.states)], "stable": orbit.stable,
+        }  # fmt: skip
+
+    def row(self, smooth: System, eta: float, near: Any) -> tuple[dict[str, Any], Any]:
+        """The smoothed system's orbit near a state, exponents and attractors; with the state to look near next."""
+        row: dict[str, Any] = {"status": codes.OK, "note": ""}
+        found = None
+        if self.orbit is not None:
+            found, row = _near(smooth, self.orbit, near, self.transient)
+            near = near if found is None else found.u
+        try:
+            row["exponents"] = _exponents(smooth, found, near, self.length)[: len(self.system.states)]
+        except SolveError as error:
+            row |= {"status": _code(error), "note": str(error)}
+        if self.search is not None:
+            others = attractors_of(smooth, self.search, "eta", eta)
+            row["n_attractors"], row["missing"], row["spurious"] = len(others), *matched(self.own, others)
+        return row | ({} if found is None else self.of(found)), near
+
+
+def _sharp(
+    system: System, orbit: Orbit | None, start: Any, transient: int, periods: int | None, duration: float | None
+) -> _Sharp:
+    length = {"periods": periods, "duration": duration}
+    if orbit is None and periods is None and duration is None:
+        length["periods"] = 1000
+    return _Sharp(system, orbit, start if orbit is None else orbit.u, transient, length)
 
 
 def _widths(etas: Any) -> FloatArray:
@@ -223,14 +250,6 @@ def _code(error: SolveError) -> int:
     from nonsmooth.results.statuses import STATUSES
 
     return next((status.code for status in STATUSES if status.name == error.status), codes.NO_CONVERGENCE)
-
-
-def _of(orbit: Orbit, n: int) -> dict[str, Any]:
-    """The compared parts of an orbit; multipliers of memory, which only a band has, are the least and left out."""
-    return {
-        "section": orbit.u, "maximum": orbit.maximum, "minimum": orbit.minimum, "period": orbit.period,
-        "floquet_multipliers": orbit.floquet_multipliers[:n], "stable": orbit.stable,
-    }  # fmt: skip
 
 
 def _exponents(system: System, orbit: Orbit | None, start: Any, length: Mapping[str, Any]) -> FloatArray:

@@ -88,6 +88,8 @@ def describe(
     elements: Any = None,
 ) -> Description:
     """Check everything, call each function once with symbols, and return the description."""
+    if not isinstance(name, str) or not name:
+        raise SystemDefinitionError(f"`name` must be a string, not {name!r}")
     units = _units(states, "states", name)
     if not units:
         raise SystemDefinitionError(f"{name!r}: a system needs at least one state")

@@ -9,15 +9,14 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.system.description import Description, describe
 from nonsmooth.system.equations import TracedSurface
 from nonsmooth.system.mode import Band, Mode
-from nonsmooth.system.names import by_name, nearest
+from nonsmooth.system.names import by_name
 from nonsmooth.system.parameter import Parameter
 from nonsmooth.system.transition import Surface, Transition
-from nonsmooth.system.values import changed_values, parameter_rows, smoothed_values
-from nonsmooth.system.variant import ONE_ETA, SHARP, Variant, variant_of
+from nonsmooth.system.values import changed_values, no_attribute, parameter_rows, smoothed_values
+from nonsmooth.system.variant import SHARP, Variant, variant_of
 
 if TYPE_CHECKING:
     from nonsmooth.system.symbolic.derivatives import Derivatives
@@ -92,8 +91,6 @@ class System:
         elements: Any = None,
         name: str = "system",
     ) -> None:
-        if not isinstance(name, str) or not name:
-            raise SystemDefinitionError(f"`name` must be a string, not {name!r}")
         description = describe(
             name=name, states=states, parameters=parameters, modes=modes, indicators=indicators,
             transitions=transitions, memory=memory, outputs=outputs, symmetry=symmetry, scale=scale,
@@ -104,10 +101,8 @@ class System:
         self._variant.domain.check(values)
 
     def _set(self, description: Description, values: dict[str, float], variant: Variant) -> None:
-        put = object.__setattr__
-        put(self, "_description", description)
-        put(self, "_values", values)
-        put(self, "_variant", variant)
+        for name, what in (("_description", description), ("_values", values), ("_variant", variant)):
+            object.__setattr__(self, name, what)
 
     @classmethod
     def _make(cls, description: Description, values: dict[str, float], variant: Variant) -> Self:
@@ -119,13 +114,7 @@ class System:
         raise AttributeError(f"a System does not change: use with_parameters(...) (tried to set {name!r})")
 
     def __getattr__(self, name: str) -> Any:
-        text = f"a System has no {name!r}"
-        if not name.startswith("_"):
-            if name in self._values:
-                text += f": the value of a parameter is system.values[{name!r}], set by with_parameters({name}=...)"
-            elif near := nearest(name, [word for word in dir(type(self)) if not word.startswith("_")]):
-                text += f"; nearest: {', '.join(near)}"
-        raise AttributeError(text)
+        raise AttributeError(no_attribute(name, () if name.startswith("_") else self._values, dir(type(self))))
 
     def __delattr__(self, name: str) -> None:
         raise AttributeError("a System does not change")
@@ -145,12 +134,8 @@ class System:
     @property
     def parameters(self) -> Mapping[str, Parameter]:
         """Parameters with present value, unit and symbol; a smoothed system has ``eta`` at the end."""
-        known = self._description.parameters
-        table = {key: Parameter(self._values[key], known[key].unit, known[key].symbol) for key in known}
-        for key, indicator in self._variant.etas:
-            symbol = r"\eta" if indicator is None else rf"\eta_{{\mathrm{{{indicator}}}}}"
-            table[key] = Parameter(self._values[key], "", symbol)
-        return MappingProxyType(table)
+        units, symbols = self._variant.units, self._variant.symbols
+        return MappingProxyType({key: Parameter(now, units[key], symbols[key]) for key, now in self._values.items()})
 
     @property
     def values(self) -> Mapping[str, float]:
@@ -228,11 +213,7 @@ class System:
     @property
     def eta(self) -> float | dict[str, float] | None:
         """Half width of the bands: None, a number, or a number for each indicator."""
-        if not self.is_smoothed:
-            return None
-        if self._variant.kind == ONE_ETA:
-            return self._values["eta"]
-        return {str(indicator): self._values[key] for key, indicator in self._variant.etas}
+        return self._variant.eta(self._values)
 
     @property
     def band(self) -> str | None:
@@ -252,17 +233,11 @@ class System:
     @property
     def is_map(self) -> bool:
         """Return whether the states change by transitions alone and the period is 1, as those of a `Map` do."""
-        fields = self.traced.fields
-        return self.traced.period == 1 and all(entry == 0 for field in fields for entry in field)
+        return self.traced.is_map
 
     def refuse_patterns(self, verb: str) -> None:
         """Raise SystemDefinitionError where the modes are made when they are first visited."""
-        if self._variant.traced.patterns is not None:
-            raise SystemDefinitionError(
-                f"{self.name!r} has more combinations of its elements' phases than are written out; a mode is made "
-                "when a run first visits it, for simulate, poincare, sweep and frequency_response. Not so for "
-                f"{verb}: take fewer elements for it"
-            )
+        self._variant.refuse_patterns(self.name, verb)
 
     # Numbers
 
@@ -284,14 +259,7 @@ class System:
 
     def period_at(self, values: Mapping[str, float] | Sequence[float] | np.ndarray) -> float | None:
         """Return the forcing period at other values: a mapping (others stay), or a vector in declared order."""
-        period = self._variant.period
-        if period is None:
-            return None
-        if isinstance(values, Mapping):
-            arguments = [float(values.get(key, now)) for key, now in self._values.items()]
-        else:
-            arguments = [float(value) for value in values]
-        return float(period(*arguments))
+        return self._variant.period_at(self._values, values)
 
     def parameter_points(self, columns: Mapping[str, Any]) -> np.ndarray:
         """Return checked rows of parameter values, (P, n_parameters), for columns of equal length P.

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
+from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.system.description import Description
 from nonsmooth.system.symbolic.derivatives import Derivatives
 from nonsmooth.system.symbolic.domain import Domain
@@ -37,6 +40,10 @@ class Variant:
             **{name: parameter.unit for name, parameter in description.parameters.items()},
             **{name: "" for name, _ in self.etas},
         }
+        self.symbols: Mapping[str, str] = {
+            **{name: parameter.symbol for name, parameter in description.parameters.items()},
+            **{name: r"\eta" if of is None else rf"\eta_{{\mathrm{{{of}}}}}" for name, of in self.etas},
+        }
         self.domain = Domain(self.traced, (*description.ranges, *extra))
 
     @cached_property
@@ -47,6 +54,33 @@ class Variant:
         import sympy as sp
 
         return sp.lambdify(self.traced.p, self.traced.period, modules="math")
+
+    def period_at(
+        self, now: Mapping[str, float], values: Mapping[str, float] | Sequence[float] | np.ndarray
+    ) -> float | None:
+        """The forcing period at other values than those of ``now``: a mapping (others stay), or all in order."""
+        if self.period is None:
+            return None
+        if isinstance(values, Mapping):
+            values = [values.get(key, value) for key, value in now.items()]
+        return float(self.period(*map(float, values)))
+
+    def eta(self, values: Mapping[str, float]) -> float | dict[str, float] | None:
+        """Half width of the bands: None, a number, or a number for each indicator."""
+        if self.kind == SHARP:
+            return None
+        if self.kind == ONE_ETA:
+            return values["eta"]
+        return {str(indicator): values[key] for key, indicator in self.etas}
+
+    def refuse_patterns(self, name: str, verb: str) -> None:
+        """Raise SystemDefinitionError where the modes are made when they are first visited."""
+        if self.traced.patterns is not None:
+            raise SystemDefinitionError(
+                f"{name!r} has more combinations of its elements' phases than are written out; a mode is made "
+                "when a run first visits it, for simulate, poincare, sweep and frequency_response. Not so for "
+                f"{verb}: take fewer elements for it"
+            )
 
     @cached_property
     def derivatives(self) -> Derivatives:

@@ -68,7 +68,7 @@ class Branches(View):
         from nonsmooth.explorer.figures import TIP
         from nonsmooth.plot.branch import MARKS
 
-        plot = page.diagram.plot
+        plot = page.sheet.diagram.plot
         self._lines = {
             line: ColumnDataSource(name=f"{words} branches", data={"x": [], "y": []})
             for line, words in {"-": "stable", "--": "unstable", ":": "virtual"}.items()

@@ -106,7 +106,7 @@ class Response(View):
         plot.add_tools(HoverTool(renderers=lines, mode="vline", tooltips=TIP))
         self._here = Span(dimension="height", line_color=COLORS["third"], line_width=1.5, line_dash="dashed")
         plot.add_layout(self._here)
-        self._bench = page.bench
+        self._bench = page.sheet.bench
         self._measured = ColumnDataSource(name="recorded response", data={"x": [], "y": []})
         self._rings = plot.scatter(
             "x", "y", source=self._measured, size=8, fill_color=None, line_color=INK, line_width=1.3

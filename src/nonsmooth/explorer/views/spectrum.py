@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 import nonsmooth as ns
-from nonsmooth.explorer.labels import number, symbols_of
+from nonsmooth.explorer.labels import number, plain_of, symbols_of
 from nonsmooth.explorer.views.view import View
+from nonsmooth.plot.amplitude_spectrum import FLOOR
 
 if TYPE_CHECKING:
     from nonsmooth.explorer.session import Session
@@ -19,10 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Spectrum"]
 
-_LINES = 20  # multiples of the forcing frequency that are drawn
-_PER_PERIOD = 512  # samples; the last multiple drawn is far below half their rate
-_LONG = 256  # periods of a motion without a period number
-_FLOOR = 1e-7  # of the largest line: below it rounding and the tolerance rule
+_LINES = 20  # multiples of the base frequency that are drawn
 
 
 class Spectrum(View):
@@ -30,6 +28,7 @@ class Spectrum(View):
 
     name, title, panel = "spectrum", "Spectrum", "lower"
     stages: ClassVar = {"spectrum": True}
+    saved: ClassVar = ("spectrum", "amplitude_spectrum")
 
     def requests(self, system: System, state: State, base: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
         """One request, once the period number is known: that many periods have lines with no leakage."""
@@ -39,34 +38,13 @@ class Spectrum(View):
 
     @staticmethod
     def compute(system: System, job: Mapping[str, Any], options: Mapping[str, Any], heard: Heard) -> dict[str, Any]:
-        """Spectra of all states over ``frequency``; ``unit`` is the frequency of the forcing, or of the returns."""
-        from nonsmooth.recordings.signals.spectrum import spectrum
+        """An ``amplitude_spectrum``."""
+        from nonsmooth.explorer.work import section_of
 
-        heard(0.0)
-        periods = job["period"] or _LONG
-        if system.is_map:
-            rate, unit, count = 1.0, 1.0, 16 * _LONG
-            found = ns.poincare(
-                system, n=count, transient=job["transient"], start=list(job["start"]), **options
-            )["section"].values  # fmt: skip
-        else:
-            if (period := system.period()) is not None:
-                begin, length, unit = job["transient"] * period, periods * period, 1.0 / period
-            else:  # of a cycle exactly one round; else what the other views show
-                begin, length = job["begin"], job["span"] / (2 if job["period"] else 1)
-                unit = periods / length if job["period"] else 1.0
-            count = _PER_PERIOD * (periods if job["period"] else _LONG // 8)
-            rate = count / length
-            times = begin + np.arange(count) / rate
-            run = ns.simulate(
-                system, duration=length, transient=begin, start=list(job["start"]), samples=times, **options
-            )  # fmt: skip
-            at = np.searchsorted(run["time"].values, times).clip(0, run.sizes["time"] - 1)
-            found = run["u"].values[at]
-        window = "boxcar" if job["period"] and not system.is_map else "hann"
-        lines = [spectrum(np.nan_to_num(column), rate, window=window)["amplitude"] for column in found.T]
-        return {"amplitude": np.stack([one.values for one in lines]), "frequency": lines[0]["frequency"].values,
-                "unit": unit, "discrete": window == "boxcar"}  # fmt: skip
+        return {"spectrum": ns.amplitude_spectrum(
+            system, start=list(job["start"]), section=section_of(system), transient=job["transient"], progress=heard,
+            **options,
+        )}  # fmt: skip
 
     def build(self, page: Session) -> Any:
         """Lines with a dot on each where the motion is periodic, a curve where it is not."""
@@ -88,36 +66,36 @@ class Spectrum(View):
 
     def redraw(self, system: System, state: State) -> None:
         """Draw the state of the phase plane's horizontal axis, as the time history does."""
-        if not self.results:
+        result = self.results.get("spectrum")
+        if result is None:
             return
-        from nonsmooth.explorer.labels import plain_of
-
-        which, unit = list(system.states).index(state.x), float(self.results["unit"])
-        order = self.results["frequency"] / unit
-        own = self.results["amplitude"][which]
+        base, discrete = float(result["base_frequency"]), bool(result["period_number"])
+        order, own = result["order"].values, result["amplitude"].sel(state=state.x).values
         some = (order > 1e-9) & (order <= _LINES)
         largest = float(own[some].max(initial=0.0)) or 1.0
-        some &= own > _FLOOR * largest
+        some &= own > FLOOR * largest
         x, y = order[some], own[some]
-        forced = system.period() is not None
-        hertz = "" if system.is_map else "Hz"
-        times = "frequency / forcing frequency" if forced else (
-            "frequency / cycle frequency" if unit != 1.0 else "frequency (Hz)"
-        )  # fmt: skip
+        hertz = result["base_frequency"].attrs["units"]
+        times = "frequency / forcing frequency" if system.period() is not None else "frequency / that of the returns"
         words = [
-            f"{a:.4g}{f' · {number(a * unit, hertz)}' if unit != 1.0 else ''}: {number(b, system.states[state.x])}"
+            f"{a:.4g}{'' if system.is_map else f' · {number(a * base, hertz)}'}: {number(b, system.states[state.x])}"
             for a, b in zip(x, y, strict=True)
         ]
-        self._source.data = {"x": x, "y": y, "low": np.full(len(x), _FLOOR * largest), "words": words}
-        self._stems.visible = self._dots.visible = bool(self.results["discrete"])
-        self._curve.glyph.line_alpha = 0.0 if self.results["discrete"] else 1.0
-        self._panel.show((0.0, float(order[some].max(initial=1.0)) * 1.02), (_FLOOR * largest, 3 * largest))
+        self._source.data = {"x": x, "y": y, "low": np.full(len(x), FLOOR * largest), "words": words}
+        self._stems.visible = self._dots.visible = discrete
+        self._curve.glyph.line_alpha = 0.0 if discrete else 1.0
+        self._panel.show((0.0, float(order[some].max(initial=1.0)) * 1.02), (FLOOR * largest, 3 * largest))
         self._panel.plot.xaxis[0].axis_label = "frequency per iterate" if system.is_map else times
         label = plain_of(symbols_of(system)[state.x])
         unit_of = system.states[state.x]
         self._panel.plot.yaxis[0].axis_label = f"amplitude of {label}" + (
             "" if unit_of in ("", "1") else f" ({unit_of})"
         )
+
+    @staticmethod
+    def axes(state: State) -> dict[str, str]:
+        """The state of the ordinate."""
+        return {"y": state.x}
 
     def clear(self) -> None:
         """Show no line."""

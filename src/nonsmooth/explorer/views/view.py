@@ -6,6 +6,7 @@ in the page's. Bokeh is therefore imported where a view is built.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -43,7 +44,7 @@ class Setting:
     also: tuple[str, ...] = ()
 
 
-class View:
+class View(ABC):
     """A view; the base has the common part.
 
     Attributes
@@ -87,36 +88,36 @@ class View:
             return setting.default(system, state)
         return value
 
+    @abstractmethod
     def requests(self, system: System, state: State, base: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
         """Requests by stage, the quick first; ``base`` holds what all of them have."""
-        raise NotImplementedError
 
     @staticmethod
+    @abstractmethod
     def compute(system: System, job: Mapping[str, Any], options: Mapping[str, Any], heard: Heard) -> dict[str, Any]:
         """Results by name, in the worker."""
-        raise NotImplementedError
 
+    @abstractmethod
     def build(self, page: Session) -> Any:
         """Make the figure, and return its plot; None where the view lies in another one's."""
-        raise NotImplementedError
 
     def show(self, job: Mapping[str, Any], found: Mapping[str, Any], system: System, state: State) -> None:
         """Take results, and draw them."""
         self.results.update(found)
         self.redraw(system, state)
 
+    @abstractmethod
     def redraw(self, system: System, state: State) -> None:
         """Draw what is there, as for other axes."""
-        raise NotImplementedError
 
-    def place(self, system: System, state: State) -> None:
+    def place(self, system: System, state: State) -> None:  # noqa: B027  most views mark nothing
         """Mark where the page is."""
 
     def clear(self) -> None:
         """Show nothing, as when another model was chosen."""
         self.results.clear()
 
-    def paint(self, dark: bool) -> None:
+    def paint(self, dark: bool) -> None:  # noqa: B027  most colours show on either ground
         """Take the colours that show on a light or a dark ground."""
 
     def legend(self, system: System, state: State) -> list[tuple[str, str]]:

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.compare.clouds import energy_distance
 from nonsmooth.identification.compare.orbits import common_length, orbit_distance
 from nonsmooth.identification.compare.predict import Attractor, Motions
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 __all__ = ["motion_band"]
 
-FloatArray = NDArray[np.float64]
 
 POINTS = 500  # of the clouds whose distance is taken for each draw
 

@@ -18,9 +18,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from nonsmooth.arrays import FloatArray
+
 __all__ = ["CloudDistance", "block_length", "cloud_distance", "energy_distance", "wasserstein"]
 
-FloatArray = NDArray[np.float64]
 
 FEWEST_BLOCKS = 20
 LIKENESS = 0.1  # successive points are taken as unrelated where their mean distance is within 10 % of that of any two

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.compare.draws import Settings, draw_systems, drawn_variables, nominal
 from nonsmooth.identification.compare.flips import Flip, delayed_flips
 from nonsmooth.identification.compare.periods import flips, measured_period, period_numbers
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 
 __all__ = ["compare_diagram"]
 
-FloatArray = NDArray[np.float64]
 
 FINE = 201
 KEEP = 64

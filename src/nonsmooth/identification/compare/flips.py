@@ -22,11 +22,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.compare.periods import flips
 
 __all__ = ["Flip", "delayed_flips"]
 
-FloatArray = NDArray[np.float64]
 
 FEWEST = 12  # points with a splitting that can be seen
 STRAY = 12  # points of another period number in a row that end the doubled side

@@ -8,11 +8,12 @@ two samples.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from nonsmooth.arrays import FloatArray
 
 __all__ = ["fold", "mean_orbit"]
 
-FloatArray = NDArray[np.float64]
 
 FEWEST_SAMPLES = 8  # per forcing period: fewer do not show an orbit
 

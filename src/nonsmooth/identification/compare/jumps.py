@@ -7,11 +7,11 @@ from itertools import combinations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+
+from nonsmooth.arrays import FloatArray
 
 __all__ = ["Jump", "Jumps", "jumps_in_steps", "match_jumps"]
 
-FloatArray = NDArray[np.float64]
 
 STEEPER = 2.5  # a jump exceeds the steps on both sides by this factor
 LEAST = 0.02  # and this part of the amplitude

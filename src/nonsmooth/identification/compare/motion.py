@@ -6,8 +6,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.compare.band import motion_band
 from nonsmooth.identification.compare.clouds import cloud_distance, wasserstein
 from nonsmooth.identification.compare.draws import Settings, draw_systems, drawn_variables, nominal
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 __all__ = ["compare_motion"]
 
-FloatArray = NDArray[np.float64]
 
 KEEP = 128  # section points by which a predicted motion is judged
 CLOUD = 2000  # section points of a predicted motion without a period number

@@ -15,13 +15,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
 
 __all__ = ["OrbitDistance", "common_length", "orbit_distance"]
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

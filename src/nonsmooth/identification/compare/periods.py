@@ -16,9 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from nonsmooth.arrays import FloatArray
+
 __all__ = ["BOUND", "MeasuredPeriod", "flips", "measured_period", "period_numbers"]
 
-FloatArray = NDArray[np.float64]
 
 BOUND = 2.0  # of r_p: the stated noise may be wrong by as much before a period is lost
 FEWEST_RETURNS = 4

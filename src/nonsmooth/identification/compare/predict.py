@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.attractors.settle import Attractors, longest_period, tolerance_of
 from nonsmooth.attractors.settled import usable
 from nonsmooth.flow.engines.engine import Chain, SectionPlan, State
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Attractor", "Motions"]
 
-FloatArray = NDArray[np.float64]
 
 SAME = 1e-6  # orbits whose points are nearer to each other than this part of the motion are one
 

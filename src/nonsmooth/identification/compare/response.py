@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.diagrams.response import jumps_in
 from nonsmooth.diagrams.sweep import sweep
 from nonsmooth.identification.compare.draws import Settings, draw_systems, drawn_variables, nominal
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
 
 __all__ = ["compare_response"]
 
-FloatArray = NDArray[np.float64]
 
 FINE = 301  # values of the predicted curve
 

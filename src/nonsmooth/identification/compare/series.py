@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.compare.fold import fold
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ __all__ = ["measured_response", "measured_rise", "measured_sections", "section_p
 FEW = 6  # turns of the drive below which no period number is sought
 
 
-def section_points(motion: xr.Dataset) -> NDArray[np.float64]:
+def section_points(motion: xr.Dataset) -> FloatArray:
     """Points of a measured motion at phase 0, one for each whole period of the drive: (periods, states)."""
     return fold(motion["phase"].values, motion["u"].values, 8)[:, 0]
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.compare.clouds import energy_distance
 from nonsmooth.identification.compare.fold import fold, mean_orbit
 from nonsmooth.identification.compare.periods import measured_period
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Prediction", "from_result", "predict"]
 
-FloatArray = NDArray[np.float64]
 
 EXACT = 1e-6  # noise of a computed section point, in parts of the motion's size
 SHOWN = 16  # forcing periods of a motion without a period number that are kept for the overlays

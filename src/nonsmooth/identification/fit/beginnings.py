@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.identification.fit.first_level import misfits, settle_soft
 from nonsmooth.identification.fit.first_windows import WIDE, first_windows, states_from_samples
@@ -20,7 +20,6 @@ from nonsmooth.identification.fit.windows import Window, Windows
 
 __all__ = ["beginnings", "drawn"]
 
-FloatArray = NDArray[np.float64]
 _SPREAD = 0.5  # other first guesses lie within this factor, exp(+-0.5), of the one that was given
 _GUESSES, _STARTS = 128, 8  # drawn; starts for each guess
 _FITTED = 24  # of these guesses

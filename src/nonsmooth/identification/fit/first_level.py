@@ -12,8 +12,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.identification.arrow import settle
 from nonsmooth.identification.fit.first_windows import first_windows, states_from_samples
@@ -22,7 +22,6 @@ from nonsmooth.identification.pieces import State
 
 __all__ = ["LEAST", "level", "misfits", "settle_first", "settle_soft"]
 
-FloatArray = NDArray[np.float64]
 LEAST = 1e-13  # eigenvalue of the scaled normal matrix from which a direction counts as determined
 _ROUNDS = 10
 _PART = 1 / 3  # of the residuals: as how large the noise is taken

@@ -12,8 +12,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.fit.records import Record
 from nonsmooth.identification.fit.windows import Window, Windows
 
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 __all__ = ["first_length", "first_windows", "rates", "states_from_samples"]
 
-FloatArray = NDArray[np.float64]
 _AROUND = 3  # samples on either side, from which value and slope at a sample are taken
 _SWING = 0.15  # of a quantity's range: what counts as a swing
 _OF_A_SWING = 0.3  # to and fro: the length of the first windows

@@ -7,8 +7,8 @@ from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.arguments import check_system, real_number, whole_number, yes_or_no
 from nonsmooth.flow.starts import is_one_start, start_states
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
 __all__ = ["best_of", "fit", "problem_of"]
 
-FloatArray = NDArray[np.float64]
 _PHASES = 8  # first guesses of an unknown phase
 _LONGER = 3.3  # the other length of first windows, in every second try
 _MORE = 3  # guesses that are looked at, for each that is fitted

@@ -12,8 +12,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.identification.arrow import Unsettled, settle
 from nonsmooth.identification.fit.first_level import LEAST, level, settle_first
@@ -22,7 +22,6 @@ from nonsmooth.identification.pieces import State
 
 __all__ = ["POOR", "SHORT", "Grown", "grow"]
 
-FloatArray = NDArray[np.float64]
 POOR = 50.0  # chi^2 per degree of freedom of the first windows, from which there is no use in longer ones
 _CHAOS = 1e3  # growth of a start's change within a window, from which neighbouring motions are not followed
 _REGULAR = 10.0  # that growth, below which a motion is regular enough to be followed over twice the time

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.flow.engines.engine import Engine, Log, State
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.sensitivity import apart, settled
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Marcher", "Motion"]
 
-FloatArray = NDArray[np.float64]
 RTOL = 1e-11  # where the flow is not exact: below any noise, and below what a step of a fit changes
 
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.arrow import inverted, reduced
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.fit.first_level import LEAST
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
 __all__ = ["outcome"]
 
-FloatArray = NDArray[np.float64]
 _TOGETHER = 0.98  # correlation from which two parameters are said to be known only together
 _POOR = 2.0  # residuals over the record's own irregularity, from which the model is said not to be the motion
 METHOD = (

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.arrow import Unsettled, inverted, settle
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.fit.first_level import LEAST
@@ -16,7 +16,6 @@ from nonsmooth.results.progress import Progress, progress
 
 __all__ = ["profiled"]
 
-FloatArray = NDArray[np.float64]
 _STEP = 0.5  # of a standard uncertainty
 _STEPS = 16  # on either side, at most
 _ENOUGH = 5.0  # rise of chi^2 beyond which no limit at 95 % lies

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import shortened
 from nonsmooth.flow.arguments import float_array, real_number
 from nonsmooth.identification.fit.sensors import Sensor, read_sensors
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Record", "read_records"]
 
-FloatArray = NDArray[np.float64]
 FORMS = (
     "a Recording, a Dataset over time, a DataFrame with a column of time (or time as its index), a mapping of channel "
     "to (t, y), or a list of these"

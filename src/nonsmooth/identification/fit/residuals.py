@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 __all__ = ["by_place", "residual_data"]
 
-FloatArray = NDArray[np.float64]
 _NEAR = 1.5  # sampling steps from a transition or a graze
 _GRAZING = 0.03  # clearance over the largest size of the indicator, below which a touch is a graze
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.arguments import check_system, whole_number
 from nonsmooth.identification.blas import one_blas_thread
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
 
 __all__ = ["select_model"]
 
-FloatArray = NDArray[np.float64]
 _BLOCK = 2.0  # first windows: the length of a part that is held out
 
 

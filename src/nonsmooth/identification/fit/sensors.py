@@ -8,8 +8,8 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.flow.arguments import real_number
 from nonsmooth.system.names import unknown
 
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
 __all__ = ["OF_A_SENSOR", "Readout", "Sensor", "read_sensors"]
 
-FloatArray = NDArray[np.float64]
 #: What a fit may find of a sensor, as ``"x.offset"``.
 OF_A_SENSOR = ("gain", "offset", "delay")
 

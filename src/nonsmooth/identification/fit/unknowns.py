@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import shortened
 from nonsmooth.flow.arguments import real_number
 from nonsmooth.identification.fit.sensors import OF_A_SENSOR, Sensor
@@ -18,8 +19,6 @@ if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
 __all__ = ["Unknowns", "read_unknowns"]
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

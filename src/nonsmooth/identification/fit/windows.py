@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.identification.fit.motion import Marcher, Motion
 from nonsmooth.identification.fit.records import Record
@@ -26,8 +27,6 @@ if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
 __all__ = ["Window", "Windows"]
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,8 +14,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings.readers.archive import Archive
 from nonsmooth.recordings.readers.capstone_xml import Experiment, Segment, parse
 from nonsmooth.recordings.reading import Options, Reading, Source, Trace
@@ -108,8 +108,8 @@ def _trace(
 
 @dataclass(frozen=True, eq=False)
 class _Stretch:
-    times: NDArray[np.float64]
-    values: NDArray[np.float64]
+    times: FloatArray
+    values: FloatArray
     blank: int
 
 
@@ -140,9 +140,9 @@ def _stretch(segment: Segment, archive: Archive, comma: bool, source: Source) ->
     return _Stretch(start + interval * np.arange(len(values), dtype=np.float64), values, blank)
 
 
-def _records(member: str, size: int, archive: Archive, source: Source) -> NDArray[np.float64] | None:
+def _records(member: str, size: int, archive: Archive, source: Source) -> FloatArray | None:
     """The values up to the last valid one (an invalid one before it is NaN); None if the member holds typed text."""
-    found: list[NDArray[np.float64]] = []
+    found: list[FloatArray] = []
     rest, records, valid, last = b"", 0, 0, 0
     for piece in archive.pieces(member):
         rest += piece

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import DataFileError
 from nonsmooth.recordings.readers import capstone_cap, capstone_csv
 from nonsmooth.recordings.recording import Recording
@@ -186,14 +186,14 @@ def _print(value: float, digits: int) -> str:
     return text.removeprefix("-") if float(text) == 0 else text
 
 
-def _records(values: NDArray[np.float64]) -> bytes:
+def _records(values: FloatArray) -> bytes:
     table = np.zeros(-(-max(len(values), 1) // _PAGE) * _PAGE, capstone_cap.RECORD)
     table["valid"][: len(values)] = 1
     table["value"][: len(values)] = values
     return table.tobytes()
 
 
-def _even(time: NDArray[np.float64]) -> tuple[float, float] | None:
+def _even(time: FloatArray) -> tuple[float, float] | None:
     """Start and interval that give back every time exactly, as the reader computes them."""
     if len(time) < 2:
         return (float(time[0]), 1.0) if len(time) else (0.0, 1.0)

@@ -15,8 +15,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings.limits import MAX_COLUMNS
 from nonsmooth.recordings.readers.text_table import decoded, number
 from nonsmooth.recordings.reading import Options, Reading, Source, Trace
@@ -267,7 +267,7 @@ def _texts(segment: _Segment, key: str, n: int) -> list[str]:
 
 def _numbers(
     segment: _Segment, key: str, default: float, decimal: str, place: str, source: Source
-) -> NDArray[np.float64]:
+) -> FloatArray:
     found = np.full(len(segment.names), default)
     for k, text in enumerate(_texts(segment, key, len(segment.names))):
         if text:

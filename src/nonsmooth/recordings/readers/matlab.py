@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings.limits import MAX_COLUMNS, MAX_DEPTH
 from nonsmooth.recordings.readers.matlab_v5 import load_v5
 from nonsmooth.recordings.readers.matlab_v73 import load_v73
@@ -158,7 +159,7 @@ def _chosen(variables: dict[str, Any], options: Options, source: Source, remarks
         for name, value in node.items()
         if _is_numbers(value) and value.size > 1
     }
-    picked: dict[str, tuple[str, NDArray[np.float64], str]] = {}
+    picked: dict[str, tuple[str, FloatArray, str]] = {}
     for ours, theirs in (options.columns or {}).items():
         wanted, unit = theirs if isinstance(theirs, tuple) else (theirs, "")
         picked[ours] = (str(wanted), _pick(str(wanted), arrays, source), unit)
@@ -178,7 +179,7 @@ def _chosen(variables: dict[str, Any], options: Options, source: Source, remarks
         yield Trace(_TOP, ours, own, axis, values, path, unit)
 
 
-def _pick(path: str, arrays: Mapping[str, NDArray[Any]], source: Source) -> NDArray[np.float64]:
+def _pick(path: str, arrays: Mapping[str, NDArray[Any]], source: Source) -> FloatArray:
     if path in arrays and _is_vector(arrays[path]):
         return _real(arrays[path].ravel(), path, source)
     match = _PICK.fullmatch(path)
@@ -192,8 +193,8 @@ def _pick(path: str, arrays: Mapping[str, NDArray[Any]], source: Source) -> NDAr
 
 
 def _seconds(
-    axis: NDArray[np.float64], unit: str, run: str, key: str, source: Source, remarks: Remarks
-) -> tuple[NDArray[np.float64], str]:
+    axis: FloatArray, unit: str, run: str, key: str, source: Source, remarks: Remarks
+) -> tuple[FloatArray, str]:
     scaled = scaled_time(axis, unit)
     if scaled is None:
         raise source.error("", f"run {run!r}: {key!r} is in {unit!r}, which is no unit of time")
@@ -202,7 +203,7 @@ def _seconds(
     return scaled, "s"
 
 
-def _real(values: NDArray[Any], path: str, source: Source) -> NDArray[np.float64]:
+def _real(values: NDArray[Any], path: str, source: Source) -> FloatArray:
     if values.dtype.kind == "c":
         raise source.error(path, "holds complex numbers; save its parts as two real vectors")
     return np.ascontiguousarray(values, dtype=np.float64)

@@ -13,8 +13,8 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import DataFileError
 from nonsmooth.recordings.limits import MAX_COLUMNS
 from nonsmooth.recordings.needed import needed
@@ -88,8 +88,8 @@ def _traces(
     options: Options,
     remarks: Remarks,
 ) -> Iterator[Trace]:
-    numeric: list[tuple[str, dict[str, str], NDArray[np.float64]]] = []
-    clock: tuple[str, NDArray[np.float64]] | None = None
+    numeric: list[tuple[str, dict[str, str], FloatArray]] = []
+    clock: tuple[str, FloatArray] | None = None
     for name, properties, raw in channels:
         values = np.asarray(raw)
         if values.dtype.kind == "M":
@@ -115,14 +115,14 @@ def _trace(
     run: str,
     name: str,
     properties: dict[str, str],
-    values: NDArray[np.float64],
-    clock: tuple[str, NDArray[np.float64]] | None,
+    values: FloatArray,
+    clock: tuple[str, FloatArray] | None,
     source: Source,
     options: Options,
 ) -> Trace:
     origin = f"/{run}/{name}"
     step = _number(properties.get("wf_increment"))
-    axis: NDArray[np.float64]
+    axis: FloatArray
     if step is not None and step > 0:
         axis = (_number(properties.get("wf_start_offset")) or 0.0) + step * np.arange(len(values), dtype=np.float64)
     elif clock is not None:

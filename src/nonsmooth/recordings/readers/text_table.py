@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings.limits import MAX_COLUMNS
 from nonsmooth.recordings.reading import Source
 from nonsmooth.recordings.remarks import Remarks
@@ -99,7 +100,7 @@ def number(field: str, decimal: str) -> float | None:
 class Cells:
     """The columns of a table: values, and the rows (from 0) in which each has one; the line of every row."""
 
-    values: list[NDArray[np.float64]]
+    values: list[FloatArray]
     rows: list[NDArray[np.int64]]
     lines: NDArray[np.int64]
 

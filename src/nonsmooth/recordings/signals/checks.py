@@ -10,8 +10,9 @@ import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings.recording import Recording, RecordingWarning
 from nonsmooth.recordings.sampling import examine, missing_runs
 
@@ -19,8 +20,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["even_rate", "signal", "take", "warn", "whose"]
-
-Floats = NDArray[np.float64]
 
 
 def whose(x: Any, default: str = "the signal") -> str:
@@ -36,7 +35,9 @@ def warn(x: Any, sentence: str) -> None:
     warnings.warn(f"{whose(x)}: {sentence}", RecordingWarning, stacklevel=3)
 
 
-def signal(time: ArrayLike, x: Any, *, least: int, purpose: str, missing: str = "error") -> tuple[Floats, Floats]:
+def signal(
+    time: ArrayLike, x: Any, *, least: int, purpose: str, missing: str = "error"
+) -> tuple[FloatArray, FloatArray]:
     """Times and values as arrays, checked.
 
     Parameters
@@ -86,7 +87,7 @@ def signal(time: ArrayLike, x: Any, *, least: int, purpose: str, missing: str = 
     return t, values
 
 
-def even_rate(time: Floats, x: Any, purpose: str) -> float:
+def even_rate(time: FloatArray, x: Any, purpose: str) -> float:
     """The one sample rate of a signal in Hz.
 
     Raises

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.recordings.signals.checks import signal
 from nonsmooth.recordings.signals.smoothing import smooth
@@ -23,7 +24,6 @@ __all__ = ["contacts"]
 
 _UNDECIDED = 0.01  # of the samples: at the edge of contact, of which none is used for the support
 
-Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 
@@ -119,7 +119,7 @@ def _support(found: xr.Dataset, omega: float | None, resolution: float) -> tuple
     return float(g), 2.0 * math.sqrt(float(along @ C @ along)), float(-line[1])
 
 
-def _beside_the_free_motion(found: xr.Dataset, omega: float | None, free: Mask) -> tuple[Floats, Mask]:
+def _beside_the_free_motion(found: xr.Dataset, omega: float | None, free: Mask) -> tuple[FloatArray, Mask]:
     """Acceleration that the free motion does not explain, and the samples that it does; empty if it fits nowhere."""
     t, x, v, a = (found[name].values for name in ("time", "x", "v", "a"))
     columns = [np.ones_like(x), x, v]
@@ -147,7 +147,7 @@ def _beside_the_free_motion(found: xr.Dataset, omega: float | None, free: Mask) 
     return left, free
 
 
-def _drive(t: Floats, left: Floats, free: Mask) -> float | None:
+def _drive(t: FloatArray, left: FloatArray, free: Mask) -> float | None:
     """The frequency of a forcing in what is left of the free motion: its largest line, with zeros in the gaps."""
     from scipy import fft
 
@@ -166,7 +166,7 @@ def _drive(t: Floats, left: Floats, free: Mask) -> float | None:
     return float(2 * np.pi * place * (n - 1) / (8 * n * (t[-1] - t[0])))
 
 
-def _intervals(found: xr.Dataset, gap: float) -> tuple[Floats, Floats, Mask]:
+def _intervals(found: xr.Dataset, gap: float) -> tuple[FloatArray, FloatArray, Mask]:
     """Begin and end of each interval with x > gap, and whether the record cuts it off."""
     from nonsmooth.recordings.signals.sections import poincare
 

@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.recordings.signals.checks import signal, whose
 
@@ -16,8 +17,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["HarmonicFit", "fit"]
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,8 +41,8 @@ class HarmonicFit:
     omega: float
     omega_error: float
     mean: float
-    amplitudes: Floats
-    phases: Floats
+    amplitudes: FloatArray
+    phases: FloatArray
     covariance: xr.DataArray = field(repr=False)
     residual: float
     correlation: float
@@ -60,24 +59,24 @@ class HarmonicFit:
         return float(np.sqrt(self.covariance.values[0, 0]))
 
     @property
-    def amplitude_errors(self) -> Floats:
+    def amplitude_errors(self) -> FloatArray:
         """Standard errors of the amplitudes, to first order."""
         return self._errors(np.cos(self.phases), np.sin(self.phases))
 
     @property
-    def phase_errors(self) -> Floats:
+    def phase_errors(self) -> FloatArray:
         """Standard errors of the phases in rad, to first order."""
         size = np.maximum(self.amplitudes, np.finfo(float).tiny)
         return self._errors(-np.sin(self.phases) / size, np.cos(self.phases) / size)
 
-    def _errors(self, by_cos: Floats, by_sin: Floats) -> Floats:
+    def _errors(self, by_cos: FloatArray, by_sin: FloatArray) -> FloatArray:
         C, found = self.covariance.values, []
         for j, (a, b) in enumerate(zip(by_cos, by_sin, strict=True)):
             block = C[1 + 2 * j : 3 + 2 * j, 1 + 2 * j : 3 + 2 * j]
             found.append(a * a * block[0, 0] + 2 * a * b * block[0, 1] + b * b * block[1, 1])
         return np.sqrt(np.maximum(found, 0.0))
 
-    def evaluate(self, time: ArrayLike) -> Floats:
+    def evaluate(self, time: ArrayLike) -> FloatArray:
         """The fitted signal at these times."""
         t = np.asarray(time, np.float64)
         j = np.arange(1, len(self.amplitudes) + 1)
@@ -171,20 +170,20 @@ def fit(
     )  # fmt: skip
 
 
-def _columns(tau: Floats, omega: float, n: int) -> Floats:
+def _columns(tau: FloatArray, omega: float, n: int) -> FloatArray:
     angle = np.multiply.outer(tau, omega * np.arange(1, n + 1))
     A = np.ones((len(tau), 2 * n + 1))
     A[:, 1::2], A[:, 2::2] = np.cos(angle), np.sin(angle)
     return A
 
 
-def _best(tau: Floats, values: Floats, omega: float, n: int, length: float) -> float:
+def _best(tau: FloatArray, values: FloatArray, omega: float, n: int, length: float) -> float:
     """The frequency of the least squares near ``omega``: the sum has a valley about 2 pi / length wide there.
 
     A few are tried, then Gauss-Newton steps change frequency and amplitudes together.
     """
 
-    def fitted(w: float) -> tuple[Floats, Floats, Floats]:
+    def fitted(w: float) -> tuple[FloatArray, FloatArray, FloatArray]:
         A = _columns(tau, w, n)
         p, *_ = np.linalg.lstsq(A, values, rcond=None)
         return A, np.asarray(p, np.float64), values - A @ p
@@ -213,7 +212,7 @@ def _best(tau: Floats, values: Floats, omega: float, n: int, length: float) -> f
     return best
 
 
-def _correlation(left: Floats) -> float:
+def _correlation(left: FloatArray) -> float:
     """The integrated autocorrelation of residuals, summed up to its first negative value; at least 1."""
     n = len(left)
     power = float(left @ left)

@@ -6,8 +6,9 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.recordings.signals.checks import signal, whose
 from nonsmooth.recordings.signals.smoothing import smooth
@@ -16,8 +17,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["impacts"]
-
-Floats = NDArray[np.float64]
 
 
 def impacts(
@@ -91,7 +90,9 @@ def impacts(
     return kept
 
 
-def _forward(t: Floats, x: Floats, variance: float, significance: float, window: int) -> list[tuple[float, float]]:
+def _forward(
+    t: FloatArray, x: FloatArray, variance: float, significance: float, window: int
+) -> list[tuple[float, float]]:
     """Times of kinks and their errors, in order; more rather than fewer."""
     gain, place, error = (np.zeros(len(t) - 1) for _ in range(3))
     taken: dict[int, tuple[float, float]] = {}
@@ -111,7 +112,7 @@ def _forward(t: Floats, x: Floats, variance: float, significance: float, window:
         todo = [k for k in near if all(abs(k - j) > 1 for j in taken)]
 
 
-def _kink(t: Floats, x: Floats, i: int, low: int, high: int, variance: float) -> tuple[float, float, float]:
+def _kink(t: FloatArray, x: FloatArray, i: int, low: int, high: int, variance: float) -> tuple[float, float, float]:
     """Fall of the sum of squares by a kink between samples i and i + 1, its time, and the error of that."""
     none = (0.0, math.nan, math.nan)
     if i - low < 1 or high - i < 3 or high - low < 7:
@@ -142,7 +143,7 @@ def _kink(t: Floats, x: Floats, i: int, low: int, high: int, variance: float) ->
     return (plain - float(found.fun)) / variance, t[i] + tau, min(error, h / math.sqrt(12.0))
 
 
-def _squares(A: Floats, y: Floats) -> float:
+def _squares(A: FloatArray, y: FloatArray) -> float:
     """Sum of squares that a fit leaves."""
     R = np.asarray(np.linalg.qr(np.column_stack([A, y]), mode="r"))
     return float(R[-1, -1] ** 2)

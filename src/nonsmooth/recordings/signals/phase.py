@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings.signals.checks import signal, warn, whose
 
 __all__ = ["DrivePhase", "drive_phase"]
 
-Floats = NDArray[np.float64]
 TURN = 2.0 * math.pi
 
 
@@ -45,7 +45,7 @@ class DrivePhase:
     t_0_error: float
     scatter: float
     method: str
-    turn_times: Floats = field(repr=False)
+    turn_times: FloatArray = field(repr=False)
     turns: NDArray[np.int64] = field(repr=False)
     span: tuple[float, float]
 
@@ -54,7 +54,7 @@ class DrivePhase:
         """Mean duration of a turn in seconds."""
         return TURN / self.omega
 
-    def phase(self, time: ArrayLike) -> Floats:
+    def phase(self, time: ArrayLike) -> FloatArray:
         """Unwrapped phase in rad, 0 at ``t_0``; straight between turns, and with the mean frequency beyond them."""
         t = np.asarray(time, np.float64)
         inside = TURN * np.interp(t, self.turn_times, self.turns)
@@ -79,7 +79,7 @@ class DrivePhase:
         steady = bool(chi2.sf(seen / gate * (len(steps) - 1), len(steps) - 1) > 1e-4)
         return float(np.sqrt(max(seen - gate, 0.0)) / np.mean(steps)), steady
 
-    def times(self, phase: float = 0.0) -> Floats:
+    def times(self, phase: float = 0.0) -> FloatArray:
         """The instants within ``span`` at which the phase is ``phase`` (in turns, 0 to 1) plus a whole number."""
         low, high = self.span
         first, last = self.phase(np.array([low, high])) / TURN - phase

@@ -10,16 +10,15 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings.signals.checks import even_rate, signal, whose
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["flights", "restitution"]
-
-Floats = NDArray[np.float64]
 
 
 def flights(time: ArrayLike, height: Any, *, threshold: float = 6.0, least: int = 4) -> xr.Dataset:
@@ -156,7 +155,7 @@ def restitution(
     )
 
 
-def _densest(values: Floats) -> tuple[float, float]:
+def _densest(values: FloatArray) -> tuple[float, float]:
     """Median of the shortest interval that holds half of the values, and the standard deviation that its width says."""
     ordered = np.sort(values)
     half = max(len(ordered) // 2, 1)
@@ -165,7 +164,7 @@ def _densest(values: Floats) -> tuple[float, float]:
     return float(np.median(ordered[k : k + half + 1])), float(width[k]) / (2 * 0.6745)
 
 
-def _common_fall(t: Floats, z: Floats, rows: list[tuple[int, int]]) -> tuple[float, float, float]:
+def _common_fall(t: FloatArray, z: FloatArray, rows: list[tuple[int, int]]) -> tuple[float, float, float]:
     """Acceleration common to all flights, its error, and the noise: each flight's line is taken out first."""
     top = bottom = squares = 0.0
     parts, freedom = [], -1
@@ -187,7 +186,7 @@ def _common_fall(t: Floats, z: Floats, rows: list[tuple[int, int]]) -> tuple[flo
 class _Side:
     """A parabola fitted to the samples on one side, over the time since ``origin``."""
 
-    def __init__(self, t: Floats, z: Floats, origin: float) -> None:
+    def __init__(self, t: FloatArray, z: FloatArray, origin: float) -> None:
         A = np.vander(t - origin, 3, increasing=True)
         self.p, *_ = np.linalg.lstsq(A, z, rcond=None)
         left = z - A @ self.p
@@ -202,7 +201,7 @@ class _Side:
         return noise * math.sqrt(float(along @ self.C @ along))
 
 
-def _meeting(d: Floats, length: float) -> float:
+def _meeting(d: FloatArray, length: float) -> float:
     """Zero of the difference of two parabolas within (0, length); the middle if there is none."""
     roots = np.roots(d[::-1])
     real = np.real(roots[np.abs(np.imag(roots)) < 1e-9])

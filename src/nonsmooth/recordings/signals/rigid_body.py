@@ -12,8 +12,9 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings.signals.checks import whose
 
 if TYPE_CHECKING:
@@ -21,16 +22,14 @@ if TYPE_CHECKING:
 
 __all__ = ["corner_heights", "corner_restitution", "cube"]
 
-Floats = NDArray[np.float64]
 
-
-def cube(half_width: float = 1.0) -> Floats:
+def cube(half_width: float = 1.0) -> FloatArray:
     """The eight corners of a cube about its centre, shape (8, 3)."""
     signs = np.array(np.meshgrid([-1.0, 1.0], [-1.0, 1.0], [-1.0, 1.0], indexing="ij"))
     return np.asarray(half_width * signs.reshape(3, -1).T)
 
 
-def corner_heights(position: ArrayLike, orientation: ArrayLike, corners: ArrayLike) -> Floats:
+def corner_heights(position: ArrayLike, orientation: ArrayLike, corners: ArrayLike) -> FloatArray:
     """Heights of all corners over time.
 
     Parameters
@@ -164,7 +163,7 @@ def corner_restitution(
     )
 
 
-def _nearest_zero(t: Floats, y: Floats) -> float:
+def _nearest_zero(t: FloatArray, y: FloatArray) -> float:
     """Zero of y between two of its samples; where there is none, the sample nearest to zero."""
     k = np.flatnonzero(np.sign(y[:-1]) != np.sign(y[1:]))
     if len(k) == 0:
@@ -176,7 +175,7 @@ def _nearest_zero(t: Floats, y: Floats) -> float:
 class _Flight:
     """Centre and orientation on one side of an impact: a parabola of known acceleration, a constant spin."""
 
-    def __init__(self, t: Floats, place: Floats, turns: Any, here: slice, fall: float) -> None:
+    def __init__(self, t: FloatArray, place: FloatArray, turns: Any, here: slice, fall: float) -> None:
         from scipy.spatial.transform import Rotation
 
         self.origin = float(t[here].mean())
@@ -193,19 +192,19 @@ class _Flight:
         self.spin_error = math.sqrt(float(np.sum(left_turn**2)) / 3 / max(n - 2, 1) / self.spread)
         self.middle = Rotation.from_rotvec(vectors.mean(axis=0)) * middle
 
-    def _arms(self, when: float, points: Floats) -> Floats:
+    def _arms(self, when: float, points: FloatArray) -> FloatArray:
         """Corners about the centre, in the axes of the room."""
         from scipy.spatial.transform import Rotation
 
         turn = Rotation.from_rotvec(self.spin * (when - self.origin)) * self.middle
         return np.asarray(turn.apply(points))
 
-    def heights(self, when: float, points: Floats) -> Floats:
+    def heights(self, when: float, points: FloatArray) -> FloatArray:
         """Heights of the corners, extrapolated."""
         s = when - self.origin
         return np.asarray(self.z + self.v * s + 0.5 * self.fall * s * s + self._arms(when, points)[:, 2])
 
-    def velocity(self, when: float, point: Floats) -> tuple[float, float]:
+    def velocity(self, when: float, point: FloatArray) -> tuple[float, float]:
         """Vertical velocity of a corner and its error."""
         arm = self._arms(when, point[None, :])[0]
         turning = float(np.cross(self.spin, arm)[2])

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from nonsmooth.recordings.signals.checks import even_rate, signal, whose
 
@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["savitzky_golay"]
-
-Floats = NDArray[np.float64]
 
 
 def savitzky_golay(

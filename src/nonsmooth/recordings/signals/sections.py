@@ -6,11 +6,12 @@ order 3 or 5. An impact between two samples is not interpolated across: each sid
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings.signals.checks import signal, whose
 
 if TYPE_CHECKING:
@@ -20,31 +21,31 @@ if TYPE_CHECKING:
 
 __all__ = ["poincare", "stroboscopic"]
 
-Floats = NDArray[np.float64]
+
+class Known(TypedDict, total=False):
+    """Of a motion, beside its positions and velocities; ``impacts`` are times at which the velocity jumps."""
+
+    a: ArrayLike | None
+    x_error: ArrayLike | None
+    v_error: ArrayLike | None
+    impacts: ArrayLike
 
 
 def stroboscopic(
-    time: ArrayLike,
-    x: Any,
-    v: ArrayLike,
-    drive_phase: DrivePhase,
-    phase: float = 0.0,
-    *,
-    a: ArrayLike | None = None,
-    x_error: ArrayLike | None = None,
-    v_error: ArrayLike | None = None,
-    impacts: ArrayLike = (),
+    time: ArrayLike, x: Any, v: ArrayLike, drive_phase: DrivePhase, phase: float = 0.0, **known: Unpack[Known]
 ) -> xr.Dataset:
     """Position and velocity once per turn of the drive.
 
     Parameters
     ----------
     time, x, v : array_like, shape (N,)
-        A smoothed motion; ``a``, ``x_error`` and ``v_error`` where known, as ``smooth`` gives them.
+        A smoothed motion.
     drive_phase : DrivePhase
     phase : float
         In turns, 0 to 1, as in ``ns.Stroboscopic``.
-    impacts : array_like
+    a, x_error, v_error : array_like, shape (N,), optional
+        As ``smooth`` gives them.
+    impacts : array_like, optional
         Times at which v jumps.
 
     Returns
@@ -60,7 +61,7 @@ def stroboscopic(
     """
     if not 0.0 <= phase <= 1.0:
         raise ValueError(f"phase must lie between 0 and 1 turns, got {phase!r}")
-    between = _Between(time, x, v, a, x_error, v_error, impacts)
+    between = _Between(time, x, v, **known)
     instants = drive_phase.times(phase)
     instants = instants[(instants >= between.t[0]) & (instants <= between.t[-1])]
     if len(instants) == 0:
@@ -73,18 +74,9 @@ def stroboscopic(
 
 
 def poincare(
-    time: ArrayLike,
-    x: Any,
-    v: ArrayLike,
-    *,
-    surface: str = "x",
-    level: float = 0.0,
-    rising: bool | None = True,
-    a: ArrayLike | None = None,
-    x_error: ArrayLike | None = None,
-    v_error: ArrayLike | None = None,
-    impacts: ArrayLike = (),
-) -> xr.Dataset:
+    time: ArrayLike, x: Any, v: ArrayLike, *, surface: str = "x", level: float = 0.0, rising: bool | None = True,
+    **known: Unpack[Known],
+) -> xr.Dataset:  # fmt: skip
     """Position and velocity where x (or v) passes a level.
 
     Parameters
@@ -103,7 +95,7 @@ def poincare(
     """
     if surface not in ("x", "v"):
         raise ValueError(f"surface must be x or v, got {surface!r}")
-    between = _Between(time, x, v, a, x_error, v_error, impacts)
+    between = _Between(time, x, v, **known)
     which = 0 if surface == "x" else 1
     values = between.states[:, which] - level
     # A sample on the level belongs to the side it goes to.
@@ -126,11 +118,11 @@ class _Between:
     """A motion between its samples."""
 
     def __init__(
-        self, time: ArrayLike, x: Any, v: ArrayLike, a: ArrayLike | None, x_error: ArrayLike | None,
-        v_error: ArrayLike | None, impacts: ArrayLike,
+        self, time: ArrayLike, x: Any, v: ArrayLike, a: ArrayLike | None = None, x_error: ArrayLike | None = None,
+        v_error: ArrayLike | None = None, impacts: ArrayLike = (),
     ) -> None:  # fmt: skip
         self.t, position = signal(time, x, least=4, purpose="section points")
-        columns: list[Floats] = [position]
+        columns: list[FloatArray] = [position]
         for name, given in (("v", v), ("a", a), ("x_error", x_error), ("v_error", v_error)):
             column = np.full(len(self.t), np.nan) if given is None else np.asarray(given, np.float64)
             if column.shape != self.t.shape:
@@ -144,10 +136,10 @@ class _Between:
         self.unit = str(getattr(x, "attrs", {}).get("units", "m"))
         self.hits = np.unique(np.asarray(impacts, np.float64).ravel())
 
-    def _interval(self, times: Floats) -> NDArray[np.intp]:
+    def _interval(self, times: FloatArray) -> NDArray[np.intp]:
         return np.clip(np.searchsorted(self.t, times, side="right") - 1, 0, len(self.t) - 2)
 
-    def at(self, times: Floats, derivative: int = 0) -> Floats:
+    def at(self, times: FloatArray, derivative: int = 0) -> FloatArray:
         """x and v (or their derivatives) at these times, shape (n, 2)."""
         i = self._interval(times)
         h = self.t[i + 1] - self.t[i]
@@ -165,7 +157,7 @@ class _Between:
             return np.column_stack([value, rate / h])
         return np.column_stack([rate / h, bend / h**2])
 
-    def _polynomial(self, i: NDArray[np.intp], h: Floats) -> Floats:
+    def _polynomial(self, i: NDArray[np.intp], h: FloatArray) -> FloatArray:
         """Coefficients in s = (t - t_i) / h: Hermite of order 3, or 5 with accelerations."""
         x0, x1 = self.states[i, 0], self.states[i + 1, 0]
         v0, v1 = self.states[i, 1] * h, self.states[i + 1, 1] * h
@@ -182,7 +174,7 @@ class _Between:
             ]
         )  # fmt: skip
 
-    def _taylor(self, k: NDArray[np.intp], origin: Floats, h: Floats, terms: int) -> Floats:
+    def _taylor(self, k: NDArray[np.intp], origin: FloatArray, h: FloatArray, terms: int) -> FloatArray:
         """x + v dt + a dt^2 / 2 about sample k, whose place in the step is ``origin`` (0 or 1)."""
         x, v = self.states[k, 0], self.states[k, 1] * h
         b = np.zeros(len(k)) if self.a is None else 0.5 * self.a[k] * h**2
@@ -192,10 +184,10 @@ class _Between:
         p[:, 2] = b
         return p
 
-    def passing(self, i: NDArray[np.intp], which: int, level: float) -> Floats:
+    def passing(self, i: NDArray[np.intp], which: int, level: float) -> FloatArray:
         """The times in steps i at which x or v passes a level, by halving until no number lies between."""
 
-        def away(times: Floats) -> Floats:
+        def away(times: FloatArray) -> FloatArray:
             return np.asarray(self.at(times)[:, which] - level)
 
         low, high = self.t[i], np.nextafter(self.t[i + 1], self.t[i])
@@ -213,13 +205,13 @@ class _Between:
             behind = inside & (np.sign(away(middle)) == np.sign(at_low))
             low, high = np.where(behind, middle, low), np.where(inside & ~behind, middle, high)
 
-    def error_at(self, times: Floats) -> Floats:
+    def error_at(self, times: FloatArray) -> FloatArray:
         """Errors of x and v between samples: the larger one of the two ends."""
         i = self._interval(times)
         return np.maximum(self.errors[i], self.errors[i + 1])
 
 
-def _horner(p: Floats, s: Floats, derivative: int) -> Floats:
+def _horner(p: FloatArray, s: FloatArray, derivative: int) -> FloatArray:
     q = p
     for _ in range(derivative):
         q = q[:, 1:] * np.arange(1, q.shape[1])
@@ -230,7 +222,7 @@ def _horner(p: Floats, s: Floats, derivative: int) -> Floats:
 
 
 def _points(
-    between: _Between, times: Floats, instant_error: Floats, attrs: dict[str, str], *, along: bool
+    between: _Between, times: FloatArray, instant_error: FloatArray, attrs: dict[str, str], *, along: bool
 ) -> xr.Dataset:
     import xarray as xr
 

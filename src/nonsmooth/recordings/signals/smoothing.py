@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.recordings.signals.checks import signal, whose
 from nonsmooth.recordings.signals.savitzky_golay import savitzky_golay
@@ -25,8 +26,6 @@ __all__ = ["MODELS", "savitzky_golay", "smooth"]
 
 #: The derivative that is white noise, by the name of the model.
 MODELS = {"white_acceleration": 2, "white_jerk": 3, "white_snap": 4}
-
-Floats = NDArray[np.float64]
 
 
 def smooth(
@@ -105,7 +104,7 @@ def smooth(
     return nodes.result(q, model, x)
 
 
-def _places(t: Floats, places: ArrayLike, x: Any) -> Floats:
+def _places(t: FloatArray, places: ArrayLike, x: Any) -> FloatArray:
     found = np.unique(np.asarray(places, np.float64).ravel())
     if len(found) and not (t[0] < found[0] and found[-1] < t[-1]):
         raise ValueError(
@@ -118,14 +117,14 @@ def _places(t: Floats, places: ArrayLike, x: Any) -> Floats:
 class _Intervals:
     """Intervals of contact, in order and apart."""
 
-    def __init__(self, begin: Floats, end: Floats, x: Any) -> None:
+    def __init__(self, begin: FloatArray, end: FloatArray, x: Any) -> None:
         if begin.ndim != 1 or begin.shape != end.shape or not (begin < end).all() or not (end[:-1] <= begin[1:]).all():
             raise ValueError(
                 f"{whose(x)}: contacts must be a begin and an end each, begin before end, one after the other"
             )
         self.begin, self.end = begin, end
 
-    def hold(self, times: Floats) -> NDArray[np.bool_]:
+    def hold(self, times: FloatArray) -> NDArray[np.bool_]:
         """Mask of the times that lie inside one of them."""
         k = np.searchsorted(self.begin, times, side="right") - 1
         return (k >= 0) & (times < np.append(self.end, -np.inf)[k])
@@ -135,7 +134,7 @@ class _Nodes:
     """Samples and places between them in units in which the typical step and the error of a sample are 1."""
 
     def __init__(
-        self, t: Floats, x: Floats, impacts: Floats, contacts: _Intervals, order: int,
+        self, t: FloatArray, x: FloatArray, impacts: FloatArray, contacts: _Intervals, order: int,
         resolution: float | None, noise: float,
     ) -> None:  # fmt: skip
         self.t, self.order, self.impacts = t, order, impacts
@@ -180,7 +179,7 @@ class _Nodes:
         self.P_p, self.P_f = np.zeros((count_nodes, n, n)), np.zeros((count_nodes, n, n))
         self.work, self.sums = np.zeros((5, n, n)), np.zeros(2)
 
-    def _wide(self, t: Floats, y: Floats) -> Floats:
+    def _wide(self, t: FloatArray, y: FloatArray) -> FloatArray:
         """Variances far above those of the state: a start, or a derivative that jumps, is not to be guided."""
         level, wide = y, []
         for k in range(self.order):
@@ -188,13 +187,13 @@ class _Nodes:
             level = np.diff(level) / np.maximum(np.diff(t[: len(level)]), 0.2)
         return np.array(wide)
 
-    def scaled(self, intensity: float | tuple[float, float]) -> Floats:
+    def scaled(self, intensity: float | tuple[float, float]) -> FloatArray:
         given = np.atleast_1d(np.asarray(intensity, np.float64))
         if len(given) not in (1, 2) or not np.isfinite(given).all() or (given < 0).any():
             raise ValueError(f"intensity must be a number >= 0, or (outside, inside) of contacts, got {intensity!r}")
         return given[[0, -1]] * self.h ** (2 * self.order - 1) / self.sigma**2
 
-    def cost(self, q: Floats) -> float:
+    def cost(self, q: FloatArray) -> float:
         """-2 log likelihood of the samples, up to a constant; leaves the filtered states behind.
 
         ``q`` holds the intensities outside and inside of contacts.
@@ -210,7 +209,7 @@ class _Nodes:
         used = int(np.count_nonzero(np.isfinite(self.r)))
         return float(used * math.log(self.sums[0] / (used - self.order)) + self.sums[1])
 
-    def likeliest(self) -> Floats:
+    def likeliest(self) -> FloatArray:
         """The intensities of the largest likelihood: on a grid over all that can matter, then refined."""
         from scipy.optimize import minimize, minimize_scalar
 
@@ -240,7 +239,7 @@ class _Nodes:
             )
         return np.asarray(10.0 ** np.clip(both.x, low, high))
 
-    def result(self, q: Floats, model: str, x: Any) -> xr.Dataset:
+    def result(self, q: FloatArray, model: str, x: Any) -> xr.Dataset:
         """Filter, smooth, and label."""
         import xarray as xr
 
@@ -297,7 +296,7 @@ class _Edges:
     two stays: the error of a motion that passes a count in n samples, in the middle of a step.
     """
 
-    def __init__(self, t: Floats, x: Floats, resolution: float) -> None:
+    def __init__(self, t: FloatArray, x: FloatArray, resolution: float) -> None:
         changes = np.flatnonzero(np.diff(x) != 0) + 1
         ends = np.concatenate([[0], changes, [len(x)]]) if len(x) else np.zeros(0, np.int64)
         lengths = np.diff(ends)

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings.signals.checks import even_rate, signal, whose
 
 if TYPE_CHECKING:
@@ -23,8 +24,6 @@ __all__ = ["INTERPOLATIONS", "Peak", "peak", "spectrum"]
 #: Ways to find a peak between lines.
 INTERPOLATIONS = ("window", "parabola", "none")
 FINE = 32  # points per line in the table of a window's transform; a cubic between them is right to 1e-7
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -215,7 +214,7 @@ class _Shape:
         self.total = float(self.weights.sum())
         self._finely: Any = None
 
-    def _lines(self, weights: Floats) -> Floats:
+    def _lines(self, weights: FloatArray) -> FloatArray:
         """Transform of weights about the middle of the record at offsets k / FINE, k = 0, 1, ...; real part."""
         from scipy import fft
 
@@ -223,7 +222,7 @@ class _Shape:
         lines = fft.rfft(weights, length)
         return np.asarray((lines * np.exp(1j * np.pi * (self.n - 1) * np.arange(len(lines)) / length)).real)
 
-    def at(self, offset: ArrayLike) -> Floats:
+    def at(self, offset: ArrayLike) -> FloatArray:
         """Value at these distances from the peak, up to 3 spacings."""
         from scipy.interpolate import CubicSpline
 
@@ -239,12 +238,12 @@ class _Shape:
         low, high = (round((2.0 * place + side * self.padding) * FINE) for side in (-1, 1))
         return float(np.abs(self._all[max(low, 0) : min(high, len(self._all)) + 1]).max(initial=0.0))
 
-    def in_phase(self, amplitude: Floats, phase: Floats) -> Floats:
+    def in_phase(self, amplitude: FloatArray, phase: FloatArray) -> FloatArray:
         """Three neighbouring lines, referred to the middle of the record, in phase with the middle one."""
         turn = 2 * np.pi * np.array([-1.0, 0.0, 1.0]) * 0.5 * (self.n - 1) / (self.n * self.padding)
         return amplitude * np.cos(phase + turn - phase[1])
 
-    def interpolate(self, three: Floats, interpolation: str) -> tuple[float, float]:
+    def interpolate(self, three: FloatArray, interpolation: str) -> tuple[float, float]:
         """Place of the peak from the middle line, in spacings, and its height."""
         from scipy.optimize import brentq
 
@@ -268,7 +267,7 @@ class _Shape:
             delta = float(brentq(misfit, -0.75, 0.75, xtol=1e-12))
         return delta, float(three[1] / self.at(-delta))
 
-    def spread(self, three: Floats, variance: float, interpolation: str) -> float:
+    def spread(self, three: FloatArray, variance: float, interpolation: str) -> float:
         """Standard error of the place, in spacings, from white noise of this variance per sample."""
         if not math.isfinite(variance) or three[1] == 0:
             return math.nan

@@ -12,8 +12,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings.sampling import examine
 from nonsmooth.recordings.signals.checks import signal, whose
 from nonsmooth.recordings.signals.harmonics import fit
@@ -23,8 +24,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["SteadyResponse", "steady_response"]
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,14 +189,14 @@ def steady_response(
     )  # fmt: skip
 
 
-def _largest_line(t: Floats, values: Floats) -> float:
+def _largest_line(t: FloatArray, values: FloatArray) -> float:
     """Angular frequency of the largest line; evenly interpolated, since this is only a start."""
     even = np.linspace(t[0], t[-1], len(t))
     found = peak(spectrum(np.interp(even, t, values), (len(t) - 1) / (t[-1] - t[0])))
     return found.omega
 
 
-def _slope(t: Floats, y: Floats, errors: Floats) -> tuple[float, float]:
+def _slope(t: FloatArray, y: FloatArray, errors: FloatArray) -> tuple[float, float]:
     """Slope of a line and its error: by the scatter about it, and at least by the errors of the points."""
     centred = t - t.mean()
     spread = float(centred @ centred)

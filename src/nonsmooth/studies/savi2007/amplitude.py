@@ -5,17 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from nonsmooth import plot
 from nonsmooth.studies.savi2007.branches import branches
-from nonsmooth.studies.savi2007.diagrams import ABOUT_BRANCHES, diagrams, draw_diagram, how, shared_legend
-from nonsmooth.studies.savi2007.figure import Figure, only_outer, sheet
-from nonsmooth.studies.savi2007.flows import FLOWS, Settings
+from nonsmooth.studies.savi2007.diagrams import ABOUT_BRANCHES, diagrams, draw_both, how
+from nonsmooth.studies.savi2007.figure import Figure
+from nonsmooth.studies.savi2007.flows import Settings
 from nonsmooth.studies.savi2007.portraits import describe, draw_portraits, portraits
 from nonsmooth.studies.savi2007.printed import FIGURE_11, FIGURE_12, NUMBERS
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.figure import Figure as Canvas
 
 __all__ = ["FIGURES", "PRINTED"]
 
@@ -24,18 +22,6 @@ PRINTED = {NUMBERS[key].value: NUMBERS[key].text for key in ("period 4 from", "p
 
 def _compute_11(settings: Settings) -> dict[str, xr.Dataset]:
     return diagrams(settings, FIGURE_11, "rho", 0.2, 0.5, (600, 300), tuple(FIGURE_12)) | branches("fig11")
-
-
-def _draw_11(data: Mapping[str, xr.Dataset]) -> Canvas:
-    with plot.journal():
-        canvas = sheet(plot.PAGE, 0.5 * plot.PAGE)
-        grid = canvas.subplots(1, 2, sharey=True)
-        for ax, flow, letter in zip(grid, FLOWS, "ab", strict=True):
-            draw_diagram(ax, data, flow.key, "v", values=PRINTED, words="printed in the paper (N)")
-            ax.set_title(f"({letter}) {flow.title}")
-        only_outer(grid)
-        shared_legend(canvas)
-    return canvas
 
 
 def _caption_11(data: Mapping[str, xr.Dataset]) -> str:
@@ -59,7 +45,10 @@ def _caption_12(data: Mapping[str, xr.Dataset]) -> str:
 
 
 FIGURES = (
-    Figure("fig11", 11, "Bifurcation diagram over the forcing amplitude", _compute_11, _draw_11, _caption_11),
+    Figure(
+        "fig11", 11, "Bifurcation diagram over the forcing amplitude", _compute_11,
+        draw_both(PRINTED, "printed in the paper (N)"), _caption_11,
+    ),
     Figure(
         "fig12", 12, "Phase portraits over the forcing amplitude", _compute_12,
         draw_portraits("rho", "N", r"\rho", FIGURE_12), _caption_12,

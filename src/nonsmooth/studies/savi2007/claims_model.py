@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.studies.savi2007.band import FITTED, order_in_eta
 from nonsmooth.studies.savi2007.claims_response import main_jump, small_jump
 from nonsmooth.studies.savi2007.flows import ETA
@@ -49,7 +49,7 @@ def m1(data: Data) -> list[Row]:
     ]  # fmt: skip
 
 
-def _indicators(orbit: xr.Dataset) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _indicators(orbit: xr.Dataset) -> tuple[FloatArray, FloatArray]:
     x, v = (orbit["u"].sel(state=name).values for name in "xv")
     g, late = float(orbit["g"]), float(orbit["c_s"] / orbit["k_s"])
     return x - g, -(x - g) - late * v

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from nonsmooth.plot.branch import draw_branch
 from nonsmooth.plot.style import even_dots, halo, small
 from nonsmooth.results.provenance import read_provenance
 from nonsmooth.studies.savi2007.branches import branches_of
+from nonsmooth.studies.savi2007.figure import only_outer, sheet
 from nonsmooth.studies.savi2007.flows import EXACT, FLOWS, Settings, starts
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Canvas
 
 __all__ = [
-    "ABOUT_BRANCHES", "diagrams", "draw_branches", "draw_diagram", "how", "mark_grazing", "mark_values",
+    "ABOUT_BRANCHES", "diagrams", "draw_both", "draw_branches", "draw_diagram", "how", "mark_grazing", "mark_values",
     "shared_legend",
 ]  # fmt: skip
 
@@ -92,6 +93,23 @@ def draw_diagram(
     if key == EXACT.key:
         draw_branches(ax, data, y=y)
     mark_values(ax, values, words)
+
+
+def draw_both(values: Mapping[float, str], words: str) -> Callable[[Mapping[str, xr.Dataset]], Canvas]:
+    """The sheet: the velocity at the section, of each flow; ``values`` and ``words`` as in `draw_diagram`."""
+
+    def draw(data: Mapping[str, xr.Dataset]) -> Canvas:
+        with plot.journal():
+            canvas = sheet(plot.PAGE, 0.5 * plot.PAGE)
+            grid = canvas.subplots(1, 2, sharey=True)
+            for ax, flow, letter in zip(grid, FLOWS, "ab", strict=True):
+                draw_diagram(ax, data, flow.key, "v", values=values, words=words)
+                ax.set_title(f"({letter}) {flow.title}")
+            only_outer(grid)
+            shared_legend(canvas)
+        return canvas
+
+    return draw
 
 
 def other_motions(many: xr.Dataset, swept: xr.Dataset) -> xr.DataArray:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from nonsmooth import Stroboscopic, plot, poincare
 from nonsmooth.plot.units import prefixed
 from nonsmooth.studies.savi2007.branches import branches
-from nonsmooth.studies.savi2007.diagrams import ABOUT_BRANCHES, diagrams, draw_diagram, how, shared_legend
+from nonsmooth.studies.savi2007.diagrams import ABOUT_BRANCHES, diagrams, draw_both, how
 from nonsmooth.studies.savi2007.figure import Figure, only_outer, sheet
 from nonsmooth.studies.savi2007.flows import FLOWS, Settings
 from nonsmooth.studies.savi2007.portraits import describe, draw_portraits, portraits
@@ -29,18 +29,6 @@ GAPS = {g: prefixed(g, "m")[0] for g in FIGURE_14}
 
 def _compute_13(settings: Settings) -> dict[str, xr.Dataset]:
     return diagrams(settings, FIGURE_13, "g", -0.0015, 0.002, (700, 280), tuple(FIGURE_14)) | branches("fig13")
-
-
-def _draw_13(data: Mapping[str, xr.Dataset]) -> Canvas:
-    with plot.journal():
-        canvas = sheet(plot.PAGE, 0.5 * plot.PAGE)
-        grid = canvas.subplots(1, 2, sharey=True)
-        for ax, flow, letter in zip(grid, FLOWS, "ab", strict=True):
-            draw_diagram(ax, data, flow.key, "v", values=GAPS, words="gaps of Fig. 14 (mm)")
-            ax.set_title(f"({letter}) {flow.title}")
-        only_outer(grid)
-        shared_legend(canvas)
-    return canvas
 
 
 def _caption_13(data: Mapping[str, xr.Dataset]) -> str:
@@ -99,9 +87,12 @@ def _caption_15(data: Mapping[str, xr.Dataset]) -> str:
 
 
 FIGURES = (
-    Figure("fig13", 13, "Bifurcation diagram over the gap", _compute_13, _draw_13, _caption_13),
+    Figure(
+        "fig13", 13, "Bifurcation diagram over the gap", _compute_13, draw_both(GAPS, "gaps of Fig. 14 (mm)"),
+        _caption_13,
+    ),
     Figure(
         "fig14", 14, "Phase portraits over the gap", _compute_14, draw_portraits("g", "m", "g", FIGURE_14), _caption_14
     ),
     Figure("fig15", 15, "Strange attractor at four section phases", _compute_15, _draw_15, _caption_15),
-)
+)  # fmt: skip

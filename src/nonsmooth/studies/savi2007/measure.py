@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.results.statuses import by_name
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ def with_uncertainty(value: float, uncertainty: float) -> str:
     return f"{value:.{digits}f} ± {uncertainty:.{digits}f}"
 
 
-def regimes(swept: xr.Dataset, direction: str | None = None) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def regimes(swept: xr.Dataset, direction: str | None = None) -> tuple[FloatArray, NDArray[np.int64]]:
     """Parameter values, rising, and the regime at each: the period number, APERIODIC or UNSETTLED."""
     one = swept if direction is None or "direction" not in swept.dims else swept.sel(direction=direction)
     values = one[str(one["maximum"].dims[0])].values
@@ -119,7 +120,7 @@ def measured_jumps(runs: xr.Dataset, direction: str) -> list[Interval]:
     )
 
 
-def measured_periods(runs: xr.Dataset, direction: str | None = None) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def measured_periods(runs: xr.Dataset, direction: str | None = None) -> tuple[FloatArray, NDArray[np.int64]]:
     """Frequencies, rising, and the period number measured at each; of one direction or of all runs."""
     mine = runs if direction is None else runs.isel(run=runs["direction"].values.astype(str) == direction)
     order = np.argsort(mine["omega"].values, kind="stable")

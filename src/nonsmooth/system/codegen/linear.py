@@ -16,15 +16,14 @@ from typing import Any
 
 import numpy as np
 import sympy
-from numpy.typing import NDArray
 from sympy import Expr, Symbol
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.system.symbolic.printing import Printer, assignments
 from nonsmooth.system.symbolic.traced import Traced, TracedTransition
 
 __all__ = ["LinearForm", "LinearTables", "linear_form"]
 
-FloatArray = NDArray[np.float64]
 Terms = dict[Hashable, Expr]  # "1", "t", ("u", i), ("cos", k) or ("sin", k) -> coefficient in the parameters
 
 

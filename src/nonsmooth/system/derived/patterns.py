@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import sympy as sp
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.system.derived.assembly import Assembler, Part, Pattern
 from nonsmooth.system.symbolic.traced import Row as Condition
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Patterns", "Row", "Rows"]
 
-FloatArray = NDArray[np.float64]
 ROUNDING = 1e-12  # of the terms of a sum: below it the sum is zero
 REGULAR = 1e-9  # least singular value of effects in units of their diagonal, above which forces are determined
 

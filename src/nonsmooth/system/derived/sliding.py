@@ -32,8 +32,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import sympy as sp
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SystemDefinitionError, shortened
 from nonsmooth.system.equations import TracedSurface
 from nonsmooth.system.symbolic.scalar import as_written
@@ -44,7 +44,6 @@ __all__ = ["repelled", "slide"]
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-FloatArray = NDArray[np.float64]
 BEYOND = 10**9  # a state farther from the surface than the indicator's scale over this is not on it
 ON_SURFACE = 1e-12  # of the indicator's size: a start so near lies on the surface
 SEEDS = 3  # random points at which the orders of two surfaces are compared

@@ -79,6 +79,11 @@ class Traced:
     period: Expr | None
     patterns: Patterns | None = field(default=None, compare=False, repr=False)  # modes are made when they are visited
 
+    @property
+    def is_map(self) -> bool:
+        """Return whether the states change by transitions alone, and the period is 1."""
+        return self.period == 1 and all(entry == 0 for field in self.fields for entry in field)
+
     def phase_text(self, jump: TracedTransition) -> str:
         """The phase of a transition as it was written."""
         if isinstance(jump.at, int | float):

@@ -54,10 +54,11 @@ class Symbols:
         return Parameters({name: Scalar(s) for name, s in symbols.items()}, self.units, repr(self.name))
 
 
-class States(np.lib.mixins.NDArrayOperatorsMixin):
-    """The state vector in a user's function: ``x, v = u``, ``u.x``, ``u[0]``, ``A @ u``."""
+class _Named:
+    """Symbols by name, as attributes; ``_of`` is what one of them is called in messages."""
 
     __slots__ = ("_owner", "_units", "_values")
+    _of: str
 
     def __init__(self, values: dict[str, Scalar], units: Mapping[str, str], owner: str) -> None:
         self._values, self._units, self._owner = values, units, owner
@@ -68,7 +69,15 @@ class States(np.lib.mixins.NDArrayOperatorsMixin):
         try:
             return self._values[name]
         except KeyError:
-            raise SystemDefinitionError(unknown(name, "a state", self._owner, self._units)) from None
+            known = {key: self._units.get(key, "") for key in self._values}
+            raise SystemDefinitionError(unknown(name, self._of, self._owner, known)) from None
+
+
+class States(_Named, np.lib.mixins.NDArrayOperatorsMixin):
+    """The state vector in a user's function: ``x, v = u``, ``u.x``, ``u[0]``, ``A @ u``."""
+
+    __slots__ = ()
+    _of = "a state"
 
     def __iter__(self) -> Iterator[Scalar]:
         return iter(self._values.values())
@@ -92,28 +101,17 @@ class States(np.lib.mixins.NDArrayOperatorsMixin):
         return f"({', '.join(self._values)})"
 
 
-class Parameters:
+class Parameters(_Named):
     """Parameters and memory in a user's function: ``p.k``, ``p.v_a``, ``p["k"]``."""
 
-    __slots__ = ("_owner", "_units", "_values")
-
-    def __init__(self, values: dict[str, Scalar], units: Mapping[str, str], owner: str) -> None:
-        self._values, self._units, self._owner = values, units, owner
-
-    def __getattr__(self, name: str) -> Scalar:
-        if name.startswith("_"):
-            raise AttributeError(name)
-        try:
-            return self._values[name]
-        except KeyError:
-            known = {key: self._units.get(key, "") for key in self._values}
-            raise SystemDefinitionError(unknown(name, "a parameter", self._owner, known)) from None
+    __slots__ = ()
+    _of = "a parameter"
 
     def __getitem__(self, name: str) -> Scalar:
         return getattr(self, name)
 
     def __setattr__(self, name: str, value: Any) -> None:
-        if name not in Parameters.__slots__:
+        if name not in _Named.__slots__:
             raise SystemDefinitionError(f"p.{name} cannot be set: memory is written by Transition(..., write=...)")
         object.__setattr__(self, name, value)
 

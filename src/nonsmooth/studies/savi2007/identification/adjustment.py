@@ -22,15 +22,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nonsmooth import SolveError
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate
 from nonsmooth.identification.uncertainty import uniform
 
 __all__ = ["LAWS", "UNKNOWNS", "Adjusted", "Observation", "adjust"]
 
-FloatArray = NDArray[np.float64]
 
 _ROUNDS = 50
 _CONVERGED = 1e-6  # of a standard uncertainty

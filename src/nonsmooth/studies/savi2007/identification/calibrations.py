@@ -15,8 +15,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, Finding
 from nonsmooth.identification.uncertainty import coverage_factor, uniform
 from nonsmooth.recordings.signals.phase import drive_phase
@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["crank_force", "voltage_frequency"]
-
-FloatArray = NDArray[np.float64]
 
 
 def voltage_frequency(runs: Sequence[Run], *, voltage_error: float = 0.0) -> Finding:

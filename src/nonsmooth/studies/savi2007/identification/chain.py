@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nonsmooth import ParameterSet, SolveError
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, Finding
 from nonsmooth.identification.blas import one_blas_thread
 from nonsmooth.recordings import Quantity, RecordingWarning, Session
@@ -46,7 +46,6 @@ from nonsmooth.studies.savi2007.identification.support_damping import support_da
 
 __all__ = ["identify"]
 
-FloatArray = NDArray[np.float64]
 #: The findings that name the runs of a procedure which were used.
 _FOUND_BY = {"impulse": ("omega_0", "c_decay"), "drop": ("c_s_drop",), "springs": ("spring_slope",),
              "support": ("support_slope",)}  # fmt: skip

@@ -21,9 +21,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
+
 __all__ = ["CHANCE", "Consistent", "birge_ratio", "consistent"]
 
-FloatArray = NDArray[np.float64]
 #: Probability of a chi^2 this large by chance, below which measurements disagree.
 CHANCE = 1e-4
 

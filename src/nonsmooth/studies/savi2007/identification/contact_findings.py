@@ -11,7 +11,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nonsmooth import SolveError
 from nonsmooth.identification import Estimate, Finding
@@ -26,7 +25,6 @@ if TYPE_CHECKING:
 
 __all__ = ["contact_finding", "one_contact"]
 
-FloatArray = NDArray[np.float64]
 _KAPPA, _GAMMA = 3, 4  # indices of k_s/m and c_s/m among the parameters
 _POINTS = 24
 _TRIED = 15  # pieces of which the median one is shown
@@ -39,10 +37,8 @@ def contact_finding(found: ContactFit, mass: Quantity, *, resolution: float) -> 
     ----------
     found : ContactFit
         Outcome of `shoot_contacts`.
-    mass : Quantity
-        Mass (kg) with its standard uncertainty.
-    resolution : float
-        Length of a count (m).
+    mass, resolution
+        As in `decay_damping`.
 
     Returns
     -------

@@ -7,14 +7,14 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from nonsmooth.arrays import FloatArray
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["ANOMALIES", "ASKED", "BESIDE", "COMPARED", "misses", "page", "pooled", "to_dataset", "unnamed"]
 
-FloatArray = NDArray[np.float64]
 
 #: What is counted, with the largest allowed median and maximum of the error: relative, or in m for a gap (None: by
 #: coverage only).

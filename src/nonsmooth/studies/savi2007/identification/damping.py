@@ -12,9 +12,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nonsmooth import SolveError
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, Finding
 from nonsmooth.recordings import Quantity
 from nonsmooth.studies.savi2007.identification.free_decay import DecayFit
@@ -24,7 +24,6 @@ from nonsmooth.studies.savi2007.identification.steady import Steady
 
 __all__ = ["amplitude_fit", "viscous_bias"]
 
-FloatArray = NDArray[np.float64]
 #: Frequencies relative to the natural one over which Fig. 6 is fitted, where no others are given.
 RANGE = (0.55, 0.7, 0.8, 0.9, 0.95, 1.0, 1.05, 1.1, 1.2, 1.3, 1.45, 1.7)
 LEAST = 5  # runs

@@ -16,8 +16,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, Finding
 from nonsmooth.recordings import Quantity
 from nonsmooth.studies.savi2007.identification.evidence import Run
@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["decay_damping", "envelope"]
-
-FloatArray = NDArray[np.float64]
 
 
 def envelope(time: FloatArray, first: float, omega_0: float, b: float, f: float) -> FloatArray:

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nonsmooth import Recording
+from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings.session import PROCEDURES, SETTINGS, Quantity, Session, load_session
 from nonsmooth.recordings.signals.checks import take
 from nonsmooth.recordings.signals.displacement import position, resolution
@@ -19,7 +19,6 @@ from nonsmooth.system.names import unknown
 
 __all__ = ["Evidence", "Run", "gather"]
 
-FloatArray = NDArray[np.float64]
 
 #: Channels that a procedure cannot do without.
 _NEEDS: Mapping[str, tuple[str, ...]] = {

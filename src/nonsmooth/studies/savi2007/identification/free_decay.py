@@ -25,16 +25,15 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nonsmooth import SolveError
+from nonsmooth.arrays import FloatArray
 from nonsmooth.studies.savi2007.identification.consistency import Consistent, consistent
 from nonsmooth.studies.savi2007.identification.pieces import Piece, start_state
 from nonsmooth.studies.savi2007.identification.shooting import ShootingFit, shoot
 
 __all__ = ["DecayFit", "free_decay", "swing"]
 
-FloatArray = NDArray[np.float64]
 
 #: Speed (m/s) of the slowest half swing that is used.
 SLOWEST = 0.03

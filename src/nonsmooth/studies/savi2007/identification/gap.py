@@ -14,13 +14,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.studies.savi2007.identification.steady import Steady
 
 __all__ = ["MeanShift", "grazing_amplitude", "mean_of_drive", "mean_shift"]
 
-FloatArray = NDArray[np.float64]
 
 _CLEAR = 4.0  # standard uncertainties by which a sign, or a contradiction, is taken as seen
 

@@ -35,6 +35,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, Finding
 from nonsmooth.identification.uncertainty import uniform
 from nonsmooth.studies.savi2007.identification.evidence import Run
@@ -47,7 +48,6 @@ if TYPE_CHECKING:
 
 __all__ = ["grazing_gap"]
 
-FloatArray = NDArray[np.float64]
 _FIRST = 4  # runs that must be free
 _SIGMAS = 5.0  # by which the mean must leave its place
 _STEADY = 0.5  # counts: by which the mean of free runs may move

@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, Finding
 from nonsmooth.recordings import Quantity
 from nonsmooth.studies.savi2007.identification.steady import Steady
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
 
 __all__ = ["half_power", "half_power_points"]
 
-FloatArray = NDArray[np.float64]
 _DEEPEST = 3.0  # amplitudes from a third of the largest on are used
 _DRAWS = 200
 

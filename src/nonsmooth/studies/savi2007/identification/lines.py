@@ -12,14 +12,12 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nonsmooth import SolveError
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.uncertainty import correlated
 
 __all__ = ["LinearLaw", "StraightLine", "linear_law", "scattered_line", "york"]
-
-FloatArray = NDArray[np.float64]
 
 
 class StraightLine(NamedTuple):

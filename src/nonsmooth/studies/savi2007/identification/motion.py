@@ -21,11 +21,9 @@ from math import ceil, cos, sin
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 __all__ = ["CONTACT", "DRIVE", "OSCILLATOR", "march"]
 
-FloatArray = NDArray[np.float64]
 
 #: Order of the numbers in the vector ``oscillator``, each over the mass where it has one.
 OSCILLATOR = ("omega_0", "b", "f", "x_e")

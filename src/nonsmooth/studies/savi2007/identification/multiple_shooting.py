@@ -20,9 +20,9 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nonsmooth import SolveError
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.arrow import Unsettled, reduced
 from nonsmooth.recordings.signals.phase import drive_phase
 from nonsmooth.studies.savi2007.identification.evidence import Run
@@ -32,7 +32,6 @@ from nonsmooth.studies.savi2007.identification.shooting import ShootingFit, shoo
 
 __all__ = ["ContactFit", "shoot_contacts"]
 
-FloatArray = NDArray[np.float64]
 _SHARED = 5  # omega_0, b, f, kappa, gamma
 _PER_RUN = 6  # gap, place, cosine and sine of the drive, its second harmonic
 LONGEST = 2.5  # s: of a piece

@@ -17,15 +17,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, Finding
 from nonsmooth.studies.savi2007.identification.evidence import Run
 from nonsmooth.studies.savi2007.identification.free_decay import DecayFit
 
 __all__ = ["natural_frequency", "spectral_peak"]
 
-FloatArray = NDArray[np.float64]
 
 GRID = 2048  # samples of the paper's DFT: 100 Hz / 2048 * 15 = 0.732 Hz
 FINE = 400  # frequencies between its values about the peak

@@ -6,11 +6,10 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from nonsmooth.arrays import FloatArray
 
 __all__ = ["nonlinear_fit"]
-
-FloatArray = NDArray[np.float64]
 
 
 def nonlinear_fit(

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.pieces import State
 from nonsmooth.identification.uncertainty import correlation_times
 
 __all__ = ["Build", "Piece", "Problem", "start_state"]
 
-FloatArray = NDArray[np.float64]
 #: From the parameters of a piece to the vectors ``oscillator``, ``drive``, ``contact`` of `motion.march`.
 Build = Callable[[FloatArray], tuple[Any, Any, Any]]
 

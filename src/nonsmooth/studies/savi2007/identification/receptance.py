@@ -15,9 +15,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nonsmooth import SolveError
+from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.identification import Estimate, Finding
 from nonsmooth.recordings import Quantity
 from nonsmooth.studies.savi2007.identification.free_decay import DecayFit
@@ -27,13 +27,12 @@ from nonsmooth.studies.savi2007.identification.steady import Steady
 
 __all__ = ["crank_mark", "receptance", "receptance_fit"]
 
-FloatArray = NDArray[np.float64]
 LEAST = 8  # runs
 
 
 def receptance(
     omega: Any, crank_length: Any, omega_0: float, b: float, f: float = 0.0, scale: float = 1.0, mark: float = 0.0
-) -> NDArray[np.complex128]:
+) -> ComplexArray:
     r"""The complex amplitude X (m) of the car, :math:`x = \mathrm{Re}\, X e^{i\omega t}`.
 
     Parameters

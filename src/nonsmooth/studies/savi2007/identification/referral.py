@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, Finding
 from nonsmooth.identification.uncertainty import uniform
 from nonsmooth.studies.savi2007.identification.adjustment import Adjusted
@@ -25,7 +25,6 @@ from nonsmooth.studies.savi2007.identification.steady import Steady
 
 __all__ = ["CountedGap", "Referred", "counted_gap", "mark_of", "places", "refer"]
 
-FloatArray = NDArray[np.float64]
 
 _MOUNTED = 0.15  # rad: within which a mark is taken as put where it should be
 _HELD = 1e-3  # m: half width within which dry friction may hold a car of which nothing is known

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth import SolveError
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.arrow import settle
 from nonsmooth.identification.pieces import State
 from nonsmooth.identification.sandwich import sandwich
@@ -28,7 +29,6 @@ from nonsmooth.studies.savi2007.identification.pieces import Piece, Problem
 
 __all__ = ["ShootingFit", "shoot"]
 
-FloatArray = NDArray[np.float64]
 _UNEVEN = 0.2  # steps of the clock: the most that its instants are taken to jitter
 _ROUNDS = 10  # of weights from residuals and residuals from weights
 

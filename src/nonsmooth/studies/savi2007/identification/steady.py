@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.recordings.signals.harmonics import HarmonicFit
 from nonsmooth.recordings.signals.harmonics import fit as harmonic_fit
 from nonsmooth.recordings.signals.phase import drive_phase
@@ -16,7 +16,6 @@ from nonsmooth.studies.savi2007.identification.evidence import Run
 
 __all__ = ["Steady", "harmonics_of", "steady"]
 
-FloatArray = NDArray[np.float64]
 HARMONICS = 3
 
 
@@ -50,7 +49,7 @@ class Steady:
     crank: FloatArray
     amplitude: FloatArray
     error: FloatArray
-    response: NDArray[np.complex128]
+    response: ComplexArray
     mean: FloatArray
     mean_error: FloatArray
     highest: FloatArray

@@ -21,8 +21,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, Finding
 from nonsmooth.identification.uncertainty import uniform
 from nonsmooth.recordings.signals.savitzky_golay import savitzky_golay
@@ -34,7 +34,6 @@ if TYPE_CHECKING:
 
 __all__ = ["stiffness"]
 
-FloatArray = NDArray[np.float64]
 _WINDOW, _ORDER = 21, 4  # samples: follows a hand's tremor, 3 Hz, to 1 %
 
 

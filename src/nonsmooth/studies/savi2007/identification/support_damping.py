@@ -13,16 +13,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, Finding
 from nonsmooth.recordings import Quantity
 from nonsmooth.studies.savi2007.identification.evidence import Run
 from nonsmooth.studies.savi2007.identification.free_decay import DecayFit, free_decay
 
 __all__ = ["log_decrement", "support_damping"]
-
-FloatArray = NDArray[np.float64]
 
 
 def log_decrement(time: FloatArray, x: FloatArray, rest: float, *, resolution: float) -> tuple[FloatArray, ...]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.studies.savi2007.rig import sensors
 from nonsmooth.studies.savi2007.rig.physics import NO_SUPPORT, hanging_mass
 from nonsmooth.studies.savi2007.rig.sampled import sampled
@@ -24,7 +24,7 @@ def impulse(
     rig: VirtualRig, *, velocities: tuple[float, ...] = (0.5, -0.5, 0.35, -0.35, 0.2, -0.2, 0.1, -0.1),
     duration: float = 20.0,
 ) -> Recording:  # fmt: skip
-    """Tap the resting car, no support, and let it stop: about these velocities (m/s), one run each."""
+    """Tap the resting car, no support, and let it stop: about these velocities (m/s), one run each: Fig. 5."""
     system = rig.system().with_parameters(rig.parameters(crank_length=0.0, g=NO_SUPPORT))
     runs = []
     for i, velocity in enumerate(velocities):
@@ -47,7 +47,7 @@ def _stuck(rig: VirtualRig, run: int) -> dict[str, float]:
 
 
 def drop(rig: VirtualRig, *, n: int = 6, duration: float = 20.0) -> Recording:
-    """Hang the test mass on the support's spring, drop it from where the spring is unloaded, or nearly; ``n`` runs."""
+    """Drop the test mass on the support's spring from where the spring is unloaded, or nearly; ``n`` runs: Fig. 7."""
     p = {name: rig.truth[name] for name in ("k_s", "c_s", "test_mass")}
     system = hanging_mass().with_parameters(p)
     sag = p["test_mass"] * GRAVITY / p["k_s"]
@@ -72,14 +72,14 @@ def _decay(
     )
     held = np.zeros((2, len(at)))
     held[0] = start.get("x", 0.0)  # held there until it is let go
-    motion: NDArray[np.float64] = held
+    motion: FloatArray = held
     motion[:, moving] = states
     if slips:
         motion[0] -= _slip(rig, at - begin, states)
     return name, rig.channels(rng, name, time, motion[0], motion[1]), {}
 
 
-def _slip(rig: VirtualRig, since: NDArray[np.float64], states: NDArray[np.float64]) -> NDArray[np.float64]:
+def _slip(rig: VirtualRig, since: FloatArray, states: FloatArray) -> FloatArray:
     """Travel (m) that the sensor misses: within 50 ms the string slips on its wheel, in one of the first swings."""
     rng = np.random.default_rng([rig.seed, 5])
     begin = float(rng.uniform(0.5, 2.5))

@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.studies.savi2007.rig import sensors
 from nonsmooth.studies.savi2007.rig.physics import friction
 
@@ -19,17 +19,16 @@ if TYPE_CHECKING:
     from nonsmooth import Recording
     from nonsmooth.studies.savi2007.rig.virtual_rig import VirtualRig
 
-__all__ = ["pull_car", "push_support"]
+__all__ = ["springs", "support"]
 
-FloatArray = NDArray[np.float64]
 Run = tuple[str, Mapping[str, Any], Mapping[str, Any]]
 _TREMOR = 1e-4  # m, with the frequencies below in Hz
 _TREMBLING = (1.1, 1.7, 2.6)
 _TURNING = 1.0  # s, that the hand takes to start, to turn, and to stop
 
 
-def pull_car(rig: VirtualRig, *, reach: float = 0.12, n: int = 6) -> Recording:
-    """Pull the car slowly to ``reach`` (m) and back through the force sensor, to both sides in turn; ``n`` runs."""
+def springs(rig: VirtualRig, *, reach: float = 0.12, n: int = 6) -> Recording:
+    """Pull the car slowly to ``reach`` (m) and back by the force sensor, to both sides in turn; ``n`` runs: Fig. 4a."""
     p = rig.named_parameters(crank_length=0.0)
     limit = p.pretension / p.k
     if reach * 1.01 > limit:
@@ -46,8 +45,8 @@ def pull_car(rig: VirtualRig, *, reach: float = 0.12, n: int = 6) -> Recording:
     return rig.recording("springs", runs)
 
 
-def push_support(rig: VirtualRig, *, force: float = 35.0, n: int = 6) -> Recording:
-    """Push the support's spring up to about ``force`` (N) and let it come back; ``n`` runs."""
+def support(rig: VirtualRig, *, force: float = 35.0, n: int = 6) -> Recording:
+    """Push the support's spring up to about ``force`` (N) and let it come back; ``n`` runs: Fig. 4b."""
     runs: list[Run] = []
     k_s, c_s = rig.truth["k_s"], rig.truth["c_s"]
     for i in range(n):

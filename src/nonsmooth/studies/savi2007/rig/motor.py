@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.studies.savi2007.rig import sensors
 from nonsmooth.studies.savi2007.rig.physics import Wander, crank_angle, drive
 
@@ -56,7 +56,7 @@ def mean_position(rig: VirtualRig, crank_length: float) -> float:
     return rig.truth["motor_side"] * moved
 
 
-def passages(rig: VirtualRig, omega: float, begin: float, end: float, wander: Wander = ()) -> NDArray[np.float64]:
+def passages(rig: VirtualRig, omega: float, begin: float, end: float, wander: Wander = ()) -> FloatArray:
     """The times in [begin, end] at which the crank's angle is a multiple of 2 pi."""
     if wander:
         return _uneven(rig, omega, begin, end, wander)
@@ -72,7 +72,7 @@ def passages(rig: VirtualRig, omega: float, begin: float, end: float, wander: Wa
     return first + period * n
 
 
-def _uneven(rig: VirtualRig, omega: float, begin: float, end: float, wander: Wander) -> NDArray[np.float64]:
+def _uneven(rig: VirtualRig, omega: float, begin: float, end: float, wander: Wander) -> FloatArray:
     """The same for a motor that wanders: each passage by Newton's method from where even turning has it."""
     p = rig.named_parameters(omega=omega)
     first, last = crank_angle(np.array([begin, end]), p, wander) / (2 * np.pi)
@@ -89,7 +89,7 @@ def _uneven(rig: VirtualRig, omega: float, begin: float, end: float, wander: Wan
 def voltage(
     rig: VirtualRig, *, voltages: Sequence[float] = (2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12), turns: int = 40
 ) -> Recording:
-    """The motor alone, at one voltage (V) per run, for about ``turns`` passages of the photogate."""
+    """The motor alone, at one voltage (V) per run, for about ``turns`` passages of the photogate: Fig. 8a."""
     runs = []
     for i, setting in enumerate(voltages):
         rng = rig.generator("voltage", i)
@@ -105,7 +105,7 @@ def crank(
     rig: VirtualRig, *, lengths: Sequence[float] = (0.01, 0.015, 0.02, 0.025, 0.03, 0.04, 0.05, 0.06),
     voltage: float = 4.0, duration: float = 20.0,
 ) -> Recording:  # fmt: skip
-    """The car held at x = 0 by the force sensor, at one crank length (m) per run: it feels k d(phi)."""
+    """The car held at x = 0 by the force sensor, at one crank length (m) per run, feels k d(phi): Fig. 8b."""
     runs = []
     omega = frequency(rig, voltage)
     for i, length in enumerate(lengths):

@@ -6,8 +6,8 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.studies.savi2007.rig.physics import driven_tension, fixed_tension, wander_of
 
 if TYPE_CHECKING:
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 __all__ = ["sampled", "simulated"]
 
-FloatArray = NDArray[np.float64]
 #: The paper's method. Over 40 periods with 121 crossings of a rig with friction it differs from the Taylor series at
 #: rtol 1e-12 by 2e-10 m/s, far below what a sensor tells.
 METHOD: dict[str, Any] = {"method": "rkf45", "rtol": 1e-9}

@@ -14,8 +14,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings import RecordingWarning
 
 if TYPE_CHECKING:
@@ -45,8 +45,6 @@ MAX_TURNS_PER_SECOND = 30.0
 FORCE_RANGE = 50.0  # N
 FORCE_STEP = 0.03  # N
 TURN_STEP = 1e-4  # s
-
-FloatArray = NDArray[np.float64]
 
 
 def instants(rig: VirtualRig, rng: np.random.Generator, duration: float) -> tuple[FloatArray, FloatArray]:

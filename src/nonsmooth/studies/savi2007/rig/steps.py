@@ -37,9 +37,10 @@ def response(
     rig: VirtualRig, *, crank_lengths: Sequence[float] = (0.0165, 0.035), voltages: Sequence[float] | None = None,
     gap: float | None = None, duration: float = 12.0, after: Sequence[Setting] = (),
 ) -> Recording:  # fmt: skip
-    """Frequency steps up and then down at each crank length (m), one run per step, the motion carried along.
+    """Frequency steps up and then down at each crank length (m), one run per step, the motion carried along: Fig. 6.
 
-    ``after``: runs that follow, for figures with the support mounted those without it.
+    With a ``gap`` (m) Figs. 9 and 10. ``after``: runs that follow, for figures with the support mounted those without
+    it.
     """
     natural = float(np.sqrt(2 * rig.truth["k"] / rig.truth["m"]))
     steps = [voltage_for(rig, natural * r) for r in RELATIVE] if voltages is None else list(voltages)

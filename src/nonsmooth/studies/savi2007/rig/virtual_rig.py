@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.recordings.session import PROCEDURES
-from nonsmooth.studies.savi2007.rig import sensors
+from nonsmooth.studies.savi2007.rig import decays, figures, hand, motor, sensors, steps
 from nonsmooth.studies.savi2007.rig.physics import WANDERING, Wander
 from nonsmooth.studies.savi2007.rig.truth import FEATURES, HOLDING, NOMINAL_GAP, awkward, drawn, published, switched
 from nonsmooth.system.names import unknown
@@ -210,77 +210,18 @@ class VirtualRig:
         made: Recording = getattr(self, procedure)(**options)
         return made
 
-    def springs(self, **options: Any) -> Recording:
-        """Slow pulls of the car through the force sensor: Fig. 4a. Options: ``reach``, ``n``."""
-        from nonsmooth.studies.savi2007.rig.hand import pull_car
-
-        return pull_car(self, **options)
-
-    def support(self, **options: Any) -> Recording:
-        """Slow pushes of the support's spring by the force sensor: Fig. 4b. Options: ``force``, ``n``."""
-        from nonsmooth.studies.savi2007.rig.hand import push_support
-
-        return push_support(self, **options)
-
-    def impulse(self, **options: Any) -> Recording:
-        """Taps of the car and its free decays: Fig. 5. Options: ``velocities``, ``duration``."""
-        from nonsmooth.studies.savi2007.rig.decays import impulse
-
-        return impulse(self, **options)
-
-    def drop(self, **options: Any) -> Recording:
-        """Free decays of the support with the test mass: Fig. 7. Options: ``n``, ``duration``."""
-        from nonsmooth.studies.savi2007.rig.decays import drop
-
-        return drop(self, **options)
-
-    def voltage(self, **options: Any) -> Recording:
-        """Frequency of the motor at several voltages: Fig. 8a. Options: ``voltages``, ``turns``."""
-        from nonsmooth.studies.savi2007.rig.motor import voltage
-
-        return voltage(self, **options)
-
-    def crank(self, **options: Any) -> Recording:
-        """Force of the drive on the held car at several crank lengths: Fig. 8b. Options: ``lengths``, ``voltage``."""
-        from nonsmooth.studies.savi2007.rig.motor import crank
-
-        return crank(self, **options)
-
-    def response(self, **options: Any) -> Recording:
-        """Frequency steps up and down: Fig. 6 (Figs. 9, 10 with ``gap``). Options: ``crank_lengths``, ``voltages``."""
-        from nonsmooth.studies.savi2007.rig.steps import response
-
-        return response(self, **options)
-
-    def grazing(self, **options: Any) -> Recording:
-        """Fine frequency steps through the first contact. Options: ``crank_length``, ``gap``, ``step``."""
-        from nonsmooth.studies.savi2007.rig.steps import grazing
-
-        return grazing(self, **options)
-
-    def contact(self, **options: Any) -> Recording:
-        """Records with contact in several regimes. Options: ``regimes``, ``gap``, ``duration``."""
-        from nonsmooth.studies.savi2007.rig.steps import contact
-
-        return contact(self, **options)
-
-    def rise(self, **options: Any) -> Recording:
-        """A slow rise of the forcing: Fig. 11. Options: ``crank_length``, ``voltage``, ``gap``, ``duration``."""
-        from nonsmooth.studies.savi2007.rig.figures import rise
-
-        return rise(self, **options)
-
-    def section(self, **options: Any) -> Recording:
-        """Long steady records at settings of Figs. 12 to 18. Options: those of ``figures.section``."""
-        from nonsmooth.studies.savi2007.rig.figures import section
-
-        return section(self, **options)
-
-    def figure(self, number: int, **options: Any) -> dict[str, Recording]:
-        """The recordings behind one of the paper's Figs. 4 to 18, by procedure."""
-        from nonsmooth.studies.savi2007.rig.figures import figure
-
-        return figure(self, number, **options)
+    springs = hand.springs
+    support = hand.support
+    impulse = decays.impulse
+    drop = decays.drop
+    voltage = motor.voltage
+    crank = motor.crank
+    response = steps.response
+    grazing = steps.grazing
+    contact = steps.contact
+    rise = figures.rise
+    section = figures.section
+    figure = figures.figure
 
     def write_session(
         self, folder: str | os.PathLike[str], procedures: Sequence[str] | None = None, *,

@@ -1,0 +1,75 @@
+"""The way of a continuation through the settings of a drive: what is varied, from where, over which range."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from nonsmooth.control.held import Held
+from nonsmooth.control.outcome import Names
+from nonsmooth.errors import shortened
+from nonsmooth.flow.arguments import real_number
+from nonsmooth.system.names import unknown
+
+__all__ = ["Course", "course_of"]
+
+
+@dataclass(frozen=True)
+class Course:
+    """The drive at the beginning, and which of its two settings is varied over which range."""
+
+    parameter: str  # "frequency" or "amplitude"
+    low: float
+    high: float
+    frequency: float
+    amplitude: float
+    rising: bool
+
+    def setting(self, value: float) -> tuple[float, float]:
+        """Frequency and amplitude of the drive at a value of the parameter."""
+        return (value, self.amplitude) if self.parameter == "frequency" else (self.frequency, value)
+
+    def of(self, held: Held) -> float:
+        """The parameter that was really set."""
+        return float(getattr(held, self.parameter))
+
+    def inside(self, value: float) -> bool:
+        """Return whether a value lies in the range."""
+        return self.low <= value <= self.high
+
+
+def course_of(
+    names: Names, parameter: Any, range: Any, frequency: float, amplitude: float, direction: str
+) -> Course:
+    """The course that was asked for, checked.
+
+    Raises
+    ------
+    ValueError, TypeError
+        Settings that do not fit the drive or each other.
+    """
+    own = {"frequency": "frequency", "amplitude": "amplitude"}
+    known = own | {names.frequency: "frequency", names.amplitude: "amplitude"}
+    if parameter not in known:
+        raise ValueError(unknown(parameter, "a parameter", "the drive", known))
+    low, high = _limits(range)
+    begin = {"frequency": real_number(frequency, "frequency"), "amplitude": real_number(amplitude, "amplitude")}
+    if begin["frequency"] <= 0:
+        raise ValueError(f"frequency = {frequency!r}: the angular frequency of the drive is positive")
+    varied = known[parameter]
+    if not low <= begin[varied] <= high:
+        raise ValueError(f"{varied} = {begin[varied]!r} lies outside the range {low:g} ... {high:g}: begin within it")
+    if direction not in ("up", "down"):
+        raise ValueError(f"direction = {direction!r}; allowed: 'up', 'down'")
+    return Course(varied, low, high, rising=direction == "up", **begin)
+
+
+def _limits(given: Any) -> tuple[float, float]:
+    try:
+        low, high = given
+    except (TypeError, ValueError):
+        raise ValueError(f"range = {shortened(given)}: give (low, high)") from None
+    low, high = real_number(low, "the lower end of the range"), real_number(high, "the upper end of the range")
+    if not low < high:
+        raise ValueError(f"range = ({low:g}, {high:g}): the lower end comes first")
+    return low, high

@@ -1,0 +1,184 @@
+"""``amplitude_spectrum``: the harmonics and subharmonics of a motion.
+
+The record of a periodic motion is as long as its period, so that each line is the Fourier coefficient itself, without
+leakage: a motion of period p has lines at multiples of 1/p of the forcing frequency. A motion without a period gets a
+Hann window, and its lines are as wide as the record is short.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.diagrams.sweep import sweep
+from nonsmooth.errors import SolveError
+from nonsmooth.flow.arguments import check_options, check_system, whole_number
+from nonsmooth.flow.engines.engine import FloatArray
+from nonsmooth.flow.engines.methods import engine_for
+from nonsmooth.flow.poincare import poincare
+from nonsmooth.flow.sections import Poincare, Stroboscopic
+from nonsmooth.flow.simulate import simulate
+from nonsmooth.flow.starts import is_one_start, plain_start
+from nonsmooth.results.progress import Progress
+from nonsmooth.system.names import by_name
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from nonsmooth.system.system import System
+
+__all__ = ["amplitude_spectrum"]
+
+LEAST = 4096  # samples of a motion of a short period; more raise the highest line
+
+
+@by_name
+def amplitude_spectrum(
+    system: System,
+    *,
+    start: Any = None,
+    section: Stroboscopic | Poincare | None = None,
+    transient: int = 500,
+    periods: int = 256,
+    samples: int = 512,
+    method: str = "auto",
+    rtol: float | None = None,
+    atol: Any = None,
+    progress: Progress = False,
+    **expert: Any,
+) -> xr.Dataset:
+    r"""Amplitude of every state over frequency, for the motion that a start leads to.
+
+    .. math:: A_k = \frac{2}{N} \Bigl| \sum_{j<N} u_j e^{-2\pi i jk/N} \Bigr|
+
+    over p periods of a motion of period number p; with a Hann window over ``periods`` of one that has none.
+
+    Parameters
+    ----------
+    system : System
+    start : state, optional
+        Zeros where not given.
+    section : Stroboscopic or Poincare, optional
+        What counts a period; ``Stroboscopic(0)`` where the system has a period, and needed where it has none.
+    transient : int
+        Section returns passed over.
+    periods : int
+        Length of the record of a motion without a period number, in section returns.
+    samples : int
+        Per period of the forcing, or per return: lines up to half as many times the base frequency.
+    method, rtol, atol
+        See :func:`nonsmooth.flow.engines.methods.engine_for`.
+    progress : bool, or function
+        As in :func:`nonsmooth.sweep`.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over ``frequency`` (per unit of time) and ``state``: ``amplitude``, that of a sinusoid of this frequency in the
+        state's unit, the mean at 0; ``order``, the frequency over ``base_frequency``, which is that of the forcing or
+        the mean one of the returns; ``period_number`` (0: none found, and the lines are not sharp).
+
+    Raises
+    ------
+    ValueError, TypeError
+        Arguments that do not fit.
+    SolveError
+        A motion that does not get as far.
+
+    Examples
+    --------
+    A motion of period 4 has lines at quarters of the forcing frequency.
+
+    >>> import nonsmooth as ns
+    >>> found = ns.amplitude_spectrum(ns.models.discontinuous_support(rho=0.26))
+    >>> int(found.period_number), bool(found.amplitude.sel(state="x")[1] > 1e-4)
+    (4, True)
+    """
+    check_system(system, "amplitude_spectrum")
+    check_options(system, expert, amplitude_spectrum)
+    if not is_one_start(start):
+        raise ValueError("amplitude_spectrum follows one trajectory: give one start")
+    transient = whole_number(transient, "transient", 0)
+    periods, samples = whole_number(periods, "periods", 8), whole_number(samples, "samples", 8)
+    engine = engine_for(system, method, rtol, atol, **expert)
+    how = {"method": method, "rtol": rtol, "atol": atol, **expert}
+    count = _period_number(system, {"start": start, "section": section, "transient": transient, **how}, progress)
+    length = count or periods
+    each = max(samples, -(-LEAST // length)) if count else samples
+    if system.is_map:
+        each = 1
+        length = -(-LEAST // length) * length
+        values = poincare(system, n=length, transient=transient, start=start, **how)["section"].values
+        base = rate = 1.0
+    else:
+        begin, span = _stretch(system, start, section, transient, length, how)
+        rate, base = length * each / span, length / span
+        values = _sampled(system, start, begin, span, length * each, how)
+    window = np.ones(len(values)) if count else np.hanning(len(values) + 1)[:-1]
+    amplitude = 2.0 * np.abs(np.fft.rfft(values * window[:, None], axis=0)) / window.sum()
+    amplitude[0] /= 2.0
+    if len(values) % 2 == 0:
+        amplitude[-1] /= 2.0
+    options = {
+        "start": plain_start(system, start), "section": section, "transient": transient, "periods": periods,
+        "samples": samples, **how,
+    }  # fmt: skip
+    frequency = np.arange(len(amplitude), dtype=np.float64) * (rate / len(values))
+    return _dataset(system, engine.name, options, frequency, amplitude, base, count)
+
+
+def _period_number(system: System, options: dict[str, Any], progress: Progress) -> int:
+    name = next(iter(system.parameters))
+    judged = sweep(system, name, [system.values[name]], direction=None, progress=progress, **options)
+    return int(judged["period_number"].values[0])
+
+
+def _stretch(
+    system: System, start: Any, section: Any, transient: int, length: int, how: dict[str, Any]
+) -> tuple[float, float]:
+    """Begin and duration of so many periods, or section returns."""
+    period = system.period()
+    if period is not None and not isinstance(section, Poincare):
+        return transient * period, length * period
+    times = poincare(system, section=section, n=length + 1, transient=transient, start=start, **how)["time"].values
+    return float(times[0]), float(times[-1] - times[0])
+
+
+def _sampled(
+    system: System, start: Any, begin: float, span: float, number: int, how: dict[str, Any]
+) -> FloatArray:  # fmt: skip
+    times = begin + np.arange(number) * (span / number)
+    run = simulate(system, duration=span, transient=begin, start=start, samples=times, **how)
+    at = np.searchsorted(run["time"].values, times).clip(0, run.sizes["time"] - 1)
+    values: FloatArray = run["u"].values[at]
+    if not np.isfinite(values).all() or run["time"].values[-1] < times[-1]:
+        raise SolveError(f"the motion of {system.name!r} ended at t = {float(run['time'][-1]):.6g}, before its record")
+    return values
+
+
+def _dataset(
+    system: System, method: str, options: dict[str, Any], frequency: FloatArray, amplitude: FloatArray, base: float,
+    count: int,
+) -> xr.Dataset:  # fmt: skip
+    import xarray as xr
+
+    from nonsmooth.results.labels import labels_of
+    from nonsmooth.results.provenance import provenance, with_short_record
+    from nonsmooth.results.schema import parameter_coords, state_coords
+
+    labels = labels_of(system)
+    per = "per iterate" if labels.is_map else "Hz" if labels.time_unit == "s" else f"1/{labels.time_unit}"
+    return with_short_record(xr.Dataset(
+        {
+            "amplitude": (("frequency", "state"), amplitude, {"long_name": "amplitude"}),
+            "base_frequency": ((), base, {"long_name": "frequency of the forcing, or of the returns", "units": per}),
+            "period_number": ((), np.int64(count), {"long_name": "period number (0: none found)"}),
+        },
+        {
+            "frequency": ("frequency", frequency, {"long_name": "frequency", "units": per}),
+            "order": ("frequency", frequency / base, {"long_name": "frequency over the base frequency"}),
+            **state_coords(labels), **parameter_coords(labels),
+        },
+        provenance(labels, "amplitude_spectrum", options, method=method),
+    ))  # fmt: skip
