@@ -21,16 +21,21 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
+from nonsmooth.kernels.compile.cache import reached
+from nonsmooth.kernels.cuda import ptx
+from nonsmooth.kernels.cuda.module import OBSERVERS, joined, stamp
+from nonsmooth.kernels.linear.module import STEPPER
 
 COMPILER = [importlib.util.find_spec(name) is not None for name in ("numba_cuda", "nvidia")]
 pytestmark = pytest.mark.skipif(not COMPILER[0], reason="numba-cuda is not installed (extra `test`, Linux only)")
 SCRIPT = Path(__file__).with_name("gpu_script.py")
 
 COMPILE = """
-import functools, json, sys
+import functools, gc, json, sys
 import numba.cuda
 from nonsmooth.kernels.cuda.ptx import ptx_of
 
+gc.disable()  # a compile makes millions of objects and hardly a cycle
 found, opt, kernels = {}, *json.load(sys.stdin)
 numba.cuda.compile = functools.partial(numba.cuda.compile, opt=opt)
 for name, signature in kernels.items():
@@ -125,14 +130,15 @@ def test_every_kernel_compiles_for_the_types_it_is_launched_with(
     """Half a minute, so not again for the same texts, types and compiler. Without optimising it refuses the same."""
     given = json.dumps([optimised, {name: simulated["launched"][name] for name in sorted(entries)}])
     compiler = [version(name) for name in ("numba-cuda", "nvidia-nvvm", "llvmlite")]
-    texts = [path.read_bytes() for path in sorted((Path(ns.__file__).parent / "kernels").rglob("*.py"))]
-    stamp = hashlib.sha256(repr([given, compiler, texts]).encode()).hexdigest()
+    texts = [joined((*STEPPER, *parts)) for parts in OBSERVERS.values()]
+    texts += [stamp(), Path(ptx.__file__).read_text(), *(reached(text) for text in texts)]
+    key = hashlib.sha256(repr([given, compiler, texts]).encode()).hexdigest()
     cache = getattr(request.config, "cache", None)  # there is none where pytest was told so
-    if cache and cache.get(f"gpu/{optimised}", "") == stamp:
+    if cache and cache.get(f"gpu/{optimised}", "") == key:
         return
     assert json.loads(run(["-c", COMPILE], given)) == {name: [1, True] for name in entries}
     if cache:
-        cache.set(f"gpu/{optimised}", stamp)
+        cache.set(f"gpu/{optimised}", key)
 
 
 def test_tables_are_built_once_for_each_point(simulated: dict[str, Any]) -> None:

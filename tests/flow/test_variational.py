@@ -232,6 +232,20 @@ def test_legs_are_exponentials_of_linear_modes() -> None:
     assert (legs.status == 0).all() and legs.P.shape == (4, 2, 0)
 
 
+def test_a_short_leg_from_balanced_forces_ends() -> None:
+    """A speed that is all rounding, as where friction lets a mass go, shrinks no steps: v(tau) = a' tau^2 / 2."""
+    system = ns.models.discontinuous_support()
+    flow, v = VariationalFlow.of(system, ("omega",)), system.values
+    t, tau = 0.8, np.array([5e-8, -5e-8, 3e-10])
+    values = system.parameter_vector()
+    force = flow.segments(values, [0], [t], [0.0], [[0.0, 0.0]]).f_end[0, 1] * v["m"]
+    legs = flow.segments(values, [0] * 3, [t] * 3, tau, [[force / (2 * v["k"]), 0.0]] * 3)
+    assert (legs.status == codes.OK).all()
+    assert legs.Phi[:, 0, 1] == pytest.approx(tau, rel=1e-6)
+    growth = (legs.f_end[:, 1] - legs.f_begin[:, 1]) / tau
+    assert legs.z[:2, 1] == pytest.approx(growth[:2] * tau[:2] ** 2 / 2, rel=1e-4)
+
+
 def test_a_leg_and_its_way_back_cancel() -> None:
     """Of a nonlinear mode, with parameters: z returns, the matrices are inverse, and P of the way back undoes P."""
     template = TEMPLATES["shell"]()

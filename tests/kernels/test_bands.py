@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -10,13 +9,48 @@ import pytest
 from numba import njit
 from scipy.linalg import expm
 
-from nonsmooth.kernels.compile.lanes import LANES, add_products, plain
+from nonsmooth.kernels.compile.cache import load_module
+from nonsmooth.kernels.compile.lanes import LANES
+from nonsmooth.kernels.compile.long_sums import add_products, plain
 from nonsmooth.kernels.hybrid.records import Form
 from nonsmooth.kernels.linear.module import linear_module
 
 MASSES, RATE = 20, 1.3
 STATES = 2 * MASSES
 FULL = 1  # the mode whose matrix has no zeros
+CALLABLE = """
+from numba import types
+from nonsmooth.kernels.compile.cache import kernel
+from nonsmooth.kernels.hybrid.records import FORM, TABLES, WORK
+import {0} as text
+
+i, f, f1, f2 = types.int64, types.float64, types.float64[::1], types.float64[:, ::1]
+
+
+@kernel(types.void(i, FORM, TABLES, WORK))
+def build(point, form, tables, work):
+    text.build(point, form, tables, work)
+
+
+@kernel(types.void(TABLES, WORK, i))
+def whole_step(tables, work, mode):
+    text.whole_step(tables, work, mode)
+
+
+@kernel(types.void(TABLES, WORK, i, f, f1))
+def dense(tables, work, mode, at, out):
+    text.dense(tables, work, mode, at, out)
+
+
+@kernel(f(TABLES, f2, i, i, f1))
+def bound_at(tables, row, mode, k, w):
+    return text.bound_at(tables, row, mode, k, w)
+
+
+@kernel(types.void(TABLES, WORK, i, f, f1, f2))
+def carry(tables, work, mode, part, scale, X):
+    text.carry(tables, work, mode, part, scale, X)
+"""  # kept on disk, as what ``njit`` makes of functions is not
 
 
 def callable_from_python(function: Any) -> Any:
@@ -46,8 +80,7 @@ def generators() -> list[np.ndarray]:
 def made(generators: list[np.ndarray]) -> tuple[Any, Any, Any]:
     """The kernels, the tables of the two modes, and working memory with a state in it; no indicators, no outputs."""
     text, n = linear_module(STATES, 1), STATES
-    names = ("build", "whole_step", "dense", "bound_at", "carry")
-    module = SimpleNamespace(NODE=text.NODE, **{name: callable_from_python(getattr(text, name)) for name in names})
+    module = load_module(CALLABLE.format(text.__name__), "test_bands")
 
     def of(part: Any) -> np.ndarray:
         return np.ascontiguousarray(np.array([part(M) for M in generators])[None])
@@ -72,7 +105,7 @@ def test_a_state_at_any_instant_of_a_step_is_the_matrix_exponential(generators, 
     module, tables, work = made
     assert (tables.lines[mode, 0, 0] > 0) == (mode != FULL)
     module.whole_step(tables, work, mode)
-    work.found[module.NODE] = -1
+    work.found[module.text.NODE] = -1
     step, out = tables.info[mode, 0], np.zeros(STATES + 3)
     end = expm(generators[mode] * step) @ work.w
     assert np.abs(work.w1 - end).max() < 2e-15 * np.abs(end).max()

@@ -66,6 +66,20 @@ class LoopEngine(ABC):
         """(modes, n) 1 where a mode has not that state."""
         return np.array(self.traced.lacking, dtype=np.int64).reshape(len(self.traced.mode_names), -1)
 
+    @cached_property
+    def _some_lacking(self) -> bool:
+        return bool((self.lacking == 1).any())
+
+    @cached_property
+    def _none(self) -> Any:
+        """No samples, no crossings, no touches: of most runs from one sample of a controller to the next."""
+        n_u, n_m = len(self.scale), len(self.traced.m)
+        return _samples(np.empty(0), n_u, n_m), _crossings(0, n_u, n_m), _touches(0, n_u)
+
+    @cached_property
+    def _limit(self) -> FloatArray:
+        return DIVERGENCE * np.asarray(self.scale, dtype=float)
+
     def chain(
         self, tables: Any, first: int, last: int, state: State, starts: FloatArray | None,
         plan: SectionPlan, transient: int, keep: int, out: Chain,
@@ -114,10 +128,7 @@ class LoopEngine(ABC):
 
         n, n_u, n_m = len(samples), len(self.scale), len(self.traced.m)
         goal, motion = self._goal(0, 0, until, 0.0), self._motion(state, state.settled)
-        sampled = (
-            np.ascontiguousarray(samples, dtype=float), np.full((n, n_u), np.nan), np.full((n, n_m), np.nan),
-            np.full(n, -1, dtype=np.int64), np.zeros(n, dtype=np.int64),
-        )  # fmt: skip
+        sampled = _samples(samples, n_u, n_m) if n else self._none[0]
         (model, own, work), crossings, touches = LoopEngine.room(self, tables) if room is None else room
         kernel = self.module(tables, "record").record
         spare, code = self.touches_of_a_leg(), codes.LOG_FULL
@@ -132,13 +143,12 @@ class LoopEngine(ABC):
                 crossings = _longer(crossings, _crossings(2 * len(crossings[0]), n_u, n_m))
                 touches = _longer(touches, _touches(2 * len(touches[0]) + spare, n_u))
         state.settled = True
-        n_c, n_t = work.tally[[CROSSINGS, TOUCHES]]
-        times, transitions, before, after, memory = (part[:n_c].copy() for part in crossings)
-        touch_times, indicators, touch_u, clearances = (part[:n_t].copy() for part in touches)
+        n_c, n_t = work.tally[CROSSINGS], work.tally[TOUCHES]
+        times, transitions, before, after, memory = [part[:n_c].copy() for part in crossings] if n_c else self._none[1]
+        touch_times, indicators, touch_u, clearances = [part[:n_t].copy() for part in touches] if n_t else self._none[2]
         _, sample_u, sample_memory, sample_mode, sample_segment = sampled
-        lacking = self.lacking == 1
-        if lacking.any():
-            jumps = self.traced.transitions
+        if self._some_lacking:
+            lacking, jumps = self.lacking == 1, self.traced.transitions
             sample_u[lacking[sample_mode] & (sample_mode >= 0)[:, None]] = np.nan
             before[lacking[[t.source for t in jumps]][transitions]] = np.nan
             after[lacking[[t.target for t in jumps]][transitions]] = np.nan
@@ -150,8 +160,7 @@ class LoopEngine(ABC):
     def _goal(self, transient: int, keep: int, until: float, unit: float) -> Any:
         from nonsmooth.kernels.hybrid.records import Goal
 
-        limit = DIVERGENCE * np.asarray(self.scale, dtype=float)
-        return Goal(int(transient), int(keep), float(until), float(unit), limit, PATIENCE)
+        return Goal(int(transient), int(keep), float(until), float(unit), self._limit, PATIENCE)
 
     def _motion(self, state: State, settled: bool) -> Any:
         from nonsmooth.kernels.hybrid.records import Motion
@@ -175,6 +184,15 @@ def nowhere() -> Any:
     from nonsmooth.kernels.hybrid.records import Section
 
     return Section(-1, 0, -1, 0, 1, 0, -1.0, 0.0)
+
+
+def _samples(instants: FloatArray, n: int, n_memory: int) -> list[Any]:
+    """Instants, and room for states, memory, mode and number of crossings there."""
+    size = len(instants)
+    return [
+        np.ascontiguousarray(instants, dtype=float), np.full((size, n), np.nan), np.full((size, n_memory), np.nan),
+        np.full(size, -1, dtype=np.int64), np.zeros(size, dtype=np.int64),
+    ]  # fmt: skip
 
 
 def _crossings(size: int, n: int, n_memory: int) -> list[Any]:

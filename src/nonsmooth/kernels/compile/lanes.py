@@ -2,7 +2,8 @@
 
 Numba does not find these sums by itself: it unrolls such short loops, and switches off the pass of LLVM that would join
 what comes out. Here the vector instructions are written down; LLVM splits them to what the processor has. ``plain``
-holds the same sums as loops, for a GPU's threads and for runs without compilation.
+holds the same sums as loops, for a GPU's threads and for runs without compilation. Sums over many states stand in
+``long_sums``.
 """
 
 from __future__ import annotations
@@ -18,8 +19,8 @@ from numba.core import cgutils, types
 from numba.extending import intrinsic, models, register_model
 
 __all__ = [
-    "FOUR", "LANES", "add_products", "dot", "load", "plain", "plus", "sizes", "spread", "store", "sum_columns",
-    "sum_rows", "sum_some_rows", "sum_terms", "times",
+    "CONTRACT", "FOUR", "LANES", "LONGEST", "WIDEST", "Array", "choose", "load", "plain", "plus", "scaled", "store",
+    "sum_columns", "sum_rows", "sum_some_rows", "times",
 ]  # fmt: skip
 
 LANES = 8
@@ -27,7 +28,7 @@ FOUR = 4  # numbers of a vector that is a value in a kernel
 WIDEST = 32  # lanes of one sum: what the vector registers hold
 LONGEST = 24  # sums of more terms are loops
 FEW = 2  # so many columns' entries go one by one: joining them costs more than it gains
-_CONTRACT = ("contract",)
+CONTRACT = ("contract",)
 
 
 def _sum_rows(out: Any, row: Any, table: Any, mode: Any, f: Any, w: Any, one: Any, m: Any) -> None:
@@ -81,49 +82,10 @@ def _plus(y: Any, a: Any, x: Any) -> Any:
     return y + a * x
 
 
-def _dot(total: Any, row: Any, at: Any, w: Any, n: Any) -> Any:
-    """total + sum_j row[at + j] w[j] for j < n."""
-    for j in range(n):
-        total += row[at + j] * w[j]
-    return total
+plain = SimpleNamespace(sum_rows=_sum_rows, sum_some_rows=_sum_some_rows, sum_columns=_sum_columns)
 
 
-def _spread(total: Any, row: Any, at: Any, w: Any, about: Any, n: Any) -> Any:
-    """total + sum_j row[at + j] |w[j] - about[2 + j]| for j < n."""
-    for j in range(n):
-        total += row[at + j] * abs(w[j] - about[2 + j])
-    return total
-
-
-def _sizes(total: Any, row: Any, at: Any, w: Any, n: Any) -> Any:
-    """total + sum_j |row[at + j] w[j]| for j < n."""
-    for j in range(n):
-        total += abs(row[at + j] * w[j])
-    return total
-
-
-def _add_products(rows: Any, k: Any, bands: Any, mode: Any, d: Any, offset: Any, first: Any, last: Any) -> None:
-    """rows[k, r] += bands[mode, d, r] rows[k - 1, r + offset] for first <= r < last."""
-    for r in range(first, last):
-        rows[k, r] += bands[mode, d, r] * rows[k - 1, r + offset]
-
-
-def _sum_terms(out: Any, rows: Any, first: Any, last: Any, x: Any, sized: Any, m: Any) -> None:
-    """out[j] = sum_k x^(k - first) / (k - first)! rows[k, j] for first <= k <= last and j < m; ``sized``: of |rows|."""
-    for j in range(m):
-        total = abs(rows[last, j]) if sized else rows[last, j]
-        for k in range(last - 1, first - 1, -1):
-            total = total * x / (k + 1 - first) + (abs(rows[k, j]) if sized else rows[k, j])
-        out[j] = total
-
-
-plain = SimpleNamespace(
-    sum_rows=_sum_rows, sum_some_rows=_sum_some_rows, sum_columns=_sum_columns, dot=_dot, sizes=_sizes, spread=_spread,
-    add_products=_add_products, sum_terms=_sum_terms,
-)  # fmt: skip
-
-
-class _Array:
+class Array:
     """Numbers and vectors from and to an array, inside a function under construction."""
 
     def __init__(self, context: Any, builder: Any, kind: Any, value: Any) -> None:
@@ -154,19 +116,19 @@ class _Array:
         self.builder.store(value, self.builder.bitcast(self._at(*indices), value.type.as_pointer()), align=8)
 
 
-def _scaled(builder: Any, vector: Any, number: Any) -> Any:
+def scaled(builder: Any, vector: Any, number: Any) -> Any:
     """A vector times a number."""
     nothing, lane = ir.Constant(vector.type, ir.Undefined), ir.IntType(32)
     one = builder.insert_element(nothing, number, ir.Constant(lane, 0))
     zeros = ir.Constant(ir.VectorType(lane, vector.type.count), [0] * vector.type.count)
-    return builder.fmul(vector, builder.shuffle_vector(one, nothing, zeros), flags=_CONTRACT)
+    return builder.fmul(vector, builder.shuffle_vector(one, nothing, zeros), flags=CONTRACT)
 
 
 def _sum(builder: Any, first: Any, terms: Callable[[Any], Any], one: int, m: int) -> Any:
     """``first`` and terms(j) for j behind ``one``, then before it; one by one, or in loops where there are many."""
 
     def add(total: Any, j: Any) -> Any:
-        return builder.fadd(total, terms(j), flags=_CONTRACT)
+        return builder.fadd(total, terms(j), flags=CONTRACT)
 
     if m <= LONGEST:
         total = first
@@ -194,13 +156,13 @@ def _sum_rows_in_lanes(
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         out_, row_, table_, mode_, f_, w_ = arguments[:6]
-        source, weights = _Array(context, builder, table, table_), _Array(context, builder, w, w_)
+        source, weights = Array(context, builder, table, table_), Array(context, builder, w, w_)
         total = _sum(
             builder, source.load(vector, mode_, f_, one.literal_value, 0),
-            lambda j: _scaled(builder, source.load(vector, mode_, f_, j, 0), weights.number(j)),
+            lambda j: scaled(builder, source.load(vector, mode_, f_, j, 0), weights.number(j)),
             one.literal_value, m.literal_value,
         )  # fmt: skip
-        _Array(context, builder, out, out_).store(total, row_, 0)
+        Array(context, builder, out, out_).store(total, row_, 0)
         return context.get_dummy_value()
 
     return signature, generate
@@ -214,15 +176,15 @@ def _sum_some_rows_in_lanes(typing: Any, out: Any, row: Any, table: Any, mode: A
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         out_, row_, table_, mode_, f_, w_, some_ = arguments
-        source, weights = _Array(context, builder, table, table_), _Array(context, builder, w, w_)
-        places, index = _Array(context, builder, some, some_), ir.IntType(64)
+        source, weights = Array(context, builder, table, table_), Array(context, builder, w, w_)
+        places, index = Array(context, builder, some, some_), ir.IntType(64)
         place = cgutils.alloca_once_value(builder, ir.Constant(vector, [0.0] * LANES))
         begin, end = ir.Constant(index, 1), builder.add(places.number(0), ir.Constant(index, 1))
         with cgutils.for_range_slice(builder, begin, end, begin, intp=index) as (q, _):
             j = places.number(q)
-            term = _scaled(builder, source.load(vector, mode_, f_, j, 0), weights.number(j))
-            builder.store(builder.fadd(builder.load(place), term, flags=_CONTRACT), place)
-        _Array(context, builder, out, out_).store(builder.load(place), row_, 0)
+            term = scaled(builder, source.load(vector, mode_, f_, j, 0), weights.number(j))
+            builder.store(builder.fadd(builder.load(place), term, flags=CONTRACT), place)
+        Array(context, builder, out, out_).store(builder.load(place), row_, 0)
         return context.get_dummy_value()
 
     return signature, generate
@@ -236,12 +198,12 @@ def _sum_columns_in_lanes(typing: Any, out: Any, table: Any, mode: Any, node: An
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         out_, table_, mode_, node_, w_ = arguments[:5]
-        source, weights = _Array(context, builder, table, table_), _Array(context, builder, w, w_)
-        target = _Array(context, builder, out, out_)
+        source, weights = Array(context, builder, table, table_), Array(context, builder, w, w_)
+        target = Array(context, builder, out, out_)
         if states <= FEW:
 
             def product(r: int, j: Any) -> Any:
-                return builder.fmul(source.number(mode_, node_, j, r), weights.number(j), flags=_CONTRACT)
+                return builder.fmul(source.number(mode_, node_, j, r), weights.number(j), flags=CONTRACT)
 
             totals = [
                 _sum(builder, source.number(mode_, node_, states, r), partial(product, r), states, m.literal_value)
@@ -252,7 +214,7 @@ def _sum_columns_in_lanes(typing: Any, out: Any, table: Any, mode: Any, node: An
             return context.get_dummy_value()
 
         def column(vector: Any, begin: int, j: Any) -> Any:
-            return _scaled(builder, source.load(vector, mode_, node_, j, begin), weights.number(j))
+            return scaled(builder, source.load(vector, mode_, node_, j, begin), weights.number(j))
 
         parts = []
         begins = list(range(0, max(states - LANES, 1), WIDEST))  # a few that are left go with the last
@@ -262,173 +224,6 @@ def _sum_columns_in_lanes(typing: Any, out: Any, table: Any, mode: Any, node: An
             parts.append((begin, _sum(builder, first, partial(column, vector, begin), states, m.literal_value)))
         for begin, total in parts:
             target.store(total, begin)
-        return context.get_dummy_value()
-
-    return signature, generate
-
-
-def _size(builder: Any, value: Any) -> Any:
-    """|value| of a number or a vector: without its sign's bit."""
-    bits: Any = ir.IntType(64)
-    mask: Any = 2**63 - 1
-    if isinstance(value.type, ir.VectorType):
-        bits, mask = ir.VectorType(bits, value.type.count), [mask] * value.type.count
-    return builder.bitcast(builder.and_(builder.bitcast(value, bits), ir.Constant(bits, mask)), value.type)
-
-
-def _fold(builder: Any, total: Any, term: Callable[[Any, Any], Any], n: int) -> Any:
-    """``total`` and term(vector, j) for all j < n: in the widest vectors that fit, added up in halves at the end."""
-
-    def add(a: Any, b: Any) -> Any:
-        return builder.fadd(a, b, flags=_CONTRACT)
-
-    width, at, parts = WIDEST, 0, None
-    while width > 1:
-        vector = ir.VectorType(ir.DoubleType(), width)
-        count = (n - at) // width
-        if count:
-            parts = term(vector, at) if parts is None else add(parts, term(vector, at))
-            at += width
-        if count > LONGEST:
-            whole = ir.IntType(64)
-            place = cgutils.alloca_once_value(builder, parts)
-            ends = (ir.Constant(whole, k) for k in (at, at + (count - 1) * width, width))
-            with cgutils.for_range_slice(builder, *ends, intp=whole) as (j, _):
-                builder.store(add(builder.load(place), term(vector, j)), place)
-            parts = builder.load(place)
-            at += (count - 1) * width
-        elif count > 1:
-            for _ in range(count - 1):
-                parts = add(parts, term(vector, at))
-                at += width
-        if parts is not None:
-            lane, nothing = ir.IntType(32), ir.Constant(vector, ir.Undefined)
-            low, high = (
-                ir.Constant(ir.VectorType(lane, width // 2), list(range(begin, begin + width // 2)))
-                for begin in (0, width // 2)
-            )
-            parts = add(builder.shuffle_vector(parts, nothing, low), builder.shuffle_vector(parts, nothing, high))
-        width //= 2
-    if parts is not None:
-        total = add(total, builder.extract_element(parts, ir.Constant(ir.IntType(32), 0)))
-    for j in range(at, n):
-        total = add(total, term(None, j))
-    return total
-
-
-def _products(total: Any, row: Any, w: Any, n: Any, whole: bool) -> Any:
-    """Signature and code of ``total`` and the products of two rows, or (not ``whole``) their sizes."""
-    signature = types.float64(types.float64, row, types.int64, w, n)
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        total_, row_, at_, w_ = arguments[:4]
-        source, weights = _Array(context, builder, row, row_), _Array(context, builder, w, w_)
-
-        def term(vector: Any, j: Any) -> Any:
-            place = builder.add(at_, j if isinstance(j, ir.Value) else ir.Constant(at_.type, j))
-            product = builder.fmul(source.get(vector, place), weights.get(vector, j), flags=_CONTRACT)
-            return product if whole else _size(builder, product)
-
-        return _fold(builder, total_, term, n.literal_value)
-
-    return signature, generate
-
-
-@intrinsic(prefer_literal=True)
-def _dot_in_lanes(typing: Any, total: Any, row: Any, at: Any, w: Any, n: Any) -> Any:
-    return _products(total, row, w, n, True)
-
-
-@intrinsic(prefer_literal=True)
-def _sizes_in_lanes(typing: Any, total: Any, row: Any, at: Any, w: Any, n: Any) -> Any:
-    return _products(total, row, w, n, False)
-
-
-@intrinsic(prefer_literal=True)
-def _spread_in_lanes(typing: Any, total: Any, row: Any, at: Any, w: Any, about: Any, n: Any) -> Any:
-    signature = types.float64(types.float64, row, types.int64, w, about, n)
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        total_, row_, at_, w_, about_ = arguments[:5]
-        source, weights = _Array(context, builder, row, row_), _Array(context, builder, w, w_)
-        middle = _Array(context, builder, about, about_)
-
-        def term(vector: Any, j: Any) -> Any:
-            j = j if isinstance(j, ir.Value) else ir.Constant(at_.type, j)
-            there = middle.get(vector, builder.add(j, ir.Constant(at_.type, 2)))
-            apart = builder.fsub(weights.get(vector, j), there)
-            return builder.fmul(source.get(vector, builder.add(at_, j)), _size(builder, apart), flags=_CONTRACT)
-
-        return _fold(builder, total_, term, n.literal_value)
-
-    return signature, generate
-
-
-@intrinsic
-def _add_products_in_lanes(
-    typing: Any, rows: Any, k: Any, bands: Any, mode: Any, d: Any, offset: Any, first: Any, last: Any
-) -> Any:  # fmt: skip
-    whole = types.int64
-    signature = types.void(rows, whole, bands, whole, whole, whole, whole, whole)
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        rows_, k_, bands_, mode_, d_, offset_, first_, last_ = arguments
-        values, factors = _Array(context, builder, rows, rows_), _Array(context, builder, bands, bands_)
-        index = ir.IntType(64)
-        before = builder.sub(k_, ir.Constant(index, 1))
-        size = builder.sub(last_, first_)
-        middle = builder.add(first_, builder.and_(size, ir.Constant(index, -LANES)))
-        for begin, end, width in ((first_, middle, LANES), (middle, last_, 1)):
-            vector = ir.VectorType(ir.DoubleType(), width) if width > 1 else None
-            step = ir.Constant(index, width)
-            with cgutils.for_range_slice(builder, begin, end, step, intp=index) as (r, _):
-                product = builder.fmul(
-                    factors.get(vector, mode_, d_, r), values.get(vector, before, builder.add(r, offset_)),
-                    flags=_CONTRACT,
-                )  # fmt: skip
-                total = builder.fadd(values.get(vector, k_, r), product, flags=_CONTRACT)
-                if vector is None:
-                    values.put(total, k_, r)
-                else:
-                    values.store(total, k_, r)
-        return context.get_dummy_value()
-
-    return signature, generate
-
-
-@intrinsic(prefer_literal=True)
-def _sum_terms_in_lanes(
-    typing: Any, out: Any, rows: Any, first: Any, last: Any, x: Any, sized: Any, m: Any
-) -> Any:  # fmt: skip
-    signature = types.void(out, rows, first, last, types.float64, sized, m)
-    begin, end, whole, width = first.literal_value, last.literal_value, m.literal_value, sized.literal_value
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        target, source = _Array(context, builder, out, arguments[0]), _Array(context, builder, rows, arguments[1])
-        x_ = arguments[4]
-
-        def term(vector: Any, k: int, at: int) -> Any:
-            value = source.get(vector, k, at)
-            return _size(builder, value) if width else value
-
-        factors = [
-            builder.fmul(x_, ir.Constant(ir.DoubleType(), 1.0 / (k + 1 - begin)), flags=_CONTRACT)
-            for k in range(begin, end)
-        ]
-        at = 0
-        while at < whole:
-            lanes = next(size for size in (WIDEST, LANES, 1) if at + size <= whole)
-            vector = ir.VectorType(ir.DoubleType(), lanes) if lanes > 1 else None
-            total = term(vector, end, at)
-            for k in range(end - 1, begin - 1, -1):
-                factor = factors[k - begin]
-                scaled = _scaled(builder, total, factor) if lanes > 1 else builder.fmul(total, factor, flags=_CONTRACT)
-                total = builder.fadd(scaled, term(vector, k, at), flags=_CONTRACT)
-            if vector is None:
-                target.put(total, at)
-            else:
-                target.store(total, at)
-            at += lanes
         return context.get_dummy_value()
 
     return signature, generate
@@ -475,7 +270,7 @@ def _store_four(typing: Any, D: Any, place: Any, x: Any) -> Any:
 @intrinsic
 def _times_four(typing: Any, a: Any, x: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return _scaled(builder, arguments[1], arguments[0])
+        return scaled(builder, arguments[1], arguments[0])
 
     return _four(types.float64, x), generate
 
@@ -483,22 +278,18 @@ def _times_four(typing: Any, a: Any, x: Any) -> Any:
 @intrinsic
 def _plus_four(typing: Any, y: Any, a: Any, x: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return builder.fadd(arguments[0], _scaled(builder, arguments[2], arguments[1]), flags=_CONTRACT)
+        return builder.fadd(arguments[0], scaled(builder, arguments[2], arguments[1]), flags=CONTRACT)
 
     return _four(y, types.float64, x), generate
 
 
-def _choose(compiled: Any, loops: Callable[..., Any]) -> Any:
+def choose(compiled: Any, loops: Callable[..., Any]) -> Any:
+    """The compiled way, or the loops where nothing is compiled."""
     return loops if numba.config.DISABLE_JIT else compiled
 
 
-sum_rows = _choose(_sum_rows_in_lanes, _sum_rows)
-sum_columns = _choose(_sum_columns_in_lanes, _sum_columns)
-sum_some_rows = _choose(_sum_some_rows_in_lanes, _sum_some_rows)
-sum_terms = _choose(_sum_terms_in_lanes, _sum_terms)
-add_products = _choose(_add_products_in_lanes, _add_products)
-dot = _choose(_dot_in_lanes, _dot)
-sizes = _choose(_sizes_in_lanes, _sizes)
-spread = _choose(_spread_in_lanes, _spread)
-load, store = _choose(_load_four, _load), _choose(_store_four, _store)
-times, plus = _choose(_times_four, _times), _choose(_plus_four, _plus)
+sum_rows = choose(_sum_rows_in_lanes, _sum_rows)
+sum_columns = choose(_sum_columns_in_lanes, _sum_columns)
+sum_some_rows = choose(_sum_some_rows_in_lanes, _sum_some_rows)
+load, store = choose(_load_four, _load), choose(_store_four, _store)
+times, plus = choose(_times_four, _times), choose(_plus_four, _plus)

@@ -49,7 +49,7 @@ def joined(parts: Iterable[str]) -> str:
     """The text of some kernel files in one, with the GPU's markers; a model's functions are there by name."""
     text = assembly.joined(parts, absent=("series.generated",))
     text = re.sub(r"^ +(field|jet|values|jump) = \1_of\(form\)$", "", text, flags=re.MULTILINE)
-    header = r"from nonsmooth\.kernels\.compile\.(?:cache|lanes) import"
+    header = r"from nonsmooth\.kernels\.compile\.(?:cache|lanes|long_sums) import"
     return re.sub(header, "from nonsmooth.kernels.cuda.target import", text)
 
 
@@ -57,5 +57,6 @@ def stamp() -> str:
     """A line that stands for the header: Numba's disk cache goes by the module's text alone, and the header decides how
     it is compiled."""
     room = Path(__file__).parents[1]
-    header = "".join((room / name).read_text(encoding="utf-8") for name in ("cuda/target.py", "compile/lanes.py"))
+    files = ("cuda/target.py", "compile/lanes.py", "compile/long_sums.py")
+    header = "".join((room / name).read_text(encoding="utf-8") for name in files)
     return f"\nHEADER = {hashlib.sha256(header.encode()).hexdigest()!r}\n"

@@ -15,7 +15,7 @@ from typing import Any
 
 from numba import config, cuda
 
-from nonsmooth.kernels.compile.lanes import plain
+from nonsmooth.kernels.compile import lanes, long_sums
 
 __all__ = [
     "REGISTERS", "THREADS", "add_products", "callback", "cuda", "device", "dot", "entry", "inline", "kernel", "local",
@@ -35,10 +35,10 @@ def device(function: Callable[..., Any]) -> Any:
 
 
 inline = once = device
-sum_rows, sum_columns = device(plain.sum_rows), device(plain.sum_columns)
-dot, sizes, spread = device(plain.dot), device(plain.sizes), device(plain.spread)
-sum_some_rows = device(plain.sum_some_rows)
-add_products, sum_terms = device(plain.add_products), device(plain.sum_terms)
+sum_rows, sum_columns = device(lanes.plain.sum_rows), device(lanes.plain.sum_columns)
+sum_some_rows = device(lanes.plain.sum_some_rows)
+dot, sizes, spread = device(long_sums.plain.dot), device(long_sums.plain.sizes), device(long_sums.plain.spread)
+add_products, sum_terms = device(long_sums.plain.add_products), device(long_sums.plain.sum_terms)
 
 
 def local(function: Callable[..., Any]) -> Any:

@@ -9,7 +9,7 @@ moves by its propagators.
 """
 
 from nonsmooth.kernels.compile.cache import device
-from nonsmooth.kernels.compile.lanes import add_products, sum_terms
+from nonsmooth.kernels.compile.long_sums import add_products, sum_terms
 from nonsmooth.kernels.linear.tables import HARMONICS, MANY, ONE, STATES, WAVE, M
 
 ORDER = 22  # of the series: (pi / 2)^23 / 23! is 1e-18

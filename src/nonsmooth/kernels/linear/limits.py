@@ -3,7 +3,7 @@
 from math import fabs
 
 from nonsmooth.kernels.compile.cache import device, inline, once
-from nonsmooth.kernels.compile.lanes import dot
+from nonsmooth.kernels.compile.long_sums import dot
 from nonsmooth.kernels.hybrid.places import LONGEST_STEP
 from nonsmooth.kernels.linear.tables import HARMONICS, MANY, ONE, SIZES, STATES, WAVE, M
 from nonsmooth.kernels.linear.values import EPS, rounding, slope_of, value_of

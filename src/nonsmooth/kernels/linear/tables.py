@@ -27,7 +27,7 @@ every inner loop has constant bounds. Arrays (M columns of w, functionals = indi
 from math import cos, fabs, sin, sqrt
 
 from nonsmooth.kernels.compile.cache import device, inline
-from nonsmooth.kernels.compile.lanes import dot
+from nonsmooth.kernels.compile.long_sums import dot
 
 STATES = 2
 HARMONICS = 1
@@ -42,7 +42,7 @@ GROUP = 8  # nodes up to here, and its multiples, by their own series
 FEWER_TERMS = 18  # enough within the first GROUP nodes
 DEGREE = 7  # of the Taylor polynomials: within 3/4 of a node spacing the remainder is below 1e-16 of the amplitude
 STEP_ANGLE = 1.5707963267948966  # 2 pi / 4: longer is faster, but the polynomials of degree 7 would not reach
-MANY = 8  # states from which on sums over them go in vectors (``lanes``)
+MANY = 8  # states from which on sums over them go in vectors (``long_sums``)
 BANDED = STATES >= 4 * MANY  # and from which on few entries make a series shorter than a propagator (``bands``)
 SIZES = 2 * (M + STATES)  # the place in fun of the sums of value and slope row without signs
 FREE_STEP = 1.0  # a mode without a time scale of its own moves on polynomials: any step is exact

@@ -8,7 +8,8 @@ of it). Many states that move with few others each go by the series of the whole
 from math import fabs
 
 from nonsmooth.kernels.compile.cache import inline
-from nonsmooth.kernels.compile.lanes import dot, sizes, spread, sum_columns, sum_rows, sum_some_rows
+from nonsmooth.kernels.compile.lanes import sum_columns, sum_rows, sum_some_rows
+from nonsmooth.kernels.compile.long_sums import dot, sizes, spread
 from nonsmooth.kernels.linear.bands import STEEP, along, expand
 from nonsmooth.kernels.linear.polynomial import horner
 from nonsmooth.kernels.linear.tables import BANDED, HARMONICS, MANY, NODES, ONE, STATES, WAVE, M

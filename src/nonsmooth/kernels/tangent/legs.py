@@ -20,6 +20,7 @@ from nonsmooth.kernels.compile.lanes import FOUR, load, plus, store
 from nonsmooth.kernels.compile.pointers import function_at
 from nonsmooth.kernels.hybrid.codes import DIVERGED, NO_CONVERGENCE, OK
 from nonsmooth.kernels.hybrid.records import type_of
+from nonsmooth.kernels.series.crossing import NOISE
 from nonsmooth.kernels.tangent.frame import saltation
 
 __all__ = ["ORDER", "Crossing", "Ends", "Equations", "Steps", "cross", "follow", "march_legs"]
@@ -172,7 +173,8 @@ def step_end(C, D, equations, mode, order, s, u, X):
 def fits(field, mode, t, s, work):
     """Return whether the series of the states satisfy the equations on a step s, where they are asked.
 
-    A layer (of a steep tanh) that the step reaches far from its begin shows in none of their terms."""
+    A layer (of a steep tanh) that the step reaches far from its begin shows in none of their terms. What rounding does
+    to the equations does not count: where they balance, a state is all rounding."""
     C, at, f = work.C, work.X[0], work.Y[0]
     n_u, order = work.u.shape[0], C.shape[1] - 1
     for place in range(1, PLACES + 1):
@@ -189,9 +191,29 @@ def fits(field, mode, t, s, work):
                 slope = slope * x + k * C[i, k]
             for k in range(order // 2):
                 top = max(top, fabs(C[i, k]) * work.powers[k])
-            if not (fabs((slope - f[i]) * s) <= AGREES * top):
+            if fabs((slope - f[i]) * s) <= AGREES * top:
+                continue
+            if not (fabs(slope - f[i]) <= rounding(field, mode, t + x, i, work) < inf):
                 return False
     return True
+
+
+@device
+def rounding(field, mode, t, i, work):
+    """Size of what rounding of the time and the states does to f_i at the point where the equations are asked."""
+    at, f, q = work.X[0], work.Y[0], work.q
+    here = f[i]
+    total = NOISE * fabs(here)
+    for j in range(work.u.shape[0]):
+        kept = at[j]
+        at[j] = kept * (1.0 + NOISE)
+        field(mode, t, at, q, f)
+        total += fabs(f[i] - here)
+        at[j] = kept
+    field(mode, t * (1.0 + NOISE), at, q, f)
+    total += fabs(f[i] - here)
+    field(mode, t, at, q, f)
+    return total
 
 
 @device
