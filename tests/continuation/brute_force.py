@@ -18,6 +18,7 @@ NEAR = 0.3  # of the size of the orbit at the end: farther off it is another orb
 NEARER = 0.6  # an orbit that the end belongs to comes nearer by this factor from one distance to the next
 STARTS = 24
 SOLVED = 1e-8
+AT_SECTION = 1e-9  # of the period: an impact as near to the section lies on either side of it
 SAME = 1e-3  # nearer to the branch itself, between two of its points, is the branch
 
 
@@ -122,7 +123,11 @@ def misses(system: ns.System, branch: xr.Dataset, name: str, count: int = 12) ->
         if i in special or np.abs(point["floquet_multipliers"].values).max() > 100:
             continue
         same, mode = system.with_parameters({name: float(point[name])}), system.modes[int(point["mode"])]
-        run = ns.simulate(same, duration=float(point["period"]), start=point["section"].values, mode=mode)
+        period = float(point["period"])
+        run = ns.simulate(same, duration=period, start=point["section"].values, mode=mode)
+        at = run["crossing_time"].values
+        if (np.minimum(np.abs(at), np.abs(at - period)) < AT_SECTION * period).any():
+            continue  # before the impact or behind it
         missed = np.abs(run["u"].values[-1] - point["section"].values) / system.scale_vector()
         worst = max(worst, float(np.nanmax(missed)))
     return worst
