@@ -1,4 +1,4 @@
-"""Branches of orbits with impacts that accumulate: what rounding decides in the last impacts before rest ends nothing."""
+"""Branches of orbits with impacts that accumulate: what rounding decides in the last ones before rest ends nothing."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ def followed(template: str, seed: int, low: float, high: float, **begin: float) 
 
 
 def test_lift_off_that_is_only_solved_for_is_no_graze() -> None:
-    """Where rest ends, gap, speed and push vanish together: the path begins behind it by what the orbit is solved for."""
+    """Gap, speed and push vanish together at lift-off: the path begins behind it by what the orbit is solved for."""
     branch = followed("rest", 8, 1.05, 1.7)
     assert branch.sizes["special"] == 0
 
 
 def test_beyond_the_end_of_rest_every_distance_has_another_signature() -> None:
-    """Where rest ends impacts accumulate: orbits beyond come nearer in proportion, each with another count of them."""
+    """Impacts accumulate there: orbits beyond come nearer in proportion, each with another count of them."""
     followed("rest", 3, 1.26, 1.58215)
 
 

@@ -230,7 +230,7 @@ class Unseen(Boundary):
 
 
 #: In the order of ``Path.margins``: what explains the others first.
-BOUNDARIES = tuple(kind(i) for i, kind in enumerate((Short, Slow, Own, Touch, Others, Landed)))
+BOUNDARIES = (Short(0), Slow(1), Own(2), Touch(3), Others(4), Landed(5))
 
 
 def passed_by(step: Step) -> list[Met]:
