@@ -10,6 +10,7 @@ import xarray as xr
 from test_random_branches import endings
 
 import nonsmooth as ns
+from nonsmooth.continuation.march.begin import curve_of
 
 
 def followed(template: str, seed: int, low: float, high: float, **begin: float) -> xr.Dataset:
@@ -26,9 +27,18 @@ def followed(template: str, seed: int, low: float, high: float, **begin: float) 
 
 
 def test_lift_off_that_is_only_solved_for_is_no_graze() -> None:
-    """Gap, speed and push vanish together at lift-off: the path begins behind it by what the orbit is solved for."""
-    branch = followed("rest", 8, 1.05, 1.7)
-    assert branch.sizes["special"] == 0
+    """Gap, speed and push vanish together at lift-off: behind it the push is zero to what the orbit is solved for."""
+    system, name, limits, start = templates.rest(np.random.default_rng([8, 4]))
+    orbit = ns.find_orbit(system, start=start, progress=False)
+    curve, X = curve_of(orbit, name, limits[1] - limits[0])
+    solved = curve.shooting.evaluate(X)
+    states = curve.shooting.split(X)[1].copy()
+    lifts = len(states) - 1
+    assert solved.times[lifts] == orbit.crossing_times[-1]
+    for early in (1e-13, 1e-12, 1e-11):
+        solved.times[lifts] = orbit.crossing_times[-1] - early
+        path = curve.walk.along(solved, states)
+        assert not np.isfinite(path.inner[lifts, 2]), early
 
 
 def test_beyond_the_end_of_rest_every_distance_has_another_signature() -> None:

@@ -109,7 +109,7 @@ def test_a_circle_closes_with_two_folds() -> None:
 
 
 def test_a_branch_that_comes_back_in_another_word_closes() -> None:
-    """The part of a point that all words have tells it: the last point lies beside the first, to the order of the chord's arc."""
+    """The part of a point that all words have tells it: the last one lies beside the first, by the arc of a chord."""
     curve = circle()
     first = curve.at_parameter(np.array([-0.8, 0.6]) / curve.scale, 0.6).facing(1.0)
     found = march(curve, first, Limits(((-1, -4.0, 4.0),), 0.05, 500, ("another word", np.empty(0), first.Y)))

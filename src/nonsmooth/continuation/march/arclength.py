@@ -134,11 +134,11 @@ class Curve(ABC, Generic[P]):
         return None
 
     def seen(self, point: P) -> FloatArray:
-        """What points of all curves of one branch have, whatever their word, scaled."""
+        """The part of a point that curves of one branch have whatever their word, scaled."""
         return point.Y
 
     def landmark(self, point: P) -> Place:
-        """What tells that a branch comes back to a point."""
+        """The place by which a branch that comes back to a point is told."""
         return self.word(), point.X, self.seen(point)
 
     def margins(self, point: P) -> FloatArray:
