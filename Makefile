@@ -40,10 +40,10 @@ altered: $(VENV)/.compiled-test  ## alter bytes of 400 saved files of each forma
 	$(BIN)/python -m pytest -m slow tests/results/test_altered_bytes.py -s
 
 coverage: $(VENV)/.compiled-run  ## identify 40 virtual rigs; writes docs/measured_coverage.md
-	$(BIN)/python -m nonsmooth.studies.savi2007.identification.coverage --seeds 0-39 --out docs/measured_coverage.md
+	$(BIN)/python -m tests.studies.identification.coverage --seeds 0-39 --out docs/measured_coverage.md
 
 coverage-awkward: $(VENV)/.compiled-run  ## the same on rigs where much goes wrong; writes docs/measured_coverage_awkward.md
-	$(BIN)/python -m nonsmooth.studies.savi2007.identification.coverage --awkward --seeds 0-39 --out docs/measured_coverage_awkward.md
+	$(BIN)/python -m tests.studies.identification.coverage --awkward --seeds 0-39 --out docs/measured_coverage_awkward.md
 
 coverage-fit: $(VENV)/.compiled-test  ## fit ten systems to data of SciPy, 40 seeds each; writes docs/measured_coverage_fit.md
 	$(BIN)/python -m tests.identification.fit_coverage --seeds 0-39 --out docs/measured_coverage_fit.md

@@ -179,7 +179,7 @@ def test_two_tabs_do_not_disturb_each_other(page: Any, server: Any, new_page: Ca
     other.until_done()
     assert (page.readout()["motion"], other.readout()["motion"]) == ("period 4", "period 1")
     for one in (page, other):
-        assert re.fullmatch(r"\d+ tabs share this machine", one.tab.inner_text("#tabs"))
+        assert re.fullmatch(r"\d+ tabs", one.tab.inner_text("#tabs"))
     other.tab.context.close()
     page.until("document.getElementById('tabs').hidden")
 

@@ -14,10 +14,10 @@ import reference_values as known
 import nonsmooth as ns
 from nonsmooth import plot
 from nonsmooth.studies.savi2007 import Reproduction
-from nonsmooth.studies.savi2007.branches import BEGINNINGS, branches, branches_of
-from nonsmooth.studies.savi2007.pages import to_markdown
+from nonsmooth.studies.savi2007.figures.branches import BEGINNINGS, branches, branches_of
 from nonsmooth.studies.savi2007.printed import FIGURE_9, FIGURE_10, FIGURE_17
-from nonsmooth.studies.savi2007.special import SpecialPoint, ratios, special_table, table_of_points
+from nonsmooth.studies.savi2007.report.pages import to_markdown
+from nonsmooth.studies.savi2007.report.special import SpecialPoint, ratios, special_table, table_of_points
 
 GRAZES = {"fig09": (FIGURE_9, 2), "fig10": (FIGURE_10, 2), "fig17": (FIGURE_17, 1)}
 

@@ -8,7 +8,7 @@ import xarray as xr
 
 import nonsmooth as ns
 from nonsmooth.studies.savi2007 import grazing_frequencies
-from nonsmooth.studies.savi2007.claims_response import main_jump, small_jump
+from nonsmooth.studies.savi2007.claims.response import main_jump, small_jump
 from nonsmooth.studies.savi2007.grazing import free_amplitude, steady_state
 from nonsmooth.studies.savi2007.measure import UNSETTLED, Interval, changes, regimes, separation_rate
 from nonsmooth.studies.savi2007.printed import FIGURE_9, FIGURE_10, FIGURE_17

@@ -10,9 +10,9 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.studies.savi2007 import reproduce
-from nonsmooth.studies.savi2007.charts import CHARTS, curves, grid_of
-from nonsmooth.studies.savi2007.claims_basins import f13_basins, f17_basins
-from nonsmooth.studies.savi2007.coexisting import names_of
+from nonsmooth.studies.savi2007.claims.basins import f13_basins, f17_basins
+from nonsmooth.studies.savi2007.figures.charts import CHARTS, curves, grid_of
+from nonsmooth.studies.savi2007.figures.coexisting import names_of
 from nonsmooth.studies.savi2007.flows import Settings
 from nonsmooth.studies.savi2007.study import figures_of_the_study
 

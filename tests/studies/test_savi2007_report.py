@@ -14,13 +14,13 @@ import nonsmooth as ns
 from nonsmooth.recordings.session import load_session
 from nonsmooth.studies.savi2007 import Reproduction, reproduce, study
 from nonsmooth.studies.savi2007.bench import Bench
-from nonsmooth.studies.savi2007.claims import CLAIMS
+from nonsmooth.studies.savi2007.claims.claims import CLAIMS
+from nonsmooth.studies.savi2007.claims.verdicts import Verdict
 from nonsmooth.studies.savi2007.findings import estimates_of
 from nonsmooth.studies.savi2007.finished import finish, finished, just_made
 from nonsmooth.studies.savi2007.flows import Settings
 from nonsmooth.studies.savi2007.printed import TABLE_1
 from nonsmooth.studies.savi2007.study import figures_of_the_study
-from nonsmooth.studies.savi2007.verdicts import Verdict
 
 NUMBERS = {2, *range(4, 19)}
 MEASURED = {*range(4, 15), 16, 17, 18}

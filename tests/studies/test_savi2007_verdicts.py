@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from nonsmooth.studies.savi2007.claims.rows import Cell, Row, against_printed, printed_cell
+from nonsmooth.studies.savi2007.claims.verdicts import MEANING, RULE, Beside, Cause, Verdict, judge, judge_step
 from nonsmooth.studies.savi2007.findings import Number
 from nonsmooth.studies.savi2007.flows import Settings
 from nonsmooth.studies.savi2007.measure import Interval
-from nonsmooth.studies.savi2007.pages import to_html, to_markdown
 from nonsmooth.studies.savi2007.printed import NATURAL_FREQUENCY, TABLE_1, Printed
-from nonsmooth.studies.savi2007.report import write_report
-from nonsmooth.studies.savi2007.rows import Cell, Row, against_printed, printed_cell
-from nonsmooth.studies.savi2007.verdicts import MEANING, RULE, Beside, Cause, Verdict, judge, judge_step
+from nonsmooth.studies.savi2007.report.pages import to_html, to_markdown
+from nonsmooth.studies.savi2007.report.report import write_report
 
 
 def _known(value: float, expanded: float) -> Interval:
@@ -146,7 +146,7 @@ def test_the_page_is_whole_by_itself(tmp_path: Path) -> None:
 
 
 def test_what_a_cell_holds_is_text() -> None:
-    from nonsmooth.studies.savi2007.pages import Table
+    from nonsmooth.studies.savi2007.report.pages import Table
 
     table = Table(("a", "b"), (("<b>", "x | y"),), ("<i>",))
     assert "<b>" not in to_html([table], "t").partition("<body>")[2]

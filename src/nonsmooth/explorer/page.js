@@ -120,7 +120,7 @@
         return [dot, text];
       }));
     $("tabs").hidden = ui.tabs < 2;
-    $("tabs").textContent = `${ui.tabs} tabs share this machine`;
+    $("tabs").textContent = `${ui.tabs} tabs`;
     tabs(ui);
     parameters(ui);
     root.classList.toggle("dark", ui.dark);

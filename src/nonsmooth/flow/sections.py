@@ -46,7 +46,8 @@ class Poincare:
     indicator : str
         Name of the indicator.
     rising : bool or None
-        Through zero upwards, downwards, or (None) both.
+        Through zero upwards, downwards, or (None) both. A motion that comes to the surface and slides or rests on it
+        has passed it when it arrives, not when it leaves; an impact passes it both upwards and downwards.
     mode : str, optional
         Count it in this mode only.
     side : str

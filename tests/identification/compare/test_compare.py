@@ -169,8 +169,10 @@ def test_a_comparison_is_kept_whole(tmp_path: Path) -> None:
 
 def test_what_cannot_be_compared_is_refused() -> None:
     motion = record(MODEL.with_parameters(RUN, g=0.0009), 20.0)
-    with pytest.raises(TypeError, match="measured_motion"):
+    with pytest.raises(TypeError, match="motion_of.*measured_motion.*nonsmooth.fit"):
         compare("recording.csv", MODEL)
+    with pytest.raises(ValueError, match="states are x, those of the theory x, v: name them so; .*nonsmooth.fit"):
+        compare(motion.isel(state=[0]), MODEL)
     with pytest.raises(TypeError, match="System or a result"):
         compare(motion, 3)
     with pytest.raises(ValueError, match="standard error of the measured states is not known"):

@@ -32,12 +32,14 @@ def test_a_rule_has_an_uncertainty_of_its_own() -> None:
 def test_along_a_diagram_the_error_of_a_rule_stays() -> None:
     """g follows rho; a drawn system is off its rule by the same error at every point of the diagram."""
     from nonsmooth.identification.compare.diagram import _marched
+    from nonsmooth.identification.compare.model import Model
 
     rule = read_settings({"g": (lambda p: p["rho"] / 10, 1e-3)}, MODEL)
     base = nominal(MODEL, None, rule).with_parameters(omega=9.0, rho=0.1)
     drawn = base.with_parameters(g=0.01 + 2e-3)
     grid = np.array([0.05, 0.1])
-    sections, _ = _marched(drawn, "rho", grid, rule, ["up"], 300, 4, {})
+    model = Model(MODEL, None, rule, transient=300, draws=0, level=0.95, seed=0, options={})
+    sections, _ = _marched(drawn, model, "rho", grid, ["up"], 4, 0.0)
     for i, rho in enumerate(grid):
         alone = ns.poincare(base.with_parameters(rho=rho, g=rho / 10 + 2e-3), n=1, transient=600)["section"].values
         np.testing.assert_allclose(sections[0, i, -1], alone[0], atol=1e-9)

@@ -13,6 +13,7 @@ from nonsmooth.identification.compare import (
     measured_response,
     measured_rise,
     measured_sections,
+    motion_of,
 )
 from nonsmooth.identification.compare import measured as module
 from nonsmooth.recordings import Recording, load_session
@@ -187,3 +188,29 @@ def test_a_long_record_is_smoothed_as_a_short_one(session: object, monkeypatch: 
     away = (quick["u"] - whole["u"]) / whole["u_error"]
     assert float(np.sqrt((away**2).mean())) < 0.2
     np.testing.assert_allclose(quick["u_error"].median("time"), whole["u_error"].median("time"), rtol=0.2)
+
+
+def test_a_sampled_position_of_another_rig_is_compared() -> None:
+    """The forced oscillator in closed form, sampled with noise; a damper of another size moves it by what that says."""
+    m, k, F, w, noise = 2.0, 50.0, 3.0, 4.0, 1e-4
+    t = np.arange(0, 30, 1 / 60)
+
+    def amplitude(c: float) -> complex:
+        return F / (k - m * w**2 + 1j * c * w)
+
+    q = np.real(amplitude(1.5) * np.exp(1j * w * t)) + noise * np.random.default_rng(0).normal(size=len(t))
+    measured = motion_of(t, xr.DataArray(q, attrs={"units": "m"}), w * t / (2 * np.pi), states=("q", "r"))
+    assert measured["state_unit"].values.tolist() == ["m", "m/s"]
+    system = ns.System(
+        name="forced oscillator", states={"q": "m", "r": "m/s"}, parameters={"c": 1.5},
+        modes={"free": lambda t, u, p: (u.r, (F * np.cos(w * t) - k * u.q - p.c * u.r) / m)},
+    )  # fmt: skip
+    found = ns.compare(measured, system)
+    assert int(found["period_agrees"]) == 1 and float(found["orbit_distance"]) < 2e-3
+    other = ns.compare(measured, system, settings={"c": 4.5})
+    orbit = other["measured_orbit"].values[:, 0] + 1j * other["measured_orbit"].values[:, 1] / w
+    apart = other["theory_orbit"].values[:, 0] + 1j * other["theory_orbit"].values[:, 1] / w - orbit
+    true = abs(amplitude(4.5) - amplitude(1.5)) / abs(amplitude(1.5))
+    assert np.mean(np.abs(apart)) / np.mean(np.abs(orbit)) == pytest.approx(true, rel=2e-3)
+    with pytest.raises(ValueError, match="one finite number for each of 1800 samples"):
+        motion_of(t, q, [0.0, 1.0])

@@ -4,12 +4,12 @@ import shutil
 
 import numpy as np
 import pytest
+from tests.studies.identification.coverage_tables import unnamed
 
 import nonsmooth as ns
 from nonsmooth.recordings import load_session
 from nonsmooth.recordings.recording import RecordingWarning
 from nonsmooth.studies.savi2007.comparison import gap_offset, gap_reference, session_measurement
-from nonsmooth.studies.savi2007.identification.coverage_tables import unnamed
 from nonsmooth.studies.savi2007.rig import VirtualRig, sensors
 from nonsmooth.studies.savi2007.rig.motor import mean_position
 

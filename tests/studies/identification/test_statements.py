@@ -1,14 +1,11 @@
 """Values of a model and statements about them: the set for a model, required parameters, report, coverage tables."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
-
-import nonsmooth as ns
-from nonsmooth.identification.finding import Estimate, Finding
-from nonsmooth.identification.parameter_set import ParameterSet
-from nonsmooth.identification.report import report
-from nonsmooth.studies.savi2007.identification.coverage import drive_mean
-from nonsmooth.studies.savi2007.identification.coverage_tables import (
+from tests.studies.identification.coverage import drive_mean
+from tests.studies.identification.coverage_tables import (
     ASKED,
     BESIDE,
     misses,
@@ -17,6 +14,11 @@ from nonsmooth.studies.savi2007.identification.coverage_tables import (
     to_dataset,
     unnamed,
 )
+
+import nonsmooth as ns
+from nonsmooth.identification.finding import Estimate, Finding
+from nonsmooth.identification.parameter_set import ParameterSet
+from nonsmooth.identification.report import report
 from nonsmooth.studies.savi2007.identification.gap import mean_of_drive
 from nonsmooth.studies.savi2007.identification.statements import for_model, require
 
@@ -134,3 +136,11 @@ def test_an_awkward_rig_has_its_anomalies_counted_in_the_notes():
 def test_the_campaigns_own_mean_of_the_drive():
     truth = {"ripple": 0.01, "ripple_phase": 0.7, "string_length": 0.8}
     assert drive_mean(truth, 0.039) == pytest.approx(mean_of_drive(0.039, 0.8, 0.01, 0.7), abs=1e-6)
+
+
+@pytest.mark.parametrize("page_of", ["measured_coverage.md", "measured_coverage_awkward.md"])
+def test_the_committed_pages_have_every_row_of_the_program(page_of: str) -> None:
+    lines = (Path(__file__).parents[3] / "docs" / page_of).read_text(encoding="utf-8").splitlines()
+    named = [line.split("|")[1].strip() for line in lines if line.startswith("| ")]
+    assert [name for name in named if name in ASKED] == list(ASKED)
+    assert [name for name in named if name in BESIDE] == list(BESIDE)

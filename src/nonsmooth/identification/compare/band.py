@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.compare.clouds import energy_distance
+from nonsmooth.identification.compare.model import Model
 from nonsmooth.identification.compare.orbits import common_length, orbit_distance
 from nonsmooth.identification.compare.predict import Attractor, Motions
 
@@ -22,26 +22,16 @@ POINTS = 500  # of the clouds whose distance is taken for each draw
 
 
 def motion_band(
-    systems: list[System],
-    nearest: Attractor,
-    sections: list[FloatArray],
-    phases: list[float],
-    noise: FloatArray,
-    scale: FloatArray,
-    closed: tuple[FloatArray, FloatArray] | None,
-    *,
-    level: float,
-    seed: int,
-    grid: int,
-    transient: int,
-    max_period: int,
-    options: Mapping[str, Any],
-) -> dict[str, Any]:
+    systems: list[System], model: Model, nearest: Attractor, sections: list[FloatArray], phases: list[float],
+    noise: FloatArray, scale: FloatArray, closed: tuple[FloatArray, FloatArray] | None, *, grid: int, max_period: int,
+) -> dict[str, Any]:  # fmt: skip
     """Carry the nearest motion on to each drawn system, and say how the prediction spreads.
 
     Parameters
     ----------
     systems : list of System
+        As the model has drawn them.
+    model : Model
     nearest : Attractor
         The nominal motion; each drawn system begins on it.
     sections : list of array (n, states)
@@ -54,13 +44,15 @@ def motion_band(
     A draw with another period number has another motion, not a point of the band: ``band_share`` says how many kept
     theirs.
     """
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(model.seed)
     draws = len(systems)
     numbers = np.zeros(draws, dtype=np.int64)
     distances = np.full((draws, len(phases)), np.nan)
     to_measured = np.full(draws, np.nan)
     orbits: list[FloatArray] = []
-    motions = Motions(systems, transient=transient, keep=64, max_period=max_period, options=options)
+    motions = Motions(
+        systems, transient=model.transient, keep=64, max_period=max_period, options=model.options
+    )
     for i in range(draws):
         (one,) = motions.attractors(i, nearest.point)
         numbers[i] = one.period_number
@@ -87,7 +79,7 @@ def motion_band(
         "long_name": "share of the draws that keep the period; these make the band"})  # fmt: skip
     if orbits:
         stack = np.stack(orbits)
-        low, middle, high = np.quantile(stack, [(1 - level) / 2, 0.5, (1 + level) / 2], axis=0)
+        low, middle, high = np.quantile(stack, model.quantiles, axis=0)
         for word, values in (("low", low), ("median", middle), ("high", high)):
             variables[f"theory_{word}"] = (("phase", "state"), values, {"long_name": f"{word} of the band"})
         inside = ((closed[0] >= low) & (closed[0] <= high)).mean(axis=0)

@@ -9,7 +9,8 @@ import numpy as np
 
 from nonsmooth.flow.arguments import real_number, whole_number
 from nonsmooth.identification.blas import one_blas_thread
-from nonsmooth.identification.compare.draws import nominal, read_settings
+from nonsmooth.identification.compare.draws import read_settings
+from nonsmooth.identification.compare.model import Model
 from nonsmooth.system.names import unknown
 
 if TYPE_CHECKING:
@@ -21,6 +22,14 @@ if TYPE_CHECKING:
 __all__ = ["compare"]
 
 DRAWS = 60
+READINGS = (
+    "where some states were not measured, nonsmooth.fit(system, recording, [...]) lays the others over the model, and "
+    "its `residuals` show where they part"
+)
+FORMS = (
+    "nonsmooth.identification.compare.motion_of(time, x, phase) makes one of a sampled position, and measured_motion "
+    f"of a rig with a rotary sensor and a photogate; {READINGS}"
+)
 NEGLIGIBLE = 1e-4  # relative uncertainties of settings below this ask for no band
 
 
@@ -51,8 +60,8 @@ def compare(
     What is compared follows from what ``measured`` holds:
 
     - a **motion**: ``u(time, state)`` with ``phase(time)`` in forcing periods (and ``u_error``), as
-      :func:`nonsmooth.identification.compare.measured_motion` makes it from a recording; or its section points alone,
-      ``section(iterate, state)``;
+      :func:`nonsmooth.identification.compare.motion_of` makes it of a sampled position, and ``measured_motion`` of a
+      recording of the paper's rig; or its section points alone, ``section(iterate, state)``;
     - a **response**: ``amplitude`` over ``run`` with the parameter (``omega``) and ``direction`` of each, or a result
       of ``frequency_response``;
     - a **diagram**: ``section(<parameter>, iterate, state)`` of steady runs, or ``section(iterate, state)`` with the
@@ -138,8 +147,7 @@ def compare(
 
     if not isinstance(measured, xr.Dataset):
         raise TypeError(
-            f"compare takes a Dataset of measured signals, not {type(measured).__name__}; make one from a recording "
-            "with nonsmooth.identification.compare.measured_motion"
+            f"compare takes a Dataset of measured signals, not {type(measured).__name__}: {FORMS}"
         )
     from nonsmooth.system.system import System
 
@@ -159,25 +167,22 @@ def compare(
         raise ValueError(f"level = {level!r} must lie between 0 and 1, as 0.95")
     kind = _kind(measured, parameter)
     states = _states(measured, theory)
-    shared: dict[str, Any] = {
-        "parameters": parameters, "settings": set_, "transient": whole_number(transient, "transient", 0),
-        "draws": draws, "level": level, "seed": seed, "options": options,
-    }  # fmt: skip
+    model = Model(theory, parameters, set_, whole_number(transient, "transient", 0), draws, level, seed, options)
     squeeze: tuple[str, ...] = ()
     if kind == "response":
         from nonsmooth.identification.compare.response import compare_response
 
         name = _parameter(parameter or "omega", theory)
-        variables = compare_response(measured, theory, name=name, state=states[0], **shared)
+        variables = compare_response(measured, model, name=name, state=states[0])
     elif kind == "diagram":
         from nonsmooth.identification.compare.diagram import compare_diagram
 
-        name = _parameter(parameter or _swept(measured, theory), theory)
+        name = _parameter(parameter or _swept(measured), theory)
         if direction not in ("up", "down", "both"):
             raise ValueError(f"direction = {direction!r}; allowed: 'up', 'down', 'both'")
         variables = compare_diagram(
-            measured, theory, name=name, noise=_noise(measured, noise, states), direction=direction, values=values,
-            phase=real_number(section_phase, "section_phase"), max_period=max_period, **shared,
+            measured, model, name=name, noise=_noise(measured, noise, states), direction=direction, values=values,
+            phase=real_number(section_phase, "section_phase"), max_period=max_period,
         )  # fmt: skip
     else:
         from nonsmooth.identification.compare.motion import compare_motion
@@ -187,9 +192,9 @@ def compare(
             raise ValueError("measured section points are of one phase: give section_phase as one number")
         squeeze = ("section_phase",) if np.ndim(section_phase) == 0 else ()
         variables = compare_motion(
-            measured, theory, noise=_noise(measured, noise, states), states=states, start=start, phases=phases,
+            measured, model, noise=_noise(measured, noise, states), states=states, start=start, phases=phases,
             grid=whole_number(grid, "grid", 8), max_period=whole_number(max_period, "max_period", 1),
-            splits=whole_number(splits, "splits", 20), **shared,
+            splits=whole_number(splits, "splits", 20),
         )  # fmt: skip
         variables["section_phase"] = (("section_phase",), np.array(phases), {
             "long_name": "phase of the section", "units": "forcing periods"})  # fmt: skip
@@ -199,7 +204,7 @@ def compare(
         "section_phase": section_phase, "grid": grid, "transient": transient, "max_period": max_period,
         "draws": draws, "level": level, "splits": splits, "seed": seed, **options,
     }  # fmt: skip
-    result = _dataset(variables, measured, theory, parameters, set_, kind, given, seed)
+    result = _dataset(variables, measured, model, kind, given)
     return result.squeeze([dim for dim in squeeze if dim in result.dims])
 
 
@@ -210,7 +215,7 @@ def _kind(measured: xr.Dataset, parameter: str | None) -> str:
         if "phase" not in measured:
             raise ValueError(
                 "a measured motion needs `phase` (of the drive, in forcing periods) over time beside `u`; see "
-                "nonsmooth.identification.compare.measured_motion"
+                "nonsmooth.identification.compare.motion_of"
             )
         return "motion"
     if "section" in measured:
@@ -219,7 +224,7 @@ def _kind(measured: xr.Dataset, parameter: str | None) -> str:
         return "motion"
     raise ValueError(
         "nothing here can be compared: a motion holds `u` over time with `phase`, or `section` over iterate; a "
-        f"response `amplitude`; this Dataset holds {', '.join(map(str, measured.data_vars)) or 'nothing'}"
+        f"response `amplitude`; this Dataset holds {', '.join(map(str, measured.data_vars)) or 'nothing'}; {FORMS}"
     )
 
 
@@ -231,7 +236,10 @@ def _states(measured: xr.Dataset, theory: Any) -> list[str]:
         raise ValueError(f"`state` must name the measured states; the theory has {', '.join(known)}")
     held = [str(name) for name in np.atleast_1d(measured["state"].values)]
     if held != known and not ("amplitude" in measured and held[0] in known):
-        raise ValueError(f"the measured states are {', '.join(held)}, those of the theory {', '.join(known)}")
+        raise ValueError(
+            f"the measured states are {', '.join(held)}, those of the theory {', '.join(known)}: name them so; "
+            f"{READINGS}"
+        )
     return held
 
 
@@ -266,7 +274,7 @@ def _parameter(name: str, theory: Any) -> str:
     return name
 
 
-def _swept(measured: xr.Dataset, theory: Any) -> str:
+def _swept(measured: xr.Dataset) -> str:
     others = [str(dim) for dim in measured["section"].dims if dim not in ("iterate", "state")]
     if len(others) != 1:
         raise ValueError(f"which parameter the sections lie along is not clear ({others}): give parameter=")
@@ -274,9 +282,8 @@ def _swept(measured: xr.Dataset, theory: Any) -> str:
 
 
 def _dataset(
-    variables: dict[str, Any], measured: xr.Dataset, theory: Any, parameters: Any, settings: Any, kind: str,
-    given: dict[str, Any], seed: int,
-) -> xr.Dataset:  # fmt: skip
+    variables: dict[str, Any], measured: xr.Dataset, model: Model, kind: str, given: dict[str, Any]
+) -> xr.Dataset:
     import xarray as xr
 
     from nonsmooth.results.labels import labels_of
@@ -289,14 +296,14 @@ def _dataset(
         with_short_record,
     )
 
-    if hasattr(theory, "data_vars"):
-        record = read_provenance(theory) | {"verb": "compare", "options": options_as_data(given), "seed": seed}
+    theory = model.theory
+    if model.system is None:
+        record = read_provenance(theory) | {"verb": "compare", "options": options_as_data(given), "seed": model.seed}
         states = {str(n): str(u) for n, u in zip(theory["state"].values, theory["state_unit"].values, strict=True)}
     else:
-        system = nominal(theory, parameters, settings)
-        labels = labels_of(system)
+        labels = labels_of(model.system)
         method = str(given.get("method", "auto"))
-        record = read_provenance(xr.Dataset(attrs=provenance(labels, "compare", given, method=method, seed=seed)))
+        record = read_provenance(xr.Dataset(attrs=provenance(labels, "compare", given, method=method, seed=model.seed)))
         states = {name: quantity.unit for name, quantity in labels.states.items()}
         for name, quantity in labels.parameters.items():
             if name not in variables:

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.identification.compare.draws import Settings, draw_systems, drawn_variables, nominal
 from nonsmooth.identification.compare.flips import Flip, delayed_flips
+from nonsmooth.identification.compare.model import Model
 from nonsmooth.identification.compare.periods import flips, measured_period, period_numbers
 from nonsmooth.identification.compare.predict import Motions
 
@@ -27,36 +27,21 @@ KEEP = 64
 
 
 def compare_diagram(
-    measured: xr.Dataset,
-    theory: Any,
-    *,
-    parameters: Any,
-    settings: Settings,
-    name: str,
-    noise: FloatArray,
-    direction: str,
-    values: FloatArray | None,
-    phase: float,
-    transient: int,
-    max_period: int,
-    draws: int,
-    level: float,
-    seed: int,
-    options: dict[str, Any],
-) -> dict[str, Any]:
+    measured: xr.Dataset, model: Model, *, name: str, noise: FloatArray, direction: str, values: FloatArray | None,
+    phase: float, max_period: int,
+) -> dict[str, Any]:  # fmt: skip
     """The variables of the comparison, ``{name: (dims, values, attributes)}``; see :func:`compare` for each."""
     at, points, numbers = _measured(measured, name, noise, max_period)
     unit = measured[name].attrs.get("units", "1")
     grid = np.linspace(at.min(), at.max(), FINE) if values is None else np.asarray(values, dtype=float)
-    is_system = not hasattr(theory, "data_vars")
-
     words = ["up", "down"] if direction == "both" else [direction]
 
     def diagram(system: System) -> tuple[FloatArray, NDArray[np.int64]]:
-        return _marched(system, name, grid, settings, words, transient, max_period, options, phase)
+        return _marched(system, model, name, grid, words, max_period, phase)
 
-    if is_system:
-        sections, periods = diagram(nominal(theory, parameters, settings))
+    theory = model.theory
+    if model.system is not None:
+        sections, periods = diagram(model.system)
     else:
         grid = np.asarray(theory[name].values, dtype=float)
         words = np.atleast_1d(theory["direction"].values).astype(str).tolist()
@@ -74,41 +59,42 @@ def compare_diagram(
         "direction": (("direction",), np.array(words), {"long_name": "direction of the sweep"}),
     }  # fmt: skip
     drawn_flips: list[dict[str, float]] = []
-    if is_system and draws:
-        systems, drawn = draw_systems(theory, parameters, settings, draws, seed)
+    if model.system is not None and model.draws:
+        systems, drawn = model.drawn()
         lows, highs = [], []
         for one in systems:
             cloud, counts = diagram(one)
             lows.append(cloud[0].min(axis=1))
             highs.append(cloud[0].max(axis=1))
             drawn_flips.append(flips(grid, counts[0]))
-        q = (1 - level) / 2
+        q, _, _ = model.quantiles
         for word, stack, at_q in (("low", lows, q), ("high", highs, 1 - q)):
             variables[f"theory_{word}"] = ((name, "state"), np.nanquantile(np.stack(stack), at_q, axis=0), {
                 "long_name": f"{word} edge of the section points for drawn parameters"})  # fmt: skip
-        variables |= drawn_variables(drawn, theory)
+        variables |= drawn
     if name in measured["section"].dims:  # steady runs: a flip lies between two of them
         seen = {word: Flip(place, np.nan, place) for word, place in flips(at, numbers).items()}
     else:
         seen = delayed_flips(at, points, noise, numbers)
         variables["rise_per_return"] = ((), float((at[-1] - at[0]) / (len(at) - 1)), {
             "long_name": f"rise of {name} per return", "units": unit})  # fmt: skip
-    return variables | _flips(seen, flips(grid, periods[0]), drawn_flips, unit, level)
+    return variables | _flips(seen, flips(grid, periods[0]), drawn_flips, unit, model)
 
 
 def _marched(
-    system: System, name: str, grid: FloatArray, settings: Settings, words: Sequence[str], transient: int,
-    max_period: int, options: dict[str, Any], phase: float = 0.0,
-) -> tuple[FloatArray, NDArray[np.int64]]:  # fmt: skip
+    system: System, model: Model, name: str, grid: FloatArray, words: Sequence[str], max_period: int, phase: float
+) -> tuple[FloatArray, NDArray[np.int64]]:
     """The diagram, the state carried along; settings that follow from the parameter change with it."""
-    rules = {key: setting for key, setting in settings.items() if setting.follows and key != name}
+    rules = {key: setting for key, setting in model.settings.items() if setting.follows and key != name}
     # A drawn system is off its rule by an error that stays the same along the diagram.
     beside = {key: system.values[key] - rule.at(system.values) for key, rule in rules.items()}
     systems = []
     for value in grid:
         here = {**system.values, name: float(value)}
         systems.append(system.with_parameters(here | {k: rule.at(here) + beside[k] for k, rule in rules.items()}))
-    motions = Motions(systems, transient=transient, keep=KEEP, max_period=max_period, options=options, phase=phase)
+    motions = Motions(
+        systems, transient=model.transient, keep=KEEP, max_period=max_period, options=model.options, phase=phase
+    )
     rising = np.argsort(grid, kind="stable").tolist()
     found = [motions.carried(rising if word == "up" else rising[::-1]) for word in words]
     return np.stack([sections for sections, _ in found]), np.stack([periods for _, periods in found])
@@ -139,7 +125,7 @@ def _measured(
 
 
 def _flips(
-    measured: dict[str, Flip], theory: dict[str, float], drawn: list[dict[str, float]], unit: str, level: float
+    measured: dict[str, Flip], theory: dict[str, float], drawn: list[dict[str, float]], unit: str, model: Model
 ) -> dict[str, Any]:
     words = sorted({*measured, *theory})
     nothing = Flip(np.nan, np.nan, np.nan)
@@ -158,7 +144,7 @@ def _flips(
     if drawn:
         table = np.array([[one.get(word, np.nan) for word in words] for one in drawn], dtype=float)
         known = np.isfinite(table).sum(axis=0) * 2 >= len(drawn)
-        for word, q in (("low", (1 - level) / 2), ("high", (1 + level) / 2)):
+        for word, q in zip(("low", "high"), model.quantiles[::2], strict=True):
             edge = [np.nanquantile(table[:, i], q) if known[i] else np.nan for i in range(len(words))]
             variables[f"theory_flip_{word}"] = (over, np.array(edge, dtype=float), {
                 "long_name": f"{word} end of the interval for drawn parameters", "units": unit})  # fmt: skip

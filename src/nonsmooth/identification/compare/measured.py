@@ -1,21 +1,86 @@
-"""From a recorded run to a motion over the drive's phase, which ``compare`` takes."""
+"""From a sampled position, or a recorded run of a rig, to a motion over the drive's phase, which ``compare`` takes."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
+
+from nonsmooth.arrays import FloatArray
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from nonsmooth.recordings.recording import Recording
 
-__all__ = ["measured_motion"]
+__all__ = ["measured_motion", "motion_of"]
 
 ANGLES = ("rad", "deg", "rev")
 LONG = 150.0  # s: of a longer record the support and the smoother's intensity are found in its middle
 PIECE = 75.0  # s
+
+
+def motion_of(
+    time: ArrayLike, x: Any, phase: ArrayLike, *, states: tuple[str, str] = ("x", "v"),
+    resolution: float | None = None, **smoothing: Any,
+) -> xr.Dataset:  # fmt: skip
+    r"""The motion of any oscillator of which a position was sampled, with its rate and the errors of both.
+
+    Parameters
+    ----------
+    time, x : array_like, shape (N,)
+        Times and positions in the units of the model; a unit in ``x.attrs["units"]`` is kept.
+    phase : array_like, shape (N,)
+        Phase of the drive in forcing periods, counting on: :math:`\omega t / 2 \pi` of a known frequency, or that of
+        :func:`nonsmooth.recordings.signals.phase.drive_phase`.
+    states : (str, str)
+        Names of the position and of its rate in the model.
+    resolution : float, optional
+        The step of the sensor; the error of a sample is found from the record where not given.
+    **smoothing
+        Further options of :func:`nonsmooth.recordings.signals.smoothing.smooth`: times of ``impacts``, ``contacts``.
+
+    Returns
+    -------
+    xarray.Dataset
+        As :func:`measured_motion` gives, without frequency.
+
+    Raises
+    ------
+    ValueError
+        Phases of another number than the samples, or what ``smooth`` refuses.
+    """
+    from nonsmooth.recordings.signals.checks import whose
+    from nonsmooth.recordings.signals.smoothing import smooth
+
+    smoothed = smooth(time, x, resolution=resolution, **smoothing)
+    turns = np.asarray(phase, dtype=np.float64)
+    if turns.shape != (smoothed.sizes["time"],) or not np.isfinite(turns).all():
+        raise ValueError(
+            f"{whose(x)}: phase must be one finite number for each of {smoothed.sizes['time']} samples (omega t / 2 pi "
+            f"in forcing periods), got an array of shape {turns.shape}"
+        )
+    return _motion(smoothed, turns, states)
+
+
+def _motion(smoothed: xr.Dataset, phase: FloatArray, states: tuple[str, str] = ("x", "v")) -> xr.Dataset:
+    """Position and velocity as the states of a model, over time and the phase of the drive."""
+    import xarray as xr
+
+    columns = {name: np.column_stack([smoothed[k + name].values for k in "xv"]) for name in ("", "_error")}
+    units = [smoothed[k].attrs["units"] for k in "xv"]
+    return xr.Dataset(
+        {
+            "u": (("time", "state"), columns[""], {"long_name": "measured state"}),
+            "u_error": (("time", "state"), columns["_error"], {"long_name": "standard error of the measured state"}),
+            "phase": ("time", phase, {"long_name": "phase of the drive", "units": "forcing periods"}),
+        },
+        {
+            "time": ("time", smoothed["time"].values, {"long_name": "time", "units": "s"}),
+            "state": ("state", list(states)), "state_unit": ("state", units),
+        },
+    )  # fmt: skip
 
 
 def measured_motion(
@@ -65,8 +130,6 @@ def measured_motion(
     ValueError
         A channel that is missing, too short or in another unit; the message names run and channel.
     """
-    import xarray as xr
-
     from nonsmooth.recordings.signals.checks import take
     from nonsmooth.recordings.signals.displacement import position, resolution
     from nonsmooth.recordings.signals.phase import drive_phase
@@ -82,24 +145,10 @@ def measured_motion(
     smoothed = _smoothed(time, x, step, drive.omega, support)
     # Beyond the first and last turn the phase would be a guess.
     inside = (time >= turns[0]) & (time <= turns[-1])
-    states = ("x", "v")
-    u = np.column_stack([smoothed[state].values for state in states])[inside]
-    error = np.column_stack([smoothed[f"{state}_error"].values for state in states])[inside]
-    units = ["m", "m/s"]
-    return xr.Dataset(
-        {
-            "u": (("time", "state"), u, {"long_name": "measured state"}),
-            "u_error": (("time", "state"), error, {"long_name": "standard error of the measured state"}),
-            "phase": ("time", (drive.phase(time[inside]) + mark % (2 * np.pi)) / (2 * np.pi), {
-                "long_name": "phase of the drive", "units": "forcing periods"}),
-        },
-        {
-            "time": ("time", time[inside], {"long_name": "time", "units": "s"}),
-            "state": ("state", list(states)), "state_unit": ("state", units),
-            "omega": ((), drive.omega, {"long_name": "frequency of the drive", "units": "rad/s"}),
-            "omega_error": ((), drive.omega_error, {"long_name": "standard error of it", "units": "rad/s"}),
-        },
-        _attributes(recording, name),
+    phase = (drive.phase(time[inside]) + mark % (2 * np.pi)) / (2 * np.pi)
+    return _motion(smoothed.isel(time=inside), phase).assign_attrs(_attributes(recording, name)).assign_coords(
+        omega=((), drive.omega, {"long_name": "frequency of the drive", "units": "rad/s"}),
+        omega_error=((), drive.omega_error, {"long_name": "standard error of it", "units": "rad/s"}),
     )  # fmt: skip
 
 

@@ -10,8 +10,8 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.compare.band import motion_band
 from nonsmooth.identification.compare.clouds import cloud_distance, wasserstein
-from nonsmooth.identification.compare.draws import Settings, draw_systems, drawn_variables, nominal
 from nonsmooth.identification.compare.fold import fold, mean_orbit
+from nonsmooth.identification.compare.model import Model
 from nonsmooth.identification.compare.orbits import common_length, orbit_distance
 from nonsmooth.identification.compare.periods import measured_period
 from nonsmooth.identification.compare.predict import Attractor, Motions
@@ -30,53 +30,38 @@ MEASURED_STARTS = 4
 
 
 def compare_motion(
-    measured: xr.Dataset,
-    theory: Any,
-    *,
-    parameters: Any,
-    settings: Settings,
-    noise: FloatArray,
-    states: list[str],
-    start: Any,
-    phases: list[float],
-    grid: int,
-    transient: int,
-    max_period: int,
-    draws: int,
-    level: float,
-    splits: int,
-    seed: int,
-    options: dict[str, Any],
-) -> dict[str, Any]:
+    measured: xr.Dataset, model: Model, *, noise: FloatArray, states: list[str], start: Any, phases: list[float],
+    grid: int, max_period: int, splits: int,
+) -> dict[str, Any]:  # fmt: skip
     """The variables of the comparison, ``{name: (dims, values, attributes)}``; see :func:`compare` for each."""
     folded, sections = _measured(measured, phases, grid)
     scale = _scale(sections)
     number = measured_period(sections[0], noise, max_period=max_period).number
-    rng = np.random.default_rng(seed)
-    is_system = not hasattr(theory, "data_vars")
-    system = nominal(theory, parameters, settings) if is_system else None
+    rng = np.random.default_rng(model.seed)
     motions = None
-    if system is not None:
+    if model.system is not None:
         starts = _starts(sections[0] if phases[0] == 0 else None, folded, len(states), start)
-        motions = Motions([system], transient=transient, keep=KEEP, max_period=max_period, options=options)
+        motions = Motions(
+            [model.system], transient=model.transient, keep=KEEP, max_period=max_period, options=model.options
+        )
         predicted = predict(motions, sections, phases, scale, starts=starts, n=max(CLOUD, len(sections[0])), grid=grid)
     else:
-        predicted = from_result(theory, states, phases, grid, max_period)
+        predicted = from_result(model.theory, states, phases, grid, max_period)
     blurred = [points + noise * rng.standard_normal(points.shape) for points in predicted.sections]
-    variables = _clouds(sections, blurred, predicted.sections, scale, splits, seed)
+    variables = _clouds(sections, blurred, predicted.sections, scale, splits, model.seed)
     variables |= _periods(number, predicted)
     predicted = _begun_with_the_measurement(motions, folded, number, predicted, grid)
     variables |= _orbits(folded, number, predicted, grid)
-    if system is not None and draws:
+    if model.system is not None and model.draws:
         assert predicted.attractor is not None  # a System's prediction has one
-        systems, drawn = draw_systems(theory, parameters, settings, draws, seed)
+        systems, drawn = model.drawn()
         both = ("measured_orbit", "theory_orbit")
         closed = tuple(variables[key][1] for key in both) if "phase" in variables else None
         variables |= motion_band(
-            systems, predicted.attractor, sections, phases, noise, scale, closed, level=level, seed=seed, grid=grid,
-            transient=transient, max_period=max_period, options=options,
+            systems, model, predicted.attractor, sections, phases, noise, scale, closed, grid=grid,
+            max_period=max_period,
         )  # fmt: skip
-        variables |= drawn_variables(drawn, theory)
+        variables |= drawn
     return variables
 
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from nonsmooth.arrays import FloatArray
 from nonsmooth.diagrams.response import jumps_in
 from nonsmooth.diagrams.sweep import sweep
-from nonsmooth.identification.compare.draws import Settings, draw_systems, drawn_variables, nominal
 from nonsmooth.identification.compare.jumps import Jump, Jumps, jumps_in_steps, match_jumps
+from nonsmooth.identification.compare.model import Model
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -24,35 +24,20 @@ __all__ = ["compare_response"]
 FINE = 301  # values of the predicted curve
 
 
-def compare_response(
-    measured: xr.Dataset,
-    theory: Any,
-    *,
-    parameters: Any,
-    settings: Settings,
-    name: str,
-    state: str,
-    transient: int,
-    draws: int,
-    level: float,
-    seed: int,
-    options: dict[str, Any],
-) -> dict[str, Any]:
+def compare_response(measured: xr.Dataset, model: Model, *, name: str, state: str) -> dict[str, Any]:
     """The variables of the comparison, ``{name: (dims, values, attributes)}``; see :func:`compare` for each."""
     runs = _runs(measured, name, state)
     unit = measured[name].attrs.get("units", "1")
     directions = [word for word in ("up", "down") if (runs["direction"] == word).any()]
-    if hasattr(theory, "data_vars"):
-        values, curves = _given(theory, name, state, directions)
+    if model.system is None:
+        values, curves = _given(model.theory, name, state, directions)
         at_runs = np.full(len(runs["value"]), np.nan)
         for d, word in enumerate(directions):
             mine = runs["direction"] == word
             at_runs[mine] = np.interp(runs["value"][mine], values, curves[:, d])
-        system = None
     else:
-        system = nominal(theory, parameters, settings)
         values = np.linspace(runs["value"].min(), runs["value"].max(), FINE)
-        curves, at_runs = _curves(system, name, state, values, runs, directions, transient, options)
+        curves, at_runs = _curves(model.system, model, name, state, values, runs, directions)
     variables: dict[str, Any] = {
         f"measured_{name}": (("run",), runs["value"], {"long_name": f"measured {name}", "units": unit}),
         "measured_direction": (("run",), runs["direction"], {"long_name": "direction in which the run was reached"}),
@@ -70,15 +55,15 @@ def compare_response(
     expected = _jumps(values, curves, directions)
     seen = _measured_jumps(measured, runs, directions)
     drawn_jumps: list[Jumps] = []
-    if system is not None and draws:
-        systems, drawn = draw_systems(theory, parameters, settings, draws, seed)
+    if model.system is not None and model.draws:
+        systems, drawn = model.drawn()
         stack, stack_runs = [], []
         for one in systems:
-            curve, points = _curves(one, name, state, values, runs, directions, transient, options)
+            curve, points = _curves(one, model, name, state, values, runs, directions)
             stack.append(curve)
             stack_runs.append(points)
             drawn_jumps.append(_jumps(values, curve, directions))
-        q = [(1 - level) / 2, 0.5, (1 + level) / 2]
+        q = model.quantiles
         for word, curve in zip(("low", "median", "high"), np.nanquantile(np.stack(stack), q, axis=0), strict=True):
             variables[f"theory_{word}"] = ((name, "direction"), curve, {"long_name": f"{word} of the band"})
         low, _, high = np.nanquantile(np.stack(stack_runs), q, axis=0)
@@ -86,8 +71,8 @@ def compare_response(
         inside = (runs["amplitude"] + reach >= low) & (runs["amplitude"] - reach <= high)
         variables["inside_band"] = ((), float(inside.mean()), {
             "long_name": "share of the runs within two standard errors of the band"})  # fmt: skip
-        variables |= drawn_variables(drawn, theory)
-    return variables | match_jumps(seen, expected, drawn_jumps, unit, level)
+        variables |= drawn
+    return variables | match_jumps(seen, expected, drawn_jumps, unit, model.level)
 
 
 def _runs(measured: xr.Dataset, name: str, state: str) -> dict[str, NDArray[Any]]:
@@ -128,8 +113,8 @@ def _runs(measured: xr.Dataset, name: str, state: str) -> dict[str, NDArray[Any]
 
 
 def _curves(
-    system: System, name: str, state: str, values: FloatArray, runs: dict[str, NDArray[Any]], directions: list[str],
-    transient: int, options: dict[str, Any],
+    system: System, model: Model, name: str, state: str, values: FloatArray, runs: dict[str, NDArray[Any]],
+    directions: list[str],
 ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
     """The predicted curve on a regular grid, and at the runs: one carried sweep over both for each direction."""
     curves = np.empty((len(values), len(directions)))
@@ -138,7 +123,7 @@ def _curves(
         mine = runs["direction"] == word
         every = np.union1d(values, runs["value"][mine])
         result = sweep(
-            system, name, every, direction=word, transient=transient, keep=32, progress=False, **options
+            system, name, every, direction=word, transient=model.transient, keep=32, progress=False, **model.options
         )  # fmt: skip
         heights = 0.5 * (result["maximum"] - result["minimum"]).sel(state=state).values
         curves[:, d] = heights[np.searchsorted(every, values)]

@@ -66,7 +66,7 @@ def read_records(
         raise ValueError(f"the list of recordings is empty; give {FORMS}")
     tables: dict[str, dict[str, tuple[FloatArray, FloatArray]]] = {}
     for i, one in enumerate(given):
-        found = _tables(system, one, runs, time)
+        found = _tables(one, runs, time)
         for name, table in found.items():
             label = name if len(given) == 1 else f"{i}" if len(found) == 1 else f"{i} {name}"
             tables[label] = table
@@ -104,9 +104,7 @@ def _joined(label: str, columns: list[tuple[FloatArray, FloatArray]], settings: 
     return Record(label, time, values, settings)
 
 
-def _tables(
-    system: System, one: Any, runs: Sequence[str] | None, time: str
-) -> dict[str, dict[str, tuple[FloatArray, FloatArray]]]:
+def _tables(one: Any, runs: Sequence[str] | None, time: str) -> dict[str, dict[str, tuple[FloatArray, FloatArray]]]:
     """Channels of each run as (t, y)."""
     if isinstance(one, Recording):
         wanted = one.runs if runs is None else [runs] if isinstance(runs, str) else runs
@@ -122,7 +120,7 @@ def _tables(
     if runs is not None:
         raise ValueError("runs= chooses runs of a Recording; what is given here is one run, so leave it out")
     if hasattr(one, "data_vars"):
-        return {"run": _of_dataset(system, one, time)}
+        return {"run": _of_dataset(one, time)}
     if hasattr(one, "columns") and hasattr(one, "index"):
         by = time if time in one.columns else None
         t = one[by].to_numpy() if by is not None else one.index.to_numpy()
@@ -142,7 +140,7 @@ def _tables(
     raise TypeError(f"fit takes {FORMS}, not {shortened(one)}")
 
 
-def _of_dataset(system: System, one: Any, time: str) -> dict[str, tuple[FloatArray, FloatArray]]:
+def _of_dataset(one: Any, time: str) -> dict[str, tuple[FloatArray, FloatArray]]:
     """Channels of a Dataset; of a result of ``simulate`` its states and outputs, each instant once."""
     if time not in one.coords:
         raise ValueError(f"the Dataset has no coordinate {time!r}; it has {', '.join(map(str, one.coords)) or 'none'}")

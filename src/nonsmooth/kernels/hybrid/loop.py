@@ -175,7 +175,7 @@ def transit(i, t, short, form, net, section, goal, seen, tables, work):
     sense = 0  # where the section lies on the surface just crossed
     if section.indicator >= 0 and fired >= 0:
         if section.mode < 0 or section.mode == (mode if section.after != 0 else tally[SOURCE]):
-            sense = met(tally[FIRST], fired, form, net, section, work)
+            sense = met(tally[FIRST], fired, form, net, section, tables, work)
     return code, sense
 
 

@@ -18,6 +18,8 @@ from nonsmooth.kernels.linear.values import NODE, bound_at, dense, slope_of, tur
 
 STEPPER = FORM, TABLES, WORK  # the types of this stepper's records: model, tables, work
 
+SAME = 1e-9  # of a node spacing: the section is met by the transition that is so close
+
 
 @inline
 def set_phase(work, s):
@@ -195,7 +197,9 @@ def leg(i, form, net, section, goal, tables, work, r_max, ready, first):
     n_rows = rows.shape[0]
     start = net.mode_start[mode]
     n_own = net.mode_start[mode + 1] - start
-    n_all = n_own + 2 if section.indicator >= 0 and (section.mode < 0 or section.mode == mode) else n_own
+    n_all = n_own  # a motion that stays on the section's surface (SIDE 0) does not pass it
+    if section.indicator >= 0 and found[SIDE] != 0 and (section.mode < 0 or section.mode == mode):
+        n_all += 2
     for k in range(first, n_all):
         t = -1
         sense = 0
@@ -216,6 +220,8 @@ def leg(i, form, net, section, goal, tables, work, r_max, ready, first):
             if low >= 0:
                 continue
         tau = search(tables, work, mode, rows, lo, hi, sense * found[SIDE] > 0, best)
+        if sense != 0 and fired >= 0 and functional == section.indicator and best - tau < SAME * tables.info[mode, 1]:
+            continue  # the transition there passes the section
         if tau >= 0.0 and (tau < best or (fired < 0 and crossed == 0 and tau <= best)):
             best = tau
             fired = t
@@ -250,14 +256,19 @@ def arrive_at(t, since, full, wrapped, form, net, tables, work):
 
 
 @once
-def met(t, fired, form, net, section, work):
-    """Direction in which transition t, whose functional ``fired`` has crossed, meets the section; 0: it does not."""
+def met(t, fired, form, net, section, tables, work):
+    """Direction in which transition t, whose functional ``fired`` has crossed, meets the section; 0: it does not.
+
+    The direction is that of the arrival or, where the functional stays zero, of the departure: an impact does both."""
     sense = 0
     if fired == section.indicator:
         for k in range(net.row_start[t], net.row_start[t + 1]):
             if net.rows[k, 0] == fired:
                 sense = net.rows[k, 1]
-    return sense if section.rising * sense >= 0 else 0
+        if section.rising * sense < 0:
+            back = work.zero[fired] != 0 and sign_after(tables, work, work.tally[MODE], fired) == section.rising
+            sense = section.rising if back else 0
+    return sense
 
 
 @once
@@ -268,13 +279,13 @@ def touch_section(section, work):
 
 @once
 def note_side(t, sense, section, tables, work):
-    """The sign of the section's functional where the next segment begins."""
+    """The sign of the section's functional where the next segment begins; 0 as long as the motion stays on it."""
     mode = work.tally[MODE]
     if t >= 0:
         work.found[SIDE] = sign_after(tables, work, mode, section.indicator)
     elif sense != 0:
         work.found[SIDE] = sense
-    else:
+    elif work.found[SIDE] != 0:
         value = value_of(tables, mode, section.indicator, work.w)
         if value != 0.0:
             work.found[SIDE] = 1 if value > 0.0 else -1

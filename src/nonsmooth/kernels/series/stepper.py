@@ -23,6 +23,8 @@ from nonsmooth.kernels.series.taylor import copied, dense_states, end_states, fi
 
 STEPPER = GENERATED, types.Tuple(()), SERIES_WORK  # the types of this stepper's records: model, tables, work
 
+ON_SURFACE = 1e-13  # of its scale: an indicator that stays smaller over a step has not left its surface
+
 # --------------------------------------------------------------------------------------------------------------
 # At one instant
 
@@ -81,6 +83,7 @@ def start_on_section(form, section, tables, work):
     """A start on the section is no return, nor is a carried state left there."""
     J = work.J0 if METHOD == place.RKF45 else work.C
     s = section.indicator
+    work.tally[place.STAYS] = 1 if work.side[s] == 0 else 0
     if fabs(J[work.w.shape[0] + s, 0]) <= 1e-9 * work.scale[s]:
         J[work.w.shape[0] + s, 0] = 0.0
         work.side[s] = 0
@@ -131,17 +134,19 @@ def take(i, t, fired, form, tables, net, work):
 
 
 @once
-def met(t, fired, form, net, section, work):
+def met(t, fired, form, net, section, tables, work):
     """Return whether a transition at this instant also passes the section: its indicator was zero before the jump.
 
     The direction may be that of the arrival or, where the indicator stays zero, of the departure (an impact does
-    both)."""
+    both). A motion that comes along the surface, as one that slides, does not pass it."""
     J = work.J0 if METHOD == place.RKF45 else work.C
     row = work.w.shape[0] + section.indicator
     noise, way = NOISE * work.scale[section.indicator], section.rising
-    if fabs(work.memo[place.VALUE_BEFORE]) > noise:
+    slope = work.memo[place.SLOPE_BEFORE]
+    along = fabs(slope) * work.memo[place.LENGTH] <= ON_SURFACE * work.scale[section.indicator]
+    if fabs(work.memo[place.VALUE_BEFORE]) > noise or along or work.tally[place.STAYS] == 1:
         return 0
-    if way == 0 or work.memo[place.SLOPE_BEFORE] * way > 0.0:
+    if way == 0 or slope * way > 0.0:
         return 1
     return 1 if fabs(J[row, 0]) <= noise and J[row, 1] * way > 0.0 else 0
 
@@ -192,12 +197,15 @@ def next_pass(form, section, work):
     """Local time of the next pass of a section on the step, before its transition (-1: none), and the direction."""
     tally, memo, s = work.tally, work.memo, section.indicator
     mode, n = tally[MODE], work.w.shape[0]
-    if s < 0 or tally[place.CALM] == 1 or not (section.mode < 0 or section.mode == mode):
+    if s < 0 or tally[place.CALM] == 1 or tally[place.STAYS] == 1 or not (section.mode < 0 or section.mode == mode):
         return -1.0, 0
     degree = 5 if METHOD == place.RKF45 else form.order
     h, part, cursor = memo[place.LENGTH], memo[place.PART], memo[place.CURSOR]
     if cursor == 0.0:
         _, low, high = row_bounds(work.C, n + s, 1.0, degree, work.powers)
+        if max(high, -low) <= ON_SURFACE * work.scale[s]:
+            work.side_next[s] = 0
+            return -1.0, 0
         if (low > 0.0 and work.side[s] >= 0) or (high < 0.0 and work.side[s] <= 0):
             work.side_next[s] = 1 if low > 0.0 else -1
             return -1.0, 0
@@ -315,7 +323,9 @@ def touch_section(section, work):
 
 @once
 def note_side(t, sense, section, tables, work):
-    """Signs are kept by the segment."""
+    """Note behind a transition whether the motion stays on the section's surface; signs are kept by the segment."""
+    if t >= 0:
+        work.tally[place.STAYS] = 1 if work.side[section.indicator] == 0 else 0
 
 
 @once

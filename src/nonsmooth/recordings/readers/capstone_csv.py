@@ -122,12 +122,7 @@ def _trace(
     name, unit = split_unit(label)
     where = f"run {run!r}, channel {name!r}"
     held = cells.rows[column]
-    timed = np.searchsorted(cells.rows[time], held)
-    found = timed < len(cells.rows[time])
-    found[found] = cells.rows[time][timed[found]] == held[found]
-    if not found.all():
-        line = cells.lines[held[int(np.flatnonzero(~found)[0])]]
-        raise source.error(f"line {line}", f"{where} has a value where its run has no time")
+    timed = cells.places(held, cells.rows[time], source, f"{where} has a value where its run has no time")
     seconds = scaled_time(cells.values[time][timed], time_unit)
     if seconds is None:
         raise source.error("line 1", f"{where}: its time is in {time_unit!r}, which is no unit of time")

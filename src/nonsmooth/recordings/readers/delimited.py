@@ -162,13 +162,8 @@ def _traces(
         for run, inside in runs:
             mine = inside[cells.rows[column]]
             at, values = cells.rows[column][mine], cells.values[column][mine]
-            where = f"run {run!r}, channel {name!r}"
-            place = np.searchsorted(held, at)
-            ok = place < len(held)
-            ok[ok] = held[place[ok]] == at[ok]
-            if not ok.all():
-                line = cells.lines[at[int(np.flatnonzero(~ok)[0])]]
-                raise source.error(f"line {line}", f"{where} has a value where there is no {axis}")
+            complaint = f"run {run!r}, channel {name!r} has a value where there is no {axis}"
+            place = cells.places(at, held, source, complaint)
             taken = along[place] if axis in chosen else (at - int(np.flatnonzero(inside)[0])) / float(options.rate or 1)
             blank = int(np.count_nonzero(inside)) - len(at)
             if blank and len(at):

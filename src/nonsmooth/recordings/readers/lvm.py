@@ -9,6 +9,7 @@ X0 + k Delta_X.
 
 from __future__ import annotations
 
+import itertools
 import math
 from array import array
 from collections.abc import Iterator
@@ -88,7 +89,7 @@ def _lines(data: bytes, source: Source, remarks: Remarks) -> tuple[str, Lines]:
 
     def split() -> Lines:
         special = False
-        for number_, text in enumerate(_both(top, stream), 1):
+        for number_, text in enumerate(itertools.chain(top, stream), 1):
             # Blocks of other programs' data; their own business.
             if text.startswith("***Start_Special***"):
                 special = True
@@ -98,11 +99,6 @@ def _lines(data: bytes, source: Source, remarks: Remarks) -> tuple[str, Lines]:
                 special = False
 
     return separator, split()
-
-
-def _both(top: list[str], rest: Iterator[str]) -> Iterator[str]:
-    yield from top
-    yield from rest
 
 
 def _keys(lines: Lines, source: Source, what: str, first: list[str] | None = None) -> dict[str, list[str]]:
@@ -222,8 +218,8 @@ def _traces(
     step = _numbers(segment, "Delta_X", math.nan, decimal, at, source)
     said = _numbers(segment, "Samples", math.nan, decimal, at, source)
     units = _texts(segment, "Y_Unit_Label", n)
-    lines = np.frombuffer(segment.lines, np.int64) if segment.lines else np.empty(0, np.int64)
-    clock = np.frombuffer(segment.x[0], np.float64) if segment.x[0] else np.empty(0)
+    lines = np.asarray(segment.lines)
+    clock = np.asarray(segment.x[0])
     dimension = (_texts(segment, "X_Dimension", n)[0] or "Time").strip()
     if dimension.casefold() != options.axis.casefold():
         raise source.error(at, f"its channels are over {dimension!r}; read it with axis={dimension.lower()!r}")
@@ -231,10 +227,10 @@ def _traces(
     dates, times = _texts(segment, "Date", n), _texts(segment, "Time", n)
     for k, name in enumerate(segment.names):
         where = f"run {run!r}, channel {name!r}"
-        rows = np.frombuffer(segment.rows[k], np.int64) if segment.rows[k] else np.empty(0, np.int64)
-        values = np.frombuffer(segment.values[k], np.float64) if segment.values[k] else np.empty(0)
+        rows = np.asarray(segment.rows[k])
+        values = np.asarray(segment.values[k])
         if clocks == "Multi":
-            axis = np.frombuffer(segment.x[k], np.float64) if segment.x[k] else np.empty(0)
+            axis = np.asarray(segment.x[k])
         elif clocks == "One" and _same(step[k], step[0]) and len(rows) and len(clock):
             axis = clock[rows] + (start[k] - start[0])
         else:

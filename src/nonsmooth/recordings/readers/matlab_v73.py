@@ -56,7 +56,7 @@ class _Reader:
         if self._members < 0:
             raise self._source.error(place, f"the file holds more than {16 * MAX_COLUMNS} arrays")
         if isinstance(item, self._h5py.Group):
-            return _rows(self.group(item, depth + 1), item)
+            return _rows(self.group(item, depth + 1))
         if not isinstance(item, self._h5py.Dataset):
             self._remarks.say(f"{place}: is neither a group nor an array; left out")
             return None
@@ -106,7 +106,7 @@ class _Column(list[Any]):
     """One field of an array of structs: its values in each of them."""
 
 
-def _rows(fields: dict[str, Any], group: Any) -> Any:
+def _rows(fields: dict[str, Any]) -> Any:
     """A struct, or an array of structs, which is stored by field."""
     columns = list(fields.values())
     if columns and all(isinstance(c, _Column) for c in columns) and len({len(c) for c in columns}) == 1:

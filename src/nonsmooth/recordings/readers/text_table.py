@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import csv
 import io
+import itertools
 from array import array
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -104,6 +105,16 @@ class Cells:
     rows: list[NDArray[np.int64]]
     lines: NDArray[np.int64]
 
+    def places(
+        self, held: NDArray[np.int64], axis: NDArray[np.int64], source: Source, complaint: str
+    ) -> NDArray[np.int64]:
+        """Place among the rows of the axis of each row in which a channel has a value; all must be there."""
+        place = np.searchsorted(axis, held)
+        missing = np.flatnonzero(axis[np.minimum(place, len(axis) - 1)] != held) if len(axis) else np.arange(len(held))
+        if len(missing):
+            raise source.error(f"line {self.lines[held[missing[0]]]}", complaint)
+        return place
+
     def blanks(self, column: int) -> tuple[int, int]:
         """Number of blank rows after a column's last value, and before it."""
         held = self.rows[column]
@@ -132,7 +143,7 @@ def read_cells(
     if decimal is None:
         head = [row for _, row in zip(range(_SNIFFED), table, strict=False)]
         decimal = _decimal_of(head, wanted)
-        table = _chain(head, table)
+        table = itertools.chain(head, table)
     values = [array("d") for _ in wanted]
     held = [array("q") for _ in wanted]
     lines = array("q")
@@ -166,10 +177,8 @@ def read_cells(
     if short:
         remarks.say(f"{short} rows have fewer fields than the header, first line {first_short}; taken as blank")
     return Cells(
-        [np.frombuffer(v, dtype=np.float64) if v else np.empty(0) for v in values],
-        [np.frombuffer(h, dtype=np.int64) if h else np.empty(0, np.int64) for h in held],
-        np.frombuffer(lines, dtype=np.int64) if lines else np.empty(0, np.int64),
-    )
+        [np.asarray(v) for v in values], [np.asarray(h) for h in held], np.asarray(lines),
+    )  # fmt: skip
 
 
 def split_unit(text: str, brackets: str = "()") -> tuple[str, str]:
@@ -193,11 +202,6 @@ def _decimal_of(head: list[Row], wanted: Sequence[int]) -> str:
     commas = any("," in f and number(f, ",") is not None for f in fields)
     points = any("." in f and number(f, ".") is not None for f in fields)
     return "," if commas and not points else "."
-
-
-def _chain(head: list[Row], rest: Iterator[Row]) -> Iterator[Row]:
-    yield from head
-    yield from rest
 
 
 def _line_of(data: bytes, position: int) -> int:

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from nonsmooth.studies.savi2007.figure import Figure
+    from nonsmooth.studies.savi2007.figures.figure import Figure
     from nonsmooth.studies.savi2007.flows import Settings
 
 __all__ = ["Bench", "main", "measure"]

@@ -6,24 +6,30 @@ import tempfile
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nonsmooth.results.progress import say
 from nonsmooth.studies.savi2007.bench import Bench
-from nonsmooth.studies.savi2007.figure import Figure
+from nonsmooth.studies.savi2007.figures.figure import Figure
 from nonsmooth.studies.savi2007.finished import finish, finished, just_made, refuse_strange
 from nonsmooth.studies.savi2007.flows import Settings
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from nonsmooth.studies.savi2007.claims import Row
+    from nonsmooth.studies.savi2007.claims.claims import Row
 
 __all__ = ["Reproduction", "figures_of_the_study", "reproduce"]
 
 PICTURE_DPI = 200
 PARAMETERS = "table1"
+#: Files that hold figures: of the model, and of the virtual rig.
+ROOMS = (
+    ("figures", ("regions", "resonance", "amplitude", "gap", "frequency", "coexisting", "charts", "band")),
+    ("rig_figures", ("parameters", "response", "amplitude", "gap", "frequency")),
+)
 
 
 @dataclass(frozen=True)
@@ -42,26 +48,7 @@ def figures_of_the_study(full: bool = False) -> tuple[Figure, ...]:
 
     Those that take long only where ``full`` is asked for.
     """
-    from nonsmooth.studies.savi2007 import (
-        amplitude,
-        band,
-        charts,
-        coexisting,
-        frequency,
-        gap,
-        regions,
-        resonance,
-        rig_amplitude,
-        rig_frequency,
-        rig_gap,
-        rig_parameters,
-        rig_response,
-    )
-
-    rooms = (
-        regions, rig_parameters, resonance, rig_response, amplitude, rig_amplitude, gap, rig_gap, frequency,
-        rig_frequency, coexisting, charts, band,
-    )  # fmt: skip
+    rooms = [import_module(f"nonsmooth.studies.savi2007.{room}.{name}") for room, names in ROOMS for name in names]
     figures = [figure for room in rooms for figure in room.FIGURES if full or not figure.full]
     places = {PARAMETERS: 8.5}
     return tuple(sorted(figures, key=lambda figure: (places.get(figure.name, figure.place), figure.rig)))
@@ -111,8 +98,8 @@ def reproduce(
     RuntimeError
         If the measurement on the virtual rig failed.
     """
-    from nonsmooth.studies.savi2007.claims import measure_claims
-    from nonsmooth.studies.savi2007.report import REPORTS, write_report
+    from nonsmooth.studies.savi2007.claims.claims import measure_claims
+    from nonsmooth.studies.savi2007.report.report import REPORTS, write_report
 
     chosen = _chosen(figures, full)
     folder = Path(out)

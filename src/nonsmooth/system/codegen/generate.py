@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
-from sympy import Basic, Expr
+from sympy import Basic, Expr, Integer
 
 from nonsmooth.system.codegen.jet import jet_code
 from nonsmooth.system.symbolic.printing import Printer, assignments
@@ -104,8 +104,9 @@ def model_source(traced: Traced) -> str:
     }
     jets = []
     for mode, fields in enumerate(traced.fields):
-        outputs = [output[mode] for output in traced.outputs]
-        jets.append(jet_code(traced.t, traced.u, _constants(traced), fields, [*traced.indicators, *outputs]))
+        rows = [Integer(0) if traced.keeps_at_zero(mode, i) else h for i, h in enumerate(traced.indicators)]
+        rows += [output[mode] for output in traced.outputs]
+        jets.append(jet_code(traced.t, traced.u, _constants(traced), fields, rows))
     bodies = {name: [lines for lines, _ in parts] for name, parts in writers.items()}
     bodies["jet"] = [jet.lines for jet in jets]
     functions = {f for parts in writers.values() for _, used in parts for f in used}

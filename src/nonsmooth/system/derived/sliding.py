@@ -92,7 +92,7 @@ def slide(traced: Traced, surfaces: Sequence[TracedSurface], scale: Mapping[str,
         traced,
         mode_names=tuple(build.modes), fields=tuple(build.fields), lacking=tuple(build.lacking),
         indicator_names=tuple(build.indicator_names), indicators=tuple(build.indicators),
-        transitions=tuple(build.jumps), outputs=tuple(tuple(row) for row in build.outputs),
+        transitions=tuple(build.jumps), outputs=tuple(tuple(row) for row in build.outputs), along=tuple(build.along),
     )  # fmt: skip
 
 
@@ -329,6 +329,7 @@ class _Builder:
             self.modes.append(name)
             self.fields.append(self.fields[slid])
             self.lacking.append(self.lacking[slid])
+            self.along.append(self.along[slid])
             for row in self.outputs:
                 row.append(row[slid])
         return self.modes.index(name)

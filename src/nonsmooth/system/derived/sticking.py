@@ -48,7 +48,7 @@ def without_sticking(traced: Traced) -> tuple[Traced, list[tuple[sp.Expr, str]]]
     return replace(
         traced, mode_names=tuple(traced.mode_names[i] for i in kept), fields=tuple(traced.fields[i] for i in kept),
         lacking=tuple(traced.lacking[i] for i in kept), transitions=tuple(jumps.values()),
-        outputs=tuple(tuple(row[i] for i in kept) for row in traced.outputs),
+        outputs=tuple(tuple(row[i] for i in kept) for row in traced.outputs), along=(),
     ), apart  # fmt: skip
 
 

@@ -57,7 +57,8 @@ class Traced:
     """The expressions of a system in its symbols ``t``, ``u``, ``p`` (parameters) and ``m`` (memory).
 
     ``fields[mode][state]`` is du/dt (0 where ``lacking[mode][state]``: the mode does not have that state),
-    ``indicators[i]``, ``outputs[i][mode]``. ``period`` is the forcing period in ``p`` (None: autonomous).
+    ``indicators[i]``, ``outputs[i][mode]``. ``period`` is the forcing period in ``p`` (None: autonomous). Modes behind
+    the declared ones may keep indicators at zero: ``along[mode]``.
     """
 
     name: str
@@ -77,12 +78,17 @@ class Traced:
     transitions: tuple[TracedTransition, ...]
     outputs: tuple[tuple[Expr, ...], ...]
     period: Expr | None
+    along: tuple[frozenset[int], ...] = ()
     patterns: Patterns | None = field(default=None, compare=False, repr=False)  # modes are made when they are visited
 
     @property
     def is_map(self) -> bool:
         """Return whether the states change by transitions alone, and the period is 1."""
         return self.period == 1 and all(entry == 0 for field in self.fields for entry in field)
+
+    def keeps_at_zero(self, mode: int, indicator: int) -> bool:
+        """Return whether motion in a mode slides along the surface of an indicator."""
+        return mode < len(self.along) and indicator in self.along[mode]
 
     def phase_text(self, jump: TracedTransition) -> str:
         """The phase of a transition as it was written."""

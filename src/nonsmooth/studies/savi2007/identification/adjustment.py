@@ -125,8 +125,8 @@ def adjust(observations: list[Observation], *, gain_limit: float) -> Adjusted:
     names = tuple(name for name in UNKNOWNS if name in first)
     scale = np.array([first[name] if first[name] else 1.0 for name in names])
     u = np.array([first[name] for name in names])
-    weight = np.linalg.inv(_scaled(covariance, y)[0])
-    size = _scaled(covariance, y)[1]
+    size = np.sqrt(np.diag(covariance))
+    weight = np.linalg.inv(covariance / np.outer(size, size))
     prior = np.zeros((len(names), len(names)))
     known = u.copy()
     if "gain" in names:
@@ -171,11 +171,6 @@ def adjust(observations: list[Observation], *, gain_limit: float) -> Adjusted:
     birge = float(np.sqrt(chi2 / freedom)) if freedom > 0 else float("nan")
     influence = np.linalg.solve(normal, jacobian.T @ weight) * scale[:, None] / size
     return Adjusted(names, u, np.asarray(found, dtype=np.float64), birge, freedom, pulls, influence, tuple(labels))
-
-
-def _scaled(covariance: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-    size = np.sqrt(np.diag(covariance))
-    return covariance / np.outer(size, size), size
 
 
 def _first(seen: Mapping[str, float]) -> dict[str, float]:

@@ -1,0 +1,1 @@
+"""The report of a reproduction, as Markdown and as a page."""

@@ -1,0 +1,83 @@
+"""Sections on the surface of a motion that slides or rests on it: a return is an arrival, not what rounding does there.
+
+The arrivals are counted in the log of the same run.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+
+PERIODS = 12
+ELEMENT = {"w": 0.4, "d": 0.3}
+
+
+def block(speed: str) -> ns.System:
+    """A forced block on a belt whose speed is constant, or swings with the forcing."""
+    belt = (lambda t, p: p.v_b) if speed == "constant" else (lambda t, p: p.v_b * np.sin(p.omega * t))
+    rest = lambda t, u, p: p.A * np.cos(p.omega * t) - u.x - 0.1 * u.v
+    return ns.System(
+        name="block on a belt", states=["x", "v"], parameters={"A": 0.6, "omega": 0.7, "F": 0.5, "v_b": 0.3},
+        modes={"slower": lambda t, u, p: (u.v, rest(t, u, p) + p.F),
+               "faster": lambda t, u, p: (u.v, rest(t, u, p) - p.F)},
+        indicators={"slip": lambda t, u, p: u.v - belt(t, p)},
+        transitions=[ns.Surface("slip", below="slower", above="faster", mode="stick")],
+    )  # fmt: skip
+
+
+def arrivals(system: ns.System, sources: tuple[str, ...], method: str) -> Any:
+    run = ns.simulate(system, periods=PERIODS, transient=20, method=method)
+    from_there = [system.transitions[i].label.split(" -> ")[0] in sources for i in run.crossing_transition.values]
+    return run.crossing_time.values[from_there]
+
+
+@pytest.mark.parametrize("method", ["auto", "taylor"])
+@pytest.mark.parametrize("speed", ["constant", "swings"])
+def test_each_arrival_at_a_belt_is_one_return(speed: str, method: str) -> None:
+    base = block(speed)
+    for v_b in np.linspace(0.05, 0.6, 12):
+        system = base.with_parameters(v_b=v_b)
+        ends = [k * system.period() for k in (20, 20 + PERIODS)]
+        for rising, sources in ((True, ("slower",)), (False, ("faster",)), (None, ("slower", "faster"))):
+            known = arrivals(system, sources, method)
+            if not len(known):
+                continue
+            many = ns.poincare(system, section=ns.Poincare("slip", rising=rising), n=300, method=method).time.values
+            assert many[-1] > ends[1]
+            np.testing.assert_allclose(many[(many >= ends[0]) & (many < ends[1])], known, rtol=1e-9)
+
+
+def test_a_contact_that_rests_is_met_at_its_impacts() -> None:
+    system = ns.mechanical(
+        1.0, 0.1, 1.0, parameters=ELEMENT, forcing={"q": lambda t, p: np.cos(p.w * t)},
+        elements={"stop": ns.elements.Stop(at="q", position="d", restitution=0.5, creep=1e-4)},
+    )  # fmt: skip
+    known = arrivals(system, ("stop_open",), "auto")
+    ends = [k * system.period() for k in (20, 20 + PERIODS)]
+    many = ns.poincare(system, section=ns.Poincare("stop_gap", rising=False), n=1000).time.values
+    assert many[-1] > ends[1]
+    np.testing.assert_allclose(many[(many >= ends[0]) & (many < ends[1])], known, rtol=1e-9)
+
+
+def test_a_sweep_of_the_stick_slip_belt_finds_one_return_per_cycle_everywhere() -> None:
+    values = np.linspace(0.12, 0.28, 600)[[193, 194, 373, 416, 422, 470]]
+    swept = ns.sweep(
+        ns.models.stick_slip_belt(), "v_b", values, direction="down", start=[0.1, 0.1],
+        section=ns.Poincare("relative"), progress=False,
+    )  # fmt: skip
+    assert (swept.period_number.values == 1).all()
+
+
+@pytest.mark.parametrize("method", ["auto", "taylor"])
+def test_an_impact_passes_its_stop_both_ways(method: str) -> None:
+    ball = ns.models.impact_oscillator(omega=0.8, A=0.5)
+    times = [
+        ns.poincare(ball, section=ns.Poincare("stop", rising=rising), n=6, transient=50, method=method).time.values
+        for rising in (True, False, None)
+    ]  # fmt: skip
+    np.testing.assert_allclose(times[1], times[0], rtol=1e-12)
+    np.testing.assert_allclose(times[2], times[0], rtol=1e-12)
