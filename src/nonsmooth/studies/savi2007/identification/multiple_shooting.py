@@ -40,6 +40,7 @@ LONGEST = 2.5  # s: of a piece
 _GRAZING = ((2e-5, np.inf), (6e-5, 0.015))
 _SLOW = 5e-4  # m/s: a car that is slower is all but held
 _NEAR = 1.0  # standard uncertainties from its minimum, within which a fit that no step improves is taken
+_HELD, _ROUNDS = 0.05, 3  # share of pieces whose starts corners may hold, and how often they are looked for
 _LARGE, _LEFT_OUT = 3.0, 0.2  # chi^2 per degree of freedom, and share of pieces, from which a fit is doubted
 
 
@@ -190,20 +191,30 @@ class _Joint:
                     raise
         raise AssertionError
 
-    def near(self, kept: list[Piece], reason: Unsettled) -> tuple[ShootingFit, list[Piece], float]:
+    def near(
+        self, kept: list[Piece], reason: Unsettled, rounds: int = _ROUNDS
+    ) -> tuple[ShootingFit, list[Piece], float]:
         """The fit where it stands short of its minimum, with what is left of the way as a further uncertainty.
 
-        Where friction holds the car or a contact grazes, the sum of squares has corners, and no step leads on.
+        Where friction holds the car or a contact grazes, the sum of squares has corners, and no step leads on. The few
+        pieces whose own starts are held by one are left out with the grazes.
 
         Raises
         ------
         SolveError
             If more than a standard uncertainty of a parameter or a start is left.
         """
+        pieces = [replace(piece, start=start) for piece, start in zip(kept, reason.starts, strict=True)]
+        held = reason.distance[1:] > _NEAR
+        if rounds and 0 < np.mean(held) <= _HELD:
+            pieces = [piece for piece, corner in zip(pieces, held, strict=True) if not corner]
+            try:
+                return replace(self, pieces=pieces).fit(reason.values), pieces, 0.0
+            except Unsettled as again:
+                return self.near(pieces, again, rounds - 1)
         short = float(np.max(reason.distance))
         if short > _NEAR:
             raise reason
-        pieces = [replace(piece, start=start) for piece, start in zip(kept, reason.starts, strict=True)]
         found = replace(self, pieces=pieces).fit(reason.values, rough=True)
         return replace(found, covariance=found.covariance + np.outer(reason.step, reason.step)), pieces, short
 
