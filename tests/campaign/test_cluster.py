@@ -74,7 +74,7 @@ class Crew:
 
 @pytest.fixture
 def three_workers():
-    distributed = pytest.importorskip("distributed")
+    distributed = pytest.importorskip("distributed", reason="dask.distributed is not installed (extra `cluster`)")
     with (
         distributed.LocalCluster(n_workers=0, processes=True, dashboard_address=None, silence_logs=50) as found,
         distributed.Client(found) as client,
@@ -97,7 +97,7 @@ def test_a_cluster_computes_the_same(three_workers, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_one_process_and_eight_workers_write_the_same_chart(tmp_path: Path) -> None:
-    distributed = pytest.importorskip("distributed")
+    distributed = pytest.importorskip("distributed", reason="dask.distributed is not installed (extra `cluster`)")
     system = ns.models.discontinuous_support(omega=11.15)
     grid = {"g": np.linspace(-0.0015, 0.002, 200), "rho": np.linspace(0.2, 0.5, 200)}
     one = ns.chart(system, grid, store=tmp_path / "one.zarr", threads=1, **QUIET)

@@ -111,7 +111,7 @@ class Cluster:
 
 @pytest.fixture
 def cluster(port: int) -> Iterator[Cluster]:
-    pytest.importorskip("distributed")
+    pytest.importorskip("distributed", reason="dask.distributed is not installed (extra `cluster`)")
     found = Cluster(port)
     found.start()
     yield found
@@ -147,7 +147,7 @@ def test_a_scheduler_that_is_killed_and_comes_back(cluster: Cluster, tmp_path: P
 
 @pytest.mark.slow
 def test_no_scheduler_there(port: int, tmp_path: Path) -> None:
-    pytest.importorskip("distributed")
+    pytest.importorskip("distributed", reason="dask.distributed is not installed (extra `cluster`)")
     study = tmp_path / "chart.toml"
     study.write_text(STUDY, encoding="utf-8")
     said = finished(program("run", str(study), "--scheduler", f"tcp://127.0.0.1:{port}"), 2)

@@ -240,7 +240,7 @@ def test_the_schema_takes_every_study_of_the_documentation_and_of_init() -> None
     """The judge is the library jsonschema."""
     import tomllib
 
-    jsonschema = pytest.importorskip("jsonschema")
+    jsonschema = pytest.importorskip("jsonschema", reason="the judge of the schema is not installed (group `test`)")
     jsonschema.Draft4Validator.check_schema(schema())
     judge = jsonschema.Draft4Validator(schema())
     guides = Path(__file__).parents[2] / "docs"
@@ -272,7 +272,7 @@ def test_the_schema_takes_every_study_of_the_documentation_and_of_init() -> None
     ],
 )
 def test_the_schema_refuses_what_run_refuses(change: dict, tmp_path: Path) -> None:
-    jsonschema = pytest.importorskip("jsonschema")
+    jsonschema = pytest.importorskip("jsonschema", reason="the judge of the schema is not installed (group `test`)")
     study = {"system": {"model": "discontinuous_support"}, "sweep": {"parameter": "rho", "values": [0.3]}}
     judge = jsonschema.Draft4Validator(schema())
     judge.validate(study)

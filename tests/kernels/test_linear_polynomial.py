@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numba import njit
+from numba import types
 from numpy.polynomial import polynomial as P
 
+from nonsmooth.kernels.compile.cache import kernel
 from nonsmooth.kernels.linear import polynomial as linear
 
 NAMES = {linear.NEVER: "never", linear.ALWAYS: "always", linear.ONCE: "once", linear.OPEN: "open"}
 
 
-@njit
+@kernel(types.int64(*[types.float64] * 6))
 def _classify(g0: float, s0: float, g1: float, s1: float, h: float, bound: float) -> int:
     return linear.classify(g0, s0, g1, s1, h, bound)
 
 
-@njit
+@kernel(types.float64(types.float64[:, ::1], types.float64, types.float64))
 def _bracketed(row: np.ndarray, lo: float, hi: float) -> float:
     return linear.bracketed(row, 0, 0, lo, hi)
 

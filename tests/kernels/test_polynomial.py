@@ -6,44 +6,46 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numba import njit
+from numba import types
 
+from nonsmooth.kernels.compile.cache import kernel  # kept on disk, as what ``njit`` makes is not
 from nonsmooth.kernels.series import polynomial as poly
 
 UP, DOWN, EITHER = 1, -1, 0
+i, f, i1, f1, f2 = types.int64, types.float64, types.int64[::1], types.float64[::1], types.float64[:, ::1]
 
 
-@njit
+@kernel(f(f1, i, i, i, f, f1, i1))
 def _crossing(a: Any, m: int, way: int, before: int, error: float, stack: Any, found: Any) -> float:
     return poly.first_crossing(a, m, np.int64(way), np.int64(before), error, stack, found)
 
 
-@njit
+@kernel(f(f1, i, f, f1))
 def _largest(a: Any, m: int, current: float, stack: Any) -> float:
     return poly.largest(a, m, current, stack)
 
 
-@njit
+@kernel(types.UniTuple(f, 2)(f1, i))
 def _bounds(a: Any, m: int) -> Any:
     return poly.bounds(a, m)
 
 
-@njit
+@kernel(types.UniTuple(f, 3)(f2, f, i, f1))
 def _row_bounds(C: Any, sign: float, m: int, powers: Any) -> Any:
     return poly.row_bounds(C, 1, sign, m, powers)
 
 
-@njit
+@kernel(i(f2, f, i, f1, f1))
 def _load(C: Any, sign: float, m: int, powers: Any, a: Any) -> int:
     return poly.load(C, 1, sign, m, powers, a)
 
 
-@njit
+@kernel(types.void(f1, i, f, f, f1))
 def _shift(a: Any, m: int, x: float, width: float, out: Any) -> None:
     poly.shift(a, m, x, width, out)
 
 
-@njit
+@kernel(i(f1, i))
 def _strip(a: Any, m: int) -> int:
     return poly.strip(a, m)
 

@@ -107,7 +107,7 @@ def _hdf5() -> bytes:
 
 
 def _tdms() -> bytes:
-    nptdms = pytest.importorskip("nptdms")
+    nptdms = pytest.importorskip("nptdms", reason="npTDMS is not installed (extra `experiment`)")
     packed = io.BytesIO()
     with nptdms.TdmsWriter(packed) as writer:
         wave = {"wf_increment": 0.01, "unit_string": "m"}

@@ -6,7 +6,7 @@ import struct
 
 import pytest
 
-pytest.importorskip("nptdms")
+pytest.importorskip("nptdms", reason="npTDMS is not installed (extra `experiment`)")
 
 from nonsmooth.errors import DataFileError
 from nonsmooth.recordings.load import parse_recording

@@ -12,6 +12,9 @@ import pytest
 import nonsmooth as ns
 from nonsmooth.elements import Backlash, Coulomb, ElasticStop, PreloadedSpring, Stop
 
+#: Two masses without a force run on kernels that are there: those of four states and a harmonic.
+NO_FORCE: dict[str, Any] = {"parameters": {"F": 0.0}, "forcing": {"a": lambda t, p: p.F * np.cos(t)}}
+
 
 def shaken(**values: float) -> ns.System:
     """A mass under a force cos(w t), with a rigid stop on its right."""
@@ -126,7 +129,7 @@ def test_friction_sticks_below_its_static_force_and_slips_with_its_kinetic_one()
 def test_impacts_between_masses_keep_the_momentum() -> None:
     """Two free masses with an elastic bumper, an inelastic one and a spring each: momentum before and after."""
     pair = ns.mechanical(
-        [[2.0, 0.0], [0.0, 1.0]], np.zeros((2, 2)), np.zeros((2, 2)), coordinates=["a", "b"],
+        [[2.0, 0.0], [0.0, 1.0]], np.zeros((2, 2)), np.zeros((2, 2)), coordinates=["a", "b"], **NO_FORCE,
         elements={"bumper": Stop(at={"b": 1, "a": -1}, position=0.0, side=-1, restitution=0.25)},
     )  # fmt: skip
     run = ns.simulate(pair, duration=3.0, start={"a": 0.0, "b": 1.0, "v_a": 1.0, "v_b": 0.0})
@@ -139,7 +142,7 @@ def test_impacts_between_masses_keep_the_momentum() -> None:
 def test_what_friction_holds_is_driven_away_by_an_impact() -> None:
     """A finite force bears no impulse: the struck mass leaves with (1 + e) / 2 and the momentum is kept."""
     pair = ns.mechanical(
-        np.eye(2), np.zeros((2, 2)), np.zeros((2, 2)), coordinates=["a", "b"],
+        np.eye(2), np.zeros((2, 2)), np.zeros((2, 2)), coordinates=["a", "b"], **NO_FORCE,
         elements={
             "bumper": Stop(at={"b": 1, "a": -1}, side=-1, restitution=0.25), "rub": Coulomb(at="b", friction=0.1),
         },
