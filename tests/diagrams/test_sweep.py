@@ -392,6 +392,14 @@ def test_without_judgement_the_points_are_those_of_poincare_and_no_period_is_cla
     assert not {"period_number", "residual"} & set(looked.variables)
     assert words(looked["status"]) == ["ok"] * 3
     assert ns.plot.bifurcation(looked)
+    bare = ns.sweep(
+        system, "rho", values, direction=None, transient=60, keep=20, judge=False, extremes=False, **QUIET
+    )  # fmt: skip
+    np.testing.assert_allclose(bare["section"], looked["section"], atol=1e-12)
+    assert np.array_equal(bare["contacts_per_period"], looked["contacts_per_period"])
+    assert not {"maximum", "minimum", "clearance"} & set(bare.variables)
+    with pytest.raises(ValueError, match="rests on the size"):
+        ns.sweep(system, "rho", values, extremes=False)
     with pytest.raises(ValueError, match="leave out density"):
         ns.sweep(system, "rho", values, density=True, judge=False)
     with pytest.raises(TypeError, match="judge = 0"):

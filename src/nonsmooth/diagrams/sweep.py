@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -46,6 +47,7 @@ def sweep(
     keep: int = 100,
     max_period: int | None = None,
     judge: bool = True,
+    extremes: bool = True,
     density: bool | Mapping[str, Any] = False,
     bins: int = 400,
     method: str = "auto",
@@ -80,6 +82,9 @@ def sweep(
     judge : bool
         False: record what follows one transient, settled or not, and leave out ``period_number`` and ``residual``. A
         first look, in half the time.
+    extremes : bool
+        False, with ``judge=False``: leave out the extremes of states, indicators and outputs too, which takes half the
+        time of the kept returns away.
     density : bool or mapping
         Store a histogram of each state's section points instead of the points. A mapping gives ranges,
         ``{"x": (lowest, highest)}``; where none is given it is that of a coarse sweep and a twentieth more either side.
@@ -132,6 +137,10 @@ def sweep(
     gpu = on_gpu(device, "sweep", engine, plan, carried=direction is not None)
     if not isinstance(judge, bool):
         raise TypeError(f"judge = {judge!r}: give True or False")
+    if not isinstance(extremes, bool):
+        raise TypeError(f"extremes = {extremes!r}: give True or False")
+    if judge and not extremes:
+        raise ValueError("a period number rests on the size of the motion: give judge=False with extremes=False")
     if not judge and (gpu or density is not False):
         raise ValueError('judge=False records section points on the processor: leave out density and device="cuda"')
     if gpu and density is not False:
@@ -161,14 +170,15 @@ def sweep(
             )["section"].transpose(..., "state").values  # fmt: skip
         edges = bin_edges(system, ranges, n_bins, coarse)
     attractors = Attractors(
-        engine, engine.prepare(points), plan, transient, keep, max_period, tolerance_of(engine, rtol),
-        system.scale_vector(),
+        engine, engine.prepare(points), replace(plan, extremes=extremes), transient, keep, max_period,
+        tolerance_of(engine, rtol), system.scale_vector(),
     )  # fmt: skip
     slots = {(d, k): Slot(attractors, points, sizes, edges) for d in range(len(directions)) for k in range(len(starts))}
     options = {
         "parameter": parameter, "values": values, "direction": direction, "start": plain_start(system, start),
         "section": section, "transient": transient, "keep": keep, "max_period": max_period,
-        **({} if judge else {"judge": False}), **({} if density is False else {"density": density, "bins": bins}),
+        **({} if judge else {"judge": False}), **({} if extremes else {"extremes": False}),
+        **({} if density is False else {"density": density, "bins": bins}),
         "method": method, "rtol": rtol, "atol": atol, **({"device": device} if gpu else {}), **expert,
     }  # fmt: skip
     squeeze = (() if direction == "both" else ("direction",)) + (("start",) if is_one_start(start) else ())
@@ -193,10 +203,12 @@ def sweep(
         run_on_gpu(points, starts, memory, attractors, slots, progress, parameter)
     else:
         run_pieces(march, pieces_of(directions, len(starts), numbers), threads, progress, parameter)
-    largest = largest_of(starts, slots.values())
+    largest = largest_of(starts, slots.values(), extremes)
     warn_if_coarse(system, engine, largest)
     warn_if_small(system, largest)
-    return _dataset(system, engine.name, parameter, numbers, directions, starts, slots, options, squeeze, judge)
+    return _dataset(
+        system, engine.name, parameter, numbers, directions, starts, slots, options, squeeze, judge, extremes
+    )
 
 
 def _directions(direction: Any) -> tuple[str, ...]:
@@ -216,6 +228,7 @@ def _dataset(
     options: Mapping[str, Any],
     squeeze: Iterable[str],
     judge: bool,
+    extremes: bool,
 ) -> xr.Dataset:
     from nonsmooth.results.labels import labels_of
     from nonsmooth.results.provenance import provenance
@@ -249,6 +262,9 @@ def _dataset(
         del arrays["output_maximum"], arrays["output_minimum"]
     if not judge:
         del arrays["period_number"], arrays["residual"]
+    if not extremes:
+        for name in ("maximum", "minimum", "clearance", "output_maximum", "output_minimum"):
+            arrays.pop(name, None)
     counted = next(iter(slots.values())).counted
     if counted is not None:
         del arrays["section"]

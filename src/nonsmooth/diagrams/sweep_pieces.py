@@ -105,12 +105,14 @@ def run_on_gpu(
             slot.period_number[:], slot.residual[:], slot.status[:] = found.period_number, found.residual, found.status
 
 
-def largest_of(starts: FloatArray, slots: Iterable[Slot]) -> FloatArray:
-    """The largest size of each state, of the starts and of all runs that came to their end."""
+def largest_of(starts: FloatArray, slots: Iterable[Slot], extremes: bool) -> FloatArray:
+    """The largest size of each state, of the starts and of all runs that came to their end; without their extremes
+    that of their section points."""
     sizes = [np.abs(starts)]
     for slot in slots:
         there = ended(slot)
-        sizes += [np.abs(slot.chain.maximum[there]), np.abs(slot.chain.minimum[there])]
+        ends = (slot.chain.maximum, slot.chain.minimum) if extremes else (np.abs(slot.chain.section).max(axis=1),)
+        sizes += [np.abs(end[there]) for end in ends]
     return np.nan_to_num(np.vstack(sizes)).max(axis=0)
 
 

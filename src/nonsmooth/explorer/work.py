@@ -110,7 +110,8 @@ def _first_look(system: ns.System, job: Mapping[str, Any], options: dict[str, An
     """A diagram that nothing judged yet, every column from the same state, on all cores."""
     return {"diagram": ns.sweep(
         system, job["over"], _values(job), direction=None, start=list(job["begin"]), section=section_of(system),
-        transient=job["transient"], keep=job["keep"], judge=False, progress=heard, **options,
+        transient=job["transient"], keep=job["keep"], judge=False, extremes=False, progress=heard,
+        **options,
     )}  # fmt: skip
 
 
