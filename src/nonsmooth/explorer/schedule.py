@@ -24,6 +24,7 @@ ORDER = (
 )  # fmt: skip
 #: Short work: a newer request of the same view waits for it, so that a drawing follows a hand that moves.
 _CHEAP = ("orbit", "recording", "first look", "section", *(stage for stage in _STAGES if _STAGES[stage]))
+_BLINK = 0.4  # seconds: a first look that took no longer the last time comes before the orbit, for a hand that moves
 _PATIENCE = 1.0  # seconds after which short work is cancelled like any other
 _DEAF = 10.0  # seconds in which cancelled work must end by itself
 #: The view in which a message on a request appears.
@@ -55,6 +56,7 @@ class Schedule:
         self._crashed: dict[str, int] = {}
         self._running: Asked | None = None
         self._count = 0
+        self._looked = "", float("inf")  # the model of the last first look, and the seconds that it took
         self.worker: Worker | None = None  # a request that opens no page starts no process
 
     def begin(self, hear: Callable[[Answer], None]) -> bool:
@@ -78,6 +80,8 @@ class Schedule:
             view for view in ORDER
             if view in wanted and wanted[view][1] not in (self.done.get(view), self._failed.get(view))
         ]  # fmt: skip
+        if "first look" in missing and self._looked[0] == self.page.subject[0] and self._looked[1] < _BLINK:
+            missing.sort(key=lambda view: view != "first look")
         now, running = time.monotonic(), self._running
         if running is not None:
             stale = running.view not in wanted or wanted[running.view][1] != running.key
@@ -127,6 +131,8 @@ class Schedule:
             self.page.sheet.forget(running.view)
         elif kind == "done":
             found, warned = content
+            if running.view == "first look":
+                self._looked = running.of[0], time.monotonic() - running.since
             self.done[running.view] = running.key
             self._failed.pop(running.view, None)
             self.page.notes.pop(place, None)
