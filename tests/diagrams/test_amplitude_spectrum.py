@@ -64,6 +64,15 @@ def test_the_logistic_map_of_period_2_has_its_mean_and_one_line_at_one_half() ->
     assert lines[1:-1].max() < 1e-12
 
 
+def test_a_motion_that_settles_slowly_is_waited_for_and_what_does_not_close_is_said() -> None:
+    slow = SUPPORT.with_parameters(rho=0.43)  # 80 periods leave 1e-3 of the distance to its orbit
+    settled = ns.amplitude_spectrum(slow, transient=4000).amplitude.sel(state="x")
+    waited = ns.amplitude_spectrum(slow, transient=80).amplitude.sel(state="x")
+    assert abs(waited - settled).max() < 1e-7 * settled.max()
+    with pytest.warns(UserWarning, match="does not close"):
+        ns.amplitude_spectrum(slow, transient=20)
+
+
 def test_chaos_has_no_sharp_lines() -> None:
     chaos = SUPPORT.with_parameters(rho=0.33, g=0.0018, omega=11.15)
     found = ns.amplitude_spectrum(chaos)
