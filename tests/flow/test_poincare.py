@@ -211,3 +211,13 @@ def test_every_start_begins_with_the_initial_memory(method: str) -> None:
     )  # fmt: skip
     found = ns.poincare(system, n=2, start=[[0.0, 0.0], [1.0, 0.0]], method=method)
     assert np.allclose(found["section"].values[..., 0], [[0.3, 0.6], [1.3, 1.6]], atol=1e-12)
+
+
+def test_steps_of_returns_that_are_only_counted_do_not_add_up() -> None:
+    """A section met by whole steps alone, at rest: more than two million segments pass in so many periods."""
+    system = ns.mechanical(
+        1.0, 0.1, 1.0, parameters={"w": 0.4}, forcing={"q": lambda t, p: np.cos(p.w * t)},
+        elements={"stop": ns.elements.Stop(at="q", position=0.3, restitution=0.5, creep=1e-7)},
+    )  # fmt: skip
+    found = ns.poincare(system, n=3, transient=300_000)
+    assert np.allclose(found.section.values, [0.3, 0.0], atol=1e-15)

@@ -125,7 +125,7 @@ def hurry(i, form, net, section, goal, seen, tables, work, patience):
     )  # fmt: skip
     if counted > returns:
         tally[RETURNS] = counted
-        tally[JUMPS] = 0
+        tally[JUMPS], tally[TRIES] = 0, 0
     if s != began or whole != turns:
         memo[SINCE] = 1e300
         if counted >= goal.transient:
@@ -232,7 +232,7 @@ def arrive(i, code, source, t, sense, state, form, section, goal, seen, tables, 
     if state == LATE and code == OK:
         memo[TIME] = section.phase * T
         tally[RETURNS] += 1
-        tally[JUMPS] = 0
+        tally[JUMPS], tally[TRIES] = 0, 0
         if tally[RETURNS] > goal.transient:
             keep_point(
                 i, tally[RETURNS] - goal.transient - 1, work.w, mode, memo[PERIODS] * T + memo[TIME], seen, work
