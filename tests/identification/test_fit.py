@@ -238,9 +238,12 @@ def test_readings_of_which_the_model_has_no_motion_are_counted():
     assert any("readings are not used" in sentence for sentence in found.anomalies)
 
 
-@pytest.mark.parametrize(("name", "seed"), [("impact damper", 1), ("relay feedback", 34)])
+@pytest.mark.parametrize(("name", "seed"), [("impact damper", 1), ("relay feedback", 34), ("relief valve", 16)])
 def test_hidden_states_are_found_from_a_guess_far_off(name, seed, tmp_path):
-    """No window of a part of a swing says where the ball is; short windows of the relay do not come to a minimum."""
+    """No window of a part of a swing says where the ball is; short windows of the relay do not come to a minimum.
+
+    Those of the valve tell next to nothing of its restitution: 1e8 was tried for it, a motion of hours.
+    """
     assert len(coverage(CASES[name], [seed], tmp_path).far) == 1
 
 
