@@ -78,7 +78,7 @@ def test_a_fit_that_does_not_settle_is_refused():
 
 
 def test_a_piece_of_another_motion_does_not_keep_the_others_from_settling(monkeypatch):
-    """Where no step leads on, what stands out of the residuals is left out, and counted, before the fit is refused."""
+    """Pieces that stand out of the residuals are left out, and counted, before a fit that stops is refused."""
     rng, w, b = np.random.default_rng(1), 4.5, 1.04
 
     def law(p):
