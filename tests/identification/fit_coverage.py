@@ -2,16 +2,22 @@
 
 ``python -m tests.identification.fit_coverage --systems "impact damper" --seeds 0-7``
 ``python -m tests.identification.fit_coverage --seeds 0-39 --out docs/measured_coverage_fit.md``
+
+Finished fits are kept in ``--folder``, under a name that the package's source and the cases give, and not computed
+again: so a page can be put together from several runs, and never from fits of different sources.
 """
 
 from __future__ import annotations
 
 import argparse
+import hashlib
+import json
 import sys
 import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,8 +33,9 @@ SciPy's DOP853 between events, one quantity is read with noise, rounded to a cou
 deviation, 0.3 % for the damper), on a clock that jitters by 2 % of its step. Each seed has a start, readings and a
 first guess of its own, every parameter 30 % off either way. *Converged* are the fits without an anomaly; all others
 said so. Coverage and the root mean square (rms) of the normalised errors are pooled over the parameters of the fits
-that converged; *largest* is the largest of these errors. Seconds are of processor time: the median over the seeds, and
-the largest, which is mostly the first with its compiling.
+that converged; ± is the binomial standard error of a coverage of 0.95 at so many intervals (somewhat too small: the
+intervals of one fit are not independent). *Largest* is the largest of these errors. Seconds are of processor time: the
+median over the seeds, and the largest, which is mostly the first with its compiling.
 """
 HEAD = "| system | parameters | converged | in the 95 % interval | rms of normalised errors | largest | seconds a fit |"
 
@@ -54,7 +61,8 @@ def pooled(rows: Iterable[Row]) -> str:
     z = np.concatenate([row.far.ravel() for row in rows])
     if not len(z):
         return "- | - | -"
-    return f"{cover(z):.3f} of {len(z)} | {rms(z):.2f} | {np.max(np.abs(z)):.1f}"
+    error = np.sqrt(0.95 * 0.05 / len(z))
+    return f"{cover(z):.3f} ± {error:.3f} of {len(z)} | {rms(z):.2f} | {np.max(np.abs(z)):.1f}"
 
 
 def cover(z: NDArray[np.float64]) -> float:
@@ -65,23 +73,38 @@ def rms(z: NDArray[np.float64]) -> float:
     return float(np.sqrt(np.mean(z**2)))
 
 
-def coverage(case: Case, seeds: Iterable[int]) -> Row:
+def one_fit(case: Case, seed: int, folder: Path) -> dict[str, Any]:
+    """Fit a case at a seed: ``far`` (normalised errors) or ``said`` (why not), and ``seconds``; kept in ``folder``."""
+    kept = folder / f"{case.name}, {seed}.json"
+    if kept.is_file():
+        found: dict[str, Any] = json.loads(kept.read_text(encoding="utf-8"))
+        return found
+    data, measured, _ = case.recording(seed)
+    begun = time.process_time()
+    try:
+        fitted = ns.fit(case.guess(seed), data, case.find, measured=measured, progress=False)
+    except SolveError as reason:
+        found = {"said": str(reason)}
+    else:
+        far = [(fitted[name] - case.truth[name]) / fitted.uncertainty[name] for name in case.find]
+        found = {"said": fitted.anomalies[0]} if fitted.anomalies else {"far": far}
+    found["seconds"] = time.process_time() - begun
+    kept.write_text(json.dumps(found), encoding="utf-8")
+    return found
+
+
+def coverage(case: Case, seeds: Iterable[int], folder: Path) -> Row:
     """Fit a case at these seeds."""
-    far, said, seconds = [], {}, []
-    for seed in seeds:
-        data, measured, _ = case.recording(seed)
-        begun = time.process_time()
-        try:
-            found = ns.fit(case.guess(seed), data, case.find, measured=measured, progress=False)
-        except SolveError as reason:
-            said[seed] = str(reason)
-        else:
-            if found.anomalies:
-                said[seed] = found.anomalies[0]
-            else:
-                far.append([(found[name] - case.truth[name]) / found.uncertainty[name] for name in case.find])
-        seconds.append(time.process_time() - begun)
-    return Row(case, np.array(far).reshape(-1, len(case.find)), said, seconds)
+    fits = {seed: one_fit(case, seed, folder) for seed in seeds}
+    far = [fit["far"] for fit in fits.values() if "far" in fit]
+    said = {seed: fit["said"] for seed, fit in fits.items() if "said" in fit}
+    return Row(case, np.array(far).reshape(-1, len(case.find)), said, [fit["seconds"] for fit in fits.values()])
+
+
+def source() -> str:
+    """A name for the package's source and the cases as they are."""
+    files = [*sorted(Path(ns.__file__).parent.rglob("*.py")), Path(sys.modules[Case.__module__].__file__ or "")]
+    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()[:12]
 
 
 def _seeds(text: str) -> list[int]:
@@ -95,12 +118,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--systems", nargs="+", choices=list(CASES), default=list(CASES), metavar="NAME")
     parser.add_argument("--seeds", type=_seeds, default=list(range(40)), help="as 0-39")
     parser.add_argument("--out", type=Path, help="Markdown file for the table")
+    parser.add_argument("--folder", type=Path, default=Path("out/coverage_fit"), help="where finished fits are kept")
     options = parser.parse_args(arguments)
+    folder = options.folder / source()
+    folder.mkdir(parents=True, exist_ok=True)
     lines = [HEAD, "|" + "---|" * (HEAD.count("|") - 1)]
     print(*lines, sep="\n", flush=True)
     rows = []
     for name in options.systems:
-        rows.append(coverage(CASES[name], options.seeds))
+        rows.append(coverage(CASES[name], options.seeds, folder))
         print(rows[-1], flush=True)
         for seed, sentence in rows[-1].said.items():
             print(f"    seed {seed}: {sentence}", file=sys.stderr, flush=True)

@@ -238,17 +238,20 @@ def test_readings_of_which_the_model_has_no_motion_are_counted():
     assert any("readings are not used" in sentence for sentence in found.anomalies)
 
 
-@pytest.mark.parametrize(("name", "seed"), [("impact damper", 1), ("relay feedback", 34)])
-def test_hidden_states_are_found_from_a_guess_far_off(name, seed):
-    """No window of a part of a swing says where the ball is; short windows of the relay do not come to a minimum."""
-    assert len(coverage(CASES[name], [seed]).far) == 1
+@pytest.mark.parametrize(("name", "seed"), [("impact damper", 1), ("relay feedback", 34), ("relief valve", 16)])
+def test_hidden_states_are_found_from_a_guess_far_off(name, seed, tmp_path):
+    """No window of a part of a swing says where the ball is; short windows of the relay do not come to a minimum.
+
+    Those of the valve tell next to nothing of its restitution: 1e8 was tried for it, a motion of hours.
+    """
+    assert len(coverage(CASES[name], [seed], tmp_path).far) == 1
 
 
 @pytest.mark.slow
-def test_intervals_cover_the_truth_over_forty_seeds():
+def test_intervals_cover_the_truth_over_forty_seeds(tmp_path):
     rows = []
     for case in CASES.values():
-        rows.append(coverage(case, range(40)))
+        rows.append(coverage(case, range(40), tmp_path))
         print(rows[-1])
         assert len(rows[-1].far) >= 38 and np.max(np.abs(rows[-1].far)) < 5.0
         assert 0.90 <= cover(rows[-1].far) and 0.85 <= rms(rows[-1].far) <= 1.15
@@ -330,7 +333,7 @@ def test_mistakes_are_answered_with_what_to_do():
     ):  # fmt: skip
         with pytest.raises(ValueError, match=sentence.replace("(", r"\(")):
             ns.fit(system, data, **arguments)
-    with pytest.raises(TypeError, match="fit takes a Recording, a Dataset over time, a DataFrame"):
+    with pytest.raises(TypeError, match="a recording is a Recording, a Dataset over time, a DataFrame"):
         ns.fit(system, 3.0, ["k"])
     with pytest.raises(ValueError, match="the time must increase"):
         ns.fit(system, {"x": ([*t[::-1].tolist(), 0.0], np.ones(len(t) + 1))}, ["k"])

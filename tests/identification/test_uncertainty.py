@@ -1,10 +1,14 @@
 """Intervals, correlated residuals, profiles and lines against closed forms and published numbers."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from nonsmooth.identification.finding import Estimate
+from nonsmooth.identification.pieces import State
 from nonsmooth.identification.profiles import profile_of
+from nonsmooth.identification.sandwich import sandwich
 from nonsmooth.identification.uncertainty import (
     correlated,
     correlation_times,
@@ -46,6 +50,29 @@ def test_correlation_of_an_autoregressive_series():
     # and the variance of its mean is tau times that of white residuals
     c = correlated(np.ones((20_000, 1)), x[:20_000] - x[:20_000].mean())
     assert c[0, 0] * 20_000 == pytest.approx(1 / (1 - a) ** 2, rel=0.25)
+
+
+def test_parameters_known_mainly_together_keep_the_uncertainty_of_white_residuals():
+    """Ordinary least squares: u^2 = s^2 [(X^T X)^-1]_ii, never less, and hardly more where residuals are white.
+
+    Raising the scores of two such parameters by different factors would add what only one of them can do to both.
+    """
+    rng, n, together = np.random.default_rng(2), 600, 1e-3
+    a, b = rng.standard_normal((2, n))
+    table = np.column_stack([a, a + together * b])
+    piece = SimpleNamespace(which=np.arange(2), n_free=0, by_instant=lambda rows: rows, correlation=correlation_times)
+    ratios = []
+    for _ in range(40):
+        y = rng.standard_normal(n)
+        r = y - table @ np.linalg.lstsq(table, y, rcond=None)[0]
+        state = State([r], [r], [table], [np.zeros((n, 1))])
+        problem = SimpleNamespace(
+            pieces=[piece], derivatives=lambda theta, starts, now=state: now, weights=lambda state, spread: [np.ones(n)]
+        )
+        found = sandwich(problem, np.zeros(2), np.zeros((1, 1)), 0.0, np.ones(1, dtype=bool), np.zeros((2, 2)))
+        white = np.linalg.inv(table.T @ table) * (r @ r) / (n - 2)
+        ratios.append(np.sqrt(np.diag(found.covariance) / np.diag(white)))
+    assert np.min(ratios) > 0.999999 and np.mean(ratios) < 1.05 and np.max(ratios) < 1.3
 
 
 def test_profile_of_a_parabola_gives_the_normal_interval():

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.arrow import inverted, reduced
 from nonsmooth.identification.pieces import Fittable, State
-from nonsmooth.identification.uncertainty import newey_west
+from nonsmooth.identification.uncertainty import newey_west, not_below
 
 __all__ = ["Sandwich", "sandwich"]
 
@@ -62,11 +62,8 @@ def sandwich(
     tau = float(np.median([piece.correlation(r) for piece, _, r in scores]))
     meat = _meat(scores, p)
     inverse, _ = inverted(normal + prior, least)
-    data = normal * size
-    # what the scatter of the scores shows, and never less than white residuals of their size
-    raised = np.maximum(1.0, np.sqrt(np.maximum(np.diag(data), 1e-300) / np.maximum(np.diag(meat), 1e-300)))
-    meat = meat * np.outer(raised, raised) * sum(rows) / freedom
-    covariance = inverse @ (meat + prior) @ inverse
+    part = sum(rows) / freedom
+    covariance = not_below(inverse @ (meat * part + prior) @ inverse, inverse @ (normal * size + prior) @ inverse)
     return Sandwich(state, covariance, size, tau)
 
 

@@ -16,7 +16,8 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 
 __all__ = [
-    "correlated", "correlation_times", "coverage_factor", "factor_interval", "interval", "newey_west", "uniform",
+    "correlated", "correlation_times", "coverage_factor", "factor_interval", "interval", "newey_west", "not_below",
+    "uniform",
 ]  # fmt: skip
 
 
@@ -122,6 +123,16 @@ def newey_west(scores: FloatArray, times: float) -> FloatArray:
     return found
 
 
+def not_below(covariance: FloatArray, least: FloatArray) -> FloatArray:
+    """The covariance with no variance below that of ``least``, its correlations as they are.
+
+    A short record can make a sum of few products small by chance.
+    """
+    ratio = np.sqrt(np.maximum(np.diag(least), 1e-300) / np.maximum(np.diag(covariance), 1e-300))
+    raised = np.maximum(ratio, 1.0)
+    return covariance * np.outer(raised, raised)
+
+
 def correlated(jacobian: Any, residuals: Any, pieces: Sequence[int] | None = None) -> FloatArray:
     r"""Covariance of a least-squares estimate whose residuals are correlated in time.
 
@@ -162,11 +173,6 @@ def correlated(jacobian: Any, residuals: Any, pieces: Sequence[int] | None = Non
         score = (j[piece] / scale) * r[piece, None]
         meat += newey_west(score, correlation_times(r[piece]))
         begin += length
-    sandwich = inverse @ meat @ inverse * n / max(n - p, 1)
-    found = sandwich
-    # a short record can make the sum small by chance: what is below white is raised to it
-    ratio = np.sqrt(np.maximum(np.diag(white), 1e-300) / np.maximum(np.diag(sandwich), 1e-300))
-    raise_by = np.maximum(ratio, 1.0)
-    found = sandwich * np.outer(raise_by, raise_by)
+    found = not_below(inverse @ meat @ inverse * n / max(n - p, 1), white)
     result: FloatArray = found / np.outer(scale, scale)
     return result

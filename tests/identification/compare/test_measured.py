@@ -214,3 +214,38 @@ def test_a_sampled_position_of_another_rig_is_compared() -> None:
     assert np.mean(np.abs(apart)) / np.mean(np.abs(orbit)) == pytest.approx(true, rel=2e-3)
     with pytest.raises(ValueError, match="one finite number for each of 1800 samples"):
         motion_of(t, q, [0.0, 1.0])
+
+
+def test_a_recording_is_compared_in_the_states_that_it_shows() -> None:
+    """Of a chain of two masses in closed form one position was read, through a sensor, on a clock that began late."""
+    k, c, F, w, noise = 50.0, 0.6, 3.0, 4.0, 1e-4
+    t = np.arange(3.1, 30, 1 / 60)
+
+    def amplitudes(k: float) -> np.ndarray:
+        """Of (-w^2 + i c w + K) q = (F, 0): masses of 1, springs k to the ground and between them."""
+        stiff = (1j * c * w - w**2) * np.eye(2) + k * np.array([[2.0, -1.0], [-1.0, 1.0]])
+        return np.linalg.solve(stiff, [F, 0.0])
+
+    q = np.real(amplitudes(k)[1] * np.exp(1j * w * (t + 0.3))) + noise * np.random.default_rng(0).normal(size=len(t))
+    system = ns.System(
+        name="two masses", states=["a", "b", "v_a", "v_b"], parameters={"k": k},
+        modes={"free": lambda t, u, p: (
+            u.v_a, u.v_b, F * np.cos(w * t) - p.k * (2 * u.a - u.b) - c * u.v_a, p.k * (u.a - u.b) - c * u.v_b)},
+    )  # fmt: skip
+    record = {"sensor": (t, 100.0 * q + 7.0)}
+    channels = {"b": ns.Sensor("sensor", gain=100.0, offset=7.0, delay=-0.3)}
+    found = ns.compare(record, system, channels=channels)
+    assert found["state"].values.tolist() == ["b"] and int(found["period_agrees"]) == 1
+    assert float(found["orbit_distance"]) < 2e-3 and abs(float(found["phase_shift"])) < 1e-3
+    other = ns.compare(record, system, channels=channels, settings={"k": 1.1 * k})
+    size = np.sqrt(0.5 * (abs(amplitudes(k)[1]) ** 2 + abs(amplitudes(1.1 * k)[1]) ** 2))
+    apart = abs(amplitudes(1.1 * k)[1] - amplitudes(k)[1]) / size
+    assert float(other["orbit_distance"]) == pytest.approx(apart, rel=5e-3)
+    banded = ns.compare(
+        record, system, channels=channels, parameters=ns.fit(system, record, ["k"], measured=channels), draws=5
+    )
+    assert banded["theory_low"].shape == (128, 1)
+    with pytest.raises(ValueError, match="run = ... one of 0, 1"):
+        ns.compare([record, record], system, channels=channels)
+    with pytest.raises(ValueError, match="`nothing` is not a state or an output"):
+        ns.compare(record, system, channels={"nothing": "sensor"})

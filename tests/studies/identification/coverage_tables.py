@@ -84,9 +84,12 @@ def misses(results: Sequence[Mapping[str, Any]]) -> list[str]:
     """Sentences on the limits that are not met; empty where all are."""
     found = []
     for name, limit in ASKED.items():
-        counted = _Counted(name, _rows(name, results))
-        if counted.n < len(results):
-            found.append(f"{name}: not identified on {len(results) - counted.n} of {len(results)} rigs")
+        rows = _rows(name, results)
+        if len(rows) < len(results):
+            found.append(f"{name}: not identified on {len(results) - len(rows)} of {len(results)} rigs")
+        if not rows:
+            continue
+        counted = _Counted(name, rows)
         if counted.inside < SHARE * counted.n:
             found.append(f"{name}: {counted.inside} of {counted.n} truths lie in their intervals")
         if not SPREAD[0] <= counted.spread <= SPREAD[1]:
@@ -99,7 +102,7 @@ def misses(results: Sequence[Mapping[str, Any]]) -> list[str]:
 
 def pooled(results: Sequence[Mapping[str, Any]]) -> tuple[int, int]:
     """Truths within their 95 % intervals over all parameters and rigs, and their number."""
-    counted = [_Counted(name, _rows(name, results)) for name in ASKED]
+    counted = [_Counted(name, rows) for name in ASKED if (rows := _rows(name, results))]
     return sum(c.inside for c in counted), sum(c.n for c in counted)
 
 
@@ -144,7 +147,10 @@ def page(results: Sequence[Mapping[str, Any]], *, awkward: bool = False) -> str:
         "|---|---|---|---|---|---|",
     ]  # fmt: skip
     for name in ASKED:
-        c = _Counted(name, _rows(name, results))
+        if not (rows := _rows(name, results)):
+            lines.append(f"| {name} | not identified | | | | |")
+            continue
+        c = _Counted(name, rows)
         lines.append(
             f"| {name} | {c.inside} of {c.n} | {c.spread:.2f} | {c.written(float(np.median(c.off)))} | "
             f"{c.written(float(np.max(c.off)))} | {c.written(c.stated)} |"
@@ -179,10 +185,10 @@ def page(results: Sequence[Mapping[str, Any]], *, awkward: bool = False) -> str:
 
 
 def _said(results: Sequence[Mapping[str, Any]]) -> list[str]:
-    factor = np.median([np.exp(1.96 * r["rows"]["c_s"][2] / r["rows"]["c_s"][1]) for r in results])
-    lines = ["", f"c_s is known within a factor {factor:.3f} (median, 95 %)."]
+    factors = [np.exp(1.96 * error / value) for _, value, error, *_ in _rows("c_s", results)]
+    lines = ["", f"c_s is known within a factor {np.median(factors):.3f} (median, 95 %)."] if factors else [""]
     label = "c by amplitude, viscous only (Fig. 6)"
-    seen = [r for r in results if label in r["beside"]]
+    seen = [r for r in results if label in r["beside"] and "c" in r["rows"]]
     pairs = [(r["truth"]["friction"], r["beside"][label][1] / r["rows"]["c"][0] - 1) for r in seen]
     if pairs:
         dry, bias = np.array(pairs).T

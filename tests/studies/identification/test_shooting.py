@@ -5,7 +5,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from nonsmooth.errors import SolveError
+from nonsmooth.identification.arrow import Unsettled
 from nonsmooth.identification.pieces import State
+from nonsmooth.studies.savi2007.identification import shooting
 from nonsmooth.studies.savi2007.identification.free_decay import free_decay, swing
 from nonsmooth.studies.savi2007.identification.motion import march
 from nonsmooth.studies.savi2007.identification.pieces import Piece, start_state
@@ -73,6 +75,36 @@ def test_a_fit_that_does_not_settle_is_refused():
     # derivatives over a step of 3 rad/s point nowhere: that no step lowers the sum of squares is no convergence
     with pytest.raises(SolveError, match="did not settle"):
         shoot([piece], first, np.array([3.0, 1e-4, 1e-6]), resolution=COUNT)
+
+
+def test_a_piece_of_another_motion_does_not_keep_the_others_from_settling(monkeypatch):
+    """Pieces that stand out of the residuals are left out, and counted, before a fit that stops is refused."""
+    rng, w, b = np.random.default_rng(1), 4.5, 1.04
+
+    def law(p):
+        return np.array([p[0], p[1], 0.0, 0.0]), np.zeros(4), np.array([0.0, 0.0, np.inf])
+
+    pieces = []
+    for other in (w, w, w, 1.3 * w, w):
+        time, x = viscous(other, b, 0.11, rng)
+        begin, end = swing(time, x, resolution=COUNT)
+        local, x = time[begin:end] - time[begin], x[begin:end]
+        pieces.append(Piece(local, x, np.zeros_like(local), np.arange(2), law, start_state(local, x)))
+    real = shooting.settle
+
+    def settle(problem, theta, starts, spread, used, centre, prior, iterations, rough):
+        found = real(problem, theta, starts, spread, used, centre, prior, iterations, True)
+        if used.all():
+            raise Unsettled("no step leads on", np.ones(6), np.zeros(2), found[0], found[1])
+        return real(problem, found[0], found[1], spread, used, centre, prior, iterations, rough)
+
+    monkeypatch.setattr(shooting, "settle", settle)
+    given = (pieces, np.array([4.4, 1.0]), np.array([1e-4, 1e-4]))
+    found = shoot(*given, resolution=COUNT, outliers=6.0)
+    assert found.used.tolist() == [True, True, True, False, True]
+    assert np.all(np.abs(found.values - [w, b]) < 3.5 * np.sqrt(np.diag(found.covariance)))
+    with pytest.raises(Unsettled):
+        shoot(*given, resolution=COUNT)
 
 
 def test_a_step_with_endless_switches_is_no_motion():

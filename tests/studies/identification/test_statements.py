@@ -115,6 +115,19 @@ def test_the_page_counts_what_it_was_given():
     assert float(data["low"].sel(parameter="k", rig=0)) == 2.0
 
 
+def test_what_no_rig_or_not_every_rig_tells_is_said():
+    rows = results(n=4)
+    for row in rows:
+        del row["rows"]["c_s"]
+    del rows[2]["rows"]["c"]
+    text = page(rows)
+    assert "| c_s | not identified |" in text and "of 3 |" in text and "c_s is known within" not in text
+    assert [line for line in misses(rows) if "not identified" in line] == [
+        "c: not identified on 1 of 4 rigs", "c_s: not identified on 4 of 4 rigs",
+    ]  # fmt: skip
+    assert pooled(rows)[1] == 4 * len(ASKED) - 5
+
+
 def test_an_awkward_rig_has_its_anomalies_counted_in_the_notes():
     truth = {
         "sensor_zero": 4e-4, "motor_side": -1.0, "motor_wander": 0.0, "slipped_tap": 3.0, "angle_sign": 1.0,

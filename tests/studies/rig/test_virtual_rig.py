@@ -10,7 +10,7 @@ from nonsmooth.recordings import RecordingWarning
 from nonsmooth.recordings.session import PROCEDURES
 from nonsmooth.studies.savi2007.rig import FEATURES, UNITS, VirtualRig, sensors
 from nonsmooth.studies.savi2007.rig.driven import Setting, records
-from nonsmooth.studies.savi2007.rig.figures import RELEASES, stairs
+from nonsmooth.studies.savi2007.rig.figures import RELEASES
 from nonsmooth.studies.savi2007.rig.motor import frequency, passages, voltage_for
 from nonsmooth.studies.savi2007.rig.physics import crank_angle
 from nonsmooth.studies.savi2007.rig.truth import published
@@ -307,17 +307,23 @@ def test_figure_14_is_recorded_from_several_places() -> None:
     assert len(rig.section(figure=14, periods=2, settle=1.0, releases=()).runs) == 4
 
 
-def test_a_release_begins_where_it_says() -> None:
+@pytest.mark.parametrize("carry", [False, True])
+def test_a_release_begins_where_it_says_and_the_next_run_goes_on_where_motion_is_carried(carry: bool) -> None:
     """No waiting, a motor hardly driving, no support: the car swings freely from where it was let go."""
     rig = VirtualRig.published(friction=False, quantisation=False, jitter=False, ripple=False)
-    settings = [Setting(4.0, 0.0, None, 1.0, (), -0.03)]
-    x = position(records(rig, "response", settings, settle=1e-9), "Run #1")
-    p, omega = rig.truth, frequency(rig, 4.0)
-    begin = float(rig.generator("response", 0).uniform()) * 2 * np.pi / omega + 2 * np.pi / omega
+    settings = [Setting(4.0, 0.0, None, 1.0, (), -0.03), Setting(4.0, 0.0, None, 1.0)]
+    made = records(rig, "response", settings, settle=1e-9, carry=carry)
+    p, period = rig.truth, 2 * np.pi / frequency(rig, 4.0)
     decay, natural = p["c"] / (2 * p["m"]), np.sqrt(2 * p["k"] / p["m"])
-    t = begin + np.arange(len(x)) / 100
     w = np.sqrt(natural**2 - decay**2)
-    np.testing.assert_allclose(x, -0.03 * np.exp(-decay * t) * (np.cos(w * t) + decay / w * np.sin(w * t)), atol=1e-7)
+    # a run begins within the second turn, and ends with the turn in which its last sample lies
+    first, second = (1 + float(rig.generator("response", i).uniform()) for i in range(2))
+    ended = np.ceil(first + (1.0 + 1 / sensors.RATE) / period)
+    for run, turns, size in (("Run #1", first, 0.03), ("Run #2", ended + second, 0.03 if carry else 0.0)):
+        x = position(made, run)
+        t = turns * period + np.arange(len(x)) / sensors.RATE
+        expected = -size * np.exp(-decay * t) * (np.cos(w * t) + decay / w * np.sin(w * t))
+        np.testing.assert_allclose(x, expected, atol=1e-7)
 
 
 @pytest.mark.parametrize("number", [9, 11, 12, 16])
@@ -332,14 +338,6 @@ def test_each_figure_with_the_support_has_runs_without_it(number: int) -> None:
     shown = made["response" if number == 9 else "rise" if number == 11 else "section"]
     used = {shown.tree[run].attrs["crank_length"] for run in shown.runs}
     assert used <= lengths and len(free) == len(lengths) == {9: 1, 11: 3, 12: 4, 16: 1}[number]
-
-
-def test_the_rise_in_steps_carries_the_motion() -> None:
-    rig = VirtualRig.published()
-    recording = stairs(rig, forcing=(0.38, 0.39), settle=20.0, duration=4.0)
-    cranks = [recording.tree[run].attrs["crank_length"] for run in recording.runs]
-    assert cranks == [round(rho / 8.47, 5) for rho in (0.38, 0.39)]
-    assert {recording.tree[run].attrs["gap"] for run in recording.runs} == {-0.0045}
 
 
 # What goes wrong on request

@@ -51,7 +51,7 @@ def motion_band(
     to_measured = np.full(draws, np.nan)
     orbits: list[FloatArray] = []
     motions = Motions(
-        systems, transient=model.transient, keep=64, max_period=max_period, options=model.options
+        systems, transient=model.transient, keep=64, max_period=max_period, options=model.options, places=model.places
     )
     for i in range(draws):
         (one,) = motions.attractors(i, nearest.point)

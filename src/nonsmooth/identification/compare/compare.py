@@ -9,7 +9,8 @@ import numpy as np
 
 from nonsmooth.flow.arguments import real_number, whole_number
 from nonsmooth.identification.blas import one_blas_thread
-from nonsmooth.identification.compare.draws import read_settings
+from nonsmooth.identification.compare.draws import nominal, read_settings
+from nonsmooth.identification.compare.measured import recorded_motion
 from nonsmooth.identification.compare.model import Model
 from nonsmooth.system.names import unknown
 
@@ -22,22 +23,20 @@ if TYPE_CHECKING:
 __all__ = ["compare"]
 
 DRAWS = 60
-READINGS = (
-    "where some states were not measured, nonsmooth.fit(system, recording, [...]) lays the others over the model, and "
-    "its `residuals` show where they part"
-)
 FORMS = (
     "nonsmooth.identification.compare.motion_of(time, x, phase) makes one of a sampled position, and measured_motion "
-    f"of a rig with a rotary sensor and a photogate; {READINGS}"
+    "of a rig with a rotary sensor and a photogate"
 )
 NEGLIGIBLE = 1e-4  # relative uncertainties of settings below this ask for no band
 
 
 @one_blas_thread()
 def compare(
-    measured: xr.Dataset,
+    measured: Any,
     theory: System | xr.Dataset,
     *,
+    channels: Any = None,
+    run: str | None = None,
     parameters: ParameterSet | Mapping[str, float] | None = None,
     settings: Mapping[str, Any] | None = None,
     noise: Any = None,
@@ -59,9 +58,10 @@ def compare(
 
     What is compared follows from what ``measured`` holds:
 
-    - a **motion**: ``u(time, state)`` with ``phase(time)`` in forcing periods (and ``u_error``), as
-      :func:`nonsmooth.identification.compare.motion_of` makes it of a sampled position, and ``measured_motion`` of a
-      recording of the paper's rig; or its section points alone, ``section(iterate, state)``;
+    - a **motion**: a recording as :func:`nonsmooth.fit` takes it; ``u(time, state)`` with ``phase(time)`` in forcing
+      periods (and ``u_error``), as :func:`nonsmooth.identification.compare.motion_of` makes it of a sampled position,
+      and ``measured_motion`` of a recording of the paper's rig; or its section points alone, ``section(iterate,
+      state)``. It is compared in the states that were measured, one or more;
     - a **response**: ``amplitude`` over ``run`` with the parameter (``omega``) and ``direction`` of each, or a result
       of ``frequency_response``;
     - a **diagram**: ``section(<parameter>, iterate, state)`` of steady runs, or ``section(iterate, state)`` with the
@@ -69,10 +69,15 @@ def compare(
 
     Parameters
     ----------
-    measured : xarray.Dataset
+    measured : xarray.Dataset, Recording, DataFrame or mapping
     theory : System or xarray.Dataset
         The model, or a result at hand: of ``simulate``, ``poincare`` or ``sweep`` for a motion, ``frequency_response``
         for a response, ``sweep`` for a diagram.
+    channels : mapping of str to str or Sensor, optional
+        Of a recording: which channel shows which state, as ``measured`` of :func:`nonsmooth.fit`. Times are those of
+        the model: the forcing begins at t = 0, or at the ``phase`` that the fit found.
+    run : str, optional
+        Of a recording that has several.
     parameters : ParameterSet or mapping, optional
         Identified parameters; with a covariance their uncertainty is carried into the prediction.
     settings : mapping, optional
@@ -87,8 +92,8 @@ def compare(
     direction : {"up", "down", "both"}
         Of the predicted diagram.
     start : state or list of states, optional
-        Where predictions of a motion begin; rest and four measured section points where not given. Of all motions they
-        lead to the nearest is taken; all period numbers are kept.
+        Where predictions of a motion begin; rest and four measured section points where not given, other states being
+        0. Of all motions they lead to the nearest is taken; all period numbers are kept.
     section_phase : float or list of float
         Phases of the stroboscopic sections, in forcing periods.
     grid : int
@@ -145,10 +150,6 @@ def compare(
     """
     import xarray as xr
 
-    if not isinstance(measured, xr.Dataset):
-        raise TypeError(
-            f"compare takes a Dataset of measured signals, not {type(measured).__name__}: {FORMS}"
-        )
     from nonsmooth.system.system import System
 
     if not isinstance(theory, System | xr.Dataset):
@@ -165,9 +166,15 @@ def compare(
     draws = whole_number(draws, "draws", 0)
     if not 0 < real_number(level, "level") < 1:
         raise ValueError(f"level = {level!r} must lie between 0 and 1, as 0.95")
+    if not isinstance(measured, xr.Dataset) or channels is not None:
+        if not isinstance(theory, System):
+            raise TypeError(f"a recording is laid over a System, not over a result; of a measured motion: {FORMS}")
+        measured = recorded_motion(measured, nominal(theory, parameters, set_), channels, run, _phase_found(parameters))
     kind = _kind(measured, parameter)
     states = _states(measured, theory)
-    model = Model(theory, parameters, set_, whole_number(transient, "transient", 0), draws, level, seed, options)
+    model = Model(
+        theory, states, parameters, set_, whole_number(transient, "transient", 0), draws, level, seed, options
+    )
     squeeze: tuple[str, ...] = ()
     if kind == "response":
         from nonsmooth.identification.compare.response import compare_response
@@ -192,7 +199,7 @@ def compare(
             raise ValueError("measured section points are of one phase: give section_phase as one number")
         squeeze = ("section_phase",) if np.ndim(section_phase) == 0 else ()
         variables = compare_motion(
-            measured, model, noise=_noise(measured, noise, states), states=states, start=start, phases=phases,
+            measured, model, noise=_noise(measured, noise, states), start=start, phases=phases,
             grid=whole_number(grid, "grid", 8), max_period=whole_number(max_period, "max_period", 1),
             splits=whole_number(splits, "splits", 20),
         )  # fmt: skip
@@ -224,7 +231,8 @@ def _kind(measured: xr.Dataset, parameter: str | None) -> str:
         return "motion"
     raise ValueError(
         "nothing here can be compared: a motion holds `u` over time with `phase`, or `section` over iterate; a "
-        f"response `amplitude`; this Dataset holds {', '.join(map(str, measured.data_vars)) or 'nothing'}; {FORMS}"
+        f"response `amplitude`; this Dataset holds {', '.join(map(str, measured.data_vars)) or 'nothing'}: of a "
+        f"recording say channels={{state: channel}}; {FORMS}"
     )
 
 
@@ -235,12 +243,17 @@ def _states(measured: xr.Dataset, theory: Any) -> list[str]:
             return known
         raise ValueError(f"`state` must name the measured states; the theory has {', '.join(known)}")
     held = [str(name) for name in np.atleast_1d(measured["state"].values)]
-    if held != known and not ("amplitude" in measured and held[0] in known):
+    if any(name not in known for name in held) or len(set(held)) < len(held):
         raise ValueError(
-            f"the measured states are {', '.join(held)}, those of the theory {', '.join(known)}: name them so; "
-            f"{READINGS}"
+            f"the measured states are {', '.join(held)}, those of the theory {', '.join(known)}: name them so"
         )
     return held
+
+
+def _phase_found(parameters: Any) -> float:
+    """Phase of the forcing at t = 0, in periods, where a fit has found it."""
+    found = getattr(parameters, "extra", {}).get("phase")
+    return 0.0 if found is None else float(found.value)
 
 
 def _noise(measured: xr.Dataset, noise: Any, states: list[str]) -> np.ndarray:
@@ -299,12 +312,12 @@ def _dataset(
     theory = model.theory
     if model.system is None:
         record = read_provenance(theory) | {"verb": "compare", "options": options_as_data(given), "seed": model.seed}
-        states = {str(n): str(u) for n, u in zip(theory["state"].values, theory["state_unit"].values, strict=True)}
+        units = dict(zip(theory["state"].values.tolist(), theory["state_unit"].values.tolist(), strict=True))
     else:
         labels = labels_of(model.system)
         method = str(given.get("method", "auto"))
         record = read_provenance(xr.Dataset(attrs=provenance(labels, "compare", given, method=method, seed=model.seed)))
-        states = {name: quantity.unit for name, quantity in labels.states.items()}
+        units = {name: quantity.unit for name, quantity in labels.states.items()}
         for name, quantity in labels.parameters.items():
             if name not in variables:
                 attributes = {"long_name": name, "units": quantity.unit}
@@ -312,8 +325,8 @@ def _dataset(
     record["measured"] = {key: str(value) for key, value in measured.attrs.items() if key != ATTRIBUTE}
     synthetic = str(measured.attrs.get("synthetic", "no"))
     coords = {
-        "state": ("state", np.array(list(states)), {"long_name": "state"}),
-        "state_unit": ("state", np.array(list(states.values())), {"long_name": "unit"}),
+        "state": ("state", np.array(model.states), {"long_name": "state"}),
+        "state_unit": ("state", np.array([units[name] for name in model.states]), {"long_name": "unit"}),
     }
     parameter_names = set(getattr(theory, "parameters", ()))
     named = {key for key, (dims, _, _) in variables.items() if dims == (key,) or (not dims and key in parameter_names)}

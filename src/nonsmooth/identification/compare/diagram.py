@@ -45,7 +45,7 @@ def compare_diagram(
     else:
         grid = np.asarray(theory[name].values, dtype=float)
         words = np.atleast_1d(theory["direction"].values).astype(str).tolist()
-        whole = theory["section"].transpose(..., name, "iterate", "state").values
+        whole = theory["section"].sel(state=model.states).transpose(..., name, "iterate", "state").values
         sections = whole.reshape(-1, *whole.shape[-3:])
         periods = theory["period_number"].transpose(..., name).values.reshape(-1, len(grid))
     over = (name, "direction", "iterate", "state")
@@ -93,8 +93,9 @@ def _marched(
         here = {**system.values, name: float(value)}
         systems.append(system.with_parameters(here | {k: rule.at(here) + beside[k] for k, rule in rules.items()}))
     motions = Motions(
-        systems, transient=model.transient, keep=KEEP, max_period=max_period, options=model.options, phase=phase
-    )
+        systems, transient=model.transient, keep=KEEP, max_period=max_period, options=model.options, phase=phase,
+        places=model.places,
+    )  # fmt: skip
     rising = np.argsort(grid, kind="stable").tolist()
     found = [motions.carried(rising if word == "up" else rising[::-1]) for word in words]
     return np.stack([sections for sections, _ in found]), np.stack([periods for _, periods in found])

@@ -13,8 +13,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from nonsmooth.recordings.recording import Recording
+    from nonsmooth.system.system import System
 
-__all__ = ["measured_motion", "motion_of"]
+__all__ = ["measured_motion", "motion_of", "recorded_motion"]
 
 ANGLES = ("rad", "deg", "rev")
 LONG = 150.0  # s: of a longer record the support and the smoother's intensity are found in its middle
@@ -81,6 +82,64 @@ def _motion(smoothed: xr.Dataset, phase: FloatArray, states: tuple[str, str] = (
             "state": ("state", list(states)), "state_unit": ("state", units),
         },
     )  # fmt: skip
+
+
+def recorded_motion(
+    recording: Any, system: System, channels: Any = None, run: str | None = None, phase: float = 0.0
+) -> xr.Dataset:
+    """The readings of states as a motion over the drive's phase, their errors from the record's own irregularity.
+
+    Parameters
+    ----------
+    recording : Recording, Dataset, DataFrame or mapping
+    system : System
+        At its parameters: with the forcing period of the run.
+    channels : mapping of str to str or Sensor, optional
+        Which channel shows which state; channels named as states where not given.
+    run : str, optional
+        Needed where there are several.
+    phase : float
+        Of the forcing at t = 0, in periods.
+
+    Raises
+    ------
+    ValueError, TypeError
+        No recording, several runs, outputs among the quantities, channels whose clocks differ, a system without a
+        period.
+    """
+    import xarray as xr
+
+    from nonsmooth.identification.fit.records import irregularity, read_records
+
+    sensors, records = read_records(system, recording, channels, runs=run)
+    if len(records) > 1:
+        raise ValueError(
+            f"compare lays one run over the model: run = ... one of {', '.join(record.name for record in records)}"
+        )
+    (record,), period = records, system.period()
+    if period is None:
+        raise ValueError(f"{system.name!r} has no forcing period; compare takes forced systems")
+    if outputs := [name for name in sensors if name not in system.states]:
+        raise ValueError(f"{', '.join(outputs)}: no state of {system.name!r}; compare lays states over the model")
+    if len({sensor.delay for sensor in sensors.values()}) > 1 or np.isnan(record.values).any(axis=1).mean() > 0.5:
+        raise ValueError("the channels have clocks or delays of their own: compare them one by one, channels={...}")
+    gain, offset = (np.array([getattr(sensor, word) for sensor in sensors.values()]) for word in ("gain", "offset"))
+    error = [
+        max(irregularity(y), sensor.floor) if sensor.noise is None else np.hypot(sensor.noise, sensor.floor)
+        for sensor, y in zip(sensors.values(), record.values.T, strict=True)
+    ]
+    u = (record.values - offset) / gain
+    time = record.time - next(iter(sensors.values())).delay
+    synthetic = "yes" if getattr(recording, "synthetic", False) else "no"
+    return xr.Dataset(
+        {
+            "u": (("time", "state"), u),
+            "u_error": (("time", "state"), np.broadcast_to(error / np.abs(gain), u.shape)),
+            "phase": ("time", time / period + phase),
+        },
+        {"time": time, "state": list(sensors)},
+        {"synthetic": synthetic, "title": record.name},
+    )
 
 
 def measured_motion(

@@ -17,9 +17,13 @@ __all__ = ["Model"]
 
 @dataclass(frozen=True)
 class Model:
-    """A System with identified parameters and a run's settings, or a result at hand; draws, seed and band level."""
+    """A System with identified parameters and a run's settings, or a result at hand; draws, seed and band level.
+
+    ``states``: those that were measured, in their order, in which the comparison is made.
+    """
 
     theory: Any
+    states: list[str]
     parameters: Any
     settings: Settings
     transient: int
@@ -39,6 +43,11 @@ class Model:
         """Systems whose parameters are drawn, and the draws as variables."""
         systems, drawn = draw_systems(self.theory, self.parameters, self.settings, self.draws, self.seed)
         return systems, drawn_variables(drawn, self.theory)
+
+    @property
+    def places(self) -> list[int]:
+        """Places of the compared states among those of the theory."""
+        return [list(self.theory.states).index(name) for name in self.states]
 
     @property
     def quantiles(self) -> tuple[float, float, float]:

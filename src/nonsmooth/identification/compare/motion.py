@@ -30,8 +30,8 @@ MEASURED_STARTS = 4
 
 
 def compare_motion(
-    measured: xr.Dataset, model: Model, *, noise: FloatArray, states: list[str], start: Any, phases: list[float],
-    grid: int, max_period: int, splits: int,
+    measured: xr.Dataset, model: Model, *, noise: FloatArray, start: Any, phases: list[float], grid: int,
+    max_period: int, splits: int,
 ) -> dict[str, Any]:  # fmt: skip
     """The variables of the comparison, ``{name: (dims, values, attributes)}``; see :func:`compare` for each."""
     folded, sections = _measured(measured, phases, grid)
@@ -40,17 +40,19 @@ def compare_motion(
     rng = np.random.default_rng(model.seed)
     motions = None
     if model.system is not None:
-        starts = _starts(sections[0] if phases[0] == 0 else None, folded, len(states), start)
+        starts = _starts(sections[0] if phases[0] == 0 else None, folded, model, start)
         motions = Motions(
-            [model.system], transient=model.transient, keep=KEEP, max_period=max_period, options=model.options
-        )
+            [model.system], transient=model.transient, keep=KEEP, max_period=max_period, options=model.options,
+            places=model.places,
+        )  # fmt: skip
         predicted = predict(motions, sections, phases, scale, starts=starts, n=max(CLOUD, len(sections[0])), grid=grid)
     else:
-        predicted = from_result(model.theory, states, phases, grid, max_period)
+        predicted = from_result(model.theory, model.states, phases, grid, max_period)
     blurred = [points + noise * rng.standard_normal(points.shape) for points in predicted.sections]
     variables = _clouds(sections, blurred, predicted.sections, scale, splits, model.seed)
     variables |= _periods(number, predicted)
-    predicted = _begun_with_the_measurement(motions, folded, number, predicted, grid)
+    if motions is not None and sorted(model.places) == list(range(len(motions.system.states))):
+        predicted = _begun_with_the_measurement(motions, folded, number, predicted, grid)
     variables |= _orbits(folded, number, predicted, grid)
     if model.system is not None and model.draws:
         assert predicted.attractor is not None  # a System's prediction has one
@@ -82,15 +84,19 @@ def _scale(sections: list[FloatArray]) -> FloatArray:
     return np.where(spread > 0, spread, 1.0)
 
 
-def _starts(points: FloatArray | None, folded: FloatArray | None, states: int, start: Any) -> Any:
-    """The starts given; else rest and measured points at phase 0, so that theory begins where the experiment was."""
+def _starts(points: FloatArray | None, folded: FloatArray | None, model: Model, start: Any) -> Any:
+    """The starts given; else rest and measured points at phase 0, so that theory begins where the experiment was.
+
+    States that were not measured begin at 0.
+    """
     if start is not None:
         return np.atleast_2d(np.asarray(start, dtype=float))
     at_zero = _finite(folded[:, 0]) if folded is not None else points
-    if at_zero is None:
-        return np.zeros((1, states))
-    chosen = at_zero[np.linspace(0, len(at_zero) - 1, min(MEASURED_STARTS, len(at_zero))).astype(int)]
-    return np.vstack([np.zeros((1, states)), chosen])
+    count = 0 if at_zero is None else min(MEASURED_STARTS, len(at_zero))
+    starts = np.zeros((1 + count, len(model.theory.states)))
+    if at_zero is not None:
+        starts[1:, model.places] = at_zero[np.linspace(0, len(at_zero) - 1, count).astype(int)]
+    return starts
 
 
 def _clouds(
@@ -155,15 +161,17 @@ def _periods(number: int, predicted: Prediction) -> dict[str, Any]:
 
 
 def _begun_with_the_measurement(
-    motions: Motions | None, folded: FloatArray | None, number: int, predicted: Prediction, grid: int
+    motions: Motions, folded: FloatArray | None, number: int, predicted: Prediction, grid: int
 ) -> Prediction:
     """Begin the predicted motion at the first measured state that is shown, where neither has a period."""
-    if motions is None or folded is None or number or predicted.period_number:
+    if folded is None or number or predicted.period_number:
         return predicted
     whole = folded[np.isfinite(folded).all(axis=(1, 2))][-SHOWN:]
     if not len(whole):
         return predicted
-    begun = Attractor(0, whole[0, 0], 0)
+    at = np.empty(len(motions.places))
+    at[motions.places] = whole[0, 0]
+    begun = Attractor(0, at, 0)
     return replace(predicted, orbit=motions.orbit(0, begun, grid, len(whole)))
 
 

@@ -52,6 +52,8 @@ class Motions:
         ``method``, ``rtol``, ``atol``.
     phase : float
         Of the stroboscopic section, in forcing periods.
+    places : list of int, optional
+        The states that `cloud`, `orbit` and `carried` return; all where not given.
 
     Raises
     ------
@@ -61,11 +63,12 @@ class Motions:
 
     def __init__(
         self, systems: Sequence[System], *, transient: int, keep: int, max_period: int, options: Mapping[str, Any],
-        phase: float = 0.0,
+        phase: float = 0.0, places: list[int] | None = None,
     ) -> None:  # fmt: skip
         self.system = systems[0]
         if self.system.period() is None:
             raise ValueError(f"{self.system.name!r} has no forcing period; compare takes forced systems")
+        self.places = list(range(len(self.system.states))) if places is None else places
         self.periods = [float(one.period() or np.nan) for one in systems]
         self.engine = engine_for(self.system, **options)
         self.points = np.array([one.parameter_vector() for one in systems])
@@ -101,7 +104,7 @@ class Motions:
             periods[i] = verdict.period_number
             if usable(verdict.status):
                 sections[i] = self.out.section[i]
-        return sections, periods
+        return sections[..., self.places], periods
 
     def attractors(self, i: int, starts: Any) -> list[Attractor]:
         """The different motions of system i that the starts settle on, in the order of the starts.
@@ -145,7 +148,8 @@ class Motions:
         self.engine.chain(self._alone(i), 0, 1, self._state(start[0]), start, plan, 0, count, out)
         if out.status[0] not in (codes.OK, codes.NOT_GUARANTEED):
             raise solve_error(int(out.status[0]))
-        return np.resize(out.section[0], (n, out.section.shape[2])) if count < n else out.section[0]
+        points = out.section[0][:, self.places]
+        return np.resize(points, (n, points.shape[1])) if count < n else points
 
     def orbit(self, i: int, attractor: Attractor, grid: int, periods: int) -> FloatArray:
         """The motion from phase 0 over whole forcing periods: (periods * grid, states)."""
@@ -154,7 +158,8 @@ class Motions:
         state = self._state(attractor.point)
         log = self.engine.record(self._alone(i), state, end, instants)
         check_complete(log, self.system, state, self.periods[i])
-        return fold(instants / self.periods[i], log.sample_u, grid)[:periods].reshape(periods * grid, -1)
+        u = log.sample_u[:, self.places]
+        return fold(instants / self.periods[i], u, grid)[:periods].reshape(periods * grid, -1)
 
 
 def _apart(point: FloatArray, cycle: FloatArray, size: FloatArray) -> float:

@@ -161,7 +161,7 @@ def problem_of(
     """The problem, without windows; the noise is the records' own irregularity."""
     check_system(system, "fit")
     from nonsmooth.identification.fit.motion import Marcher
-    from nonsmooth.identification.fit.records import read_records
+    from nonsmooth.identification.fit.records import irregularity, read_records
     from nonsmooth.identification.fit.unknowns import read_unknowns
     from nonsmooth.identification.fit.windows import Windows
 
@@ -171,16 +171,10 @@ def problem_of(
     labels = [record.name for record in records]
     unknowns = read_unknowns(system, sensors, parameters, priors, labels, [record.settings for record in records])
     irregular = np.array([
-        max(np.sqrt(np.mean([_irregularity(record.values[:, c]) ** 2 for record in records])), sensor.floor, 1e-300)
+        max(np.sqrt(np.mean([irregularity(record.values[:, c]) ** 2 for record in records])), sensor.floor, 1e-300)
         for c, sensor in enumerate(sensors.values())
     ])  # fmt: skip
     return Windows(system, Marcher(system, unknowns.active), records, sensors, unknowns, irregular)
-
-
-def _irregularity(y: FloatArray) -> float:
-    """Standard deviation of white noise that explains the third differences; a motion adds to it."""
-    third = np.diff(y[np.isfinite(y)], 3)
-    return float(np.sqrt(np.median(third**2) / (20.0 * 0.4549))) if len(third) else 0.0
 
 
 def best_of(

@@ -18,7 +18,7 @@ from nonsmooth.system.names import unknown
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["Record", "read_records"]
+__all__ = ["Record", "irregularity", "read_records"]
 
 FORMS = (
     "a Recording, a Dataset over time, a DataFrame with a column of time (or time as its index), a mapping of channel "
@@ -48,6 +48,12 @@ class Record:
     @property
     def duration(self) -> float:
         return float(self.time[-1] - self.time[0])
+
+
+def irregularity(y: FloatArray) -> float:
+    """Standard deviation of white noise that explains the third differences; a motion adds to it."""
+    third = np.diff(y[np.isfinite(y)], 3)
+    return float(np.sqrt(np.median(third**2) / (20.0 * 0.4549))) if len(third) else 0.0
 
 
 def read_records(
@@ -137,7 +143,7 @@ def _tables(one: Any, runs: Sequence[str] | None, time: str) -> dict[str, dict[s
                 )
             made[str(name)] = _pair(pair[0], pair[1], str(name))
         return {"run": made}
-    raise TypeError(f"fit takes {FORMS}, not {shortened(one)}")
+    raise TypeError(f"a recording is {FORMS}, not {shortened(one)}")
 
 
 def _of_dataset(one: Any, time: str) -> dict[str, tuple[FloatArray, FloatArray]]:

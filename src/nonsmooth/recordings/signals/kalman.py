@@ -128,12 +128,10 @@ def filter_nodes(
 
 
 @kernel(
-    "void(int64, float64[::1], int64[::1], float64[::1], float64[::1], float64[:, ::1], float64[:, :, ::1], "
-    "float64[:, ::1], float64[:, :, ::1], float64[:, :, ::1])"
+    "void(int64, float64[::1], float64[::1], float64[:, ::1], float64[:, :, ::1], float64[:, ::1], "
+    "float64[:, :, ::1], float64[:, :, ::1])"
 )
-def smooth_nodes(
-    n: Any, step: Any, jump: Any, wide: Any, q: Any, u_p: Any, P_p: Any, u_f: Any, P_f: Any, work: Any
-) -> None:
+def smooth_nodes(n: Any, step: Any, q: Any, u_p: Any, P_p: Any, u_f: Any, P_f: Any, work: Any) -> None:
     """Turn the filtered states and covariances ``u_f, P_f`` into smoothed ones, from the last node back."""
     F, Q, C, G, D = work[0], work[1], work[2], work[3], work[4]
     for k in range(len(step) - 2, -1, -1):

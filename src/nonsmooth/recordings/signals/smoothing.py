@@ -247,7 +247,7 @@ class _Nodes:
 
         n, cost = self.order, self.cost(q)
         shake = np.where(self.inside, q[1], q[0])
-        smooth_nodes(n, self.step, self.jump, self.wide, shake, self.u_p, self.P_p, self.u_f, self.P_f, self.work)
+        smooth_nodes(n, self.step, shake, self.u_p, self.P_p, self.u_f, self.P_f, self.work)
         used = int(np.count_nonzero(np.isfinite(self.r)))
         sigma = self.sigma if self.known else self.sigma * math.sqrt(self.sums[0] / (used - n))
         units = [self.h**-k for k in range(n)]

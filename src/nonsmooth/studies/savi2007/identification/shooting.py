@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from nonsmooth import SolveError
 from nonsmooth.arrays import FloatArray
-from nonsmooth.identification.arrow import settle
+from nonsmooth.identification.arrow import Unsettled, settle
 from nonsmooth.identification.pieces import State
 from nonsmooth.identification.sandwich import sandwich
 from nonsmooth.studies.savi2007.identification.pieces import Piece, Problem
@@ -122,7 +122,14 @@ def shoot(
     used = np.ones(len(pieces), dtype=bool)
     total = 0
     for _ in range(_ROUNDS):  # weights from residuals, residuals from weights
-        theta, starts, state, count = settle(problem, theta, starts, spread, used, centre, prior, iterations, rough)
+        try:
+            theta, starts, state, count = settle(problem, theta, starts, spread, used, centre, prior, iterations, rough)
+        except Unsettled as reason:  # pieces of another motion keep all others from settling: first without them
+            worse = _worse(problem.residuals(reason.values, reason.starts), used, outliers or np.inf)
+            if not worse.any():
+                raise
+            theta, starts, used = reason.values, reason.starts, used & ~worse
+            continue
         total += count
         again = False
         if outliers is not None:

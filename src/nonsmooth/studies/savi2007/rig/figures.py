@@ -21,8 +21,7 @@ if TYPE_CHECKING:
     from nonsmooth.studies.savi2007.rig.virtual_rig import VirtualRig
 
 __all__ = [
-    "FIGURES", "RELEASES", "SECTIONS", "TAPS", "crank_for", "figure", "rise", "screw_for", "section", "stairs",
-    "without_support",
+    "FIGURES", "RELEASES", "SECTIONS", "TAPS", "crank_for", "figure", "rise", "screw_for", "section", "without_support",
 ]  # fmt: skip
 
 #: Settings of the sections: frequency (rad/s), forcing (N), gap (m).
@@ -99,17 +98,6 @@ def rise(
     knob = voltage_for(rig, omega) if voltage is None else voltage
     screw = screw_for(rig, at_rest, 0.0) if gap is None else gap
     return driven.rise(rig, voltage=knob, crank_length=lengths, gap=screw, duration=duration)
-
-
-def stairs(rig: VirtualRig, *, forcing: Sequence[float], settle: float = 1800.0, duration: float = 60.0) -> Recording:
-    """The rise of Fig. 11 in steps (N), the motion carried along, ``settle`` seconds of waiting at each."""
-    omega, _, _, at_rest = _RISE
-    screw, knob = screw_for(rig, at_rest, 0.0), voltage_for(rig, omega)
-    settings = [
-        Setting(knob, crank_for(rig, rho), screw, duration, (("figure", 11), ("note", f"rho {rho:.4g} N, in steps")))
-        for rho in forcing
-    ]
-    return records(rig, "section", settings, settle=settle, carry=True)
 
 
 def without_support(rig: VirtualRig, number: int) -> list[Setting]:
