@@ -7,8 +7,8 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.branches.following import Asked
 from nonsmooth.continuation.branches.orbit import Orbit
 from nonsmooth.continuation.branches.other_branches import born, straight_on, switched
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 
 __all__ = ["continue_orbit"]
 
-FloatArray = NDArray[np.float64]
 ZERO = 1e-6  # of the numbers beside it: the first orbit is a special point
 
 

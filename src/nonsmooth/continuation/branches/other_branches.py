@@ -6,8 +6,8 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.branches.following import Asked
 from nonsmooth.continuation.branches.reading import hopf_row, one_row, special_row
 from nonsmooth.continuation.branches.records import PointRecord, SpecialRecord, point_record
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 __all__ = ["born", "straight_on", "switched"]
 
-FloatArray = NDArray[np.float64]
 AWAY = (1e-3, 3e-3, 3e-4, 1e-2, 1e-4)  # from a crossing of branches
 
 

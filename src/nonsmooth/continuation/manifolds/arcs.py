@@ -12,9 +12,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
+
 __all__ = ["BEGIN", "Arc", "grow"]
 
-FloatArray = NDArray[np.float64]
 Step = Callable[[FloatArray, FloatArray], FloatArray]  # (points, guesses) -> images or preimages
 View = Callable[[FloatArray], FloatArray]
 BEGIN = 9  # points of the first segment

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.problems.solve import Factored, solve
 from nonsmooth.errors import SystemDefinitionError
 
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Curve", "Point", "passing"]
 
-FloatArray = NDArray[np.float64]
 DONE = 1e-9  # a step this small is followed by one of its square
 FARTHEST = 2.5  # times the last step: a cubic is not trusted beyond
 SMALL = 1e-6  # residual of a first guess that a small step alone makes a solution

@@ -5,14 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from nonsmooth.arrays import FloatArray
 
 if TYPE_CHECKING:
     from nonsmooth.continuation.march.arclength import Curve
 
 __all__ = ["branch_point", "other_direction"]
-
-FloatArray = NDArray[np.float64]
 
 
 def other_direction(curve: Curve[Any], Y: FloatArray, along: FloatArray | None) -> FloatArray | None:

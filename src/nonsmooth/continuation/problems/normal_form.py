@@ -21,8 +21,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.problems.solve import solve
 
 if TYPE_CHECKING:
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
 __all__ = ["flip_coefficient", "torus_coefficient"]
 
-FloatArray = NDArray[np.float64]
 STEP = 1e-2  # of the orbit's size
 SHRINKS, AGREED = 5, 1e-5
 ROUNDS = 12

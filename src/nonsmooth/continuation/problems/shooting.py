@@ -22,8 +22,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.problems.solve import solve
 from nonsmooth.continuation.problems.surfaces import divide
 from nonsmooth.continuation.signature.signature import AT_ONCE, Signature
@@ -36,7 +36,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Shooting", "Solved"]
 
-FloatArray = NDArray[np.float64]
 ROUNDING = 1e-16  # of the period
 
 

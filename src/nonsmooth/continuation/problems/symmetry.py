@@ -5,14 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from nonsmooth.arrays import FloatArray
 
 if TYPE_CHECKING:
     from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
 
 __all__ = ["breaks_symmetry", "is_doubled"]
-
-FloatArray = NDArray[np.float64]
 
 
 def is_doubled(curve: Orbits, point: OrbitPoint) -> bool:

@@ -9,8 +9,8 @@ from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.engines.engine import Log, State
 from nonsmooth.kernels import before_compiling
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Search", "search_within"]
 
-FloatArray = NDArray[np.float64]
 PIECE = 0.25  # seconds of a processor between two looks at the time
 FIRST = 1 / 64  # of a run: the first piece, from which the pace is read
 
