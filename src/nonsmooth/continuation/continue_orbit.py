@@ -48,7 +48,7 @@ def continue_orbit(
     start : Orbit, branch, or one row of ``special_points``
         An orbit is followed both ways from its parameter. A branch goes on at each end that stopped at the edge of
         its range (give a wider ``range``), at the largest number of points or by Ctrl-C. A flip gives the branch of
-        twice the period, a pitchfork or branch_point the other branch through it, a Hopf point of
+        twice the period, a pitchfork or transcritical the other branch through it, a Hopf point of
         ``continue_equilibrium`` the cycles that emanate from it.
     parameter : str
         Name of the parameter; that of the branch where not given.
