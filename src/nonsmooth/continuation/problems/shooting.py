@@ -210,6 +210,8 @@ class Shooting:
         J.ravel()[self._after] = 1.0
         # Closure
         F[:n] = segments.z[m] - z[0]
+        if segments.status.any():  # a segment that was not followed to its end
+            F[:] = np.nan
         first = self.z_at[m] - 1
         J[:n, max(first, 0) : first + 1 + n] = D[m, :, max(-first, 0) : n + 1]
         J[:n, :n] -= self._one
