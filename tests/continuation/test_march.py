@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from nonsmooth.continuation.march.arclength import Curve, Point
+from nonsmooth.continuation.march.crossing import tangents
 from nonsmooth.continuation.march.event import Crossing, Event, Fold, Met, Step, locate
 from nonsmooth.continuation.march.march import march
 from nonsmooth.continuation.march.marches import Limits, March
@@ -138,10 +139,34 @@ def test_a_range_ends_exactly_at_its_edge() -> None:
 def test_another_branch_crosses() -> None:
     """x (x - p) = 0: along x = 0 the line x = p is met at the origin, which is no fold."""
     found = run(Plane(lambda x, p: (x * (x - p), 2 * x - p, -x)), 0.0, -1.0, 1.0, high=1.0)
-    assert [one.kind for one in found.special if one.kind != "zero"] == ["branch_point"]
-    (origin,) = (one.point for one in found.special if one.kind == "branch_point")
+    assert [one.kind for one in found.special if one.kind != "zero"] == ["transcritical"]
+    (origin,) = (one.point for one in found.special if one.kind == "transcritical")
     assert origin.X == pytest.approx([0.0, 0.0], abs=1e-12)
     assert found.ending == "range"
+
+
+@pytest.mark.parametrize("way", [-1.0, 1.0])
+def test_a_pitchfork_without_symmetry(way: float) -> None:
+    """x (x^2 - p + 3 x p) = 0: along x = 0 the curve p = x^2 / (1 - 3 x) is met, which turns there."""
+
+    def f(x: float, p: float) -> tuple[float, float, float]:
+        return x**3 - x * p + 3 * x * x * p, 3 * x * x - p + 6 * x * p, 3 * x * x - x
+
+    found = run(Plane(f), 0.0, way, -way, low=-1.0, high=1.0)
+    assert [one.kind for one in found.special if one.kind != "zero"] == ["pitchfork"]
+
+
+def test_both_tangents_at_a_crossing() -> None:
+    """x (x - p) = 0 in units 2 and 1/2: (0, 1) and (1 / 2, 2), of length 1."""
+    both = tangents(Plane(lambda x, p: (x * (x - p), 2 * x - p, -x)), np.zeros(2))
+    straight, sloping = sorted(both, key=lambda v: abs(v[0]))
+    assert np.abs(straight) == pytest.approx([0.0, 1.0], abs=1e-9)
+    assert sloping / sloping[0] == pytest.approx([1.0, 4.0], abs=1e-9)
+
+
+def test_no_tangents_where_no_branches_cross() -> None:
+    """x^2 + p^2 = 0 holds at the origin alone."""
+    assert tangents(Plane(lambda x, p: (x * x + p * p, 2 * x, 2 * p)), np.zeros(2)) is None
 
 
 def test_a_branch_goes_on_behind_a_boundary() -> None:

@@ -127,6 +127,19 @@ def test_pitchfork_of_a_symmetric_double_well() -> None:
     assert other["stable"].values[np.abs(other["a"].values - float(fork["a"])) > 1e-6].all()
 
 
+def test_transcritical_of_the_logistic_map() -> None:
+    """x = 0 and x = 1 - 1 / r cross at r = 1 with the multiplier 1, and both go on."""
+    system = ns.Map(states=["x"], parameters={"r": 1.5}, branches=[ns.Branch(lambda u, p: (p.r * u.x * (1 - u.x),))])
+    branch = ns.continue_orbit(ns.find_orbit(system, start={"x": 0.3}), "r", (0.5, 2.0))
+    crossing = row(branch, "transcritical")
+    assert float(crossing["r"]) == pytest.approx(1.0, abs=1e-12)
+    other = ns.continue_orbit(crossing)
+    assert sorted(other["r"].values[[0, -1]]) == [0.5, 2.0]
+    for one, fixed in ((branch, 1 - 1 / branch["r"].values), (other, 0 * other["r"].values)):
+        assert one["section"].values[:, 0] == pytest.approx(fixed, abs=1e-11)
+        assert set(ns.special_points(one)["kind"].values) == {"transcritical"}
+
+
 @pytest.mark.parametrize(("r", "period_number", "multiplier"), [(1.5, 1, 0.5), (2.9, 1, -0.9), (3.2, 2, 0.16)])
 def test_a_reset_at_a_phase_counts_where_it_changes_nothing(r: float, period_number: int, multiplier: float) -> None:
     """The logistic map as a kick: 2 - r at its fixed point, 4 + 2 r - r^2 on its cycle of two."""

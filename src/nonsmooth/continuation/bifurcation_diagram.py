@@ -6,8 +6,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
+from nonsmooth.continuation.branches.other_branches import SWITCHES
 from nonsmooth.continuation.branches.reading import read_branch
 from nonsmooth.continuation.continue_orbit import continue_orbit
 from nonsmooth.continuation.find import find_orbit
@@ -27,8 +28,6 @@ if TYPE_CHECKING:
 
 __all__ = ["bifurcation_diagram"]
 
-FloatArray = NDArray[np.float64]
-SWITCHES = ("flip", "pitchfork", "branch_point")
 SAME = 1e-8  # of the range: special points nearer than this are one
 ON_BRANCH = 0.02  # of a branch's size: a point of the sweep nearer to it than this lies on it
 
@@ -100,7 +99,7 @@ def bifurcation_diagram(
     """Compute the branches of periodic orbits over a range of a parameter, stable and unstable, with special points.
 
     The parameter is swept up and down; the orbit behind each periodic interval of the sweeps is found and followed both
-    ways, unless it lies on a branch that is known. At flips, pitchforks and branch points the other branch is followed
+    ways, unless it lies on a branch that is known. At flips and where branches cross the other branch is followed
     too, and from its special points again, ``depth`` times.
 
     Parameters
@@ -268,9 +267,7 @@ def returns_of(branch: xr.Dataset) -> FloatArray:
     return found
 
 
-def _dataset(
-    system: System, found: _Found, swept: xr.Dataset, options: dict[str, Any], complete: bool
-) -> xr.Dataset:
+def _dataset(system: System, found: _Found, swept: xr.Dataset, options: dict[str, Any], complete: bool) -> xr.Dataset:
     from nonsmooth.results.branches import diagram
     from nonsmooth.results.labels import labels_of
     from nonsmooth.results.provenance import provenance

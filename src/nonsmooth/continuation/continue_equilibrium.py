@@ -56,9 +56,9 @@ def continue_equilibrium(
     -------
     xarray.Dataset
         Over ``point``: the parameter, ``u(point, state)``, ``eigenvalues``, ``stable``, ``mode``; special points as in
-        :func:`nonsmooth.special_points`: ``fold``, ``branch_point``, ``hopf`` (a row given to ``continue_orbit`` gives
-        the cycles that emanate from it), ``boundary_equilibrium``. Over ``end`` how the branch ends: ``ended`` and, in
-        a sentence, ``ended_because``.
+        :func:`nonsmooth.special_points`: ``fold``, ``pitchfork``, ``transcritical``, ``hopf`` (a row given to
+        ``continue_orbit`` gives the cycles that emanate from it), ``boundary_equilibrium``. Over ``end`` how the branch
+        ends: ``ended`` and, in a sentence, ``ended_because``.
 
     Raises
     ------

@@ -7,8 +7,8 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.branches.following import Asked
 from nonsmooth.continuation.branches.orbit import Orbit
 from nonsmooth.continuation.branches.other_branches import born, straight_on, switched
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 
 __all__ = ["continue_orbit"]
 
-FloatArray = NDArray[np.float64]
 ZERO = 1e-6  # of the numbers beside it: the first orbit is a special point
 
 
@@ -49,7 +48,7 @@ def continue_orbit(
     start : Orbit, branch, or one row of ``special_points``
         An orbit is followed both ways from its parameter. A branch goes on at each end that stopped at the edge of
         its range (give a wider ``range``), at the largest number of points or by Ctrl-C. A flip gives the branch of
-        twice the period, a pitchfork or branch_point the other branch through it, a Hopf point of
+        twice the period, a pitchfork or transcritical the other branch through it, a Hopf point of
         ``continue_equilibrium`` the cycles that emanate from it.
     parameter : str
         Name of the parameter; that of the branch where not given.

@@ -6,8 +6,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.branches.orbit import Orbit, orbit_of
 from nonsmooth.continuation.problems.anchor import anchor_at
 from nonsmooth.continuation.problems.multipliers import multipliers_of, nearest_to_one, stability
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 
 __all__ = ["find_orbit"]
 
-FloatArray = NDArray[np.float64]
 GOOD = (codes.OK, codes.NOT_GUARANTEED)
 RTOL = 1e-12  # of the runs from which orbits are read, where the flow is not exact
 NOISE = 1e-11  # of the motion's size: beyond a boundary by less than this is on it

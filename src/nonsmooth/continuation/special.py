@@ -27,9 +27,10 @@ def special_points(branch: Any) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        Over ``special``: ``kind`` (fold, flip, neimark_sacker, pitchfork, branch_point, grazing, corner, hopf), the
+        Over ``special``: ``kind`` (fold, flip, neimark_sacker, pitchfork, transcritical, grazing, corner, hopf), the
         parameter, ``section``, ``floquet_multipliers`` and the orbit's other properties. Of equilibria (fold,
-        branch_point, hopf, boundary_equilibrium): ``u``, ``eigenvalues``, ``stable``, ``mode``. At a graze
+        pitchfork, transcritical, hopf, focus_centre, boundary_equilibrium): ``u``, ``eigenvalues``, ``stable``,
+        ``mode``. A crossing of branches whose tangents cannot be told is a branch_point. At a graze
         ``floquet_multipliers`` are those without the contact, ``contact_multipliers`` those with it in the limit,
         ``grazing`` says ``persistence`` or ``non_smooth_fold``, ``determinant`` holds det(I - M-), det(I - M+),
         det(I + M-), det(I + M+). ``sliding`` names the bifurcation where a visit of a sliding mode begins, ends or

@@ -15,14 +15,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.arrays import ComplexArray, FloatArray
+
 if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Traced
     from nonsmooth.system.system import System
 
 __all__ = ["AT_REST", "ROUNDING", "Equilibrium", "ModeField", "equilibrium_at", "refuse_resting", "sorted_eigenvalues"]
 
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 AT_REST = 1e-7  # of a state's size: nearer to an equilibrium than this is at it
 ROUNDING = 1e-14  # and nearer than this nothing but rounding leads away
 VANISHING = 1e-9  # of an eigenvalue's size, of an indicator's: zero

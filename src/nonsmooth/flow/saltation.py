@@ -25,11 +25,10 @@ from dataclasses import dataclass
 from functools import reduce
 
 import numpy as np
-from numpy.typing import NDArray
+
+from nonsmooth.arrays import FloatArray
 
 __all__ = ["Jump", "Touch", "chained"]
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(slots=True)

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.flow.saltation import Jump, Touch, chained
 from nonsmooth.system.phases import phase_slopes, varying_phases
 
@@ -29,8 +30,6 @@ if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
 __all__ = ["Jump", "Segments", "Touch", "VariationalFlow"]
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(slots=True)

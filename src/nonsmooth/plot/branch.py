@@ -22,6 +22,7 @@ MARKS = {
     "flip": ("s", "flip"),
     "neimark_sacker": ("D", "Neimark-Sacker"),
     "pitchfork": ("^", "pitchfork"),
+    "transcritical": ("<", "transcritical"),
     "branch_point": ("v", "branch point"),
     "grazing": ("X", "grazing"),
     "corner": ("P", "corner"),

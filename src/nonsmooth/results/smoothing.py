@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.results.labels import Labels
 from nonsmooth.results.provenance import with_short_record
 from nonsmooth.results.schema import floats, parameter_coords, state_coords, strings
@@ -17,7 +17,6 @@ from nonsmooth.results.statuses import status_attributes
 
 __all__ = ["report"]
 
-FloatArray = NDArray[np.float64]
 
 #: Name, dim beside band and eta, long name, and what stands where there is no orbit.
 _ORBIT: dict[str, tuple[tuple[str, ...], str, Any]] = {

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.continuation.problems.anchor import anchor_at
 from nonsmooth.continuation.problems.equilibrium import Equilibria
 from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
@@ -16,7 +16,6 @@ from nonsmooth.system.system import System
 
 __all__ = ["cycle_about_a_centre", "first_cycle"]
 
-FloatArray = NDArray[np.float64]
 ANGLES = 720
 LARGEST = 1e6  # of the states' scales
 SMALL = 1e-2  # amplitude of the first cycle, in units of the states' scales
@@ -101,7 +100,7 @@ def cycle_about_a_centre(
 
 def _rotation(
     system: System, name: str, value: float, mode: int, u: FloatArray, width: float
-) -> tuple[FloatArray, NDArray[np.complex128], float] | None:
+) -> tuple[FloatArray, ComplexArray, float] | None:
     """(equilibrium with memory, eigenvector of the imaginary pair of unit size, its frequency)."""
     equilibria = Equilibria(system, mode, name, width)
     rest = equilibria.at(u, value)

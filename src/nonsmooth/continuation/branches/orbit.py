@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.continuation.problems.multipliers import multipliers_of, stability, stable_by
 from nonsmooth.continuation.signature.signature import Signature
 from nonsmooth.results.representation import cut, html_table
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Orbit", "orbit_of"]
 
-FloatArray = NDArray[np.float64]
 RTOL = 1e-13  # of the trajectory, where the flow is not exact
 AT_SECTION = 1e-14  # of the period: a transition nearer to the section than rounding tells
 
@@ -77,7 +76,7 @@ class Orbit:
     crossing_times: FloatArray
     crossing_states: FloatArray
     monodromy_matrix: FloatArray
-    floquet_multipliers: NDArray[np.complex128]
+    floquet_multipliers: ComplexArray
     stable: bool
     maximum: FloatArray
     minimum: FloatArray

@@ -6,13 +6,13 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.branches.following import Asked
 from nonsmooth.continuation.branches.reading import hopf_row, one_row, special_row
 from nonsmooth.continuation.branches.records import PointRecord, SpecialRecord, point_record
 from nonsmooth.continuation.march.begin import resumed_at
-from nonsmooth.continuation.march.crossing import other_direction
+from nonsmooth.continuation.march.crossing import tangents
 from nonsmooth.continuation.march.marches import March, in_turn
 from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
 from nonsmooth.continuation.problems.shooting import Shooting
@@ -21,9 +21,9 @@ from nonsmooth.errors import SolveError
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["born", "straight_on", "switched"]
+__all__ = ["SWITCHES", "born", "straight_on", "switched"]
 
-FloatArray = NDArray[np.float64]
+SWITCHES = ("flip", "pitchfork", "transcritical", "branch_point")
 AWAY = (1e-3, 3e-3, 3e-4, 1e-2, 1e-4)  # from a crossing of branches
 
 
@@ -32,9 +32,9 @@ def switched(start: xr.Dataset, name: str | None, asked: Asked) -> xr.Dataset:
     system, kind, own, point, period_number, before = special_row(start, "continue_orbit")
     _check_parameter(name, own)
     branch = asked.follow(system, own, before)
-    if kind not in ("flip", "pitchfork", "branch_point"):
+    if kind not in SWITCHES:
         raise ValueError(
-            f"no other branch passes through a {kind}: switching is possible at a flip, a pitchfork or a branch_point "
+            f"no other branch passes through a {kind}: switching is possible at a {', '.join(SWITCHES)} "
             "(with virtual=True a grazing or corner row goes straight on)"
         )
     curve, X = resumed_at(system, period_number, point, own, branch.width)
@@ -137,15 +137,16 @@ def emanating(
 ) -> list[tuple[Orbits, FloatArray, FloatArray]]:
     """Curve, common point and direction of each new half branch at a special point.
 
-    A flip has one (the orbit begun a round later is the same orbit); a pitchfork or a branch point two.
+    A flip has one (the orbit begun a round later is the same orbit), a crossing of branches two.
     """
     if kind == "flip":
         twice, X2 = doubled(curve.shooting, X)
         fresh = Orbits(twice, curve.size, 2 * curve.period, curve.widths)
-        # Across the branch gone round twice: the null vector without a change of the parameter.
-        direction = other_direction(fresh, X2 / fresh.scale, None)
-        return [] if direction is None else [(fresh, X2 / fresh.scale, direction)]
-    direction = other_direction(curve, X / curve.scale, along / np.linalg.norm(along))
-    if direction is None:
+        both = tangents(fresh, X2 / fresh.scale)
+        # The parameter turns on the branch of twice the period.
+        return [] if both is None else [(fresh, X2 / fresh.scale, min(both, key=lambda v: abs(v[-1])))]
+    both = tangents(curve, X / curve.scale)
+    if both is None:
         return []
-    return [(curve, X / curve.scale, direction), (curve, X / curve.scale, -direction)]
+    other = min(both, key=lambda v: abs(v @ along))
+    return [(curve, X / curve.scale, other), (curve, X / curve.scale, -other)]

@@ -13,8 +13,8 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.branches.records import BranchRecord, PointRecord, SpecialRecord
 from nonsmooth.continuation.march.marches import ENDINGS
 from nonsmooth.continuation.signature.signature import AT_ONCE, SECTION, Signature, Visit
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 __all__ = ["hopf_row", "one_row", "read_branch", "read_orbit", "recorded", "special_row"]
 
-FloatArray = NDArray[np.float64]
 #: What is read of one point, beside its parameter.
 _POINT = ("layout", "unknowns", "tangent", "mode", "section", "maximum", "minimum", "period", "floquet_multipliers",
           "stable", "clearance", "virtual")  # fmt: skip

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.continuation.problems.multipliers import stable_by
 from nonsmooth.continuation.signature.signature import Signature
 
@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
 
 __all__ = ["BranchRecord", "PointRecord", "SpecialRecord", "from_march", "joined"]
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass
@@ -33,7 +31,7 @@ class PointRecord:
     maximum: FloatArray
     minimum: FloatArray
     period: float
-    multipliers: NDArray[np.complex128]
+    multipliers: ComplexArray
     stable: bool
     clearance: FloatArray  # (n_indicators,)
     virtual: bool = False
@@ -50,7 +48,7 @@ class SpecialRecord:
     sliding: str = ""
     bounded: bool = True
     doubled: bool = False
-    contact: NDArray[np.complex128] | None = None  # multipliers with the contact, in the limit
+    contact: ComplexArray | None = None  # multipliers with the contact, in the limit
     determinants: FloatArray = field(default_factory=lambda: np.full(4, np.nan))
 
 

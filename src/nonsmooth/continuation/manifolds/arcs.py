@@ -12,9 +12,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
+
 __all__ = ["BEGIN", "Arc", "grow"]
 
-FloatArray = NDArray[np.float64]
 Step = Callable[[FloatArray, FloatArray], FloatArray]  # (points, guesses) -> images or preimages
 View = Callable[[FloatArray], FloatArray]
 BEGIN = 9  # points of the first segment
@@ -77,20 +78,25 @@ def grow(
 
 def _bad(x: FloatArray, s: FloatArray, left: float, near: float, turn: float) -> NDArray[np.bool_]:
     """Gaps between neighbours that want another point; none beyond the length that is left."""
-    chord = np.diff(x, axis=0)
-    d = np.linalg.norm(chord, axis=1)
+    d, angle = _chords(x)
     wide: NDArray[np.bool_] = np.logical_not(d <= near)  # NaN is wide: the edge of what has an image
     lost: NDArray[np.bool_] = np.asarray(~np.isfinite(x).all(axis=1), dtype=np.bool_)
     wide[lost[:-1] & lost[1:]] = False
-    with np.errstate(invalid="ignore", divide="ignore"):
-        along = chord / d[:, None]
-        cosine = np.clip((along[1:] * along[:-1]).sum(axis=1), -1.0, 1.0)
-    sharp = np.arccos(cosine) > turn
+    sharp = angle > turn
     far = d > FINEST * near
     wide[:-1] |= sharp & far[:-1]
     wide[1:] |= sharp & far[1:]
     reached = np.concatenate([[0.0], np.cumsum(np.nan_to_num(d))])[:-1]
     return np.asarray(wide & (np.diff(s) > NARROW) & (reached <= left))
+
+
+def _chords(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Distances of neighbours, and the angles between them."""
+    chord = np.diff(x, axis=0)
+    d = np.linalg.norm(chord, axis=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        along = chord / d[:, None]
+        return d, np.arccos(np.clip((along[1:] * along[:-1]).sum(axis=1), -1.0, 1.0))
 
 
 def _refine(
@@ -147,13 +153,9 @@ def _thin(
     s: FloatArray, levels: list[FloatArray], x: FloatArray, near: float, turn: float
 ) -> tuple[FloatArray, list[FloatArray]]:
     """Leave out every other point where the last image stays fine without it."""
-    chord = np.diff(x, axis=0)
-    d = np.linalg.norm(chord, axis=1)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        along = chord / d[:, None]
-        cosine = np.clip((along[1:] * along[:-1]).sum(axis=1), -1.0, 1.0)
+    d, angle = _chords(x)
     spare = np.zeros(len(s), dtype=bool)
-    spare[1:-1] = (d[1:] + d[:-1] < 0.2 * near) & (np.arccos(cosine) < 0.2 * turn)
+    spare[1:-1] = (d[1:] + d[:-1] < 0.2 * near) & (angle < 0.2 * turn)
     spare[::2] = False
     if len(s) - int(spare.sum()) < BEGIN:
         return s, levels

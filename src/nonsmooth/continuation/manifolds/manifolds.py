@@ -28,8 +28,8 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.branches.orbit import Orbit
 from nonsmooth.continuation.manifolds.arcs import BEGIN, Arc, grow
 from nonsmooth.continuation.manifolds.section_map import SectionMap
@@ -44,7 +44,6 @@ if TYPE_CHECKING:
 
 __all__ = ["ENDS", "manifolds"]
 
-FloatArray = NDArray[np.float64]
 ENDS = {
     "length": "The length asked for was reached.",
     "closed": "The manifold ends: its images no longer grow (it runs into another orbit).",

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.flow.engines.engine import Chain, SectionPlan, State
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.kernels.hybrid import codes
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 
 __all__ = ["SectionMap"]
 
-FloatArray = NDArray[np.float64]
 RTOL = 1e-12  # where the flow is not exact
 CHUNK = 128
 STEP = 1e-7  # of the differences, in scaled states

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.problems.solve import Factored, solve
 from nonsmooth.errors import SystemDefinitionError
 
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Curve", "Point", "passing"]
 
-FloatArray = NDArray[np.float64]
 DONE = 1e-9  # a step this small is followed by one of its square
 FARTHEST = 2.5  # times the last step: a cubic is not trusted beyond
 SMALL = 1e-6  # residual of a first guess that a small step alone makes a solution
@@ -290,10 +289,10 @@ class Curve(ABC, Generic[P]):
         if found is None:
             return None
         point = self.point(found[0], found[1], a.tangent, found[2])
-        if point is not None and float(point.tangent @ a.tangent) < 0.5:
+        if point is None or float(point.tangent @ a.tangent) < 0.5:
             # At a crossing of branches any direction in their plane is null: keep that of the branch.
             towards = (1 - x) * a.tangent + x * b.tangent
-            point.tangent = towards / np.linalg.norm(towards)
+            return self.described(found[1], towards / np.linalg.norm(towards), 0.0, found[2], found[0])
         return point
 
     def at_parameter(self, Y: FloatArray, value: float, which: int = -1) -> P | None:
@@ -316,9 +315,7 @@ class Curve(ABC, Generic[P]):
         point = self.at_parameter(a.Y + x * (b.Y - a.Y), edge, which)
         if point is None or np.abs(point.Y - a.Y).max() > 4 * np.abs(b.Y - a.Y).max():
             return None
-        if float(point.tangent @ a.tangent) < 0:
-            point.tangent = -point.tangent
-        return point
+        return point if float(point.tangent @ a.tangent) > 0.0 else point.turned()
 
 
 def passing(Y: FloatArray, a: FloatArray, b: FloatArray) -> float | None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.branches.orbit import Orbit
 from nonsmooth.continuation.branches.records import PointRecord
 from nonsmooth.continuation.problems.anchor import anchor_at
@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
 __all__ = ["curve_of", "largest_step", "limits", "resumed_at", "size_of"]
-
-FloatArray = NDArray[np.float64]
 
 
 def largest_step(step: Any) -> float:

@@ -1,35 +1,40 @@
-"""Crossings of branches: the exact place, and the direction of the other branch."""
+"""Crossings of branches: the exact place, and the tangents of both."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from nonsmooth.arrays import FloatArray
 
 if TYPE_CHECKING:
     from nonsmooth.continuation.march.arclength import Curve
 
-__all__ = ["branch_point", "other_direction"]
+__all__ = ["branch_point", "tangents"]
 
-FloatArray = NDArray[np.float64]
+STEP = 1e-5  # of differences, in scaled unknowns
 
 
-def other_direction(curve: Curve[Any], Y: FloatArray, along: FloatArray | None) -> FloatArray | None:
-    """A unit vector that the Jacobian at a crossing takes to zero, across the direction ``along`` already known.
+def tangents(curve: Curve[Any], Y: FloatArray) -> FloatArray | None:
+    r"""Unit tangents (2, n) of both branches at their crossing; None where only one orbit lies there.
 
-    ``along`` is None where only the null vectors are known: then the one with no component in the parameter.
+    Null vectors v of the Jacobian with :math:`\psi \cdot F_{YY} v v = 0`, :math:`F_Y^T \psi = 0`.
     """
-    matrix = curve.bordered(curve.evaluate(Y), np.zeros(curve.n))[:-1]
-    plane = np.linalg.svd(matrix)[2][-2:]
-    if along is None:
-        a, b = plane
-        vector = a * b[-1] - b * a[-1]
-    else:
-        inside = plane @ along
-        vector = np.array([-inside[1], inside[0]]) @ plane
-    length = float(np.linalg.norm(vector))
-    return None if length < 1e-12 else vector / length
+
+    def jacobian(Z: FloatArray) -> FloatArray:
+        return curve.bordered(curve.evaluate(Z), np.zeros(curve.n))[:-1]
+
+    left, _, right = np.linalg.svd(jacobian(Y))
+    plane, psi = right[-2:], left[:, -1]
+    bent = np.array([psi @ (jacobian(Y + STEP * v) - jacobian(Y - STEP * v)) @ plane.T for v in plane])
+    if not np.isfinite(bent).all():
+        return None
+    (low, high), own = np.linalg.eigh(bent + bent.T)
+    if not low < 0.0 < high:
+        return None
+    a, b = (np.sqrt(np.array([high, -low]) / (high - low)) * own).T
+    return np.array([a + b, a - b]) @ plane
 
 
 def branch_point(curve: Curve[Any], Y: FloatArray, *, tolerance: float = 1e-11, most: int = 12) -> FloatArray | None:
@@ -47,14 +52,14 @@ def branch_point(curve: Curve[Any], Y: FloatArray, *, tolerance: float = 1e-11, 
 
     _, J = scaled(Y)
     psi = np.linalg.svd(J)[0][:, -1]
-    first, beta, step = psi.copy(), 0.0, 1e-5
+    first, beta = psi.copy(), 0.0
     for _ in range(most):
         F, J = scaled(Y)
         second = np.empty((n + 1, n + 1))
         for j in range(n + 1):
             moved = np.zeros(n + 1)
-            moved[j] = step
-            second[:, j] = (scaled(Y + moved)[1] - scaled(Y - moved)[1]).T @ psi / (2 * step)
+            moved[j] = STEP
+            second[:, j] = (scaled(Y + moved)[1] - scaled(Y - moved)[1]).T @ psi / (2 * STEP)
         matrix = np.zeros((2 * n + 2, 2 * n + 2))
         matrix[:n, : n + 1], matrix[:n, -1] = J, first
         matrix[n : 2 * n + 1, : n + 1], matrix[n : 2 * n + 1, n + 1 : 2 * n + 1] = second, J.T

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.continuation.march.crossing import branch_point
+from nonsmooth.continuation.march.crossing import branch_point, tangents
 from nonsmooth.continuation.problems.solve import determinant
 
 if TYPE_CHECKING:
@@ -29,8 +29,9 @@ ROUNDING = 1e-13  # of the numbers at both ends: smaller than this is zero, howe
 LARGEST = 1e3  # of a number, for Brent's method: margins may be infinite
 BESIDE = 1e-6  # along the branch: nearer to a boundary than this is the boundary itself
 CLOSING = 1e-4  # along the branch: nearer to its first point than this is that point, a crossing of branches maybe
-TURN = 1e-5  # along the branch: a fold nearer to a crossing of branches than this is that crossing
+TURN = 1e-4  # along the branch: a fold nearer to a crossing of branches than this is that crossing
 ABOUT = 1e-2  # along the branch: steps are short beside a crossing of branches, and its first place is rough
+TURNS = 1e-5  # of the other tangent's component in the parameter: smaller than this is zero
 SAME = 1e-9  # of the numbers at both ends: smaller than this at the place of another event is the same event
 
 
@@ -130,6 +131,14 @@ class Crossing(Event):
     def number(self, curve: Any, point: Any) -> float:
         """The sign of the bordered determinant."""
         return float(point.orientation)
+
+    def named(self, step: Step, point: Any) -> tuple[str, str | None] | None:
+        """A pitchfork where the parameter turns on one of the two branches, and a transcritical where it does not."""
+        both = tangents(step.curve, point.Y)
+        if both is None:
+            return self.name, None
+        least, most = sorted(np.abs(both[:, -1]))
+        return ("pitchfork" if least < TURNS * most else "transcritical"), None
 
     def located(self, step: Step) -> tuple[float, Any] | None:
         """The zero of the determinant itself, made exact by a system that is regular there."""

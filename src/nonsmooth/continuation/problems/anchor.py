@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.signature.signature import Signature, Visit
 
 if TYPE_CHECKING:
@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from nonsmooth.flow.variational import VariationalFlow
 
 __all__ = ["anchor_at", "anchored", "plane_across"]
-
-FloatArray = NDArray[np.float64]
 
 
 def anchored(

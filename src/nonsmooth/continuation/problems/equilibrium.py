@@ -7,8 +7,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.continuation.march.arclength import Curve, Point
 from nonsmooth.continuation.march.event import Crossing, Event, Fold, Met, Step
 from nonsmooth.continuation.march.marches import INTERRUPTED
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Equilibria", "Rest"]
 
-FloatArray = NDArray[np.float64]
 COMMON = 1e-8  # of the states' scales: nearer than this two equilibria are one
 BEYOND = 1e-6  # along the branch: the first equilibrium behind a boundary
 ENDS = {
@@ -52,7 +51,7 @@ class Rest(Point):
     solved: _Field
     u: FloatArray
     jacobian: FloatArray  # (n, n)
-    eigenvalues: NDArray[np.complex128]  # largest real part first
+    eigenvalues: ComplexArray  # largest real part first
     margins: FloatArray  # (n_transitions,) of the transitions out of the mode, -inf for the others
 
 

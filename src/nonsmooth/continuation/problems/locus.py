@@ -18,8 +18,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.march.marches import INTERRUPTED
 from nonsmooth.continuation.problems.codimension_two import kinds_on
 from nonsmooth.continuation.problems.multipliers import multipliers_of, product_of_pairs, without_own
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 
 __all__ = ["KINDS", "Locus"]
 
-FloatArray = NDArray[np.float64]
 #: The kinds that have curves, each with the point of codimension two at which its curve meets a graze.
 KINDS = {
     "fold": "grazing_fold", "flip": "grazing_flip", "neimark_sacker": "grazing_neimark_sacker",

@@ -11,12 +11,12 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.arrays import ComplexArray, FloatArray
+
 __all__ = [
     "EDGE", "multipliers_of", "nearest_to_one", "pairs", "product_of_pairs", "stability", "stable_by", "without_own",
 ]  # fmt: skip
 
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 EDGE = 1e-9  # a modulus within this of 1 counts as neither
 NEUTRAL = 1e-6  # an unstable multiplier nearer to the unit circle than this is called neutral: no damping, a family
 

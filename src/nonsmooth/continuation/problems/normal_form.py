@@ -21,8 +21,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.problems.solve import solve
 
 if TYPE_CHECKING:
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
 __all__ = ["flip_coefficient", "torus_coefficient"]
 
-FloatArray = NDArray[np.float64]
 STEP = 1e-2  # of the orbit's size
 SHRINKS, AGREED = 5, 1e-5
 ROUNDS = 12
@@ -88,16 +87,15 @@ class _ReturnMap:
 
 def _vectors(A: FloatArray, at: complex) -> tuple[Any, Any, complex]:
     """Right and left eigenvectors of the eigenvalue nearest ``at``, and that eigenvalue."""
-    values, right = np.linalg.eig(A)
+    from scipy.linalg import eig
+
+    values, left, right = eig(A, left=True)
     i = int(np.abs(values - at).argmin())
-    mu, q = values[i], right[:, i]
-    values, left = np.linalg.eig(A.T)
-    p = left[:, int(np.abs(values - np.conj(mu)).argmin())]
-    q = q / np.linalg.norm(q)
+    q, p = right[:, i], left[:, i]
     along = np.vdot(p, q)
     if along == 0.0:
         raise np.linalg.LinAlgError("the eigenvalue is double: its eigenvectors are orthogonal")
-    return q, p / np.conj(along), complex(mu)
+    return q, p / np.conj(along), complex(values[i])
 
 
 def _summed(terms: list[complex]) -> tuple[float, float]:

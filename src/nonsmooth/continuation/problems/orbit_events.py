@@ -2,7 +2,7 @@ r"""Special points of branches of orbits that do not end a signature.
 
 fold
     the parameter turns: the tangent's last component vanishes;
-pitchfork, branch_point
+pitchfork, transcritical
     another branch crosses: the bordered determinant changes sign;
 flip
     det(M + I) = 0;
@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.continuation.march.event import Crossing, Event, Fold, Step
+from nonsmooth.continuation.problems.doubled import is_doubled
 from nonsmooth.continuation.problems.multipliers import product_of_pairs, without_own
-from nonsmooth.continuation.problems.symmetry import breaks_symmetry, is_doubled
 
 if TYPE_CHECKING:
     from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
@@ -44,12 +44,12 @@ class CrossingOfOrbits(Crossing):
     """Another branch of orbits crosses."""
 
     def named(self, step: Step, point: Any) -> tuple[str, str | None] | None:
-        """The flip of the orbit of half the period, which ends the branch; a pitchfork where a symmetry breaks."""
+        """The flip of the orbit of half the period, which ends the branch, or a crossing by its name."""
         if step.curve.shooting.forced and np.abs(point.multipliers - 1.0).min() > POLE:
             return None  # a contact of no length turns the determinant's sign too
         if is_doubled(step.curve, point):
             return "flip", "branching"
-        return ("pitchfork" if breaks_symmetry(step.curve, point) else "branch_point"), None
+        return super().named(step, point)
 
 
 class Flip(Event):

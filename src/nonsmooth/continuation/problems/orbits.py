@@ -9,8 +9,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.continuation.march.arclength import Curve, Point
 from nonsmooth.continuation.march.marches import ENDINGS
 from nonsmooth.continuation.problems.anchor import anchor_at, plane_across
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 
 __all__ = ["OrbitPoint", "Orbits"]
 
-FloatArray = NDArray[np.float64]
 AHEAD = 1e-6  # of the range
 
 
@@ -42,7 +41,7 @@ class OrbitPoint(Point):
 
     solved: Solved
     M: FloatArray
-    multipliers: NDArray[np.complex128]
+    multipliers: ComplexArray
     path: Path
 
     @property

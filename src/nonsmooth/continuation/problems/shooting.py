@@ -22,8 +22,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.problems.solve import solve
 from nonsmooth.continuation.problems.surfaces import divide
 from nonsmooth.continuation.signature.signature import AT_ONCE, Signature
@@ -36,7 +36,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Shooting", "Solved"]
 
-FloatArray = NDArray[np.float64]
 ROUNDING = 1e-16  # of the period
 
 
@@ -211,6 +210,8 @@ class Shooting:
         J.ravel()[self._after] = 1.0
         # Closure
         F[:n] = segments.z[m] - z[0]
+        if segments.status.any():  # a segment that was not followed to its end
+            F[:] = np.nan
         first = self.z_at[m] - 1
         J[:n, max(first, 0) : first + 1 + n] = D[m, :, max(-first, 0) : n + 1]
         J[:n, :n] -= self._one

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
+
 __all__ = ["Factored", "determinant", "solve"]
 
-FloatArray = NDArray[np.float64]
 LARGE = 64  # unknowns; beyond, the blocks of the visits fill a small part of the matrix
 
 

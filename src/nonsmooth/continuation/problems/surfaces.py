@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from nonsmooth.arrays import FloatArray
 
 if TYPE_CHECKING:
     from nonsmooth.continuation.problems.shooting import Shooting
 
 __all__ = ["divide", "look_at_surfaces"]
 
-FloatArray = NDArray[np.float64]
 SHORT = 1e-6  # of the period: a visit shorter than this is divided by its series
 SAME = 1e-12  # of their sizes: gradients and values of one surface
 

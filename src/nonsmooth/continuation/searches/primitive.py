@@ -7,14 +7,13 @@ better after two or more periods than after its own one, so such solutions are m
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.problems.shooting import Shooting, Solved
 from nonsmooth.continuation.signature.signature import Signature
 
 __all__ = ["primitive"]
 
-FloatArray = NDArray[np.float64]
 SAME = 1e-8  # of the size: states nearer than this are one state
 LONGEST = 64  # rounds looked for where neither the period number nor the transitions tell how many there may be
 

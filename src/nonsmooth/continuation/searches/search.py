@@ -9,8 +9,8 @@ from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.engines.engine import Log, State
 from nonsmooth.kernels import before_compiling
@@ -23,9 +23,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Search", "search_within"]
 
-FloatArray = NDArray[np.float64]
-PIECE = 0.25  # seconds of a processor between two looks at the time
-FIRST = 1 / 64  # of a run: the first piece, from which the pace is read
+MOMENT, LONGEST = 0.25, 2.0  # seconds of a processor between two looks at the time
+PART = 1 / 64  # of a run
 
 
 class Search:
@@ -41,7 +40,7 @@ class Search:
         self.budget, self.spent, self.doing = budget, 0.0, "letting the motion settle"
         self._advance, self._shown = advance, 0
         self._compiled, self._since = False, time.thread_time()
-        self._pace = 0.0  # units of time marched in a second
+        self._pace = np.inf  # units of time marched in a second
 
     def look(self) -> float:
         """Count the time since the last look; the seconds, NaN where kernels were compiled in them.
@@ -74,12 +73,15 @@ class Search:
         self._compiled = True
 
     def in_pieces(self, length: float, march: Callable[[float], bool]) -> None:
-        """Call ``march(piece)``, which says whether to go on, with parts of a length that take a moment each."""
-        done, piece = 0.0, length * FIRST
-        if self._pace:
-            piece = self._pace * PIECE
+        """Call ``march(piece)``, which says whether to go on, with equal parts of a length.
+
+        Only of slow motions, whose parts would take seconds, are they shorter: where a run is cut its rounding
+        differs, and what is found should not depend on how busy the machine is."""
+        done = 0.0
         while done < length:
-            piece = min(piece, length - done)
+            piece = min(length * PART, length - done)
+            if piece > LONGEST * self._pace:
+                piece = MOMENT * self._pace
             rest = length - done - piece
             if rest < 1e-9 * length:
                 piece, rest = length - done, 0.0
@@ -90,7 +92,6 @@ class Search:
             took = self.look()
             if np.isfinite(took):
                 self._pace = piece / max(took, 1e-4)
-            piece = min(self._pace * PIECE, 4.0 * piece) if self._pace else piece
 
     def record(self, engine: Engine, tables: Any, state: State, until: float, samples: FloatArray) -> Log:
         """``engine.record`` in pieces; its log stops where it failed."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.searches.visits import visits_of
 from nonsmooth.continuation.signature.signature import Signature, Visit
 from nonsmooth.flow.engines.engine import Chain, SectionPlan, State
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
 
 __all__ = ["CLOSED", "NEAR", "Guess", "forced_guesses", "settle_forced", "touching"]
 
-FloatArray = NDArray[np.float64]
 CHOICE = 6  # candidates tried: period numbers, or returning points for a given one
 CLOSED = 1e-8  # a return nearer than this has closed: the shortest such period comes first
 TOUCH = 1e-6  # of the period, of the motion's size: a contact as short, an impact as weak as this may be a touch

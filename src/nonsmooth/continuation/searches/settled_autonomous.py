@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.problems.anchor import anchored
 from nonsmooth.continuation.searches.settled import NEAR, Guess
 from nonsmooth.continuation.searches.visits import visits_of
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
 
 __all__ = ["autonomous_guesses"]
 
-FloatArray = NDArray[np.float64]
 SAMPLES = 4001
 FEW, MANY = 8, 200  # rounds in a stretch of motion that is long, and short, enough to look at
 LONGEST = 1e6

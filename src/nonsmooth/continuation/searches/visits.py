@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.signature.signature import AT_ONCE, Visit
 
 if TYPE_CHECKING:
@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 
 __all__ = ["visits_of"]
 
-FloatArray = NDArray[np.float64]
 BEHIND = 1e-9  # of an indicator's size: nearer to a boundary than this is on it
 
 

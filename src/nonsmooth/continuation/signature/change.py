@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.problems.anchor import anchored
 from nonsmooth.continuation.signature.signature import AT_ONCE, Signature, Visit
 
@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from nonsmooth.continuation.problems.shooting import Solved
 
 __all__ = ["Change", "common_orbit", "common_point", "inserted", "past_the_section", "without"]
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.continuation.problems.multipliers import multipliers_of
 from nonsmooth.continuation.signature.signature import AT_ONCE
 from nonsmooth.flow.saltation import chained
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Graze", "both_sides", "graze"]
 
-FloatArray = NDArray[np.float64]
 ASIDE = 1e-6  # of the period: the touch is looked at from this far before and behind
 
 
@@ -44,8 +43,8 @@ class Graze:
     bounded: bool
     M_free: FloatArray  # M-
     M_contact: FloatArray  # M+ (unbounded: just beyond the graze)
-    multipliers_free: NDArray[np.complex128]
-    multipliers_contact: NDArray[np.complex128]
+    multipliers_free: ComplexArray
+    multipliers_contact: ComplexArray
     doubled: bool  # an orbit of twice the period is born here
 
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth.continuation.march.event import Met, Step, first_met
+from nonsmooth.continuation.problems.doubled import is_doubled
 from nonsmooth.continuation.problems.equilibrium import Equilibria
-from nonsmooth.continuation.problems.symmetry import is_doubled
 from nonsmooth.continuation.signature.change import Change, common_point, past_the_section
 from nonsmooth.continuation.signature.grazing import graze
 from nonsmooth.continuation.signature.neighbours import beside

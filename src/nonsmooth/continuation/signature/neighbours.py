@@ -14,8 +14,8 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.searches.settled import Guess, touching
 from nonsmooth.continuation.signature.change import Change, common_orbit
 from nonsmooth.continuation.signature.rounds import Rounds
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
 __all__ = ["beside"]
 
-FloatArray = NDArray[np.float64]
 ASIDE = (1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4)  # of the range: how far beyond the boundary orbits are looked for
 NEARER = 0.1  # once more at this part of it: an orbit that the branch goes on with comes nearer
 SHRINKS = 0.5  # by at least this factor (a square root: 0.32)

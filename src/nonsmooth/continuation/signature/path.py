@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.signature.signature import AT_ONCE
 
 if TYPE_CHECKING:
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Path", "Walk"]
 
-FloatArray = NDArray[np.float64]
 ORDER = 20
 RTOL = 1e-15
 ROUNDING = 1e-13  # of an indicator's size

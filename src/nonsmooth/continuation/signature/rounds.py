@@ -10,8 +10,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.problems.anchor import anchored
 from nonsmooth.continuation.searches.settled import Guess
 from nonsmooth.continuation.searches.visits import visits_of
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Rounds"]
 
-FloatArray = NDArray[np.float64]
 RTOL = 1e-13  # where the flow is not exact
 ROUNDING = 1e-14  # of the period
 SHORT = 1e-6  # of the period: as soon after an impact follows the next one shortly before rest
@@ -82,9 +81,7 @@ class Rounds:
         """The engine that is asked where the first one denies a signature."""
         return self.engine if self.engine.name != "exact" else engine_for(self.system, "taylor", rtol=RTOL)
 
-    def _middle(
-        self, shooting: Shooting, X: FloatArray, values: FloatArray
-    ) -> tuple[int, float, FloatArray, float]:
+    def _middle(self, shooting: Shooting, X: FloatArray, values: FloatArray) -> tuple[int, float, FloatArray, float]:
         """The longest visit of an orbit, time and state in its middle, and the period."""
         times, states = shooting.split(X)
         forced = shooting.forced

@@ -12,11 +12,11 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.results.memory import room_for
 
 __all__ = ["Chain", "Engine", "Log", "SectionPlan", "State"]
 
-FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 

@@ -20,7 +20,7 @@ from nonsmooth.kernels.compile.lanes import FOUR, load, plus, store
 from nonsmooth.kernels.compile.pointers import function_at
 from nonsmooth.kernels.hybrid.codes import DIVERGED, NO_CONVERGENCE, OK
 from nonsmooth.kernels.hybrid.records import type_of
-from nonsmooth.kernels.series.crossing import NOISE
+from nonsmooth.kernels.tangent.agreement import fits
 from nonsmooth.kernels.tangent.frame import saltation
 
 __all__ = ["ORDER", "Crossing", "Ends", "Equations", "Steps", "cross", "follow", "march_legs"]
@@ -28,8 +28,6 @@ __all__ = ["ORDER", "Crossing", "Ends", "Equations", "Steps", "cross", "follow",
 ORDER = 24
 ACCURACY = 1e-17  # of the last two terms of a series against its largest one
 MOST_STEPS = 100_000  # in one leg
-AGREES = 1e-11  # of a state's size: by how much its series may miss the equations on a step
-PLACES = 3  # on a step where they are compared
 
 _i, _f = types.int64, types.float64
 _f1, _f2, _f3, _i1, _i2 = _f[::1], _f[:, ::1], _f[:, :, ::1], _i[::1], _i[:, ::1]
@@ -167,53 +165,6 @@ def step_end(C, D, equations, mode, order, s, u, X):
         for c in range(columns):
             X[i, c] = D[order, i, c]
     return divergence
-
-
-@device
-def fits(field, mode, t, s, work):
-    """Return whether the series of the states satisfy the equations on a step s, where they are asked.
-
-    A layer (of a steep tanh) that the step reaches far from its begin shows in none of their terms. What rounding does
-    to the equations does not count: where they balance, a state is all rounding."""
-    C, at, f = work.C, work.X[0], work.Y[0]
-    n_u, order = work.u.shape[0], C.shape[1] - 1
-    for place in range(1, PLACES + 1):
-        x = s * place / PLACES
-        for i in range(n_u):
-            v = C[i, order]
-            for k in range(order - 1, -1, -1):
-                v = v * x + C[i, k]
-            at[i] = v
-        field(mode, t + x, at, work.q, f)
-        for i in range(n_u):
-            slope, top = 0.0, 0.0
-            for k in range(order, 0, -1):
-                slope = slope * x + k * C[i, k]
-            for k in range(order // 2):
-                top = max(top, fabs(C[i, k]) * work.powers[k])
-            if fabs((slope - f[i]) * s) <= AGREES * top:
-                continue
-            if not (fabs(slope - f[i]) <= rounding(field, mode, t + x, i, work) < inf):
-                return False
-    return True
-
-
-@device
-def rounding(field, mode, t, i, work):
-    """Size of what rounding of the time and the states does to f_i at the point where the equations are asked."""
-    at, f, q = work.X[0], work.Y[0], work.q
-    here = f[i]
-    total = NOISE * fabs(here)
-    for j in range(work.u.shape[0]):
-        kept = at[j]
-        at[j] = kept * (1.0 + NOISE)
-        field(mode, t, at, q, f)
-        total += fabs(f[i] - here)
-        at[j] = kept
-    field(mode, t * (1.0 + NOISE), at, q, f)
-    total += fabs(f[i] - here)
-    field(mode, t, at, q, f)
-    return total
 
 
 @device
