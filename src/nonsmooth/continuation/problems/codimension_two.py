@@ -36,6 +36,7 @@ __all__ = ["kinds_on"]
 PAIR = 1e-6  # imaginary part of a complex pair
 NOISE = 1e-6  # a coefficient that stays below this balance vanishes all along (an area-preserving map)
 POLE = 1e-3  # of the numbers at both ends: one that is larger at its root has gone through infinity
+DOUBLE = 1e-5  # two multipliers nearer to -1 than this: rounding decides on the coefficient, which has a pole there
 #: Points at which a Neimark-Sacker curve ends: beyond, the two multipliers are real.
 ENDED = ("resonance_1_1", "resonance_1_2")
 Number = Callable[["Locus", "OrbitPoint"], float]
@@ -81,6 +82,11 @@ class Coefficient(CodimensionTwo):
         """Return whether its sign changes, and it is not zero all along."""
         balance = (abs(_coefficient(step.curve, end)[1]) for end in (step.a, step.b))
         return was * now < 0.0 and max(balance) >= NOISE
+
+    def named(self, step: Step, point: Any) -> tuple[str, str | None] | None:
+        """Its name; None at a 1:2 resonance."""
+        resonant = int((np.abs(point.multipliers + 1.0) < DOUBLE).sum()) > 1
+        return None if resonant else super().named(step, point)
 
 
 class Cusp(Event):

@@ -159,7 +159,7 @@ class Branches(View):
 
 
 #: Markers of Bokeh for the kinds of special points, in the order of ``nonsmooth.plot.branch.MARKS``.
-_SIGNS = ("circle", "square", "diamond", "triangle", "inverted_triangle", "x", "cross", "hex", "star")
+_SIGNS = ("circle", "square", "diamond", "triangle", "triangle_pin", "inverted_triangle", "x", "cross", "hex", "star")
 _WORDS = {"neimark_sacker": "Neimark-Sacker bifurcation", "flip": "flip (period doubling)"}
 
 
