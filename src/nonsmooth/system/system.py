@@ -47,6 +47,7 @@ class System:
         ``{"contact_force": (f, "N")}``, f a function or a mapping mode -> function.
     symmetry : tuple, optional
         ``(map, shift)`` or ``(map, shift, {mode: mode})``: ``map(u)`` of a solution, ``shift`` periods later, is one.
+        It is checked against the equations and kept with the system; bifurcations are named without it.
     scale : mapping of str to float, optional
         Typical sizes of the states (1 where missing): used by every norm and tolerance.
     period : float or callable, optional
