@@ -106,8 +106,8 @@ $(VENV)/.installed-%: pyproject.toml | $(BIN)/python
 .PRECIOUS: $(VENV)/.installed-%
 
 # The reproduction runs nothing by Taylor series.
-$(VENV)/.compiled-run $(VENV)/.compiled-zarr: METHODS := --methods rkf45
+$(VENV)/.compiled-run $(VENV)/.compiled-zarr: STEPPERS := --steppers rkf45 planar
 
 $(VENV)/.compiled-%: $(VENV)/.installed-%
-	$(BIN)/python -m nonsmooth.kernels.compile.ahead --shapes 2,1 $(METHODS)
+	$(BIN)/python -m nonsmooth.kernels.compile.ahead $(STEPPERS)
 	@touch $@

@@ -14,9 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.flow.engines.engine import FloatArray, State
-from nonsmooth.flow.engines.loop import LoopEngine, nowhere, pack_net
-from nonsmooth.kernels.hybrid import codes
-from nonsmooth.kernels.hybrid.places import BEGUN
+from nonsmooth.flow.engines.loop import LoopEngine, pack_net
 
 if TYPE_CHECKING:
     from nonsmooth.system.codegen.linear import LinearForm
@@ -49,8 +47,7 @@ class Tables:
     points: FloatArray
     form: Any  # ``kernels.records.Form``
     period: FloatArray
-    sizes: tuple[int, int, int, int]
-    harmonics: int
+    sizes: tuple[int, int, int, int]  # modes, indicators, outputs, rows of conditions
 
 
 @dataclass
@@ -91,22 +88,30 @@ class LinearEngine(LoopEngine):
             t.A, t.b, t.c, t.s, multiples, t.omega, t.period,
             t.ia, t.ib, t.ic, t.is_, *outputs, t.ra, t.rb, t.rc, t.rs, lacking,
         )  # fmt: skip
-        tables = Tables(points, form, form.period, (n_modes, n_i, outputs[0].shape[1], len(self.net.rows)), n_h)
+        if self.is_planar and n_h == 0:  # a forcing of no size
+            form = _with_harmonic(form)
         if n_points > 1:  # threads may share them
-            compiled(self.module(tables, "sections").chain)
-        return tables
+            compiled(self.module().run)
+        return Tables(points, form, form.period, (n_modes, n_i, outputs[0].shape[1], len(self.net.rows)))
 
-    def module(self, tables: Tables, observer: str) -> ModuleType:
+    @property
+    def is_planar(self) -> bool:
+        """Return whether it runs by the kernel of two states with one harmonic."""
+        return len(self.scale) == 2 and not self.traced.m and len(self.form.multiples) <= 1
+
+    def module(self) -> ModuleType:
         from nonsmooth.kernels.linear.module import linear_module
 
-        memory = len(self.traced.m)
-        return linear_module(len(self.scale) + memory, tables.harmonics, observer, memory)
+        return linear_module(self.is_planar)
 
-    def given(self, tables: Tables, observer: str) -> tuple[Any, Any, Any]:
+    def given(self, tables: Tables) -> tuple[Any, Any, Any]:
         """The present thread's tables and work; the kernel keeps the tables of the last point in them."""
         local = self._local
         if not hasattr(local, "work"):
-            local.work, local.last = self.module(tables, observer).scratch(*tables.sizes), tables
+            from nonsmooth.kernels.linear.layout import scratch
+
+            n, harmonics = tables.form.A.shape[-1], len(tables.form.multiples)
+            local.work, local.last = scratch(n, harmonics, *tables.sizes), tables
         if local.last is not tables:  # the same place among other points
             local.work[1].built[0], local.last = 0, tables
         return tables.form, *local.work
@@ -118,14 +123,22 @@ class LinearEngine(LoopEngine):
         """Point i: march ``count`` units of time with a frame (``kernels.records.Growth``). Returns a status.
 
         The periods in the state's clock count from here."""
-        form, own, work = self.given(tables, "growth")
-        kernel = self.module(tables, "growth").grow
-        goal, motion = self._goal(0, count, 0.0, unit), self._motion(state, False)
-        work.tally[BEGUN], code = 0, codes.PAUSED
-        while code == codes.PAUSED:
-            code = kernel(i, form, self.net_of(tables, i), nowhere(), goal, motion, growth, own, work)
+        march = self.march()
+        state.counters[1] = 0
+        march.grown(i, state, count, unit, growth)
+        code, _ = self._run(march, tables)
         state.settled = True
-        return int(code)
+        return code
+
+
+def _with_harmonic(form: Any) -> Any:
+    """The same form with one harmonic, all of whose coefficients are zero."""
+    waves = {}
+    for name in ("c", "s", "ic", "is_", "oc", "os", "rc", "rs"):
+        shape = list(getattr(form, name).shape)
+        shape[2 if name in ("c", "s", "rc", "rs") else -1] = 1
+        waves[name] = np.zeros(shape)
+    return form._replace(multiples=np.ones(1, dtype=np.int64), **waves)
 
 
 class PlanarEngine(LinearEngine):

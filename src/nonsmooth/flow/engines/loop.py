@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from functools import cached_property
@@ -11,8 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.flow.engines.engine import Chain, FloatArray, Log, SectionPlan, State
+from nonsmooth.flow.engines.march import March
 from nonsmooth.kernels.hybrid import codes
-from nonsmooth.kernels.hybrid.places import BEGUN, CROSSINGS, DEAD_END, PATIENCE, RESET, TOUCHES
+from nonsmooth.kernels.hybrid.places import BEGUN, CROSSINGS, DEAD_END, RESET, TOUCHES
 from nonsmooth.kernels.hybrid.stopping import flag
 from nonsmooth.system.phases import phases, varying_phases
 
@@ -28,8 +30,8 @@ SPARE = 64  # crossings that one leg may add to a log
 class LoopEngine(ABC):
     """``chain`` and ``record`` of an engine over the kernels of ``kernels.hybrid``.
 
-    An engine says which compiled module observes a run (:meth:`module`), and what stands for the system there:
-    model, tables and work (:meth:`given`).
+    An engine says which compiled module marches (:meth:`module`), and what stands for the system there: model, tables
+    and work (:meth:`given`).
     """
 
     traced: Traced
@@ -37,16 +39,28 @@ class LoopEngine(ABC):
     net: Any  # ``kernels.records.Net``
 
     @abstractmethod
-    def module(self, tables: Any, observer: str) -> ModuleType:
-        """The kernels of this engine's stepper with an observer: ``"sections"`` or ``"record"``."""
+    def module(self) -> ModuleType:
+        """The kernels of this engine's stepper."""
 
     @abstractmethod
-    def given(self, tables: Any, observer: str) -> tuple[Any, Any, Any]:
+    def given(self, tables: Any) -> tuple[Any, Any, Any]:
         """Model, tables and work of the kernels."""
 
     @abstractmethod
     def touches_of_a_leg(self) -> int:
         """Number of touches that one segment may add to a log, at most."""
+
+    def march(self) -> March:
+        """The present thread's way into the kernels."""
+        local = self._threads
+        if not hasattr(local, "march"):
+            local.march = March(self.module(), self._limit)
+        found: March = local.march
+        return found
+
+    @cached_property
+    def _threads(self) -> threading.local:
+        return threading.local()
 
     def go_on(self, tables: Any) -> bool:
         """Give a run that has paused what it waits for; True where that exchanged model, tables or work."""
@@ -80,13 +94,22 @@ class LoopEngine(ABC):
     def _limit(self) -> FloatArray:
         return DIVERGENCE * np.asarray(self.scale, dtype=float)
 
+    def system(self, tables: Any, i: int, indicator: int = -1) -> tuple[Any, Any, Any, Any]:
+        """Model, transition table with a section's indicator, tables and work: what a march is given."""
+        model, own, work = self.given(tables)
+        net, local = self.net_of(tables, i), self._threads
+        if indicator >= 0:
+            known = getattr(local, "section", None)
+            if known is None or known[0] is not net or known[1] != indicator:
+                local.section = net, indicator, with_section(net, indicator)
+            net = local.section[2]
+        return model, net, own, work
+
     def chain(
         self, tables: Any, first: int, last: int, state: State, starts: FloatArray | None,
         plan: SectionPlan, transient: int, keep: int, out: Chain,
     ) -> None:  # fmt: skip
         """See :class:`nonsmooth.flow.engines.engine.Engine`."""
-        from nonsmooth.kernels.hybrid.records import Section
-
         if self.phases is not None and last - first > 1:  # each point has a net of its own
             for i in range(first, last):
                 self.chain(tables, i, i + 1, state, starts, plan, transient, keep, out)
@@ -95,30 +118,35 @@ class LoopEngine(ABC):
         if carry:
             state.keep_phase(float(tables.period[first]), plan.phase if plan.indicator < 0 else -1.0)
             state.clock[2] = 0.0  # for the kernel: done, take the time as it stands
-        section = Section(
-            plan.indicator, plan.rising, plan.mode, int(plan.after), plan.every, int(plan.extremes),
-            float(plan.phase) if plan.indicator < 0 else -1.0, min(float(plan.t_max), 1e300),
-        )  # fmt: skip
-        begun = np.zeros((0, 0)) if starts is None else _with_memory(starts, state.memory)
-        goal, motion = self._goal(transient, keep, 0.0, 0.0), self._motion(state, carry and state.settled)
-        kernel, kept = self.module(tables, "sections").chain, out.record()
-        model, own, work = self.given(tables, "sections")  # a run that pauses stands in its work
-        work.tally[BEGUN] = 0
-        while first < last:  # Ctrl-C comes in between
-            net = with_section(self.net_of(tables, first), plan.indicator)
-            first = kernel(first, last, begun, model, net, section, goal, motion, kept, own, work)
-            if self.go_on(tables):
-                model, own, work = self.given(tables, "sections")
-            _end_if_not_wanted()
+        begun = None if starts is None else _with_memory(starts, state.memory)
+        state.counters[1] = int(carry and state.settled)
+        march = self.march()
+        march.returns(first, last, state, begun, plan, transient, keep, out)
+        self._run(march, tables, plan.indicator)
         if carry:
             state.settled = True
             if state.clock[2] == 0.0 and tables.period[last - 1] < np.inf:
                 state.clock[:] = clock  # failed at the first point: nothing was written
 
+    def _run(self, march: March, tables: Any, indicator: int = -1) -> tuple[int, Any]:
+        """March until the goal is reached or a log is full; Ctrl-C comes in between. Returns the code, and the work."""
+        system = self.system(tables, int(march.orders[0]), indicator)
+        system[3].tally[BEGUN] = 0
+        return self._go_on(march, tables, indicator, system)
+
+    def _go_on(self, march: March, tables: Any, indicator: int, system: Any) -> tuple[int, Any]:
+        code = codes.PAUSED
+        while code == codes.PAUSED:
+            code = march.run(system)
+            if self.go_on(tables):
+                system = self.system(tables, int(march.orders[0]), indicator)
+            _end_if_not_wanted()
+        return code, system
+
     def room(self, tables: Any) -> Any:
         """Memory of :meth:`record` for many short runs with the same tables, which it would else make each time."""
         n_u, n_m = len(self.scale), len(self.traced.m)
-        return [self.given(tables, "record"), _crossings(1024, n_u, n_m), _touches(1024, n_u)]
+        return [_crossings(1024, n_u, n_m), _touches(1024, n_u)]
 
     def record(
         self, tables: Any, state: State, until: float, samples: FloatArray, room: Any = None
@@ -127,23 +155,21 @@ class LoopEngine(ABC):
         from nonsmooth.kernels.hybrid import records
 
         n, n_u, n_m = len(samples), len(self.scale), len(self.traced.m)
-        goal, motion = self._goal(0, 0, until, 0.0), self._motion(state, state.settled)
         sampled = _samples(samples, n_u, n_m) if n else self._none[0]
-        (model, own, work), crossings, touches = LoopEngine.room(self, tables) if room is None else room
-        kernel = self.module(tables, "record").record
-        spare, code = self.touches_of_a_leg(), codes.LOG_FULL
-        work.tally[BEGUN] = 0
-        while code in (codes.LOG_FULL, codes.PAUSED):
-            log = records.Log(*(*sampled, *crossings, *touches, spare))
-            code = kernel(model, self.net_of(tables, 0), nowhere(), goal, motion, log, own, work)
-            if self.go_on(tables):
-                model, own, work = self.given(tables, "record")
-            _end_if_not_wanted()
-            if code == codes.LOG_FULL:
-                crossings = _longer(crossings, _crossings(2 * len(crossings[0]), n_u, n_m))
-                touches = _longer(touches, _touches(2 * len(touches[0]) + spare, n_u))
+        crossings, touches = LoopEngine.room(self, tables) if room is None else room
+        spare, march = self.touches_of_a_leg(), self.march()
+        state.counters[1] = int(state.settled)
+        march.logged(state, float(until))
+        march.log.put(records.Log(*sampled, *crossings, *touches, spare))
+        code, system = self._run(march, tables)
+        while code == codes.LOG_FULL:
+            crossings = _longer(crossings, _crossings(2 * len(crossings[0]), n_u, n_m))
+            touches = _longer(touches, _touches(2 * len(touches[0]) + spare, n_u))
+            march.log.put(records.Log(*sampled, *crossings, *touches, spare))
+            code, system = self._go_on(march, tables, -1, system)
         state.settled = True
-        n_c, n_t = work.tally[CROSSINGS], work.tally[TOUCHES]
+        tally = system[3].tally
+        n_c, n_t = tally[CROSSINGS], tally[TOUCHES]
         times, transitions, before, after, memory = [part[:n_c].copy() for part in crossings] if n_c else self._none[1]
         touch_times, indicators, touch_u, clearances = [part[:n_t].copy() for part in touches] if n_t else self._none[2]
         _, sample_u, sample_memory, sample_mode, sample_segment = sampled
@@ -157,17 +183,6 @@ class LoopEngine(ABC):
             touch_times, indicators, touch_u, clearances, int(code),
         )  # fmt: skip
 
-    def _goal(self, transient: int, keep: int, until: float, unit: float) -> Any:
-        from nonsmooth.kernels.hybrid.records import Goal
-
-        return Goal(int(transient), int(keep), float(until), float(unit), self._limit, PATIENCE)
-
-    def _motion(self, state: State, settled: bool) -> Any:
-        from nonsmooth.kernels.hybrid.records import Motion
-
-        state.counters[1] = int(settled)
-        return Motion(state.u, state.memory, state.clock, state.counters)
-
 
 def _with_memory(starts: FloatArray, memory: FloatArray) -> FloatArray:
     """States and memory side by side: every start begins with the memory that is given."""
@@ -177,13 +192,6 @@ def _with_memory(starts: FloatArray, memory: FloatArray) -> FloatArray:
 def _end_if_not_wanted() -> None:
     if flag()[0]:
         raise KeyboardInterrupt
-
-
-def nowhere() -> Any:
-    """A section that is never met."""
-    from nonsmooth.kernels.hybrid.records import Section
-
-    return Section(-1, 0, -1, 0, 1, 0, -1.0, 0.0)
 
 
 def _samples(instants: FloatArray, n: int, n_memory: int) -> list[Any]:
@@ -217,7 +225,7 @@ def _longer(old: list[Any], new: list[Any]) -> list[Any]:
 def with_section(net: Any, indicator: int) -> Any:
     """The transition table, its last two rows being the section's (rising, falling)."""
     rows = net.rows.copy()
-    rows[-2:, 0] = max(indicator, 0)
+    rows[-2:, 0] = indicator
     return net._replace(rows=rows)
 
 

@@ -56,12 +56,12 @@ class PatternEngine(LoopEngine):
         linear = self.patterns.form.evaluate(points)
         return Points(np.asarray(points, dtype=float), linear, linear.period)
 
-    def module(self, tables: Any, observer: str) -> ModuleType:
+    def module(self) -> ModuleType:
         from nonsmooth.kernels.linear.module import linear_module
 
-        return linear_module(len(self.scale), len(self.patterns.form.multiples), observer, may_wait=True)
+        return linear_module()
 
-    def given(self, tables: Any, observer: str) -> tuple[Any, Any, Any]:
+    def given(self, tables: Any) -> tuple[Any, Any, Any]:
         return tables.form, tables.standing, tables.work
 
     def net_of(self, tables: Any, i: int) -> Any:
@@ -119,11 +119,11 @@ class PatternTables:
         from nonsmooth.kernels.linear.module import modes_module
 
         patterns = engine.patterns
-        self.patterns, self.scratch = patterns, engine.module(None, "sections").scratch_apart
+        self.patterns = patterns
         self.rows = patterns.rows(tables.linear, i)
         n, width = self.rows.field.shape
         self.harmonics = (width - n - 1) // 2
-        self.stand = modes_module(n, self.harmonics).stand
+        self.stand = modes_module().stand
         self.points, self.period = tables.points[i : i + 1], tables.period[i : i + 1]
         self.omega = np.ascontiguousarray(tables.linear.omega[i : i + 1])
         self.multiples = np.array(patterns.form.multiples, dtype=np.int64)
@@ -257,6 +257,8 @@ class PatternTables:
 
     def _widen(self, conditions: int, outputs: int) -> None:
         """Make room; a table takes memory only where it is written, so that much may be asked for."""
+        from nonsmooth.kernels.linear.layout import scratch
+
         n, width = self.rows.field.shape
         of_one = table_bytes(n, self.harmonics, 1) + 8 * (conditions + n + outputs) * 13 * width
         self.capacity = 2 * self.capacity or max(8, min(MOST, (free_memory() or 2**32) // (4 * of_one)))
@@ -265,7 +267,7 @@ class PatternTables:
             "take fewer elements or a shorter run: it visits more patterns than there is memory for",
         )  # fmt: skip
         most = 64 * len(self.rows.parts)
-        own, work = self.scratch(self.capacity, conditions, outputs, most)
+        own, work = scratch(n, self.harmonics, self.capacity, conditions, outputs, most, apart=True)
         if self.own is not None:
             for old, new in ((self.own, own), (self.work, work)):
                 for one, other in zip(old, new, strict=True):

@@ -141,13 +141,18 @@ class SeriesEngine(LoopEngine):
             steps, smooth = exact_steps(self.traced, points, EXACT_ORDER)
         return Tables(points, periods(self.traced, points), steps, smooth)
 
-    def module(self, tables: Tables, observer: str) -> ModuleType:
+    def module(self) -> ModuleType:
         from nonsmooth.kernels.series.module import series_module
 
-        return series_module(observer, self.name)
+        return series_module(self.name)
 
-    def given(self, tables: Tables, observer: str) -> tuple[Any, Any, Any]:
-        return self.generated(tables), (), self._work()
+    def given(self, tables: Tables) -> tuple[Any, Any, Any]:
+        local = self._threads
+        if getattr(local, "tables", None) is not tables:
+            local.tables, local.generated = tables, self.generated(tables)
+        if not hasattr(local, "work"):
+            local.work = self._work()
+        return local.generated, (), local.work
 
     def touches_of_a_leg(self) -> int:
         return (len(self.net.rows) + 1) * (self.series_order + 1)

@@ -14,8 +14,6 @@ import re
 import shutil
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from inspect import signature
-from itertools import product
 from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -25,46 +23,34 @@ from typing import Any
 from nonsmooth.kernels.compile.target import AHEAD, level
 from nonsmooth.kernels.series.places import METHODS
 
-__all__ = ["compile_ahead", "kernels_of", "plain_files", "tasks"]
+__all__ = ["STEPPERS", "compile_ahead", "kernels_of", "plain_files", "tasks"]
 
-#: Numbers of states and of harmonics that the exact flow is compiled for ahead; others when they are first met.
-SHAPES = ("2,1", "2,0")
+STEPPERS = (*METHODS, "linear", "planar")
+JOINED = ("kernels.hybrid.run", "kernels.linear.modes")  # texts of modules that are made for a stepper
 _ROOT = Path(__file__).parents[2]
 _Task = tuple[str, str, tuple[Any, ...]]  # a module, or a function in it that makes one and its arguments
 
 
 def plain_files() -> Iterator[str]:
-    """Modules of the package with kernels of one shape, found by their decorators."""
-    from nonsmooth.kernels.compile.cache import reached
-
+    """Modules of the package with kernels that are no text of another module, found by their decorators."""
     for path in sorted(_ROOT.rglob("*.py")):
         text = path.read_text(encoding="utf-8")
-        if re.search(r"^@kernel\(", text, flags=re.MULTILINE):
-            texts = [text, *reached(text).values()]
-            if not any(re.search(r"^STATES = ", found, flags=re.MULTILINE) for found in texts):
-                yield ".".join(["nonsmooth", *path.relative_to(_ROOT).with_suffix("").parts])
+        name = ".".join(path.relative_to(_ROOT).with_suffix("").parts)
+        if re.search(r"^@kernel\(", text, flags=re.MULTILINE) and name not in JOINED:
+            yield f"nonsmooth.{name}"
 
 
-def tasks(shapes: Sequence[str] = SHAPES, methods: Sequence[str] | None = None) -> list[_Task]:
-    """The list of modules to compile, each by one process: those of every ``*_module`` function, and the plain files.
+def tasks(steppers: Sequence[str] = STEPPERS) -> list[_Task]:
+    """The list of modules to compile, each by one process: the marches of these steppers, then the plain files.
 
-    Its arguments are told by their names: ``states`` and ``harmonics`` of a shape, and each of the file's observers and
-    methods, or of the ``methods`` given. The longest come first, and a module behind those whose kernels it calls: two
-    processes then do not compile these twice."""
-    found: list[_Task] = []
-    for stepper in ("linear", "series"):
-        file = importlib.import_module(f"nonsmooth.kernels.{stepper}.module")
-        for name in (name for name in file.__all__ if name.endswith("_module")):
-            for states, harmonics in (map(int, shape.split(",")) for shape in shapes):
-                choices: dict[str, Any] = {"states": [states], "harmonics": [harmonics]}
-                choices |= {one: getattr(file, f"{one.upper()}S", []) for one in ("observer", "method")}
-                if methods is not None:
-                    choices["method"] = methods
-                names = signature(getattr(file, name)).parameters
-                given = product(*(choices.get(one, [names[one].default]) for one in names))
-                found += [(file.__name__, name, arguments) for arguments in given]
-    found += [(name, "", ()) for name in plain_files()]
-    return list(dict.fromkeys(found))
+    The longest come first."""
+    linear, series = (f"nonsmooth.kernels.{stepper}.module" for stepper in ("linear", "series"))
+    made = {name: (series, "series_module", (name,)) for name in METHODS}
+    made |= {"planar": (linear, "linear_module", (True,)), "linear": (linear, "linear_module", (False,))}
+    found = [made[name] for name in STEPPERS if name in steppers]
+    if "linear" in steppers:
+        found.append((linear, "modes_module", ()))
+    return found + [(name, "", ()) for name in plain_files()]
 
 
 def _module(task: _Task) -> ModuleType:
@@ -119,15 +105,12 @@ def compile_ahead(into: Path, chosen: str, work: Sequence[_Task], *, whole: bool
 def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m nonsmooth.kernels.compile.ahead", description=__doc__)
     parser.add_argument("levels", nargs="*", help="levels of the architecture; without one, this processor's highest")
-    parser.add_argument("--shapes", nargs="+", default=SHAPES, metavar="STATES,HARMONICS", help="of the exact flow")
-    parser.add_argument(
-        "--methods", nargs="+", choices=tuple(METHODS), help="of the series; without it, all of them are compiled"
-    )
+    parser.add_argument("--steppers", nargs="+", choices=STEPPERS, default=STEPPERS, help="without it, all")
     parser.add_argument("--into", type=Path, default=AHEAD, help="another folder than the package's own")
     options = parser.parse_args()
     for chosen in filter(None, options.levels or [level()]):
-        work = tasks(options.shapes, options.methods)
-        number = compile_ahead(options.into, chosen, work, whole=options.methods is None)
+        work = tasks(options.steppers)
+        number = compile_ahead(options.into, chosen, work, whole=len(options.steppers) == len(STEPPERS))
         print(f"{number} kernels compiled for {chosen} in {options.into / chosen}")
     return 0
 

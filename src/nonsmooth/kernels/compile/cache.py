@@ -50,13 +50,14 @@ from nonsmooth.kernels.compile.folder import (
 from nonsmooth.kernels.compile.target import Function, made_ahead
 
 __all__ = [
-    "cache_statistics", "callback", "compiled", "device", "inline", "kernel", "load_module", "once", "reached",
+    "cache_statistics", "callback", "compiled", "device", "inline", "kernel", "load_module", "once", "reached", "summed",
 ]  # fmt: skip
 
 # Kernels allocate nothing (scratch is an argument), so they need no reference counts: "_nrt" off saves a third.
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}, "_nrt": False}
-# What only kernels call needs no way in from Python.
-_INNER: dict[str, Any] = {**_OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+# What only kernels call needs no way in from Python. Numba takes over what is not set here (``forceinline``, fastmath)
+# from the function whose compilation asks for this one.
+_INNER: dict[str, Any] = {**_OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "forceinline": False}
 _DIGEST = hashlib.sha256().digest_size
 _GENERATED = "nonsmooth_generated_"
 _MACHINERY = {f"compile.{name}" for name in ("ahead", "assembly", "cache", "folder", "target")}
@@ -322,6 +323,11 @@ def inline(function: Callable[..., Any]) -> Any:
     the dozen multiplications behind it. Every call site grows the caller and its compile time, so use it sparingly.
     """
     return _jitted(function, {**_INNER, "forceinline": True})
+
+
+def summed(function: Callable[..., Any]) -> Any:
+    """Like :func:`inline`, for a loop whose sum may be taken in any order: it then goes in vectors."""
+    return _jitted(function, {**_INNER, "forceinline": True, "fastmath": {"contract", "reassoc"}})
 
 
 def once(function: Callable[..., Any]) -> Any:

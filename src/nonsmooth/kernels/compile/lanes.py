@@ -1,232 +1,28 @@
-"""Many numbers at once: sums of table rows and columns in vector instructions.
+"""Numbers and vectors of four or eight at an address, inside kernels: for sums that the compiler does not find.
 
-Numba does not find these sums by itself: it unrolls such short loops, and switches off the pass of LLVM that would join
-what comes out. Here the vector instructions are written down; LLVM splits them to what the processor has. ``plain``
-holds the same sums as loops, for a GPU's threads and for runs without compilation. Sums over many states stand in
-``long_sums``.
+Numba unrolls short loops and switches off the pass of LLVM that would join what comes out. And an array is seven words
+of a call: a function that is given addresses costs no more than the two nanoseconds of the call, so that its loops
+stand once in the code. Whoever passes addresses keeps the arrays alive. With ``NUMBA_DISABLE_JIT=1`` the same is done
+by ctypes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
-from types import SimpleNamespace
+from ctypes import c_double, c_int64
 from typing import Any
 
 import numba
+import numpy as np
 from llvmlite import ir
 from numba.core import cgutils, types
 from numba.extending import intrinsic, models, register_model
 
-__all__ = [
-    "CONTRACT", "FOUR", "LANES", "LONGEST", "WIDEST", "Array", "choose", "load", "plain", "plus", "scaled", "store",
-    "sum_columns", "sum_rows", "sum_some_rows", "times",
-]  # fmt: skip
+__all__ = ["FOUR", "apart", "four_at", "load", "number_at", "plus", "store", "sum_columns", "times", "whole_at", "write_four"]
 
-LANES = 8
 FOUR = 4  # numbers of a vector that is a value in a kernel
-WIDEST = 32  # lanes of one sum: what the vector registers hold
-LONGEST = 24  # sums of more terms are loops
-FEW = 2  # so many columns' entries go one by one: joining them costs more than it gains
+MOST = 8  # vectors of a column that are summed side by side: they keep the processor busy
 CONTRACT = ("contract",)
-
-
-def _sum_rows(out: Any, row: Any, table: Any, mode: Any, f: Any, w: Any, one: Any, m: Any) -> None:
-    """out[row, :] = sum_j table[mode, f, j, :] w[j], with w[one] = 1; the first ``one`` terms come last."""
-    for k in range(LANES):
-        total = table[mode, f, one, k]
-        for j in range(one + 1, m):
-            total += table[mode, f, j, k] * w[j]
-        for j in range(one - 1, -1, -1):
-            total += table[mode, f, j, k] * w[j]
-        out[row, k] = total
-
-
-def _sum_some_rows(out: Any, row: Any, table: Any, mode: Any, f: Any, w: Any, some: Any) -> None:
-    """The same where table[mode, f, j, :] is zero but for the some[0] values of j that stand behind that number."""
-    for k in range(LANES):
-        total = 0.0
-        for q in range(1, some[0] + 1):
-            total += table[mode, f, some[q], k] * w[some[q]]
-        out[row, k] = total
-
-
-def _sum_columns(out: Any, table: Any, mode: Any, node: Any, w: Any, n: Any, m: Any) -> None:
-    """out[:n] = sum_j table[mode, node, j, :] w[j], with w[n] = 1; the states, known last, come last."""
-    for r in range(n):
-        total = table[mode, node, n, r]
-        for j in range(n + 1, m):
-            total += table[mode, node, j, r] * w[j]
-        for j in range(n - 1, -1, -1):
-            total += table[mode, node, j, r] * w[j]
-        out[r] = total
-
-
-def _load(D: Any, place: Any) -> Any:
-    """Four numbers of an array from a place in its memory on."""
-    return D.reshape(-1)[place : place + FOUR].copy()
-
-
-def _store(D: Any, place: Any, x: Any) -> None:
-    """Four numbers to an array."""
-    D.reshape(-1)[place : place + FOUR] = x
-
-
-def _times(a: Any, x: Any) -> Any:
-    """A number times four."""
-    return a * x
-
-
-def _plus(y: Any, a: Any, x: Any) -> Any:
-    """y + a x."""
-    return y + a * x
-
-
-plain = SimpleNamespace(sum_rows=_sum_rows, sum_some_rows=_sum_some_rows, sum_columns=_sum_columns)
-
-
-class Array:
-    """Numbers and vectors from and to an array, inside a function under construction."""
-
-    def __init__(self, context: Any, builder: Any, kind: Any, value: Any) -> None:
-        self.context, self.builder, self.kind = context, builder, kind
-        self.array = context.make_array(kind)(context, builder, value)
-
-    def _at(self, *indices: Any) -> Any:
-        full = [i if isinstance(i, ir.Value) else ir.Constant(ir.IntType(64), i) for i in indices]
-        return cgutils.get_item_pointer2(
-            self.context, self.builder, self.array.data, cgutils.unpack_tuple(self.builder, self.array.shape),
-            cgutils.unpack_tuple(self.builder, self.array.strides), self.kind.layout, full, wraparound=False,
-        )  # fmt: skip
-
-    def number(self, *indices: Any) -> Any:
-        return self.builder.load(self._at(*indices))
-
-    def put(self, number: Any, *indices: Any) -> None:
-        self.builder.store(number, self._at(*indices))
-
-    def load(self, vector: Any, *indices: Any) -> Any:
-        return self.builder.load(self.builder.bitcast(self._at(*indices), vector.as_pointer()), align=8)
-
-    def get(self, vector: Any, *indices: Any) -> Any:
-        """A vector, or a number where ``vector`` is None."""
-        return self.number(*indices) if vector is None else self.load(vector, *indices)
-
-    def store(self, value: Any, *indices: Any) -> None:
-        self.builder.store(value, self.builder.bitcast(self._at(*indices), value.type.as_pointer()), align=8)
-
-
-def scaled(builder: Any, vector: Any, number: Any) -> Any:
-    """A vector times a number."""
-    nothing, lane = ir.Constant(vector.type, ir.Undefined), ir.IntType(32)
-    one = builder.insert_element(nothing, number, ir.Constant(lane, 0))
-    zeros = ir.Constant(ir.VectorType(lane, vector.type.count), [0] * vector.type.count)
-    return builder.fmul(vector, builder.shuffle_vector(one, nothing, zeros), flags=CONTRACT)
-
-
-def _sum(builder: Any, first: Any, terms: Callable[[Any], Any], one: int, m: int) -> Any:
-    """``first`` and terms(j) for j behind ``one``, then before it; one by one, or in loops where there are many."""
-
-    def add(total: Any, j: Any) -> Any:
-        return builder.fadd(total, terms(j), flags=CONTRACT)
-
-    if m <= LONGEST:
-        total = first
-        for j in (*range(one + 1, m), *range(one - 1, -1, -1)):
-            total = add(total, j)
-        return total
-    place = cgutils.alloca_once_value(builder, first)
-    for begin, end in ((one + 1, m), (0, one)):
-        if end > begin:
-            whole = ir.IntType(64)
-            with cgutils.for_range_slice(
-                builder, ir.Constant(whole, begin), ir.Constant(whole, end), ir.Constant(whole, 1), intp=whole
-            ) as (j, _):
-                builder.store(add(builder.load(place), j), place)
-    return builder.load(place)
-
-
-@intrinsic(prefer_literal=True)
-def _sum_rows_in_lanes(
-    typing: Any, out: Any, row: Any, table: Any, mode: Any, f: Any, w: Any, one: Any, m: Any
-) -> Any:  # fmt: skip
-    whole = types.int64
-    signature = types.void(out, whole, table, whole, whole, w, one, m)
-    vector = ir.VectorType(ir.DoubleType(), LANES)
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        out_, row_, table_, mode_, f_, w_ = arguments[:6]
-        source, weights = Array(context, builder, table, table_), Array(context, builder, w, w_)
-        total = _sum(
-            builder, source.load(vector, mode_, f_, one.literal_value, 0),
-            lambda j: scaled(builder, source.load(vector, mode_, f_, j, 0), weights.number(j)),
-            one.literal_value, m.literal_value,
-        )  # fmt: skip
-        Array(context, builder, out, out_).store(total, row_, 0)
-        return context.get_dummy_value()
-
-    return signature, generate
-
-
-@intrinsic
-def _sum_some_rows_in_lanes(typing: Any, out: Any, row: Any, table: Any, mode: Any, f: Any, w: Any, some: Any) -> Any:
-    whole = types.int64
-    signature = types.void(out, whole, table, whole, whole, w, some)
-    vector = ir.VectorType(ir.DoubleType(), LANES)
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        out_, row_, table_, mode_, f_, w_, some_ = arguments
-        source, weights = Array(context, builder, table, table_), Array(context, builder, w, w_)
-        places, index = Array(context, builder, some, some_), ir.IntType(64)
-        place = cgutils.alloca_once_value(builder, ir.Constant(vector, [0.0] * LANES))
-        begin, end = ir.Constant(index, 1), builder.add(places.number(0), ir.Constant(index, 1))
-        with cgutils.for_range_slice(builder, begin, end, begin, intp=index) as (q, _):
-            j = places.number(q)
-            term = scaled(builder, source.load(vector, mode_, f_, j, 0), weights.number(j))
-            builder.store(builder.fadd(builder.load(place), term, flags=CONTRACT), place)
-        Array(context, builder, out, out_).store(builder.load(place), row_, 0)
-        return context.get_dummy_value()
-
-    return signature, generate
-
-
-@intrinsic(prefer_literal=True)
-def _sum_columns_in_lanes(typing: Any, out: Any, table: Any, mode: Any, node: Any, w: Any, n: Any, m: Any) -> Any:
-    whole = types.int64
-    signature = types.void(out, table, whole, whole, w, n, m)
-    states = n.literal_value
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        out_, table_, mode_, node_, w_ = arguments[:5]
-        source, weights = Array(context, builder, table, table_), Array(context, builder, w, w_)
-        target = Array(context, builder, out, out_)
-        if states <= FEW:
-
-            def product(r: int, j: Any) -> Any:
-                return builder.fmul(source.number(mode_, node_, j, r), weights.number(j), flags=CONTRACT)
-
-            totals = [
-                _sum(builder, source.number(mode_, node_, states, r), partial(product, r), states, m.literal_value)
-                for r in range(states)
-            ]
-            for r, total in enumerate(totals):
-                target.put(total, r)
-            return context.get_dummy_value()
-
-        def column(vector: Any, begin: int, j: Any) -> Any:
-            return scaled(builder, source.load(vector, mode_, node_, j, begin), weights.number(j))
-
-        parts = []
-        begins = list(range(0, max(states - LANES, 1), WIDEST))  # a few that are left go with the last
-        for begin, end in zip(begins, [*begins[1:], states], strict=True):
-            vector = ir.VectorType(ir.DoubleType(), end - begin)
-            first = source.load(vector, mode_, node_, states, begin)
-            parts.append((begin, _sum(builder, first, partial(column, vector, begin), states, m.literal_value)))
-        for begin, total in parts:
-            target.store(total, begin)
-        return context.get_dummy_value()
-
-    return signature, generate
+_whole = ir.IntType(64)
 
 
 class _Four(types.Type):
@@ -245,15 +41,72 @@ class _FourModel(models.PrimitiveModel):
         super().__init__(manager, kind, _vector)
 
 
-def _at(context: Any, builder: Any, kind: Any, array: Any, place: Any) -> Any:
-    data = context.make_array(kind)(context, builder, array).data
-    return builder.bitcast(builder.gep(data, [place]), _vector.as_pointer())
+def _pointer(builder: Any, kind: Any, address: Any, place: Any) -> Any:
+    """Place ``place`` behind an address, counted in numbers of eight bytes."""
+    first = builder.inttoptr(address, ir.DoubleType().as_pointer())
+    return builder.bitcast(builder.gep(first, [place]), kind.as_pointer())
+
+
+def _reader(kind: Any, lowered: Any) -> Any:
+    @intrinsic
+    def read(typing: Any, address: Any, place: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            return builder.load(_pointer(builder, lowered, *arguments), align=8)
+
+        return kind(types.int64, types.int64), generate
+
+    return read
+
+
+@intrinsic
+def _write(typing: Any, address: Any, place: Any, x: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        vector = arguments[2]
+        builder.store(vector, _pointer(builder, vector.type, *arguments[:2]), align=8)
+        return context.get_dummy_value()
+
+    return types.void(types.int64, types.int64, x), generate
+
+
+def _scaled(builder: Any, vector: Any, number: Any) -> Any:
+    """A vector times a number."""
+    nothing, lane = ir.Constant(vector.type, ir.Undefined), ir.IntType(32)
+    one = builder.insert_element(nothing, number, ir.Constant(lane, 0))
+    zeros = ir.Constant(ir.VectorType(lane, vector.type.count), [0] * vector.type.count)
+    return builder.fmul(vector, builder.shuffle_vector(one, nothing, zeros), flags=CONTRACT)
+
+
+@intrinsic
+def _apart(typing: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        builder.function.attributes.add("noinline")
+        return context.get_dummy_value()
+
+    return types.void(), generate
+
+
+@intrinsic
+def _times(typing: Any, a: Any, x: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return _scaled(builder, arguments[1], arguments[0])
+
+    return x(types.float64, x), generate
+
+
+@intrinsic
+def _plus(typing: Any, y: Any, a: Any, x: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.fadd(arguments[0], _scaled(builder, arguments[2], arguments[1]), flags=CONTRACT)
+
+    return y(y, types.float64, x), generate
 
 
 @intrinsic
 def _load_four(typing: Any, D: Any, place: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return builder.load(_at(context, builder, D, *arguments), align=8)
+        data = context.make_array(D)(context, builder, arguments[0]).data
+        pointer = builder.bitcast(builder.gep(data, [arguments[1]]), _vector.as_pointer())
+        return builder.load(pointer, align=8)
 
     return _four(D, types.int64), generate
 
@@ -261,35 +114,113 @@ def _load_four(typing: Any, D: Any, place: Any) -> Any:
 @intrinsic
 def _store_four(typing: Any, D: Any, place: Any, x: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        builder.store(arguments[2], _at(context, builder, D, *arguments[:2]), align=8)
+        data = context.make_array(D)(context, builder, arguments[0]).data
+        pointer = builder.bitcast(builder.gep(data, [arguments[1]]), _vector.as_pointer())
+        builder.store(arguments[2], pointer, align=8)
         return context.get_dummy_value()
 
     return types.void(D, types.int64, x), generate
 
 
 @intrinsic
-def _times_four(typing: Any, a: Any, x: Any) -> Any:
+def _sum_columns(typing: Any, table: Any, filled: Any, w: Any, n: Any, m: Any, out: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return scaled(builder, arguments[1], arguments[0])
+        table_, filled_, w_, n_, m_, out_ = arguments
+        zero, one = ir.Constant(_whole, 0), ir.Constant(_whole, 1)
 
-    return _four(types.float64, x), generate
+        def sums(begin: Any, count: int) -> None:
+            def term(j: Any, k: int) -> Any:
+                place = builder.add(builder.mul(j, filled_), builder.add(begin, ir.Constant(_whole, FOUR * k)))
+                return builder.load(_pointer(builder, _vector, table_, place), align=8)
+
+            totals = [cgutils.alloca_once_value(builder, term(n_, k)) for k in range(count)]
+
+            def add(j: Any) -> None:
+                weight = builder.load(_pointer(builder, ir.DoubleType(), w_, j))
+                for k, total in enumerate(totals):
+                    more = builder.fadd(builder.load(total), _scaled(builder, term(j, k), weight), flags=CONTRACT)
+                    builder.store(more, total)
+
+            with cgutils.for_range_slice(builder, builder.add(n_, one), m_, one, intp=_whole) as (j, _):
+                add(j)
+            with cgutils.for_range_slice(builder, zero, n_, one, intp=_whole) as (j, _):
+                add(builder.sub(builder.sub(n_, one), j))
+            for k, total in enumerate(totals):
+                place = builder.add(begin, ir.Constant(_whole, FOUR * k))
+                builder.store(builder.load(total), _pointer(builder, _vector, out_, place), align=8)
+
+        step = ir.Constant(_whole, FOUR * MOST)
+        with cgutils.for_range_slice(builder, zero, n_, step, intp=_whole) as (begin, _):
+            left = builder.ashr(builder.add(builder.sub(n_, begin), ir.Constant(_whole, FOUR - 1)), ir.Constant(_whole, 2))
+            end = builder.append_basic_block("summed")
+            all_of_them = builder.append_basic_block("most")
+            switch = builder.switch(left, all_of_them)
+            for count in range(1, MOST + 1):
+                block = all_of_them if count == MOST else builder.append_basic_block(f"vectors_{count}")
+                if count < MOST:
+                    switch.add_case(ir.Constant(_whole, count), block)
+                builder.position_at_end(block)
+                sums(begin, count)
+                builder.branch(end)
+            builder.position_at_end(end)
+        return context.get_dummy_value()
+
+    return types.void(*[types.int64] * 6), generate
 
 
-@intrinsic
-def _plus_four(typing: Any, y: Any, a: Any, x: Any) -> Any:
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return builder.fadd(arguments[0], scaled(builder, arguments[2], arguments[1]), flags=CONTRACT)
-
-    return _four(y, types.float64, x), generate
+def _number(address: int, place: int) -> float:
+    return c_double.from_address(address + 8 * place).value
 
 
-def choose(compiled: Any, loops: Callable[..., Any]) -> Any:
-    """The compiled way, or the loops where nothing is compiled."""
-    return loops if numba.config.DISABLE_JIT else compiled
+def _whole_number(address: int, place: int) -> int:
+    return c_int64.from_address(address + 8 * place).value
 
 
-sum_rows = choose(_sum_rows_in_lanes, _sum_rows)
-sum_columns = choose(_sum_columns_in_lanes, _sum_columns)
-sum_some_rows = choose(_sum_some_rows_in_lanes, _sum_some_rows)
-load, store = choose(_load_four, _load), choose(_store_four, _store)
-times, plus = choose(_times_four, _times), choose(_plus_four, _plus)
+def _plain_four(address: int, place: int) -> Any:
+    return np.array([_number(address, place + k) for k in range(FOUR)])
+
+
+def _plain_write(address: int, place: int, x: Any) -> None:
+    for k in range(FOUR):
+        c_double.from_address(address + 8 * (place + k)).value = x[k]
+
+
+def _plain_load(D: Any, place: Any) -> Any:
+    return D.reshape(-1)[place : place + FOUR].copy()
+
+
+def _plain_store(D: Any, place: Any, x: Any) -> None:
+    D.reshape(-1)[place : place + FOUR] = x
+
+
+def _plain_times(a: Any, x: Any) -> Any:
+    return a * x
+
+
+def _plain_plus(y: Any, a: Any, x: Any) -> Any:
+    return y + a * x
+
+
+def _plain_columns(table: int, filled: int, w: int, n: int, m: int, out: int) -> None:
+    for r in range(0, n, FOUR):
+        total = _plain_four(table, n * filled + r)
+        for j in (*range(n + 1, m), *range(n - 1, -1, -1)):
+            total = total + _number(w, j) * _plain_four(table, j * filled + r)
+        _plain_write(out, r, total)
+
+
+def _choose(compiled: Any, plain: Any) -> Any:
+    """The compiled way, or the plain one where nothing is compiled."""
+    return plain if numba.config.DISABLE_JIT else compiled
+
+
+#: Called by a function that must not become part of its callers.
+apart = _choose(_apart, lambda: None)
+number_at = _choose(_reader(types.float64, ir.DoubleType()), _number)
+whole_at = _choose(_reader(types.int64, _whole), _whole_number)
+four_at, write_four = _choose(_reader(_four, _vector), _plain_four), _choose(_write, _plain_write)
+load, store = _choose(_load_four, _plain_load), _choose(_store_four, _plain_store)
+times, plus = _choose(_times, _plain_times), _choose(_plus, _plain_plus)
+#: out[:n] = sum_j table[j, :n] w[j] for j < m, with w[n] = 1; the states, known last, come last. The rows of the table
+#: are ``filled`` numbers, a multiple of four, and so many numbers of ``out`` are written. All by their addresses.
+sum_columns = _choose(_sum_columns, _plain_columns)

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import numba
+from llvmlite.binding import create_new_function_pass_manager
 from numba.core.codegen import JITCPUCodegen, get_host_cpu_features
 from numba.core.registry import CPUDispatcher, CPUTarget, cpu_target
 
@@ -27,22 +28,17 @@ AHEAD = Path(__file__).parents[1] / "ahead"  # a folder for each level; what the
 
 _V2 = "cx16 popcnt sahf sse3 sse4.1 sse4.2 ssse3"
 _V3 = f"{_V2} avx avx2 bmi bmi2 f16c fma lzcnt movbe xsave"
-_V4 = f"{_V3} avx512f avx512bw avx512cd avx512dq avx512vl"
 #: Machine -> level -> what a processor must have for it, as LLVM calls it; the highest level first.
 LEVELS: dict[str, dict[str, str]] = {
-    "x86_64": {"x86-64-v4": _V4, "x86-64-v3": _V3},
+    "x86_64": {"x86-64-v3": _V3},
     "aarch64": {"generic": "neon"},
 }
-#: Levels for modes of so many states only: their long vectors slow down the short loops of few (docs/decisions.md).
-FEWEST_STATES = {"x86-64-v4": 64}
 _SAME = {"amd64": "x86_64", "arm64": "aarch64"}
 
 
 @cache
-def level(states: int = 0) -> str:
+def level() -> str:
     """The level that code is made for: that of the code that came with the package, else this processor's highest.
-
-    Modules that have a number of states as a constant may have a level of their own (``FEWEST_STATES``).
 
     ``NONSMOOTH_LEVEL`` chooses another. Empty where the processor has none of ``LEVELS``, or where ``NUMBA_CPU_NAME``
     and the like say what code is made for: then it is made as Numba makes it.
@@ -58,12 +54,12 @@ def level(states: int = 0) -> str:
     there = set(get_host_cpu_features().split(","))
     possible = [
         name for name, needed in LEVELS.get(_SAME.get(machine, machine), {}).items()
-        if there.issuperset(f"+{feature}" for feature in needed.split()) and states >= FEWEST_STATES.get(name, 0)
+        if there.issuperset(f"+{feature}" for feature in needed.split())
     ]  # fmt: skip
     chosen = os.environ.get("NONSMOOTH_LEVEL", "")
     if chosen and chosen not in possible:
         raise ValueError(f"NONSMOOTH_LEVEL={chosen}: this processor has {', '.join(possible) or 'no level'}; unset it")
-    with_code = [name for name in possible if name in FEWEST_STATES or (AHEAD / name).is_dir()]
+    with_code = [name for name in possible if (AHEAD / name).is_dir()]
     return chosen or [*with_code, *possible, ""][0]
 
 
@@ -78,11 +74,16 @@ def made_ahead(entry: str) -> bytes:
 
 
 class _Codegen(JITCPUCodegen):
-    """An engine of its own, for the level of its number of states."""
+    """An engine of its own.
 
-    def __init__(self, name: str, states: int = 0) -> None:
-        self._level = level(states)
+    ``vectors``: loops over arrays become loops over vectors, each in four versions behind each other."""
+
+    def __init__(self, name: str, vectors: bool = True) -> None:
+        self._level, self._vectors = level(), vectors
         super().__init__(name)
+
+    def _pass_builder(self, **options: Any) -> Any:
+        return super()._pass_builder(**options if self._vectors else {**options, "loop_vectorize": False})
 
     def _get_host_cpu_name(self) -> Any:
         return self._level or super()._get_host_cpu_name()
@@ -92,22 +93,26 @@ class _Codegen(JITCPUCodegen):
 
     def _function_pass_manager(self, **options: Any) -> Any:
         """One for all functions: Numba makes one for each, and llvmlite never frees it (15 kB)."""
-        return super()._function_pass_manager(**options) if options else _function_passes()[0]
+        return _function_passes()[:2]
 
 
 @cache
-def _function_passes() -> tuple[Any, Any]:
-    """The passes, and an engine that does nothing but live as long: they need its description of the processor."""
+def _function_passes() -> tuple[Any, Any, Any]:
+    """Passes over a function before it meets what it calls, and an engine that does nothing but live as long: they need
+    its description of the processor.
+
+    None is made: what Numba makes here it makes again of the whole module, and of the march, in which records of sixty
+    arrays are values, it took 14 of 39 s."""
     engine = _Codegen("passes")
-    return JITCPUCodegen._function_pass_manager(engine), engine
+    return create_new_function_pass_manager(), engine._pass_builder(), engine
 
 
 class _Target(CPUTarget):
     """Numba's own target with another engine."""
 
-    def __init__(self, states: int) -> None:
+    def __init__(self, vectors: bool) -> None:
         super().__init__("cpu")
-        self._context = cpu_target.target_context.subtarget(_internal_codegen=_Codegen("nonsmooth", states))
+        self._context = cpu_target.target_context.subtarget(_internal_codegen=_Codegen("nonsmooth", vectors))
 
     @property
     def target_context(self) -> Any:
@@ -124,7 +129,7 @@ class Function(CPUDispatcher):
     def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
         names = function.__globals__
         if "_target" not in names:
-            names["_target"] = _Target(names.get("STATES", 0))  # of the exact flow
+            names["_target"] = _Target(bool(names.get("VECTORS", 1)))
         self.targetdescr = names["_target"]
         super().__init__(py_func=function, targetoptions={"nopython": True, "boundscheck": None, **options})
 

@@ -65,7 +65,7 @@ def stand(i, form, tables, work):
     for h in range(HARMONICS):
         work.rates[h] = form.multiples[h] * form.omega[0]
     for f in range(N_INDICATORS):
-        work.twin[f] = twin_of(f, N_INDICATORS, tables.fun)
+        work.twin[f] = twin_of(f, tables)
 
 
 build = stand  # what the joined text's other functions find under this name

@@ -2,9 +2,9 @@
 
 The *stepper* knows the flow: ``linear.stepper`` (linear modes with harmonic forcing, any number of states) or
 ``series.stepper`` (generated Taylor series, Runge-Kutta-Fehlberg). It prepares a point, marches a segment to its first
-crossing, ends it there, takes transitions and says which conditions hold just after. The *observer* (``sections``,
-``record`` or ``growth``) says how far to go and looks at each segment and each transition. Their functions stand in the
-text that is joined with this file. Everything else is here: start rule, transitions of one instant in declared order,
+crossing, ends it there, takes transitions and says which conditions hold just after. The *observer* (``observers``)
+says how far to go and looks at each segment and each transition. Their functions stand in the text that is joined with
+this file. Everything else is here: start rule, transitions of one instant in declared order,
 limits on chatter, the clock.
 
 All that a run knows beside its arrays stands in ``work.tally`` and ``work.memo``: it may pause and go on. It pauses
@@ -26,6 +26,7 @@ from nonsmooth.kernels.hybrid.places import (
     BEGUN,
     BURST,
     BURST_LENGTH,
+    CLOSED,
     CLOSELY,
     DEAD_END,
     FIRED,
@@ -148,7 +149,7 @@ def transit(i, t, short, form, net, section, goal, seen, tables, work):
     jumps = tally[TAKEN] if MAY_WAIT != 0 else 0
     if jumps == 0:
         tally[SOURCE], tally[FIRST] = mode, t
-        approach(mode, fired, seen, tables, work)
+        approach(mode, fired, goal, seen, tables, work)
     while t >= 0:
         if jumps > min(net.mode_start.shape[0] + 1, MOST_AT_ONCE):  # as many as modes, and three
             code = CHATTER
@@ -157,7 +158,7 @@ def transit(i, t, short, form, net, section, goal, seen, tables, work):
             tally[WAITS], tally[TAKEN], tally[CLOSELY] = t + 1, jumps, 1 if short else 0
             return PAUSED, 0
         mode = take(i, t, fired if jumps == 0 else -1, form, tables, net, work)
-        cross(i, t, mode, jumps, form, net, section, goal, seen, tables, work)
+        cross(i, t, mode, form, net, section, goal, seen, tables, work)
         tally[MODE] = mode
         jumps += 1
         if net.transitions[t, 2] == DEAD_END:
@@ -165,7 +166,7 @@ def transit(i, t, short, form, net, section, goal, seen, tables, work):
             break
         t = next_holding(mode, tables, net, work)
     tally[TAKEN] = 0
-    depart(jumps, seen, work)
+    depart(jumps, goal, seen, work)
     tally[JUMPS] += jumps
     tally[BURST] = tally[BURST] + 1 if short else 0
     if tally[BURST] > BURST_LENGTH:
@@ -188,12 +189,12 @@ def march(i, form, net, section, goal, motion, seen, tables, work):
     code = OK
     if tally[BEGUN] == 0:
         code = begin(i, form, net, section, motion, tables, work)
-        open_window(i, form, section, seen, tables, work)
+        open_window(i, form, section, goal, seen, tables, work)
     patience = goal.patience
-    strides = may_stride(i, form, net, section, seen)
+    strides = may_stride(i, form, net, section, goal)
     while code == OK and (waiting(work) >= 0 or not reached(goal, work)):
         patience -= 1
-        code = PAUSED if patience < 0 and may_pause(work) else room(seen, work)
+        code = PAUSED if patience < 0 and may_pause(work) else room(goal, seen, work)
         if code != OK:
             break
         t, sense = waiting(work), 0
@@ -203,7 +204,7 @@ def march(i, form, net, section, goal, motion, seen, tables, work):
         else:
             ready, first = False, 0
             if strides:
-                ready, first, patience = hurry(i, form, net, section, goal, seen, tables, work, patience)
+                ready, first, patience = hasten(i, form, net, section, goal, seen, tables, work, patience)
             stop, timed = NO_END, -1
             if not strides:
                 stop, timed = next_stop(i, form, net, section, goal, work)

@@ -23,5 +23,9 @@ SHORT = 1e-11
 PATIENCE = 1_000_000  # steps of a run between two looks whether somebody wants to stop it
 NO_END = 1e300  # a time that is never reached
 
+# What a run is for (``Goal.kind``), and what an observer says of a segment.
+RETURNS_OF_SECTION, LOGGED, GROW = 0, 1, 2
+OPEN_RUN, LATE, CLOSED = 0, 1, 2
+
 RESET = 1  # of ``Net.transitions``, place 1: the states change (2: memory alone)
 DEAD_END = 2  # of place 2: behind it motion is not unique, and the run ends (1: a contact begins)

@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 from numba import types
 
 __all__ = [
-    "FLOW", "FORM", "GENERATED", "GOAL", "GROWTH", "KEPT", "LOG", "MOTION", "NET", "SECTION", "SERIES_WORK", "TABLES",
-    "WORK",
-    "Flow", "Form", "Generated", "Goal", "Growth", "Kept", "Log", "Motion", "Net", "Section", "SeriesWork",
+    "CALL", "FORM", "GENERATED", "GOAL", "GROWTH", "KEPT", "LOG", "MOTION", "NET", "SECTION", "SEEN", "SERIES_WORK",
+    "TABLES", "WORK",
+    "Call", "Form", "Generated", "Goal", "Growth", "Kept", "Log", "Motion", "Net", "Section", "Seen", "SeriesWork",
     "Tables", "Work", "type_of",
 ]  # fmt: skip
 
@@ -186,6 +186,7 @@ class Section(NamedTuple):
 class Goal(NamedTuple):
     """When a run is over, and when it has failed or is to pause. A kernel takes of it what it has use for."""
 
+    kind: Any  # ``places.RETURNS_OF_SECTION``, ``LOGGED`` or ``GROW``
     transient: Any  # section returns that are not kept
     keep: Any  # and that are; or units of time
     until: Any  # time
@@ -248,19 +249,28 @@ class Growth(NamedTuple):
     scratch: Any  # (n,)
 
 
-class Flow(NamedTuple):
-    """Arguments of the runs of a linear system to a stroboscopic section."""
+class Seen(NamedTuple):
+    """What a run leaves behind: one of these, as its goal says."""
 
-    form: Any
-    net: Any
-    phase: Any  # of the section, in periods
-    t_max: Any
+    kept: Any
+    log: Any
+    growth: Any
+
+
+class Call(NamedTuple):
+    """What is asked of a march, but for the system and what it leaves behind."""
+
+    orders: Any  # whole numbers, at the places below
+    reals: Any
     limit: Any  # (n,) sizes beyond which a state has diverged
-    tables: Any
-    work: Any
-    starts: Any  # (0, n): runs go on from a ``Motion``
-    patience: Any  # steps between two looks at the flag
-    stop: Any  # (1,) not zero: the work is not wanted any more
+    starts: Any  # (P, n + memory), or none: runs go on from ``motion``
+    motion: Any
+
+
+# Places in ``Call.orders`` and ``Call.reals``.
+BEGIN, END, KIND, TRANSIENT, KEEP, PATIENCE_LEFT, INDICATOR, RISING, OF_MODE, AFTER, EVERY, EXTREMES = range(12)
+UNTIL, UNIT, PHASE, T_MAX = range(4)
+N_ORDERS, N_REALS = 12, 4
 
 
 FORM = type_of(
@@ -276,8 +286,9 @@ SERIES_WORK = type_of(
 )  # fmt: skip
 MOTION = type_of(Motion, _f1, _f1, _f1, _i1)
 SECTION = type_of(Section, *[_i] * 6, _f, _f)
-FLOW = type_of(Flow, FORM, NET, _f, _f, _f1, TABLES, WORK, _f2, _i, _i1)
-GOAL = type_of(Goal, _i, _i, _f, _f, _f1, _i)
+GOAL = type_of(Goal, _i, _i, _i, _f, _f, _f1, _i)
+CALL = type_of(Call, _i1, _f1, _f1, _f2, MOTION)
 KEPT = type_of(Kept, _f3, *[_f2] * 6, _i1, _i1, _f1, _f2, _i2, _i1)
 LOG = type_of(Log, _f1, _f2, _f2, _i1, _i1, _f1, _i1, _f2, _f2, _f2, _f1, _i1, _f2, _f1, _i)
 GROWTH = type_of(Growth, _f1, _f2, _f2, _f1, _f1, _f2, _f2, _f2, _f2, _f1, _f1)
+SEEN = type_of(Seen, KEPT, LOG, GROWTH)

@@ -1,22 +1,21 @@
-"""Observer of section returns: points of a sweep one after the other, with extremes and counts of the kept window.
+"""Section returns of a run: its kept points, with extremes and counts of the kept window.
 
 Of ``transient`` + ``keep`` returns the last ones are kept. The window reaches from the last transient return (or the
 start) to the last kept one; its end is where a carried state goes on.
 """
 
-from math import fabs, inf
+from math import inf
 
-from numba import types
-
-from nonsmooth.kernels.compile.cache import inline, kernel, once
-from nonsmooth.kernels.hybrid.codes import NO_CONVERGENCE, NOT_GUARANTEED, OK, PAUSED
-from nonsmooth.kernels.hybrid.loop import leave, march
+from nonsmooth.kernels.compile.cache import inline, once
+from nonsmooth.kernels.hybrid.codes import NO_CONVERGENCE, OK
 from nonsmooth.kernels.hybrid.places import (
-    BEGUN,
+    CLOSED,
     JUMPS,
+    LATE,
     MODE,
     MOST_STEPS,
     NO_END,
+    OPEN_RUN,
     PASSES,
     PERIODS,
     RETURNS,
@@ -25,19 +24,8 @@ from nonsmooth.kernels.hybrid.places import (
     TRIES,
     WAITED,
 )
-from nonsmooth.kernels.hybrid.records import GOAL, KEPT, MOTION, NET, SECTION
-from nonsmooth.kernels.linear.extremes import finish, include, widen
-from nonsmooth.kernels.linear.stepper import (
-    STEPPER,
-    at_rest,
-    n_states,
-    note_side,
-    state_at,
-    steps_at_a_stride,
-    stride,
-)
-
-OPEN_RUN, LATE, CLOSED = 0, 1, 2
+from nonsmooth.kernels.linear.extremes import include, widen
+from nonsmooth.kernels.linear.stepper import at_rest, note_side, state_at, stride
 
 
 @once
@@ -62,7 +50,7 @@ def forget(i, kept):
 
 
 @once
-def open_window(i, form, section, seen, tables, work):
+def open_returns(i, seen):
     """Begin the counts of point i."""
     forget(i, seen)
     seen.crossings[i] = 0
@@ -71,31 +59,7 @@ def open_window(i, form, section, seen, tables, work):
 
 
 @once
-def reached(goal, work):
-    """Return whether the run is over."""
-    return work.tally[RETURNS] >= goal.transient + goal.keep
-
-
-@once
-def room(seen, work):
-    """Nothing is logged."""
-    return OK
-
-
-@once
-def remaining(section, goal, work):
-    """Time for which a return to a surface is waited still."""
-    return section.t_max - work.memo[WAITED] if section.indicator >= 0 else NO_END
-
-
-@once
-def may_stride(i, form, net, section, seen):
-    """Return whether whole steps may be made at a stride."""
-    return steps_at_a_stride(i, form, net, section)
-
-
-@once
-def watched(section, goal, work):
+def returns_watched(section, goal, work):
     """Return whether extremes on the segment are wanted."""
     return section.extremes != 0 and work.tally[RETURNS] >= goal.transient
 
@@ -137,14 +101,14 @@ def hurry(i, form, net, section, goal, seen, tables, work, patience):
 @inline
 def keep_point(i, k, u, mode, time, seen, work):
     """The k-th kept point of the section."""
-    for j in range(n_states(work)):
+    for j in range(seen.section.shape[2]):
         seen.section[i, k, j] = u[j]
     seen.section_mode[i, k] = mode
     seen.section_time[i, k] = time
 
 
 @once
-def observe(i, step, stop, triggered, form, net, section, goal, seen, tables, work):
+def observe_returns(i, step, stop, triggered, form, section, goal, seen, tables, work):
     """Returns at a phase of the forcing on the segment, and extremes of its part in the kept window.
 
     CLOSED: the last return, where the run ends. LATE: a transition at the section's own phase comes first; a run that
@@ -167,7 +131,7 @@ def observe(i, step, stop, triggered, form, net, section, goal, seen, tables, wo
                 state_at(r, form, tables, work, work.wp)
                 turn = memo[PERIODS] if s < target and target <= after else memo[PERIODS] + 1.0
                 keep_point(i, tally[RETURNS] - goal.transient - 1, work.wp, tally[MODE], turn * T + target, seen, work)
-                if reached(goal, work):
+                if tally[RETURNS] >= goal.transient + goal.keep:
                     state, b = CLOSED, r
                     memo[PERIODS] = turn
             elif tally[RETURNS] == goal.transient:
@@ -178,25 +142,20 @@ def observe(i, step, stop, triggered, form, net, section, goal, seen, tables, wo
         seen.elapsed[i] += b - a
     if state == CLOSED:
         memo[TIME] = section.phase * T
-        for j in range(n_states(work)):
+        for j in range(seen.section.shape[2]):
             work.w[j] = seen.section[i, goal.keep - 1, j]
     return state
 
 
 @once
-def mark(i, wrapped, ended, crossed, step, form, goal, seen, work):
+def mark_return(step, work):
     """Count a segment."""
     work.memo[WAITED] += step
     work.tally[TRIES] += 1
 
 
 @once
-def approach(mode, fired, seen, tables, work):
-    """Nothing is asked of a crossing before it is made."""
-
-
-@once
-def cross(i, t, mode, jumps, form, net, section, goal, seen, tables, work):
+def count_transition(i, t, mode, form, net, section, goal, seen, tables, work):
     """Count a transition in the kept window."""
     if work.tally[RETURNS] >= goal.transient:
         seen.crossings[i] += 1
@@ -206,12 +165,7 @@ def cross(i, t, mode, jumps, form, net, section, goal, seen, tables, work):
 
 
 @once
-def depart(jumps, seen, work):
-    """Nothing is asked of a crossing after it was made."""
-
-
-@once
-def arrive(i, code, source, t, sense, state, form, section, goal, seen, tables, work):
+def arrive_at_section(i, code, source, t, sense, state, form, section, goal, seen, tables, work):
     """Returns at the end of a segment: on a surface, or behind a transition at the section's phase. Gives a status."""
     tally, memo, T = work.tally, work.memo, form.period[i]
     mode = tally[MODE]
@@ -245,39 +199,3 @@ def arrive(i, code, source, t, sense, state, form, section, goal, seen, tables, 
     if code == OK and tally[TRIES] > MOST_STEPS:
         code = NO_CONVERGENCE
     return code
-
-
-@kernel(types.int64(
-    types.int64, types.int64, types.float64[:, ::1], STEPPER[0], NET, SECTION, GOAL, MOTION, KEPT, *STEPPER[1:]
-))  # fmt: skip
-def chain(first, last, starts, form, net, section, goal, motion, seen, tables, work):
-    """Run points first <= i < last into ``seen``; returns the point that has paused, or ``last``.
-
-    Without ``starts`` each point goes on from where the last good one ended, at equal phase of the forcing; else it
-    begins at its own row of them (states, memory), in the first mode. A point that fails leaves the motion where it
-    was."""
-    for i in range(first, last):
-        T = form.period[i]
-        if work.tally[BEGUN] == 0:
-            if starts.shape[0] > 0:
-                for j in range(motion.u.shape[0]):
-                    motion.u[j] = starts[i, j]
-                for j in range(motion.memory.shape[0]):
-                    motion.memory[j] = starts[i, motion.u.shape[0] + j]
-                motion.counters[0], motion.counters[1] = 0, 0
-                motion.clock[0], motion.clock[1], motion.clock[2] = 0.0, 0.0, 0.0
-            elif motion.clock[2] > 0.0:
-                motion.clock[0] = motion.clock[0] / motion.clock[2] * T
-                if fabs(motion.clock[0] - section.phase * T) <= 1e-12 * T:  # else rounding would count it once more
-                    motion.clock[0] = section.phase * T
-                motion.clock[2] = T if T < NO_END else 0.0
-        code = march(i, form, net, section, goal, motion, seen, tables, work)
-        if code == PAUSED:
-            return i
-        work.tally[BEGUN] = 0
-        motion.counters[1] = 0
-        finish(i, form, tables, work, seen)
-        seen.status[i] = code
-        if code == OK or code == NOT_GUARANTEED:
-            leave(i, form, motion, work)
-    return last

@@ -8,29 +8,39 @@ behind each other and go in vectors: masses in a row have five. A mode with too 
 moves by its propagators.
 """
 
-from nonsmooth.kernels.compile.cache import device
-from nonsmooth.kernels.compile.long_sums import add_products, sum_terms
-from nonsmooth.kernels.linear.tables import HARMONICS, MANY, ONE, STATES, WAVE, M
+from math import fabs
 
+from nonsmooth.kernels.compile.cache import device, inline
+from nonsmooth.kernels.linear.tables import states_of, width_of
+
+BANDED = 32  # states from which on few entries make a series shorter than a propagator
+LINE = 8  # entries that a diagonal costs before its first
 ORDER = 22  # of the series: (pi / 2)^23 / 23! is 1e-18
 STEEP = ORDER + 1  # the row of ``work.row`` behind the terms: bounds on the fourth derivatives of w
 WORTH = 3  # a series may take so many times the multiplications of a propagator, which is read from far away
 
 
+@inline
+def by_series(tables, mode):
+    """Return whether the mode moves by the series of its whole step (asked only where the number of states varies)."""
+    return tables.lines[mode, 0, 0] > 0
+
+
 @device
 def fill_bands(mode, tables):
     """List the diagonals of a mode's matrix and the columns of its forcing, where a series costs less."""
+    n, m = states_of(tables.field), width_of(tables.field)
     field, bands, lines, step = tables.field, tables.bands, tables.lines, tables.info[mode, 0]
     count, total = 0, 0
-    for offset in range(1 - STATES, STATES):
-        first, last = STATES, 0
-        for r in range(max(0, -offset), min(STATES, STATES - offset)):
+    for offset in range(1 - n, n):
+        first, last = n, 0
+        for r in range(max(0, -offset), min(n, n - offset)):
             if field[mode, r, r + offset] != 0.0:
                 first, last = min(first, r), r + 1
         if first >= last:
             continue
-        total += last - first + MANY
-        if total * ORDER > WORTH * STATES * M:
+        total += last - first + LINE
+        if total * ORDER > WORTH * n * m:
             count = 0
             break
         count += 1
@@ -38,65 +48,81 @@ def fill_bands(mode, tables):
         for r in range(first, last):
             bands[mode, count, r] = step * field[mode, r, r + offset]
     lines[mode, 0, 0] = count
-    for j in range(ONE, M):
-        first, last = STATES, 0
-        for r in range(STATES):
-            bands[mode, STATES + j, r] = step * field[mode, r, j]
+    for j in range(n, m):
+        first, last = n, 0
+        for r in range(n):
+            bands[mode, n + j, r] = step * field[mode, r, j]
             if field[mode, r, j] != 0.0:
                 first, last = min(first, r), r + 1
-        lines[mode, STATES + j, 1], lines[mode, STATES + j, 2] = first, last
+        lines[mode, n + j, 1], lines[mode, n + j, 2] = first, last
 
 
 @device
 def next_term(tables, mode, row, k):
     """row[k + 1] = h M row[k], for the states."""
+    n, m = states_of(tables.field), width_of(tables.field)
     bands, lines = tables.bands, tables.lines
-    for r in range(STATES):
+    for r in range(n):
         row[k + 1, r] = 0.0
     for d in range(1, lines[mode, 0, 0] + 1):
-        add_products(row, k + 1, bands, mode, d, lines[mode, d, 0], lines[mode, d, 1], lines[mode, d, 2])
-    for j in range(ONE if k == 0 else WAVE, M):
-        for r in range(lines[mode, STATES + j, 1], lines[mode, STATES + j, 2]):
-            row[k + 1, r] += bands[mode, STATES + j, r] * row[k, j]
+        offset = lines[mode, d, 0]
+        for r in range(lines[mode, d, 1], lines[mode, d, 2]):
+            row[k + 1, r] += bands[mode, d, r] * row[k, r + offset]
+    for j in range(n if k == 0 else n + 1, m):
+        for r in range(lines[mode, n + j, 1], lines[mode, n + j, 2]):
+            row[k + 1, r] += bands[mode, n + j, r] * row[k, j]
 
 
 @device
 def expand(tables, work, mode):
     """Terms of the series on the step that begins at w, into ``work.row``, and bounds (``STEEP``)."""
+    n, m = states_of(tables.field), width_of(tables.field)
+    harmonics = (m - n - 1) >> 1
     row, w, rates, step = work.row, work.w, work.rates, tables.info[mode, 0]
-    for j in range(M):
+    for j in range(m):
         row[0, j] = w[j]
-    row[0, ONE] = 1.0
+    row[0, n] = 1.0
     for k in range(1, ORDER + 1):
         next_term(tables, mode, row, k - 1)
-        row[k, ONE] = 0.0
-        for h in range(HARMONICS):
+        row[k, n] = 0.0
+        for h in range(harmonics):
             turn_by = step * rates[h]
-            row[k, WAVE + 2 * h] = -turn_by * row[k - 1, WAVE + 1 + 2 * h]
-            row[k, WAVE + 1 + 2 * h] = turn_by * row[k - 1, WAVE + 2 * h]
-    sum_terms(row[STEEP], row, 4, ORDER, 1.0, 1, M)
+            row[k, n + 1 + 2 * h] = -turn_by * row[k - 1, n + 2 + 2 * h]
+            row[k, n + 2 + 2 * h] = turn_by * row[k - 1, n + 1 + 2 * h]
+    for j in range(m):
+        row[STEEP, j] = fabs(row[ORDER, j])
+    for k in range(ORDER - 1, 3, -1):
+        part = 1.0 / (k - 3)
+        for j in range(m):
+            row[STEEP, j] = row[STEEP, j] * part + fabs(row[k, j])
     quick = 1.0 / (step * step * step * step)
-    for j in range(M):
+    for j in range(m):
         row[STEEP, j] *= quick
 
 
 @device
-def along(row, x, out):
+def along(row, x, m, out):
     """w at a part x of the step, from the terms of its series."""
-    sum_terms(out, row, 0, ORDER, x, 0, M)
+    for j in range(m):
+        out[j] = row[ORDER, j]
+    for k in range(ORDER - 1, -1, -1):
+        part = x / (k + 1)
+        for j in range(m):
+            out[j] = out[j] * part + row[k, j]
 
 
 @device
 def carry(tables, work, mode, x, scale, X):
     """The columns of X, in units ``scale`` of the states, along the motion for a part x of a step."""
+    n, m = states_of(tables.field), width_of(tables.field)
     row, w = work.row, work.wn
     for c in range(X.shape[1]):
-        for r in range(STATES):
+        for r in range(n):
             row[0, r] = scale[r] * X[r, c]
         for k in range(ORDER):
-            for j in range(STATES, M):
+            for j in range(n, m):
                 row[k, j] = 0.0
             next_term(tables, mode, row, k)
-        along(row, x, w)
-        for r in range(STATES):
+        along(row, x, m, w)
+        for r in range(n):
             X[r, c] = w[r] / scale[r]

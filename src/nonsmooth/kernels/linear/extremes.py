@@ -7,7 +7,7 @@ is halved down to two node spacings, where the polynomial's critical points deci
 from nonsmooth.kernels.compile.cache import inline, once
 from nonsmooth.kernels.hybrid.places import MODE
 from nonsmooth.kernels.linear.polynomial import NEVER, THIRD, classify, critical_points, horner
-from nonsmooth.kernels.linear.tables import MEMORY, NODES, ONE, OWN, STATES
+from nonsmooth.kernels.linear.tables import NODES, states_of
 from nonsmooth.kernels.linear.values import bound_at, compose, slope_of, to_node, value_of
 
 
@@ -64,25 +64,26 @@ def exceeds(tables, row, mode, f, w, w1, lowest, highest):
 
 
 @inline
-def extremes_of(f, kept, n_i):
+def extremes_of(f, n, n_i, kept):
     """Maxima and minima in which those of functional f are kept, and its column there."""
     if f < n_i:
         return kept.i_max, kept.i_min, f
-    if f < n_i + STATES:
+    if f < n_i + n:
         return kept.maximum, kept.minimum, f - n_i
-    return kept.o_max, kept.o_min, f - n_i - STATES
+    return kept.o_max, kept.o_min, f - n_i - n
 
 
 @once
 def widen(i, a, b, form, tables, work, kept):
     """Extend the extremes of point i by the piece [a, b] of a segment."""
+    n = states_of(tables.field)
     n_i, mode = work.zero.shape[0], work.tally[MODE]
     for f in range(tables.fun.shape[1]):
         if f < n_i and work.twin[f] >= 0:
             continue  # a state but for a constant: see ``finish``
-        if MEMORY > 0 and n_i + OWN <= f < n_i + STATES:
+        if n_i + kept.maximum.shape[1] <= f < n_i + n:  # memory
             continue
-        hi, lo, k = extremes_of(f, kept, n_i)
+        hi, lo, k = extremes_of(f, n, n_i, kept)
         below, above = exceeds(tables, work.row, mode, f, work.w, work.w1, lo[i, k], hi[i, k])
         for side in range(2):
             if above if side == 0 else below:
@@ -97,20 +98,22 @@ def widen(i, a, b, form, tables, work, kept):
 @once
 def finish(i, form, tables, work, kept):
     """Extremes of the indicators that are a state but for a constant."""
+    n = states_of(tables.field)
     for f in range(work.zero.shape[0]):
         if work.twin[f] >= 0:
-            kept.i_max[i, f] = kept.maximum[i, work.twin[f]] + tables.fun[0, f, ONE]
-            kept.i_min[i, f] = kept.minimum[i, work.twin[f]] + tables.fun[0, f, ONE]
+            kept.i_max[i, f] = kept.maximum[i, work.twin[f]] + tables.fun[0, f, n]
+            kept.i_min[i, f] = kept.minimum[i, work.twin[f]] + tables.fun[0, f, n]
 
 
 @once
 def include(i, mode, form, tables, work, kept):
     """Extend the extremes of point i by the present instant."""
+    n = states_of(tables.field)
     n_i = work.zero.shape[0]
     for f in range(tables.fun.shape[1]):
-        if MEMORY > 0 and n_i + OWN <= f < n_i + STATES:
+        if n_i + kept.maximum.shape[1] <= f < n_i + n:  # memory
             continue
-        hi, lo, k = extremes_of(f, kept, n_i)
+        hi, lo, k = extremes_of(f, n, n_i, kept)
         value = value_of(tables, mode, f, work.w)
         hi[i, k] = max(hi[i, k], value)
         lo[i, k] = min(lo[i, k], value)

@@ -1,42 +1,51 @@
 """Working memory of the kernels of the exact flow."""
 
+from __future__ import annotations
+
+from typing import Any
+
 import numpy as np
 
 from nonsmooth.kernels.compile.block import one_block
 from nonsmooth.kernels.hybrid.places import N_MEMO, N_TALLY
 from nonsmooth.kernels.hybrid.records import Tables, Work
+from nonsmooth.kernels.linear.bands import BANDED
+from nonsmooth.kernels.linear.module import is_planar
 from nonsmooth.kernels.linear.search import WIDTH
-from nonsmooth.kernels.linear.tables import BANDED, DEGREE, HARMONICS, MANY, NODES, STATES, TERMS, M
+from nonsmooth.kernels.linear.tables import DEGREE, NODES, TERMS
+
+__all__ = ["scratch"]
+
+LANES = 4  # numbers of a vector: columns of propagators are filled up to whole ones
 
 
-def scratch(n_modes, n_indicators, n_outputs, n_rows):
-    """Tables and working memory for one thread, in one block."""
-    tables = _tables(n_modes, n_indicators + STATES + n_outputs)
-    block = one_block(*tables, *_work(n_modes, n_indicators, n_rows))
+def scratch(
+    states: int, harmonics: int, n_modes: int, n_indicators: int, n_outputs: int, n_rows: int, apart: bool = False
+) -> tuple[Tables, Work]:  # fmt: skip
+    """Tables and working memory for one thread, in one block.
+
+    ``apart``: each table by itself, which takes memory only where it is written."""
+    n, m, n_f = states, states + 1 + 2 * harmonics, n_indicators + states + n_outputs
+    planar = is_planar(states, harmonics)
+    filled = n if planar else -(-n // LANES) * LANES
+
+    def whole(*shape: int) -> Any:
+        return np.zeros(shape, dtype=np.int64)
+
+    tables = (
+        np.zeros((n_modes, NODES + 1, m, filled)), np.zeros((n_modes, NODES + 1, 2 * harmonics + 1)),
+        np.zeros((n_modes, n_f, 2 * (m + n + 1))), np.zeros((n_modes, n_f, m, DEGREE + 1)),
+        np.zeros((n_modes, n, m)), np.zeros((n_modes, 2 + n)),
+        whole(1, 1, 1, 1) if planar else whole(n_modes, n_f, 2, m + 1),
+        np.zeros((n_modes, n + m, n) if n >= BANDED else (n_modes, 1, 1)),
+        whole(n_modes, n + m if n >= BANDED else 1, 3),
+    )  # fmt: skip
+    work = (
+        *(np.zeros(m + LANES) for _ in range(8)), np.zeros((max(TERMS, n) + 1, m)),
+        np.zeros((n_rows + n + 1, WIDTH)), np.zeros(4), np.zeros(harmonics),
+        *map(whole, (n_indicators, 4, n_modes, n_indicators, 2, N_TALLY)), np.zeros(N_MEMO),
+    )  # fmt: skip
+    if apart:
+        return Tables(*tables), Work(*one_block(*work))
+    block = one_block(*tables, *work)
     return Tables(*block[: len(tables)]), Work(*block[len(tables) :])
-
-
-def scratch_apart(n_modes, n_indicators, n_outputs, n_rows):
-    """The same with each table by itself, which takes memory only where it is written."""
-    tables = _tables(n_modes, n_indicators + STATES + n_outputs)
-    return Tables(*tables), Work(*one_block(*_work(n_modes, n_indicators, n_rows)))
-
-
-def _tables(n_modes, n_f):
-    return (
-        np.zeros((n_modes, NODES + 1, M, STATES)), np.zeros((n_modes, NODES + 1, 2 * HARMONICS + 1)),
-        np.zeros((n_modes, n_f, 2 * (M + STATES + 1))), np.zeros((n_modes, n_f, M, DEGREE + 1)),
-        np.zeros((n_modes, STATES, M)), np.zeros((n_modes, 2 + STATES)),
-        np.zeros((n_modes, n_f, 2, M + 1) if STATES >= MANY else (1, 1, 1, 1), dtype=np.int64),
-        np.zeros((n_modes, STATES + M, STATES) if BANDED else (1, 1, 1)),
-        np.zeros((n_modes, STATES + M, 3) if BANDED else (1, 1, 1), dtype=np.int64),
-    )  # fmt: skip
-
-
-def _work(n_modes, n_indicators, n_rows):
-    vectors = [np.zeros(M) for _ in range(8)]
-    integers = [np.zeros(n, dtype=np.int64) for n in (n_indicators, 4, n_modes, n_indicators, 2, N_TALLY)]
-    return (
-        *vectors, np.zeros((max(TERMS, STATES) + 1, M)), np.zeros((n_rows + STATES + 1, WIDTH)), np.zeros(4),
-        np.zeros(HARMONICS), *integers, np.zeros(N_MEMO),
-    )  # fmt: skip

@@ -3,16 +3,16 @@
 from math import fabs
 
 from nonsmooth.kernels.compile.cache import device, inline, once
-from nonsmooth.kernels.compile.long_sums import dot
 from nonsmooth.kernels.hybrid.places import LONGEST_STEP
-from nonsmooth.kernels.linear.tables import HARMONICS, MANY, ONE, SIZES, STATES, WAVE, M
+from nonsmooth.kernels.linear.sums import at, dot
+from nonsmooth.kernels.linear.tables import STATES, sizes_at, states_of, width_of
 from nonsmooth.kernels.linear.values import EPS, rounding, slope_of, value_of
 
 
 @inline
 def flat(tables, mode, f, w):
     """Return whether the slope of functional f is zero within rounding at w."""
-    return fabs(slope_of(tables, mode, f, w)) <= rounding(tables, mode, f, M, w)
+    return fabs(slope_of(tables, mode, f, w)) <= rounding(tables, mode, f, width_of(tables.field), w)
 
 
 @device
@@ -21,14 +21,15 @@ def vanishing(tables, mode, f, w):
 
     Of those up to the fourth; (5, 0) where they vanish all. A harmonic's rounding is that of its phase, whatever its
     value: a force that presses may be nothing else."""
+    n, m = states_of(tables.field), width_of(tables.field)
     tay = tables.tay
     for k in range(2, 5):
-        total = tay[mode, f, ONE, k]
+        total = tay[mode, f, n, k]
         size = fabs(total)
-        for j in range(M):
-            if j != ONE:
+        for j in range(m):
+            if j != n:
                 total += tay[mode, f, j, k] * w[j]
-                size += fabs(tay[mode, f, j, k]) * (fabs(w[j]) if j < WAVE else 1.0)
+                size += fabs(tay[mode, f, j, k]) * (fabs(w[j]) if j <= n else 1.0)
         if fabs(total) > 64.0 * EPS * size:
             return k, 1 if total > 0.0 else -1
     return 5, 0
@@ -41,21 +42,22 @@ def mark_zeros(tables, work, mode):
     Two where a stick ends, three where a contact lifts off: what is rounding there must not decide. At a crossing w
     carries the rounding of the step that led there: it decides where an indicator has no constant part, such as that of
     a stop at x = 0."""
-    w, zero, fun, memo = work.w, work.zero, tables.fun, work.memo
+    n, m = states_of(tables.field), width_of(tables.field)
+    w, zero, fun, memo, sizes = work.w, work.zero, tables.fun, work.memo, sizes_at(n, m)
     step = max(memo[LONGEST_STEP], tables.info[mode, 0])
     memo[LONGEST_STEP] = step
     largest = 1.0
-    for r in range(STATES):
+    for r in range(n):
         largest = max(largest, fabs(w[r]))
     most = 17.0 * EPS * largest  # noise is below this with every state as large as the largest
     for f in range(zero.shape[0]):
         zero[f] = 0
-        if fun[mode, f, SIZES] < 0.0:  # not asked for in this mode
+        if fun[mode, f, sizes] < 0.0:  # not asked for in this mode
             continue
         value = fabs(value_of(tables, mode, f, w))
-        if not value <= most * (fun[mode, f, SIZES] + 0.25 * step * fun[mode, f, SIZES + 1]):
+        if not value <= most * (fun[mode, f, sizes] + 0.25 * step * fun[mode, f, sizes + 1]):
             continue
-        if value <= rounding(tables, mode, f, 0, w) + 0.25 * step * rounding(tables, mode, f, M, w):
+        if value <= rounding(tables, mode, f, 0, w) + 0.25 * step * rounding(tables, mode, f, m, w):
             zero[f] = 1
         if zero[f] != 0 and flat(tables, mode, f, w):
             zero[f], _ = vanishing(tables, mode, f, w)
@@ -104,32 +106,32 @@ def look(i, form, tables, work, mode):
 
 
 @inline
-def mapped(i, m, r, form, w):
-    """State r behind the map m."""
-    total = form.rb[i, m, r]
-    if STATES >= MANY:
-        total = dot(total, form.ra[i, m, r], 0, w, STATES)
+def mapped(n, i, map_, r, form, w):
+    """State r of n behind a map."""
+    total = form.rb[i, map_, r]
+    if STATES == 0:
+        total += dot(at(form.ra, ((i * form.ra.shape[1] + map_) * n + r) * n), at(w, 0), n)
     else:
-        for j in range(STATES):
-            total += form.ra[i, m, r, j] * w[j]
-    for h in range(HARMONICS):
-        total += form.rc[i, m, h, r] * w[WAVE + 2 * h] + form.rs[i, m, h, r] * w[WAVE + 1 + 2 * h]
+        for j in range(n):
+            total += form.ra[i, map_, r, j] * w[j]
+    for h in range(form.rc.shape[2]):
+        total += form.rc[i, map_, h, r] * w[n + 1 + 2 * h] + form.rs[i, map_, h, r] * w[n + 2 + 2 * h]
     return total
 
 
 @inline
-def apply_map(i, t, form, net, work):
-    """The states behind transition t, into w; of many only those that it changes are looked at."""
-    w, wn, m = work.w, work.wn, net.transitions[t, 3]
-    if STATES >= MANY:
-        for q in range(1, net.changed[m, 0] + 1):
-            wn[net.changed[m, q]] = mapped(i, m, net.changed[m, q], form, w)
-        for q in range(1, net.changed[m, 0] + 1):
-            w[net.changed[m, q]] = wn[net.changed[m, q]]
+def apply_map(i, t, form, net, tables, work):
+    """The states behind transition t, into w; where they may be many only those that it changes are looked at."""
+    n, w, wn, map_ = states_of(tables.field), work.w, work.wn, net.transitions[t, 3]
+    if STATES == 0:
+        for q in range(1, net.changed[map_, 0] + 1):
+            wn[net.changed[map_, q]] = mapped(n, i, map_, net.changed[map_, q], form, w)
+        for q in range(1, net.changed[map_, 0] + 1):
+            w[net.changed[map_, q]] = wn[net.changed[map_, q]]
     else:
-        for r in range(STATES):
-            wn[r] = mapped(i, m, r, form, w)
-        for r in range(STATES):
+        for r in range(n):
+            wn[r] = mapped(n, i, map_, r, form, w)
+        for r in range(n):
             w[r] = wn[r]
 
 
@@ -139,12 +141,12 @@ def take(i, t, fired, form, tables, net, work):
 
     What has crossed is zero, also behind a reset that leaves it where it was. ``work.wp`` keeps w just before."""
     w, wp, zero = work.w, work.wp, work.zero
-    for j in range(M):
+    for j in range(width_of(tables.field)):
         wp[j] = w[j]
     mode = net.transitions[t, 0]
     if net.transitions[t, 1] != 0:
         off = fabs(value_of(tables, mode, fired, w)) if fired >= 0 else 0.0
-        apply_map(i, t, form, net, work)
+        apply_map(i, t, form, net, tables, work)
         if fired >= 0 and fabs(value_of(tables, mode, fired, w)) > 2.0 * off:
             fired = -1
     mark_zeros(tables, work, mode)

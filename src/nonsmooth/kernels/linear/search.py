@@ -24,7 +24,7 @@ from nonsmooth.kernels.linear.polynomial import (
     next_upward,
     slope_at,
 )  # fmt: skip
-from nonsmooth.kernels.linear.tables import DEGREE, NODES, ONE, STATES, M
+from nonsmooth.kernels.linear.tables import DEGREE, NODES, states_of, width_of
 from nonsmooth.kernels.linear.values import (
     NODE,
     at_node,
@@ -48,25 +48,26 @@ def refine(tables, work, mode, f, sign, zero, guess):
     """The upward root of a functional near a good guess, on its polynomial beside the nearest node; -1: not found.
 
     Halley's method: of third order, so that two steps mostly do. What has not converged is not found."""
+    n = states_of(tables.field)
     spacing, scr = tables.info[mode, 1], work.scr
     tau = guess
     result = -1.0
     for _ in range(4):
         node = min(max(int(tau / spacing + 0.5), 0), NODES)
         at_node(tables, work, mode, node)
-        compose(tables, mode, f, work.wn, scr, STATES)
+        compose(tables, mode, f, work.wn, scr, n)
         if node == 0 and zero != 0:
             for k in range(zero):
-                scr[STATES, k] = 0.0
+                scr[n, k] = 0.0
         local = tau - node * spacing
         converged = False
         slope = 1.0
         for _k in range(10):
             if not (fabs(local) <= 0.75 * spacing):
                 break
-            value = horner(scr, STATES, local)
-            slope = slope_at(scr, STATES, local)
-            half = 0.5 * curvature_at(scr, STATES, local)
+            value = horner(scr, n, local)
+            slope = slope_at(scr, n, local)
+            half = 0.5 * curvature_at(scr, n, local)
             change = value * slope / (slope * slope - value * half)
             local -= change
             # the next change would be the cube of this one, over the square of the time scale
@@ -152,14 +153,15 @@ def finest(tables, work, mode, rows, lo, hi, node, up):
 @inline
 def returns_at_once(tables, work, mode, rows, lo, hi):
     """Return whether a condition that begins on its surface comes back to it within one node spacing, as in chatter."""
+    n, m = states_of(tables.field), width_of(tables.field)
     w, zero, spacing = work.w, work.zero, tables.info[mode, 1]
     soon = False
     for r in range(lo, hi):
         f = rows[r, 0]
         if f < zero.shape[0] and zero[f] == 1:
-            bend = tables.tay[mode, f, ONE, 2]
-            for j in range(M):
-                if j != ONE:
+            bend = tables.tay[mode, f, n, 2]
+            for j in range(m):
+                if j != n:
                     bend += tables.tay[mode, f, j, 2] * w[j]
             slope = slope_of(tables, mode, f, w)
             soon = soon or (slope * bend < 0.0 and fabs(slope) < fabs(bend) * spacing)

@@ -4,7 +4,7 @@ A segment is one step of the mode, or its part up to the first crossing, section
 (u_1, ..., u_n, 1, cos k_1 w t, sin k_1 w t, ...); times count from the start of the forcing period.
 """
 
-from math import cos, fabs, isfinite, sin
+from math import cos, fabs, sin
 
 from nonsmooth.kernels.compile.cache import inline, once
 from nonsmooth.kernels.hybrid.places import FIRED, MODE, NO_END, TIME
@@ -13,7 +13,7 @@ from nonsmooth.kernels.linear.build import build
 from nonsmooth.kernels.linear.limits import sign_after
 from nonsmooth.kernels.linear.polynomial import NEVER, classify
 from nonsmooth.kernels.linear.search import FUNCTIONAL, SIDE, search
-from nonsmooth.kernels.linear.tables import HARMONICS, MEMORY, NODES, ONE, OWN, STATES, WAVE, M
+from nonsmooth.kernels.linear.tables import NODES, STATES, states_of, width_of
 from nonsmooth.kernels.linear.values import NODE, bound_at, dense, slope_of, turn, value_of, whole_step
 
 STEPPER = FORM, TABLES, WORK  # the types of this stepper's records: model, tables, work
@@ -22,38 +22,39 @@ SAME = 1e-9  # of a node spacing: the section is met by the transition that is s
 
 
 @inline
-def set_phase(work, s):
+def set_phase(n, m, work, s):
     """Harmonics of the forcing at the time s in the period."""
     w, rates = work.w, work.rates
-    for h in range(HARMONICS):
-        w[WAVE + 2 * h] = cos(rates[h] * s)
-        w[WAVE + 1 + 2 * h] = sin(rates[h] * s)
+    for h in range((m - n - 1) >> 1):
+        w[n + 1 + 2 * h] = cos(rates[h] * s)
+        w[n + 2 + 2 * h] = sin(rates[h] * s)
 
 
 @inline
 def wrap_phase(tables, work, mode, s):
     """Harmonics of the forcing at a time s shorter than a step of the mode, from its table: no drift over periods."""
+    n, m = states_of(tables.field), width_of(tables.field)
     w, rates, rot = work.w, work.rates, tables.rot
     spacing = tables.info[mode, 1]
     node = min(int(s / spacing + 0.5), NODES)
     local = s - node * spacing
-    for h in range(HARMONICS):
+    for h in range((m - n - 1) >> 1):
         c, s_ = turn(rates[h] * local, rot[mode, node, 2 * h], rot[mode, node, 2 * h + 1])
-        w[WAVE + 2 * h] = c
-        w[WAVE + 1 + 2 * h] = s_
+        w[n + 1 + 2 * h] = c
+        w[n + 2 + 2 * h] = s_
 
 
 @once
 def prepare(i, form, motion, tables, work):
     """Tables of point i, and where the motion is."""
+    n, m, w, own = states_of(tables.field), width_of(tables.field), work.w, motion.u.shape[0]
     build(i, form, tables, work)
-    w = work.w
-    for j in range(OWN):
+    for j in range(own):
         w[j] = motion.u[j]
-    for j in range(MEMORY):
-        w[OWN + j] = motion.memory[j]
-    w[ONE] = 1.0
-    set_phase(work, motion.clock[0])
+    for j in range(own, n):
+        w[j] = motion.memory[j - own]
+    w[n] = 1.0
+    set_phase(n, m, work, motion.clock[0])
 
 
 @once
@@ -130,6 +131,7 @@ def stride(tables, net, work, mode, s, whole, target, period, returns, most, pat
 
     Returns (s, whole, returns, first, patience left); w1 then stands at the end of the next step, on which the mode's
     transition at the place ``first`` may fire, or none (-1; the step would be one return too many)."""
+    n, m = states_of(tables.field), width_of(tables.field)
     w, w1 = work.w, work.w1
     step = tables.info[mode, 0]
     whole_step(tables, work, mode)
@@ -146,14 +148,14 @@ def stride(tables, net, work, mode, s, whole, target, period, returns, most, pat
             returns += 1
         first = 0
         s = after
-        for j in range(M):
+        for j in range(m):
             w[j] = w1[j]
         if s >= period:
             s -= period
             whole += 1.0
             wrap_phase(tables, work, mode, s)
             lost = False
-            for r in range(STATES):
+            for r in range(n):
                 lost = lost or not fabs(w[r]) < 1e300
             if lost:
                 break
@@ -181,6 +183,7 @@ def leg(i, form, net, section, goal, tables, work, r_max, ready, first):
     ``end`` stands at the segment's end where that is shorter (the third number returned tells). Returns (time marched,
     transition or -1, whole step or not, section direction or 0).
     """
+    m = width_of(tables.field)
     end, there, found, rows = work.end, work.there, work.found, net.rows
     mode = work.tally[MODE]
     found[NODE] = -1
@@ -227,7 +230,7 @@ def leg(i, form, net, section, goal, tables, work, r_max, ready, first):
             fired = t
             crossed = sense
             functional = found[FUNCTIONAL]
-            for j in range(M):
+            for j in range(m):
                 end[j] = there[j]
     work.tally[FIRED] = functional
     whole = fired < 0 and crossed == 0 and r_max >= step
@@ -245,8 +248,9 @@ def time_scale(i, since, form, tables, work):
 @once
 def arrive_at(t, since, full, wrapped, form, net, tables, work):
     """State and phase at the end of a segment. Returns its transition."""
+    m = width_of(tables.field)
     w, w1, end, zero = work.w, work.w1, work.end, work.zero
-    for j in range(M):
+    for j in range(m):
         w[j] = w1[j] if full else end[j]
     if wrapped:
         wrap_phase(tables, work, work.tally[MODE], work.memo[TIME])
@@ -304,38 +308,27 @@ def state_at(tau, form, tables, work, out):
 
 
 @once
-def n_states(work):
-    """Number of states, without memory."""
-    return OWN
-
-
-@once
-def n_memory(form, work):
-    """Number of values in memory: the last of the kernel's states."""
-    return MEMORY
-
-
-@once
-def memory_at(k, form, work):
-    """The k-th of them."""
-    return work.w[OWN + k]
+def memory_at(k, own, form, work):
+    """The k-th value in memory, of a system with so many states of its own."""
+    return work.w[own + k]
 
 
 @once
 def put_state(motion, work):
     """Write the state to the motion."""
-    for j in range(OWN):
+    own = motion.u.shape[0]
+    for j in range(own):
         motion.u[j] = work.w[j]
-    for j in range(MEMORY):
-        motion.memory[j] = work.w[OWN + j]
+    for j in range(motion.memory.shape[0]):
+        motion.memory[j] = work.w[own + j]
 
 
 @once
 def bounded(work, limit):
     """Finite and below the limits of divergence."""
     within = True
-    for r in range(OWN):
-        within = within and isfinite(work.w[r]) and fabs(work.w[r]) < limit[r]
+    for r in range(STATES if STATES > 0 else limit.shape[0]):
+        within = within and fabs(work.w[r]) < limit[r]
     return within
 
 

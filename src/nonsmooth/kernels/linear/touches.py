@@ -3,7 +3,7 @@
 from nonsmooth.kernels.compile.cache import once
 from nonsmooth.kernels.hybrid.places import DONE, MODE, TOUCHES
 from nonsmooth.kernels.linear.polynomial import critical_points, curvature_at, horner
-from nonsmooth.kernels.linear.tables import NODES, OWN
+from nonsmooth.kernels.linear.tables import NODES
 from nonsmooth.kernels.linear.values import compose, to_node
 
 
@@ -37,7 +37,7 @@ def log_touches(step, form, net, seen, tables, work):
                     seen.touch_time[n] = base + tau
                     seen.touch_indicator[n] = f
                     seen.touch_gap[n] = -value
-                    for s in range(OWN):
+                    for s in range(seen.touch_u.shape[1]):
                         compose(tables, mode, work.zero.shape[0] + s, wn, scr, 1)
                         seen.touch_u[n, s] = horner(scr, 1, local)
                     n += 1

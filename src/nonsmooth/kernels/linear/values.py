@@ -8,129 +8,122 @@ of it). Many states that move with few others each go by the series of the whole
 from math import fabs
 
 from nonsmooth.kernels.compile.cache import inline
-from nonsmooth.kernels.compile.lanes import sum_columns, sum_rows, sum_some_rows
-from nonsmooth.kernels.compile.long_sums import dot, sizes, spread
-from nonsmooth.kernels.linear.bands import STEEP, along, expand
+from nonsmooth.kernels.linear.bands import STEEP, along, by_series, expand
 from nonsmooth.kernels.linear.polynomial import horner
-from nonsmooth.kernels.linear.tables import BANDED, HARMONICS, MANY, NODES, ONE, STATES, WAVE, M
+from nonsmooth.kernels.linear.sums import at, composed, propagated, row_of, sizes_of, spread_of
+from nonsmooth.kernels.linear.tables import DEGREE, NODES, STATES, states_of, width_of
 
 EPS = 2.3e-16
-FEW = 8  # states of a condition that are summed one by one
 # In ``work.found``: the node whose w stands in ``work.wn``, with the Taylor coefficients of the states in the first
 # rows of ``work.scr`` (-2 - node: without them, -1: none).
 NODE = 1
 
 
 @inline
-def sum_few(total, tables, mode, f, at, w):
-    """``total`` and the states' part of a functional's value (at = 0) or slope (M): one by one where they are few."""
-    fun, some = tables.fun, tables.some
-    count = some[mode, f, 1, 0]
-    if count > FEW:
-        return dot(total, fun[mode, f], at, w, STATES)
-    for q in range(1, count + 1):
-        j = some[mode, f, 1, q]
-        total += fun[mode, f, at + j] * w[j]
+def row_place(tables, mode, f):
+    """The place of functional f's rows in the memory of ``tables.fun``."""
+    return (mode * tables.fun.shape[1] + f) * tables.fun.shape[2]
+
+
+@inline
+def some_at(tables, mode, f, which):
+    """The address of a list of the functional's columns (``tables.some``)."""
+    some = tables.some
+    return at(some, ((mode * some.shape[1] + f) * 2 + which) * some.shape[3])
+
+
+@inline
+def row_at(tables, mode, f, first, w):
+    """The row of functional f that begins at a place of fun, at w. (The states come last, being known later.)"""
+    fun, n, m = tables.fun, states_of(tables.field), width_of(tables.field)
+    if STATES == 0:
+        return row_of(at(fun, row_place(tables, mode, f) + first), some_at(tables, mode, f, 1), at(w, 0), n, m)
+    total = fun[mode, f, first + n]
+    for j in range(n + 1, m):
+        total += fun[mode, f, first + j] * w[j]
+    for j in range(n - 1, -1, -1):
+        total += fun[mode, f, first + j] * w[j]
     return total
 
 
 @inline
 def value_of(tables, mode, f, w):
-    """Functional f at w. (Here and below the states come last: they are known later than the harmonics.)"""
-    fun = tables.fun
-    total = fun[mode, f, ONE]
-    for j in range(WAVE, M):
-        total += fun[mode, f, j] * w[j]
-    if STATES >= MANY:
-        return sum_few(total, tables, mode, f, 0, w)
-    for j in range(STATES - 1, -1, -1):
-        total += fun[mode, f, j] * w[j]
-    return total
+    """Functional f at w."""
+    return row_at(tables, mode, f, 0, w)
 
 
 @inline
 def slope_of(tables, mode, f, w):
     """Slope of functional f along the mode at w."""
-    fun = tables.fun
-    total = fun[mode, f, M + ONE]
-    for j in range(WAVE, M):
-        total += fun[mode, f, M + j] * w[j]
-    if STATES >= MANY:
-        return sum_few(total, tables, mode, f, M, w)
-    for j in range(STATES - 1, -1, -1):
-        total += fun[mode, f, M + j] * w[j]
-    return total
+    return row_at(tables, mode, f, width_of(tables.field), w)
 
 
 @inline
 def bound_at(tables, row, mode, f, w):
     """Bound on the fourth derivative of functional f on the step that starts at w."""
-    fun, info = tables.fun, tables.info
-    if BANDED:
-        if tables.lines[mode, 0, 0] > 0:
+    fun, info, n, m = tables.fun, tables.info, states_of(tables.field), width_of(tables.field)
+    if STATES == 0:
+        if by_series(tables, mode):
             return bound_by_series(tables, row, mode, f)
-    total = fun[mode, f, 2 * M + STATES]
-    if STATES >= MANY:
-        return spread(total, fun[mode, f], 2 * M, w, info[mode], STATES)
-    for j in range(STATES - 1, -1, -1):
-        total += fun[mode, f, 2 * M + j] * fabs(w[j] - info[mode, 2 + j])
+        return spread_of(at(fun, row_place(tables, mode, f) + 2 * m), at(w, 0), at(info, mode * (n + 2) + 2), n)
+    total = fun[mode, f, 2 * m + n]
+    for j in range(n - 1, -1, -1):
+        total += fun[mode, f, 2 * m + j] * fabs(w[j] - info[mode, 2 + j])
     return total
 
 
 @inline
 def bound_by_series(tables, row, mode, f):
     """The same from those on w itself."""
-    fun, some = tables.fun, tables.some
-    total = 0.0
-    for j in range(WAVE, M):
-        total += fabs(fun[mode, f, j]) * row[STEEP, j]
-    count = some[mode, f, 1, 0]
-    if count > FEW:
-        return sizes(total, fun[mode, f], 0, row[STEEP], STATES)
-    for q in range(1, count + 1):
-        j = some[mode, f, 1, q]
-        total += fabs(fun[mode, f, j]) * row[STEEP, j]
-    return total
+    n, m = states_of(tables.field), width_of(tables.field)
+    steep = at(row, STEEP * row.shape[1])
+    return sizes_of(at(tables.fun, row_place(tables, mode, f)), some_at(tables, mode, f, 1), steep, n, n + 1, m)
 
 
 @inline
-def rounding(tables, mode, f, at, w):
-    """Below this the row fun[mode, f, at:] is zero within rounding at w."""
+def rounding(tables, mode, f, first, w):
+    """Below this the row fun[mode, f, first:] is zero within rounding at w."""
+    n, m = states_of(tables.field), width_of(tables.field)
+    if STATES == 0:
+        row = at(tables.fun, row_place(tables, mode, f) + first)
+        return 16.0 * EPS * sizes_of(row, some_at(tables, mode, f, 1), at(w, 0), n, n, m)
     total = 0.0
-    if STATES >= MANY:
-        for q in range(1, tables.some[mode, f, 1, 0] + 1):
-            j = tables.some[mode, f, 1, q]
-            total += fabs(tables.fun[mode, f, at + j] * w[j])
-        for j in range(STATES, M):
-            total += fabs(tables.fun[mode, f, at + j] * w[j])
-    else:
-        for j in range(M):
-            total += fabs(tables.fun[mode, f, at + j] * w[j])
+    for j in range(m):
+        total += fabs(tables.fun[mode, f, first + j] * w[j])
     return 16.0 * EPS * total
 
 
 @inline
 def to_node(tables, row, mode, node, w, out):
     """w at a node of the step, from w at its start."""
-    rot = tables.rot
-    if BANDED:
-        if tables.lines[mode, 0, 0] > 0:
-            along(row, node / NODES, out)
+    rot, prop, n, m = tables.rot, tables.prop, states_of(tables.field), width_of(tables.field)
+    if STATES == 0:
+        if by_series(tables, mode):
+            along(row, node / NODES, m, out)
             return
-    for h in range(HARMONICS):
+        filled = prop.shape[3]
+        propagated(at(prop, (mode * (NODES + 1) + node) * m * filled), filled, at(w, 0), n, m, at(out, 0))
+    else:
+        for r in range(n):
+            total = prop[mode, node, n, r]
+            for j in range(n + 1, m):
+                total += prop[mode, node, j, r] * w[j]
+            for j in range(n - 1, -1, -1):
+                total += prop[mode, node, j, r] * w[j]
+            out[r] = total
+    out[n] = 1.0
+    for h in range((m - n - 1) >> 1):
         c = rot[mode, node, 2 * h]
         s = rot[mode, node, 2 * h + 1]
-        out[WAVE + 2 * h] = w[WAVE + 2 * h] * c - w[WAVE + 1 + 2 * h] * s
-        out[WAVE + 1 + 2 * h] = w[WAVE + 1 + 2 * h] * c + w[WAVE + 2 * h] * s
-    sum_columns(out, tables.prop, mode, node, w, STATES, M)
-    out[ONE] = 1.0
+        out[n + 1 + 2 * h] = w[n + 1 + 2 * h] * c - w[n + 2 + 2 * h] * s
+        out[n + 2 + 2 * h] = w[n + 2 + 2 * h] * c + w[n + 1 + 2 * h] * s
 
 
 @inline
 def whole_step(tables, work, mode):
     """w at the end of the step, into ``work.w1``; with what the step's instants and bounds are found from."""
-    if BANDED:
-        if tables.lines[mode, 0, 0] > 0:
+    if STATES == 0:
+        if by_series(tables, mode):
             expand(tables, work, mode)
     to_node(tables, work.row, mode, NODES, work.w, work.w1)
 
@@ -138,10 +131,19 @@ def whole_step(tables, work, mode):
 @inline
 def compose(tables, mode, f, wn, scr, row):
     """Taylor coefficients of functional f at a node where w is ``wn``, into a row of scr."""
-    if STATES >= MANY:
-        sum_some_rows(scr, row, tables.tay, mode, f, wn, tables.some[mode, f, 0])
+    tay = tables.tay
+    if STATES == 0:
+        place = (mode * tay.shape[1] + f) * tay.shape[2] * (DEGREE + 1)
+        composed(at(tay, place), some_at(tables, mode, f, 0), at(wn, 0), at(scr, row * (DEGREE + 1)))
     else:
-        sum_rows(scr, row, tables.tay, mode, f, wn, STATES, M)
+        n, m = states_of(tables.field), width_of(tables.field)
+        for k in range(DEGREE + 1):
+            total = tay[mode, f, n, k]
+            for j in range(n + 1, m):
+                total += tay[mode, f, j, k] * wn[j]
+            for j in range(n - 1, -1, -1):
+                total += tay[mode, f, j, k] * wn[j]
+            scr[row, k] = total
 
 
 @inline
@@ -156,9 +158,10 @@ def at_node(tables, work, mode, node):
 @inline
 def place(tables, work, mode, node):
     """w at a node of the step, and there the Taylor coefficients of the states (the first rows of scr)."""
+    n = states_of(tables.field)
     if work.found[NODE] != node:
         at_node(tables, work, mode, node)
-        for r in range(STATES):
+        for r in range(n):
             compose(tables, mode, work.zero.shape[0] + r, work.wn, work.scr, r)
         work.found[NODE] = node
 
@@ -175,9 +178,10 @@ def turn(angle, c, s):
 @inline
 def dense(tables, work, mode, tau, out):
     """w at any instant of the step."""
-    if BANDED:
-        if tables.lines[mode, 0, 0] > 0:
-            along(work.row, tau / tables.info[mode, 0], out)
+    n, m = states_of(tables.field), width_of(tables.field)
+    if STATES == 0:
+        if by_series(tables, mode):
+            along(work.row, tau / tables.info[mode, 0], m, out)
             return
     spacing = tables.info[mode, 1]
     wn, scr, rates = work.wn, work.scr, work.rates
@@ -186,10 +190,10 @@ def dense(tables, work, mode, tau, out):
         node = min(int(tau / spacing + 0.5), NODES)
     place(tables, work, mode, node)
     local = tau - node * spacing
-    for r in range(STATES):
+    for r in range(n):
         out[r] = horner(scr, r, local)
-    out[ONE] = 1.0
-    for h in range(HARMONICS):
-        c, s = turn(rates[h] * local, wn[WAVE + 2 * h], wn[WAVE + 1 + 2 * h])
-        out[WAVE + 2 * h] = c
-        out[WAVE + 1 + 2 * h] = s
+    out[n] = 1.0
+    for h in range((m - n - 1) >> 1):
+        c, s = turn(rates[h] * local, wn[n + 1 + 2 * h], wn[n + 2 + 2 * h])
+        out[n + 1 + 2 * h] = c
+        out[n + 2 + 2 * h] = s

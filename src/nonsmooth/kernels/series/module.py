@@ -1,4 +1,4 @@
-"""The kernels of the series methods, for one observer and one method."""
+"""The kernels of the series methods, for one method."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from nonsmooth.kernels.compile.assembly import joined, with_numbers
 from nonsmooth.kernels.compile.cache import load_module
 from nonsmooth.kernels.series.places import METHODS
 
-__all__ = ["METHODS", "OBSERVERS", "series_module"]
+__all__ = ["METHODS", "STEPPER", "series_module"]
 
 STEPPER = ("series.step", "series.watch", "series.stepper", "hybrid.loop")
-OBSERVERS = {"sections": ("hybrid.sections",), "record": ("hybrid.every_step", "hybrid.record")}
+OBSERVERS = ("hybrid.sections", "hybrid.record", "hybrid.observers", "hybrid.run")
 
 
 @cache
-def series_module(observer: str, method: str) -> ModuleType:
-    """The module with ``chain`` (sections) or ``record``.
+def series_module(method: str) -> ModuleType:
+    """The module with ``run``.
 
     The method is a constant of the text: what another one needs is not in the way, nor compiled."""
-    text = with_numbers(joined((*STEPPER, *OBSERVERS[observer])), {"METHOD": METHODS[method]})
-    return load_module(text, f"series_{observer}_{method}")
+    text = joined((*STEPPER, *OBSERVERS), absent=("hybrid.growth",))
+    return load_module(with_numbers(text, {"METHOD": METHODS[method], "GROWS": 0}), f"series_{method}")

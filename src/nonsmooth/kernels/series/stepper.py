@@ -359,20 +359,8 @@ def state_at(tau, form, tables, work, out):
 
 
 @once
-def n_states(work):
-    """Number of states."""
-    return work.w.shape[0]
-
-
-@once
-def n_memory(form, work):
-    """Number of memory variables."""
-    return work.q.shape[0] - form.points.shape[1]
-
-
-@once
-def memory_at(k, form, work):
-    """A memory variable."""
+def memory_at(k, own, form, work):
+    """The k-th value in memory."""
     return work.q[form.points.shape[1] + k]
 
 

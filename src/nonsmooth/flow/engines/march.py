@@ -1,0 +1,73 @@
+"""One thread's calls of an engine's compiled march: the blocks of memory that it reads and writes (``kernels.hybrid``)."""
+
+from __future__ import annotations
+
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from nonsmooth.flow.engines.engine import Chain, FloatArray, SectionPlan, State
+from nonsmooth.kernels.hybrid.places import GROW, LOGGED, PATIENCE, RETURNS_OF_SECTION
+
+__all__ = ["March"]
+
+_NO_STARTS = np.zeros((0, 0))
+
+
+class March:
+    """The blocks of one thread, over the kernels of one stepper (``linear_module`` or ``series_module``)."""
+
+    def __init__(self, module: ModuleType, limit: FloatArray) -> None:
+        from nonsmooth.kernels.compile.pointers import Block
+        from nonsmooth.kernels.hybrid.blocks import call_block, growth_block, kept_block, log_block
+        from nonsmooth.kernels.hybrid.records import N_ORDERS, N_REALS
+
+        self.module, self.limit = module, limit
+        self.system = Block(module.SYSTEM, module.put_system)
+        self.call, self.kept, self.log, self.growth = call_block(), kept_block(), log_block(), growth_block()
+        self.orders, self.reals = np.zeros(N_ORDERS, dtype=np.int64), np.zeros(N_REALS)
+
+    def returns(
+        self, first: int, last: int, state: State, starts: FloatArray | None, plan: SectionPlan, transient: int,
+        keep: int, out: Chain,
+    ) -> None:  # fmt: skip
+        """Ask for section returns of some points; see :class:`nonsmooth.flow.engines.engine.Engine`."""
+        self.orders[:] = (
+            first, last, RETURNS_OF_SECTION, transient, keep, PATIENCE, plan.indicator, plan.rising, plan.mode,
+            plan.after, plan.every, plan.extremes,
+        )  # fmt: skip
+        phase = plan.phase if plan.indicator < 0 else -1.0
+        self.reals[:] = 0.0, 0.0, phase, min(plan.t_max, 1e300)
+        self.kept.put(out.record())
+        self._ask(state, _NO_STARTS if starts is None else starts)
+
+    def logged(self, state: State, until: float) -> None:
+        """Ask for the log of point 0 to a time."""
+        self._anywhere(0, LOGGED, 0)
+        self.reals[:] = until, 0.0, -1.0, 0.0
+        self._ask(state, _NO_STARTS)
+
+    def grown(self, i: int, state: State, count: int, unit: float, growth: Any) -> None:
+        """Ask for ``count`` units of time of point i with its frame (``records.Growth``)."""
+        self._anywhere(i, GROW, count)
+        self.reals[:] = 0.0, unit, -1.0, 0.0
+        self.growth.put(growth)
+        self._ask(state, _NO_STARTS)
+
+    def run(self, system: tuple[Any, Any, Any, Any]) -> int:
+        """March what is asked for: model, transition table, tables, work. Returns a code of ``kernels.hybrid.codes``."""
+        address = self.system.put(system)
+        return int(
+            self.module.run(address, self.call.address, self.kept.address, self.log.address, self.growth.address)
+        )
+
+    def _anywhere(self, i: int, kind: int, keep: int) -> None:
+        """A run that knows no section."""
+        self.orders[:] = i, i + 1, kind, 0, keep, PATIENCE, -1, 0, -1, 0, 1, 0
+
+    def _ask(self, state: State, starts: FloatArray) -> None:
+        from nonsmooth.kernels.hybrid.records import Call, Motion
+
+        motion = Motion(state.u, state.memory, state.clock, state.counters)
+        self.call.put(Call(self.orders, self.reals, self.limit, starts, motion))

@@ -1,0 +1,62 @@
+"""Blocks of memory from which a march reads what is asked of it and where it writes what it leaves."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numba import types
+
+from nonsmooth.kernels.compile.cache import kernel
+from nonsmooth.kernels.compile.pointers import Block, stored
+from nonsmooth.kernels.hybrid.records import CALL, GROWTH, KEPT, LOG
+
+__all__ = ["call_at", "call_block", "growth_at", "growth_block", "kept_at", "kept_block", "log_at", "log_block"]
+
+_put_call, call_at = stored(CALL)
+_put_kept, kept_at = stored(KEPT)
+_put_log, log_at = stored(LOG)
+_put_growth, growth_at = stored(GROWTH)
+
+
+@kernel(types.void(types.int64, CALL))
+def put_call(address, record):
+    """Write what is asked of a march to an address."""
+    _put_call(address, record)
+
+
+@kernel(types.void(types.int64, KEPT))
+def put_kept(address, record):
+    """Write the arrays of kept returns to an address."""
+    _put_kept(address, record)
+
+
+@kernel(types.void(types.int64, LOG))
+def put_log(address, record):
+    """Write the arrays of a log to an address."""
+    _put_log(address, record)
+
+
+@kernel(types.void(types.int64, GROWTH))
+def put_growth(address, record):
+    """Write the arrays of a frame and its growth to an address."""
+    _put_growth(address, record)
+
+
+def call_block() -> Any:
+    """Room for what is asked of a march (``records.Call``)."""
+    return Block(CALL, put_call)
+
+
+def kept_block() -> Any:
+    """Room for kept returns (``records.Kept``)."""
+    return Block(KEPT, put_kept)
+
+
+def log_block() -> Any:
+    """Room for a log (``records.Log``)."""
+    return Block(LOG, put_log)
+
+
+def growth_block() -> Any:
+    """Room for a frame and its growth (``records.Growth``)."""
+    return Block(GROWTH, put_growth)

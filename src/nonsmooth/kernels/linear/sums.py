@@ -1,0 +1,106 @@
+"""Sums over as many states as a system has, for the text in which their number varies: given addresses, so that each
+loop stands once in the code and is not held up by arrays that might overlap.
+
+Places are counted in numbers of eight bytes. ``some`` lists places: how many, then which.
+"""
+
+from math import fabs
+
+from nonsmooth.kernels.compile.cache import device, inline, summed
+from nonsmooth.kernels.compile.lanes import FOUR, apart, four_at, number_at, plus, sum_columns, times, whole_at, write_four
+
+FEW = 8  # states of a condition that are summed one by one
+
+
+@inline
+def at(array, place):
+    """The address of a place in the memory of an array."""
+    return array.ctypes.data + 8 * place
+
+
+@device
+def propagated(table, filled, w, n, m, out):
+    """out[:n]: the columns of a propagator, ``filled`` up to whole vectors, times w."""
+    apart()
+    sum_columns(table, filled, w, n, m, out)
+
+
+@device
+def composed(table, some, w, out):
+    """out[:8] = sum_j table[j, :8] w[j] over the places j in ``some``."""
+    apart()
+    for begin in range(0, 8, FOUR):
+        total = times(0.0, four_at(table, begin))
+        for q in range(1, whole_at(some, 0) + 1):
+            j = whole_at(some, q)
+            total = plus(total, number_at(w, j), four_at(table, 8 * j + begin))
+        write_four(out, begin, total)
+
+
+@summed
+def whole_row(row, w, n):
+    """sum_j row[j] w[j] for j < n."""
+    total = 0.0
+    for j in range(n):
+        total += number_at(row, j) * number_at(w, j)
+    return total
+
+
+@device
+def dot(row, w, n):
+    """sum_j row[j] w[j] for j < n."""
+    apart()
+    return whole_row(row, w, n)
+
+
+@device
+def row_of(row, some, w, n, m):
+    """row[n] + sum_j row[j] w[j] over the harmonics and the states in ``some``: one by one where they are few."""
+    apart()
+    total = number_at(row, n)
+    for j in range(n + 1, m):
+        total += number_at(row, j) * number_at(w, j)
+    count = whole_at(some, 0)
+    if count > FEW:
+        return total + whole_row(row, w, n)
+    for q in range(1, count + 1):
+        j = whole_at(some, q)
+        total += number_at(row, j) * number_at(w, j)
+    return total
+
+
+@summed
+def spread(total, row, w, about, n):
+    """total + sum_j row[j] |w[j] - about[j]| for j < n."""
+    for j in range(n):
+        total += number_at(row, j) * fabs(number_at(w, j) - number_at(about, j))
+    return total
+
+
+@device
+def spread_of(row, w, about, n):
+    """row[n] + sum_j row[j] |w[j] - about[j]| for j < n."""
+    apart()
+    return spread(number_at(row, n), row, w, about, n)
+
+
+@summed
+def sizes(total, row, w, first, last):
+    """total + sum_j |row[j] w[j]| for first <= j < last."""
+    for j in range(first, last):
+        total += fabs(number_at(row, j) * number_at(w, j))
+    return total
+
+
+@device
+def sizes_of(row, some, w, n, first, m):
+    """sum_j |row[j] w[j]| over first <= j < m behind the states, and the states in ``some``."""
+    apart()
+    total = sizes(0.0, row, w, first, m)
+    count = whole_at(some, 0)
+    if count > FEW:
+        return sizes(total, row, w, 0, n)
+    for q in range(1, count + 1):
+        j = whole_at(some, q)
+        total += fabs(number_at(row, j) * number_at(w, j))
+    return total
