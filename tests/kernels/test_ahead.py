@@ -160,19 +160,16 @@ def test_every_kernel_of_the_package_is_compiled_ahead():
     modules = {ahead._module(task) for task in ahead.tasks()}
     found = [kernel.__name__ for module in modules for kernel in ahead.kernels_of(module)]
     assert len(written) > 10 and set(found) == written
-    of_shapes = [arguments[:2] for _, name, arguments in ahead.tasks() if name == "linear_module"]
-    assert set(of_shapes) == {(2, 0), (2, 1)}
+    assert [arguments for _, name, arguments in ahead.tasks() if name == "linear_module"] == [(False,), (True,)]
 
 
-def test_a_list_for_some_methods():
-    """Leave out what other methods need; a module comes behind the one whose kernel it calls."""
+def test_a_list_for_some_steppers():
+    """Leave out what other steppers need."""
     from nonsmooth.kernels.compile import ahead
 
-    chosen, every = ahead.tasks(["2,1"], ["rkf45"]), ahead.tasks(["2,1"])
-    left_out = [arguments for _, name, arguments in every if name == "series_module" and arguments[1] != "rkf45"]
-    assert len(left_out) == 4 and [task for task in every if task[2] not in left_out] == chosen
-    place = {(name, *arguments): k for k, (_, name, arguments) in enumerate(every)}
-    assert place["linear_module", 2, 1, "sections", 0, False] < place["settle_module", 2, 1]
+    chosen, every = ahead.tasks(["rkf45", "planar"]), ahead.tasks()
+    left_out = [task[1:] for task in every if task not in chosen]
+    assert left_out == [("series_module", ("taylor",)), ("linear_module", (False,)), ("modes_module", ())]
 
 
 #: A later process; the package's own folder of code made ahead is moved.

@@ -17,12 +17,12 @@ from nonsmooth.kernels.series import module as series_module
 ROOM = "nonsmooth.kernels."
 FOLDER = Path(cuda_module.__file__).parents[1]
 TEXTS = {
-    **{name: (*linear_module.STEPPER, *parts) for name, parts in linear_module.OBSERVERS.items()},
+    "linear": (*linear_module.STEPPER, *linear_module.OBSERVERS),
     **{f"cuda {name}": (*cuda_module.STEPPER, *parts) for name, parts in cuda_module.OBSERVERS.items()},
-    **{f"series {name}": (*series_module.STEPPER, *parts) for name, parts in series_module.OBSERVERS.items()},
+    "series": (*series_module.STEPPER, *series_module.OBSERVERS),
     "cuda series": cuda_series_module.PARTS,
 }
-MARKERS = {"device", "inline", "kernel", "callback", "once", "sum_rows", "sum_columns"}  # another compiler's on a GPU
+MARKERS = {"device", "inline", "kernel", "callback", "once"}  # another compiler's on a GPU
 ON_PURPOSE = MARKERS | {"build", "may_pause", "__all__"}  # replaced on a GPU
 SWAPPED = {"linear.stepper", "linear.extremes", "linear.touches", "series.generated"}  # for the stepper that is joined
 

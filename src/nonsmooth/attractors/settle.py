@@ -185,7 +185,7 @@ def rules_of(
 
 def tolerance_of(engine: Engine, rtol: float | None) -> float:
     """Tolerance of a return, in units of the motion's size: no less than the engine's own tolerance shows."""
-    return TOLERANCE if engine.name == "exact" else max(TOLERANCE, 10.0 * (RTOL if rtol is None else rtol))
+    return TOLERANCE if engine.name == "exact" else max(TOLERANCE, 10.0 * getattr(engine, "rtol", RTOL))
 
 
 def longest_period(keep: int, max_period: object) -> int:

@@ -22,7 +22,9 @@ from nonsmooth.attractors.settled import Settled, least_sizes, usable
 from nonsmooth.attractors.trace import Trace, mode_at, period_of, place_of, state_at, trace
 from nonsmooth.flow.engines.engine import Chain, Engine, FloatArray, IntArray, SectionPlan, State
 from nonsmooth.flow.engines.linear import LinearEngine
+from nonsmooth.flow.engines.loop import LoopEngine
 from nonsmooth.flow.engines.methods import engine_for
+from nonsmooth.flow.engines.series import SeriesEngine
 from nonsmooth.results.memory import room_for
 from nonsmooth.system.phases import varying_phases
 
@@ -78,18 +80,16 @@ class Settler:
         return _remade, (text, values, options["engine"].name, given)
 
     @property
-    def linear(self) -> LinearEngine | None:
-        """The engine whose jobs run in one compiled call; None where they run one by one."""
-        if not isinstance(self.engine, LinearEngine) or self.engine.phases is not None:
-            return None
-        return self.engine if self.plan.indicator < 0 else None
+    def compiled(self) -> LoopEngine | None:
+        """The engine whose jobs run in one compiled call; None where they run one by one: modes that are made on the
+        way, phases that depend on the parameters, sections on a surface."""
+        one_call = isinstance(self.engine, LinearEngine | SeriesEngine) and self.engine.phases is None
+        return self.engine if one_call and self.plan.indicator < 0 else None
 
     def load(self) -> None:
         """Compile or load the kernel now, before threads ask for it."""
-        if self.linear is not None and self.device == "cpu":
-            from nonsmooth.kernels.compile.cache import compiled
-
-            compiled(load(self.linear).settle_many)
+        if self.compiled is not None and self.device == "cpu":
+            load(self.compiled)
 
     def run(
         self,
@@ -131,11 +131,11 @@ class Settler:
         if self.device == "cuda":
             assert not carried  # refused at the door
             return settle_on_gpu(self, points, rows, starts, modes, begin, attempts)
-        if self.linear is None:
+        if self.compiled is None:
             return self._run_one_by_one(points, rows, starts, carried, modes, begin, attempts)
         return run_compiled(
-            self.linear, points, rows, starts, modes, begin, self.plan.phase, carried, self.extremes,
-            self.rules(attempts, beyond=1),
+            self.compiled, points, rows, starts, self.system.memory_vector(), modes, begin, self.plan.phase, carried,
+            self.extremes, self.rules(attempts, beyond=1),
         )  # fmt: skip
 
     def rules(self, attempts: int = ATTEMPTS, beyond: int = 0) -> Rules:
@@ -195,8 +195,10 @@ class Settler:
         jobs = points, rows, starts, modes, batch // 4 + BATCHES * batch, batch
         if self.device == "cuda" and self.width == len(self.system.traced.u) + len(self.system.traced.m):
             status = separate_on_gpu(self, *jobs, size, offsets, sums)
-        elif self.linear is not None:
-            status = exponents_compiled(self.linear, *jobs, self.plan.phase, size, offsets, sums)
+        elif self.compiled is not None:
+            status = exponents_compiled(
+                self.compiled, *jobs[:3], self.system.memory_vector(), *jobs[3:], self.plan.phase, size, offsets, sums
+            )
         else:
             status = separate_one_by_one(self.system, self.engine, self.plan, *jobs, size, offsets, sums)
         return rates(sums, status)

@@ -17,7 +17,7 @@ __all__ = ["BATCH", "DEVICES", "batch_size", "check_device", "engine_on", "gpu_n
 
 DEVICES = ("cpu", "cuda")
 BATCH = 65536  # trajectories of one chunk of work on a GPU
-SERIES = ("taylor", "exact")  # methods of the series kernels that a GPU runs
+SERIES = ("taylor",)  # methods of the series kernels that a GPU runs
 PER_MULTIPROCESSOR = 512  # of one launch: twice what its registers hold, so that a small GPU is not busy for long
 
 
@@ -85,9 +85,9 @@ def engine_on(device: Any, engine: Engine, plan: SectionPlan | None) -> Engine:
         return engine
     if isinstance(engine, PlanarEngine) and (plan is None or plan.indicator < 0):
         return engine
-    from nonsmooth.flow.engines.methods import RTOL
+    from nonsmooth.flow.engines.methods import SHARPEST
 
-    return SeriesEngine(engine.traced, engine.scale, "exact", RTOL, None)
+    return SeriesEngine(engine.traced, engine.scale, "taylor", SHARPEST)
 
 
 def on_gpu(device: Any, verb: str, engine: Engine, plan: SectionPlan | None, *, carried: bool = False) -> bool:

@@ -50,6 +50,12 @@ class State:
             self.clock[0] = phase * period
         self.clock[2] = period
 
+    def motion(self) -> Any:
+        """The same arrays as the kernels take them (``kernels.records.Motion``)."""
+        from nonsmooth.kernels.hybrid.records import Motion
+
+        return Motion(self.u, self.memory, self.clock, self.counters)
+
     def copy(self) -> State:
         return State(self.u.copy(), self.memory.copy(), self.clock.copy(), self.counters.copy(), self.settled)
 

@@ -116,6 +116,9 @@ class LinearEngine(LoopEngine):
             local.work[1].built[0], local.last = 0, tables
         return tables.form, *local.work
 
+    def outputs_of(self, tables: Tables) -> int:
+        return tables.sizes[2]
+
     def touches_of_a_leg(self) -> int:
         return 64 * len(self.net.rows)
 

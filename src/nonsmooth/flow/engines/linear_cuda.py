@@ -57,19 +57,20 @@ class PlanarOnGpu:
     def __init__(self, engine: PlanarEngine, points: FloatArray, plan: SectionPlan) -> None:
         from nonsmooth.kernels.cuda.module import cuda_linear_module
         from nonsmooth.kernels.cuda.target import THREADS, cuda
+        from nonsmooth.kernels.linear.layout import scratch
 
         tables = engine.prepare(points)
         n_modes, n_indicators, n_outputs, n_rows = tables.sizes
         self.sizes = max(n_indicators, 1), max(n_outputs, 1)
         self.void = [] if n_indicators else [self.n]  # a row of no indicator: no array is empty there
-        shape = len(engine.form.multiples), n_modes, *self.sizes, max(len(engine.net.transitions), 1), n_rows
+        harmonics = len(tables.form.multiples)
+        shape = harmonics, n_modes, *self.sizes, max(len(engine.net.transitions), 1), n_rows
         self.module = cuda_linear_module(*shape)
         self.growth = partial(cuda_linear_module, *shape, "growth")
         self.cuda, self.threads, self.plan, self.phase = cuda, THREADS, plan, float(plan.phase)
         self.period: FloatArray = tables.period
-        multiples = tables.form.multiples if len(tables.form.multiples) else np.ones(1, dtype=np.int64)
-        given = cuda.to_device(_packed(tables.form)), cuda.to_device(multiples)
-        of_point = sum(part.size for part in self.module.scratch(n_modes, *self.sizes, n_rows)[0])
+        given = cuda.to_device(_packed(tables.form)), cuda.to_device(tables.form.multiples)
+        of_point = sum(part.size for part in scratch(self.n, harmonics, n_modes, *self.sizes, n_rows)[0])
         self.tables = *given, cuda.device_array((of_point, len(points)))
         self.launch(self.module.tabulate, np.arange(len(points)), self.tables)
         self.net = tuple(cuda.to_device(_not_empty(part)) for part in engine.net)

@@ -62,6 +62,10 @@ class LoopEngine(ABC):
     def _threads(self) -> threading.local:
         return threading.local()
 
+    def outputs_of(self, tables: Any) -> int:
+        """Number of outputs whose extremes are kept."""
+        return len(self.traced.outputs)
+
     def go_on(self, tables: Any) -> bool:
         """Give a run that has paused what it waits for; True where that exchanged model, tables or work."""
         return False

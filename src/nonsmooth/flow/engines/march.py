@@ -67,7 +67,6 @@ class March:
         self.orders[:] = i, i + 1, kind, 0, keep, PATIENCE, -1, 0, -1, 0, 1, 0
 
     def _ask(self, state: State, starts: FloatArray) -> None:
-        from nonsmooth.kernels.hybrid.records import Call, Motion
+        from nonsmooth.kernels.hybrid.records import Call
 
-        motion = Motion(state.u, state.memory, state.clock, state.counters)
-        self.call.put(Call(self.orders, self.reals, self.limit, starts, motion))
+        self.call.put(Call(self.orders, self.reals, self.limit, starts, state.motion()))

@@ -20,6 +20,7 @@ __all__ = ["EXPERT", "METHODS", "RTOL", "engine_for", "warn_if_coarse"]
 
 METHODS = ("auto", "exact", "taylor", "rkf45")
 RTOL = 1e-9
+SHARPEST = 1e-15  # the relative tolerance of a Taylor series for linear modes beyond the exact flow's kernels
 EXPERT = ("order", "locate")  # options of the series engine, beyond those of the verbs
 
 
@@ -91,14 +92,26 @@ def engine_for(
             plain = not equations.m and not any(map(any, equations.lacking))
             kind = PlanarEngine if plain and len(equations.u) == 2 else LinearEngine
             return kind(equations, form, system.scale_vector())
-        name = "exact"
-    elif method == "exact":
-        name = "exact"
-    else:
-        name = "taylor" if method == "auto" else method
+    if method == "exact":
+        raise ValueError(
+            f"{system.name!r} has linear modes, but {_beyond(system, form, expert)}: such a system runs by Taylor "
+            f'series at rtol = {SHARPEST:g}, as exactly; leave method out, or use method="taylor"'
+        )
+    if form is not None and rtol is None and step is None and method == "auto" and not system.is_smoothed:
+        tolerance = SHARPEST  # what has linear modes is exact, whatever its indicators
+    name = "taylor" if method == "auto" else method
     from nonsmooth.flow.engines.series import SeriesEngine
 
     return SeriesEngine(equations, system.scale_vector(), name, tolerance, absolute, step=step, **expert)
+
+
+def _beyond(system: System, form: Any, expert: Mapping[str, Any]) -> str:
+    """The reason why the exact flow does not take a system with linear modes."""
+    if expert or system.is_smoothed:
+        return "it is smoothed" if system.is_smoothed else f"{', '.join(sorted(expert))} belongs to a series"
+    if not form.affine_indicators:
+        return "some indicator is not affine"
+    return "some reset is not affine" if not form.affine_resets else "too many modes and states for its tables"
 
 
 def _of_patterns(system: System, method: str, options: bool) -> Engine:

@@ -1,4 +1,4 @@
-"""The engine of the series methods: generated Taylor series, Runge-Kutta-Fehlberg 4(5), and the exact flow for any n.
+"""The engine of the series methods: generated Taylor series and Runge-Kutta-Fehlberg 4(5).
 
 It packs a system into the records of ``kernels.series``; no numerics of its own.
 """
@@ -16,7 +16,7 @@ import numpy as np
 from nonsmooth.flow.engines.engine import FloatArray
 from nonsmooth.flow.engines.layers import Layers, layers
 from nonsmooth.flow.engines.loop import DIVERGENCE, LoopEngine, pack_net
-from nonsmooth.flow.engines.series_tables import Tables, exact_steps, periods, work_of
+from nonsmooth.flow.engines.series_tables import Tables, periods, work_of
 from nonsmooth.kernels.series.places import METHODS
 
 if TYPE_CHECKING:
@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Traced
 
 __all__ = ["SeriesEngine", "order_for"]
-
-EXACT_ORDER = 22
 
 
 def order_for(rtol: float, fixed_step: bool = False) -> int:
@@ -48,10 +46,9 @@ class SeriesEngine(LoopEngine):
     scale : array (n,)
         Size of each state; ``atol`` defaults to ``rtol * scale``.
     name : str
-        ``"taylor"``, ``"rkf45"``, or ``"exact"``: Taylor series of the matrix exponential, of order 22 and with
-        steps so short that the remainder is below rounding, for systems whose modes are all linear.
+        ``"taylor"`` or ``"rkf45"``.
     rtol : float
-        Relative tolerance per step, 1e-15 to 1e-2 (not used by ``"exact"``).
+        Relative tolerance per step, 1e-15 to 1e-2.
     atol : array (n,), optional
         Absolute tolerance per state.
     step : float, optional
@@ -133,13 +130,9 @@ class SeriesEngine(LoopEngine):
         return self.model.smooth_outputs[: len(self.traced.outputs)]
 
     def prepare(self, points: FloatArray) -> Tables:
-        """Periods, and for ``"exact"`` the length of a step in each mode, at the parameter points (P, n_parameters)."""
+        """Periods at the parameter points (P, n_parameters)."""
         points = np.ascontiguousarray(points, dtype=float)
-        n_modes = len(self.traced.mode_names)
-        steps, smooth = np.zeros((len(points), n_modes)), False
-        if self.name == "exact":
-            steps, smooth = exact_steps(self.traced, points, EXACT_ORDER)
-        return Tables(points, periods(self.traced, points), steps, smooth)
+        return Tables(points, periods(self.traced, points))
 
     def module(self) -> ModuleType:
         from nonsmooth.kernels.series.module import series_module
@@ -164,10 +157,10 @@ class SeriesEngine(LoopEngine):
         traced = self.traced
         weight, absolute, _ = self.norms
         return Generated(
-            self.functions, tables.points, tables.period, tables.steps, self.lacking, self.kinds, weight, absolute,
-            float(self.rtol), 0.0 if self.step is None else float(self.step), self.series_order,
-            int(self.locate), int(self.layers.checked), int(not all(self.smooth_outputs)), int(tables.nonlinear_rows),
-            self.layers.count, len(traced.indicators), len(traced.outputs),
+            self.functions, tables.points, tables.period, self.lacking, self.kinds, weight, absolute, float(self.rtol),
+            0.0 if self.step is None else float(self.step), self.series_order,
+            int(self.locate), int(self.layers.checked), int(not all(self.smooth_outputs)), self.layers.count,
+            len(traced.indicators), len(traced.outputs),
         )  # fmt: skip
 
     @cached_property
@@ -180,8 +173,6 @@ class SeriesEngine(LoopEngine):
     @property
     def series_order(self) -> int:
         """Order of the series."""
-        if self.name == "exact":
-            return EXACT_ORDER
         return order_for(self.rtol, self.step is not None) if self.order is None else self.order
 
     def _work(self) -> Any:

@@ -46,7 +46,7 @@ def module_of(engine: SeriesEngine, tables: Tables) -> Any:
     net, form = engine.net, engine.generated(tables)
     sizes = {
         "METHOD": METHODS[engine.name], "ORDER": form.order, "CHECKED": form.checked, "CORNERS": form.corners,
-        "NONLINEAR_ROWS": form.nonlinear_rows, "N_GUARDS": form.guards, "N_PARAMETERS": len(engine.traced.p),
+        "N_GUARDS": form.guards, "N_PARAMETERS": len(engine.traced.p),
         "N_INDICATORS": form.indicators, "N_OUTPUTS": form.outputs, "N_MEMORY": len(engine.traced.m),
         "N_SCRATCH_ROWS": engine.model.n_scratch,
     }  # fmt: skip
@@ -87,7 +87,7 @@ class SeriesOnGpu:
         phase = plan.phase if plan.indicator < 0 else 0.0
         step = 0.0 if engine.step is None else engine.step
         self.tables = (
-            tuple(map(cuda.to_device, (np.ascontiguousarray(columns), tables.period, tables.steps))),
+            tuple(map(cuda.to_device, (np.ascontiguousarray(columns), tables.period))),
             tuple(map(cuda.to_device, engine.norms)),
             cuda.to_device(np.array([plan.indicator, plan.rising, plan.mode, plan.after, plan.every], dtype=np.int64)),
             cuda.to_device(np.array([engine.rtol, step, phase, min(plan.t_max, 1e300)])),

@@ -1,10 +1,9 @@
-"""All that the series kernels need to know of a system: its transition table, periods, exact steps and scratch."""
+"""All that the series kernels need to know of a system: its periods and scratch."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from math import factorial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +13,7 @@ from nonsmooth.flow.engines.engine import FloatArray
 if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Traced
 
-__all__ = ["Tables", "exact_steps", "periods", "work_of"]
+__all__ = ["Tables", "periods", "work_of"]
 
 
 @dataclass(frozen=True)
@@ -23,8 +22,6 @@ class Tables:
 
     points: FloatArray  # (P, n_parameters)
     period: FloatArray  # (P,), inf where autonomous
-    steps: FloatArray  # (P, n_modes): length of an exact step
-    nonlinear_rows: bool  # indicators whose series must be watched on an exact step
 
 
 def work_of(
@@ -61,53 +58,3 @@ def periods(traced: Traced, points: FloatArray) -> FloatArray:
         return np.full(len(points), np.inf)
     values = _period_function(traced)(list(points.T))
     return np.full(len(points), values, dtype=float)
-
-
-def exact_steps(traced: Traced, points: FloatArray, order: int) -> tuple[FloatArray, bool]:
-    r"""Lengths (P, n_modes) of steps on which a Taylor series of this order is exact to rounding.
-
-    With the generator's norm beta (the balanced matrix of the mode, the frequencies of the forcing) the remainder
-    after the term of order p is below (beta h)^(p+1) / (p+1)! / (1 - beta h / (p+2)) of the state's size; h makes it
-    2^-60.
-
-    Returns
-    -------
-    steps : array (P, n_modes)
-    nonlinear : bool
-        Whether some indicator is not affine, so that its own series needs watching.
-
-    Raises
-    ------
-    ValueError
-        Some mode is not linear with constant coefficients and harmonic forcing.
-    """
-    from nonsmooth.system.codegen.linear import linear_form
-
-    form = linear_form(traced)
-    if form is None:
-        raise ValueError(
-            f'{traced.name!r} has no exact flow: some mode is not linear with harmonic forcing; use method="taylor"'
-        )
-    linear = form.evaluate(points)
-    beta = balanced_norm(linear.A)
-    if len(form.multiples):
-        beta = np.maximum(beta, np.abs(linear.omega)[:, None] * max(form.multiples))
-    reach = (2.0**-60 * factorial(order + 1)) ** (1.0 / (order + 1)) * 0.99
-    with np.errstate(divide="ignore"):
-        return np.ascontiguousarray(reach / beta), not form.affine_indicators
-
-
-def balanced_norm(matrices: FloatArray) -> FloatArray:
-    """An upper bound of the growth rate of the powers of each matrix (..., n, n): the norm after diagonal scaling."""
-    size = np.abs(matrices)
-    n = size.shape[-1]
-    off = size * (1.0 - np.eye(n))
-    for _ in range(4):
-        for i in range(n):
-            row, column = off[..., i, :].sum(-1), off[..., :, i].sum(-1)
-            with np.errstate(divide="ignore", invalid="ignore"):
-                factor = np.where((row > 0.0) & (column > 0.0), np.sqrt(row / column), 1.0)
-            off[..., i, :] /= factor[..., None]
-            off[..., :, i] *= factor[..., None]
-    diagonal = np.abs(np.diagonal(matrices, axis1=-2, axis2=-1))
-    return np.asarray((off.sum(-1) + diagonal).max(-1), dtype=float)

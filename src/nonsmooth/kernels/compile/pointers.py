@@ -102,7 +102,8 @@ class Block:
     ``put`` is the kernel ``(address, record)`` that writes it."""
 
     def __init__(self, kind: Any, put: Any) -> None:
-        self._put, self._record = put, None
+        self._put: Any = put
+        self.record: Any = None
         if _DISABLED:
             self.address: Any = []
         else:
@@ -113,9 +114,9 @@ class Block:
 
     def put(self, record: Any) -> Any:
         """Write a record, where other arrays stand; the block's address."""
-        if self._record is None or any(new is not old for new, old in zip(record, self._record, strict=True)):
+        if self.record is None or any(new is not old for new, old in zip(record, self.record, strict=True)):
             if _DISABLED:
                 self.address.clear()
             self._put(self.address, record)
-            self._record = record
+            self.record = record
         return self.address

@@ -1,7 +1,7 @@
 """Trajectories of planar systems on a GPU, one per thread.
 
 This file is text of a generated module (``cuda.module``), behind the planar files of the CPU. ``advance`` is the one
-heavy kernel: it marches every trajectory by its own number of section returns with ``chain``. What becomes of the
+heavy kernel: it marches every trajectory by its own number of section returns. What becomes of the
 returns is decided outside, so that all threads do the same thing at the same time, finished trajectories are left out
 of the next launch, and a launch stays short.
 """
@@ -9,13 +9,31 @@ of the next launch, and a launch stays short.
 from nonsmooth.kernels.cuda.tables import tabled
 from nonsmooth.kernels.cuda.target import cuda, device, entry
 from nonsmooth.kernels.hybrid.codes import OK
-from nonsmooth.kernels.hybrid.records import Flow, Kept, Motion, Net
-from nonsmooth.kernels.linear.many import go
+from nonsmooth.kernels.hybrid.loop import leave, march
+from nonsmooth.kernels.hybrid.places import BEGUN, RETURNS_OF_SECTION
+from nonsmooth.kernels.hybrid.records import Goal, Kept, Motion, Net, Section, Seen
+from nonsmooth.kernels.linear.extremes import finish
+
+
+@device
+def go(motion, form, net, phase, limit, plan, transient, keep, out, scratch):
+    """Run the one parameter row on from a motion, which is left where it ends. Returns the status."""
+    tables, work = scratch
+    section = Section(plan[0], plan[1], plan[2], plan[3], plan[4], plan[5], phase, 1e300)
+    goal = Goal(RETURNS_OF_SECTION, transient, keep, 0.0, 0.0, limit, 1 << 62)
+    code = march(0, form, net, section, goal, motion, Seen(out, (), ()), tables, work)
+    work.tally[BEGUN] = 0
+    motion.counters[1] = 0
+    finish(0, form, tables, work, out)
+    out.status[0] = code
+    if code == OK:
+        leave(0, form, motion, work)
+    return code
 
 
 @device
 def row_of(buffers, row):
-    """The arrays that ``chain`` writes for one trajectory, from the buffers of all."""
+    """The arrays that ``go`` writes for one trajectory, from the buffers of all."""
     section, maximum, minimum, i_max, i_min, o_max, o_min, crossings, contacts, elapsed, times, modes, status = buffers
     return Kept(
         section[row : row + 1], maximum[row : row + 1], minimum[row : row + 1], i_max[row : row + 1],
@@ -45,13 +63,12 @@ def advance(jobs, rows, point, net, place, counts, plans, way, phase, limit, out
     linear, scratch = tabled(point, rows[j])
     n_transient = transient[min(j, transient.shape[0] - 1)]
     n_keep = keep[min(j, keep.shape[0] - 1)]
-    flow = Flow(linear, Net(*net), phase, 1e300, limit, scratch[0], scratch[1], u[0:0], 1 << 62, jobs)
     for leg in range(legs):
         row = j + leg * apart
         if leg > 0:
             n_transient, n_keep = n_transient + n_keep - 1 if apart > 0 else 0, 1
         motion = Motion(u[row], u[row, 0:0], clock[row], counters[row])
         plan, into = (plans[1], other) if leg > 0 else (plans[0], out)
-        code = go(0, motion, flow, plan, n_transient, n_keep, row_of(into, row))
+        code = go(motion, linear, Net(*net), phase, limit, plan, n_transient, n_keep, row_of(into, row), scratch)
         if code != OK:
             break

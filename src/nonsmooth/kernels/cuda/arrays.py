@@ -11,7 +11,7 @@ from nonsmooth.kernels.cuda.target import cuda, device, local
 from nonsmooth.kernels.hybrid.places import N_MEMO, N_TALLY
 from nonsmooth.kernels.hybrid.records import Form, Tables, Work
 from nonsmooth.kernels.linear.search import WIDTH
-from nonsmooth.kernels.linear.tables import HARMONICS, NODES, TERMS, M
+from nonsmooth.kernels.linear.tables import HARMONICS, NODES, TERMS
 
 # Set for each system; none is below 1, so that no array is empty.
 N_MODES = 2
@@ -19,6 +19,7 @@ N_INDICATORS = 2
 N_OUTPUTS = 1
 N_TRANSITIONS = 2
 N_ROWS = 5
+M = 3 + 2 * HARMONICS
 N_HARMONICS = HARMONICS if HARMONICS > 0 else 1
 N_FUNCTIONALS = N_INDICATORS + 2 + N_OUTPUTS
 N_NODES = NODES + 1

@@ -22,13 +22,14 @@ __all__ = ["cuda_linear_module", "joined", "stamp"]
 
 OBSERVERS = {
     "sections": (
-        "linear.extremes", "hybrid.sections", "judging.judge", "judging.settle", "judging.exponent", "linear.many",
+        "linear.extremes", "hybrid.sections", "hybrid.observers", "judging.judge", "judging.settle", "judging.exponent",
         "cuda.arrays", "cuda.tables", "cuda.advance", "cuda.settle", "cuda.neighbours",
     ),
     "growth": (
-        "tangent.frame", "hybrid.every_step", "hybrid.growth", "cuda.arrays", "cuda.tables", "cuda.growth",
+        "tangent.frame", "hybrid.growth", "hybrid.observers", "cuda.arrays", "cuda.tables", "cuda.growth",
     ),
 }  # fmt: skip
+ELSEWHERE = ("hybrid.growth", "hybrid.record", "hybrid.sections", "linear.sums", "series.generated")  # not for a GPU
 
 
 @cache
@@ -39,24 +40,22 @@ def cuda_linear_module(
     """The module with the entries of the ``cuda`` texts of one observer; ``rows`` counts those of the section too."""
     sizes = {
         "HARMONICS": harmonics, "N_MODES": modes, "N_INDICATORS": indicators, "N_OUTPUTS": outputs,
-        "N_TRANSITIONS": transitions, "N_ROWS": rows,
+        "N_TRANSITIONS": transitions, "N_ROWS": rows, "LOGS": 0, "GROWS": 2 if observer == "growth" else 0,
     }  # fmt: skip
     text = with_numbers(joined((*STEPPER, *OBSERVERS[observer])), sizes)
-    return load_module(text + stamp(), f"cuda_{observer}_" + "_".join(str(size) for size in sizes.values()))
+    name = "_".join(map(str, (harmonics, modes, indicators, outputs, transitions, rows)))
+    return load_module(text + stamp(), f"cuda_{observer}_{name}")
 
 
 def joined(parts: Iterable[str]) -> str:
     """The text of some kernel files in one, with the GPU's markers; a model's functions are there by name."""
-    text = assembly.joined(parts, absent=("series.generated",))
+    text = assembly.joined(parts, absent=ELSEWHERE)
     text = re.sub(r"^ +(field|jet|values|jump) = \1_of\(form\)$", "", text, flags=re.MULTILINE)
-    header = r"from nonsmooth\.kernels\.compile\.(?:cache|lanes|long_sums) import"
-    return re.sub(header, "from nonsmooth.kernels.cuda.target import", text)
+    return text.replace("from nonsmooth.kernels.compile.cache import", "from nonsmooth.kernels.cuda.target import")
 
 
 def stamp() -> str:
     """A line that stands for the header: Numba's disk cache goes by the module's text alone, and the header decides how
     it is compiled."""
-    room = Path(__file__).parents[1]
-    files = ("cuda/target.py", "compile/lanes.py", "compile/long_sums.py")
-    header = "".join((room / name).read_text(encoding="utf-8") for name in files)
+    header = Path(__file__).with_name("target.py").read_text(encoding="utf-8")
     return f"\nHEADER = {hashlib.sha256(header.encode()).hexdigest()!r}\n"

@@ -9,13 +9,15 @@ from numba import float64, int64
 from nonsmooth.kernels.cuda.arrays import N_INDICATORS, N_OUTPUTS
 from nonsmooth.kernels.cuda.tables import tabled
 from nonsmooth.kernels.cuda.target import cuda, entry, local
-from nonsmooth.kernels.hybrid.records import Flow, Kept, Motion, Net
-from nonsmooth.kernels.linear.many import follow_pair
+from nonsmooth.kernels.cuda.advance import go
+from nonsmooth.kernels.hybrid.codes import OK
+from nonsmooth.kernels.hybrid.records import Kept, Motion, Net
+from nonsmooth.kernels.judging.exponent import separate
 
 
 @local
 def single():
-    """Room for the results of ``chain``, for one return of one trajectory."""
+    """Room for the results of ``go``, for one return of one trajectory."""
     section = cuda.local.array((1, 1, 2), float64)
     top = cuda.local.array((1, 2), float64)
     bottom = cuda.local.array((1, 2), float64)
@@ -36,7 +38,7 @@ def single():
 
 @entry
 def neighbours(jobs, rows, point, net, place, span, size, pair, plan, phase, limit, status):
-    """Returns begin <= n < end of each job and its neighbour (``span``: begin, end, batch): see ``follow_pair``."""
+    """Returns begin <= n < end of each job and its neighbour (``span``: begin, end, batch): see ``exponent``."""
     k = cuda.grid(1)
     if k >= jobs.shape[0]:
         return
@@ -47,5 +49,20 @@ def neighbours(jobs, rows, point, net, place, span, size, pair, plan, phase, lim
     linear, scratch = tabled(point, rows[j])
     motion = Motion(u[j], u[j, 0:0], clock[j], counters[j])
     moved = Motion(cuda.local.array(2, float64), u[j, 0:0], cuda.local.array(3, float64), cuda.local.array(4, int64))
-    flow = Flow(linear, Net(*net), phase, 1e300, limit, scratch[0], scratch[1], u[0:0], 1 << 62, jobs)
-    status[j] = follow_pair(begin, end, batch, 0, size, motion, moved, offsets[j], sums[j], flow, plan, single())
+    out, code = single(), OK
+    for n in range(begin, end):
+        for d in range(2):
+            moved.u[d] = motion.u[d] + offsets[j, d]
+        for d in range(3):
+            moved.clock[d] = motion.clock[d]
+        for d in range(4):
+            moved.counters[d] = motion.counters[d]
+        for one in range(2):
+            which = motion if one == 0 else moved
+            code = go(which, linear, Net(*net), phase, limit, plan, 0, 1, out, scratch)
+            if code != OK:
+                break
+        if code != OK:
+            break
+        separate(n, batch, linear.period[0], motion.u, moved.u, size, offsets[j], sums[j])
+    status[j] = code

@@ -15,13 +15,13 @@ from numba import float64, int64
 from nonsmooth.kernels.cuda.target import cuda, entry, local, once
 from nonsmooth.kernels.hybrid.codes import PAUSED
 from nonsmooth.kernels.hybrid.loop import leave, march
-from nonsmooth.kernels.hybrid.places import BEGUN
-from nonsmooth.kernels.hybrid.records import Generated, Goal, Kept, Motion, Net, Section, SeriesWork
+from nonsmooth.kernels.hybrid.places import BEGUN, RETURNS_OF_SECTION
+from nonsmooth.kernels.hybrid.records import Generated, Goal, Kept, Motion, Net, Section, Seen, SeriesWork
 from nonsmooth.kernels.series.places import N_SERIES_MEMO, N_SERIES_TALLY, OPEN_STEP, READY, ZERO_ROW
 from nonsmooth.kernels.series.polynomial import stack_size
 
 # Set for each system and method.
-ORDER, CHECKED, CORNERS, NONLINEAR_ROWS, N_GUARDS = 16, 0, 0, 0, 0
+ORDER, CHECKED, CORNERS, N_GUARDS = 16, 0, 0, 0
 N_PARAMETERS, N_MEMORY, N_INDICATORS, N_OUTPUTS, N_SCRATCH_ROWS = 1, 0, 1, 0, 1
 TRANSITIONS = np.array([[0, 0, 0]])
 ROWS = np.array([[0, 1, 0]])
@@ -106,7 +106,7 @@ def advance(jobs, rows, point, norms, plan, settings, place, counts, way, out):
     keep[j] more, whose points and extremes are kept (one number for all jobs where these arrays are short).
 
     ``way``: fresh, pause; fresh = 1 begins a run, 0 goes on with one whose status is PAUSED. ``point``: parameters,
-    periods, exact steps of all; ``place``: states, memory, clocks, counters; ``counts``: settled, transient, keep;
+    periods of all; ``place``: states, memory, clocks, counters; ``counts``: settled, transient, keep;
     ``out``: what is kept between launches, then as in ``Kept``. ``plan``: indicator, rising, mode, after,
     every; ``settings``: rtol, fixed step, phase of the section, longest wait for a return."""
     k = cuda.grid(1)
@@ -114,7 +114,7 @@ def advance(jobs, rows, point, norms, plan, settings, place, counts, way, out):
         return
     j = jobs[k]
     i = rows[j]
-    points, periods, exact_steps = point
+    points, periods = point
     u, memory, clock, counters = place
     settled, transient, keep = counts
     fresh, pause = way
@@ -150,11 +150,12 @@ def advance(jobs, rows, point, norms, plan, settings, place, counts, way, out):
         for n in range(N_MEMORY):
             work.q[N_PARAMETERS + n] = memory[j, n]
     form = Generated(
-        periods, own[:, :N_PARAMETERS], periods[i : i + 1], exact_steps[i : i + 1], LACKING, KINDS, norms[0], norms[1],
-        settings[0], settings[1], ORDER, 1, CHECKED, CORNERS, NONLINEAR_ROWS, N_GUARDS, N_INDICATORS, N_OUTPUTS,
+        periods, own[:, :N_PARAMETERS], periods[i : i + 1], LACKING, KINDS, norms[0], norms[1],
+        settings[0], settings[1], ORDER, 1, CHECKED, CORNERS, N_GUARDS, N_INDICATORS, N_OUTPUTS,
     )  # fmt: skip
     at = Section(plan[0], plan[1], plan[2], plan[3], plan[4], 1, settings[2] if plan[0] < 0 else -1.0, settings[3])
-    goal = Goal(transient[min(j, transient.shape[0] - 1)], keep[min(j, keep.shape[0] - 1)], 0.0, 0.0, norms[2], pause)
+    returns = transient[min(j, transient.shape[0] - 1)], keep[min(j, keep.shape[0] - 1)]
+    goal = Goal(RETURNS_OF_SECTION, returns[0], returns[1], 0.0, 0.0, norms[2], pause)
     motion = Motion(u[j], memory[j, :N_MEMORY], clock[j], counters[j])
     points_kept, top, bottom = section[j : j + 1], maximum[j : j + 1], minimum[j : j + 1]
     seen = Kept(
@@ -165,7 +166,7 @@ def advance(jobs, rows, point, norms, plan, settings, place, counts, way, out):
         status[j : j + 1],
     )  # fmt: skip
     net = Net(TRANSITIONS, ROWS, ROW_START, MODE_START, MODE_LIST, AT, TRANSITIONS)  # series ask nothing of the last
-    code = march(0, form, net, at, goal, motion, seen, (), work)
+    code = march(0, form, net, at, goal, motion, Seen(seen, (), ()), (), work)
     status[j] = code
     if code != PAUSED:
         leave(0, form, motion, work)

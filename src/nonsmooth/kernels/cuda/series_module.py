@@ -20,7 +20,7 @@ __all__ = ["cuda_series_module", "cuda_series_source"]
 
 PARTS = (
     "circular", "series.polynomial", "series.crossing", "series.rkf45", "series.taylor", "series.trust", "series.step",
-    "series.watch", "series.stepper", "hybrid.loop", "hybrid.sections", "judging.judge", "judging.settle",
+    "series.watch", "series.stepper", "hybrid.loop", "hybrid.sections", "hybrid.observers", "judging.judge", "judging.settle",
     "judging.exponent", "cuda.settle", "cuda.series",
 )  # fmt: skip
 
@@ -38,12 +38,12 @@ def cuda_series_source(model: str, sizes: Mapping[str, int], tables: Mapping[str
         The arrays there.
     """
     text = f"{model}\n{joined(PARTS)}"
-    for names in (("METHOD",), ("ORDER", "CHECKED", "CORNERS", "NONLINEAR_ROWS", "N_GUARDS"),
+    for names in (("METHOD",), ("ORDER", "CHECKED", "CORNERS", "N_GUARDS"),
                   ("N_PARAMETERS", "N_MEMORY", "N_INDICATORS", "N_OUTPUTS", "N_SCRATCH_ROWS")):  # fmt: skip
         line = f"{', '.join(names)} = {', '.join(str(int(sizes[name])) for name in names)}"
         text, found = re.subn(rf"^{', '.join(names)} = [\d, ]+$", line, text, flags=re.MULTILINE)
         assert found == 1, names
-    text = with_numbers(text, {"N_STATES": tables["LACKING"].shape[1]})
+    text = with_numbers(text, {"N_STATES": tables["LACKING"].shape[1], "LOGS": 0, "GROWS": 0})
     for name, table in tables.items():
         line = f"{name} = np.array({table.tolist()!r}, dtype=np.{table.dtype}).reshape({table.shape})"
         text, found = re.subn(rf"^{name} = np\.array.*$", line, text, flags=re.MULTILINE)

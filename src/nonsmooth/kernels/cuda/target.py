@@ -15,12 +15,7 @@ from typing import Any
 
 from numba import config, cuda
 
-from nonsmooth.kernels.compile import lanes, long_sums
-
-__all__ = [
-    "REGISTERS", "THREADS", "add_products", "callback", "cuda", "device", "dot", "entry", "inline", "kernel", "local",
-    "once", "sizes", "spread", "sum_columns", "sum_rows", "sum_some_rows", "sum_terms",
-]  # fmt: skip
+__all__ = ["REGISTERS", "THREADS", "callback", "cuda", "device", "entry", "inline", "kernel", "local", "once"]
 
 THREADS = 64  # in a block: few, because a trajectory fills a thread's registers
 REGISTERS = None  # of a thread, at most; None: as many as the compiler takes (255)
@@ -35,10 +30,6 @@ def device(function: Callable[..., Any]) -> Any:
 
 
 inline = once = device
-sum_rows, sum_columns = device(lanes.plain.sum_rows), device(lanes.plain.sum_columns)
-sum_some_rows = device(lanes.plain.sum_some_rows)
-dot, sizes, spread = device(long_sums.plain.dot), device(long_sums.plain.sizes), device(long_sums.plain.spread)
-add_products, sum_terms = device(long_sums.plain.add_products), device(long_sums.plain.sum_terms)
 
 
 def local(function: Callable[..., Any]) -> Any:

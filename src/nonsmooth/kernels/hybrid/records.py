@@ -109,7 +109,6 @@ class Generated(NamedTuple):
     functions: Any  # addresses of field, jet, values and jump (see ``generated``)
     points: Any  # (P, parameters)
     period: Any  # (P,), inf where nothing depends on time
-    exact_steps: Any  # (P, modes) lengths of exact steps
     lacking: Any  # (modes, n) 1: a state that the mode has not
     kinds: Any  # (rows,) of the jets: 1 a polynomial, 0 an output with a corner, -1 - s: it repeats state s
     weight: Any  # (n,) atol / rtol
@@ -120,7 +119,6 @@ class Generated(NamedTuple):
     locate: Any  # 0: transitions are judged at the ends of steps
     checked: Any  # 1: polynomials are held against the equations
     corners: Any  # 1: some output has corners
-    nonlinear_rows: Any  # 1: some indicator is not affine, so that an exact step must be watched
     guards: Any  # rows behind the outputs where a polynomial may miss something
     indicators: Any
     outputs: Any
@@ -279,7 +277,7 @@ FORM = type_of(
 TABLES = type_of(Tables, _f4, _f3, _f3, _f4, _f3, _f2, _i[:, :, :, ::1], _f3, _i[:, :, ::1])
 NET = type_of(Net, _i2, _i2, _i1, _i1, _i1, _f1, _i2)
 WORK = type_of(Work, *[_f1] * 8, _f2, _f2, _f1, _f1, *[_i1] * 6, _f1)
-GENERATED = type_of(Generated, _i1, _f2, _f1, _f2, _i2, _i1, _f1, _f1, _f, _f, *[_i] * 8)
+GENERATED = type_of(Generated, _i1, _f2, _f1, _i2, _i1, _f1, _f1, _f, _f, *[_i] * 7)
 SERIES_WORK = type_of(
     SeriesWork, *[_f1] * 7, *[_f2] * 4, types.UniTuple(_f1, 8), *[_f1] * 7, *[_i1] * 3, _f1, _f1, _i1, _f1, _i1, _f1,
     _i1, _f1,

@@ -3,8 +3,8 @@
 from nonsmooth.kernels.hybrid.places import N_MEMO as FIRST_TIME
 from nonsmooth.kernels.hybrid.places import N_TALLY as FIRST_COUNT
 
-TAYLOR, RKF45, EXACT = 0, 1, 2
-METHODS = {"taylor": TAYLOR, "rkf45": RKF45, "exact": EXACT}
+TAYLOR, RKF45 = 0, 1
+METHODS = {"taylor": TAYLOR, "rkf45": RKF45}
 
 # The jets at the present instant stand in their place; a polynomial of which only a part has been gone; the transition
 # on it, and its row that crosses; it ends at a stop; nothing happens on it; the indicator that vanishes where the next

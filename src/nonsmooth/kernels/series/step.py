@@ -22,20 +22,6 @@ METHOD = 0
 
 
 @device
-def converged(C, m, n, n_indicators, h, scale):
-    """Shorten an exact step until the series of nonlinear indicators has converged as well; 0 where it does not."""
-    for _ in range(60):
-        worst, power = 0.0, h ** (m - 1)
-        for i in range(n_indicators):
-            if scale[i] > 0.0:
-                worst = max(worst, (fabs(C[n + i, m - 1]) * power + fabs(C[n + i, m]) * power * h) / scale[i])
-        if not (worst > 1e-16):
-            return h
-        h *= 0.8
-    return 0.0
-
-
-@device
 def polished(form, work, row, t, h, tau):
     """A zero of the interpolated indicator ``row``, moved to the zero of the indicator of the dense state.
 
@@ -87,18 +73,14 @@ def at_end(C, m, row, h):
 
 
 @once
-def planned_length(i, mode, form, J, log_rtol, work):
+def planned_length(mode, form, J, log_rtol, work):
     """The length of the next step, before stops and crossings in sight shorten it."""
     n = work.w.shape[0]
     if form.step > 0.0:
         return form.step
     if METHOD == place.RKF45:
         return work.usual[mode] if work.usual[mode] > 0.0 else first_step(J, work.w, n, form.absolute, form.rtol)
-    if METHOD == place.TAYLOR:
-        return step_length(J, form.order, n, form.indicators, work.w, form.weight, work.scale, log_rtol)
-    if form.nonlinear_rows == 1:
-        return converged(J, form.order, n, form.indicators, form.exact_steps[i, mode], work.scale)
-    return form.exact_steps[i, mode]
+    return step_length(J, form.order, n, form.indicators, work.w, form.weight, work.scale, log_rtol)
 
 
 @inline
@@ -123,7 +105,7 @@ def length_of_step(i, form, net, work, r_max):
             work.side[tally[place.ZERO_ROW]] = 0
             tally[place.ZERO_ROW] = -1
         tally[place.READY] = 1
-    h = planned_length(i, mode, form, J, log_tolerance(form), work)
+    h = planned_length(mode, form, J, log_tolerance(form), work)
     if not (h > 1e-16 * t):
         return -1.0
     if form.period[i] < NO_END:

@@ -60,8 +60,6 @@ def look(i, form, tables, work, mode):
     h = work.usual[mode]
     if form.step > 0.0:
         h = form.step
-    elif METHOD == place.EXACT:
-        h = form.exact_steps[i, mode]
     elif METHOD == place.RKF45:
         if h <= 0.0:
             h = first_step(X, u, n, form.absolute, form.rtol)
