@@ -26,8 +26,8 @@ __all__ = ["Answer", "Worker"]
 _OFTEN = 0.15  # seconds between two words on progress
 _SILENT = 1.0  # seconds in which cancelled work must end before it is interrupted
 
-#: ``(kind, number, content)``: "progress" with the fraction done, "done" with results and warnings, "cancelled",
-#: "error" with a sentence, "ended" with the exit code of the process.
+#: ``(kind, number, content)``: "ready" to take work, "progress" with the fraction done, "compiling" with the name of a
+#: kernel, "done" with results and warnings, "cancelled", "error" with a sentence, "ended" with the process's exit code.
 Answer = tuple[str, int, Any]
 
 
@@ -145,13 +145,25 @@ def main() -> None:
     out = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     waiting: queue.SimpleQueue[tuple[int, dict[str, Any]] | None] = queue.SimpleQueue()
-    threading.Thread(target=_read, args=(waiting, cancelled), daemon=True).start()
+    # Before a request is read, which may hold arrays: two threads that load NumPy at once break it.
     from nonsmooth.explorer.work import compute
+    from nonsmooth.kernels import before_compiling
+
+    whole = threading.Lock()
 
     def send(answer: Answer) -> None:
-        pickle.dump(answer, out, protocol=pickle.HIGHEST_PROTOCOL)
-        out.flush()
+        with whole:  # kernels are compiled in any thread
+            pickle.dump(answer, out, protocol=pickle.HIGHEST_PROTOCOL)
+            out.flush()
 
+    def compiling(name: str) -> None:
+        number, cancelled.at_work = cancelled.at_work, 0  # a message is not cut in two
+        send(("compiling", number, name))
+        cancelled.at_work = number
+
+    before_compiling.append(compiling)
+    threading.Thread(target=_read, args=(waiting, cancelled), daemon=True).start()
+    send(("ready", 0, None))
     while (request := waiting.get()) is not None:
         number, job = request
         if number not in cancelled.numbers:
