@@ -25,8 +25,8 @@ def lowest(project: dict) -> dict[str, str]:
     """The least version allowed of each library that the package and its extras need."""
     extras = project["optional-dependencies"]
     wanted = [*project["dependencies"], *(one for extra in EXTRAS for one in extras[extra])]
-    found = dict(re.fullmatch(r"([\w-]+)(?:\[\w+\])?>=([\d.]+)", one).groups() for one in wanted)
-    return found
+    found = [re.fullmatch(r"([\w-]+)(?:\[\w+\])?>=([\d.]+)", one) for one in wanted]
+    return {one[1]: one[2] for one in found if one is not None}
 
 
 def interpreter(version: str) -> str | None:
@@ -53,7 +53,7 @@ def tried(program: str, pins: list[str], what: str) -> bool:
         wanted = f"{ROOT}[{','.join(EXTRAS)}]"
         for command in (
             [program, "-m", "venv", str(folder / "venv")],
-            [python, "-m", "pip", "install", "-q", "--disable-pip-version-check", "-c", str(folder / "pins.txt"), wanted],
+            [python, "-m", "pip", "install", "-qq", "-c", str(folder / "pins.txt"), wanted],
             [python, str(ROOT / "tests" / "every_verb.py")],
         ):
             if subprocess.run(command, cwd=folder, env=environment).returncode:

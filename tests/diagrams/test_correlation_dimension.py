@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import threading
+import time
+
 import numpy as np
 import pytest
 
@@ -100,3 +105,18 @@ def test_the_error_knows_of_a_drifting_slope() -> None:
     even = ns.correlation_dimension(np.random.default_rng(1).random(20_000))
     assert abs(even.dimension - 1.0) < 3 * even.standard_error + 0.01
     assert found.dimension < 0.95 and found.standard_error > 3 * even.standard_error
+
+
+def test_ctrl_c_is_heard_while_the_pairs_of_many_points_are_counted() -> None:
+    """Of processor time: that of other jobs does not count. Whole, these points take seven times as long."""
+    points = np.random.default_rng(3).uniform(size=(20_000, 4))
+    pressed: list[float] = []
+
+    def press() -> None:
+        pressed.append(time.process_time())
+        os.kill(os.getpid(), signal.SIGINT)
+
+    threading.Timer(0.3, press).start()
+    with pytest.raises(KeyboardInterrupt):
+        correlation_dimension(points)
+    assert time.process_time() - pressed[0] < 1.0

@@ -164,8 +164,8 @@ class Sheet:
         if self._of[0] != subject[0]:
             self.results.clear()
             done.clear()
-            for one in (self.portrait, self.history, self.section):
-                one.clear()
+            for panel in (self.portrait, self.history, self.section):
+                panel.clear()
             self.page.tell("readout", [])
             self.bench.arrange()
         for view in ("first look", "diagram"):

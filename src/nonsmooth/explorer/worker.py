@@ -21,6 +21,8 @@ from contextlib import suppress
 from types import FrameType
 from typing import Any
 
+from nonsmooth.forks import is_importing
+
 __all__ = ["Answer", "Worker"]
 
 _OFTEN = 0.15  # seconds between two words on progress
@@ -125,18 +127,10 @@ class _Cancelled:
     def _interrupted(self, signum: int, frame: FrameType | None) -> None:
         if self.at_work not in self.numbers:
             return
-        if _is_importing(frame):  # a package that is loaded by half stays so for the rest of the process
+        if is_importing(frame):  # a package that is loaded by half stays so for the rest of the process
             self._later(_OFTEN, self.at_work)
             return
         raise KeyboardInterrupt
-
-
-def _is_importing(frame: FrameType | None) -> bool:
-    while frame is not None:
-        if frame.f_code.co_filename.startswith("<frozen importlib"):
-            return True
-        frame = frame.f_back
-    return False
 
 
 def main() -> None:
