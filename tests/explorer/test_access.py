@@ -70,7 +70,7 @@ def told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.mark.skipif(os.name == "nt", reason="programs as scripts, and modes of files")
 def test_the_browser_is_told_a_file_that_only_the_user_can_read(told: Path, with_browser: Any) -> None:
-    """Every user may read command lines: no token stands in that of the browser, and the one in the file serves once."""
+    """Every user may read command lines: none holds a token, and the one in the file serves once."""
     server, end = with_browser, time.monotonic() + 60
     while not (told.exists() and told.read_text().endswith("\n")):
         assert time.monotonic() < end

@@ -63,7 +63,7 @@ class Tab:
         found = {}
         for root in self.session.document.roots:
             for source in root.select({"type": ColumnDataSource}):
-                columns = [np.asarray(column) for name, column in source.data.items() if name in ("image", "x", "value")]
+                columns = [np.asarray(column) for name, column in source.data.items() if name in ("x", "value")]
                 if "image" in source.data:
                     columns = [np.nan_to_num(np.asarray(source.data["image"][0])).ravel()]
                     columns = [column[column != 0] for column in columns]
@@ -100,7 +100,7 @@ def test_a_compile_is_said(tabs: list[Session], tmp_path: Path, monkeypatch: pyt
     tab = Tab(tabs, f"model=stick_slip_belt&{FEW}")
     tab.say("begin")
     tab.until(lambda: any(one.get("compiling") for one in tab.busy))
-    assert [one for one in tab.busy if one.get("compiling")][0]["view"] == "orbit"
+    assert tab.busy[-1] == {"view": "orbit", "fraction": 0, "long": True, "compiling": True}
 
 
 def test_a_process_that_cannot_start_is_given_up(tabs: list[Session], tmp_path: Path, monkeypatch: Any) -> None:

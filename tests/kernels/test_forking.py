@@ -119,6 +119,40 @@ def test_fifty_forks_beside_a_thread_that_loads_modules(tmp_path: Path) -> None:
     assert run(LOADING, tmp_path) == "hung: []"
 
 
+ONCE = """
+import functools, os, sys, threading, time, warnings
+import nonsmooth
+
+warnings.simplefilter("ignore")
+class Thing:
+    @functools.cached_property
+    def value(self):
+        began.set()
+        time.sleep(0.3)
+        return 7
+
+began = threading.Event()
+thread = threading.Thread(target=lambda: Thing().value)
+thread.start()
+began.wait()
+child = os.fork()
+if child == 0:
+    os._exit(Thing().value)  # of another object: up to Python 3.11 all share one lock
+end, done = time.monotonic() + 20, 0
+while not done and time.monotonic() < end:
+    done, status = os.waitpid(child, os.WNOHANG)
+    time.sleep(0.01)
+if not done:
+    os.kill(child, 9)
+print(os.waitstatus_to_exitcode(status) if done else "hung")
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system does not fork")
+def test_a_fork_beside_a_thread_that_computes_a_property(tmp_path: Path) -> None:
+    assert run(ONCE, tmp_path) == "7"
+
+
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="this system does not fork")
 def test_a_module_that_forks_while_it_is_loaded_is_not_held_up(tmp_path: Path) -> None:
     """Also where another thread waits for that module."""

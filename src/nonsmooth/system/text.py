@@ -211,10 +211,11 @@ def _no_constant(name: str) -> float:
 
 
 def _check_kinds(expression: Any, text: str, condition: bool = False) -> None:
-    """ValueError where a condition stands for a number, or a number for a condition: SymPy takes either for the other."""
+    """ValueError where a condition stands for a number, or a number for a condition; SymPy takes some of them."""
     if condition == isinstance(expression, sp.Expr):
         wanted = ("a number", "a condition such as u.x > 0")[condition]
-        raise ValueError(f"{shortened(expression)} stands where {wanted} is wanted (in the expression {shortened(text)})")
+        given = shortened(expression, quoted=False)
+        raise ValueError(f"`{given}` stands where {wanted} is wanted (in the expression {shortened(text)})")
     if isinstance(expression, sp.Piecewise):
         for value, when in expression.args:
             _check_kinds(value, text)
