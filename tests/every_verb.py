@@ -51,7 +51,7 @@ def steps(folder: Path) -> dict[str, Callable[[dict[str, Any]], Any]]:
     def load_recording(_: Any) -> Any:
         lines = [f"{t:.2f},{value:.6f}" for t, value in zip(time_, noisy, strict=True)]
         (folder / "log.csv").write_text("\n".join(["Time (s),q (m)", *lines]))
-        return ns.load_recording(folder / "log.csv")
+        return [ns.load_recording(folder / "log.csv"), ns.load_recording(tdms(folder / "log.tdms", time_, noisy))]
 
     def compare(_: Any) -> Any:
         clock = np.arange(30.0, 60.0, 0.01)
@@ -99,7 +99,14 @@ def steps(folder: Path) -> dict[str, Callable[[dict[str, Any]], Any]]:
         with urllib.request.urlopen(heard[0], timeout=60) as page:
             return str(page.read().decode())
 
-    grid = {"rho": [0.14, 0.2], "omega": [4.5, 5.0]}
+    def chart(_: Any) -> Any:
+        from distributed import Client
+
+        work = {"grid": {"rho": [0.14, 0.2], "omega": [4.5, 5.0]}, "start": free, **FEW}
+        with Client(processes=False, n_workers=1, threads_per_worker=1, dashboard_address=None) as client:
+            far = ns.chart(s, client=client, store=folder / "chart.zarr", **work)
+        return [ns.chart(s, **work), far]
+
     return {
         "where": lambda _: ns.where(True, 1.0, 2.0),
         "mechanical": mechanical,
@@ -116,7 +123,7 @@ def steps(folder: Path) -> dict[str, Callable[[dict[str, Any]], Any]]:
         "zero_one_test": lambda _: ns.zero_one_test(rng.uniform(size=2000)),
         "basins": lambda _: ns.basins(s, {name: np.linspace(*ends, 3) for name, ends in WALLS.items()}, **FEW),
         "basin_fractions": lambda _: ns.basin_fractions(s, "omega", [4.5, 4.6], n_starts=6, box=WALLS, **FEW),
-        "chart": lambda _: ns.chart(s, grid, start=free, **FEW),
+        "chart": chart,
         "bifurcation_diagram": lambda _: ns.bifurcation_diagram(s, "omega", (4.4, 4.6), n=5, start=free, **QUIET),
         "find_orbit": lambda _: ns.find_orbit(s.with_parameters(omega=4.5), start=free, **QUIET),
         "continue_orbit": lambda found: ns.continue_orbit(found["find_orbit"], "omega", (4.0, 7.0)),
@@ -137,6 +144,16 @@ def steps(folder: Path) -> dict[str, Callable[[dict[str, Any]], Any]]:
     }  # fmt: skip
 
 
+def tdms(path: Path, clock: Any, values: Any) -> Path:
+    """A recording as LabVIEW writes it."""
+    from nptdms import ChannelObject, TdmsWriter
+
+    waveform = {"wf_increment": float(clock[1] - clock[0]), "wf_start_offset": 0.0, "unit_string": "m"}
+    with TdmsWriter(path) as file:
+        file.write_segment([ChannelObject("log", "q", values, waveform)])
+    return path
+
+
 def _served(told: Callable[[str], object]) -> None:
     import asyncio
 
@@ -152,10 +169,12 @@ FACTS: dict[str, Callable[[Any, dict[str, Any]], bool]] = {
     "correlation_dimension": lambda found, _: abs(float(found["dimension"]) - 1.0) < 0.1,  # points on a line
     "zero_one_test": lambda found, _: float(found) > 0.9,  # independent numbers
     "sweep": lambda found, _: bool((found["period_number"] == 1).all()),
+    "chart": lambda found, _: found[0]["period_number"].identical(found[1]["period_number"]),  # here, and in a cluster
     "find_orbit": lambda found, _: bool(found.stable),
     "continue_orbit": lambda found, _: bool(np.isclose(found["omega"], 4.5).any()),  # where it was found
     "special_points": lambda found, _: "fold" in found["kind"].values,
     "lyapunov": lambda found, _: bool(float(found["exponents"].max()) < 0.0),  # the motion is a stable cycle
+    "load_recording": lambda found, _: np.allclose(*(one.channel("q").values for one in found), atol=1e-6),
     "fit": lambda found, _: abs(found["k"] - 4.0) < 0.02,
     "select_model": lambda found, _: float(found["rms"].sel(model="true")) < float(found["rms"].sel(model="undamped")),
     "compare": lambda found, _: int(found["measured_period_number"]) == int(found["theory_period_number"]) == 1,
@@ -202,7 +221,7 @@ def plot(found: dict[str, Any], folder: Path) -> None:
         "frequency_response": ns.plot.frequency_response, "chart": ns.plot.chart, "basins": ns.plot.basins,
         "continue_orbit": ns.plot.branch, "manifolds": ns.plot.manifolds,
     }.items():  # fmt: skip
-        ax = figure(found[name])
+        ax = figure(found[name][0] if name == "chart" else found[name])
         ax.figure.savefig(folder / f"{name}.png")
 
 

@@ -6,6 +6,7 @@ import socket
 import sys
 import webbrowser
 from collections.abc import Callable
+from contextlib import nullcontext
 from functools import partial
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qsl
@@ -83,8 +84,8 @@ def explore(
     print(f"nonsmooth explorer: {address}\nCtrl-C ends it", file=sys.stderr, flush=True)
     if told is not None:
         told(address)
-    with access.page_for_browser(origin) as page:
-        if browser:
+    with access.page_for_browser(origin) if browser else nullcontext() as page:
+        if page is not None:
             server.io_loop.add_callback(webbrowser.open, page)
         try:
             server.io_loop.start()

@@ -143,17 +143,15 @@ def main() -> None:
     from nonsmooth.explorer.work import compute
     from nonsmooth.kernels import before_compiling
 
-    whole = threading.Lock()
-
     def send(answer: Answer) -> None:
-        with whole:  # kernels are compiled in any thread
-            pickle.dump(answer, out, protocol=pickle.HIGHEST_PROTOCOL)
-            out.flush()
+        pickle.dump(answer, out, protocol=pickle.HIGHEST_PROTOCOL)
+        out.flush()
 
     def compiling(name: str) -> None:
-        number, cancelled.at_work = cancelled.at_work, 0  # a message is not cut in two
-        send(("compiling", number, name))
-        cancelled.at_work = number
+        if threading.current_thread() is threading.main_thread():
+            number, cancelled.at_work = cancelled.at_work, 0  # a message is not cut in two
+            send(("compiling", number, name))
+            cancelled.at_work = number
 
     before_compiling.append(compiling)
     threading.Thread(target=_read, args=(waiting, cancelled), daemon=True).start()
