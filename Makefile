@@ -13,7 +13,7 @@ PYTEST_ARGS ?= -n auto --dist loadfile --no-loadscope-reorder
 
 .DEFAULT_GOAL := help
 .PHONY: help reproduce reproduce-full test slow mutants fuzz altered coverage coverage-awkward coverage-fit check \
-	bench gpu gpu-compiler docs screenshots clean distclean
+	bench gpu gpu-compiler docs screenshots clean distclean versions
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 26
@@ -111,3 +111,7 @@ $(VENV)/.compiled-run $(VENV)/.compiled-zarr: STEPPERS := --steppers rkf45 plana
 $(VENV)/.compiled-%: $(VENV)/.installed-%
 	$(BIN)/python -m nonsmooth.kernels.compile.ahead $(STEPPERS)
 	@touch $@
+
+# Each environment is thrown away; nothing is installed into .venv.
+versions:  ## every verb with the lowest and the newest libraries allowed, with each Python found (minutes each)
+	$(PYTHON) tests/versions.py

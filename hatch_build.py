@@ -6,13 +6,26 @@ default that of this processor).
 """
 
 import os
+import signal
 import subprocess
 import sys
 import tempfile
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+
+# Its pipe from the process that builds closes when that one ends, in whatever way.
+_WATCH = """
+import os, signal, threading
+def end():
+    os.read(0, 1)
+    os.killpg(0, signal.SIGKILL)
+if hasattr(os, "killpg"):
+    threading.Thread(target=end, daemon=True).start()
+"""
+_COMPILE = "from nonsmooth.kernels.compile.ahead import main\nraise SystemExit(main())"
 
 
 class CompileAhead(BuildHookInterface):  # type: ignore[misc]
@@ -24,13 +37,30 @@ class CompileAhead(BuildHookInterface):  # type: ignore[misc]
             self.folder = tempfile.TemporaryDirectory()
             arguments += ["--into", self.folder.name]
         paths = os.pathsep.join([str(sources), *filter(None, [os.environ.get("PYTHONPATH")])])
-        done = subprocess.run(
-            [sys.executable, "-m", "nonsmooth.kernels.compile.ahead", *arguments],
-            env={**os.environ, "PYTHONPATH": paths}, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-        )  # fmt: skip
-        if done.returncode:
-            self.app.display_warning(f"nothing is compiled ahead; kernels will be when they are called:\n{done.stdout}")
+        code, said = run_apart(_COMPILE, arguments, {**os.environ, "PYTHONPATH": paths})
+        if code:
+            self.app.display_warning(f"nothing is compiled ahead; kernels will be when they are called:\n{said}")
         elif version != "editable" and any(Path(self.folder.name).iterdir()):
             build_data["force_include"][self.folder.name] = "nonsmooth/kernels/ahead"
             build_data["pure_python"] = False
             build_data["infer_tag"] = True
+
+
+def run_apart(code: str, arguments: list[str], environment: dict[str, str]) -> tuple[int, str]:
+    """Run Python in a process; its exit code and what it printed.
+
+    It and the processes that it starts are a group, which ends when that process ends and when this one does, killed
+    or not: none of them is left for the installer to wait for."""
+    with tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace") as said:  # a pipe waits for all who have it
+        process = subprocess.Popen(
+            [sys.executable, "-c", _WATCH + code, *arguments], env=environment, stdin=subprocess.PIPE, stdout=said,
+            stderr=subprocess.STDOUT, start_new_session=True,
+        )  # fmt: skip
+        try:
+            process.wait()
+        finally:
+            with suppress(OSError):
+                os.killpg(process.pid, signal.SIGKILL) if hasattr(os, "killpg") else process.kill()
+            process.wait()
+        said.seek(0)
+        return process.returncode, said.read()

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import signal
+import time
+
 import numpy as np
 import pytest
 
@@ -100,3 +103,19 @@ def test_the_error_knows_of_a_drifting_slope() -> None:
     even = ns.correlation_dimension(np.random.default_rng(1).random(20_000))
     assert abs(even.dimension - 1.0) < 3 * even.standard_error + 0.01
     assert found.dimension < 0.95 and found.standard_error > 3 * even.standard_error
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="a timer of processor time")
+def test_ctrl_c_is_heard_while_the_pairs_of_many_points_are_counted() -> None:
+    """Of processor time: that of other jobs does not count. All these pairs take seven seconds of it."""
+    points = np.random.default_rng(3).uniform(size=(20_000, 4))
+    before = signal.signal(signal.SIGPROF, signal.default_int_handler)
+    try:
+        began = time.process_time()
+        signal.setitimer(signal.ITIMER_PROF, 0.5)
+        with pytest.raises(KeyboardInterrupt):
+            correlation_dimension(points)
+        assert time.process_time() - began < 1.5
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)

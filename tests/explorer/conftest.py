@@ -24,11 +24,10 @@ PATIENCE = 120.0  # seconds; a cold cache compiles in them
 class Server:
     """``nonsmooth explore`` in a process of its own."""
 
-    def __init__(self, *arguments: str) -> None:
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", "nonsmooth", "explore", *arguments, "--no-browser", "--port", "0"],
-            stderr=subprocess.PIPE, text=True,
-        )  # fmt: skip
+    def __init__(self, *arguments: str, browser: bool = False) -> None:
+        told = [*arguments, *([] if browser else ["--no-browser"]), "--port", "0"]
+        command = [sys.executable, "-m", "nonsmooth", "explore", *told]
+        self.process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
         self.said: list[str] = []
         assert self.process.stderr is not None
         for line in self.process.stderr:
@@ -145,6 +144,15 @@ def browser() -> Iterator[Any]:
         one = running.chromium.launch(executable_path=program, args=["--no-sandbox"])
         yield one
         one.close()
+
+
+@pytest.fixture
+def with_browser() -> Iterator[Server]:
+    """An explorer that opens the browser of the environment variable BROWSER."""
+    pytest.importorskip("bokeh", reason="the explorer needs bokeh")
+    one = Server(browser=True)
+    yield one
+    one.close()
 
 
 @pytest.fixture

@@ -209,15 +209,63 @@ def test_stamp_follows_imports_through_kernel_files(monkeypatch):
     cache._source_stamp.cache_clear()
 
 
-def test_old_entries_are_pruned(tmp_path):
+def grow_old(path, days=200):
+    stat = path.lstat()
+    os.utime(path, (stat.st_atime, stat.st_mtime - 86400 * days), follow_symlinks=False)
+
+
+def test_what_was_not_used_for_long_is_removed_where_it_is_ours(tmp_path, filled):
+    """Entries as a real process wrote them, and unfinished ones; of the user's files none, whatever its name."""
     from nonsmooth.kernels.compile.folder import prune
 
-    for name, age_days in (("old", 200), ("new", 1)):
-        (tmp_path / name).write_text("")
-        stat = (tmp_path / name).stat()
-        os.utime(tmp_path / name, (stat.st_atime, stat.st_mtime - 86400 * age_days))
-    prune(tmp_path)
-    assert [path.name for path in tmp_path.iterdir()] == ["new"]
+    compiled, generated = tmp_path / "cache" / "compiled", tmp_path / "cache" / "generated"
+    code, module = next(compiled.iterdir()), next(generated.glob("*.py"))
+    new = [path for path in compiled.iterdir() if path != code]
+    users = {
+        compiled: ["thesis.tex", "old", code.stem, f"copy_of_{code.name}", f"{code.name}.bak", f"a-{32 * '0'}.nbc"],
+        generated: ["notes.py", f"{module.stem}.txt", f"model_{20 * '0'}.py", f"solver_{module.stem[-20:]}.py"],
+    }  # fmt: skip
+    for folder, names in users.items():
+        for name in names:
+            (folder / name).write_text("a user's own")
+            grow_old(folder / name)
+    (compiled / f"link-{code.name[-36:]}").symlink_to(code)
+    unfinished = compiled / f"{code.name}.0123456789ab.tmp"
+    unfinished.write_bytes(b"half")
+    for path in (code, module, unfinished, compiled / f"link-{code.name[-36:]}"):
+        grow_old(path)
+    for folder in (compiled, generated):
+        prune(folder)
+    assert not code.exists() and not module.exists() and not unfinished.exists()
+    assert all(path.exists() for path in new)
+    assert all((folder / name).exists() for folder, names in users.items() for name in names)
+    assert (compiled / f"link-{code.name[-36:]}").is_symlink()
+
+
+FULL = """
+import resource
+from pathlib import Path
+from nonsmooth.kernels.compile.folder import cache_folder, make_private, write_atomically
+resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))
+path = cache_folder() / "generated" / "model.py"
+write_atomically(path, bytes(100))
+try:
+    write_atomically(path.with_name("other.py"), bytes(101))
+except OSError as error:
+    print(error)
+print(*(one.name for one in path.parent.iterdir()))
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="limits of POSIX")
+def test_a_disk_that_takes_no_more_is_a_sentence(tmp_path):
+    """By a limit on the size of files, which no administrator has to set; nothing unfinished is left."""
+    environment = {**os.environ, "NONSMOOTH_CACHE_DIR": str(tmp_path)}
+    done = subprocess.run([sys.executable, "-c", FULL], env=environment, capture_output=True, text=True)
+    said, names = done.stdout.splitlines()
+    assert f"cannot be written to {tmp_path / 'generated'} (File too large)" in said
+    assert "set the environment variable NONSMOOTH_CACHE_DIR to a folder on another disk" in said
+    assert names == "model.py"
 
 
 def test_cache_folder(tmp_path, monkeypatch):

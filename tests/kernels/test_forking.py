@@ -1,4 +1,4 @@
-"""A child that is forked while another thread compiles can compile too."""
+"""A child that is forked while another thread compiles or loads modules can do so too."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import uuid
+from pathlib import Path
 
 import pytest
 
@@ -63,3 +64,105 @@ def test_a_fork_beside_a_compile() -> None:
     script = SCRIPT.replace("NUMBER", repr(uuid.uuid4().int % 10**9 / 1e9))  # not in the cache of compiled code
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=600)
     assert (done.stdout.strip(), done.stderr) == ("7", "")
+
+
+LOADING = '''
+import importlib, os, sys, threading, time, warnings
+import nonsmooth
+
+warnings.simplefilter("ignore")
+sys.path.insert(0, FOLDER)
+hung = []
+for k in range(50):  # each while a module is loaded that the child asks for too
+    thread = threading.Thread(target=importlib.import_module, args=(f"slow_{k}",))
+    thread.start()
+    while f"slow_{k}" not in sys.modules:
+        time.sleep(0.001)
+    child = os.fork()
+    if child == 0:
+        os._exit(0 if importlib.import_module(f"slow_{k}").whole else 1)
+    end = time.monotonic() + 20
+    done = 0
+    while not done and time.monotonic() < end:
+        done, status = os.waitpid(child, os.WNOHANG)
+        time.sleep(0.002)
+    if not done:
+        os.kill(child, 9)
+        os.waitpid(child, 0)
+        hung.append(k)
+        break
+    assert os.waitstatus_to_exitcode(status) == 0, k
+    thread.join()
+print("hung:", hung)
+'''
+
+WITHIN = '''
+import sys
+import nonsmooth
+sys.path.insert(0, FOLDER)
+import forks_itself
+print(forks_itself.status)
+'''
+
+
+def run(script: str, folder: Path) -> str:
+    code = script.replace("FOLDER", repr(str(folder)))
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip()
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system does not fork")
+def test_fifty_forks_beside_a_thread_that_loads_modules(tmp_path: Path) -> None:
+    for k in range(50):
+        (tmp_path / f"slow_{k}.py").write_text("import time\ntime.sleep(0.05)\nwhole = True\n")
+    assert run(LOADING, tmp_path) == "hung: []"
+
+
+ONCE = """
+import functools, os, sys, threading, time, warnings
+import nonsmooth
+
+warnings.simplefilter("ignore")
+class Thing:
+    @functools.cached_property
+    def value(self):
+        began.set()
+        time.sleep(0.3)
+        return 7
+
+began = threading.Event()
+thread = threading.Thread(target=lambda: Thing().value)
+thread.start()
+began.wait()
+child = os.fork()
+if child == 0:
+    os._exit(Thing().value)  # of another object: up to Python 3.11 all share one lock
+end, done = time.monotonic() + 20, 0
+while not done and time.monotonic() < end:
+    done, status = os.waitpid(child, os.WNOHANG)
+    time.sleep(0.01)
+if not done:
+    os.kill(child, 9)
+print(os.waitstatus_to_exitcode(status) if done else "hung")
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system does not fork")
+def test_a_fork_beside_a_thread_that_computes_a_property(tmp_path: Path) -> None:
+    assert run(ONCE, tmp_path) == "7"
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system does not fork")
+def test_a_module_that_forks_while_it_is_loaded_is_not_held_up(tmp_path: Path) -> None:
+    """Also where another thread waits for that module."""
+    (tmp_path / "forks_itself.py").write_text(
+        "import os, sys, threading, time\n"
+        "threading.Thread(target=lambda: __import__('forks_itself'), daemon=True).start()\n"
+        "time.sleep(0.2)\n"
+        "child = os.fork()\n"
+        "if child == 0:\n"
+        "    os._exit(7)\n"
+        "status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])\n"
+    )
+    assert run(WITHIN, tmp_path) == "7"

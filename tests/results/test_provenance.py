@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import base64
 import json
+import subprocess
+import sys
 import zlib
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -159,3 +161,25 @@ def test_a_compressed_system_that_is_damaged_or_too_large_is_refused(text: str) 
     record = json.dumps({"version": "0.1.0", "system": {"name": "s", "zlib": text}})
     with pytest.raises(ValueError, match="compressed system"):
         read_provenance(xr.Dataset(attrs={ATTRIBUTE: record}))
+
+
+NOT_INSTALLED = """
+from importlib import metadata
+def version(name, real=metadata.version):
+    if name == "nonsmooth":
+        raise metadata.PackageNotFoundError(name)
+    return real(name)
+metadata.version = version
+
+import json, pathlib, sys
+import nonsmooth as ns
+run = ns.simulate(ns.models.discontinuous_support(), periods=1)
+ns.save(run, pathlib.Path(sys.argv[1]) / "run.nc")
+print(ns.__version__, json.loads(ns.load(pathlib.Path(sys.argv[1]) / "run.nc").attrs["nonsmooth"])["version"])
+"""
+
+
+def test_files_that_were_copied_without_being_installed_work(tmp_path: Path) -> None:
+    done = subprocess.run([sys.executable, "-c", NOT_INSTALLED, str(tmp_path)], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split() == ["unknown", "unknown"]

@@ -236,3 +236,38 @@ def damaged(change):
 def test_damaged_text_is_refused(text, sentence):
     with pytest.raises(SystemDefinitionError, match=sentence):
         System.from_text(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("not u.x", "a number is wanted"),
+        ("u.x > 0", "a number is wanted"),
+        ("True", "a number is wanted"),
+        ("u.x > 0 and u.v > 0", "a number is wanted"),
+        ("where(u.x > 0, not u.x, 1)", "a number is wanted"),
+        ("where(u.x > 0 and not u.v, 2, 1)", "a condition such as u.x > 0 is wanted"),
+    ],
+)
+@pytest.mark.parametrize(
+    "place",
+    [
+        lambda d, text: d["modes"]["free"].update(v=text),
+        lambda d, text: d["indicators"].update(penetration=text),
+        lambda d, text: d.update(period=text),
+    ],
+)
+def test_a_condition_is_no_number(place, text, sentence):
+    """True and false are neither a field nor an indicator nor a period, and a state is no condition."""
+    with pytest.raises(SystemDefinitionError, match=sentence):
+        System.from_text(damaged(lambda d: place(d, text)))
+
+
+def test_a_condition_within_where_is_read():
+    text = "where((p.k > 1 and p.c > 1) or not p.g < 1, 2*p.m, sin(p.m))"
+    found = System.from_text(damaged(lambda d: d["modes"]["free"].update(v=text)))
+    parameters = dict(zip(found.parameters, found.traced.p, strict=True))
+    value = found.traced.fields[0][1].subs(parameters["m"], 0.5)
+    for k, c, g, expected in ((2, 2, 0, 1.0), (2, 0, 0, np.sin(0.5)), (0, 0, 1, 1.0)):
+        numbers = {parameters["k"]: k, parameters["c"]: c, parameters["g"]: g}
+        assert float(value.subs(numbers)) == pytest.approx(expected)

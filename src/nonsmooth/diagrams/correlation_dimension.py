@@ -32,6 +32,7 @@ SPREAD = 0.06  # of the slope: a range is a scaling range where the slope's stan
 PAIRS = 200  # fewer close pairs than these make a slope of noise
 WIDEST = 0.2  # of the extent: larger distances see the attractor's edges
 LEAST_DECADES = 0.8
+BLOCK = 256  # points that are near each other, whose neighbours are counted at once
 
 
 @by_name
@@ -139,7 +140,9 @@ def _pairs(x: FloatArray, radius: FloatArray, window: int) -> FloatArray:
     from scipy.spatial import cKDTree
 
     tree = cKDTree(x)
-    counts = (tree.count_neighbors(tree, radius, p=np.inf).astype(float) - len(x)) / 2
+    counts = np.full(len(radius), -0.5 * len(x))
+    for near in np.array_split(tree.indices, np.ceil(len(x) / BLOCK)):  # Ctrl-C is heard between two of them
+        counts += tree.count_neighbors(cKDTree(x[near]), radius, p=np.inf) / 2
     for lag in np.arange(1, window + 1):
         distance = np.sort(np.abs(x[lag:] - x[:-lag]).max(axis=1))
         counts -= np.searchsorted(distance, radius, side="right")

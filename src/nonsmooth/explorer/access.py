@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import hmac
+import os
 import secrets
-from collections.abc import Awaitable, Callable
+import tempfile
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 from bokeh.server.auth_provider import AuthProvider
@@ -13,9 +17,13 @@ from tornado.websocket import WebSocketHandler
 
 __all__ = ["Access"]
 
+_LEADING = '<!DOCTYPE html><meta http-equiv="refresh" content="0; url={0}"><a href="{0}">nonsmooth explorer</a>'
+
 
 class Access(AuthProvider):
     """A token per start, first in the address that is printed, then in a cookie that no other site is sent.
+
+    The address that a browser is given holds another token, for one request: see :meth:`page_for_browser`.
 
     A request without it, to another host name (a page elsewhere whose name was made to point here), or sent by a page
     of another origin is answered with 403.
@@ -24,6 +32,7 @@ class Access(AuthProvider):
     def __init__(self) -> None:
         self.token = secrets.token_urlsafe(24)
         self.hosts: set[str] = set()
+        self._once: set[str] = set()  # tokens that have not been used yet
         self._cookie = f"nonsmooth_{secrets.token_hex(4)}"  # cookies are one for all ports
         super().__init__()
 
@@ -49,13 +58,33 @@ class Access(AuthProvider):
         if origin is not None and origin.partition("://")[2] not in self.hosts:
             raise HTTPError(403, log_message=f"origin {origin!r}", reason="Requests from other sites are refused")
         given = handler.get_query_argument("token", None)
-        if given is not None and self._is_token(given):
+        if given is not None and (self._is_token(given) or self._is_first_use(given)):
             if not isinstance(handler, WebSocketHandler):
                 handler.set_cookie(self._cookie, self.token, httponly=True, samesite="Strict", path="/")
             return "you"
         if self._is_token(handler.get_cookie(self._cookie, "")):
             return "you"
         raise HTTPError(403, log_message="no token", reason="Open the address that nonsmooth explore printed")
+
+    @contextmanager
+    def page_for_browser(self, address: str) -> Iterator[str]:
+        """The address of a file that only this user can read and that leads to the page, while the block lasts.
+
+        Command lines are for every user of the machine to see, and a browser is told in one what it is to open."""
+        token = secrets.token_urlsafe(24)
+        self._once.add(token)
+        handle, name = tempfile.mkstemp(prefix="nonsmooth-", suffix=".html")  # of mode 600
+        try:
+            with os.fdopen(handle, "w", encoding="utf-8") as file:
+                file.write(_LEADING.format(f"{address}/?token={token}"))
+            yield Path(name).as_uri()
+        finally:
+            Path(name).unlink(missing_ok=True)
+
+    def _is_first_use(self, text: str) -> bool:
+        found = next((one for one in self._once if hmac.compare_digest(one.encode(), text.encode())), None)
+        self._once.discard(found or "")
+        return found is not None
 
     def _is_token(self, text: str | None) -> bool:
         return hmac.compare_digest((text or "").encode(), self.token.encode())

@@ -141,8 +141,8 @@ class Bench:
         number_, what, model = self._job
         if self._worker is None or (kind != "ended" and count != number_):
             return
-        if kind == "progress":
-            self._fraction = float(content)
+        if kind in ("progress", "compiling"):
+            self._fraction = float(content) if kind == "progress" else self._fraction
             self.tell()
             return
         self._stop()

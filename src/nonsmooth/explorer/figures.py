@@ -11,6 +11,7 @@ from bokeh.models import (
     BoxAnnotation,
     ColumnDataSource,
     CustomJSTickFormatter,
+    GlyphRenderer,
     HoverTool,
     Range1d,
     Span,
@@ -30,6 +31,9 @@ _MODES = [COLORS[name] for name in ("first", "second", "third", "fourth")]
 _MANY_MODES = 8
 MOST = 64  # section points that are told apart one by one
 _HEIGHT = 400  # of an image before the page has said how large it is
+_NO_IMAGE = {
+    "image": [np.zeros((1, 1), np.uint32)], "x": [0.0], "y": [0.0], "dw": [1.0], "dh": [1.0], "stage": [""], "of": [""],
+}  # fmt: skip
 #: Tooltip with the words of the point below the mouse.
 TIP = '<div style="font:13px system-ui">@words</div>'
 _TICKS = "return Number((tick * Math.pow(10, -power)).toPrecision(8)).toString().replace('-', '\\u2212')"
@@ -88,6 +92,15 @@ class Panel:
         self.y = _Axis(self.plot.yaxis[0], self.plot.y_range)
         self.beside: tuple[Any, Any] = ([], [])  # what else the axes must show
 
+    def clear(self) -> None:
+        """Show nothing, as when another model was chosen."""
+        for renderer in self.plot.renderers:
+            if isinstance(renderer, GlyphRenderer):
+                source = renderer.data_source
+                source.data = {key: source.data[key][:0] for key in source.data}
+        for axis in (self.x, self.y):
+            axis.axis.axis_label = None
+
     def show(self, x: tuple[float, float] | None = None, y: tuple[float, float] | None = None) -> None:
         """Set the ranges, also those that a reset comes back to."""
         for one, ends in ((self.plot.x_range, x), (self.plot.y_range, y)):
@@ -111,11 +124,7 @@ class Diagram(Panel):
 
     def __init__(self) -> None:
         super().__init__("diagram")
-        self.image = ColumnDataSource(
-            name="diagram image",
-            data={"image": [np.zeros((1, 1), np.uint32)], "x": [0.0], "y": [0.0], "dw": [1.0], "dh": [1.0],
-                  "stage": [""], "of": [""]},
-        )  # fmt: skip
+        self.image = ColumnDataSource(name="diagram image", data=_NO_IMAGE)
         self.plot.image_rgba("image", "x", "y", "dw", "dh", source=self.image)
         keys = ("value", "low", "high", "words", "period", "status")
         self.columns = ColumnDataSource(name="columns", data={key: [] for key in keys})
@@ -163,9 +172,9 @@ class Diagram(Panel):
 
     def clear(self) -> None:
         """Show nothing, as when another model or parameter was chosen."""
+        super().clear()
         self.result, self.stage, self._fitted = None, "", None
-        self.image.data = {**self.image.data, "image": [np.zeros((1, 1), np.uint32)], "stage": [""], "of": [""]}
-        self.columns.data = {key: [] for key in self.columns.data}
+        self.image.data = _NO_IMAGE
 
     def redraw(self, state: Any, of: str | None = None) -> None:
         """Draw the points anew, as at another zoom."""
@@ -281,6 +290,11 @@ class Portrait(_Curves):
                 axis.range.update(start=ends[0], end=ends[1], reset_start=ends[0], reset_end=ends[1])
             axis.name(symbols[name], units[name])
         self.zone.update(left=zone, visible=zone is not None)
+
+    def clear(self) -> None:
+        """Show nothing, the contact zone included."""
+        super().clear()
+        self.zone.visible = False
 
     def mark(self, points: Any) -> None:
         """Section points (n, 2)."""

@@ -143,7 +143,7 @@
     if (!told.long) return;
     const bar = $("busy").querySelector("progress");
     if (told.fraction) bar.value = told.fraction; else bar.removeAttribute("value");
-    $("busy").querySelector("span").textContent = told.view;
+    $("busy").querySelector("span").textContent = told.compiling ? `${told.view}: compiling` : told.view;
   }
 
   function notes(told) {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -27,6 +27,11 @@ _CHEAP = ("orbit", "recording", "first look", "section", *(stage for stage in _S
 _BLINK = 0.4  # seconds: a first look that took no longer the last time comes before the orbit, for a hand that moves
 _PATIENCE = 1.0  # seconds after which short work is cancelled like any other
 _DEAF = 10.0  # seconds in which cancelled work must end by itself
+_VAIN = 3  # times in a row that the worker ended before it could take work; then it is not started again
+_NOT_STARTED = (
+    f"The process that computes cannot be started: {_VAIN} times in a row it ended at once. The terminal of nonsmooth "
+    "explore shows its error; mend that, and load this page again: its address holds what you set."
+)
 #: The view in which a message on a request appears.
 _PLACE = {
     "orbit": "portrait", "first look": "diagram", "section": "section", "diagram": "diagram", "stability": "readout",
@@ -54,6 +59,8 @@ class Schedule:
         self.done: dict[str, str] = {}  # of each view the key of the request whose answer is shown
         self._failed: dict[str, str] = {}
         self._crashed: dict[str, int] = {}
+        self._said: dict[str, tuple[str, str]] = {}  # of a view the key of a request and the sentence on it
+        self._vain = 0
         self._running: Asked | None = None
         self._count = 0
         self._looked = "", float("inf")  # the model of the last first look, and the seconds that it took
@@ -75,7 +82,13 @@ class Schedule:
         """Ask for what is missing, the quick first; cancel what nobody waits for any more."""
         if self.worker is None:
             return
+        if self._vain == _VAIN:
+            self.page.notes["page"] = _NOT_STARTED
+            self.page.tell("notes", self.page.notes)
+            self.page.tell("busy", {"view": ""})
+            return
         wanted = {view: (spec, key_of(spec)) for view, spec in self.page.wanted().items()}
+        self._tell_notes({view: key for view, (_, key) in wanted.items()})
         missing = [
             view for view in ORDER
             if view in wanted and wanted[view][1] not in (self.done.get(view), self._failed.get(view))
@@ -101,6 +114,16 @@ class Schedule:
         starting = not self.done and not self._failed
         self.page.tell("busy", {"view": view, "fraction": 0, "long": starting or view not in _CHEAP})
 
+    def _tell_notes(self, wanted: Mapping[str, str]) -> None:
+        """A sentence on a request is shown as long as that request is the one of the page."""
+        for view, (key, sentence) in self._said.items():
+            place = _PLACE[view]
+            if wanted.get(view) == key:
+                self.page.notes[place] = sentence
+            elif self.page.notes.get(place) == sentence:
+                del self.page.notes[place]
+        self.page.tell("notes", self.page.notes)
+
     def watch(self) -> None:
         """End a worker that does not hear that its work is cancelled."""
         running = self._running
@@ -118,16 +141,20 @@ class Schedule:
         if kind == "ended":
             self._restart(content)
             return
+        if kind == "ready":
+            self._vain = 0
+            return
         if running is None or count != running.number:
             return
-        if kind == "progress":
-            self.page.tell("busy", {"view": running.view, "fraction": round(float(content), 3), "long": True})
+        if kind in ("progress", "compiling"):
+            fraction = round(float(content), 3) if kind == "progress" else 0
+            busy = {"view": running.view, "fraction": fraction, "long": True, "compiling": kind == "compiling"}
+            self.page.tell("busy", busy)
             return
         self._running = None
-        place = _PLACE[running.view]
         if kind == "error":
             self._failed[running.view] = running.key
-            self.page.notes[place] = str(content)
+            self._said[running.view] = running.key, str(content)
             self.page.sheet.forget(running.view)
         elif kind == "done":
             found, warned = content
@@ -135,17 +162,17 @@ class Schedule:
                 self._looked = running.of[0], time.monotonic() - running.since
             self.done[running.view] = running.key
             self._failed.pop(running.view, None)
-            self.page.notes.pop(place, None)
             if warned:
-                self.page.notes[place] = warned[0]
+                self._said[running.view] = running.key, warned[0]
             self.page.sheet.show(running, found)
-        self.page.tell("notes", self.page.notes)
         self.go_on()
 
     def _restart(self, code: int) -> None:
         running, self._running = self._running, None
         assert self.worker is not None
-        self.worker.start()
+        self._vain += 1
+        if self._vain < _VAIN:
+            self.worker.start()
         if running is not None:
             known = self._crashed[running.key] = self._crashed.get(running.key, 0) + 1
             if known > 1 and running.cancelled is None:

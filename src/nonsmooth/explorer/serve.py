@@ -6,6 +6,7 @@ import socket
 import sys
 import webbrowser
 from collections.abc import Callable
+from contextlib import nullcontext
 from functools import partial
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qsl
@@ -78,16 +79,18 @@ def explore(
     )  # fmt: skip
     access.listen_at(number)
     server.start()
-    address = f"http://127.0.0.1:{number}/?token={access.token}"
+    origin = f"http://127.0.0.1:{number}"
+    address = f"{origin}/?token={access.token}"
     print(f"nonsmooth explorer: {address}\nCtrl-C ends it", file=sys.stderr, flush=True)
     if told is not None:
         told(address)
-    if browser:
-        server.io_loop.add_callback(webbrowser.open, address)
-    try:
-        server.io_loop.start()
-    finally:
-        server.stop()
+    with access.page_for_browser(origin) if browser else nullcontext() as page:
+        if page is not None:
+            server.io_loop.add_callback(webbrowser.open, page)
+        try:
+            server.io_loop.start()
+        finally:
+            server.stop()
 
 
 def _open(catalogue: Catalogue, query: str, tabs: list[Session], document: Any) -> None:

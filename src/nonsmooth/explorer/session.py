@@ -38,6 +38,7 @@ __all__ = ["Session"]
 
 #: To the browser, each one line of JSON; what comes from it is ``act``.
 CHANNELS = ("ui", "readout", "busy", "notes", "file", "recording", "building")
+MOST_TABS = 8  # that compute at a time
 #: Files that make the page; what a part of the page does comes before the page itself.
 TEXTS = (
     "page.html", "recording.html", "building.html", "page.css", "recording.js", "building.js", "tour.js", "page.js",
@@ -63,6 +64,7 @@ class Session:
         self._saved = 0
         self._heard = 0  # number of the page's last message
         self.notes: dict[str, str] = {}
+        self._refused: dict[str, tuple[State, str]] = {}  # of a note on a wrong value the state that stayed
         self._say = {name: TextInput(name=name) for name in CHANNELS}
         self._act = TextInput(name="act")
         self.past = History(self._first(query))
@@ -144,9 +146,14 @@ class Session:
         for kind in (Tap, DoubleTap):
             plot.on_event(kind, act)
 
-    def _begin(self, name: str, value: Any) -> None:
-        """The page is there: work can begin."""
-        if self.work.begin(self._hear):
+    def _begin(self) -> None:
+        """The page is there: work begins, where not too many others are at it."""
+        if self.work.worker is None and len(self.tabs) >= MOST_TABS:
+            self.notes["page"] = (
+                f"{MOST_TABS} tabs of this explorer compute already, each in a process of some 300 MB. Close one of "
+                "them; this one begins with the next change that you make here."
+            )
+        elif self.work.begin(self._hear):
             self.tabs.append(self)
             self._tell_tabs()
             self.document.add_periodic_callback(self.work.watch, 500)
@@ -183,7 +190,7 @@ class Session:
             known: dict[str, Callable[[str, Any], object]] = {
                 "set": self._set, "model": self._model, "preset": self._preset, "end": self._end_step,
                 "undo": lambda *_: self.past.undo(), "redo": lambda *_: self.past.redo(), "look": self._look,
-                "reset": self._reset, "begin": self._begin, "save": self._save, **self.bench.actions,
+                "reset": self._reset, "begin": lambda *_: None, "save": self._save, **self.bench.actions,
                 **self.workshop.actions,
             }  # fmt: skip
             if action not in known:
@@ -194,6 +201,8 @@ class Session:
         except (ValueError, TypeError, KeyError) as error:
             place = str(message.get("name") or "page") if isinstance(message, dict) else "page"
             self.notes[place] = str(error)
+            self._refused[place] = self.state, str(error)
+        self._begin()
         self.refresh()
 
     def _set(self, name: str, value: Any) -> None:
@@ -337,6 +346,11 @@ class Session:
 
     def refresh(self) -> None:
         """The page as the state has it, and work for what that lacks."""
+        for place, (state, sentence) in list(self._refused.items()):
+            if state != self.state:  # values are good again
+                del self._refused[place]
+                if self.notes.get(place) == sentence:
+                    del self.notes[place]
         self.sheet.follow()
         self.tell("notes", self.notes)
         self.work.go_on()  # before the page hears that its message has been taken in

@@ -164,6 +164,9 @@ class Sheet:
         if self._of[0] != subject[0]:
             self.results.clear()
             done.clear()
+            for panel in (self.portrait, self.history, self.section):
+                panel.clear()
+            self.page.tell("readout", [])
             self.bench.arrange()
         for view in ("first look", "diagram"):
             done.pop(view, None)
@@ -172,6 +175,7 @@ class Sheet:
                 one.clear()
                 for stage in one.stages:
                     done.pop(stage, None)
+        self.overlay.put(self.bench.laid, self.page.state)
         self._of = subject
 
 

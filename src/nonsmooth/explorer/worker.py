@@ -21,13 +21,15 @@ from contextlib import suppress
 from types import FrameType
 from typing import Any
 
+from nonsmooth.forks import is_importing
+
 __all__ = ["Answer", "Worker"]
 
 _OFTEN = 0.15  # seconds between two words on progress
 _SILENT = 1.0  # seconds in which cancelled work must end before it is interrupted
 
-#: ``(kind, number, content)``: "progress" with the fraction done, "done" with results and warnings, "cancelled",
-#: "error" with a sentence, "ended" with the exit code of the process.
+#: ``(kind, number, content)``: "ready" to take work, "progress" with the fraction done, "compiling" with the name of a
+#: kernel, "done" with results and warnings, "cancelled", "error" with a sentence, "ended" with the process's exit code.
 Answer = tuple[str, int, Any]
 
 
@@ -125,18 +127,10 @@ class _Cancelled:
     def _interrupted(self, signum: int, frame: FrameType | None) -> None:
         if self.at_work not in self.numbers:
             return
-        if _is_importing(frame):  # a package that is loaded by half stays so for the rest of the process
+        if is_importing(frame):  # a package that is loaded by half stays so for the rest of the process
             self._later(_OFTEN, self.at_work)
             return
         raise KeyboardInterrupt
-
-
-def _is_importing(frame: FrameType | None) -> bool:
-    while frame is not None:
-        if frame.f_code.co_filename.startswith("<frozen importlib"):
-            return True
-        frame = frame.f_back
-    return False
 
 
 def main() -> None:
@@ -145,13 +139,23 @@ def main() -> None:
     out = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     waiting: queue.SimpleQueue[tuple[int, dict[str, Any]] | None] = queue.SimpleQueue()
-    threading.Thread(target=_read, args=(waiting, cancelled), daemon=True).start()
+    # Before a request is read, which may hold arrays: two threads that load NumPy at once break it.
     from nonsmooth.explorer.work import compute
+    from nonsmooth.kernels import before_compiling
 
     def send(answer: Answer) -> None:
         pickle.dump(answer, out, protocol=pickle.HIGHEST_PROTOCOL)
         out.flush()
 
+    def compiling(name: str) -> None:
+        if threading.current_thread() is threading.main_thread():
+            number, cancelled.at_work = cancelled.at_work, 0  # a message is not cut in two
+            send(("compiling", number, name))
+            cancelled.at_work = number
+
+    before_compiling.append(compiling)
+    threading.Thread(target=_read, args=(waiting, cancelled), daemon=True).start()
+    send(("ready", 0, None))
     while (request := waiting.get()) is not None:
         number, job = request
         if number not in cancelled.numbers:

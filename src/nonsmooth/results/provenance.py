@@ -48,8 +48,11 @@ _LARGEST = 2**26  # bytes of a system's text: an attribute made to claim more is
 
 @cache  # it is read from a file, and every result holds it
 def package_version() -> str:
-    """The installed version of ``nonsmooth``."""
-    return metadata.version("nonsmooth")
+    """The installed version of ``nonsmooth``; "unknown" for files that were copied without being installed."""
+    try:
+        return metadata.version("nonsmooth")
+    except metadata.PackageNotFoundError:
+        return "unknown"
 
 
 def provenance(

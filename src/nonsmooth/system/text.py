@@ -210,6 +210,22 @@ def _no_constant(name: str) -> float:
     raise ValueError(f"{name} is not a finite number")
 
 
+def _check_kinds(expression: Any, text: str, condition: bool = False) -> None:
+    """ValueError where a condition stands for a number, or a number for a condition; SymPy takes some of them."""
+    if condition == isinstance(expression, sp.Expr):
+        wanted = ("a number", "a condition such as u.x > 0")[condition]
+        given = shortened(expression, quoted=False)
+        raise ValueError(f"`{given}` stands where {wanted} is wanted (in the expression {shortened(text)})")
+    if isinstance(expression, sp.Piecewise):
+        for value, when in expression.args:
+            _check_kinds(value, text)
+            _check_kinds(when, text, condition=True)
+    else:
+        of_conditions = isinstance(expression, sp.And | sp.Or | sp.Not)
+        for part in expression.args:
+            _check_kinds(part, text, of_conditions)
+
+
 class _Reader:
     """Turns the content into the arguments of `System`."""
 
@@ -223,8 +239,9 @@ class _Reader:
         self.symbols |= {f"p.{key}": s for key, s in (symbols.p | symbols.m).items()}
 
     def function(self, text: str, extra: Mapping[str, sp.Symbol] | None = None) -> Callable[..., Any]:
-        expression = Scalar(read_expression(text, self.symbols | dict(extra or {})))
-        return lambda *_: expression
+        expression = read_expression(text, self.symbols | dict(extra or {}))
+        _check_kinds(expression, text)
+        return lambda *_: Scalar(expression)
 
     def vector(self, texts: Mapping[str, str], extra: Mapping[str, sp.Symbol] | None = None) -> Callable[..., Any]:
         parts = [self.function(text, extra)() for text in texts.values()]

@@ -7,19 +7,24 @@ not used, and new ones are made for the user alone.
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import os
+import re
 import stat
 import sys
 import tempfile
 import time
 import uuid
 import warnings
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
 __all__ = ["cache_folder", "make_private", "mark_used", "prune", "read_private", "usable_folder", "write_atomically"]
 
 UNUSED_DAYS = 90.0
+#: Names that `cache` gives: of code, and of a generated module by the hash of its text; unfinished ones have more.
+_ENTRY = re.compile(r".+(-[0-9a-f]{32}\.nbc|_(?P<module>[0-9a-f]{20})\.py)(?P<unfinished>\.[0-9a-f]{12}\.tmp)?")
 PARTS = ("", "compiled", "generated", "generated/__pycache__")
 
 
@@ -119,7 +124,20 @@ def read_private(path: Path) -> bytes:
 
 
 def make_private(folder: Path) -> None:
-    folder.mkdir(exist_ok=True, mode=0o700)
+    with _room_in(folder.parent):
+        folder.mkdir(exist_ok=True, mode=0o700)
+
+
+@contextlib.contextmanager
+def _room_in(folder: Path) -> Iterator[None]:
+    """One sentence for a disk that is full, or not to be written."""
+    try:
+        yield
+    except OSError as error:
+        raise OSError(
+            f"compiled code cannot be written to {folder} ({error.strerror}): make room there, or set the environment "
+            "variable NONSMOOTH_CACHE_DIR to a folder on another disk"
+        ) from error
 
 
 def write_atomically(path: Path, data: bytes) -> None:
@@ -127,15 +145,16 @@ def write_atomically(path: Path, data: bytes) -> None:
     make_private(path.parent)
     unfinished = path.with_name(f"{path.name}.{uuid.uuid4().hex[:12]}.tmp")
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
-    try:
-        with os.fdopen(os.open(unfinished, flags, 0o600), "wb") as file:
-            file.write(data)
-        os.replace(unfinished, path)
-    except OSError:
-        with contextlib.suppress(OSError):
-            unfinished.unlink()
-        if not path.exists():  # Windows refuses to replace a file that another process reads
-            raise
+    with _room_in(path.parent):
+        try:
+            with os.fdopen(os.open(unfinished, flags, 0o600), "wb") as file:
+                file.write(data)
+            os.replace(unfinished, path)
+        except OSError:
+            with contextlib.suppress(OSError):
+                unfinished.unlink()
+            if not path.exists():  # Windows refuses to replace a file that another process reads
+                raise
 
 
 def mark_used(path: Path) -> None:
@@ -145,9 +164,24 @@ def mark_used(path: Path) -> None:
 
 
 def prune(folder: Path) -> None:
-    """Remove what no process has used for a long time: edits of the source leave entries behind."""
+    """Remove entries that no process has used for a long time: edits of the source leave them behind."""
     oldest = time.time() - 86400.0 * UNUSED_DAYS
     for path in folder.iterdir():
         with contextlib.suppress(OSError):
-            if path.is_file() and path.stat().st_mtime < oldest:
+            if path.stat().st_mtime < oldest and _is_ours(path):
                 path.unlink()
+
+
+def _is_ours(path: Path) -> bool:
+    """Return whether a file has an entry's name and holds what was written under it: all else is the user's.
+
+    Code begins with the hash of what follows, a module is named by its own; of an unfinished one the name is enough."""
+    name = _ENTRY.fullmatch(path.name)
+    if name is None or path.is_symlink() or not path.is_file():
+        return False
+    if name["unfinished"]:
+        return True
+    content = path.read_bytes()
+    if name["module"]:
+        return hashlib.sha256(content).hexdigest().startswith(name["module"])
+    return hashlib.sha256(content[32:]).digest() == content[:32]
