@@ -9,7 +9,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from nonsmooth.forks import watch_forks
+from nonsmooth.kernels.compile.forking import watch_forks
 from nonsmooth.results import progress as _progress  # noqa: F401  it says when kernels are compiled
 
 if TYPE_CHECKING:

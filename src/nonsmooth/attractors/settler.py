@@ -83,8 +83,10 @@ class Settler:
     def compiled(self) -> LoopEngine | None:
         """The engine whose jobs run in one compiled call; None where they run one by one: modes that are made on the
         way, phases that depend on the parameters, sections on a surface."""
-        one_call = isinstance(self.engine, LinearEngine | SeriesEngine) and self.engine.phases is None
-        return self.engine if one_call and self.plan.indicator < 0 else None
+        engine = self.engine
+        if isinstance(engine, LinearEngine | SeriesEngine) and engine.phases is None and self.plan.indicator < 0:
+            return engine
+        return None
 
     def load(self) -> None:
         """Compile or load the kernel now, before threads ask for it."""

@@ -21,7 +21,7 @@ from contextlib import suppress
 from types import FrameType
 from typing import Any
 
-from nonsmooth.forks import is_importing
+from nonsmooth.kernels.compile.forking import is_importing
 
 __all__ = ["Answer", "Worker"]
 

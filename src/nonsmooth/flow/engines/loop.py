@@ -39,6 +39,10 @@ class LoopEngine(ABC):
     net: Any  # ``kernels.records.Net``
 
     @abstractmethod
+    def prepare(self, points: FloatArray) -> Any:
+        """See :class:`nonsmooth.flow.engines.engine.Engine`."""
+
+    @abstractmethod
     def module(self) -> ModuleType:
         """The kernels of this engine's stepper."""
 
@@ -164,12 +168,12 @@ class LoopEngine(ABC):
         spare, march = self.touches_of_a_leg(), self.march()
         state.counters[1] = int(state.settled)
         march.logged(state, float(until))
-        march.log.put(records.Log(*sampled, *crossings, *touches, spare))
+        march.log.put(records.Log(*(*sampled, *crossings, *touches, spare)))
         code, system = self._run(march, tables)
         while code == codes.LOG_FULL:
             crossings = _longer(crossings, _crossings(2 * len(crossings[0]), n_u, n_m))
             touches = _longer(touches, _touches(2 * len(touches[0]) + spare, n_u))
-            march.log.put(records.Log(*sampled, *crossings, *touches, spare))
+            march.log.put(records.Log(*(*sampled, *crossings, *touches, spare)))
             code, system = self._go_on(march, tables, -1, system)
         state.settled = True
         tally = system[3].tally

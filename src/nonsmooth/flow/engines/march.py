@@ -1,4 +1,4 @@
-"""One thread's calls of an engine's compiled march: the blocks of memory that it reads and writes (``kernels.hybrid``)."""
+"""One thread's calls of an engine's compiled march: the blocks of memory that it reads and writes."""
 
 from __future__ import annotations
 
@@ -56,11 +56,9 @@ class March:
         self._ask(state, _NO_STARTS)
 
     def run(self, system: tuple[Any, Any, Any, Any]) -> int:
-        """March what is asked for: model, transition table, tables, work. Returns a code of ``kernels.hybrid.codes``."""
-        address = self.system.put(system)
-        return int(
-            self.module.run(address, self.call.address, self.kept.address, self.log.address, self.growth.address)
-        )
+        """March what is asked for (model, transition table, tables, work). Returns a code of ``kernels.hybrid``."""
+        blocks = self.call, self.kept, self.log, self.growth
+        return int(self.module.run(self.system.put(system), *(block.address for block in blocks)))
 
     def _anywhere(self, i: int, kind: int, keep: int) -> None:
         """A run that knows no section."""

@@ -45,7 +45,7 @@ def tasks(steppers: Sequence[str] = STEPPERS) -> list[_Task]:
 
     The longest come first."""
     linear, series = (f"nonsmooth.kernels.{stepper}.module" for stepper in ("linear", "series"))
-    made = {name: (series, "series_module", (name,)) for name in METHODS}
+    made: dict[str, _Task] = {name: (series, "series_module", (name,)) for name in METHODS}
     made |= {"planar": (linear, "linear_module", (True,)), "linear": (linear, "linear_module", (False,))}
     found = [made[name] for name in STEPPERS if name in steppers]
     if "linear" in steppers:

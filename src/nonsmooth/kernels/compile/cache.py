@@ -50,7 +50,8 @@ from nonsmooth.kernels.compile.folder import (
 from nonsmooth.kernels.compile.target import Function, made_ahead
 
 __all__ = [
-    "cache_statistics", "callback", "compiled", "device", "inline", "kernel", "load_module", "once", "reached", "summed",
+    "cache_statistics", "callback", "compiled", "device", "inline", "kernel", "load_module", "once", "reached",
+    "summed",
 ]  # fmt: skip
 
 # Kernels allocate nothing (scratch is an argument), so they need no reference counts: "_nrt" off saves a third.

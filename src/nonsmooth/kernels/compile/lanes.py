@@ -17,7 +17,9 @@ from llvmlite import ir
 from numba.core import cgutils, types
 from numba.extending import intrinsic, models, register_model
 
-__all__ = ["FOUR", "apart", "four_at", "load", "number_at", "plus", "store", "sum_columns", "times", "whole_at", "write_four"]
+__all__ = [
+    "FOUR", "apart", "four_at", "load", "number_at", "plus", "store", "sum_columns", "times", "whole_at", "write_four",
+]  # fmt: skip
 
 FOUR = 4  # numbers of a vector that is a value in a kernel
 MOST = 8  # vectors of a column that are summed side by side: they keep the processor busy
@@ -151,7 +153,8 @@ def _sum_columns(typing: Any, table: Any, filled: Any, w: Any, n: Any, m: Any, o
 
         step = ir.Constant(_whole, FOUR * MOST)
         with cgutils.for_range_slice(builder, zero, n_, step, intp=_whole) as (begin, _):
-            left = builder.ashr(builder.add(builder.sub(n_, begin), ir.Constant(_whole, FOUR - 1)), ir.Constant(_whole, 2))
+            numbers = builder.add(builder.sub(n_, begin), ir.Constant(_whole, FOUR - 1))
+            left = builder.ashr(numbers, ir.Constant(_whole, 2))
             end = builder.append_basic_block("summed")
             all_of_them = builder.append_basic_block("most")
             switch = builder.switch(left, all_of_them)

@@ -6,10 +6,10 @@ them, so that a launch stays short.
 
 from numba import float64, int64
 
+from nonsmooth.kernels.cuda.advance import go
 from nonsmooth.kernels.cuda.arrays import N_INDICATORS, N_OUTPUTS
 from nonsmooth.kernels.cuda.tables import tabled
 from nonsmooth.kernels.cuda.target import cuda, entry, local
-from nonsmooth.kernels.cuda.advance import go
 from nonsmooth.kernels.hybrid.codes import OK
 from nonsmooth.kernels.hybrid.records import Kept, Motion, Net
 from nonsmooth.kernels.judging.exponent import separate

@@ -20,8 +20,8 @@ __all__ = ["cuda_series_module", "cuda_series_source"]
 
 PARTS = (
     "circular", "series.polynomial", "series.crossing", "series.rkf45", "series.taylor", "series.trust", "series.step",
-    "series.watch", "series.stepper", "hybrid.loop", "hybrid.sections", "hybrid.observers", "judging.judge", "judging.settle",
-    "judging.exponent", "cuda.settle", "cuda.series",
+    "series.watch", "series.stepper", "hybrid.loop", "hybrid.sections", "hybrid.observers", "judging.judge",
+    "judging.settle", "judging.exponent", "cuda.settle", "cuda.series",
 )  # fmt: skip
 
 

@@ -7,7 +7,17 @@ Places are counted in numbers of eight bytes. ``some`` lists places: how many, t
 from math import fabs
 
 from nonsmooth.kernels.compile.cache import device, inline, summed
-from nonsmooth.kernels.compile.lanes import FOUR, apart, four_at, number_at, plus, sum_columns, times, whole_at, write_four
+from nonsmooth.kernels.compile.lanes import (
+    FOUR,
+    apart,
+    four_at,
+    number_at,
+    plus,
+    sum_columns,
+    times,
+    whole_at,
+    write_four,
+)
 
 FEW = 8  # states of a condition that are summed one by one
 
