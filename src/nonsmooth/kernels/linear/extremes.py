@@ -8,7 +8,7 @@ from nonsmooth.kernels.compile.cache import inline, once
 from nonsmooth.kernels.hybrid.places import MODE
 from nonsmooth.kernels.linear.polynomial import NEVER, THIRD, classify, critical_points, horner
 from nonsmooth.kernels.linear.tables import NODES, states_of
-from nonsmooth.kernels.linear.values import bound_at, compose, slope_of, to_node, value_of
+from nonsmooth.kernels.linear.values import at_ends, bound_at, compose, to_node, value_of
 
 
 @once
@@ -22,10 +22,8 @@ def locate_maximum(tables, work, mode, f, sign, a, b, best):
     while node < NODES and node * spacing <= b:
         to_node(tables, work.row, mode, node, w, wn)
         to_node(tables, work.row, mode, node + size, w, wq)
-        g0 = sign * value_of(tables, mode, f, wn) - best
-        g1 = sign * value_of(tables, mode, f, wq) - best
-        s0 = sign * slope_of(tables, mode, f, wn)
-        s1 = sign * slope_of(tables, mode, f, wq)
+        g0, s0, g1, s1 = at_ends(tables, mode, f, wn, wq)
+        g0, s0, g1, s1 = sign * g0 - best, sign * s0, sign * g1 - best, sign * s1
         if classify(g0, s0, g1, s1, size * spacing, bound) != NEVER:
             if size > 2:
                 size //= 2
@@ -48,11 +46,10 @@ def locate_maximum(tables, work, mode, f, sign, a, b, best):
 @inline
 def exceeds(tables, row, mode, f, w, w1, lowest, highest):
     """Return whether functional f may leave [lowest, highest] on the step from w to w1: (below, above)."""
-    g0 = value_of(tables, mode, f, w)
-    g1 = value_of(tables, mode, f, w1)
+    g0, s0, g1, s1 = at_ends(tables, mode, f, w, w1)
     h = tables.info[mode, 0]
-    b1 = g0 + h * slope_of(tables, mode, f, w) * THIRD
-    b2 = g1 - h * slope_of(tables, mode, f, w1) * THIRD
+    b1 = g0 + h * s0 * THIRD
+    b2 = g1 - h * s1 * THIRD
     c1 = 0.25 * (g0 + 3.0 * b1)
     c2 = 0.5 * (b1 + b2)
     c3 = 0.25 * (3.0 * b2 + g1)

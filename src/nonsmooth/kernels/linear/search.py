@@ -27,6 +27,7 @@ from nonsmooth.kernels.linear.polynomial import (
 from nonsmooth.kernels.linear.tables import DEGREE, NODES, states_of, width_of
 from nonsmooth.kernels.linear.values import (
     NODE,
+    at_ends,
     at_node,
     bound_at,
     compose,
@@ -195,16 +196,8 @@ def search(tables, work, mode, rows, lo, hi, held, r_max):
         for r in range(lo, hi):
             f = rows[r, 0]
             sign = float(rows[r, 1])
-            if size == NODES:
-                g0 = sign * value_of(tables, mode, f, w)
-                s0 = sign * slope_of(tables, mode, f, w)
-                g1 = sign * value_of(tables, mode, f, w1)
-                s1 = sign * slope_of(tables, mode, f, w1)
-            else:
-                g0 = sign * value_of(tables, mode, f, wp)
-                s0 = sign * slope_of(tables, mode, f, wp)
-                g1 = sign * value_of(tables, mode, f, wq)
-                s1 = sign * slope_of(tables, mode, f, wq)
+            g0, s0, g1, s1 = at_ends(tables, mode, f, w if size == NODES else wp, w1 if size == NODES else wq)
+            g0, s0, g1, s1 = sign * g0, sign * s0, sign * g1, sign * s1
             if node == 0 and f < zero.shape[0] and zero[f] != 0:
                 g0 = 0.0
                 if zero[f] >= 2:

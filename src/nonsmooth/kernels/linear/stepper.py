@@ -14,7 +14,7 @@ from nonsmooth.kernels.linear.limits import sign_after
 from nonsmooth.kernels.linear.polynomial import NEVER, classify
 from nonsmooth.kernels.linear.search import FUNCTIONAL, SIDE, search
 from nonsmooth.kernels.linear.tables import NODES, STATES, states_of, width_of
-from nonsmooth.kernels.linear.values import NODE, bound_at, dense, slope_of, turn, value_of, whole_step
+from nonsmooth.kernels.linear.values import NODE, at_ends, bound_at, dense, turn, value_of, whole_step
 
 STEPPER = FORM, TABLES, WORK  # the types of this stepper's records: model, tables, work
 
@@ -89,10 +89,8 @@ def blocked(tables, work, mode, rows, lo, hi, h, w1):
     for r in range(lo, hi):
         f = rows[r, 0]
         sign = float(rows[r, 1])
-        g0 = sign * value_of(tables, mode, f, w)
-        g1 = sign * value_of(tables, mode, f, w1)
-        s0 = sign * slope_of(tables, mode, f, w)
-        s1 = sign * slope_of(tables, mode, f, w1)
+        g0, s0, g1, s1 = at_ends(tables, mode, f, w, w1)
+        g0, s0, g1, s1 = sign * g0, sign * s0, sign * g1, sign * s1
         if f < zero.shape[0] and zero[f] != 0:  # what it is not zero by is rounding, all the time
             g1 -= g0
             g0 = 0.0

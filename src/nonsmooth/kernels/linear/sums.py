@@ -79,6 +79,28 @@ def row_of(row, some, w, n, m):
     return total
 
 
+@device
+def ends_of(row, some, w, w1, n, m):
+    """Value and slope rows of a functional, which stand behind each other, at w and at w1."""
+    apart()
+    if whole_at(some, 0) > FEW:
+        slope = row + 8 * m
+        return (
+            row_of(row, some, w, n, m), row_of(slope, some, w, n, m), row_of(row, some, w1, n, m),
+            row_of(slope, some, w1, n, m),
+        )  # fmt: skip
+    g0, s0 = number_at(row, n), number_at(row, m + n)
+    g1, s1 = g0, s0
+    for j in range(n + 1, m):
+        a, b, x, y = number_at(row, j), number_at(row, m + j), number_at(w, j), number_at(w1, j)
+        g0, s0, g1, s1 = g0 + a * x, s0 + b * x, g1 + a * y, s1 + b * y
+    for q in range(1, whole_at(some, 0) + 1):
+        j = whole_at(some, q)
+        a, b, x, y = number_at(row, j), number_at(row, m + j), number_at(w, j), number_at(w1, j)
+        g0, s0, g1, s1 = g0 + a * x, s0 + b * x, g1 + a * y, s1 + b * y
+    return g0, s0, g1, s1
+
+
 @summed
 def spread(total, row, w, about, n):
     """total + sum_j row[j] |w[j] - about[j]| for j < n."""

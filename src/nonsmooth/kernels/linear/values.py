@@ -10,7 +10,7 @@ from math import fabs
 from nonsmooth.kernels.compile.cache import inline
 from nonsmooth.kernels.linear.bands import STEEP, along, by_series, expand
 from nonsmooth.kernels.linear.polynomial import horner
-from nonsmooth.kernels.linear.sums import at, composed, propagated, row_of, sizes_of, spread_of
+from nonsmooth.kernels.linear.sums import at, composed, ends_of, propagated, row_of, sizes_of, spread_of
 from nonsmooth.kernels.linear.tables import DEGREE, NODES, STATES, states_of, width_of
 
 EPS = 2.3e-16
@@ -56,6 +56,16 @@ def value_of(tables, mode, f, w):
 def slope_of(tables, mode, f, w):
     """Slope of functional f along the mode at w."""
     return row_at(tables, mode, f, width_of(tables.field), w)
+
+
+@inline
+def at_ends(tables, mode, f, w, w1):
+    """Value and slope of functional f at w, then at w1."""
+    if STATES == 0:
+        row, n, m = at(tables.fun, row_place(tables, mode, f)), states_of(tables.field), width_of(tables.field)
+        return ends_of(row, some_at(tables, mode, f, 1), at(w, 0), at(w1, 0), n, m)
+    g0, s0 = value_of(tables, mode, f, w), slope_of(tables, mode, f, w)
+    return g0, s0, value_of(tables, mode, f, w1), slope_of(tables, mode, f, w1)
 
 
 @inline
