@@ -79,10 +79,9 @@ def row_of(row, some, w, n, m):
     return total
 
 
-@device
+@inline
 def ends_of(row, some, w, w1, n, m):
     """Value and slope rows of a functional, which stand behind each other, at w and at w1."""
-    apart()
     if whole_at(some, 0) > FEW:
         slope = row + 8 * m
         return (
@@ -110,10 +109,21 @@ def spread(total, row, w, about, n):
 
 
 @device
-def spread_of(row, w, about, n):
-    """row[n] + sum_j row[j] |w[j] - about[j]| for j < n."""
+def wide_spread(row, w, about, n):
+    """row[n] + sum_j row[j] |w[j] - about[j]| for many j < n."""
     apart()
     return spread(number_at(row, n), row, w, about, n)
+
+
+@inline
+def spread_of(row, w, about, n):
+    """row[n] + sum_j row[j] |w[j] - about[j]| for j < n."""
+    if n > FEW:
+        return wide_spread(row, w, about, n)
+    total = number_at(row, n)
+    for j in range(n):
+        total += number_at(row, j) * fabs(number_at(w, j) - number_at(about, j))
+    return total
 
 
 @summed
