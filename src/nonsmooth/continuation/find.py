@@ -9,13 +9,12 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.branches.orbit import Orbit, orbit_of
-from nonsmooth.continuation.problems.anchor import anchor_at
 from nonsmooth.continuation.problems.multipliers import multipliers_of, nearest_to_one, stability
+from nonsmooth.continuation.problems.path import Walk
+from nonsmooth.continuation.problems.primitive import primitive
 from nonsmooth.continuation.problems.shooting import Shooting
-from nonsmooth.continuation.searches.primitive import primitive
 from nonsmooth.continuation.searches.search import search_within
 from nonsmooth.continuation.searches.settled import CLOSED, NEAR, Guess, forced_guesses, settle_forced, touching
-from nonsmooth.continuation.signature.path import Walk
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.arguments import check_system, real_number, whole_number
 from nonsmooth.flow.engines.methods import engine_for
@@ -153,7 +152,7 @@ def _polished(system: System, guesses: list[Guess], given: bool, unstable: bool,
         size = np.concatenate([guess.size, np.ones(shooting.n - len(guess.size))])
         name = _name(guess.period_number)
         search.doing = f"looking for a {name} orbit by Newton's method"
-        anchor_at(shooting, shooting.values, X[: shooting.n], size)
+        shooting.anchor(X[: shooting.n], shooting.values, size)
         left = shooting.evaluate(X).residual[: shooting.n]  # what the guess lacks to close
         solved = shooting.newton(X, _scale(shooting, size, guess.period), look=search.look)
         shorter = None if solved is None else primitive(shooting, solved, size)

@@ -9,13 +9,6 @@ if TYPE_CHECKING:
 
 __all__ = ["special_points"]
 
-#: Variables over ``point`` that describe the orbit at a special point too.
-_ORBIT = (
-    "section", "maximum", "minimum", "period", "floquet_multipliers", "stable", "virtual", "signature", "mode",
-    "clearance", "layout", "unknowns", "tangent",
-)  # fmt: skip
-
-
 def special_points(branch: Any) -> xr.Dataset:
     """Return the special points of a branch as a table of their own.
 
@@ -44,35 +37,20 @@ def special_points(branch: Any) -> xr.Dataset:
     """
     import xarray as xr
 
+    from nonsmooth.results.branches import EQUILIBRIUM, ORBIT, SPECIAL, SPECIAL_ORBIT, STEMS
+
     if not isinstance(branch, xr.Dataset):
         raise TypeError(f"special_points takes a branch, a result of continue_orbit; not {type(branch).__name__}")
     if "special_point" not in branch or "parameter" not in branch.attrs:
         raise ValueError("special_points takes a branch, a result of continue_orbit; this Dataset is another result")
     name = str(branch.attrs["parameter"])
-    if "eigenvalues" in branch:
-        return _of_equilibria(branch, name)
-    places = branch["special_point"].values
-    orbits = branch[list(_ORBIT)].isel(point=places).rename({"point": "special"})
-    table = orbits.reset_coords(name)
-    marks = {
-        stem: branch[f"special_{stem}"]
-        for stem in ("kind", "point", "indicator", "grazing", "sliding", "bounded", "doubled", "contact_multipliers",
-                     "determinant")
-    }  # fmt: skip
-    # The touched indicator is a word of each row, beside the dim of the clearances.
-    marks["touched"] = marks.pop("indicator")
-    table = table.assign({stem: variable.variable for stem, variable in marks.items()})
+    points, marks = (EQUILIBRIUM, SPECIAL) if "eigenvalues" in branch else (ORBIT, SPECIAL_ORBIT)
+    at = branch[[column.name for column in points]]
+    table = at.isel(point=branch["special_point"].values).rename({"point": "special"}).reset_coords(name)
+    table = table.assign({STEMS[column.name]: branch[column.name].variable for column in marks})
     if "special_period_number" in branch:  # branches of a bifurcation diagram
         table["period_number"], table["branch"] = (branch[f"special_{k}"].variable for k in ("period_number", "branch"))
-    else:
+    elif "period_number" in branch:
         table["period_number"] = branch["period_number"]
     table.attrs = dict(branch.attrs)
     return table[["kind", name, *[key for key in table.data_vars if key not in ("kind", name)]]]
-
-
-def _of_equilibria(branch: xr.Dataset, name: str) -> xr.Dataset:
-    table = branch[["u", "eigenvalues", "stable", "mode"]].isel(point=branch["special_point"].values)
-    table = table.rename({"point": "special"}).reset_coords(name)
-    table["kind"], table["point"] = branch["special_kind"].variable, branch["special_point"].variable
-    table.attrs = dict(branch.attrs)
-    return table[["kind", name, "u", "eigenvalues", "stable", "mode", "point"]]

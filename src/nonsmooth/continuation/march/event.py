@@ -8,19 +8,15 @@ from __future__ import annotations
 
 import warnings
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from nonsmooth.continuation.march.crossing import branch_point, tangents
+from nonsmooth.continuation.problems.curve import Point, branch_point, tangents
 from nonsmooth.continuation.problems.solve import determinant
-
-if TYPE_CHECKING:
-    from nonsmooth.continuation.march.arclength import Point
-    from nonsmooth.continuation.march.marches import March
 
 __all__ = ["BESIDE", "Crossing", "Event", "Fold", "Met", "Step", "first_met", "locate", "special_on"]
 
@@ -107,10 +103,6 @@ class Event(ABC):
         """Its name, and the ending where the branch ends there; None where the number vanished for another reason."""
         return self.name, None
 
-    def record(self, found: March, step: Step, met: Met) -> None:
-        """List the event."""
-        found.mark(met.name, step.curve, met.point, virtual=step.virtual and met.point.virtual)
-
 
 class Fold(Event):
     """The parameter turns: the last component of the tangent vanishes."""
@@ -194,7 +186,7 @@ def locate(step: Step, number: Callable[[Any], float]) -> tuple[float, Any] | No
     return s, known[s]
 
 
-def first_met(step: Step) -> list[Met] | None:
+def first_met(step: Step, boundaries: Sequence[Event]) -> list[Met] | None:
     """The first boundary on a step: all that is met there, what explains it best first.
 
     Beyond the place where an impact or a short visit ends the path also goes through the boundary, and the other way
@@ -202,7 +194,7 @@ def first_met(step: Step) -> list[Met] | None:
     """
     located: list[Met] = []
     passed = False
-    for kind, was, now in zip(step.curve.boundaries, *step.margins, strict=True):
+    for kind, was, now in zip(boundaries, *step.margins, strict=True):
         if not kind.happened(step, was, now):
             continue
         passed = True
@@ -223,14 +215,14 @@ def first_met(step: Step) -> list[Met] | None:
     return [met for met in located if met.s <= first + BESIDE]
 
 
-def special_on(step: Step) -> list[Met]:
+def special_on(step: Step, kinds: Sequence[Event]) -> list[Met]:
     """The special points before the stop of a step, in their order."""
     found: list[Met] = []
     curve, a, b = step.curve, step.a, step.b
     # At a change of equations the parameter may turn too: that belongs to the change. Where a branch closes its first
     # point has been looked at.
     stop = step.stop - {"change": BESIDE, "closed": CLOSING}.get(step.cause, 0.0)
-    for kind, was, now in zip(curve.kinds, *step.numbers, strict=True):
+    for kind, was, now in zip(kinds, *step.numbers, strict=True):
         if not kind.happened(step, was, now):
             continue
         there: tuple[float, Any] | None = kind.located(step)

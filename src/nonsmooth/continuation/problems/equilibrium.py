@@ -4,35 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nonsmooth.arrays import ComplexArray, FloatArray
-from nonsmooth.continuation.march.arclength import Curve, Point
-from nonsmooth.continuation.march.event import Crossing, Event, Fold, Met, Step
-from nonsmooth.continuation.march.marches import INTERRUPTED
-from nonsmooth.continuation.problems.multipliers import pairs
+from nonsmooth.continuation.problems.curve import Curve, Point
 from nonsmooth.flow.equilibria import ModeField, sorted_eigenvalues
-
-if TYPE_CHECKING:
-    from nonsmooth.continuation.march.marches import March
-    from nonsmooth.system.system import System
+from nonsmooth.system.system import System
 
 __all__ = ["Equilibria", "Rest"]
-
-COMMON = 1e-8  # of the states' scales: nearer than this two equilibria are one
-BEYOND = 1e-6  # along the branch: the first equilibrium behind a boundary
-ENDS = {
-    "range": "The branch reached the edge of the range.",
-    "points": "The largest number of points was reached.",
-    "no_convergence": "Newton's method did not converge, however small the step.",
-    "boundary": (
-        "The equilibrium meets the boundary of its mode, and no equilibrium of the mode beyond continues it: on the "
-        "other side it is virtual."
-    ),
-    "interrupted": f"{INTERRUPTED}.",
-}
 
 
 @dataclass
@@ -55,40 +35,6 @@ class Rest(Point):
     margins: FloatArray  # (n_transitions,) of the transitions out of the mode, -inf for the others
 
 
-class Hopf(Event):
-    """A pair of eigenvalues passes +-i omega; in a linear mode a focus becomes a centre."""
-
-    name = "hopf"
-
-    def number(self, curve: Any, point: Any) -> float:
-        """The product of all sums of two eigenvalues."""
-        if len(point.eigenvalues) < 2:
-            return 1.0
-        i, j = pairs(len(point.eigenvalues))
-        return float(np.prod(point.eigenvalues[i] + point.eigenvalues[j]).real)
-
-    def named(self, step: Step, point: Any) -> tuple[str, str | None] | None:
-        """None where the sum of two real eigenvalues vanishes."""
-        nearest = point.eigenvalues[np.argmin(np.abs(point.eigenvalues.real))]
-        if abs(nearest.imag) <= 1e-9:
-            return None
-        return ("focus_centre" if step.curve.linear else "hopf"), None
-
-
-class Edge(Event):
-    """The equilibrium reaches the boundary of its mode."""
-
-    name = "boundary_equilibrium"
-
-    def number(self, curve: Any, point: Any) -> float:
-        """The least distance to a transition."""
-        return float(curve.margins(point)[0])
-
-    def happened(self, step: Step, was: float, now: float) -> bool:
-        """Return whether the equilibrium leaves its mode on the step."""
-        return now < 0.0 < was
-
-
 class Equilibria(Curve[Rest]):
     """Zeros of one mode's vector field over one parameter.
 
@@ -102,9 +48,6 @@ class Equilibria(Curve[Rest]):
         Size of the parameter.
     """
 
-    kinds = (Fold(), Crossing(), Hopf())
-    boundaries = (Edge(),)
-    endings = ENDS
     most, longest, grows = 20, 1e6, np.inf
 
     def __init__(self, system: System, mode: int, parameter: str, width: float) -> None:
@@ -167,26 +110,3 @@ class Equilibria(Curve[Rest]):
     def at(self, u: FloatArray, value: float) -> Rest | None:
         """The equilibrium at a value of the parameter, by Newton from a state."""
         return self.at_parameter(np.append(u[self.own], value) / self.scale, value)
-
-    def behind(self, found: March, met: list[Met]) -> tuple[Equilibria, Rest] | None:
-        """Record the boundary; the equilibrium of the mode behind it, or None."""
-        found.mark(met[0].name, self, met[0].point)
-        after = self._beyond(met[0].point)
-        if after is None:
-            found.ending = "boundary"
-        return after
-
-    def _beyond(self, rest: Rest) -> tuple[Equilibria, Rest] | None:
-        """The equilibrium of the mode behind a boundary, where the two meet; None where there is none."""
-        jump = self.system.transitions[int(rest.margins.argmax())]
-        if jump.reset is not None or jump.target == self.mode:
-            return None
-        other = Equilibria(self.system, jump.target, self.parameter, self.width)
-        common = other.at(rest.u, rest.value)
-        if common is None or np.abs((common.u - rest.u) / self.system.scale_vector()).max() > COMMON:
-            return None
-        for one in (common.facing(1.0), common.facing(-1.0)):
-            first = other.step(one, BEYOND)
-            if first is not None and (first.margins <= 0.0).all():
-                return other, first
-        return None

@@ -19,24 +19,23 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
+from nonsmooth.continuation.problems.anchor import plane_across
+from nonsmooth.continuation.problems.signature import AT_ONCE, Signature
 from nonsmooth.continuation.problems.solve import solve
-from nonsmooth.continuation.problems.surfaces import divide
-from nonsmooth.continuation.signature.signature import AT_ONCE, Signature
 from nonsmooth.flow.saltation import chained
-from nonsmooth.flow.variational import VariationalFlow
-
-if TYPE_CHECKING:
-    from nonsmooth.flow.variational import Jump, Segments
-    from nonsmooth.system.system import System
+from nonsmooth.flow.variational import Jump, Segments, VariationalFlow
+from nonsmooth.system.system import System
 
 __all__ = ["Shooting", "Solved"]
 
 ROUNDING = 1e-16  # of the period
+SHORT = 1e-6  # of the period: a visit shorter than this is divided by its series
+SAME = 1e-12  # of their sizes: gradients and values of one surface
 
 
 @dataclass
@@ -131,6 +130,48 @@ class Shooting:
                 kept.append(j)
         return kept
 
+    def prepare(self, X: FloatArray, size: FloatArray) -> None:
+        """Anchor the orbit at X, and look at the surfaces there."""
+        self.anchor(X[: self.n], self.parameters(X), size)
+        self._look_at_surfaces(X)
+
+    def anchor(self, z: FloatArray, values: FloatArray, size: FloatArray) -> None:
+        """Put the phase condition of an orbit without forcing and transitions through z; others need none."""
+        if not self.forced and not self.m:
+            field = self.flow.segments(values, [self.at_section], [0.0], [0.0], z[None, :]).f_begin[0]
+            self.reference = plane_across(z, field, size)
+
+    def _look_at_surfaces(self, X: FloatArray) -> None:
+        """Find surfaces that coincide at X.
+
+        Exits through the surface of the entry are ``divided``: a visit of no length solves their equations too. Rows
+        of one condition that vanish together leave the crossing ``alone``: they are no corner of it.
+        """
+        visits = self.signature.visits
+        times, z = self.split(X)
+        values = self.parameters(X)
+        traced = self.system.traced
+        for i, (k, row, at, _) in enumerate(self.jumps):
+            n_rows = len(traced.transitions[k].rows)
+            if at is None and n_rows > 1 and not self.at_once[i]:
+                found = [self.flow.jump(values, k, float(times[i]), z[i + 1], r) for r in range(n_rows)]
+                signs = [r.sign for r in traced.transitions[k].rows]
+                self.alone[i] = all(
+                    _coincide(signs[row] * found[row].h_z, signs[row] * found[row].h, signs[r] * one.h_z,
+                              signs[r] * one.h, z[i + 1])
+                    for r, one in enumerate(found) if r != row
+                )  # fmt: skip
+        for i in range(1, self.m):
+            k, row, at, _ = self.jumps[i]
+            k0, row0, at0, _ = self.jumps[i - 1]
+            if at is not None or at0 is not None or self.at_once[i]:
+                continue
+            entry = self.flow.jump(values, k0, float(times[i - 1]), z[i], row0)
+            leave = self.flow.jump(values, k, float(times[i - 1]), z[i], row)
+            side = 1.0 if visits[i].mode == visits[i - 1].mode else -1.0  # from impact to impact, or in and out
+            kept = _coincide(entry.h_z, entry.h, entry.h_z @ entry.R[: self.n, : self.n], entry.h, z[i])
+            self.divided[i] = kept and _coincide(entry.h_z, entry.h, side * leave.h_z, side * leave.h, z[i])
+
     def split(self, X: FloatArray) -> tuple[FloatArray, FloatArray]:
         """(instants t_1 ... t_m, states z_0 ... z_m)."""
         return X[self.t_at], X[self._columns]
@@ -206,7 +247,7 @@ class Shooting:
                 J[r, r] = 1.0
                 J[r, size:] = -(turn + phase) * dT - T * slopes
             elif self.divided[i]:
-                divide(self, i, F, J, r, values, times, z)
+                self._divide(i, F, J, r, values, times, z)
         J.ravel()[self._after] = 1.0
         # Closure
         F[:n] = segments.z[m] - z[0]
@@ -254,6 +295,36 @@ class Shooting:
         F[last] = f_ref @ (z0 - z_ref)
         J[last, : self.n] = f_ref
 
+    def _divide(
+        self, i: int, F: FloatArray, J: FloatArray, r: int, values: FloatArray, times: FloatArray, z: FloatArray
+    ) -> None:  # fmt: skip
+        """Divide row r, the equation of the exit i through the surface of the entry, by the length of the visit.
+
+        h(end) / tau = (h(end) - h(begin)) / tau, with h(begin) = 0 by the entry's own equation: the root tau = 0, where
+        the visit has not begun, is taken out. For a short visit it is the series L_f h + tau L_f^2 h / 2.
+        """
+        n, size = self.n, self.size
+        k, row, _, _ = self.jumps[i]
+        indicator = self.system.traced.transitions[k].rows[row].indicator
+        mode, t0, tau = int(self.modes[i]), float(times[i]), float(times[i + 1] - times[i])
+        touch = self.flow.indicator(values, indicator, mode, t0, z[i])
+        ti, tb, zb = self.t_at[i], self.t_at[i - 1], self.z_at[i]
+        if abs(tau) < SHORT * (times[-1] or 1.0):
+            F[r] = touch.L + 0.5 * tau * touch.L2
+            J[r] = 0.0
+            J[r, zb : zb + n] = touch.L_z
+            J[r, tb] = touch.L_t - 0.5 * touch.L2
+            J[r, ti] = 0.5 * touch.L2
+            J[r, size:] = touch.L_p
+            return
+        F[r] = (F[r] - touch.h) / tau
+        J[r, zb : zb + n] -= touch.h_z
+        J[r, tb] -= touch.h_t
+        J[r, size:] -= touch.h_p
+        J[r] /= tau
+        J[r, ti] -= F[r] / tau
+        J[r, tb] += F[r] / tau
+
     def newton(
         self, X: FloatArray, scale: FloatArray, *, tolerance: float = 1e-12, most: int = 30,
         look: Callable[[], Any] | None = None,
@@ -289,3 +360,12 @@ class Shooting:
     def at_section(self) -> int:
         """The mode at the section."""
         return self.signature.visits[0].mode
+
+
+def _coincide(a: FloatArray, h: float, b: FloatArray, g: float, z: FloatArray) -> bool:
+    """Return whether two indicators with gradients a, b and values h, g near z are one, but for a positive factor."""
+    size = float(np.sqrt((a @ a) * (b @ b)))
+    if size == 0.0 or float(a @ b) < (1.0 - SAME) * size:
+        return False
+    ratio = float(np.sqrt((b @ b) / (a @ a)))
+    return bool(abs(g - ratio * h) <= SAME * (np.abs(b * z).max() + abs(g)))

@@ -15,13 +15,12 @@ name                    with it      without    at the bifurcation
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
-    from nonsmooth.system.system import System
+from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
+from nonsmooth.system.system import System
 
 __all__ = ["sliding_bifurcation"]
 
