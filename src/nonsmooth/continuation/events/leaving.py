@@ -96,13 +96,11 @@ class AlongOrbits(Policy):
 
     def behind(self, found: March, curve: Orbits, met: list[Met]) -> tuple[Orbits, OrbitPoint] | None:
         """Record a change of signature and begin anew behind it; None where the branch ends."""
-        for one in met:
-            if one.kind.at_section(curve, one.point):
-                after = past_the_section(curve, one.point)
-                if after is None:
-                    found.ending = "no_convergence"
-                return after
         first = met[0]
+        if len(met) == 1 and first.kind.at_section(curve, first.point):
+            after = past_the_section(curve, first.point)
+            if after is not None and (after[1].path.margins[1:] > 0.0).all():
+                return after  # else another boundary is met with the section
         beyond = beside(curve, first.point, contacts_of(curve, met))
         reached = [one.kind.surface(curve, one.point, beyond[0]) for one in met] if beyond is not None else []
         if any(is_tolerance(curve, indicator) for indicator in reached):

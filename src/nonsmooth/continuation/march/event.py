@@ -163,7 +163,7 @@ def locate(step: Step, number: Callable[[Any], float]) -> tuple[float, Any] | No
     if at_ends[0] * at_ends[1] > 0.0 and abs(at_ends[0]) < BEGUN * abs(at_ends[1]):
         return 0.0, step.a  # the branch begins at the event itself
     known: dict[float, Point] = {0.0: step.a, step.end: step.b}
-    nothing = ROUNDING * max((abs(x) for x in at_ends if np.isfinite(x)), default=1.0)
+    nothing = ROUNDING * max((min(abs(x), LARGEST) for x in at_ends if np.isfinite(x)), default=1.0)
 
     def value(s: float) -> float:
         if s not in known:

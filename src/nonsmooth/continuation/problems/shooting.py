@@ -17,7 +17,6 @@ f_ref (z_0 - z_ref) = 0).
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,7 +25,7 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.problems.anchor import plane_across
 from nonsmooth.continuation.problems.signature import AT_ONCE, Signature
-from nonsmooth.continuation.problems.solve import solve
+from nonsmooth.continuation.problems.surfaces import coincide, mean_along, one_surface
 from nonsmooth.flow.saltation import chained
 from nonsmooth.flow.variational import Jump, Segments, VariationalFlow
 from nonsmooth.system.system import System
@@ -34,8 +33,8 @@ from nonsmooth.system.system import System
 __all__ = ["Shooting", "Solved"]
 
 ROUNDING = 1e-16  # of the period
-SHORT = 1e-6  # of the period: a visit shorter than this is divided by its series
-SAME = 1e-12  # of their sizes: gradients and values of one surface
+SHORT = (0.0, 1e-6, 1e-2)  # of the period, by order: of a shorter visit the mean is taken in place of the quotient
+ON = 1e-6  # of an indicator's size: a state as near to a surface is on it
 
 
 @dataclass
@@ -106,9 +105,8 @@ class Shooting:
         after = self._columns[1:].ravel()  # the states after the transitions, in their own equations
         self._after = after * (self.size + a) + after
         self.reference: tuple[FloatArray, FloatArray] | None = None  # autonomous, no crossings: (z_ref, f_ref)
-        self.tried: Solved | None = None
         self.alone = [False] * m  # crossings whose other rows vanish together with the one that fires
-        self.divided = [False] * m  # exits whose equation is divided by the length of the visit
+        self.divided = [0] * m  # the power of the visit's length by which the equations of exits are divided
 
     def _constants(self) -> list[int]:
         """Components of z that no visit moves and no transition sets."""
@@ -147,7 +145,6 @@ class Shooting:
         Exits through the surface of the entry are ``divided``: a visit of no length solves their equations too. Rows
         of one condition that vanish together leave the crossing ``alone``: they are no corner of it.
         """
-        visits = self.signature.visits
         times, z = self.split(X)
         values = self.parameters(X)
         traced = self.system.traced
@@ -157,20 +154,41 @@ class Shooting:
                 found = [self.flow.jump(values, k, float(times[i]), z[i + 1], r) for r in range(n_rows)]
                 signs = [r.sign for r in traced.transitions[k].rows]
                 self.alone[i] = all(
-                    _coincide(signs[row] * found[row].h_z, signs[row] * found[row].h, signs[r] * one.h_z,
+                    coincide(signs[row] * found[row].h_z, signs[row] * found[row].h, signs[r] * one.h_z,
                               signs[r] * one.h, z[i + 1])
                     for r, one in enumerate(found) if r != row
                 )  # fmt: skip
-        for i in range(1, self.m):
-            k, row, at, _ = self.jumps[i]
-            k0, row0, at0, _ = self.jumps[i - 1]
-            if at is not None or at0 is not None or self.at_once[i]:
-                continue
-            entry = self.flow.jump(values, k0, float(times[i - 1]), z[i], row0)
-            leave = self.flow.jump(values, k, float(times[i - 1]), z[i], row)
-            side = 1.0 if visits[i].mode == visits[i - 1].mode else -1.0  # from impact to impact, or in and out
-            kept = _coincide(entry.h_z, entry.h, entry.h_z @ entry.R[: self.n, : self.n], entry.h, z[i])
-            self.divided[i] = kept and _coincide(entry.h_z, entry.h, side * leave.h_z, side * leave.h, z[i])
+        for i in range(0 if self.forced and self.m > 1 else 1, self.m):
+            if self.jumps[i][2] is self.jumps[i - 1][2] is None and not (self.at_once[i] or self.at_once[i - 1]):
+                self.divided[i] = self._order(i, values, float(times[i - 1]), z[i or -1])
+
+    def _order(self, i: int, values: FloatArray, t: float, z: FloatArray) -> int:
+        """The order to which the equation of exit i vanishes by itself where the visit before it has no length.
+
+        1: exit and entry lie in one surface. 2: the visit leaves a mode that holds the surface (a slip from sticking),
+        and begins where the surface's rate vanishes: h and L_f h are zero there by the equations before."""
+        k, row, _, _ = self.jumps[i]
+        k0, row0, _, _ = self.jumps[i - 1]  # of the first exit it is the last of the round
+        n, indicator = self.n, self.system.traced.transitions[k].rows[row].indicator
+        entry = self.flow.jump(values, k0, t, z, row0)
+        touch = self.flow.indicator(values, indicator, int(self.modes[i]), t, z)
+        held = self.flow.indicator(values, indicator, int(self.modes[i - 1]), t, z)
+        x = np.concatenate([z, [t], values[self.places]])
+        enters, leaves = (np.concatenate([one.h_z, [one.h_t], one.h_p]) for one in (entry, touch))
+        rate, keeps = (np.concatenate([one.L_z, [one.L_t], one.L_p]) for one in (touch, held))
+        signs = [self.system.traced.transitions[j].rows[r].sign for j, r in ((k0, entry.row), (k, row))]
+        # In and out by the two sides of a surface, or from impact to impact on one of them
+        side = signs[0] * signs[1] * (1.0 if self.modes[i - 1] == self.modes[i] else -1.0)
+        if i and coincide(entry.h_z, entry.h, entry.h_z @ entry.R[:n, :n], entry.h, z) and coincide(
+            enters, entry.h, side * leaves, side * touch.h, x
+        ):
+            return 1
+        size = float(np.abs(touch.h_z) @ self.flow.scale)
+        holds = not keeps.any() or one_surface(leaves, touch.h, keeps, held.L, x)
+        if abs(touch.h) > ON * size or (entry.R[:n, :n] != self._one).any() or not holds:
+            return 0
+        across = np.eye(len(x)) - np.outer(leaves, leaves) / float(leaves @ leaves)
+        return 2 if one_surface(across @ enters, entry.h, across @ rate, touch.L, x) else 0
 
     def split(self, X: FloatArray) -> tuple[FloatArray, FloatArray]:
         """(instants t_1 ... t_m, states z_0 ... z_m)."""
@@ -297,75 +315,37 @@ class Shooting:
 
     def _divide(
         self, i: int, F: FloatArray, J: FloatArray, r: int, values: FloatArray, times: FloatArray, z: FloatArray
-    ) -> None:  # fmt: skip
-        """Divide row r, the equation of the exit i through the surface of the entry, by the length of the visit.
+    ) -> None:
+        """Divide row r, the equation of the exit i, by the power of the visit's length to which it vanishes by itself.
 
-        h(end) / tau = (h(end) - h(begin)) / tau, with h(begin) = 0 by the entry's own equation: the root tau = 0, where
-        the visit has not begun, is taken out. For a short visit it is the series L_f h + tau L_f^2 h / 2.
+        With the terms that are zero by the equations before taken out, (h(end) - h) / tau or (h(end) - h - tau L_f h) /
+        tau^2, the root tau = 0, where the visit has not begun, is gone. For a short visit both are means of derivatives
+        along it, without cancellation: of L_f h, and of (1 - s) L_f^2 h.
         """
-        n, size = self.n, self.size
+        n, order, entry = self.n, self.divided[i], i or self.m  # the first visit begins before the section
+        tau = float(times[i + 1] - times[entry]) + (0.0 if i else float(times[-1]))
         k, row, _, _ = self.jumps[i]
-        indicator = self.system.traced.transitions[k].rows[row].indicator
-        mode, t0, tau = int(self.modes[i]), float(times[i]), float(times[i + 1] - times[i])
-        touch = self.flow.indicator(values, indicator, mode, t0, z[i])
-        ti, tb, zb = self.t_at[i], self.t_at[i - 1], self.z_at[i]
-        if abs(tau) < SHORT * (times[-1] or 1.0):
-            F[r] = touch.L + 0.5 * tau * touch.L2
-            J[r] = 0.0
-            J[r, zb : zb + n] = touch.L_z
-            J[r, tb] = touch.L_t - 0.5 * touch.L2
-            J[r, ti] = 0.5 * touch.L2
-            J[r, size:] = touch.L_p
+        visit = int(self.modes[i]), self.system.traced.transitions[k].rows[row].indicator, order
+        zb, size = self.z_at[entry], self.size
+        begin, inner = slice(zb - 1, zb + n), np.zeros(J.shape[1])  # of its unknowns; slope of its length
+        inner[self.t_at[i]], inner[zb - 1] = 1.0, -1.0
+        if not i:
+            inner[size:] = self.period_number * self.flow.period(values)[1]
+        if abs(tau) < SHORT[order] * (times[-1] or 1.0):
+            x = np.concatenate([times[entry : entry + 1], z[entry], [tau], values[self.places]])
+            F[r], slopes = mean_along(self.flow, x, values, self.places, *visit)
+            J[r] = slopes[n + 1] * inner
+            J[r, begin] += slopes[: n + 1]
+            J[r, size:] += slopes[n + 2 :]
             return
-        F[r] = (F[r] - touch.h) / tau
-        J[r, zb : zb + n] -= touch.h_z
-        J[r, tb] -= touch.h_t
-        J[r, size:] -= touch.h_p
-        J[r] /= tau
-        J[r, ti] -= F[r] / tau
-        J[r, tb] += F[r] / tau
-
-    def newton(
-        self, X: FloatArray, scale: FloatArray, *, tolerance: float = 1e-12, most: int = 30,
-        look: Callable[[], Any] | None = None,
-    ) -> Solved | None:  # fmt: skip
-        """Solve at fixed parameters; None where it does not converge. ``look`` is called before each iteration.
-
-        The last iterate stays in ``tried``: what it was that did not converge."""
-        X = X.copy()
-        size = self.size
-        last = np.inf
-        for i in range(most):
-            if look is not None:
-                look()
-            solved = self.tried = self.evaluate(X)
-            if not np.isfinite(solved.residual).all():
-                return None
-            try:
-                step = solve(solved.jacobian[:, :size] * scale[:size], -solved.residual)
-            except np.linalg.LinAlgError:
-                return None
-            length = float(np.abs(step).max())
-            if not np.isfinite(length):
-                return None
-            if length < tolerance or (i > 3 and length < 1e-9 and length > 0.5 * last):
-                return solved
-            if length > 0.5:
-                step *= 0.5 / length
-            X[:size] += scale[:size] * step
-            last = length
-        return None
+        at = self.flow.indicator(values, visit[1], visit[0], float(times[entry]), z[entry])
+        for h, h_t, h_z, h_p in ((at.h, at.h_t, at.h_z, at.h_p), (at.L, at.L_t, at.L_z, at.L_p))[:order]:
+            F[r] = (F[r] - h) / tau
+            J[r, begin] -= np.concatenate([[h_t], h_z])
+            J[r, size:] -= h_p
+            J[r] = (J[r] - F[r] * inner) / tau
 
     @property
     def at_section(self) -> int:
         """The mode at the section."""
         return self.signature.visits[0].mode
-
-
-def _coincide(a: FloatArray, h: float, b: FloatArray, g: float, z: FloatArray) -> bool:
-    """Return whether two indicators with gradients a, b and values h, g near z are one, but for a positive factor."""
-    size = float(np.sqrt((a @ a) * (b @ b)))
-    if size == 0.0 or float(a @ b) < (1.0 - SAME) * size:
-        return False
-    ratio = float(np.sqrt((b @ b) / (a @ a)))
-    return bool(abs(g - ratio * h) <= SAME * (np.abs(b * z).max() + abs(g)))
