@@ -11,7 +11,7 @@ import numpy as np
 
 from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.continuation.branches.reading import layouts_of, recorded, undamaged
-from nonsmooth.continuation.problems.multipliers import multipliers_of, stability, stable_by
+from nonsmooth.continuation.problems.multipliers import stability, stable_by
 from nonsmooth.continuation.problems.path import Path
 from nonsmooth.continuation.problems.shooting import Shooting, Solved
 from nonsmooth.continuation.problems.signature import Signature
@@ -205,7 +205,7 @@ def orbit_of(shooting: Shooting, solved: Solved, path: Path, clearance: FloatArr
     times, states = shooting.split(X)
     n_u = len(system.states)
     M = solved.monodromy
-    multipliers = multipliers_of(M)
+    multipliers = solved.multipliers
     return Orbit(
         system=system, u=states[0, :n_u].copy(), mode=system.modes[shooting.at_section],
         memory=states[0, n_u:].copy(), period=float(solved.times[-1]), period_number=shooting.period_number,

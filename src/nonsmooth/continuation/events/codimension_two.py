@@ -108,6 +108,10 @@ class Cusp(Event):
         """Return whether the direction of the parameters turns on the step."""
         return float(step.a.tangent[-2:] @ step.b.tangent[-2:]) < 0.0
 
+    def confirmed(self, curve: Any, point: Any, was: float, now: float) -> bool:
+        """Return True: it has no number of its own."""
+        return True
+
     def located(self, step: Step) -> tuple[float, Any] | None:
         """The zero of the direction's component along the earlier one."""
         before = step.a.tangent[-2:]

@@ -25,6 +25,7 @@ __all__ = ["ENDINGS", "AlongOrbits"]
 FARTHEST = 0.1  # along the branch: the end of a signature is not looked for from farther behind it
 WITHIN = 1e-9  # of the range: as near as an event is located that only simulations show
 AHEAD = 1e-6  # of the range
+WAITS = 1e-3  # along the branch: an orbit whose section changes less is only longer, the parameter by the square of it
 #: How a branch can end, with the sentence for each.
 ENDINGS = {
     "range": "The branch reached the edge of the range.",
@@ -54,6 +55,10 @@ ENDINGS = {
         "the same instant."
     ),
     "interrupted": INTERRUPTED + "; continue the branch with continue_orbit(branch).",
+    "homoclinic": (
+        "The period grows beyond all bounds while states and parameter stand: the cycle ends in a homoclinic (or "
+        "heteroclinic) orbit, a connection of equilibria beside which it waits ever longer."
+    ),
 }
 
 
@@ -117,8 +122,13 @@ class AlongOrbits(Policy):
         return beyond
 
     def over(self, curve: Orbits, point: OrbitPoint) -> str | None:
-        """Return ``equilibrium`` where an autonomous orbit has all but shrunk to one."""
-        return "equilibrium" if curve.swing(point) < SMALL else None
+        """Return ``equilibrium`` where an autonomous orbit has all but shrunk to one, ``homoclinic`` where it only
+        grows longer: states and parameter stand, beside an equilibrium it waits for ever."""
+        shooting, along = curve.shooting, np.abs(point.tangent)
+        if curve.swing(point) < SMALL:
+            return "equilibrium"
+        stands = along[-1] < WAITS**2 and along[shooting.z_at[0] : shooting.z_at[0] + shooting.n].max() < WAITS
+        return "homoclinic" if not shooting.forced and stands and point.tangent[shooting.size - 1] > 0.0 else None
 
     def why(self, curve: Orbits, point: OrbitPoint) -> str:
         """Return ``physical`` where the equations do not allow the parameter ahead."""

@@ -28,6 +28,7 @@ CLOSING = 1e-4  # along the branch: nearer to its first point than this is that 
 TURN = 1e-4  # along the branch: a fold nearer to a crossing of branches than this is that crossing
 ABOUT = 1e-2  # along the branch: steps are short beside a crossing of branches, and its first place is rough
 TURNS = 1e-5  # of the other tangent's component in the parameter: smaller than this is zero
+SURE = 1e-3  # of the numbers at both ends: one larger than this at its root has jumped there
 SAME = 1e-9  # of the numbers at both ends: smaller than this at the place of another event is the same event
 
 
@@ -103,6 +104,10 @@ class Event(ABC):
         """Its name, and the ending where the branch ends there; None where the number vanished for another reason."""
         return self.name, None
 
+    def confirmed(self, curve: Any, point: Any, was: float, now: float) -> bool:
+        """Return whether the number does vanish at the corrected point: noise changes its sign elsewhere too."""
+        return abs(self.number(curve, point)) <= SURE * max(abs(was), abs(now))
+
 
 class Fold(Event):
     """The parameter turns: the last component of the tangent vanishes."""
@@ -131,6 +136,10 @@ class Crossing(Event):
             return self.name, None
         least, most = sorted(np.abs(both[:, -1]))
         return ("pitchfork" if least < TURNS * most else "transcritical"), None
+
+    def confirmed(self, curve: Any, point: Any, was: float, now: float) -> bool:
+        """Return True: its place solves equations of its own."""
+        return True
 
     def located(self, step: Step) -> tuple[float, Any] | None:
         """The zero of the determinant itself, made exact by a system that is regular there."""
@@ -234,7 +243,11 @@ def special_on(step: Step, kinds: Sequence[Event]) -> list[Met]:
                     "met but not located, and is not listed",
                     RuntimeWarning, stacklevel=2,
                 )  # fmt: skip
-        elif there[0] <= stop and (named := kind.named(step, there[1])) is not None:
+        elif (
+            there[0] <= stop
+            and kind.confirmed(curve, there[1], was, now)
+            and (named := kind.named(step, there[1])) is not None
+        ):
             found.append(Met(kind, *there, *named))
     # A branch that crosses another one where the parameter turns is one event, not two.
     crossings = [met.s for met in found if isinstance(met.kind, Crossing)]

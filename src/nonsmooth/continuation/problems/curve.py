@@ -288,7 +288,7 @@ class Curve(ABC, Generic[P]):
 def passing(Y: FloatArray, a: FloatArray, b: FloatArray) -> float | None:
     """The part of the step from a to b after which it goes through Y, as nearly as a chord follows a curve, or None."""
     step = b - a
-    x = float(step @ (Y - a)) / float(step @ step)
+    x = float(step @ (Y - a)) / max(float(step @ step), 1e-300)
     return x if 1e-9 < x <= 1.0 and float(np.abs(Y - a - x * step).max()) < 0.3 * float(np.abs(step).max()) else None
 
 

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.continuation.problems.multipliers import multipliers_of, product_of_pairs, without_own
+from nonsmooth.continuation.problems.multipliers import product_of_pairs, without_own
 from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
 from nonsmooth.continuation.problems.shooting import Shooting, Solved
 from nonsmooth.continuation.problems.solve import determinant
@@ -73,7 +73,7 @@ class Locus(Orbits):
         M = solved.monodromy
         if self.kind == "flip":
             return float(np.linalg.det(M + self._eye))
-        return product_of_pairs(without_own(multipliers_of(M), self.shooting.forced))
+        return product_of_pairs(without_own(solved.multipliers, self.shooting.forced))
 
     def calibrate(self, Y: FloatArray) -> None:
         """Choose the unit of psi so that its gradient is of order one."""

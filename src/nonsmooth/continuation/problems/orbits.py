@@ -12,7 +12,6 @@ import numpy as np
 from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.continuation.problems.anchor import plane_across
 from nonsmooth.continuation.problems.curve import Curve, Point
-from nonsmooth.continuation.problems.multipliers import multipliers_of
 from nonsmooth.continuation.problems.path import Path, Walk
 from nonsmooth.continuation.problems.rounds import Rounds
 from nonsmooth.continuation.problems.shooting import Shooting, Solved
@@ -108,7 +107,7 @@ class Orbits(Curve[OrbitPoint]):
         path = self.walk.along(solved, self.shooting.split(solved.X)[1])
         if path is None or not np.isfinite(M).all():
             return None
-        return OrbitPoint(Y, tangent, orientation, iterations, solved, M, multipliers_of(M), path)
+        return OrbitPoint(Y, tangent, orientation, iterations, solved, M, solved.multipliers, path)
 
     def word(self) -> Signature:
         """The signature."""

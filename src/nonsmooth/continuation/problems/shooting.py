@@ -22,8 +22,9 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.arrays import FloatArray
+from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.continuation.problems.anchor import plane_across
+from nonsmooth.continuation.problems.multipliers import multipliers_of
 from nonsmooth.continuation.problems.signature import AT_ONCE, Signature
 from nonsmooth.continuation.problems.surfaces import coincide, mean_along, one_surface
 from nonsmooth.flow.saltation import chained
@@ -50,6 +51,7 @@ class Solved:
     values: FloatArray
     free: list[int]
     at_once: list[bool]  # (m,) transitions at the instant of the one before
+    forced: bool
 
     @property
     def monodromy(self) -> FloatArray:
@@ -66,6 +68,16 @@ class Solved:
             M = M.copy()
             M[self.free], M[:, self.free] = 0.0, 0.0
         return np.asarray(M)
+
+    @property
+    def multipliers(self) -> ComplexArray:
+        """Floquet multipliers; the determinant is that of the pieces, which loses no digits in their product."""
+        M = self.monodromy
+        if self.free or len(M) != 2 or not np.isfinite(M).all() or any(self.at_once):
+            return multipliers_of(M)
+        jumps = np.prod([np.linalg.det(jump.saltation) for jump in self.jumps])
+        det = float(jumps) * float(np.exp(self.segments.divergence.sum()))
+        return multipliers_of(M, det, forced=self.forced)
 
 
 class Shooting:
@@ -284,7 +296,7 @@ class Shooting:
         if not self.forced:
             J[:n, size - 1] += segments.f_end[m]
             self._anchor(F, J, X, t, z[0])
-        return Solved(X, F, J, times, segments, jumps, values, self.free, self.at_once)
+        return Solved(X, F, J, times, segments, jumps, values, self.free, self.at_once, self.forced)
 
     def _transition(self, jump: Jump, D: FloatArray) -> FloatArray:
         """Derivatives of the condition and of -R at a transition, by those of the state before it."""
