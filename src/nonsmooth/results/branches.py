@@ -16,8 +16,8 @@ from nonsmooth.results.schema import floats, parameter_coords, quantity_attribut
 from nonsmooth.results.statuses import flag_attributes
 
 __all__ = [
-    "CURVE", "EQUILIBRIUM", "FOUND", "ORBIT", "SPECIAL", "SPECIAL_ORBIT", "STEMS", "Column", "attributes", "diagram",
-    "line",
+    "CURVE", "EQUILIBRIUM", "FOUND", "ORBIT", "SPECIAL", "SPECIAL_EQUILIBRIUM", "SPECIAL_ORBIT", "STEMS", "Column",
+    "attributes", "diagram", "line",
 ]  # fmt: skip
 
 
@@ -72,15 +72,21 @@ SPECIAL_ORBIT = (
 )  # fmt: skip
 #: Names in the table of special points.
 STEMS = {column.name: column.name.removeprefix("special_") for column in SPECIAL_ORBIT}
-STEMS["special_indicator"] = "touched"  # a word of each row, beside the dim of the clearances
+STEMS |= {"special_boundary": "boundary", "special_indicator": "touched"}  # beside the dim of the clearances
 CURVE = tuple(c for c in ORBIT if c.name in ("section", "maximum", "minimum", "period", "floquet_multipliers"))
 EQUILIBRIUM = (
-    Column("u", "u", ("state",), "", "equilibrium"),
+    Column("u", "u", ("state",), "", "equilibrium (the middle of a set of equilibria)"),
+    Column("u_lower", "lower", ("state",), "", "smallest value over the set of equilibria"),
+    Column("u_upper", "upper", ("state",), "", "largest value over the set of equilibria"),
     Column("eigenvalues", "eigenvalues", ("eigenvalue",), "complex", "eigenvalues"),
     Column("stable", "stable", (), "flag", "all real parts negative"),
     Column("mode", "mode", (), "mode", "mode"),
 )  # fmt: skip
 SPECIAL = SPECIAL_ORBIT[:2]
+SPECIAL_EQUILIBRIUM = (
+    *SPECIAL,
+    Column("special_boundary", "grazing", (), "text", "persistence or non-smooth fold at the boundary of a mode"),
+)
 #: What `find_orbit` gives, without a first dim.
 FOUND = (
     Column("section", "u", ("state",), "", "state at the section"),

@@ -62,7 +62,9 @@ class RestRecord:
     """One equilibrium of a branch."""
 
     value: float
-    u: FloatArray
+    u: FloatArray  # of a set its middle
+    lower: FloatArray
+    upper: FloatArray
     eigenvalues: ComplexArray
     stable: bool
     mode: int
@@ -90,8 +92,8 @@ def record_of(row: Row) -> Any:
     """The record of a solved point of a branch."""
     curve, point = row.curve, row.point
     if isinstance(curve, Equilibria):
-        stable = bool((point.eigenvalues.real < 0).all())
-        record: Any = RestRecord(point.value, point.u, point.eigenvalues, stable, curve.mode)
+        low, high = np.min(point.ends, axis=0), np.max(point.ends, axis=0)
+        record: Any = RestRecord(point.value, point.u, low, high, point.eigenvalues, curve.stable(point), curve.mode)
     else:
         record = _of_orbit(row)
     if row.kind:
@@ -118,7 +120,9 @@ def _mark(row: Row) -> SpecialRecord:
     mark = SpecialRecord(row.kind, sliding=row.sliding)
     if row.indicator >= 0:
         mark.indicator = list(row.curve.shooting.system.indicators)[row.indicator]
-    if row.graze is not None:
+    if isinstance(row.graze, str):  # of equilibria
+        mark.grazing = row.graze
+    elif row.graze is not None:
         g, one = row.graze, np.eye(len(row.graze.M_free))
         mark.grazing, mark.bounded, mark.doubled, mark.contact = g.kind, g.bounded, g.doubled, g.multipliers_contact
         both = (g.M_free, g.M_contact)

@@ -8,13 +8,15 @@ import numpy as np
 
 from nonsmooth.continuation.march.event import Crossing, Event, Fold, Met, Step
 from nonsmooth.continuation.march.march import INTERRUPTED, March, Policy
-from nonsmooth.continuation.problems.equilibrium import Equilibria, Rest
+from nonsmooth.continuation.problems.equilibrium import Equilibria, Rest, set_near
 from nonsmooth.continuation.problems.multipliers import pairs
 
-__all__ = ["AlongEquilibria"]
+__all__ = ["AlongEquilibria", "beyond"]
 
 COMMON = 1e-8  # of the states' scales: nearer than this two equilibria are one
 BEYOND = 1e-6  # along the branch: the first equilibrium behind a boundary
+NEAR = 1e-4  # of the states' scales: the ends of a set so little behind a boundary are as near
+MEETS = 1e-9  # of an indicator: a condition farther from holding is not met
 
 
 class Hopf(Event):
@@ -68,25 +70,40 @@ class AlongEquilibria(Policy):
     }
 
     def behind(self, found: March, curve: Equilibria, met: list[Met]) -> tuple[Equilibria, Rest] | None:
-        """Record the boundary; the equilibrium of the mode behind it, or None."""
-        found.mark(met[0].name, curve, met[0].point)
-        after = _beyond(curve, met[0].point)
+        """Record the boundary, and whether the branch goes on behind it or turns back; the equilibrium there, or None.
+
+        Persistence: on the other side of the boundary lies an equilibrium of the mode beyond. Non-smooth fold: it lies
+        on the same side, and both meet and vanish."""
+        rest = met[0].point
+        after = beyond(curve, rest)
         if after is None:
             found.ending = "boundary"
+        ahead = after is not None and float(rest.tangent[-1]) * float(after[1].tangent[-1]) > 0.0
+        graze = "" if after is None else "persistence" if ahead else "non_smooth_fold"
+        found.mark(met[0].name, curve, rest, graze=graze)
         return after
 
 
-def _beyond(curve: Equilibria, rest: Rest) -> tuple[Equilibria, Rest] | None:
-    """The equilibrium of the mode behind a boundary, where the two meet; None where there is none."""
-    jump = curve.system.transitions[int(rest.margins.argmax())]
-    if jump.reset is not None or jump.target == curve.mode:
-        return None
-    other = Equilibria(curve.system, jump.target, curve.parameter, curve.width)
-    common = other.at(rest.u, rest.value)
-    if common is None or np.abs((common.u - rest.u) / curve.system.scale_vector()).max() > COMMON:
-        return None
-    for one in (common.facing(1.0), common.facing(-1.0)):
-        first = other.step(one, BEYOND)
-        if first is not None and (first.margins <= 0.0).all():
-            return other, first
+def beyond(curve: Equilibria, rest: Rest) -> tuple[Equilibria, Rest] | None:
+    """The equilibrium, or the set of them, behind a boundary, where the two meet; None where there is none."""
+    system, parameter, width = curve.system, curve.parameter, curve.width
+    scale, facing = system.scale_vector(), float(rest.tangent[-1])
+    met = [int(k) for k in np.argsort(-rest.margins) if rest.margins[k] > -MEETS]
+    nearest = [*(system.transitions[k].target for k in met), curve.mode]
+    for mode in dict.fromkeys([*nearest, *range(len(system.modes))]):  # two contacts may change at once
+        other = Equilibria(system, mode, parameter, width)
+        common = other.at(rest.u, rest.value) if mode != curve.mode else None
+        if common is not None and np.abs((common.u - rest.u) / scale).max() <= COMMON:
+            for one in (common.facing(facing), common.facing(-facing)):
+                first = other.step(one, BEYOND)
+                if first is not None and (first.margins < 0.0).all():
+                    return other, first
+        for ahead in (1.0, -1.0) if mode != curve.mode else (1.0,):  # back lies the branch that has come here
+            found = set_near(other, rest.u, rest.value + float(np.copysign(BEYOND * width, facing * ahead)))
+            if found is None:
+                continue
+            fresh, first = found[0], found[1].facing(facing * ahead)
+            sides = [(np.min(one.ends, axis=0), np.max(one.ends, axis=0)) for one in (rest, first)]
+            if np.abs((np.array(sides[0]) - sides[1]) / scale).max() <= NEAR:
+                return fresh, first
     return None
