@@ -211,7 +211,10 @@ def set_near(single: Equilibria, u: FloatArray, value: float) -> tuple[SetOfEqui
         for _ in range(single.most):
             h, h_u = single.field.indicators(u + s * line, values, single.memory)
             slope = float(h_u[i] @ line)
-            s -= float(h[i]) / slope if slope else np.inf
+            if slope == 0.0:  # this indicator bounds nothing here
+                s = np.inf
+                break
+            s -= float(h[i]) / slope
         probe = SetOfEquilibria(system, mode, single.parameter, single.width, (i, i), u)
         if np.isfinite(s) and (probe.inside(u + s * line, values, i) < 0.0).all():
             found.append((s, i))
