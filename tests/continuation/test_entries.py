@@ -6,7 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+import random_templates as templates
 from mpmath import mp, mpf
+from scipy.optimize import brentq
 from test_sliding_bifurcations import BACKWARD, FORWARD, STICK, Belt, root
 
 import nonsmooth as ns
@@ -92,3 +94,29 @@ def test_sliding_bifurcations_of_elements_and_surfaces(v_b: float) -> None:
         special = ns.special_points(ns.continue_orbit(ns.find_orbit(system), "v_b", (0.05, 3.0)))
         assert special["sliding"].values.tolist() == ["crossing_sliding", "switching_sliding", "grazing_sliding"]
         assert special["v_b"].values == pytest.approx([float(value) for value in expected], abs=1e-9)
+
+
+def test_an_impact_that_vanishes_is_a_graze_from_either_side() -> None:
+    """It passes the speed below which impacts are completed as rest: that is a graze all the same.
+
+    Beyond the last one the mass touches nothing: the amplitude of the forced vibration is the gap."""
+    system, name, limits, start = templates.two_stops(np.random.default_rng([0, 9]))
+    first = ns.continue_orbit(ns.find_orbit(system, start=start, max_period=4, progress=False), name, limits)
+    tables = []
+    for value in (0.75, 0.9, 1.3):
+        i = int(np.abs(first[name].values - value).argmin())
+        here = system.with_parameters({name: float(first[name][i])})
+        orbit = ns.find_orbit(here, start=first["section"].values[i], transient=0, period_number=1, progress=False)
+        tables.append(ns.special_points(ns.continue_orbit(orbit, name, limits)))
+    p = system.values
+
+    def reach(w: float) -> float:
+        z, k = p["z"], p["s"]
+        matrix = [[1 + k - w * w + 2j * z * w, -k - 1j * z * w], [-k - 1j * z * w, k - w * w + 1j * z * w]]
+        return float(np.abs(np.linalg.solve(matrix, [p["f"], 0.0]))[0]) - p["b"]
+
+    last = brentq(reach, 0.9303, 0.9307, xtol=1e-14)
+    for table in tables:
+        assert np.abs(table[name].values[table["kind"].values == "grazing"] - last).min() < 1e-9
+        assert table["kind"].values.tolist() == tables[0]["kind"].values.tolist()
+        assert table[name].values == pytest.approx(tables[0][name].values, abs=1e-8)

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from nonsmooth.continuation.events.boundaries import BOUNDARIES, Boundary, Unseen, passed_by
+from nonsmooth.continuation.events.boundaries import BOUNDARIES, Boundary, Crossed, Unseen, passed_by
 from nonsmooth.continuation.events.change import Change, common_point, is_tolerance, past_the_section
 from nonsmooth.continuation.events.grazing import graze
 from nonsmooth.continuation.events.neighbours import beside
@@ -25,6 +25,7 @@ __all__ = ["ENDINGS", "AlongOrbits"]
 FARTHEST = 0.1  # along the branch: the end of a signature is not looked for from farther behind it
 WITHIN = 1e-9  # of the range: as near as an event is located that only simulations show
 AHEAD = 1e-6  # of the range
+BEFORE_REST = 1e-2  # of the period: a flight after an impact as slow as impacts are followed is shorter
 WAITS = 1e-3  # along the branch: an orbit whose section changes less is only longer, the parameter by the square of it
 #: How a branch can end, with the sentence for each.
 ENDINGS = {
@@ -107,8 +108,7 @@ class AlongOrbits(Policy):
             if after is not None and (after[1].path.margins[1:] > 0.0).all():
                 return after  # else another boundary is met with the section
         beyond = beside(curve, first.point, contacts_of(curve, met))
-        reached = [one.kind.surface(curve, one.point, beyond[0]) for one in met] if beyond is not None else []
-        if any(is_tolerance(curve, indicator) for indicator in reached):
+        if beyond is not None and _completes(curve, met, beyond[0]):
             return beyond
         name = mark(found, curve, met, beyond)
         if beyond is None and _is_centre(curve, first):
@@ -138,6 +138,18 @@ class AlongOrbits(Policy):
         except (SystemDefinitionError, ValueError):
             return "physical"
         return "no_convergence"
+
+
+def _completes(curve: Orbits, met: list[Met], fresh: Orbits) -> bool:
+    """Return whether only the speed below which impacts are completed as rest is reached.
+
+    An impact that vanishes far from rest passes that speed too, and is a graze."""
+    tolerances = [is_tolerance(curve, one.kind.surface(curve, one.point, fresh)) for one in met]
+    kind, times = met[0].kind, met[0].point.solved.times
+    if not any(tolerances) or tolerances[0] or not isinstance(kind, Crossed):
+        return any(tolerances)
+    visit = kind.crossing(curve, met[0].point)[0]
+    return visit + 2 < len(times) and float(times[visit + 2] - times[visit + 1]) < BEFORE_REST * float(times[-1])
 
 
 def _is_centre(curve: Orbits, met: Met) -> bool:
