@@ -12,7 +12,7 @@ import pytest
 
 import nonsmooth
 from nonsmooth.cli import main as cli
-from nonsmooth.continuation.march.arclength import Curve
+from nonsmooth.continuation.problems.curve import Curve
 
 SOURCES = Path(nonsmooth.__file__).parent
 #: Who may catch Ctrl-C without raising it at once, and why.

@@ -88,7 +88,7 @@ def test_an_orbit_with_many_transitions_is_short() -> None:
     assert "".join(cells).count("penetration > 0") == 2
     from dataclasses import replace
 
-    from nonsmooth.continuation.signature.signature import Signature
+    from nonsmooth.continuation.problems.signature import Signature
 
     long = replace(orbit, signature=Signature(orbit.signature.visits[:-1] * 60 + orbit.signature.visits[-1:]))
     assert short(repr(long)) and "(240 transitions)" in repr(long)

@@ -10,8 +10,8 @@ import reference_values as known
 import xarray as xr
 
 import nonsmooth as ns
+from nonsmooth.continuation.branches.begin import resumed_at
 from nonsmooth.continuation.branches.reading import read_branch
-from nonsmooth.continuation.march.begin import resumed_at
 
 support = ns.models.discontinuous_support
 

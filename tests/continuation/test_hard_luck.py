@@ -10,8 +10,8 @@ import reference_values as known
 import xarray as xr
 
 import nonsmooth as ns
-from nonsmooth.continuation.march.arclength import Curve
-from nonsmooth.continuation.march.marches import ENDINGS
+from nonsmooth.continuation.events.leaving import ENDINGS
+from nonsmooth.continuation.problems.curve import Curve
 from nonsmooth.continuation.problems.equilibrium import Equilibria
 from nonsmooth.continuation.problems.locus import Locus
 

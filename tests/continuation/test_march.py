@@ -9,11 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from nonsmooth.continuation.march.arclength import Curve, Point
-from nonsmooth.continuation.march.crossing import tangents
 from nonsmooth.continuation.march.event import Crossing, Event, Fold, Met, Step, locate
-from nonsmooth.continuation.march.march import march
-from nonsmooth.continuation.march.marches import Limits, March
+from nonsmooth.continuation.march.march import Limits, March, Policy, march
+from nonsmooth.continuation.problems.curve import Curve, Point, tangents
 from nonsmooth.continuation.problems.equilibrium import Equilibria
 from nonsmooth.continuation.problems.locus import Locus
 from nonsmooth.continuation.problems.orbits import Orbits
@@ -52,11 +50,8 @@ class Half(Event):
 class Plane(Curve[Point]):
     """f(x, p) = 0, in units that differ."""
 
-    kinds = (Fold(), Crossing(), Zero())
-
     def __init__(self, f: Callable[[float, float], tuple[float, float, float]], beyond: Any = None) -> None:
         self.f, self.next, self.scale = f, beyond, np.array([2.0, 0.5])
-        self.boundaries = (Half(),) if beyond else ()
 
     def evaluate(self, Y: Array) -> Solved:
         f, f_x, f_p = self.f(*(Y * self.scale))
@@ -75,12 +70,17 @@ class Plane(Curve[Point]):
         return Point(Y, tangent, orientation, iterations, solved)
 
     def margins(self, point: Point) -> Array:
-        return np.array([point.X[0] - 0.5]) if self.boundaries else np.empty(0)
+        return np.array([point.X[0] - 0.5 if self.next else np.inf])
 
-    def behind(self, found: March, met: list[Met]) -> tuple[Plane, Point] | None:
-        found.mark(met[0].name, self, met[0].point)
-        point = self.next.at_parameter(met[0].point.X / self.scale, met[0].point.value)
-        return self.next, point.facing(met[0].point.tangent[-1])
+
+class Along(Policy):
+    kinds = (Fold(), Crossing(), Zero())
+    boundaries = (Half(),)
+
+    def behind(self, found: March, curve: Plane, met: list[Met]) -> tuple[Plane, Point] | None:
+        found.mark(met[0].name, curve, met[0].point)
+        point = curve.next.at_parameter(met[0].point.X / curve.scale, met[0].point.value)
+        return curve.next, point.facing(met[0].point.tangent[-1])
 
 
 def circle() -> Plane:
@@ -92,7 +92,7 @@ def run(curve: Plane, x: float, p: float, way: float, *, low: float = -4.0, high
     assert first is not None
     first = first.facing(way)
     closed = curve.landmark(first) if more.pop("closes", False) else None
-    return march(curve, first, Limits(((-1, low, high),), 0.05, more.pop("points", 500), closed))
+    return march(curve, first, Limits(((-1, low, high),), 0.05, more.pop("points", 500), closed), Along())
 
 
 def test_a_circle_closes_with_two_folds() -> None:
@@ -113,7 +113,8 @@ def test_a_branch_that_comes_back_in_another_word_closes() -> None:
     """The part of a point that all words have tells it: the last one lies beside the first, by the arc of a chord."""
     curve = circle()
     first = curve.at_parameter(np.array([-0.8, 0.6]) / curve.scale, 0.6).facing(1.0)
-    found = march(curve, first, Limits(((-1, -4.0, 4.0),), 0.05, 500, ("another word", np.empty(0), first.Y)))
+    limits = Limits(((-1, -4.0, 4.0),), 0.05, 500, ("another word", np.empty(0), first.Y))
+    found = march(curve, first, limits, Along())
     assert found.ending == "closed"
     assert found.rows[-1].point.X == pytest.approx([-0.8, 0.6], abs=1e-3)
 

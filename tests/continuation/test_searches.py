@@ -134,3 +134,23 @@ def test_a_search_ends_with_its_budget(system: ns.System, shown: bool, monkeypat
 def test_a_budget_is_a_positive_number(budget: Any) -> None:
     with pytest.raises((TypeError, ValueError), match="budget"):
         ns.find_orbit(undamped(2.0, 0.1), budget=budget)
+
+
+@pytest.mark.parametrize(("x", "v"), [(0.0, 0.2), (-0.5, 0.2), (0.9, 0.2), (0.0, 0.0), (2.0, -1.0), (1.0, 0.2)])
+def test_a_cycle_is_found_from_wherever_simulate_shows_it(x: float, v: float) -> None:
+    """On the belt the mass leaves at x = 1 exactly, from x = 0 at t = 5: a run that is cut there goes on all the same.
+
+    Period of Leine's cycle by quadrature: sticking from the place where it comes to rest to x = 1, and one slip."""
+    from scipy.integrate import solve_ivp
+
+    def slip(t: float, u: np.ndarray) -> list[float]:
+        return [u[1], -u[0] + 1.0 / (1.0 + 3.0 * (0.2 - u[1]))]
+
+    def back(t: float, u: np.ndarray) -> float:
+        return float(u[1] - 0.2)
+
+    back.terminal, back.direction = True, 1.0  # type: ignore[attr-defined]
+    run = solve_ivp(slip, (0.0, 20.0), [1.0, 0.2], events=back, rtol=1e-12, atol=1e-13, max_step=0.01)
+    period = float(run.t_events[0][0]) + (1.0 - float(run.y_events[0][0, 0])) / 0.2
+    orbit = ns.find_orbit(ns.models.stick_slip_belt(), start={"x": x, "v": v})
+    assert orbit.period == pytest.approx(period, abs=1e-8)

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
+from nonsmooth.continuation.arguments import largest_step, limits
 from nonsmooth.continuation.branches.other_branches import SWITCHES
 from nonsmooth.continuation.branches.reading import read_branch
 from nonsmooth.continuation.continue_orbit import continue_orbit
 from nonsmooth.continuation.find import find_orbit
-from nonsmooth.continuation.march.begin import largest_step, limits
 from nonsmooth.continuation.problems.shooting import Shooting
 from nonsmooth.continuation.searches.search import Search, search_within
 from nonsmooth.continuation.special import special_points

@@ -7,24 +7,22 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nonsmooth.continuation.arguments import allowed_range, largest_step, limits
+from nonsmooth.continuation.branches.begin import size_of
+from nonsmooth.continuation.branches.following import both_ways, dataset
 from nonsmooth.continuation.branches.reading import special_row
-from nonsmooth.continuation.march.begin import largest_step, limits, size_of
-from nonsmooth.continuation.march.march import march
-from nonsmooth.continuation.march.marches import Limits, Row, both_ways, in_turn, unless_interrupted
-from nonsmooth.continuation.march.physical import allowed_range
-from nonsmooth.continuation.problems.anchor import anchor_at
-from nonsmooth.continuation.problems.locus import KINDS, Locus
-from nonsmooth.continuation.problems.orbits import OrbitPoint
+from nonsmooth.continuation.branches.records import record_of
+from nonsmooth.continuation.events.codimension_two import KINDS, AlongCurve
+from nonsmooth.continuation.march.march import Limits, Row
+from nonsmooth.continuation.problems.locus import Locus
 from nonsmooth.continuation.problems.shooting import Shooting
-from nonsmooth.continuation.problems.surfaces import look_at_surfaces
 from nonsmooth.errors import SolveError, shortened
 from nonsmooth.flow.arguments import whole_number
 from nonsmooth.system.names import by_name
+from nonsmooth.system.system import System
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from nonsmooth.system.system import System
 
 __all__ = ["continue_curve"]
 
@@ -66,6 +64,9 @@ def continue_curve(
     Interrupted
         Ctrl-C; what was found until then is its ``result``.
     """
+    from nonsmooth.results.branches import CURVE, SPECIAL
+    from nonsmooth.results.labels import labels_of
+
     largest, most = largest_step(step), whole_number(points, "points", 1)
     system, kind, own, point, period_number, _ = special_row(special_point, "continue_curve")
     if kind not in KINDS:
@@ -74,26 +75,28 @@ def continue_curve(
     names, box = _box(start, ranges)
     shooting = Shooting(start, point.signature, period_number, names)
     size = size_of(point.maximum, point.minimum, system)
-    anchor_at(shooting, start.parameter_vector(), point.X[: shooting.n], size)
     X = np.concatenate([point.X[: shooting.size], [start.values[name] for name in names]])
-    look_at_surfaces(shooting, X)
+    shooting.prepare(X, size)
     widths = (box[0][1] - box[0][0], box[1][1] - box[1][0])
     locus = Locus(shooting, kind, size, point.period, widths)
     first = locus.first(X)
     if first is None:
         raise SolveError(f"the curve of the {kind} could not be begun at this point", status="no_convergence")
     allowed = tuple((i - 2, *allowed_range(start, names[i], *ends)) for i, ends in enumerate(box))
-    closed = locus.landmark(first)
-    ahead, back = in_turn(
-        lambda: march(locus, first, Limits(allowed, largest, most, closed)),
-        lambda: march(locus, first.turned(), Limits(allowed, largest, most)),
-    )
-    rows, special = both_ways(back, Row(locus, first), ahead)
-    places = [row.point for row in rows]
-    return _dataset(system, locus, names, places, special, (back.ending, ahead.ending), {
+    policy, ahead = AlongCurve(kind, shooting.forced), (locus, first)
+    within = Limits(allowed, largest, most, locus.landmark(first))
+    record = both_ways(policy, within, (locus, first.turned()), [record_of(Row(*ahead))], ahead)
+    options = {
         "ranges": {name: list(ends) for name, ends in zip(names, box, strict=True)}, "step": largest, "points": most,
         "kind": kind,
-    })  # fmt: skip
+    }  # fmt: skip
+    more = {
+        "kind": ((), kind, {"long_name": "kind of the special point that is followed"}),
+        "period_number": ((), np.int64(period_number), {"long_name": f"{labels_of(system).turn}s (0: autonomous)"}),
+        "signature": ((), point.signature.text(system.traced), {"long_name": "signature"}),
+    }
+    values = {name: [float(one.X[i - 2]) for one in record.points] for i, name in enumerate(names)}
+    return dataset(system, "continue_curve", values, (CURVE, SPECIAL), record, policy, options, more, {})
 
 
 def _box(system: System, ranges: Any) -> tuple[tuple[str, str], list[tuple[float, float]]]:
@@ -109,29 +112,3 @@ def _box(system: System, ranges: Any) -> tuple[tuple[str, str], list[tuple[float
     ]
     first, second = ranges
     return (str(first), str(second)), box
-
-
-def _dataset(
-    system: System, locus: Locus, names: tuple[str, str], places: list[OrbitPoint], special: list[tuple[str, int]],
-    ended: tuple[str, str], options: dict[str, Any],
-) -> xr.Dataset:  # fmt: skip
-    from nonsmooth.results.branches import curve
-    from nonsmooth.results.labels import labels_of
-    from nonsmooth.results.provenance import provenance
-
-    n_u = len(system.states)
-    labels = labels_of(system)
-    arrays = {
-        "section": np.array([place.X[:n_u] for place in places]),
-        "maximum": np.array([place.path.maximum for place in places]),
-        "minimum": np.array([place.path.minimum for place in places]),
-        "period": np.array([place.solved.times[-1] for place in places]),
-        "floquet_multipliers": np.array([place.multipliers for place in places]),
-    }
-    attrs = provenance(labels, "continue_curve", options, method="multiple shooting")
-    found = curve(
-        labels, attrs, {name: [float(place.X[-2 + i]) for place in places] for i, name in enumerate(names)}, arrays,
-        special, kind=locus.kind, period_number=locus.shooting.period_number,
-        signature=locus.shooting.signature.text(system.traced), endings=locus.endings, ended=ended,
-    )  # fmt: skip
-    return unless_interrupted(found, ended)

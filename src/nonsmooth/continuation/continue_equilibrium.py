@@ -6,20 +6,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.continuation.march.begin import largest_step, limits
-from nonsmooth.continuation.march.march import march
-from nonsmooth.continuation.march.marches import Limits, Row, both_ways, in_turn, unless_interrupted
-from nonsmooth.continuation.march.physical import allowed_range
-from nonsmooth.continuation.problems.equilibrium import Equilibria, Rest
+from nonsmooth.continuation.arguments import allowed_range, largest_step, limits
+from nonsmooth.continuation.branches.following import both_ways, dataset
+from nonsmooth.continuation.branches.records import record_of
+from nonsmooth.continuation.events.of_equilibria import AlongEquilibria, beyond
+from nonsmooth.continuation.march.march import Limits, Row
+from nonsmooth.continuation.problems.equilibrium import Equilibria, Rest, set_near
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.arguments import check_system, whole_number
 from nonsmooth.flow.starts import first_state
 from nonsmooth.system.names import by_name
+from nonsmooth.system.system import System
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from nonsmooth.system.system import System
 
 __all__ = ["continue_equilibrium"]
 
@@ -55,10 +55,11 @@ def continue_equilibrium(
     Returns
     -------
     xarray.Dataset
-        Over ``point``: the parameter, ``u(point, state)``, ``eigenvalues``, ``stable``, ``mode``; special points as in
-        :func:`nonsmooth.special_points`: ``fold``, ``pitchfork``, ``transcritical``, ``hopf`` (a row given to
-        ``continue_orbit`` gives the cycles that emanate from it), ``boundary_equilibrium``. Over ``end`` how the branch
-        ends: ``ended`` and, in a sentence, ``ended_because``.
+        Over ``point``: the parameter, ``u(point, state)``, ``eigenvalues``, ``stable``, ``mode``; of a set of
+        equilibria, as one dry friction leaves it, ``u`` is the middle, and ``u_lower`` and ``u_upper`` are its
+        extent. Special points as in :func:`nonsmooth.special_points`: ``fold``, ``pitchfork``, ``transcritical``,
+        ``hopf`` (a row given to ``continue_orbit`` gives the cycles that emanate from it), ``boundary_equilibrium``.
+        Over ``end`` how the branch ends: ``ended`` and, in a sentence, ``ended_because``.
 
     Raises
     ------
@@ -69,6 +70,8 @@ def continue_equilibrium(
     Interrupted
         Ctrl-C; what was found until then is its ``result``.
     """
+    from nonsmooth.results.branches import EQUILIBRIUM, SPECIAL_EQUILIBRIUM
+
     check_system(system, "continue_equilibrium")
     if system.depends_on_time:
         raise ValueError(f"{system.name!r} depends on time: it has no equilibria; find_orbit finds its periodic orbits")
@@ -76,56 +79,32 @@ def continue_equilibrium(
     here = system.values[parameter]
     largest, most = largest_step(step), whole_number(points, "points", 1)
     state = first_state(system, start, mode)
-    curves = {
-        i: Equilibria(system, i, parameter, high - low)
-        for i, name in enumerate(system.modes) if mode is None or name == mode
-    }  # fmt: skip
-    first = None
-    for curve in curves.values():
-        found = curve.at(np.nan_to_num(state.u), here)
-        if found is not None and (found.margins <= 0.0).all():
-            first = (curve, found)
+    first: tuple[Equilibria, Rest] | None = None
+    for i, one in enumerate(system.modes):
+        if mode is not None and one != mode:
+            continue
+        curve = Equilibria(system, i, parameter, high - low)
+        rest = curve.at(np.nan_to_num(state.u), here)
+        if rest is not None and (rest.margins <= 0.0).all():
+            first = (curve, rest) if (rest.margins < 0.0).all() else beyond(curve, rest)
+        if rest is None:
+            first = set_near(curve, np.nan_to_num(state.u), here)
+        if first is not None:
             break
     if first is None:
         raise SolveError(
             "no equilibrium was found from this start: Newton's method did not converge in any mode, or what it found "
-            "lies outside its mode. Give a nearer start",
+            "lies outside its mode or behind a contact. Give a nearer start",
             status="no_convergence",
         )
     box = ((-1, *allowed_range(system, parameter, low, high)),)
     curve, rest = first
-    up, down = in_turn(
-        lambda: march(curve, rest.facing(1.0), Limits(box, largest, most)),
-        lambda: march(curve, rest.facing(-1.0), Limits(box, largest, most)),
-    )
-    rows, special = both_ways(down, Row(curve, rest), up)
-    return _dataset(system, parameter, [(row.curve, row.point) for row in rows], special, (down.ending, up.ending), {
+    policy, ahead, back = AlongEquilibria(), (curve, rest.facing(1.0)), (curve, rest.facing(-1.0))
+    record = both_ways(policy, Limits(box, largest, most), back, [record_of(Row(*ahead))], ahead)
+    options = {
         "parameter": parameter, "range": (low, high), "step": largest, "points": most, "mode": mode,
         "start": [float(x) for x in state.u],
-    })  # fmt: skip
-
-
-def _dataset(
-    system: System, parameter: str, rests: list[tuple[Equilibria, Rest]], special: list[tuple[str, int]],
-    ended: tuple[str, str], options: dict[str, Any],
-) -> xr.Dataset:  # fmt: skip
-    from nonsmooth.results.branches import equilibria
-    from nonsmooth.results.labels import labels_of
-    from nonsmooth.results.provenance import provenance
-
-    labels = labels_of(system)
-    n = max(len(rest.eigenvalues) for _, rest in rests)
-    eigenvalues = np.full((len(rests), n), np.nan + 0j)
-    for row, (_, rest) in zip(eigenvalues, rests, strict=True):
-        row[: len(rest.eigenvalues)] = rest.eigenvalues
-    attrs: dict[str, Any] = dict(provenance(labels, "continue_equilibrium", options, method="pseudo-arclength"))
-    attrs["parameter"] = parameter
-    arrays = {
-        "u": np.array([rest.u for _, rest in rests]),
-        "eigenvalues": eigenvalues,
-        "stable": np.array([bool((rest.eigenvalues.real < 0).all()) for _, rest in rests]),
-        "mode": np.array([curve.mode for curve, _ in rests]),
-    }
-    values = np.array([rest.value for _, rest in rests])
-    found = equilibria(labels, attrs, parameter, values, arrays, special, endings=Equilibria.endings, ended=ended)
-    return unless_interrupted(found, ended)
+    }  # fmt: skip
+    values, tables = {parameter: [point.value for point in record.points]}, (EQUILIBRIUM, SPECIAL_EQUILIBRIUM)
+    attrs, method = {"parameter": parameter}, "pseudo-arclength"
+    return dataset(system, "continue_equilibrium", values, tables, record, policy, options, {}, attrs, method)

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.continuation.branches.following import Asked
+from nonsmooth.continuation.arguments import largest_step
+from nonsmooth.continuation.branches.begin import curve_of, resumed_at
+from nonsmooth.continuation.branches.following import Asked, Start
 from nonsmooth.continuation.branches.orbit import Orbit
 from nonsmooth.continuation.branches.other_branches import born, straight_on, switched
 from nonsmooth.continuation.branches.reading import read_branch
-from nonsmooth.continuation.branches.records import SpecialRecord, point_record
-from nonsmooth.continuation.march.begin import curve_of, largest_step, resumed_at
-from nonsmooth.continuation.march.event import BESIDE, Crossing
-from nonsmooth.continuation.march.marches import March, in_turn
-from nonsmooth.continuation.problems.orbit_events import NeimarkSacker
+from nonsmooth.continuation.branches.records import record_of
+from nonsmooth.continuation.march.march import March, Row
 from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.arguments import whole_number
@@ -27,8 +24,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["continue_orbit"]
-
-ZERO = 1e-6  # of the numbers beside it: the first orbit is a special point
 
 
 @by_name
@@ -117,32 +112,9 @@ def _from_orbit(orbit: Orbit, name: str | None, asked: Asked) -> xr.Dataset:
     if first is None:
         raise SolveError("Newton's method did not converge at the orbit itself: give its parameter another value",
                          status="no_convergence")  # fmt: skip
-    first = first.facing(1.0)
-    up, down = in_turn(  # a closed branch needs only one
-        lambda: branch.march(curve, first, curve.landmark(first)),
-        lambda: branch.march(curve, first.facing(-1.0)),
-    )
-    marks = [SpecialRecord(kind, 0) for kind in _at_the_start(curve, first, down, up)]
-    return branch.result(orbit.period_number, down, [point_record(curve, first)], up, marks)
-
-
-def _at_the_start(curve: Orbits, first: OrbitPoint, down: March, up: March) -> list[str]:
-    """Folds, flips and tori at the first orbit itself: rounding decides whether a march from there sees them."""
-    if not (down.rows and up.rows) or not all(march.rows[0].curve is curve for march in (down, up)):
-        return []
-    before, after = down.rows[0].point.turned(), up.rows[0].point  # the march down has its tangents the other way
-    seen = {one.kind for march in (down, up) for one in march.special
-            if one.curve is curve and np.abs(one.point.Y - first.Y).max() < BESIDE}  # fmt: skip
-    found = []
-    for kind in curve.kinds:
-        if isinstance(kind, Crossing) or kind.name in seen:
-            continue
-        here, was, now = (kind.number(curve, point) for point in (first, before, after))
-        if not was * now < 0.0 or abs(here) > ZERO * max(abs(was), abs(now)):
-            continue
-        if not isinstance(kind, NeimarkSacker) or (np.abs(first.multipliers.imag) > BESIDE).any():
-            found.append(kind.name)
-    return found
+    ahead, back = (curve, first.facing(1.0)), (curve, first.facing(-1.0))
+    middle = [record_of(Row(*ahead))]
+    return branch.result(orbit.period_number, back, middle, ahead, closed=curve.landmark(first))
 
 
 def _near(curve: Orbits, X: FloatArray) -> OrbitPoint | None:
@@ -161,23 +133,15 @@ def _go_on(start: xr.Dataset, name: str | None, asked: Asked) -> xr.Dataset:
         raise ValueError(f"this branch was followed in {record.parameter!r}, not in {name!r}")
     branch = asked.follow(system, record.parameter, record.range)
     low, high = branch.bounds
-    ends = [March(ending=ending, said=said) for ending, said in zip(record.endings, record.sentences, strict=True)]
-    begun: dict[int, Callable[[], March]] = {}
+    ends: list[Start] = []
     for side, point in ((0, record.points[0]), (1, record.points[-1])):
-        ending = record.endings[side]
+        ending, said = record.endings[side], record.sentences[side]
         open_end = ending in ("points", "interrupted") or (ending in ("range", "physical") and low < point.value < high)
         if not open_end and not (asked.virtual and ending in ("grazing", "corner")):
+            ends.append(March(ending=ending, said=said))
             continue
         curve, X = resumed_at(system, record.period_number, point, branch.name, branch.width)
         border = point.tangent / curve.scale * (1.0 if side else -1.0)
         begin = curve.near(X / curve.scale, border / np.linalg.norm(border))
-        if begin is None:
-            ends[side] = March(ending="no_convergence")
-            continue
-        other = record.points[-1 if side == 0 else 0]
-        shape = curve.shape(other.maximum, other.minimum, other.X)
-        closed = (other.signature, other.X, shape) if len(record.points) > 1 else None
-        begun[side] = partial(branch.march, curve, begin, closed)
-    for side, more in zip(begun, in_turn(*begun.values()), strict=True):
-        ends[side] = more
-    return branch.result(record.period_number, ends[0], record.points, ends[1], record.special)
+        ends.append(March(ending="no_convergence") if begin is None else (curve, begin))
+    return branch.result(record.period_number, ends[0], record.points, ends[1])

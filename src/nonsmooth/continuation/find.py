@@ -9,13 +9,13 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.branches.orbit import Orbit, orbit_of
-from nonsmooth.continuation.problems.anchor import anchor_at
 from nonsmooth.continuation.problems.multipliers import multipliers_of, nearest_to_one, stability
-from nonsmooth.continuation.problems.shooting import Shooting
-from nonsmooth.continuation.searches.primitive import primitive
+from nonsmooth.continuation.problems.path import Walk
+from nonsmooth.continuation.problems.primitive import primitive
+from nonsmooth.continuation.problems.shooting import Shooting, Solved
+from nonsmooth.continuation.problems.solve import solve
 from nonsmooth.continuation.searches.search import search_within
 from nonsmooth.continuation.searches.settled import CLOSED, NEAR, Guess, forced_guesses, settle_forced, touching
-from nonsmooth.continuation.signature.path import Walk
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.arguments import check_system, real_number, whole_number
 from nonsmooth.flow.engines.methods import engine_for
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 __all__ = ["find_orbit"]
 
 GOOD = (codes.OK, codes.NOT_GUARANTEED)
+MOST, CONVERGED = 30, 1e-12  # iterations, the last step in scaled unknowns
 RTOL = 1e-12  # of the runs from which orbits are read, where the flow is not exact
 NOISE = 1e-11  # of the motion's size: beyond a boundary by less than this is on it
 FAR = 30.0  # how far from the motion, in units of its gap, the orbit may lie
@@ -153,9 +154,9 @@ def _polished(system: System, guesses: list[Guess], given: bool, unstable: bool,
         size = np.concatenate([guess.size, np.ones(shooting.n - len(guess.size))])
         name = _name(guess.period_number)
         search.doing = f"looking for a {name} orbit by Newton's method"
-        anchor_at(shooting, shooting.values, X[: shooting.n], size)
+        shooting.anchor(X[: shooting.n], shooting.values, size)
         left = shooting.evaluate(X).residual[: shooting.n]  # what the guess lacks to close
-        solved = shooting.newton(X, _scale(shooting, size, guess.period), look=search.look)
+        solved, tried = _newton(shooting, X, _scale(shooting, size, guess.period), search)
         shorter = None if solved is None else primitive(shooting, solved, size)
         gap = guess.gap
         if shorter is not None and given:
@@ -165,13 +166,13 @@ def _polished(system: System, guesses: list[Guess], given: bool, unstable: bool,
             continue
         if shorter is not None:
             shooting, X = shorter
-            solved = shooting.newton(X, _scale(shooting, size, guess.period), look=search.look)
+            solved, tried = _newton(shooting, X, _scale(shooting, size, guess.period), search)
             name = _name(shooting.period_number)
             if shooting.forced:
                 gap = float(guess.gaps[shooting.period_number - 1])
                 left = np.full(shooting.n, np.nan)
         if solved is None:
-            reasons.append(_why(shooting, name))
+            reasons.append(_why(shooting, tried, name))
             continue
         walk = Walk(shooting)
         path = walk.along(solved, shooting.split(solved.X)[1])
@@ -204,10 +205,9 @@ def _polished(system: System, guesses: list[Guess], given: bool, unstable: bool,
     )
 
 
-def _why(shooting: Shooting, name: str) -> tuple[str, str]:
+def _why(shooting: Shooting, tried: Solved, name: str) -> tuple[str, str]:
     """Status and sentence for a Newton iteration that did not converge: a multiplier is 1, or nothing is known."""
-    tried = shooting.tried
-    if tried is not None and np.isfinite(tried.monodromy).all():
+    if np.isfinite(tried.monodromy).all():
         nearest = nearest_to_one(multipliers_of(tried.monodromy), shooting.forced)
         if abs(nearest - 1.0) <= NEUTRAL:
             size = "1" if abs(nearest - 1.0) <= 1e-6 else f"{nearest.real:.6g}, nearly 1"
@@ -240,3 +240,29 @@ def _is_near(orbit: Orbit, guess: Guess, gap: float, left: FloatArray) -> bool:
         return False
     away = np.linalg.lstsq(np.eye(len(left)) - orbit.monodromy_matrix, left, rcond=None)[0]
     return moved <= SLOW * float(np.abs(away[: len(guess.size)] / guess.size).max())
+
+
+def _newton(shooting: Shooting, X: FloatArray, scale: FloatArray, search: Search) -> tuple[Solved | None, Solved]:
+    """Solve at fixed parameters; None where it does not converge, and the last iterate."""
+    X = X.copy()
+    size = shooting.size
+    last = np.inf
+    for i in range(MOST):
+        search.look()
+        solved = shooting.evaluate(X)
+        if not np.isfinite(solved.residual).all():
+            return None, solved
+        try:
+            step = solve(solved.jacobian[:, :size] * scale[:size], -solved.residual)
+        except np.linalg.LinAlgError:
+            return None, solved
+        length = float(np.abs(step).max())
+        if not np.isfinite(length):
+            return None, solved
+        if length < CONVERGED or (i > 3 and length < 1e-9 and length > 0.5 * last):
+            return solved, solved
+        if length > 0.5:
+            step *= 0.5 / length
+        X[:size] += scale[:size] * step
+        last = length
+    return None, solved

@@ -9,13 +9,6 @@ if TYPE_CHECKING:
 
 __all__ = ["special_points"]
 
-#: Variables over ``point`` that describe the orbit at a special point too.
-_ORBIT = (
-    "section", "maximum", "minimum", "period", "floquet_multipliers", "stable", "virtual", "signature", "mode",
-    "clearance", "layout", "unknowns", "tangent",
-)  # fmt: skip
-
-
 def special_points(branch: Any) -> xr.Dataset:
     """Return the special points of a branch as a table of their own.
 
@@ -30,12 +23,13 @@ def special_points(branch: Any) -> xr.Dataset:
         Over ``special``: ``kind`` (fold, flip, neimark_sacker, pitchfork, transcritical, grazing, corner, hopf), the
         parameter, ``section``, ``floquet_multipliers`` and the orbit's other properties. Of equilibria (fold,
         pitchfork, transcritical, hopf, focus_centre, boundary_equilibrium): ``u``, ``eigenvalues``, ``stable``,
-        ``mode``. A crossing of branches whose tangents cannot be told is a branch_point. At a graze
-        ``floquet_multipliers`` are those without the contact, ``contact_multipliers`` those with it in the limit,
-        ``grazing`` says ``persistence`` or ``non_smooth_fold``, ``determinant`` holds det(I - M-), det(I - M+),
-        det(I + M-), det(I + M+). ``sliding`` names the bifurcation where a visit of a sliding mode begins, ends or
-        is split: ``grazing_sliding``, ``crossing_sliding``, ``switching_sliding``, ``adding_sliding``; else it is
-        empty. One row, ``.isel(special=0)``, can be given to ``continue_orbit``.
+        ``mode``, and at a boundary_equilibrium ``boundary``: ``persistence`` or ``non_smooth_fold``. A crossing of
+        branches whose tangents cannot be told is a branch_point. At a graze ``floquet_multipliers`` are those without
+        the contact, ``contact_multipliers`` those with it in the limit, ``grazing`` says ``persistence`` or
+        ``non_smooth_fold``, ``determinant`` holds det(I - M-), det(I - M+), det(I + M-), det(I + M+). ``sliding``
+        names the bifurcation where a visit of a sliding mode begins, ends or is split: ``grazing_sliding``,
+        ``crossing_sliding``, ``switching_sliding``, ``adding_sliding``; else it is empty. One row,
+        ``.isel(special=0)``, can be given to ``continue_orbit``.
 
     Raises
     ------
@@ -44,35 +38,20 @@ def special_points(branch: Any) -> xr.Dataset:
     """
     import xarray as xr
 
+    from nonsmooth.results.branches import EQUILIBRIUM, ORBIT, SPECIAL_EQUILIBRIUM, SPECIAL_ORBIT, STEMS
+
     if not isinstance(branch, xr.Dataset):
         raise TypeError(f"special_points takes a branch, a result of continue_orbit; not {type(branch).__name__}")
     if "special_point" not in branch or "parameter" not in branch.attrs:
         raise ValueError("special_points takes a branch, a result of continue_orbit; this Dataset is another result")
     name = str(branch.attrs["parameter"])
-    if "eigenvalues" in branch:
-        return _of_equilibria(branch, name)
-    places = branch["special_point"].values
-    orbits = branch[list(_ORBIT)].isel(point=places).rename({"point": "special"})
-    table = orbits.reset_coords(name)
-    marks = {
-        stem: branch[f"special_{stem}"]
-        for stem in ("kind", "point", "indicator", "grazing", "sliding", "bounded", "doubled", "contact_multipliers",
-                     "determinant")
-    }  # fmt: skip
-    # The touched indicator is a word of each row, beside the dim of the clearances.
-    marks["touched"] = marks.pop("indicator")
-    table = table.assign({stem: variable.variable for stem, variable in marks.items()})
+    points, marks = (EQUILIBRIUM, SPECIAL_EQUILIBRIUM) if "eigenvalues" in branch else (ORBIT, SPECIAL_ORBIT)
+    at = branch[[column.name for column in points]]
+    table = at.isel(point=branch["special_point"].values).rename({"point": "special"}).reset_coords(name)
+    table = table.assign({STEMS[column.name]: branch[column.name].variable for column in marks})
     if "special_period_number" in branch:  # branches of a bifurcation diagram
         table["period_number"], table["branch"] = (branch[f"special_{k}"].variable for k in ("period_number", "branch"))
-    else:
+    elif "period_number" in branch:
         table["period_number"] = branch["period_number"]
     table.attrs = dict(branch.attrs)
     return table[["kind", name, *[key for key in table.data_vars if key not in ("kind", name)]]]
-
-
-def _of_equilibria(branch: xr.Dataset, name: str) -> xr.Dataset:
-    table = branch[["u", "eigenvalues", "stable", "mode"]].isel(point=branch["special_point"].values)
-    table = table.rename({"point": "special"}).reset_coords(name)
-    table["kind"], table["point"] = branch["special_kind"].variable, branch["special_point"].variable
-    table.attrs = dict(branch.attrs)
-    return table[["kind", name, "u", "eigenvalues", "stable", "mode", "point"]]

@@ -71,12 +71,18 @@ class ModeField:
         n, n_u = len(self.traced.indicators), len(self.traced.u)
         return found[:n], found[n:].reshape(n, n_u)
 
-    def margins(self, h: FloatArray) -> FloatArray:
-        """Margins by which conditions of transitions hold (n_transitions,), -inf for those that are not of the mode."""
-        return np.array([
-            min(row.sign * h[row.indicator] for row in jump.rows) if jump.source == self.mode and jump.rows else -np.inf
-            for jump in self.traced.transitions
-        ])  # fmt: skip
+    def margins(self, h: FloatArray, edge: FloatArray | float = 0.0) -> FloatArray:
+        """Margins by which conditions of transitions hold (n_transitions,), -inf for those that are not of the mode.
+
+        Rows nearer to zero than ``edge`` hold where another one of their condition does: a speed and an acceleration
+        vanish at every equilibrium, and what lies behind a stop is none."""
+        h = np.where(np.abs(h) <= edge, 0.0, h)
+        found = np.full(len(self.traced.transitions), -np.inf)
+        for k, jump in enumerate(self.traced.transitions):
+            if jump.source == self.mode and jump.rows:
+                rows = [row.sign * float(h[row.indicator]) for row in jump.rows]
+                found[k] = min((x for x in rows if x), default=0.0)
+        return found
 
 
 @dataclass(frozen=True)
@@ -136,11 +142,26 @@ def equilibrium_at(
     u[np.abs(u) <= ROUNDING * scale] = 0.0
     h, h_u = field.indicators(u, values, memory)
     edge = VANISHING * (np.abs(h_u) @ (scale + np.abs(u)))
-    margins = field.margins(np.sign(h) * np.maximum(np.abs(h) - edge, 0.0))
-    if (margins > 0.0).any():
-        return None  # a transition leads away
-    kind = "undecided" if (margins == 0.0).any() else _kind(eigenvalues, system.period_at(values))
+    margins = field.margins(h, edge)
+    for k in np.flatnonzero(margins > 0.0):
+        if not _rests_behind(system, int(k), u, values, memory, h, edge):
+            return None  # a transition leads away
+    kind = "undecided" if (margins >= 0.0).any() else _kind(eigenvalues, system.period_at(values))
     return Equilibrium(u, traced.mode_names[mode], eigenvalues, kind, system.depends_on_time)
+
+
+def _rests_behind(
+    system: System, k: int, u: FloatArray, values: FloatArray, memory: FloatArray, h: FloatArray, edge: FloatArray
+) -> bool:
+    """Return whether a condition holds only in part (some of its rows are zero), and the state rests beyond it too."""
+    traced, jump = system.traced, system.traced.transitions[k]
+    if all(abs(h[row.indicator]) > edge[row.indicator] for row in jump.rows):
+        return False
+    if jump.reset is not None and not _fixed(traced, jump.reset, u, values, memory):
+        return False
+    field = mode_field(traced, jump.target)
+    f, J, _ = field.evaluate(u, values, memory)
+    return bool((np.abs(f) <= AT_REST * (np.abs(J) @ (system.scale_vector() + np.abs(u))[field.own])).all())
 
 
 def refuse_resting(system: System, starts: FloatArray, points: FloatArray, verb: str) -> None:
@@ -211,7 +232,7 @@ def _fixed(traced: Traced, reset: Sequence[Any], u: FloatArray, values: FloatArr
 
     image = sp.lambdify([traced.t, list(traced.u), list(traced.p), list(traced.m)], list(reset), modules="numpy")
     moved = np.abs(np.array(image(0.0, u, values, memory), dtype=float) - u)
-    return bool((moved <= 1e-12 * np.abs(u)).all())
+    return bool((moved <= 1e-12 * np.maximum(np.abs(u), 1e-3)).all())
 
 
 def _kind(eigenvalues: ComplexArray, period: float | None) -> str:

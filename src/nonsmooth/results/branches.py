@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -13,85 +13,155 @@ from numpy.typing import ArrayLike, NDArray
 from nonsmooth.results.labels import Labels
 from nonsmooth.results.provenance import with_short_record
 from nonsmooth.results.schema import floats, parameter_coords, quantity_attributes, state_coords, strings, varied
-from nonsmooth.results.statuses import flag_attributes, status_attributes
+from nonsmooth.results.statuses import flag_attributes
 
-__all__ = ["branch", "curve", "diagram", "equilibria"]
+__all__ = [
+    "CURVE", "EQUILIBRIUM", "FOUND", "ORBIT", "SPECIAL", "SPECIAL_EQUILIBRIUM", "SPECIAL_ORBIT", "STEMS", "Column",
+    "attributes", "diagram", "line",
+]  # fmt: skip
 
-#: Dims and long names of what a branch holds for every point, and for every special point.
-_BRANCH_ARRAYS: dict[str, tuple[tuple[str, ...], str]] = {
-    "section": (("state",), "state at the section"),
-    "maximum": (("state",), "largest value along the orbit"),
-    "minimum": (("state",), "smallest value along the orbit"),
-    "period": ((), "period"),
-    "floquet_multipliers": (("multiplier",), "Floquet multipliers"),
-    "stable": ((), "all multipliers inside the unit circle"),
-    "virtual": ((), "the path goes through a boundary that it should obey"),
-    "signature": ((), "signature"),
-    "mode": ((), "mode at the section"),
-    "crossings_per_period": ((), "transitions per forcing period (autonomous: once round)"),
-    "contacts_per_period": ((), "entries into contact per forcing period (autonomous: once round)"),
-    "clearance": (("indicator",), "least distance to a transition that does not happen"),
-    "layout": ((), "signature as it begins at the section (attribute layouts)"),
-    "unknowns": (("unknown",), "unknowns of multiple shooting: state at the section, instants and states of crossings"),
-    "tangent": (("unknown",), "direction of the branch"),
-}
-_MARKS: dict[str, tuple[str, tuple[str, ...], str]] = {
-    "kind": ("special_kind", (), "kind of the special point"),
-    "place": ("special_point", (), "its place among the points"),
-    "indicator": ("special_indicator", (), "indicator that is touched"),
-    "grazing": ("special_grazing", (), "what happens at the graze (Feigin)"),
-    "sliding": ("special_sliding", (), "sliding bifurcation"),
-    "bounded": ("special_bounded", (), "multipliers stay bounded at the graze"),
-    "doubled": ("special_doubled", (), "an orbit of twice the period branches off at the graze"),
-    "contact": ("special_contact_multipliers", ("multiplier",), "multipliers with the contact, in the limit"),
-    "determinants": (
-        "special_determinant", ("matrix",), "det(I - M-), det(I - M+), det(I + M-), det(I + M+) at the graze",
-    ),
+
+class Column(NamedTuple):
+    """A variable of a branch: its name, the field of the records that hold it, its dims beside the first, the rule for
+    its numbers and their unit, and its long name."""
+
+    name: str
+    field: str
+    dims: tuple[str, ...]
+    rule: str
+    words: str
+
+
+#: Types of the numbers by rule; of "time" the unit is that of time, "mode" has a table of words.
+_TYPES: dict[str, Any] = {
+    "": float, "time": float, "complex": complex, "flag": bool, "text": str, "place": np.int64, "id": np.int32,
+    "mode": np.int16,
 }  # fmt: skip
+#: One orbit of a branch; builder, writer and reader go by these tables.
+ORBIT = (
+    Column("section", "section", ("state",), "", "state at the section"),
+    Column("maximum", "maximum", ("state",), "", "largest value along the orbit"),
+    Column("minimum", "minimum", ("state",), "", "smallest value along the orbit"),
+    Column("period", "period", (), "time", "period"),
+    Column("floquet_multipliers", "multipliers", ("multiplier",), "complex", "Floquet multipliers"),
+    Column("stable", "stable", (), "flag", "all multipliers inside the unit circle"),
+    Column("virtual", "virtual", (), "flag", "the path goes through a boundary that it should obey"),
+    Column("signature", "cycle", (), "id", "signature"),
+    Column("mode", "mode", (), "mode", "mode at the section"),
+    Column("crossings_per_period", "crossings", (), "", "transitions per forcing period (autonomous: once round)"),
+    Column("contacts_per_period", "contacts", (), "",
+           "entries into contact per forcing period (autonomous: once round)"),
+    Column("clearance", "clearance", ("indicator",), "", "least distance to a transition that does not happen"),
+    Column("layout", "layout", (), "id", "signature as it begins at the section (attribute layouts)"),
+    Column("unknowns", "X", ("unknown",), "",
+           "unknowns of multiple shooting: state at the section, instants and states of crossings"),
+    Column("tangent", "tangent", ("unknown",), "", "direction of the branch"),
+)  # fmt: skip
+SPECIAL_ORBIT = (
+    Column("special_kind", "kind", (), "text", "kind of the special point"),
+    Column("special_point", "point", (), "place", "its place among the points"),
+    Column("special_indicator", "indicator", (), "text", "indicator that is touched"),
+    Column("special_grazing", "grazing", (), "text", "what happens at the graze (Feigin)"),
+    Column("special_sliding", "sliding", (), "text", "sliding bifurcation"),
+    Column("special_bounded", "bounded", (), "flag", "multipliers stay bounded at the graze"),
+    Column("special_doubled", "doubled", (), "flag", "an orbit of twice the period branches off at the graze"),
+    Column("special_contact_multipliers", "contact", ("multiplier",), "complex",
+           "multipliers with the contact, in the limit"),
+    Column("special_determinant", "determinants", ("matrix",), "",
+           "det(I - M-), det(I - M+), det(I + M-), det(I + M+) at the graze"),
+)  # fmt: skip
+#: Names in the table of special points.
+STEMS = {column.name: column.name.removeprefix("special_") for column in SPECIAL_ORBIT}
+STEMS |= {"special_boundary": "boundary", "special_indicator": "touched"}  # beside the dim of the clearances
+CURVE = tuple(c for c in ORBIT if c.name in ("section", "maximum", "minimum", "period", "floquet_multipliers"))
+EQUILIBRIUM = (
+    Column("u", "u", ("state",), "", "equilibrium (the middle of a set of equilibria)"),
+    Column("u_lower", "lower", ("state",), "", "smallest value over the set of equilibria"),
+    Column("u_upper", "upper", ("state",), "", "largest value over the set of equilibria"),
+    Column("eigenvalues", "eigenvalues", ("eigenvalue",), "complex", "eigenvalues"),
+    Column("stable", "stable", (), "flag", "all real parts negative"),
+    Column("mode", "mode", (), "mode", "mode"),
+)  # fmt: skip
+SPECIAL = SPECIAL_ORBIT[:2]
+SPECIAL_EQUILIBRIUM = (
+    *SPECIAL,
+    Column("special_boundary", "grazing", (), "text", "persistence or non-smooth fold at the boundary of a mode"),
+)
+#: What `find_orbit` gives, without a first dim.
+FOUND = (
+    Column("section", "u", ("state",), "", "state at the section"),
+    Column("memory", "memory", ("memory",), "", "memory at the section"),
+    *(column for column in ORBIT if column.name in ("maximum", "minimum", "period", "virtual")),
+    Column("period_number", "period_number", (), "place", "forcing periods once round (0: autonomous)"),
+    Column("mode", "mode", (), "text", "mode at the section"),
+    Column("crossing_time", "crossing_times", ("crossing",), "time", "time of the crossing"),
+    Column("crossing_state", "crossing_states", ("crossing", "component"), "", "state and memory after the crossing"),
+    Column("monodromy_matrix", "monodromy_matrix", ("component", "column"), "", "monodromy matrix"),
+    Column("floquet_multipliers", "floquet_multipliers", ("multiplier",), "complex", "Floquet multipliers"),
+    Column("stable", "stable", (), "flag", "stable"),
+    Column("clearance", "clearance", ("indicator",), "", "clearance"),
+)
 
 
-def branch(
+def line(
     labels: Labels,
     attrs: Mapping[str, Any],
-    parameter: str,
-    values: ArrayLike,
-    arrays: Mapping[str, ArrayLike],
-    marks: Mapping[str, Any],
-    *,
-    period_number: int,
-    signatures: Sequence[str],
-    endings: Sequence[str],
-    ended: Sequence[str],
-    sentences: Sequence[str],
+    parameters: Mapping[str, ArrayLike],
+    tables: tuple[Sequence[Column], Sequence[Column]],
+    points: Sequence[Any],
+    special: Sequence[Any],
+    ends: tuple[Sequence[str], Sequence[str], Sequence[str]],
+    more: Mapping[str, Any],
 ) -> xr.Dataset:
-    """The result of ``continue_orbit``: orbits over ``point`` in order along the branch, marks over ``special``.
+    """A branch or a curve: records over ``point`` in order along it, special points over ``special``.
 
-    ``signatures`` are the texts of the ids in ``arrays["signature"]``; ``ended`` the outcome at both ends, of
-    ``endings``, with their sentences.
+    ``ends``: all endings there are, that of both ends, and their sentences; ``more``: further variables.
     """
-    d = labels
+    sizes = {"matrix": 4}
     variables: dict[str, Any] = {}
-    for name, (dims, long_name) in _BRANCH_ARRAYS.items():
-        words = long_name.replace("forcing period", d.turn)
-        variables[name] = (("point", *dims), np.asarray(arrays[name]), {"long_name": words})
-    variables["period"][2]["units"] = d.time_unit
-    variables["mode"] = ("point", np.asarray(arrays["mode"], np.int16), {
-        "long_name": "mode at the section", **flag_attributes(d.modes, dtype=np.int16)})  # fmt: skip
-    variables["signature"] = ("point", np.asarray(arrays["signature"], np.int32), {
-        "long_name": "signature", **flag_attributes(signatures, dtype=np.int32)})  # fmt: skip
-    variables["layout"] = ("point", np.asarray(arrays["layout"], np.int32), variables["layout"][2])
-    along = floats(values)
-    variables["status"] = ("point", np.zeros(len(along), np.int8), status_attributes())
-    for name, (stem, dims, long_name) in _MARKS.items():
-        column = marks[name]
-        array = strings(column) if name in ("kind", "indicator", "grazing", "sliding") else np.asarray(column)
-        variables[stem] = (("special", *dims), array, {"long_name": long_name})
-    variables["special_value"] = _special_value(d, parameter, along, marks["place"])
-    variables["period_number"] = ((), np.int64(period_number), {"long_name": f"{d.turn}s (0: autonomous)"})
-    coords = _coords(d, {parameter: values})
-    coords["indicator"] = ("indicator", strings(d.indicators), {"long_name": "indicator"})
-    variables |= _ends(endings, ended, sentences)
-    return with_short_record(xr.Dataset(variables, coords, dict(attrs)))
+    for dim, table, records in (("point", tables[0], points), ("special", tables[1], special)):
+        for column in table:
+            array = _array(column, [getattr(one, column.field) for one in records], sizes)
+            variables[column.name] = (dim, *column.dims), array, attributes(labels, column)
+    if len(parameters) == 1:
+        ((name, values),) = parameters.items()
+        along = floats(values)[variables["special_point"][1]]
+        variables["special_value"] = "special", along, quantity_attributes(name, labels.parameters[name])
+    endings, ended, sentences = ends
+    codes = np.array([endings.index(word) for word in ended], dtype=np.int8)
+    variables["ended"] = "end", codes, {"long_name": "how it ends", **flag_attributes(endings)}
+    variables["ended_because"] = "end", strings(sentences), {"long_name": "sentence"}
+    coords: dict[str, Any] = {}
+    for name, values in parameters.items():
+        coords |= varied(labels, name, values, "point")
+    coords |= state_coords(labels) | parameter_coords(labels, without=tuple(parameters))
+    coords["end"] = "end", strings(["first", "last"]), {"long_name": "end"}
+    if "clearance" in variables:
+        coords["indicator"] = "indicator", strings(labels.indicators), {"long_name": "indicator"}
+    return with_short_record(xr.Dataset({**variables, **more}, coords, dict(attrs)))
+
+
+def _array(column: Column, values: list[Any], sizes: dict[str, int]) -> Any:
+    """Values of a column; those of different lengths are filled with NaN, ``sizes`` are those of dims met before."""
+    if column.rule == "text":
+        return strings(values)
+    kind = _TYPES[column.rule]
+    if not column.dims:
+        return np.array(values, dtype=kind)
+    (dim,) = column.dims
+    sizes.setdefault(dim, max(map(len, values), default=0))
+    array = np.full((len(values), sizes[dim]), np.nan, dtype=kind)
+    for row, value in zip(array, values, strict=True):
+        row[: len(value)] = value
+    return array
+
+
+def attributes(d: Labels, column: Column) -> dict[str, Any]:
+    """Long name, unit and table of words of a column."""
+    words = {"long_name": column.words.replace("forcing period", d.turn)}
+    if column.rule == "time":
+        words["units"] = d.time_unit
+    return words | flag_attributes(d.modes, dtype=np.int16) if column.rule == "mode" else words
 
 
 def diagram(
@@ -119,7 +189,7 @@ def diagram(
         kept = np.array([layouts.setdefault(table, len(layouts)) for table in tables], dtype=np.int32)
         number = int(one["period_number"])
         room = {"unknown": (0, width - one.sizes["unknown"])}
-        part = one[[*_BRANCH_ARRAYS, "status", *(stem for stem, _, _ in _MARKS.values()), "special_value"]]
+        part = one[[*(column.name for column in (*ORBIT, *SPECIAL_ORBIT)), "status", "special_value"]]
         part = part.pad(room, constant_values=np.nan)
         part["signature"] = ("point", ids[one["signature"].values])
         part["layout"] = ("point", kept[one["layout"].values])
@@ -173,86 +243,3 @@ def diagram(
 def _sentences(branches: Sequence[xr.Dataset]) -> NDArray[np.str_]:
     """Endings in words of several branches (branch, end)."""
     return strings(str(text) for one in branches for text in one["ended_because"].values).reshape(-1, 2)
-
-
-def curve(
-    labels: Labels,
-    attrs: Mapping[str, Any],
-    parameters: Mapping[str, ArrayLike],
-    arrays: Mapping[str, ArrayLike],
-    special: Sequence[tuple[str, int]],
-    *,
-    kind: str,
-    period_number: int,
-    signature: str,
-    endings: Mapping[str, str],
-    ended: Sequence[str],
-) -> xr.Dataset:
-    """The result of ``continue_curve``: two parameters over ``point``, points of codimension two over ``special``."""
-    d = labels
-    variables: dict[str, Any] = {
-        name: (("point", *_BRANCH_ARRAYS[name][0]), np.asarray(array), {"long_name": _BRANCH_ARRAYS[name][1]})
-        for name, array in arrays.items()
-    }
-    variables["period"][2]["units"] = d.time_unit
-    variables["kind"] = ((), kind, {"long_name": "kind of the special point that is followed"})
-    variables["period_number"] = ((), np.int64(period_number), {"long_name": f"{d.turn}s (0: autonomous)"})
-    variables["signature"] = ((), signature, {"long_name": "signature"})
-    variables["special_kind"] = ("special", strings(name for name, _ in special), {"long_name": "codimension two"})
-    variables["special_point"] = _places(special)
-    variables |= _ends(list(endings), ended, [endings[word] for word in ended])
-    return with_short_record(xr.Dataset(variables, _coords(d, parameters), dict(attrs)))
-
-
-def equilibria(
-    labels: Labels,
-    attrs: Mapping[str, Any],
-    parameter: str,
-    values: ArrayLike,
-    arrays: Mapping[str, ArrayLike],
-    special: Sequence[tuple[str, int]],
-    *,
-    endings: Mapping[str, str],
-    ended: Sequence[str],
-) -> xr.Dataset:
-    """The result of ``continue_equilibrium``: equilibria over ``point``, marks over ``special``."""
-    d = labels
-    modes = flag_attributes(d.modes, dtype=np.int16)
-    variables: dict[str, Any] = {
-        "u": (("point", "state"), np.asarray(arrays["u"]), {"long_name": "equilibrium"}),
-        "eigenvalues": (("point", "eigenvalue"), np.asarray(arrays["eigenvalues"]), {"long_name": "eigenvalues"}),
-        "stable": ("point", np.asarray(arrays["stable"]), {"long_name": "all real parts negative"}),
-        "mode": ("point", np.asarray(arrays["mode"], np.int16), {"long_name": "mode", **modes}),
-        "special_kind": ("special", strings(kind for kind, _ in special), {"long_name": "kind of the special point"}),
-        "special_point": _places(special),
-        "special_value": _special_value(d, parameter, floats(values), [place for _, place in special]),
-        **_ends(list(endings), ended, [endings[word] for word in ended]),
-    }
-    return with_short_record(xr.Dataset(variables, _coords(d, {parameter: values}), dict(attrs)))
-
-
-def _places(special: Sequence[tuple[str, int]]) -> tuple[Any, ...]:
-    places = np.array([place for _, place in special], dtype=np.int64)
-    return "special", places, {"long_name": "its place among the points"}
-
-
-def _special_value(d: Labels, parameter: str, along: NDArray[np.float64], places: Any) -> tuple[Any, ...]:
-    return "special", along[np.asarray(places, dtype=np.int64)], quantity_attributes(parameter, d.parameters[parameter])
-
-
-def _ends(endings: Sequence[str], ended: Sequence[str], sentences: Sequence[str]) -> dict[str, Any]:
-    """Endings of both ends: one of ``endings``, and a sentence."""
-    codes = np.array([endings.index(word) for word in ended], dtype=np.int8)
-    return {
-        "ended": ("end", codes, {"long_name": "how it ends", **flag_attributes(endings)}),
-        "ended_because": ("end", strings(sentences), {"long_name": "sentence"}),
-    }
-
-
-def _coords(d: Labels, parameters: Mapping[str, ArrayLike]) -> dict[str, Any]:
-    """The parameters that vary over ``point``, the states, the other parameters, and the two ends."""
-    coords: dict[str, Any] = {}
-    for name, values in parameters.items():
-        coords |= varied(d, name, values, "point")
-    coords |= state_coords(d) | parameter_coords(d, without=tuple(parameters))
-    return coords | {"end": ("end", strings(["first", "last"]), {"long_name": "end"})}

@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from nonsmooth.arrays import ComplexArray, FloatArray
-from nonsmooth.continuation.problems.anchor import anchor_at
 from nonsmooth.continuation.problems.equilibrium import Equilibria
 from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
+from nonsmooth.continuation.problems.rounds import Rounds
 from nonsmooth.continuation.problems.shooting import Shooting
-from nonsmooth.continuation.signature.rounds import Rounds
-from nonsmooth.continuation.signature.signature import Signature, Visit
+from nonsmooth.continuation.problems.signature import Signature, Visit
 from nonsmooth.flow.equilibria import ModeField
 from nonsmooth.system.system import System
 
@@ -37,7 +36,7 @@ def first_cycle(
     curve = Orbits(shooting, scale, period, (width,))
     for amplitude in (SMALL, 0.3 * SMALL, 3 * SMALL):
         z = rested + amplitude * own.real
-        anchor_at(shooting, shooting.values, z, scale)
+        shooting.anchor(z, shooting.values, scale)
         Y = shooting.join(np.empty(0), z[None, :], period, [value]) / curve.scale
         border = np.zeros(curve.n)
         border[: shooting.n] = own.real / scale

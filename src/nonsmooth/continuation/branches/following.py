@@ -1,25 +1,99 @@
-"""A branch of orbits that is asked for: its range, its marches, and the result made of them."""
+"""Branches as they are asked for: the range, the marches both ways, and the result made of them."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from nonsmooth.continuation.branches.files import branch_dataset
-from nonsmooth.continuation.branches.records import BranchRecord, PointRecord, SpecialRecord, from_march, joined
-from nonsmooth.continuation.march.begin import limits
-from nonsmooth.continuation.march.march import march
-from nonsmooth.continuation.march.marches import ENDINGS, Limits, March, Place
-from nonsmooth.continuation.march.physical import allowed_range
+import numpy as np
+
+from nonsmooth.continuation.arguments import allowed_range, limits
+from nonsmooth.continuation.branches.records import BranchRecord, PointRecord, SpecialRecord, record_of
+from nonsmooth.continuation.events.leaving import AlongOrbits
+from nonsmooth.continuation.march.event import BESIDE, Step
+from nonsmooth.continuation.march.march import Limits, March, Policy, march
+from nonsmooth.continuation.problems.curve import Curve, Place
+from nonsmooth.continuation.problems.signature import Signature
+from nonsmooth.errors import Interrupted
+from nonsmooth.system.system import System
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
-    from nonsmooth.system.system import System
+__all__ = ["Asked", "Following", "Start", "both_ways", "dataset"]
 
-__all__ = ["Asked", "Following"]
+ZERO = 1e-6  # of the numbers beside it: the first point is a special one
+
+#: A curve and a point of it, to march on from along its tangent; or a march that has ended.
+Start = tuple[Curve[Any], Any] | March
+
+
+def both_ways(policy: Policy, limits: Limits, back: Start, middle: Sequence[Any], ahead: Start) -> BranchRecord:
+    """Follow a branch both ways from the records in its ``middle``.
+
+    After a march that came round to its beginning or was interrupted there is none the other way."""
+    found: list[March] = []
+    for start in (ahead, back):
+        if isinstance(start, March):
+            found.append(start)
+        elif found and found[0].ending in ("closed", "interrupted"):
+            found.append(March(ending=found[0].ending))
+        else:
+            found.append(march(*start, limits, policy))
+    marched, before = found
+    if isinstance(ahead, tuple) and isinstance(back, tuple) and ahead[0] is back[0]:
+        middle[0].marks.extend(SpecialRecord(kind) for kind in _at_the_start(policy, *ahead, before, marched))
+    for row in before.rows:
+        row.point = row.point.turned()
+    points = [*(record_of(row) for row in before.rows[::-1]), *middle, *(record_of(row) for row in marched.rows)]
+    said = [one.said or policy.endings[one.ending] for one in (before, marched)]
+    return BranchRecord(points, [before.ending, marched.ending], said)
+
+
+def _at_the_start(policy: Policy, curve: Curve[Any], first: Any, back: March, ahead: March) -> list[str]:
+    """Special points at the first point itself: rounding decides whether a march from there sees them."""
+    if not (back.rows and ahead.rows) or not all(march.rows[0].curve is curve for march in (back, ahead)):
+        return []
+    before, after = back.rows[0].point.turned(), ahead.rows[0].point  # the march back has its tangents the other way
+    seen = {row.kind for march in (back, ahead) for row in march.special
+            if row.curve is curve and np.abs(row.point.Y - first.Y).max() < BESIDE}  # fmt: skip
+    step, found = Step(curve, before, after, ([], []), ([], [])), []
+    for kind in policy.kinds:
+        here, was, now = (kind.number(curve, point) for point in (first, before, after))
+        happened = kind.happened(step, was, now) and abs(here) <= ZERO * max(abs(was), abs(now))
+        if happened and kind.certain and (named := kind.named(step, first)) and named[0] not in seen:
+            found.append(named[0])
+    return found
+
+
+def dataset(
+    system: System, verb: str, parameters: dict[str, list[float]], tables: Any, record: BranchRecord, policy: Policy,
+    options: dict[str, Any], more: dict[str, Any], attrs: dict[str, str], method: str = "multiple shooting",
+) -> xr.Dataset:  # fmt: skip
+    """A branch or a curve as a Dataset.
+
+    Raises
+    ------
+    Interrupted
+        Ctrl-C ended a march: no caller goes on with a part.
+    """
+    from nonsmooth.results.branches import line
+    from nonsmooth.results.labels import labels_of
+    from nonsmooth.results.provenance import provenance
+
+    labels = labels_of(system)
+    attrs = {**provenance(labels, verb, options, method=method), **attrs}
+    ends = list(policy.endings), record.endings, record.sentences
+    result = line(labels, attrs, parameters, tables, record.points, record.special, ends, more)
+    if "interrupted" not in record.endings:
+        return result
+    raise Interrupted(
+        f"interrupted: the {result.sizes['point']} points that were found are in `result` of this exception "
+        "(at a prompt: import sys; branch = sys.last_value.result). continue_orbit(branch) goes on with orbits",
+        result,
+    )
 
 
 @dataclass(frozen=True)
@@ -45,7 +119,7 @@ class Asked:
 
 @dataclass(frozen=True)
 class Following:
-    """A branch under way; ``bounds`` is the part of its range in which the equations allow the parameter."""
+    """A branch of orbits under way; ``bounds`` is the part of its range in which the equations allow the parameter."""
 
     system: System
     name: str
@@ -58,45 +132,58 @@ class Following:
         """The width of the range."""
         return self.range[1] - self.range[0]
 
-    def march(self, curve: Orbits, point: OrbitPoint, closed: Place | None = None) -> March:
-        """Follow the branch from a point along its tangent; ``closed``: where it would close."""
-        asked = self.asked
-        return march(curve, point, Limits(((-1, *self.bounds),), asked.step, asked.points, closed, asked.virtual))
-
     def result(
-        self, period_number: int, back: March, middle: Sequence[PointRecord], ahead: March,
-        marks: Sequence[SpecialRecord] = (), origin: str | None = None,
+        self, period_number: int, back: Start, middle: Sequence[PointRecord], ahead: Start,
+        closed: Place | None = None, origin: str | None = None,
     ) -> xr.Dataset:  # fmt: skip
-        """The branch of a march back, the points in the middle with their ``marks``, and a march ahead.
+        """The branch of a march back, the points in the middle, and a march ahead; ``closed``: where it would close.
 
         ``origin`` is the kind of the special point that it leaves.
-
-        Raises
-        ------
-        Interrupted
-            Ctrl-C ended a march.
         """
-        said = self._sentence(back), self._sentence(ahead)
-        for mark in marks:
-            mark.place += len(back.rows)
-        points, special = joined(from_march(back), list(middle), from_march(ahead))
-        special = sorted([*special, *marks], key=lambda one: one.place)
-        endings = back.ending, ahead.ending
-        record = BranchRecord(self.name, self.range, period_number, points, special, endings, said)
-        asked = self.asked
-        return branch_dataset(self.system, record, {
-            "parameter": self.name, "range": self.range, "step": asked.step, "points": asked.points,
-            "virtual": asked.virtual, **({} if origin is None else {"from": origin}),
-        })  # fmt: skip
-
-    def _sentence(self, found: March) -> str:
-        """Return the end of a march in words; where the range was cut, that is the reason."""
-        if found.said:
-            return found.said
-        if found.ending == "range" and found.rows:
-            value = found.rows[-1].point.value
+        asked, policy = self.asked, AlongOrbits()
+        within = Limits(((-1, *self.bounds),), asked.step, asked.points, closed, asked.virtual)
+        record = both_ways(policy, within, back, middle, ahead)
+        for end in (0, -1):  # where the range was cut, that is the reason
+            value = record.points[end].value
             side = 0 if abs(value - self.bounds[0]) < abs(value - self.bounds[1]) else 1
-            if self.bounds[side] != self.range[side]:
-                found.ending = "physical"
-                return f"{self.name} = {value:.6g}: {ENDINGS['physical']}"
-        return ENDINGS[found.ending]
+            if record.endings[end] == "range" and self.bounds[side] != self.range[side]:
+                record.endings[end] = "physical"
+                record.sentences[end] = f"{self.name} = {value:.6g}: {policy.endings['physical']}"
+        return orbits_dataset(self, record, period_number, policy, {} if origin is None else {"from": origin})
+
+
+def orbits_dataset(
+    branch: Following, record: BranchRecord, period_number: int, policy: Policy, origin: dict[str, str]
+) -> xr.Dataset:
+    """A branch of orbits as a Dataset.
+
+    The text of the system, the table of signatures and the unknowns of every point stand in it, so that a branch read
+    from a file goes on from where it stopped."""
+    from nonsmooth.results.branches import ORBIT, SPECIAL_ORBIT
+    from nonsmooth.results.labels import labels_of
+    from nonsmooth.results.statuses import flag_attributes, status_attributes
+
+    points, asked = record.points, branch.asked
+    layouts: dict[Signature, int] = {}
+    cycles: dict[Any, int] = {}
+    texts: list[str] = []
+    for point in points:
+        point.layout = layouts.setdefault(point.signature, len(layouts))
+        if point.signature.cycle not in cycles:
+            texts.append(point.signature.text(branch.system.traced))
+        point.cycle = cycles.setdefault(point.signature.cycle, len(cycles))
+    options = {
+        "parameter": branch.name, "range": branch.range, "step": asked.step, "points": asked.points,
+        "virtual": asked.virtual, **origin,
+    }  # fmt: skip
+    meanings = {"long_name": "signature", **flag_attributes(texts, dtype=np.int32)}
+    turn = labels_of(branch.system).turn
+    more = {
+        "signature": ("point", np.array([point.cycle for point in points], np.int32), meanings),
+        "period_number": ((), np.int64(period_number), {"long_name": f"{turn}s (0: autonomous)"}),
+        "status": ("point", np.zeros(len(points), np.int8), status_attributes()),
+    }
+    attrs = {"parameter": branch.name, "layouts": json.dumps([one.data for one in layouts])}
+    values = {branch.name: [point.value for point in points]}
+    tables = ORBIT, SPECIAL_ORBIT
+    return dataset(branch.system, "continue_orbit", values, tables, record, policy, options, more, attrs)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -9,16 +10,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.arrays import ComplexArray, FloatArray
-from nonsmooth.continuation.problems.multipliers import multipliers_of, stability, stable_by
-from nonsmooth.continuation.signature.signature import Signature
+from nonsmooth.continuation.branches.reading import layouts_of, recorded, undamaged
+from nonsmooth.continuation.problems.multipliers import stability, stable_by
+from nonsmooth.continuation.problems.path import Path
+from nonsmooth.continuation.problems.shooting import Shooting, Solved
+from nonsmooth.continuation.problems.signature import Signature
 from nonsmooth.results.representation import cut, html_table
+from nonsmooth.system.system import System
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from nonsmooth.continuation.problems.shooting import Shooting, Solved
-    from nonsmooth.continuation.signature.path import Path
-    from nonsmooth.system.system import System
 
 __all__ = ["Orbit", "orbit_of"]
 
@@ -147,16 +148,52 @@ class Orbit:
 
     def to_dataset(self) -> xr.Dataset:
         """The orbit as a Dataset that can be saved; ``from_dataset`` reads it back."""
-        from nonsmooth.continuation.branches.files import orbit_dataset
+        import xarray as xr
 
-        return orbit_dataset(self)
+        from nonsmooth.results.branches import FOUND, attributes
+        from nonsmooth.results.labels import labels_of
+        from nonsmooth.results.provenance import provenance, with_short_record
+        from nonsmooth.results.schema import parameter_coords, state_coords
+
+        labels = labels_of(self.system)
+        attrs: dict[str, Any] = dict(provenance(labels, "find_orbit", self.options, method="multiple shooting"))
+        attrs["layouts"] = json.dumps([self.signature.data])
+        values = vars(self) | {"clearance": np.array(list(self.clearance.values()), dtype=float)}
+        variables = {column.name: (column.dims, values[column.field], attributes(labels, column)) for column in FOUND}
+        names = np.array([*self.system.states, *self.system.memory], dtype=str)
+        coords = {
+            **state_coords(labels), **parameter_coords(labels), "component": ("component", names),
+            "column": ("column", names), "indicator": ("indicator", np.array(list(self.clearance), dtype=str)),
+        }  # fmt: skip
+        return with_short_record(xr.Dataset(variables, coords, attrs))
 
     @classmethod
     def from_dataset(cls, dataset: xr.Dataset) -> Orbit:
-        """Read `to_dataset` back, from memory or from a file."""
-        from nonsmooth.continuation.branches.reading import read_orbit
+        """Read `to_dataset` back, from memory or from a file.
 
-        return read_orbit(dataset)
+        Raises
+        ------
+        ValueError
+            A result of another verb, or one that is damaged.
+        """
+        from nonsmooth.results.branches import FOUND
+
+        source, system = recorded(dataset, "orbit")
+        if source["verb"] != "find_orbit":
+            verb = source["verb"]
+            raise ValueError(f"this Dataset was made by {verb!r}; Orbit.from_dataset reads those of find_orbit")
+        scalar: dict[str, Any] = {"flag": bool, "time": float, "text": str, "place": int}
+        with undamaged("orbit"):
+            (signature,) = layouts_of(dataset, system)
+            values: dict[str, Any] = {column.field: dataset[column.name].values for column in FOUND}
+            for column in FOUND:
+                if not column.dims:
+                    values[column.field] = scalar[column.rule](values[column.field])
+            shape = len(signature.crossings), len(system.states) + len(system.memory)
+            values["crossing_states"] = values["crossing_states"].reshape(shape)
+            names = map(str, dataset["indicator"].values)
+            values["clearance"] = dict(zip(names, map(float, values["clearance"]), strict=True))
+            return cls(system=system, signature=signature, options=source["options"], **values)
 
 
 def orbit_of(shooting: Shooting, solved: Solved, path: Path, clearance: FloatArray, virtual: bool) -> Orbit:
@@ -168,7 +205,7 @@ def orbit_of(shooting: Shooting, solved: Solved, path: Path, clearance: FloatArr
     times, states = shooting.split(X)
     n_u = len(system.states)
     M = solved.monodromy
-    multipliers = multipliers_of(M)
+    multipliers = solved.multipliers
     return Orbit(
         system=system, u=states[0, :n_u].copy(), mode=system.modes[shooting.at_section],
         memory=states[0, n_u:].copy(), period=float(solved.times[-1]), period_number=shooting.period_number,

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.continuation.branches.following import Asked
-from nonsmooth.continuation.branches.reading import hopf_row, one_row, special_row
-from nonsmooth.continuation.branches.records import PointRecord, SpecialRecord, point_record
-from nonsmooth.continuation.march.begin import resumed_at
-from nonsmooth.continuation.march.crossing import tangents
-from nonsmooth.continuation.march.marches import March, in_turn
+from nonsmooth.continuation.branches.begin import resumed_at
+from nonsmooth.continuation.branches.born import cycle_about_a_centre, first_cycle
+from nonsmooth.continuation.branches.following import Asked, Start
+from nonsmooth.continuation.branches.reading import hopf_row, mark_of, one_row, special_row
+from nonsmooth.continuation.branches.records import record_of
+from nonsmooth.continuation.march.march import March, Row
+from nonsmooth.continuation.problems.curve import tangents
 from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
 from nonsmooth.continuation.problems.shooting import Shooting
 from nonsmooth.errors import SolveError
@@ -48,16 +48,16 @@ def switched(start: xr.Dataset, name: str | None, asked: Asked) -> xr.Dataset:
                 break
     if not begun:
         raise SolveError(f"no other branch was found at this {kind}", status="no_convergence")
-    here = _origin(*ways[0])
-    closed = (here.signature, here.X, ways[0][0].shape(here.maximum, here.minimum, here.X))
-    ahead, *others = in_turn(*(partial(branch.march, *one, closed) for one in begun))
-    middle, mark = [here, point_record(*begun[0])], SpecialRecord(kind, 0)
-    back = March(ending="branching", said=f"The branch begins at the {kind}.")
-    if others:
-        back, mark.place = others[0], 1
-        middle.insert(0, point_record(begun[1][0], begun[1][1].turned()))
-    number = begun[0][0].shooting.period_number
-    return branch.result(number, back, middle, ahead, [mark], origin=kind)
+    fresh, Y, direction = ways[0]
+    here = fresh.described(Y, direction, 0.0, 0, fresh.evaluate(Y))
+    assert here is not None
+    middle = [record_of(Row(fresh, here, kind=kind)), record_of(Row(*begun[0]))]
+    back: Start = March(ending="branching", said=f"The branch begins at the {kind}.")
+    if len(begun) > 1:
+        back = begun[1]
+        middle.insert(0, record_of(Row(begun[1][0], begun[1][1].turned())))
+    number = fresh.shooting.period_number
+    return branch.result(number, back, middle, begun[0], closed=fresh.landmark(here), origin=kind)
 
 
 def straight_on(start: xr.Dataset, name: str | None, asked: Asked) -> xr.Dataset:
@@ -70,20 +70,13 @@ def straight_on(start: xr.Dataset, name: str | None, asked: Asked) -> xr.Dataset
     first = curve.near(X / curve.scale, border / np.linalg.norm(border))
     if first is None:
         raise SolveError(f"Newton's method did not converge at this {kind}", status="no_convergence")
-    back, ahead = in_turn(*(partial(branch.march, curve, one) for one in (first.turned(), first)))
-    here = one_row(start, "continue_orbit")
-    mark = SpecialRecord(
-        kind, 0, ["", *system.indicators].index(str(here["touched"].values)) - 1,
-        str(here["grazing"].values), str(here["sliding"].values), bool(here["bounded"]), bool(here["doubled"]),
-        here["contact_multipliers"].values, here["determinant"].values,
-    )  # fmt: skip
-    return branch.result(period_number, back, [point_record(curve, first)], ahead, [mark], origin=kind)
+    middle = record_of(Row(curve, first))
+    middle.marks.append(mark_of(one_row(start, "continue_orbit"), system))
+    return branch.result(period_number, (curve, first.turned()), [middle], (curve, first), origin=kind)
 
 
 def born(start: xr.Dataset, name: str | None, asked: Asked) -> xr.Dataset:
     """The cycles that emanate from a Hopf point, or from a focus-centre."""
-    from nonsmooth.continuation.branches.born import cycle_about_a_centre, first_cycle
-
     start = one_row(start, "continue_orbit")
     kind = str(start["kind"].values)
     if kind not in ("hopf", "focus_centre"):
@@ -96,23 +89,15 @@ def born(start: xr.Dataset, name: str | None, asked: Asked) -> xr.Dataset:
         raise SolveError(f"no cycle was found at this {kind}", status="no_convergence")
     curve, first = begun
     # The first cycle of a Hopf point is small; about a centre the one that touches the boundary is followed back to.
-    back = March(ending="branching", said="The branch begins at the Hopf point.")
+    back: Start = March(ending="branching", said="The branch begins at the Hopf point.")
     if kind == "focus_centre":
-        back = branch.march(curve, first.turned())
-    ahead = branch.march(curve, first)
-    return branch.result(0, back, [point_record(curve, first)], ahead, origin=kind)
+        back = curve, first.turned()
+    return branch.result(0, back, [record_of(Row(curve, first))], (curve, first), origin=kind)
 
 
 def _check_parameter(name: str | None, own: str) -> None:
     if name is not None and name != own:
         raise ValueError(f"this special point lies on a branch in {own!r}, not in {name!r}")
-
-
-def _origin(curve: Orbits, Y: FloatArray, direction: FloatArray) -> PointRecord:
-    """The special point itself, as a point of the branch that leaves it."""
-    point = curve.described(Y, direction, 0.0, 0, curve.evaluate(Y))
-    assert point is not None
-    return point_record(curve, point)
 
 
 def doubled(shooting: Shooting, X: FloatArray) -> tuple[Shooting, FloatArray]:

@@ -16,24 +16,18 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.branches.records import BranchRecord, PointRecord, SpecialRecord
-from nonsmooth.continuation.march.marches import ENDINGS
-from nonsmooth.continuation.signature.signature import AT_ONCE, SECTION, Signature, Visit
+from nonsmooth.continuation.events.leaving import ENDINGS
+from nonsmooth.continuation.problems.signature import AT_ONCE, SECTION, Signature, Visit
+from nonsmooth.system.system import System
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from nonsmooth.continuation.branches.orbit import Orbit
-    from nonsmooth.system.system import System
-
-__all__ = ["hopf_row", "one_row", "read_branch", "read_orbit", "recorded", "special_row"]
-
-#: What is read of one point, beside its parameter.
-_POINT = ("layout", "unknowns", "tangent", "mode", "section", "maximum", "minimum", "period", "floquet_multipliers",
-          "stable", "clearance", "virtual")  # fmt: skip
+__all__ = ["hopf_row", "layouts_of", "mark_of", "one_row", "read_branch", "recorded", "special_row", "undamaged"]
 
 
 @contextmanager
-def _undamaged(what: str) -> Iterator[None]:
+def undamaged(what: str) -> Iterator[None]:
     """Turn what is missing or does not fit together into one sentence."""
     try:
         yield
@@ -52,7 +46,7 @@ def recorded(dataset: xr.Dataset, what: str) -> tuple[dict[str, Any], System]:
     if not hasattr(dataset, "data_vars"):
         raise TypeError(f"this {what} is read from its Dataset, not from {type(dataset).__name__}")
     source = read_provenance(dataset)
-    with _undamaged(what):
+    with undamaged(what):
         system = recorded_system(source)
     return source, system
 
@@ -84,53 +78,24 @@ def read_branch(dataset: xr.Dataset) -> tuple[System, BranchRecord]:
         A Dataset that is damaged.
     """
     source, system = recorded(dataset, "branch")
-    with _undamaged("branch"):
+    with undamaged("branch"):
         name, period_number = str(dataset.attrs["parameter"]), int(dataset["period_number"])
-        layouts = _layouts(dataset, system)
-        columns = {key: dataset[key].values for key in (name, *_POINT)}
+        layouts = layouts_of(dataset, system)
+        columns = _columns(dataset, name)
         points = [
             _point(system, layouts, period_number, name, {key: column[i] for key, column in columns.items()})
             for i in range(dataset.sizes["point"])
         ]
-        special = [_special(dataset.isel(special=i), system, len(points)) for i in range(dataset.sizes["special"])]
+        for i in range(dataset.sizes["special"]):
+            mark = mark_of(dataset.isel(special=i), system)
+            points[_place(mark.point, len(points), "point")].marks.append(mark)
         words = list(ENDINGS)
-        first, last = (words[_place(int(code), len(words), "ending")] for code in dataset["ended"].values)
-        begun, ended = (str(text) for text in dataset["ended_because"].values)
+        endings = [words[_place(int(code), len(words), "ending")] for code in dataset["ended"].values]
+        said = [str(text) for text in dataset["ended_because"].values]
         low, high = (float(end) for end in source["options"]["range"])
-        if not points:
-            raise ValueError("it has no points")
-    return system, BranchRecord(name, (low, high), period_number, points, special, (first, last), (begun, ended))
-
-
-def read_orbit(dataset: xr.Dataset) -> Orbit:
-    """Read ``files.orbit_dataset`` back.
-
-    Raises
-    ------
-    ValueError
-        A result of another verb, or one that is damaged.
-    """
-    from nonsmooth.continuation.branches.orbit import Orbit
-
-    source, system = recorded(dataset, "orbit")
-    if source["verb"] != "find_orbit":
-        raise ValueError(f"this Dataset was made by {source['verb']!r}; Orbit.from_dataset reads those of find_orbit")
-
-    def get(name: str) -> Any:
-        return dataset[name].values
-
-    with _undamaged("orbit"):
-        (signature,) = _layouts(dataset, system)
-        n = len(system.states) + len(system.memory)
-        return Orbit(
-            system=system, u=get("section"), mode=str(get("mode")), memory=get("memory"), period=float(get("period")),
-            period_number=int(get("period_number")), signature=signature, crossing_times=get("crossing_time"),
-            crossing_states=get("crossing_state").reshape(len(signature.crossings), n),
-            monodromy_matrix=get("monodromy_matrix"), floquet_multipliers=get("floquet_multipliers"),
-            stable=bool(get("stable")), maximum=get("maximum"), minimum=get("minimum"),
-            clearance={str(k): float(v) for k, v in zip(dataset["indicator"].values, get("clearance"), strict=True)},
-            virtual=bool(get("virtual")), options=source["options"],
-        )  # fmt: skip
+        if not points or len(endings) != 2 or len(said) != 2:
+            raise ValueError("it has no points, or not two ends")
+    return system, BranchRecord(points, endings, said, name, (low, high), period_number)
 
 
 def special_row(start: Any, verb: str) -> tuple[System, str, str, PointRecord, int, Any]:
@@ -147,17 +112,16 @@ def special_row(start: Any, verb: str) -> tuple[System, str, str, PointRecord, i
         raise TypeError(f"{verb} takes a special point of orbits (of continue_orbit), not one of equilibria")
     start = one_row(start, verb)
     source, system = recorded(start, "special point")
-    with _undamaged("special point"):
+    with undamaged("special point"):
         own, period_number = str(start.attrs["parameter"]), int(start["period_number"])
-        row = {key: start[key].values for key in (own, *_POINT)}
-        point = _point(system, _layouts(start, system), period_number, own, row)
+        point = _point(system, layouts_of(start, system), period_number, own, _columns(start, own))
         return system, str(start["kind"].values), own, point, period_number, source["options"]["range"]
 
 
 def hopf_row(start: xr.Dataset) -> tuple[System, str, float, int, FloatArray, tuple[float, float]]:
     """System, parameter, its value, mode, equilibrium and range of one Hopf point of ``continue_equilibrium``."""
     source, system = recorded(start, "special point")
-    with _undamaged("special point"):
+    with undamaged("special point"):
         name = str(start.attrs["parameter"])
         value, mode = float(start[name]), _place(int(start["mode"]), len(system.modes), "mode")
         u = np.asarray(start["u"].values, dtype=float)
@@ -167,7 +131,7 @@ def hopf_row(start: xr.Dataset) -> tuple[System, str, float, int, FloatArray, tu
     return system.with_parameters({name: value}), name, value, mode, u, (low, high)
 
 
-def _layouts(dataset: xr.Dataset, system: System) -> list[Signature]:
+def layouts_of(dataset: xr.Dataset, system: System) -> list[Signature]:
     """The table of signatures, each one a way that the system's transitions allow."""
     traced = system.traced
     found = []
@@ -185,33 +149,46 @@ def _layouts(dataset: xr.Dataset, system: System) -> list[Signature]:
     return found
 
 
+def _columns(dataset: xr.Dataset, name: str) -> dict[str, Any]:
+    """Arrays of the parameter and of what is known of an orbit."""
+    from nonsmooth.results.branches import ORBIT
+
+    return {key: dataset[key].values for key in (name, *(column.name for column in ORBIT))}
+
+
 def _point(
     system: System, layouts: list[Signature], period_number: int, name: str, row: Mapping[str, Any]
 ) -> PointRecord:
     """One point of a branch, whose unknowns are as many as its signature has."""
-    signature = layouts[_place(int(row["layout"]), len(layouts), "signature")]
-    known = ~np.isnan(row["unknowns"])
+    from nonsmooth.results.branches import ORBIT
+
+    found = {column.field: row[column.name] for column in ORBIT}
+    signature = layouts[_place(int(found["layout"]), len(layouts), "signature")]
+    known = ~np.isnan(found["X"])
     n = len(system.states) + len(system.memory)
     size = n + len(signature.crossings) * (n + 1) + (1 if period_number else 2)
-    if not known[:size].all() or known[size:].any() or not np.isfinite(row["tangent"][:size]).all():
+    if not known[:size].all() or known[size:].any() or not np.isfinite(found["tangent"][:size]).all():
         raise ValueError(f"a point has not the {size} unknowns of its signature")
-    return PointRecord(
-        float(row[name]), signature, row["unknowns"][:size], row["tangent"][:size],
-        _place(int(row["mode"]), len(system.modes), "mode"), row["section"], row["maximum"], row["minimum"],
-        float(row["period"]), row["floquet_multipliers"], bool(row["stable"]), row["clearance"], bool(row["virtual"]),
-    )  # fmt: skip
+    found["X"], found["tangent"] = found["X"][:size], found["tangent"][:size]
+    found["mode"] = _place(int(found["mode"]), len(system.modes), "mode")
+    for column in ORBIT:
+        if column.rule in ("flag", "time"):
+            found[column.field] = (bool if column.rule == "flag" else float)(found[column.field])
+    return PointRecord(float(row[name]), signature, **found)
 
 
-def _special(row: xr.Dataset, system: System, points: int) -> SpecialRecord:
-    def get(name: str) -> Any:
-        return row[f"special_{name}"].values
+def mark_of(row: xr.Dataset, system: System) -> SpecialRecord:
+    """The special point of a row of a branch, or of `special_points`."""
+    from nonsmooth.results.branches import SPECIAL_ORBIT, STEMS
 
-    contact = get("contact_multipliers")
-    return SpecialRecord(
-        str(get("kind")), _place(int(get("point")), points, "point"),
-        ["", *system.indicators].index(str(get("indicator"))) - 1, str(get("grazing")), str(get("sliding")),
-        bool(get("bounded")), bool(get("doubled")), None if np.isnan(contact).all() else contact, get("determinant"),
-    )  # fmt: skip
+    types: dict[str, Any] = {"text": str, "flag": bool, "place": int}
+    found: dict[str, Any] = {}
+    for column in SPECIAL_ORBIT:
+        value = row[column.name if column.name in row else STEMS[column.name]].values
+        found[column.field] = types[column.rule](value) if column.rule in types else value
+    if found["indicator"] not in ("", *system.indicators):
+        raise ValueError(f"no indicator {found['indicator']!r}")
+    return SpecialRecord(**found)
 
 
 def _place(i: int, n: int, what: str) -> int:

@@ -1,21 +1,36 @@
-"""Points and special points of a branch as plain data: what is kept, saved and read back."""
+"""Points and special points of a branch as plain data: what is kept, saved and read back.
+
+Their fields are those of the tables in ``nonsmooth.results.branches``."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from nonsmooth.arrays import ComplexArray, FloatArray
+from nonsmooth.continuation.march.march import Row
+from nonsmooth.continuation.problems.equilibrium import Equilibria
 from nonsmooth.continuation.problems.multipliers import stable_by
-from nonsmooth.continuation.signature.signature import Signature
+from nonsmooth.continuation.problems.signature import Signature
 
-if TYPE_CHECKING:
-    from nonsmooth.continuation.march.marches import March, Special
-    from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
+__all__ = ["BranchRecord", "PointRecord", "RestRecord", "SpecialRecord", "record_of"]
 
-__all__ = ["BranchRecord", "PointRecord", "SpecialRecord", "from_march", "joined"]
+
+@dataclass
+class SpecialRecord:
+    """A special point: its kind, its data, and its place ``point`` in the branch."""
+
+    kind: str
+    indicator: str = ""
+    grazing: str = ""
+    sliding: str = ""
+    bounded: bool = True
+    doubled: bool = False
+    contact: ComplexArray = field(default_factory=lambda: np.empty(0, dtype=complex))  # in the limit
+    determinants: FloatArray = field(default_factory=lambda: np.empty(0))
+    point: int = -1
 
 
 @dataclass
@@ -34,89 +49,82 @@ class PointRecord:
     multipliers: ComplexArray
     stable: bool
     clearance: FloatArray  # (n_indicators,)
+    crossings: float  # per period
+    contacts: float
     virtual: bool = False
+    marks: list[SpecialRecord] = field(default_factory=list)
+    layout: int = -1  # its signature in the tables of a branch, as it begins at the section
+    cycle: int = -1  # and as a cycle
 
 
 @dataclass
-class SpecialRecord:
-    """One special point: the place of its orbit among the points, and what belongs to its kind."""
+class RestRecord:
+    """One equilibrium of a branch."""
 
-    kind: str
-    place: int
-    indicator: int = -1
-    grazing: str = ""
-    sliding: str = ""
-    bounded: bool = True
-    doubled: bool = False
-    contact: ComplexArray | None = None  # multipliers with the contact, in the limit
-    determinants: FloatArray = field(default_factory=lambda: np.full(4, np.nan))
+    value: float
+    u: FloatArray  # of a set its middle
+    lower: FloatArray
+    upper: FloatArray
+    eigenvalues: ComplexArray
+    stable: bool
+    mode: int
+    marks: list[SpecialRecord] = field(default_factory=list)
 
 
 @dataclass
 class BranchRecord:
-    """A branch: points in order, special points, and how each end came about (ENDINGS; a sentence)."""
+    """A branch: points in order, and how each end came about (a key of the policy's endings; a sentence)."""
 
-    parameter: str
-    range: tuple[float, float]
-    period_number: int
-    points: list[PointRecord]
-    special: list[SpecialRecord]
-    endings: tuple[str, str] = ("points", "points")
-    sentences: tuple[str, str] = ("", "")
+    points: list[Any]
+    endings: list[str]
+    sentences: list[str]
+    parameter: str = ""
+    range: tuple[float, float] = (-np.inf, np.inf)
+    period_number: int = 0
 
-
-def point_record(curve: Orbits, point: OrbitPoint, virtual: bool = False) -> PointRecord:
-    """Record of a solved point."""
-    shooting, path = curve.shooting, point.path
-    n_u = len(shooting.system.states)
-    return PointRecord(
-        float(point.X[-1]), shooting.signature, point.X, point.tangent * curve.scale, shooting.at_section,
-        point.X[:n_u], path.maximum, path.minimum, float(point.solved.times[-1]), point.multipliers,
-        stable_by(point.multipliers, shooting.forced),
-        curve.walk.clearance(path, len(shooting.system.indicators)), virtual,
-    )  # fmt: skip
+    @property
+    def special(self) -> list[SpecialRecord]:
+        """The special points, each with its place."""
+        return [replace(mark, point=i) for i, point in enumerate(self.points) for mark in point.marks]
 
 
-def special_record(special: Special) -> SpecialRecord:
-    """Record of a special point."""
-    record = SpecialRecord(special.kind, special.row, special.indicator, sliding=special.sliding)
-    g = special.graze
-    if g is not None:
-        one = np.eye(len(g.M_free))
-        record.grazing, record.bounded, record.doubled = g.kind, g.bounded, g.doubled
-        record.contact = g.multipliers_contact
-        record.determinants = np.array(
-            [np.linalg.det(one + sign * M) for sign in (-1.0, 1.0) for M in (g.M_free, g.M_contact)]
-        )
+def record_of(row: Row) -> Any:
+    """The record of a solved point of a branch."""
+    curve, point = row.curve, row.point
+    if isinstance(curve, Equilibria):
+        low, high = np.min(point.ends, axis=0), np.max(point.ends, axis=0)
+        record: Any = RestRecord(point.value, point.u, low, high, point.eigenvalues, curve.stable(point), curve.mode)
+    else:
+        record = _of_orbit(row)
+    if row.kind:
+        record.marks.append(_mark(row))
     return record
 
 
-def from_march(found: March, offset: int = 0) -> tuple[list[PointRecord], list[SpecialRecord]]:
-    """The records of a march; special points count from ``offset``."""
-    points = [point_record(row.curve, row.point, row.virtual) for row in found.rows]
-    special = []
-    for one in found.special:
-        record = special_record(one)
-        if one.graze is not None:  # exactly at the graze: the multipliers of the side without contact
-            points[one.row].multipliers = one.graze.multipliers_free
-            points[one.row].stable = stable_by(one.graze.multipliers_free, one.curve.shooting.forced)
-        record.place += offset
-        special.append(record)
-    return points, special
+def _of_orbit(row: Row) -> PointRecord:
+    curve, point = row.curve, row.point
+    shooting, path = curve.shooting, point.path
+    jumps, turns = shooting.system.traced.transitions, max(shooting.period_number, 1)
+    crossings, n_u = shooting.signature.crossings, len(shooting.system.states)
+    # Exactly at a graze the multipliers are those of the side without contact.
+    multipliers = point.multipliers if row.graze is None else row.graze.multipliers_free
+    return PointRecord(
+        point.value, shooting.signature, point.X, point.tangent * curve.scale, shooting.at_section, point.X[:n_u],
+        path.maximum, path.minimum, float(point.solved.times[-1]), multipliers,
+        stable_by(multipliers, shooting.forced), curve.walk.clearance(path, len(shooting.system.indicators)),
+        len(crossings) / turns, sum(jumps[v.transition].contact for v in crossings) / turns, row.virtual,
+    )  # fmt: skip
 
 
-def joined(
-    before: tuple[list[PointRecord], list[SpecialRecord]],
-    middle: list[PointRecord],
-    after: tuple[list[PointRecord], list[SpecialRecord]],
-) -> tuple[list[PointRecord], list[SpecialRecord]]:
-    """A march the other way, reversed; the points in the middle; a march this way."""
-    points_back, special_back = before
-    n = len(points_back)
-    for point in points_back:
-        point.tangent = -point.tangent
-    for special in special_back:
-        special.place = n - 1 - special.place
-    for special in after[1]:
-        special.place += n + len(middle)
-    return points_back[::-1] + middle + after[0], special_back[::-1] + after[1]
+def _mark(row: Row) -> SpecialRecord:
+    mark = SpecialRecord(row.kind, sliding=row.sliding)
+    if row.indicator >= 0:
+        mark.indicator = list(row.curve.shooting.system.indicators)[row.indicator]
+    if isinstance(row.graze, str):  # of equilibria
+        mark.grazing = row.graze
+    elif row.graze is not None:
+        g, one = row.graze, np.eye(len(row.graze.M_free))
+        mark.grazing, mark.bounded, mark.doubled, mark.contact = g.kind, g.bounded, g.doubled, g.multipliers_contact
+        both = (g.M_free, g.M_contact)
+        mark.determinants = np.array([np.linalg.det(one + sign * M) for sign in (-1.0, 1.0) for M in both])
+    return mark

@@ -1,1 +1,1 @@
-"""One march along a branch: predictor, corrector, step size, range, events and endings."""
+"""One march along a branch: step size, range, events and endings."""

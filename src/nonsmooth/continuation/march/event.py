@@ -8,19 +8,15 @@ from __future__ import annotations
 
 import warnings
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from nonsmooth.continuation.march.crossing import branch_point, tangents
+from nonsmooth.continuation.problems.curve import Point, branch_point, tangents
 from nonsmooth.continuation.problems.solve import determinant
-
-if TYPE_CHECKING:
-    from nonsmooth.continuation.march.arclength import Point
-    from nonsmooth.continuation.march.marches import March
 
 __all__ = ["BESIDE", "Crossing", "Event", "Fold", "Met", "Step", "first_met", "locate", "special_on"]
 
@@ -32,6 +28,7 @@ CLOSING = 1e-4  # along the branch: nearer to its first point than this is that 
 TURN = 1e-4  # along the branch: a fold nearer to a crossing of branches than this is that crossing
 ABOUT = 1e-2  # along the branch: steps are short beside a crossing of branches, and its first place is rough
 TURNS = 1e-5  # of the other tangent's component in the parameter: smaller than this is zero
+SURE = 1e-3  # of the numbers at both ends: one larger than this at its root has jumped there
 SAME = 1e-9  # of the numbers at both ends: smaller than this at the place of another event is the same event
 
 
@@ -107,9 +104,9 @@ class Event(ABC):
         """Its name, and the ending where the branch ends there; None where the number vanished for another reason."""
         return self.name, None
 
-    def record(self, found: March, step: Step, met: Met) -> None:
-        """List the event."""
-        found.mark(met.name, step.curve, met.point, virtual=step.virtual and met.point.virtual)
+    def confirmed(self, curve: Any, point: Any, was: float, now: float) -> bool:
+        """Return whether the number does vanish at the corrected point: noise changes its sign elsewhere too."""
+        return abs(self.number(curve, point)) <= SURE * max(abs(was), abs(now))
 
 
 class Fold(Event):
@@ -139,6 +136,10 @@ class Crossing(Event):
             return self.name, None
         least, most = sorted(np.abs(both[:, -1]))
         return ("pitchfork" if least < TURNS * most else "transcritical"), None
+
+    def confirmed(self, curve: Any, point: Any, was: float, now: float) -> bool:
+        """Return True: its place solves equations of its own."""
+        return True
 
     def located(self, step: Step) -> tuple[float, Any] | None:
         """The zero of the determinant itself, made exact by a system that is regular there."""
@@ -171,7 +172,7 @@ def locate(step: Step, number: Callable[[Any], float]) -> tuple[float, Any] | No
     if at_ends[0] * at_ends[1] > 0.0 and abs(at_ends[0]) < BEGUN * abs(at_ends[1]):
         return 0.0, step.a  # the branch begins at the event itself
     known: dict[float, Point] = {0.0: step.a, step.end: step.b}
-    nothing = ROUNDING * max((abs(x) for x in at_ends if np.isfinite(x)), default=1.0)
+    nothing = ROUNDING * max((min(abs(x), LARGEST) for x in at_ends if np.isfinite(x)), default=1.0)
 
     def value(s: float) -> float:
         if s not in known:
@@ -194,7 +195,7 @@ def locate(step: Step, number: Callable[[Any], float]) -> tuple[float, Any] | No
     return s, known[s]
 
 
-def first_met(step: Step) -> list[Met] | None:
+def first_met(step: Step, boundaries: Sequence[Event]) -> list[Met] | None:
     """The first boundary on a step: all that is met there, what explains it best first.
 
     Beyond the place where an impact or a short visit ends the path also goes through the boundary, and the other way
@@ -202,7 +203,7 @@ def first_met(step: Step) -> list[Met] | None:
     """
     located: list[Met] = []
     passed = False
-    for kind, was, now in zip(step.curve.boundaries, *step.margins, strict=True):
+    for kind, was, now in zip(boundaries, *step.margins, strict=True):
         if not kind.happened(step, was, now):
             continue
         passed = True
@@ -223,14 +224,14 @@ def first_met(step: Step) -> list[Met] | None:
     return [met for met in located if met.s <= first + BESIDE]
 
 
-def special_on(step: Step) -> list[Met]:
+def special_on(step: Step, kinds: Sequence[Event]) -> list[Met]:
     """The special points before the stop of a step, in their order."""
     found: list[Met] = []
     curve, a, b = step.curve, step.a, step.b
     # At a change of equations the parameter may turn too: that belongs to the change. Where a branch closes its first
     # point has been looked at.
     stop = step.stop - {"change": BESIDE, "closed": CLOSING}.get(step.cause, 0.0)
-    for kind, was, now in zip(curve.kinds, *step.numbers, strict=True):
+    for kind, was, now in zip(kinds, *step.numbers, strict=True):
         if not kind.happened(step, was, now):
             continue
         there: tuple[float, Any] | None = kind.located(step)
@@ -242,7 +243,11 @@ def special_on(step: Step) -> list[Met]:
                     "met but not located, and is not listed",
                     RuntimeWarning, stacklevel=2,
                 )  # fmt: skip
-        elif there[0] <= stop and (named := kind.named(step, there[1])) is not None:
+        elif (
+            there[0] <= stop
+            and kind.confirmed(curve, there[1], was, now)
+            and (named := kind.named(step, there[1])) is not None
+        ):
             found.append(Met(kind, *there, *named))
     # A branch that crosses another one where the parameter turns is one event, not two.
     crossings = [met.s for met in found if isinstance(met.kind, Crossing)]

@@ -2,28 +2,118 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
 
 import numpy as np
 
-from nonsmooth.continuation.march.arclength import Curve, passing
-from nonsmooth.continuation.march.event import Step, first_met, special_on
-from nonsmooth.continuation.march.marches import Limits, March, Place
+from nonsmooth.continuation.march.event import Event, Met, Step, first_met, special_on
+from nonsmooth.continuation.problems.curve import Curve, Place, Point, passing
 
-__all__ = ["march"]
+__all__ = ["INTERRUPTED", "Limits", "March", "Policy", "march"]
 
+INTERRUPTED = "Interrupted: what was found until then stands"
 FIRST = 1e-3  # step
 LEAST_STEP = 1e-9
 COSINE = 0.98  # of the angle between the tangents of neighbours
 SPREAD = 0.15  # change of what is known of neighbours (of orbits: chordal, of the multipliers)
 
 
-def march(curve: Curve[Any], point: Any, limits: Limits) -> March:
+@dataclass
+class Limits:
+    """Limits of a march."""
+
+    box: tuple[tuple[int, float, float], ...]  # place of a parameter among the unknowns, low, high
+    largest: float  # step
+    points: int
+    closed: Place | None = None  # where the branch would close
+    virtual: bool = False  # go on beyond boundaries with the same signature
+
+
+@dataclass
+class Row:
+    """A point of a branch with the curve it lies on, and what belongs to its kind where it is a special one."""
+
+    curve: Any
+    point: Any
+    virtual: bool = False  # beyond a boundary that its path should obey
+    kind: str = ""  # of a special point
+    indicator: int = -1
+    sliding: str = ""
+    graze: Any = None  # an events.grazing.Graze
+
+
+@dataclass
+class March:
+    """Rows in the order of the march, and the ending: a key of the policy's ``endings``, with its sentence."""
+
+    rows: list[Row] = field(default_factory=list)
+    ending: str = "points"
+    said: str = ""
+
+    @property
+    def special(self) -> list[Row]:
+        """The rows that are special points."""
+        return [row for row in self.rows if row.kind]
+
+    def add(self, curve: Curve[Any], point: Point) -> None:
+        """Append a point."""
+        self.rows.append(Row(curve, point, point.virtual))
+
+    def mark(self, kind: str, curve: Curve[Any], point: Point, virtual: bool = False, **more: Any) -> None:
+        """Append a special point; on a boundary itself no path is virtual."""
+        self.rows.append(Row(curve, point, virtual, kind, **more))
+
+
+class Policy:
+    """Events that are searched for along the curves of a branch, and how the branch goes on or ends there.
+
+    Attributes
+    ----------
+    kinds : sequence of Event
+        Special points that every step is searched for.
+    boundaries : sequence of Event
+        Events at which the equations stop to hold; what explains the others first.
+    endings : mapping
+        The ways in which a branch can end, with the sentence for each.
+    """
+
+    kinds: Sequence[Event] = ()
+    boundaries: Sequence[Event] = ()
+    endings: ClassVar[Mapping[str, str]] = {}
+
+    def record(self, found: March, step: Step, met: Met) -> None:
+        """List an event that a branch passes."""
+        found.mark(met.name, step.curve, met.point, step.virtual and met.point.virtual)
+
+    def behind(self, found: March, curve: Any, met: list[Met]) -> tuple[Any, Any] | None:
+        """Record the boundaries ``met`` at one place; the curve and the point behind, or None."""
+        raise NotImplementedError
+
+    def unseen(self, step: Step) -> Met | None:
+        """The first place on a step that margins do not tell lies beyond a boundary."""
+        return None
+
+    def passed_by(self, step: Step) -> list[Met]:
+        """Boundaries that a branch passes on a step with the equations that it has."""
+        return []
+
+    def over(self, curve: Any, point: Any) -> str | None:
+        """The ending of a branch whose last point this is; None where it goes on."""
+        return None
+
+    def why(self, curve: Any, point: Any) -> str:
+        """The ending of a branch on which no point follows this one."""
+        return "no_convergence"
+
+
+def march(curve: Curve[Any], point: Any, limits: Limits, policy: Policy) -> March:
     """Follow a branch from a point along its tangent until it ends; the first row is the point after it."""
     found = March()
     try:
-        _Marching(found, limits).follow(curve, point)
-    except KeyboardInterrupt:  # unless_interrupted raises it again, with what was found
+        _Marching(found, limits, policy).follow(curve, point)
+    except KeyboardInterrupt:  # `both_ways` raises it again, with what was found
         found.ending = "interrupted"
     return found
 
@@ -31,8 +121,8 @@ def march(curve: Curve[Any], point: Any, limits: Limits) -> March:
 class _Marching:
     """A march under way: the curve and its last points, the step size, and the numbers that are watched."""
 
-    def __init__(self, found: March, limits: Limits) -> None:
-        self.found, self.limits = found, limits
+    def __init__(self, found: March, limits: Limits, policy: Policy) -> None:
+        self.found, self.limits, self.policy = found, limits, policy
         self.ds, self.easy = min(FIRST, limits.largest), 1.0
         self.circle: Place | None = None  # a point that is met again if the branch goes round (Brent's method)
         self.again = 8
@@ -44,17 +134,17 @@ class _Marching:
         while len(found.rows) < self.limits.points:
             new = self._next()
             if new is None:
-                found.ending = self.curve.why(self.point)
+                found.ending = self.policy.why(self.curve, self.point)
                 return
             step = self._within(new)
-            met = None if step is None else first_met(step)
+            met = None if step is None else first_met(step, self.policy.boundaries)
             if step is None or met is None:  # an event that is not located: nearer
                 self.ds *= 0.25
                 if self.ds < LEAST_STEP:
                     found.ending = "no_convergence"
                     return
                 continue
-            if not met and not step.cause and (unseen := self.curve.unseen(step)):
+            if not met and not step.cause and (unseen := self.policy.unseen(step)):
                 met = [unseen]
             if met:
                 step.ends("change", met[0].s, met[0].point)
@@ -66,7 +156,7 @@ class _Marching:
                 found.ending = step.cause
                 return
             if step.cause == "change":
-                after = self.curve.behind(found, met)
+                after = self.policy.behind(found, self.curve, met)
                 if after is None:
                     return
                 self._begin(*after)
@@ -83,7 +173,7 @@ class _Marching:
 
     def _watched(self, point: Any) -> tuple[list[float], Any]:
         """The numbers of all kinds of events at a point, and its margins to the boundaries."""
-        return [kind.number(self.curve, point) for kind in self.curve.kinds], self.curve.margins(point)
+        return [kind.number(self.curve, point) for kind in self.policy.kinds], self.curve.margins(point)
 
     def _next(self) -> Any:
         """The next point, at a distance at which it is like the last one; None where there is none."""
@@ -131,16 +221,16 @@ class _Marching:
 
     def _special(self, step: Step) -> bool:
         """List the special points of a step; True where the branch ends at one."""
-        met = special_on(step)
+        met = special_on(step, self.policy.kinds)
         if step.virtual:
-            met = sorted([*met, *self.curve.passed_by(step)], key=lambda one: one.s)
+            met = sorted([*met, *self.policy.passed_by(step)], key=lambda one: one.s)
         for one in met:
             edge = self._beyond(one.point)
             if edge is not None:  # a fold just beyond the edge of the range
                 which, end = edge
                 step.ends("range", one.s, self.curve.at_edge(step.a, one.point, end, which) or one.point)
                 return False
-            one.kind.record(self.found, step, one)
+            self.policy.record(self.found, step, one)
             if one.ending is not None:
                 self.found.ending = one.ending
                 return True
@@ -158,7 +248,7 @@ class _Marching:
         """Take the step; True where the branch ends with it."""
         found, curve, new = self.found, self.curve, step.b
         found.add(curve, new)
-        ending = curve.over(new)
+        ending = self.policy.over(curve, new)
         if ending is None and new.virtual and came_back(self.circle, step) is not None:
             ending = "circle"
         if ending is not None:

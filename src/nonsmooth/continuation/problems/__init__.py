@@ -1,1 +1,1 @@
-"""Systems of equations that a march follows: periodic orbits, equilibria, special points in two parameters."""
+"""Equations, Jacobians and measures of points: periodic orbits, equilibria, special points in two parameters."""

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.continuation.signature.signature import Signature, Visit
+from nonsmooth.continuation.problems.signature import Signature, Visit
+from nonsmooth.flow.variational import VariationalFlow
 
-if TYPE_CHECKING:
-    from nonsmooth.continuation.problems.shooting import Shooting
-    from nonsmooth.flow.variational import VariationalFlow
-
-__all__ = ["anchor_at", "anchored", "plane_across"]
+__all__ = ["anchored", "plane_across"]
 
 
 def anchored(
@@ -33,14 +28,6 @@ def anchored(
     moved[-1] = period - 0.5 * lengths[i]
     visits = (*(crossings[j] for j in order), Visit(after.mode))
     return Signature(visits), moved, np.concatenate([z, states[1:][order]])
-
-
-def anchor_at(shooting: Shooting, values: FloatArray, z: FloatArray, size: FloatArray) -> None:
-    """Put the phase condition of an orbit without forcing and transitions through z; others need none."""
-    if shooting.forced or shooting.m:
-        return
-    field = shooting.flow.segments(values, [shooting.at_section], [0.0], [0.0], z[None, :]).f_begin[0]
-    shooting.reference = plane_across(z, field, size)
 
 
 def plane_across(z: FloatArray, field: FloatArray, size: FloatArray) -> tuple[FloatArray, FloatArray]:

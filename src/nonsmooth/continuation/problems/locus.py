@@ -15,39 +15,18 @@ psi is differentiated by central differences, in the unknowns and in both parame
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.continuation.march.marches import INTERRUPTED
-from nonsmooth.continuation.problems.codimension_two import kinds_on
-from nonsmooth.continuation.problems.multipliers import multipliers_of, product_of_pairs, without_own
+from nonsmooth.continuation.problems.multipliers import product_of_pairs, without_own
 from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
+from nonsmooth.continuation.problems.shooting import Shooting, Solved
 from nonsmooth.continuation.problems.solve import determinant
 
-if TYPE_CHECKING:
-    from nonsmooth.continuation.march.event import Met, Step
-    from nonsmooth.continuation.march.marches import March
-    from nonsmooth.continuation.problems.shooting import Shooting, Solved
+__all__ = ["Locus"]
 
-__all__ = ["KINDS", "Locus"]
-
-#: The kinds that have curves, each with the point of codimension two at which its curve meets a graze.
-KINDS = {
-    "fold": "grazing_fold", "flip": "grazing_flip", "neimark_sacker": "grazing_neimark_sacker",
-    "grazing": "double_grazing",
-}  # fmt: skip
-ENDS = {
-    "range": "The curve reached the edge of the box.",
-    "closed": "The curve came back to where it began.",
-    "points": "The largest number of points was reached.",
-    "no_convergence": "Newton's method did not converge, however small the step.",
-    "grazing": "A contact begins or ends here: beyond this point the orbit has another signature.",
-    "corner": "The orbit meets the corner of two boundaries: beyond this point it has another signature.",
-    "resonance": "Both multipliers meet on the real axis: beyond this point they are real, and there is no torus.",
-    "interrupted": f"{INTERRUPTED}.",
-}
 STEP = 1e-6  # of central differences, in scaled unknowns
 KEPT = 1e-3  # in scaled unknowns: so far the gradient of psi serves Newton's method
 CLOSE = 2e-12
@@ -61,19 +40,18 @@ class Locus(Orbits):
     shooting : Shooting
         With two active parameters.
     kind : str
-        One of ``KINDS``.
+        One of those above.
     size, period, widths
         Sizes of the states, the times and the two parameters.
     """
 
-    endings = ENDS
     tolerance = 1e-11  # the gradient of psi is not exact: no step is followed by one of its square
 
     def __init__(
         self, shooting: Shooting, kind: str, size: FloatArray, period: float, widths: tuple[float, float]
     ) -> None:
         super().__init__(shooting, size, period, widths)
-        self.kind, self.kinds = kind, kinds_on(kind, shooting.forced)
+        self.kind = kind
         self._eye = np.eye(shooting.n)
         self._unit = 1.0  # of psi
         self._gradient: tuple[FloatArray, FloatArray] | None = None  # the last one, and its place
@@ -95,7 +73,7 @@ class Locus(Orbits):
         M = solved.monodromy
         if self.kind == "flip":
             return float(np.linalg.det(M + self._eye))
-        return product_of_pairs(without_own(multipliers_of(M), self.shooting.forced))
+        return product_of_pairs(without_own(solved.multipliers, self.shooting.forced))
 
     def calibrate(self, Y: FloatArray) -> None:
         """Choose the unit of psi so that its gradient is of order one."""
@@ -162,18 +140,3 @@ class Locus(Orbits):
             inner[self.touched or path.touched] = -np.inf
             path = replace(path, touch=float(inner.max(initial=-np.inf)))
         return path.margins
-
-    def unseen(self, step: Step) -> None:
-        """Nothing: no round shows a path that only touches."""
-
-    def behind(self, found: March, met: list[Met]) -> None:
-        """Record the point at which the curve meets a graze or a corner; it ends there."""
-        found.ending = met[0].name
-        found.mark(KINDS[self.kind] if met[0].name == "grazing" else met[0].name, self, met[0].point)
-
-    def over(self, point: OrbitPoint) -> None:
-        """Nothing: no curve ends with a point of its own."""
-
-    def why(self, point: OrbitPoint) -> str:
-        """Return ``no_convergence``: the box was cut to what the equations allow."""
-        return "no_convergence"

@@ -21,13 +21,18 @@ EDGE = 1e-9  # a modulus within this of 1 counts as neither
 NEUTRAL = 1e-6  # an unstable multiplier nearer to the unit circle than this is called neutral: no damping, a family
 
 
-def multipliers_of(M: FloatArray) -> ComplexArray:
+def multipliers_of(M: FloatArray, determinant: float | None = None, *, forced: bool = True) -> ComplexArray:
     """Eigenvalues (n,) of a monodromy matrix (n, n), largest modulus first.
 
-    Two are taken from trace and determinant: the smaller one as det / larger, so that it keeps its digits.
+    Two are taken from trace and determinant: the smaller one as det / larger, so that it keeps its digits; without
+    forcing they are 1 and the determinant, however long the orbit waits beside an equilibrium.
     """
     if M.shape == (2, 2):
-        half, det = 0.5 * (M[0, 0] + M[1, 1]), M[0, 0] * M[1, 1] - M[0, 1] * M[1, 0]
+        half, det = 0.5 * (M[0, 0] + M[1, 1]), determinant
+        if det is None:
+            det = M[0, 0] * M[1, 1] - M[0, 1] * M[1, 0]
+        elif not forced:
+            return np.array(sorted([1.0, det], key=abs, reverse=True), dtype=complex)
         root = np.sqrt(complex(0.25 * (M[0, 0] - M[1, 1]) ** 2 + M[0, 1] * M[1, 0]))
         if root.imag:
             return np.array([half + root, half - root])

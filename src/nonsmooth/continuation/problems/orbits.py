@@ -2,37 +2,22 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from nonsmooth.arrays import ComplexArray, FloatArray
-from nonsmooth.continuation.march.arclength import Curve, Point
-from nonsmooth.continuation.march.marches import ENDINGS
-from nonsmooth.continuation.problems.anchor import anchor_at, plane_across
-from nonsmooth.continuation.problems.multipliers import multipliers_of
-from nonsmooth.continuation.problems.orbit_events import KINDS, SMALL, swing
+from nonsmooth.continuation.problems.anchor import plane_across
+from nonsmooth.continuation.problems.curve import Curve, Point
+from nonsmooth.continuation.problems.path import Path, Walk
+from nonsmooth.continuation.problems.rounds import Rounds
 from nonsmooth.continuation.problems.shooting import Shooting, Solved
-from nonsmooth.continuation.problems.surfaces import look_at_surfaces
-from nonsmooth.continuation.signature.boundaries import BOUNDARIES, Unseen, passed_by
-from nonsmooth.continuation.signature.leaving import behind
-from nonsmooth.continuation.signature.neighbours import beside
-from nonsmooth.continuation.signature.path import Path, Walk
-from nonsmooth.continuation.signature.rounds import Rounds
-from nonsmooth.errors import SystemDefinitionError
-
-if TYPE_CHECKING:
-    from nonsmooth.continuation.march.event import Event, Met, Step
-    from nonsmooth.continuation.march.marches import March
-    from nonsmooth.continuation.signature.signature import Signature
+from nonsmooth.continuation.problems.signature import Signature
 
 __all__ = ["OrbitPoint", "Orbits"]
-
-AHEAD = 1e-6  # of the range
 
 
 @dataclass
@@ -65,10 +50,6 @@ class Orbits(Curve[OrbitPoint]):
         Sizes of the parameters: the widths of their ranges.
     """
 
-    kinds: Sequence[Event] = KINDS
-    boundaries = BOUNDARIES
-    endings = ENDINGS
-
     def __init__(self, shooting: Shooting, size: FloatArray, period: float, widths: Sequence[float]) -> None:
         self.shooting, self.walk = shooting, Walk(shooting)
         m = shooting.m
@@ -79,7 +60,6 @@ class Orbits(Curve[OrbitPoint]):
         self.scale = scale
         self.rows = 1.0 / scale[: shooting.size]
         self.weights = self.rows[:, None] * scale[None, :]
-        self.watched = True  # by simulated rounds
 
     @property
     def width(self) -> float:
@@ -98,8 +78,7 @@ class Orbits(Curve[OrbitPoint]):
         old = self.shooting
         fresh = Shooting(old.system, signature, old.period_number, old.active)
         X = fresh.join(times, states, period, parameters)
-        anchor_at(fresh, fresh.parameters(X), states[0], self.size)
-        look_at_surfaces(fresh, X)
+        fresh.prepare(X, self.size)
         curve = Orbits(fresh, self.size, self.period, self.widths)
         curve.rounds = self.rounds  # of the same system
         return curve, X
@@ -128,7 +107,7 @@ class Orbits(Curve[OrbitPoint]):
         path = self.walk.along(solved, self.shooting.split(solved.X)[1])
         if path is None or not np.isfinite(M).all():
             return None
-        return OrbitPoint(Y, tangent, orientation, iterations, solved, M, multipliers_of(M), path)
+        return OrbitPoint(Y, tangent, orientation, iterations, solved, M, solved.multipliers, path)
 
     def word(self) -> Signature:
         """The signature."""
@@ -158,41 +137,12 @@ class Orbits(Curve[OrbitPoint]):
         """Return whether a simulated round of an orbit takes the transitions of the signature."""
         return self.rounds.shows(self.shooting, point.X, point.solved.values)
 
-    def unseen(self, step: Step) -> Met | None:
-        """The first place on a step where only a simulated round tells that the signature ends."""
-        if step.virtual or not self.watched or self.shows(step.b):
-            return None
-        met = Unseen().met(step)
-        if met is None or beside(self, met.point) is not None:
-            return met
-        warnings.warn(
-            f"a simulation of the orbit at {self.shooting.active[-1]} = {met.point.value!r} takes other transitions "
-            "than the branch: its points from here on are not confirmed",
-            RuntimeWarning, stacklevel=2,
-        )  # fmt: skip
-        self.watched = False
-        return None
-
-    def passed_by(self, step: Step) -> list[Met]:
-        """Boundaries that a virtual branch passes on a step."""
-        return passed_by(step)
-
-    def behind(self, found: March, met: list[Met]) -> tuple[Orbits, OrbitPoint] | None:
-        """Record the change of signature; the orbit behind it, or None."""
-        return behind(found, self, met)
-
-    def over(self, point: OrbitPoint) -> str | None:
-        """Return ``equilibrium`` where an autonomous orbit has all but shrunk to one."""
-        return "equilibrium" if swing(self, point) < SMALL else None
-
-    def why(self, point: OrbitPoint) -> str:
-        """Return ``physical`` where the equations do not allow the parameter ahead."""
-        ahead = point.value + AHEAD * self.width * float(np.sign(point.tangent[-1]))
-        try:
-            self.shooting.system.with_parameters({self.shooting.active[-1]: ahead})
-        except (SystemDefinitionError, ValueError):
-            return "physical"
-        return "no_convergence"
+    def swing(self, point: OrbitPoint) -> float:
+        """The range of an autonomous orbit without transitions, in units of the first one's; else 1."""
+        if self.shooting.forced or self.shooting.m:
+            return 1.0
+        swing = (point.path.maximum - point.path.minimum) / self.size[: len(point.path.maximum)]
+        return float(np.nanmax(swing))
 
     def passed(self, point: OrbitPoint) -> OrbitPoint | None:
         """The same orbit with the phase condition of one without transitions put through it."""

@@ -17,26 +17,25 @@ f_ref (z_0 - z_ref) = 0).
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from nonsmooth.arrays import FloatArray
-from nonsmooth.continuation.problems.solve import solve
-from nonsmooth.continuation.problems.surfaces import divide
-from nonsmooth.continuation.signature.signature import AT_ONCE, Signature
+from nonsmooth.arrays import ComplexArray, FloatArray
+from nonsmooth.continuation.problems.anchor import plane_across
+from nonsmooth.continuation.problems.multipliers import multipliers_of
+from nonsmooth.continuation.problems.signature import AT_ONCE, Signature
+from nonsmooth.continuation.problems.surfaces import coincide, mean_along, one_surface
 from nonsmooth.flow.saltation import chained
-from nonsmooth.flow.variational import VariationalFlow
-
-if TYPE_CHECKING:
-    from nonsmooth.flow.variational import Jump, Segments
-    from nonsmooth.system.system import System
+from nonsmooth.flow.variational import Jump, Segments, VariationalFlow
+from nonsmooth.system.system import System
 
 __all__ = ["Shooting", "Solved"]
 
 ROUNDING = 1e-16  # of the period
+SHORT = (0.0, 1e-6, 1e-2)  # of the period, by order: of a shorter visit the mean is taken in place of the quotient
+ON = 1e-6  # of an indicator's size: a state as near to a surface is on it
 
 
 @dataclass
@@ -52,6 +51,7 @@ class Solved:
     values: FloatArray
     free: list[int]
     at_once: list[bool]  # (m,) transitions at the instant of the one before
+    forced: bool
 
     @property
     def monodromy(self) -> FloatArray:
@@ -68,6 +68,16 @@ class Solved:
             M = M.copy()
             M[self.free], M[:, self.free] = 0.0, 0.0
         return np.asarray(M)
+
+    @property
+    def multipliers(self) -> ComplexArray:
+        """Floquet multipliers; the determinant is that of the pieces, which loses no digits in their product."""
+        M = self.monodromy
+        if self.free or len(M) != 2 or not np.isfinite(M).all() or any(self.at_once):
+            return multipliers_of(M)
+        jumps = np.prod([np.linalg.det(jump.saltation) for jump in self.jumps])
+        det = float(jumps) * float(np.exp(self.segments.divergence.sum()))
+        return multipliers_of(M, det, forced=self.forced)
 
 
 class Shooting:
@@ -107,9 +117,8 @@ class Shooting:
         after = self._columns[1:].ravel()  # the states after the transitions, in their own equations
         self._after = after * (self.size + a) + after
         self.reference: tuple[FloatArray, FloatArray] | None = None  # autonomous, no crossings: (z_ref, f_ref)
-        self.tried: Solved | None = None
         self.alone = [False] * m  # crossings whose other rows vanish together with the one that fires
-        self.divided = [False] * m  # exits whose equation is divided by the length of the visit
+        self.divided = [0] * m  # the power of the visit's length by which the equations of exits are divided
 
     def _constants(self) -> list[int]:
         """Components of z that no visit moves and no transition sets."""
@@ -130,6 +139,68 @@ class Shooting:
             ):
                 kept.append(j)
         return kept
+
+    def prepare(self, X: FloatArray, size: FloatArray) -> None:
+        """Anchor the orbit at X, and look at the surfaces there."""
+        self.anchor(X[: self.n], self.parameters(X), size)
+        self._look_at_surfaces(X)
+
+    def anchor(self, z: FloatArray, values: FloatArray, size: FloatArray) -> None:
+        """Put the phase condition of an orbit without forcing and transitions through z; others need none."""
+        if not self.forced and not self.m:
+            field = self.flow.segments(values, [self.at_section], [0.0], [0.0], z[None, :]).f_begin[0]
+            self.reference = plane_across(z, field, size)
+
+    def _look_at_surfaces(self, X: FloatArray) -> None:
+        """Find surfaces that coincide at X.
+
+        Exits through the surface of the entry are ``divided``: a visit of no length solves their equations too. Rows
+        of one condition that vanish together leave the crossing ``alone``: they are no corner of it.
+        """
+        times, z = self.split(X)
+        values = self.parameters(X)
+        traced = self.system.traced
+        for i, (k, row, at, _) in enumerate(self.jumps):
+            n_rows = len(traced.transitions[k].rows)
+            if at is None and n_rows > 1 and not self.at_once[i]:
+                found = [self.flow.jump(values, k, float(times[i]), z[i + 1], r) for r in range(n_rows)]
+                signs = [r.sign for r in traced.transitions[k].rows]
+                self.alone[i] = all(
+                    coincide(signs[row] * found[row].h_z, signs[row] * found[row].h, signs[r] * one.h_z,
+                              signs[r] * one.h, z[i + 1])
+                    for r, one in enumerate(found) if r != row
+                )  # fmt: skip
+        for i in range(0 if self.forced and self.m > 1 else 1, self.m):
+            if self.jumps[i][2] is self.jumps[i - 1][2] is None and not (self.at_once[i] or self.at_once[i - 1]):
+                self.divided[i] = self._order(i, values, float(times[i - 1]), z[i or -1])
+
+    def _order(self, i: int, values: FloatArray, t: float, z: FloatArray) -> int:
+        """The order to which the equation of exit i vanishes by itself where the visit before it has no length.
+
+        1: exit and entry lie in one surface. 2: the visit leaves a mode that holds the surface (a slip from sticking),
+        and begins where the surface's rate vanishes: h and L_f h are zero there by the equations before."""
+        k, row, _, _ = self.jumps[i]
+        k0, row0, _, _ = self.jumps[i - 1]  # of the first exit it is the last of the round
+        n, indicator = self.n, self.system.traced.transitions[k].rows[row].indicator
+        entry = self.flow.jump(values, k0, t, z, row0)
+        touch = self.flow.indicator(values, indicator, int(self.modes[i]), t, z)
+        held = self.flow.indicator(values, indicator, int(self.modes[i - 1]), t, z)
+        x = np.concatenate([z, [t], values[self.places]])
+        enters, leaves = (np.concatenate([one.h_z, [one.h_t], one.h_p]) for one in (entry, touch))
+        rate, keeps = (np.concatenate([one.L_z, [one.L_t], one.L_p]) for one in (touch, held))
+        signs = [self.system.traced.transitions[j].rows[r].sign for j, r in ((k0, entry.row), (k, row))]
+        # In and out by the two sides of a surface, or from impact to impact on one of them
+        side = signs[0] * signs[1] * (1.0 if self.modes[i - 1] == self.modes[i] else -1.0)
+        if i and coincide(entry.h_z, entry.h, entry.h_z @ entry.R[:n, :n], entry.h, z) and coincide(
+            enters, entry.h, side * leaves, side * touch.h, x
+        ):
+            return 1
+        size = float(np.abs(touch.h_z) @ self.flow.scale)
+        holds = not keeps.any() or one_surface(leaves, touch.h, keeps, held.L, x)
+        if abs(touch.h) > ON * size or (entry.R[:n, :n] != self._one).any() or not holds:
+            return 0
+        across = np.eye(len(x)) - np.outer(leaves, leaves) / float(leaves @ leaves)
+        return 2 if one_surface(across @ enters, entry.h, across @ rate, touch.L, x) else 0
 
     def split(self, X: FloatArray) -> tuple[FloatArray, FloatArray]:
         """(instants t_1 ... t_m, states z_0 ... z_m)."""
@@ -206,7 +277,7 @@ class Shooting:
                 J[r, r] = 1.0
                 J[r, size:] = -(turn + phase) * dT - T * slopes
             elif self.divided[i]:
-                divide(self, i, F, J, r, values, times, z)
+                self._divide(i, F, J, r, values, times, z)
         J.ravel()[self._after] = 1.0
         # Closure
         F[:n] = segments.z[m] - z[0]
@@ -225,7 +296,7 @@ class Shooting:
         if not self.forced:
             J[:n, size - 1] += segments.f_end[m]
             self._anchor(F, J, X, t, z[0])
-        return Solved(X, F, J, times, segments, jumps, values, self.free, self.at_once)
+        return Solved(X, F, J, times, segments, jumps, values, self.free, self.at_once, self.forced)
 
     def _transition(self, jump: Jump, D: FloatArray) -> FloatArray:
         """Derivatives of the condition and of -R at a transition, by those of the state before it."""
@@ -254,36 +325,37 @@ class Shooting:
         F[last] = f_ref @ (z0 - z_ref)
         J[last, : self.n] = f_ref
 
-    def newton(
-        self, X: FloatArray, scale: FloatArray, *, tolerance: float = 1e-12, most: int = 30,
-        look: Callable[[], Any] | None = None,
-    ) -> Solved | None:  # fmt: skip
-        """Solve at fixed parameters; None where it does not converge. ``look`` is called before each iteration.
+    def _divide(
+        self, i: int, F: FloatArray, J: FloatArray, r: int, values: FloatArray, times: FloatArray, z: FloatArray
+    ) -> None:
+        """Divide row r, the equation of the exit i, by the power of the visit's length to which it vanishes by itself.
 
-        The last iterate stays in ``tried``: what it was that did not converge."""
-        X = X.copy()
-        size = self.size
-        last = np.inf
-        for i in range(most):
-            if look is not None:
-                look()
-            solved = self.tried = self.evaluate(X)
-            if not np.isfinite(solved.residual).all():
-                return None
-            try:
-                step = solve(solved.jacobian[:, :size] * scale[:size], -solved.residual)
-            except np.linalg.LinAlgError:
-                return None
-            length = float(np.abs(step).max())
-            if not np.isfinite(length):
-                return None
-            if length < tolerance or (i > 3 and length < 1e-9 and length > 0.5 * last):
-                return solved
-            if length > 0.5:
-                step *= 0.5 / length
-            X[:size] += scale[:size] * step
-            last = length
-        return None
+        With the terms that are zero by the equations before taken out, (h(end) - h) / tau or (h(end) - h - tau L_f h) /
+        tau^2, the root tau = 0, where the visit has not begun, is gone. For a short visit both are means of derivatives
+        along it, without cancellation: of L_f h, and of (1 - s) L_f^2 h.
+        """
+        n, order, entry = self.n, self.divided[i], i or self.m  # the first visit begins before the section
+        tau = float(times[i + 1] - times[entry]) + (0.0 if i else float(times[-1]))
+        k, row, _, _ = self.jumps[i]
+        visit = int(self.modes[i]), self.system.traced.transitions[k].rows[row].indicator, order
+        zb, size = self.z_at[entry], self.size
+        begin, inner = slice(zb - 1, zb + n), np.zeros(J.shape[1])  # of its unknowns; slope of its length
+        inner[self.t_at[i]], inner[zb - 1] = 1.0, -1.0
+        if not i:
+            inner[size:] = self.period_number * self.flow.period(values)[1]
+        if abs(tau) < SHORT[order] * (times[-1] or 1.0):
+            x = np.concatenate([times[entry : entry + 1], z[entry], [tau], values[self.places]])
+            F[r], slopes = mean_along(self.flow, x, values, self.places, *visit)
+            J[r] = slopes[n + 1] * inner
+            J[r, begin] += slopes[: n + 1]
+            J[r, size:] += slopes[n + 2 :]
+            return
+        at = self.flow.indicator(values, visit[1], visit[0], float(times[entry]), z[entry])
+        for h, h_t, h_z, h_p in ((at.h, at.h_t, at.h_z, at.h_p), (at.L, at.L_t, at.L_z, at.L_p))[:order]:
+            F[r] = (F[r] - h) / tau
+            J[r, begin] -= np.concatenate([[h_t], h_z])
+            J[r, size:] -= h_p
+            J[r] = (J[r] - F[r] * inner) / tau
 
     @property
     def at_section(self) -> int:

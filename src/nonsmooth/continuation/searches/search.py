@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 __all__ = ["Search", "search_within"]
 
 MOMENT, LONGEST = 0.25, 2.0  # seconds of a processor between two looks at the time
-PART = 1 / 64  # of a run
+PART = 0.6180339887498949 / 40  # of a run: no event of a motion lies just where it is cut
 
 
 class Search:
@@ -103,6 +103,7 @@ class Search:
             begin = float(state.clock[0])
             stop = until if until - begin <= piece * (1.0 + 1e-9) else begin + piece
             count = len(samples) if stop == until else int(np.searchsorted(samples, stop, side="right"))
+            state.settled = False  # an event at the cut itself is taken as at any start
             logs.append(engine.record(tables, state, stop, samples[given:count]))
             given = count
             return logs[-1].status in (codes.OK, codes.NOT_GUARANTEED)

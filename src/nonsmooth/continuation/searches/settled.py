@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.continuation.searches.visits import visits_of
-from nonsmooth.continuation.signature.signature import Signature, Visit
+from nonsmooth.continuation.problems.signature import Signature, Visit
+from nonsmooth.continuation.problems.visits import visits_of
 from nonsmooth.flow.engines.engine import Chain, SectionPlan, State
 from nonsmooth.flow.variational import VariationalFlow
 from nonsmooth.kernels.hybrid import codes

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.problems.anchor import anchored
+from nonsmooth.continuation.problems.signature import Signature, Visit
+from nonsmooth.continuation.problems.visits import visits_of
 from nonsmooth.continuation.searches.settled import NEAR, Guess
-from nonsmooth.continuation.searches.visits import visits_of
-from nonsmooth.continuation.signature.signature import Signature, Visit
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.engines.engine import Log, State
 from nonsmooth.flow.equilibria import AT_REST, ROUNDING, equilibrium_at

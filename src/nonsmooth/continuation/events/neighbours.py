@@ -11,18 +11,15 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
+from nonsmooth.continuation.events.change import Change, common_orbit
+from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
+from nonsmooth.continuation.problems.rounds import Rounds
+from nonsmooth.continuation.problems.shooting import Solved
 from nonsmooth.continuation.searches.settled import Guess, touching
-from nonsmooth.continuation.signature.change import Change, common_orbit
-from nonsmooth.continuation.signature.rounds import Rounds
-
-if TYPE_CHECKING:
-    from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
-    from nonsmooth.continuation.problems.shooting import Solved
 
 __all__ = ["beside"]
 

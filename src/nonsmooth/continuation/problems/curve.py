@@ -1,7 +1,7 @@
 r"""Curves of solutions in scaled unknowns: predictor, corrector, tangent, and points between two others.
 
 A problem with one more unknown than equations has curves of solutions. Each problem is a subclass that says what its
-equations are and what is known of a solved point; a point at distance ds along the tangent t of the last one solves
+equations are and how a solved point is measured; a point at distance ds along the tangent t of the last one solves
 
 .. math:: F(Y) = 0, \qquad t \cdot Y = t \cdot Y_0 + ds .
 """
@@ -9,9 +9,8 @@ equations are and what is known of a solved point; a point at distance ds along 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import Any, Generic, Self, TypeVar
 
 import numpy as np
 
@@ -19,18 +18,15 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.problems.solve import Factored, solve
 from nonsmooth.errors import SystemDefinitionError
 
-if TYPE_CHECKING:
-    from typing import Self
-
-    from nonsmooth.continuation.march.event import Event, Met, Step
-    from nonsmooth.continuation.march.marches import March, Place
-
-__all__ = ["Curve", "Point", "passing"]
+__all__ = ["Curve", "Place", "Point", "branch_point", "passing", "tangents"]
 
 DONE = 1e-9  # a step this small is followed by one of its square
 FARTHEST = 2.5  # times the last step: a cubic is not trusted beyond
 SMALL = 1e-6  # residual of a first guess that a small step alone makes a solution
 CLOSE = 1e-12  # where multipliers are wanted to the last digits
+STEP = 1e-5  # of differences, in scaled unknowns
+#: The word of a curve (of orbits: the signature), the unknowns, and what other curves of the branch have of them.
+Place = tuple[Any, FloatArray, FloatArray]
 
 
 @dataclass
@@ -77,20 +73,11 @@ class Curve(ABC, Generic[P]):
     ----------
     scale : array (n,)
         Sizes of the unknowns.
-    kinds : sequence of Event
-        Special points that every step is searched for.
-    boundaries : sequence of Event
-        Events at which the equations stop to hold; what explains the others first.
-    endings : mapping
-        The ways in which a branch can end, with the sentence for each.
     most, longest, grows : int, float, float
         Newton's method: iterations, the longest step (scaled), the growth of steps that is not let pass.
     """
 
     scale: FloatArray
-    kinds: Sequence[Event] = ()
-    boundaries: Sequence[Event] = ()
-    endings: dict[str, str]
     most = 8
     longest, grows = 1e3, 2.0
     tolerance = DONE
@@ -124,10 +111,6 @@ class Curve(ABC, Generic[P]):
     ) -> P | None:
         """A solved point with all that is known of it; None where that cannot be computed."""
 
-    @abstractmethod
-    def behind(self, found: March, met: list[Met]) -> tuple[Curve[Any], Any] | None:
-        """Record the boundaries ``met`` at one place; the curve and the point behind, or None."""
-
     def word(self) -> Any:
         """Return what tells curves of one branch apart."""
         return None
@@ -148,27 +131,11 @@ class Curve(ABC, Generic[P]):
         """Difference of what is known of two neighbours, from 0 to 1."""
         return 0.0
 
-    def unseen(self, step: Step) -> Met | None:
-        """The first place on a step that margins do not tell lies beyond a boundary."""
-        return None
-
-    def passed_by(self, step: Step) -> list[Met]:
-        """Boundaries that a branch passes on a step with the equations that it has."""
-        return []
-
     def passed(self, point: P) -> P | None:
         """The last point where a phase condition was put through it; None where there is none to move."""
         return None
 
-    def over(self, point: P) -> str | None:
-        """The ending (a key of ``endings``) of a branch whose last point this is; None where it goes on."""
-        return None
-
-    def why(self, point: P) -> str:
-        """The ending of a branch on which no point follows this one."""
-        return "no_convergence"
-
-    # --- the march along it
+    # --- along the curve
 
     def bordered(self, solved: Any, border: FloatArray) -> FloatArray:
         """The scaled Jacobian with a last row."""
@@ -321,5 +288,67 @@ class Curve(ABC, Generic[P]):
 def passing(Y: FloatArray, a: FloatArray, b: FloatArray) -> float | None:
     """The part of the step from a to b after which it goes through Y, as nearly as a chord follows a curve, or None."""
     step = b - a
-    x = float(step @ (Y - a)) / float(step @ step)
+    x = float(step @ (Y - a)) / max(float(step @ step), 1e-300)
     return x if 1e-9 < x <= 1.0 and float(np.abs(Y - a - x * step).max()) < 0.3 * float(np.abs(step).max()) else None
+
+
+def tangents(curve: Curve[Any], Y: FloatArray) -> FloatArray | None:
+    r"""Unit tangents (2, n) of both branches at their crossing; None where only one orbit lies there.
+
+    Null vectors v of the Jacobian with :math:`\psi \cdot F_{YY} v v = 0`, :math:`F_Y^T \psi = 0`.
+    """
+
+    def jacobian(Z: FloatArray) -> FloatArray:
+        return curve.bordered(curve.evaluate(Z), np.zeros(curve.n))[:-1]
+
+    left, _, right = np.linalg.svd(jacobian(Y))
+    plane, psi = right[-2:], left[:, -1]
+    bent = np.array([psi @ (jacobian(Y + STEP * v) - jacobian(Y - STEP * v)) @ plane.T for v in plane])
+    if not np.isfinite(bent).all():
+        return None
+    (low, high), own = np.linalg.eigh(bent + bent.T)
+    if not low < 0.0 < high:
+        return None
+    a, b = (np.sqrt(np.array([high, -low]) / (high - low)) * own).T
+    return np.array([a + b, a - b]) @ plane
+
+
+def branch_point(curve: Curve[Any], Y: FloatArray, *, tolerance: float = 1e-11, most: int = 12) -> FloatArray | None:
+    r"""The crossing of branches near Y, to the last digits (Moore's system, which is regular there).
+
+    .. math:: F(Y) + \beta \psi_0 = 0, \quad F_Y^T \psi = 0, \quad \psi_0 \cdot \psi = 1
+
+    in Y, psi and beta, with :math:`\beta = 0` at the solution; second derivatives by central differences.
+    """
+    n = len(Y) - 1
+
+    def scaled(Z: FloatArray) -> tuple[FloatArray, FloatArray]:
+        solved = curve.evaluate(Z)
+        return curve.residual(solved), curve.bordered(solved, np.zeros(n + 1))[:-1]
+
+    _, J = scaled(Y)
+    psi = np.linalg.svd(J)[0][:, -1]
+    first, beta = psi.copy(), 0.0
+    for _ in range(most):
+        F, J = scaled(Y)
+        second = np.empty((n + 1, n + 1))
+        for j in range(n + 1):
+            moved = np.zeros(n + 1)
+            moved[j] = STEP
+            second[:, j] = (scaled(Y + moved)[1] - scaled(Y - moved)[1]).T @ psi / (2 * STEP)
+        matrix = np.zeros((2 * n + 2, 2 * n + 2))
+        matrix[:n, : n + 1], matrix[:n, -1] = J, first
+        matrix[n : 2 * n + 1, : n + 1], matrix[n : 2 * n + 1, n + 1 : 2 * n + 1] = second, J.T
+        matrix[-1, n + 1 : 2 * n + 1] = first
+        right = np.concatenate([F + beta * first, J.T @ psi, [first @ psi - 1.0]])
+        try:
+            change = np.linalg.solve(matrix, right)
+        except np.linalg.LinAlgError:
+            return None
+        Y, psi, beta = Y - change[: n + 1], psi - change[n + 1 : 2 * n + 1], beta - change[-1]
+        size = float(np.abs(change[: n + 1]).max())
+        if not size < 0.1:
+            return None
+        if size < tolerance:
+            return Y if abs(beta) < 1e-8 else None
+    return None

@@ -7,11 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from nonsmooth.continuation.events.change import Change, gained, inserted, is_tolerance, without
 from nonsmooth.continuation.march.event import BESIDE, Event, Met, Step
-from nonsmooth.continuation.signature.change import Change, inserted, without
-from nonsmooth.continuation.signature.leaving import contacts_of, gained, is_tolerance, mark
-from nonsmooth.continuation.signature.neighbours import beside
-from nonsmooth.continuation.signature.signature import AT_ONCE
+from nonsmooth.continuation.problems.signature import AT_ONCE
 
 __all__ = ["BOUNDARIES", "Boundary", "Unseen", "passed_by"]
 
@@ -68,10 +66,6 @@ class Boundary(Event):
         """The indicator of the surface that is reached (-1: of none).
 
         ``beyond`` is the curve on which the branch goes on."""
-
-    def record(self, found: Any, step: Step, met: Met) -> None:
-        """List a boundary that a branch passes with its signature."""
-        mark(found, step.curve, [met], beside(step.curve, met.point, contacts_of(step.curve, [met])))
 
 
 class Crossed(Boundary):

@@ -51,6 +51,11 @@ class Signature:
         return self.visits[:-1]
 
     @property
+    def data(self) -> list[list[int]]:
+        """The visits as lists of integers."""
+        return [[v.mode, v.transition, v.row, v.turn] for v in self.visits]
+
+    @property
     def cycle(self) -> tuple[tuple[int, int, int], ...]:
         """(mode, transition, row) once round, begun where this is smallest: equal for all sections of one cycle."""
         word = [(v.mode, v.transition, v.row) for v in self.crossings]

@@ -14,21 +14,17 @@ decide.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from nonsmooth.arrays import ComplexArray, FloatArray
+from nonsmooth.continuation.events.change import Change
 from nonsmooth.continuation.problems.multipliers import multipliers_of
-from nonsmooth.continuation.signature.signature import AT_ONCE
+from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
+from nonsmooth.continuation.problems.shooting import Shooting, Solved
+from nonsmooth.continuation.problems.signature import AT_ONCE, Visit
 from nonsmooth.flow.saltation import chained
-
-if TYPE_CHECKING:
-    from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
-    from nonsmooth.continuation.problems.shooting import Shooting, Solved
-    from nonsmooth.continuation.signature.change import Change
-    from nonsmooth.continuation.signature.signature import Visit
-    from nonsmooth.flow.variational import VariationalFlow
+from nonsmooth.flow.variational import VariationalFlow
 
 __all__ = ["Graze", "both_sides", "graze"]
 

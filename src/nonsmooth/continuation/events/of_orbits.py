@@ -12,18 +12,15 @@ neimark_sacker
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from nonsmooth.continuation.march.event import Crossing, Event, Fold, Step
-from nonsmooth.continuation.problems.doubled import is_doubled
 from nonsmooth.continuation.problems.multipliers import product_of_pairs, without_own
+from nonsmooth.continuation.problems.primitive import is_doubled
 
-if TYPE_CHECKING:
-    from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
-
-__all__ = ["KINDS", "SMALL", "Flip", "FoldOfOrbits", "NeimarkSacker", "swing"]
+__all__ = ["KINDS", "SMALL", "Flip", "FoldOfOrbits", "NeimarkSacker"]
 
 POLE = 1e-2  # of a multiplier from 1 or -1: farther off it is no fold, no flip, but a contact of no length
 NOTHING = 2e-2  # of the first orbit's size: a fold there is the cycle's birth
@@ -37,7 +34,7 @@ class FoldOfOrbits(Fold):
         """A Hopf point, which ends the branch, where the cycle is small."""
         if step.curve.shooting.forced and np.abs(point.multipliers - 1.0).min() > POLE:
             return None  # a contact of no length turns the parameter too, without a multiplier 1
-        return ("hopf", "equilibrium") if swing(step.curve, point) < NOTHING else ("fold", None)
+        return ("hopf", "equilibrium") if step.curve.swing(point) < NOTHING else ("fold", None)
 
 
 class CrossingOfOrbits(Crossing):
@@ -86,11 +83,3 @@ class NeimarkSacker(Event):
 
 
 KINDS = (FoldOfOrbits(), CrossingOfOrbits(), Flip(), NeimarkSacker())
-
-
-def swing(curve: Orbits, point: OrbitPoint) -> float:
-    """The range of an autonomous orbit without transitions, in units of the first one's; else 1."""
-    if curve.shooting.forced or curve.shooting.m:
-        return 1.0
-    swing = (point.path.maximum - point.path.minimum) / curve.size[: len(point.path.maximum)]
-    return float(np.nanmax(swing))

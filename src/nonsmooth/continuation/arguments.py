@@ -1,20 +1,44 @@
-"""The part of a range in which the equations allow the parameter."""
+"""Arguments of continuation: the step, and the range of a parameter, cut to what the equations allow."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
-from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.errors import SystemDefinitionError, shortened
+from nonsmooth.flow.arguments import real_number
+from nonsmooth.system.system import System
 
-if TYPE_CHECKING:
-    from nonsmooth.system.system import System
-
-__all__ = ["allowed_range"]
+__all__ = ["allowed_range", "largest_step", "limits"]
 
 GRID = 65
 INSIDE = 1e-3  # of the range: the equations are singular at the edge itself
+
+
+def largest_step(step: Any) -> float:
+    """The largest step, checked."""
+    largest = real_number(step, "step")
+    if not 0 < largest <= 1:
+        raise ValueError(f"step = {step!r}: the largest step is above 0 and at most 1 (the branch's own size is 1)")
+    return largest
+
+
+def limits(
+    system: System, name: Any, given: Any, here: float | None, *, word: str = "range", what: str = "the orbit"
+) -> tuple[float, float]:
+    """The range given for a parameter, checked; ``here``: where ``what`` lies, which must be within it."""
+    if not isinstance(name, str) or name not in system.values:
+        system.with_parameters({str(name): 0.0})  # raises with the names there are
+    try:
+        low, high = (real_number(x, "an end of the range") for x in given)
+    except (TypeError, ValueError):
+        raise ValueError(f"{word} = {shortened(given)}: give its two ends, (low, high)") from None
+    if not low < high:
+        raise ValueError(f"{word} = {shortened(given)}: the first end must be below the second")
+    if here is not None and not low <= here <= high:
+        raise ValueError(f"{what} lies at {name} = {here!r}, outside the range {low!r} ... {high!r}")
+    return low, high
 
 
 def allowed_range(system: System, name: str, low: float, high: float) -> tuple[float, float]:

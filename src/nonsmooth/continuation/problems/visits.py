@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.continuation.signature.signature import AT_ONCE, Visit
+from nonsmooth.continuation.problems.signature import AT_ONCE, Visit
 
 if TYPE_CHECKING:
     from nonsmooth.flow.engines.engine import Log

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.continuation.signature.signature import AT_ONCE
+from nonsmooth.continuation.problems.signature import AT_ONCE
 
 if TYPE_CHECKING:
     from nonsmooth.continuation.problems.shooting import Shooting, Solved

@@ -13,9 +13,9 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.problems.anchor import anchored
+from nonsmooth.continuation.problems.signature import Signature, Visit
+from nonsmooth.continuation.problems.visits import visits_of
 from nonsmooth.continuation.searches.settled import Guess
-from nonsmooth.continuation.searches.visits import visits_of
-from nonsmooth.continuation.signature.signature import Signature, Visit
 from nonsmooth.flow.engines.engine import State
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.kernels.hybrid import codes

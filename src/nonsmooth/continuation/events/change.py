@@ -6,20 +6,22 @@ speed, is put in or taken out. With which orbit the branch goes on is for ``neig
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.problems.anchor import anchored
-from nonsmooth.continuation.signature.signature import AT_ONCE, Signature, Visit
+from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
+from nonsmooth.continuation.problems.shooting import Solved
+from nonsmooth.continuation.problems.signature import AT_ONCE, Signature, Visit
 
-if TYPE_CHECKING:
-    from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
-    from nonsmooth.continuation.problems.shooting import Solved
+__all__ = [
+    "Change", "common_orbit", "common_point", "gained", "inserted", "is_tolerance", "past_the_section", "without",
+]  # fmt: skip
 
-__all__ = ["Change", "common_orbit", "common_point", "inserted", "past_the_section", "without"]
+TOLERANCE = 1e-5  # of an indicator's size: a band as narrow as this stands for no width
 
 
 @dataclass
@@ -146,3 +148,31 @@ def past_the_section(curve: Orbits, point: OrbitPoint) -> tuple[Orbits, OrbitPoi
     along = tangent[-1] * old[-1] if abs(old[-1]) > 1e-3 else float(tangent[:n] @ old[:n])
     first = fresh.point(found[0], found[1], tangent * (np.sign(along) or 1.0))
     return None if first is None else (fresh, first)
+
+
+def gained(curve: Orbits, fresh: Orbits) -> int:
+    """The indicator of the first transition that another signature has more often (-1: none)."""
+    more = Counter((v.transition, v.row) for v in fresh.shooting.signature.crossings)
+    more.subtract((v.transition, v.row) for v in curve.shooting.signature.crossings)
+    transitions = curve.shooting.system.traced.transitions
+    rows = [transitions[k].rows[row].indicator for (k, row), n in more.items() if n > 0 and row >= 0]
+    return rows[0] if rows else -1
+
+
+def is_tolerance(curve: Orbits, indicator: int) -> bool:
+    """Return whether an indicator only sets a tolerance: below the creep of a stop impacts are completed as rest.
+
+    It differs from another one of its condition, with the other sign, by a small number."""
+    system = curve.shooting.system
+    traced = system.traced
+    for jump in traced.transitions:
+        signs = {row.indicator: row.sign for row in jump.rows}
+        for other, sign in signs.items():
+            if sign * signs.get(indicator, 0) >= 0:
+                continue
+            h = traced.indicators[other]
+            width = traced.indicators[indicator] - h
+            size = sum(abs(h.diff(u)) * scale for u, scale in zip(traced.u, system.scale_vector(), strict=True))
+            if width.is_number and size.is_number and 0.0 < abs(float(width)) < TOLERANCE * float(size):
+                return True
+    return False

@@ -17,29 +17,34 @@ grazing             grazing_fold det(I - M), grazing_flip det(I + M), for M- and
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any, ClassVar
 
 import numpy as np
 
-from nonsmooth.continuation.march.event import Event, Step, locate
+from nonsmooth.continuation.events.boundaries import BOUNDARIES
+from nonsmooth.continuation.events.change import inserted
+from nonsmooth.continuation.events.grazing import both_sides
+from nonsmooth.continuation.march.event import Event, Met, Step, locate
+from nonsmooth.continuation.march.march import INTERRUPTED, March, Policy
+from nonsmooth.continuation.problems.locus import Locus
 from nonsmooth.continuation.problems.multipliers import pairs, product_of_pairs, without_own
 from nonsmooth.continuation.problems.normal_form import flip_coefficient, torus_coefficient
-from nonsmooth.continuation.signature.change import inserted
-from nonsmooth.continuation.signature.grazing import both_sides
+from nonsmooth.continuation.problems.orbits import OrbitPoint
 
-if TYPE_CHECKING:
-    from nonsmooth.continuation.problems.locus import Locus
-    from nonsmooth.continuation.problems.orbits import OrbitPoint
+__all__ = ["KINDS", "AlongCurve"]
 
-__all__ = ["kinds_on"]
-
+#: The kinds that have curves, each with the point of codimension two at which its curve meets a graze.
+KINDS = {
+    "fold": "grazing_fold", "flip": "grazing_flip", "neimark_sacker": "grazing_neimark_sacker",
+    "grazing": "double_grazing",
+}  # fmt: skip
 PAIR = 1e-6  # imaginary part of a complex pair
 NOISE = 1e-6  # a coefficient that stays below this balance vanishes all along (an area-preserving map)
 POLE = 1e-3  # of the numbers at both ends: one that is larger at its root has gone through infinity
 DOUBLE = 1e-5  # two multipliers nearer to -1 than this: rounding decides on the coefficient, which has a pole there
 #: Points at which a Neimark-Sacker curve ends: beyond, the two multipliers are real.
 ENDED = ("resonance_1_1", "resonance_1_2")
-Number = Callable[["Locus", "OrbitPoint"], float]
+Number = Callable[[Locus, OrbitPoint], float]
 
 
 class CodimensionTwo(Event):
@@ -103,13 +108,41 @@ class Cusp(Event):
         """Return whether the direction of the parameters turns on the step."""
         return float(step.a.tangent[-2:] @ step.b.tangent[-2:]) < 0.0
 
+    def confirmed(self, curve: Any, point: Any, was: float, now: float) -> bool:
+        """Return True: it has no number of its own."""
+        return True
+
     def located(self, step: Step) -> tuple[float, Any] | None:
         """The zero of the direction's component along the earlier one."""
         before = step.a.tangent[-2:]
         return locate(step, lambda point: float(point.tangent[-2:] @ before))
 
 
-def kinds_on(kind: str, forced: bool) -> tuple[Event, ...]:
+class AlongCurve(Policy):
+    """Points of codimension two on a curve of special points of one kind; it ends at a graze or a corner."""
+
+    boundaries = BOUNDARIES
+    endings: ClassVar = {
+        "range": "The curve reached the edge of the box.",
+        "closed": "The curve came back to where it began.",
+        "points": "The largest number of points was reached.",
+        "no_convergence": "Newton's method did not converge, however small the step.",
+        "grazing": "A contact begins or ends here: beyond this point the orbit has another signature.",
+        "corner": "The orbit meets the corner of two boundaries: beyond this point it has another signature.",
+        "resonance": "Both multipliers meet on the real axis: beyond this point they are real, and there is no torus.",
+        "interrupted": f"{INTERRUPTED}.",
+    }
+
+    def __init__(self, kind: str, forced: bool) -> None:
+        self.kinds, self._graze = _kinds_on(kind, forced), KINDS[kind]
+
+    def behind(self, found: March, curve: Locus, met: list[Met]) -> None:
+        """Record the point at which the curve meets a graze or a corner; it ends there."""
+        found.ending = met[0].name
+        found.mark(self._graze if met[0].name == "grazing" else met[0].name, curve, met[0].point)
+
+
+def _kinds_on(kind: str, forced: bool) -> tuple[Event, ...]:
     """The points of codimension two that curves of one kind are searched for."""
     own = 0 if forced else 1  # derivatives of p that vanish at 1 anyway
     if kind == "fold":

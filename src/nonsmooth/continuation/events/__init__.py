@@ -1,0 +1,1 @@
+"""Policy of branches: the events along curves, and how a branch goes on where its equations end."""

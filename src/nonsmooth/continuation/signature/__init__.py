@@ -1,1 +1,0 @@
-"""Signatures of orbits: whether a path obeys its own, and which one follows where it ends."""

@@ -1,0 +1,122 @@
+"""A branch does not depend on the orbit it starts from, nor on how friction is written."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import random_templates as templates
+from mpmath import mp, mpf
+from scipy.optimize import brentq
+from test_sliding_bifurcations import BACKWARD, FORWARD, STICK, Belt, root
+
+import nonsmooth as ns
+
+#: x'' + x = cos(w t) - F sgn(x'), w = 1 / 5: one slip each way from a stick, or two.
+W = mpf(1) / 5
+
+
+def by_element(F: float) -> ns.System:
+    return ns.mechanical(
+        1.0, 0.0, 1.0, parameters={"w": 0.2, "F": F}, forcing={"q": lambda t, p: np.cos(p.w * t)},
+        elements={"f": ns.elements.Coulomb(at="q", friction="F")}, coordinates=["q"],
+    )  # fmt: skip
+
+
+def by_surface(F: float) -> ns.System:
+    def slip(sign: float) -> Any:
+        return lambda t, u, p: (u.v, np.cos(p.w * t) - u.x - sign * p.F)
+
+    return ns.System(
+        states=["x", "v"], parameters={"w": 0.2, "F": F}, modes={"back": slip(-1.0), "forward": slip(1.0)},
+        indicators={"speed": lambda t, u, p: u.v},
+        transitions=[ns.Surface("speed", below="back", above="forward", mode="stick")],
+    )
+
+
+def slip(begin: Any, x0: Any, F: Any, t: Any) -> tuple[Any, Any, Any]:
+    """Place, speed and acceleration at t of a slip backward from rest."""
+    V = 1 / (1 - W * W)
+    a, b, s = x0 - F - V * mp.cos(W * begin), V * W * mp.sin(W * begin), t - begin
+    x = V * mp.cos(W * t) + F + a * mp.cos(s) + b * mp.sin(s)
+    return x, -V * W * mp.sin(W * t) - a * mp.sin(s) + b * mp.cos(s), mp.cos(W * t) - x + F
+
+
+def adding() -> Any:
+    """The stick at x touches its limit where the force is largest: 1 - x = F; a slip leads from x to -x."""
+
+    def equations(F: Any, begin: Any, end: Any) -> list[Any]:
+        x, v, _ = slip(begin, 1 - F, F, end)
+        return [mp.cos(W * begin) - (1 - F) + F, x + 1 - F, v]
+
+    return root(equations, 0.427, 7.12, 12.5)[0]
+
+
+def grazing() -> Any:
+    """The slip from x to -x comes to rest on its way, without acceleration."""
+
+    def equations(F: Any, x0: Any, begin: Any, touch: Any, end: Any) -> list[Any]:
+        x, v, _ = slip(begin, x0, F, end)
+        _, speed, acceleration = slip(begin, x0, F, touch)
+        return [mp.cos(W * begin) - x0 + F, x + x0, v, speed, acceleration]
+
+    return root(equations, 0.298, 0.91, 4.56, 11.12, 15.71)[0]
+
+
+@pytest.mark.parametrize("make", [by_element, by_surface])
+def test_from_five_orbits_the_same_branch(make: Any) -> None:
+    """Beside both points visits as short as the square root of the distance: no trivial root beside theirs."""
+    expected = [float(grazing()), float(adding())]
+    for F in (0.28, 0.35, 0.36, 0.5, 0.6):
+        branch = ns.continue_orbit(ns.find_orbit(make(F)), "F", (0.25, 0.9))
+        special = ns.special_points(branch)
+        assert special["sliding"].values.tolist() == ["grazing_sliding", "adding_sliding"], F
+        assert special["F"].values == pytest.approx(expected, abs=1e-9), F
+        assert branch["F"].values[[0, -1]] == pytest.approx([0.25, 0.9], abs=1e-14), F
+        assert all("edge of the range" in str(text) for text in branch["ended_because"].values), F
+
+
+@pytest.mark.parametrize("v_b", [0.6, 1.0, 2.05, 2.5])
+def test_sliding_bifurcations_of_elements_and_surfaces(v_b: float) -> None:
+    """Crossing-, switching- and grazing-sliding on a belt, from orbits with each of their signatures."""
+    case = "0.8", "0.02", "0.3"
+    expected = [
+        Belt(*case, FORWARD, BACKWARD).edge(1, BACKWARD, 2.01, 5.35, -1.41, 6.27, 0.52),
+        Belt(*case, STICK, BACKWARD).edge(0, FORWARD, 2.16, 5.62, -0.60, 6.06, 0.35),
+        Belt(*case).without_contact(),
+    ]
+    element = ns.mechanical(
+        1.0, 0.04, 1.0, parameters={"v_b": v_b}, forcing={"q": lambda t, p: np.cos(0.8 * t)}, coordinates=["q"],
+        period=2 * np.pi / 0.8, elements={"f": ns.elements.Coulomb(at="q", friction=0.3, belt="v_b")},
+    )  # fmt: skip
+    for system in (element, ns.models.dry_friction_oscillator(omega=0.8, zeta=0.02, f_k=0.3, f_s=0.3, v_b=v_b)):
+        special = ns.special_points(ns.continue_orbit(ns.find_orbit(system), "v_b", (0.05, 3.0)))
+        assert special["sliding"].values.tolist() == ["crossing_sliding", "switching_sliding", "grazing_sliding"]
+        assert special["v_b"].values == pytest.approx([float(value) for value in expected], abs=1e-9)
+
+
+def test_an_impact_that_vanishes_is_a_graze_from_either_side() -> None:
+    """It passes the speed below which impacts are completed as rest: that is a graze all the same.
+
+    Beyond the last one the mass touches nothing: the amplitude of the forced vibration is the gap."""
+    system, name, limits, start = templates.two_stops(np.random.default_rng([0, 9]))
+    first = ns.continue_orbit(ns.find_orbit(system, start=start, max_period=4, progress=False), name, limits)
+    tables = []
+    for value in (0.75, 0.9, 1.3):
+        i = int(np.abs(first[name].values - value).argmin())
+        here = system.with_parameters({name: float(first[name][i])})
+        orbit = ns.find_orbit(here, start=first["section"].values[i], transient=0, period_number=1, progress=False)
+        tables.append(ns.special_points(ns.continue_orbit(orbit, name, limits)))
+    p = system.values
+
+    def reach(w: float) -> float:
+        z, k = p["z"], p["s"]
+        matrix = [[1 + k - w * w + 2j * z * w, -k - 1j * z * w], [-k - 1j * z * w, k - w * w + 1j * z * w]]
+        return float(np.abs(np.linalg.solve(matrix, [p["f"], 0.0]))[0]) - p["b"]
+
+    last = brentq(reach, 0.9303, 0.9307, xtol=1e-14)
+    for table in tables:
+        assert np.abs(table[name].values[table["kind"].values == "grazing"] - last).min() < 1e-9
+        assert table["kind"].values.tolist() == tables[0]["kind"].values.tolist()
+        assert table[name].values == pytest.approx(tables[0][name].values, abs=1e-8)
