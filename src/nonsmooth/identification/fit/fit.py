@@ -39,6 +39,7 @@ def fit(
     measured: Any = None,
     start: Any = None,
     free_start: bool = True,
+    mode: Any = None,
     priors: Any = None,
     settings: Any = None,
     runs: Sequence[str] | None = None,
@@ -78,6 +79,9 @@ def fit(
         First guess of the states at the first sample; measured states need none.
     free_start : bool
         False: the motion begins exactly at ``start``.
+    mode : str or mapping of str to str, optional
+        Mode in which the recording begins, or each run of it. Where not given, each one is tried in which a motion may
+        begin there (a relay with hysteresis: both), and a note says which fits best and by how much.
     priors : mapping of str to (value, standard uncertainty), or ParameterSet, optional
         What is known before of the unknowns.
     settings : mapping or sequence, optional
@@ -131,7 +135,7 @@ def fit(
     """
     from nonsmooth.identification.fit.outcome import outcome
 
-    problem = problem_of(system, recording, parameters, measured, priors, settings, runs, time)
+    problem = problem_of(system, recording, parameters, measured, priors, settings, runs, time, mode)
     if start is not None and not is_one_start(start):
         raise ValueError("fit takes one first guess of the start, for all runs; settings= differ from run to run")
     begin = None if start is None else np.tile(start_states(system, start)[0], (len(problem.records), 1))
@@ -156,10 +160,11 @@ def fit(
 
 def problem_of(
     system: System, recording: Any, parameters: Any, measured: Any = None, priors: Any = None, settings: Any = None,
-    runs: Any = None, time: str = "time",
+    runs: Any = None, time: str = "time", mode: Any = None,
 ) -> Windows:  # fmt: skip
     """The problem, without windows; the noise is the records' own irregularity."""
     check_system(system, "fit")
+    from nonsmooth.identification.fit.first_modes import read_modes
     from nonsmooth.identification.fit.motion import Marcher
     from nonsmooth.identification.fit.records import irregularity, read_records
     from nonsmooth.identification.fit.unknowns import read_unknowns
@@ -174,7 +179,8 @@ def problem_of(
         max(np.sqrt(np.mean([irregularity(record.values[:, c]) ** 2 for record in records])), sensor.floor, 1e-300)
         for c, sensor in enumerate(sensors.values())
     ])  # fmt: skip
-    return Windows(system, Marcher(system, unknowns.active), records, sensors, unknowns, irregular)
+    modes = read_modes(system, mode, labels)
+    return Windows(system, Marcher(system, unknowns.active), records, sensors, unknowns, irregular, modes)
 
 
 def best_of(

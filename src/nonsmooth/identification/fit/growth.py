@@ -16,7 +16,9 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.identification.arrow import Unsettled, settle
-from nonsmooth.identification.fit.first_level import LEAST, level, settle_first
+from nonsmooth.identification.fit.first_level import settle_first
+from nonsmooth.identification.fit.first_modes import BETTER, other_beginnings, rechosen
+from nonsmooth.identification.fit.rough import LEAST, level
 from nonsmooth.identification.fit.windows import Window, Windows
 from nonsmooth.identification.pieces import State
 
@@ -50,6 +52,8 @@ class Grown:
         Of the residuals, over the noise that the record's own irregularity shows.
     stuck : bool
         Whether longer windows did not fit though neighbouring motions do not separate fast.
+    begins : tuple of (int, int, float)
+        Records that may begin in several modes: the record, its mode, by how much the next best raises chi^2.
     """
 
     problem: Windows
@@ -60,6 +64,7 @@ class Grown:
     left: FloatArray
     rms: float
     stuck: bool = False
+    begins: tuple[tuple[int, int, float], ...] = ()
 
     @property
     def unused(self) -> int:
@@ -121,7 +126,8 @@ def grow(
         else:
             stuck = _spreads(now, starts, state) < _REGULAR
             break
-    final = _final(now, theta, starts, problem.noise, 2 if poor else _ROUNDS)
+    rounds = 2 if poor else _ROUNDS
+    final = _begun(_final(now, theta, starts, problem.noise, rounds), problem.noise, rounds)
     return replace(final, stuck=stuck)
 
 
@@ -133,8 +139,10 @@ def _longer_windows(
     if len(joined) == len(problem.pieces):
         return None
     trial = problem.of(joined)
+    starts = trial.starts
+    rechosen(trial, theta, starts)
     try:
-        found = level(trial, theta, trial.starts)
+        found = level(trial, theta, starts)
     except SolveError:
         return None
     if _reduced(trial, found[2]) > _WORSE * max(_reduced(problem, state), 1.0) or _spreads(trial, *found[1:]) > _CHAOS:
@@ -206,6 +214,35 @@ def _final(problem: Windows, theta: FloatArray, starts: FloatArray, irregular: F
             break
     state = problem.residuals(theta, starts)
     return Grown(problem, theta, starts, state, short, left, float(np.max(_noise(problem, state) / irregular)))
+
+
+def _begun(final: Grown, irregular: FloatArray, rounds: int) -> Grown:
+    """The fit with each record in the mode in which it fits best from its beginning, all unknowns free."""
+    begins = []
+    for i in range(len(final.problem.pieces)):
+        now, best = _chi2(final.problem, final.state), None
+        others = other_beginnings(final.problem, final.theta, final.starts, i)
+        if not others:
+            continue
+        least, mode = np.inf, final.problem.pieces[i].mode
+        for _, window, start in others:
+            pieces, starts = list(final.problem.pieces), final.starts.copy()
+            pieces[i], starts[i] = window, start
+            try:
+                theta, starts, state = level(final.problem.of(pieces), final.theta, starts)
+            except SolveError:
+                continue
+            if (far := _chi2(final.problem, state)) < least:
+                least, best = far, (final.problem.of(pieces), theta, starts)
+        if best is not None and least < now - BETTER:
+            final, mode = _final(*best, irregular, rounds), best[0].pieces[i].mode
+        begins.append((final.problem.pieces[i].record, mode, abs(least - now)))
+    return replace(final, begins=tuple(begins))
+
+
+def _chi2(problem: Windows, state: State) -> float:
+    rows = zip(state.residuals, problem.weights(state, 0.0), strict=True)
+    return sum(float(np.sum((r * weight) ** 2)) for r, weight in rows)
 
 
 def _noise(problem: Windows, state: State) -> FloatArray:

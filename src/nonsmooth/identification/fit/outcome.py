@@ -11,10 +11,11 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.arrow import inverted, reduced
 from nonsmooth.identification.finding import Estimate, Finding
-from nonsmooth.identification.fit.first_level import LEAST
+from nonsmooth.identification.fit.first_modes import BETTER
 from nonsmooth.identification.fit.growth import SHORT, Grown
 from nonsmooth.identification.fit.profile import profiled
 from nonsmooth.identification.fit.residuals import by_place, residual_data
+from nonsmooth.identification.fit.rough import LEAST
 from nonsmooth.identification.parameter_set import ParameterSet
 from nonsmooth.identification.sandwich import Sandwich, sandwich
 from nonsmooth.results.progress import Progress
@@ -176,6 +177,13 @@ def _notes(grown: Grown, found: Sandwich, data: xr.Dataset) -> list[str]:
         ]
     if found.correlation > 2.0:
         notes.append(f"the residuals correlate over {found.correlation:.3g} readings; the uncertainties account for it")
+    modes = list(problem.system.modes)
+    for record, mode, excess in grown.begins:
+        label = f"run {problem.records[record].name} begins" if records > 1 else "the record begins"
+        words = f"chi^2 is {excess:.3g} higher in any other" if np.isfinite(excess) else "it has no motion in any other"
+        if excess < BETTER:
+            words = f"chi^2 is only {excess:.2g} higher in another: the readings do not tell which"
+        notes.append(f"{label} in mode {modes[mode]!r}; {words}")
     places = [row for row in by_place(data) if row[2] >= 5]
     if len(places) > 1:
         notes.append(

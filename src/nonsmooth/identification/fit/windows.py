@@ -93,7 +93,8 @@ class Window:
 class Windows:
     """Windows of all records with the system, its sensors and the unknowns.
 
-    ``noise``: standard deviation of a reading of each quantity, rounding included.
+    ``noise``: standard deviation of a reading of each quantity, rounding included. ``modes``: in which each record
+    may begin, the first guess first.
     """
 
     system: System
@@ -102,6 +103,7 @@ class Windows:
     sensors: Mapping[str, Sensor]
     unknowns: Unknowns
     noise: FloatArray
+    modes: list[tuple[int, ...]]
     pieces: list[Window] = field(default_factory=list)
 
     def of(self, pieces: list[Window]) -> Windows:
