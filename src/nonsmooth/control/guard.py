@@ -38,8 +38,8 @@ class Guard:
         if not abs(force) <= self.force:
             raise self.stopped(
                 f"the controller asked for a force of {force:.3g}, beyond its limit of {self.force:.3g}: the "
-                "controlled motion grows (an actuator or sensor of the wrong sign, a delay too long for the rate of the "
-                "readings, gains too high), or greatest_force= is too small"
+                "controlled motion grows (an actuator or sensor of the wrong sign, a delay too long for the rate of "
+                "the readings, gains too high), or greatest_force= is too small"
             )
         self._asked("apply_force", force)
 

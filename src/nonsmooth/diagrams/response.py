@@ -55,8 +55,8 @@ def frequency_response(
     Returns
     -------
     xarray.Dataset
-        The sweep with ``amplitude`` and, over ``jump``: ``jump_variable`` (the state or output whose amplitude jumps, the
-        states first, in their order), ``jump_value`` (the middle of the step in which it does), ``jump_step`` (its
+        The sweep with ``amplitude`` and, over ``jump``: ``jump_variable`` (the state or output whose amplitude jumps,
+        the states first, in their order), ``jump_value`` (the middle of the step in which it does), ``jump_step`` (its
         width, the uncertainty), ``jump_direction``, ``jump_start``, ``jump_before`` and ``jump_after`` (amplitudes in
         the order of the sweep).
 

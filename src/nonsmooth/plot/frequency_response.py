@@ -51,7 +51,8 @@ def frequency_response(
     quantity
         ``"amplitude"`` (half the peak-to-peak value), ``"maximum"`` or ``"minimum"``.
     jumps
-        Mark each jump of what is drawn by a dotted arrow and its value of the parameter with ``digits`` significant digits.
+        Mark each jump of what is drawn by a dotted arrow and its value of the parameter with ``digits`` significant
+        digits.
     """
     variable_along(result, "amplitude", "frequency_response")
     if quantity not in ("amplitude", "maximum", "minimum"):

@@ -87,7 +87,7 @@ def _of_record(
     while first < len(time) - 1:
         rest = time[-1] - time[first]
         until = time[-1] if rest < 1.75 * length else time[first] + 1.25 * length
-        end = int(np.searchsorted(time, until, "right"))
+        end = max(int(np.searchsorted(time, until, "right")), first + 2)  # across a gap that is longer than a window
         known = np.append(np.isfinite(told[first]), np.zeros(len(memory), dtype=bool))
         set_ = np.where(known, np.append(np.nan_to_num(told[first]), memory), z)
         begin = float(time[first]) - early

@@ -18,6 +18,7 @@ from nonsmooth.errors import SolveError
 from nonsmooth.identification.arrow import Unsettled, settle
 from nonsmooth.identification.fit.first_level import settle_first
 from nonsmooth.identification.fit.first_modes import BETTER, other_beginnings, rechosen
+from nonsmooth.identification.fit.noise import colours, parts, robust_size, strange
 from nonsmooth.identification.fit.rough import LEAST, level
 from nonsmooth.identification.fit.windows import Window, Windows
 from nonsmooth.identification.pieces import State
@@ -49,7 +50,9 @@ class Grown:
     left : array (p,)
         That distance in each parameter.
     rms : float
-        Of the residuals, over the noise that the record's own irregularity shows.
+        Size of the residuals over that of noise of their correlation that the record's own irregularity shows.
+    missing : bool
+        Whether they have a structure that shows that the model is missing a part.
     stuck : bool
         Whether longer windows did not fit though neighbouring motions do not separate fast.
     begins : tuple of (int, int, float)
@@ -63,6 +66,7 @@ class Grown:
     short: float
     left: FloatArray
     rms: float
+    missing: bool = False
     stuck: bool = False
     begins: tuple[tuple[int, int, float], ...] = ()
 
@@ -71,6 +75,11 @@ class Grown:
         """Number of readings in parts of the record that could not be simulated."""
         given = sum(int(np.isfinite(record.values).sum()) for record in self.problem.records)
         return given - sum(len(window.readings[0]) for window in self.problem.pieces)
+
+    @property
+    def whole(self) -> bool:
+        """Return whether one window holds each record."""
+        return len(self.problem.pieces) == len(self.problem.records)
 
     @property
     def rank(self) -> tuple[bool, bool, bool, float]:
@@ -82,12 +91,12 @@ class Grown:
         """Return whether the residuals are what the record's own irregularity leaves, and no more than noise.
 
         Where a record is sampled so coarsely that its irregularity is the motion itself, the residuals still have to
-        be independent.
+        be independent, and over windows with starts of their own they are not taken for coloured noise.
         """
         tau = [w.correlation(r) for w, r in zip(self.problem.pieces, self.state.residuals, strict=True)]
-        whole = len(self.problem.pieces) == len(self.problem.records)
         ends = not self.stuck and not self.unused and self.short <= SHORT
-        return self.rms <= _GOOD and ends and (whole or float(np.median(tau)) < _WHITE)
+        white = not self.problem.colour.any() and float(np.median(tau)) < _WHITE
+        return self.rms <= _GOOD and not self.missing and ends and (self.whole or white)
 
 
 def grow(
@@ -198,8 +207,10 @@ def _final(problem: Windows, theta: FloatArray, starts: FloatArray, irregular: F
     """The fit at its minimum, with the noise of each quantity from its residuals."""
     u, short, left = problem.unknowns, 0.0, np.zeros(len(theta))
     for _ in range(rounds):
+        colour = colours(problem, problem.plain.residuals(theta, starts))
+        problem, before = replace(problem, colour=colour), problem
         noise = _noise(problem, problem.residuals(theta, starts))
-        changed = float(np.max(np.abs(noise / problem.noise - 1.0)))
+        changed = float(max(np.max(np.abs(noise / before.noise - 1.0)), np.max(np.abs(colour - before.colour))))
         problem = replace(problem, noise=noise)
         try:
             theta, starts, _, _ = settle(
@@ -213,7 +224,8 @@ def _final(problem: Windows, theta: FloatArray, starts: FloatArray, irregular: F
         if changed < 0.02:
             break
     state = problem.residuals(theta, starts)
-    return Grown(problem, theta, starts, state, short, left, float(np.max(_noise(problem, state) / irregular)))
+    far, missing = strange(problem, problem.plain.residuals(theta, starts), state, irregular)
+    return Grown(problem, theta, starts, state, short, left, far, missing)
 
 
 def _begun(final: Grown, irregular: FloatArray, rounds: int) -> Grown:
@@ -252,11 +264,10 @@ def _noise(problem: Windows, state: State) -> FloatArray:
     grow = total / max(total - free, 0.1 * total)
     found = np.empty(len(problem.sensors))
     for c, sensor in enumerate(problem.sensors.values()):
-        r = np.concatenate([
-            r[: len(w.readings[0])][w.readings[1] == c] for w, r in zip(problem.pieces, state.residuals, strict=True)
-        ])  # fmt: skip
+        r = np.concatenate([np.zeros(0), *parts(problem, state, c)])
         if sensor.noise is not None:
             found[c] = np.hypot(sensor.noise, sensor.floor)
         else:
-            found[c] = max(float(np.sqrt(np.mean(r**2) * grow)) if len(r) else 0.0, 0.5 * sensor.floor, 1e-300)
+            size = robust_size(r) if np.isfinite(problem.loss) else float(np.sqrt(np.mean(r**2))) if len(r) else 0.0
+            found[c] = max(size * float(np.sqrt(grow)), 0.5 * sensor.floor, 1e-300)
     return found
