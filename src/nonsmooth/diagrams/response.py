@@ -98,7 +98,7 @@ def frequency_response(
     ]  # fmt: skip
     kinds = {"variable": str, "value": float, "step": float, "direction": str, "start": int, "before": float,
              "after": float}  # fmt: skip
-    jumps = {key: np.array([row[key] for row in rows], dtype=kind) for key, kind in kinds.items()}
+    jumps: dict[str, Any] = {key: np.array([row[key] for row in rows], dtype=kind) for key, kind in kinds.items()}
     result = response(swept, amplitude=amplitude, jumps=jumps)
     record = read_provenance(swept) | {"verb": "frequency_response"}
     return with_short_record(result.assign_attrs(attribute(record)))
