@@ -120,7 +120,7 @@ def test_a_position_beyond_its_limit_ends_it_within_that_reading():
     rig = OwnRig(sign=-1.0)
     branch, sentence, _ = held(rig, greatest_position=(-0.4, 0.4))
     assert branch is None and "is beyond its limit, -0.4 to 0.4" in sentence
-    assert 0 < safe(rig, position=0.4) < 0.15  # of the limit: at most one sample's way
+    assert 0 < safe(rig, position=0.4) < 0.05  # of the limit
 
 
 def test_a_force_that_cannot_be_set_to_zero_is_said():

@@ -124,7 +124,7 @@ def test_every_term_that_the_model_lacks_is_said(name, kind):
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_coverage(name, kind):
-    fits = [noise_cases.fitted(name, kind, seed) for seed in range(40)]
+    fits = [noise_cases.fitted(name, kind, seed) for seed in range(100, 140)]  # none of those it was written with
     far = np.array([z for _, z in fits])
     inside, rms = (np.abs(far) < 1.96).sum(axis=0), float(np.sqrt(np.mean(far**2)))
     alarms = sum(any(MODEL in one for one in found.anomalies) for found, _ in fits)

@@ -170,7 +170,7 @@ def _periods(
 
 
 def _doubled(single: FloatArray, doubled: FloatArray, scale: FloatArray, number: int) -> FloatArray | None:
-    """How far a flip has split the section points of an orbit; None where those are not near these.
+    """Distances by which a flip has split the section points of an orbit; None where those are not near these.
 
     Near: the middle of each pair is closer to a point of the orbit that is not doubled than the pair to each other.
     """
