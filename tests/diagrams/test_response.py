@@ -70,3 +70,36 @@ def test_directions_and_starts_of_a_response() -> None:
     p = system.values
     a = p["rho"] / np.hypot(2 * p["k"] - p["m"] * 9.0, p["c"] * 3.0)
     assert np.allclose(many["amplitude"].sel(omega=3.0, state="x"), a, rtol=1e-8)
+
+
+def test_jumps_are_those_of_every_state_and_output_and_a_plot_draws_its_own() -> None:
+    """Three bistable cells x_i' = x_i - x_i^3 + s_i a, of which the second and the third are met at other values of a.
+
+    Each leaves its lower branch where s_i a is the fold 2 / (3 sqrt 3); the first, with s = 0, never does.
+    """
+    import matplotlib
+
+    matplotlib.use("Agg")
+
+    def field(t, u, p):
+        ripple = 0.01 * np.cos(p.w * t)
+        return tuple(x - x**3 + s * p.a + ripple for x, s in ((u.x, 0.0), (u.y, 1.0), (u.z, 2.0)))
+
+    system = ns.System(
+        states=["x", "y", "z"], parameters={"a": 0.0, "w": 20.0}, modes={"only": field},
+        outputs={"square": lambda t, u, p: u.z * u.z},
+    )  # fmt: skip
+    a = np.linspace(0.0, 0.6, 61)
+    response = ns.frequency_response(
+        system, a, parameter="a", direction="up", start={"x": -1.2, "y": -1.2, "z": -1.2}, transient=200, keep=4,
+        max_period=3, rtol=1e-10, progress=False,
+    )  # fmt: skip
+    fold, names = 2 / (3 * np.sqrt(3)), response["jump_variable"].values.astype(str)
+    assert set(names) == {"y", "z", "square"} and names.tolist() == sorted(names, key=["y", "z", "square"].index)
+    for name, place in (("y", fold), ("z", fold / 2), ("square", fold / 2)):
+        values = response["jump_value"].values[names == name]
+        assert np.min(np.abs(values - place)) <= 0.5 * (a[1] - a[0]) + 0.01 * fold
+    for name, others in (("y", fold / 2), ("z", fold)):
+        texts = [float(one.get_text()) for one in ns.plot.frequency_response(response, y=name).texts if one.get_text()]
+        assert len(texts) == (names == name).sum() and np.min(np.abs(np.array(texts) - others)) > 0.02
+    assert not [one for one in ns.plot.frequency_response(response, y="x").texts if one.get_text()]

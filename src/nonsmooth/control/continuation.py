@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from nonsmooth.control.course import Course, course_of
+from nonsmooth.control.guard import Guard
 from nonsmooth.control.held import Held, Holder
 from nonsmooth.control.holding import Holding
 from nonsmooth.control.march import March, Point
@@ -27,7 +29,6 @@ if TYPE_CHECKING:
 
 __all__ = ["control_based_continuation"]
 
-REPEATS = 0.01  # scatter of the first harmonic over its size: beyond it the first motion is not of the drive's period
 PER_HARMONIC = 2.5  # samples
 MOST_HARMONICS = 20
 
@@ -74,7 +75,7 @@ def control_based_continuation(
     points : int
         The largest number of points.
     holding : Holding
-        Gains of the controller, harmonics of the reference, and the turns that each measurement takes:
+        Gains and limits of the controller, harmonics of the reference, and the turns that each measurement takes:
         :class:`nonsmooth.Holding`.
     progress : bool or callable
         A bar of the points, or a function that hears the fraction done and may return False to cancel.
@@ -97,12 +98,17 @@ def control_based_continuation(
     ValueError, TypeError
         Arguments that do not fit.
     SolveError
-        The first motion does not repeat with each turn of the drive, or no reference was found that it follows.
+        The first motion does not repeat with each turn of the drive, or no longer does under control; or what stops a
+        measurement (below) came before the first point.
     Interrupted
         Ctrl-C; its ``result`` is the branch that was measured until then. The control force is then off.
 
     Notes
     -----
+    A measurement stops where a force or a position is beyond its limit, where a reading is no number, where the sensor
+    shows the same for a whole turn, and where a method of the rig raises an exception. The force is set to zero before
+    the next reading; the branch ends there, and ``ended_because`` says why.
+
     Gains: with :math:`K_d = m \omega` the controller adds half of critical damping at the drive's frequency: a small
     difference from the reference falls by exp(-pi) per turn, faster than any resonance with light damping can make it
     grow. A force against the velocity takes energy out of impacts and contacts, whatever their stiffness. There
@@ -132,7 +138,8 @@ def control_based_continuation(
     most = whole_number(points, "points", 1)
     if not isinstance(holding, Holding):
         raise TypeError(f"holding = {shortened(holding)}: give Holding(mass=..., gains=..., ...)")
-    branch = _Branch(Holder(rig, holding, holding.mass_of(rig)), course, names)
+    guard = Guard(rig, *holding.positions)
+    branch = _Branch(Holder(guard, holding, holding.mass_of(rig)), course, names)
     options = {**asdict(course), "step": step, "points": points, "holding": asdict(holding)}
     record = {
         "version": package_version(), "verb": "control_based_continuation", "rig": type(rig).__name__,
@@ -147,9 +154,12 @@ def control_based_continuation(
             raise
         words = f"interrupted: {len(branch.points)} points were measured"
         raise Interrupted(words, branch.dataset("interrupted", record)) from error
+    except Exception as error:
+        if not branch.points:
+            raise
+        ending = f"{error}" if isinstance(error, SolveError) else f"stopped: {type(error).__name__}: {error}"
     finally:
-        with suppress(Exception):  # what went wrong before is what is said
-            rig.apply_force(0.0)
+        guard.off()
     return branch.dataset(ending, record)
 
 
@@ -169,6 +179,7 @@ class _Branch:
         """Measure the motion at the beginning, without control."""
         self.free = _first(self.holder, self.course)
         size, width = float(abs(self.free.position.c[1])), self.course.high - self.course.low
+        self.holder.size = float(np.linalg.norm(self.free.position.c[1:]))
         tolerance = self.holder.holding.tolerance
         self.march = March(self.holder, self.course.setting, self.course.of, width, size, tolerance)
 
@@ -212,8 +223,8 @@ def _first(holder: Holder, course: Course) -> Held:
         )
     holder.harmonics = asked
     free = holder.hold(frequency, amplitude, None)
-    size, scatter = abs(free.position.c[1]), free.position.u[1]
-    if not scatter < REPEATS * size:
+    if not free.repeats:
+        size, scatter = abs(free.position.c[1]), free.position.u[1]
         raise SolveError(
             f"the motion at frequency = {frequency:g}, amplitude = {amplitude:g} does not repeat with each turn of the "
             f"drive (first harmonic {size:.3g}, scatter {scatter:.2g}): begin where a motion of the drive's period is "

@@ -8,11 +8,14 @@ import numpy as np
 
 from nonsmooth.arrays import ComplexArray
 from nonsmooth.control.controller import Controller, Samples
+from nonsmooth.control.guard import Guard
 from nonsmooth.control.harmonics import Series, fitted, mean_square
 from nonsmooth.control.holding import Holding
-from nonsmooth.control.rig import Rig
 
 __all__ = ["Held", "Holder"]
+
+REPEATS = 0.01  # scatter of the first harmonic over its size: beyond it a motion is not of the drive's period
+FORCE = 3.0  # the greatest where none is given, over that which answers to a displacement of the motion's size
 
 
 @dataclass(frozen=True)
@@ -25,6 +28,11 @@ class Held:
     position: Series
     force: Series
     force_rms: float
+
+    @property
+    def repeats(self) -> bool:
+        """Return whether the motion repeats with each turn of the drive."""
+        return bool(self.position.u[1] < REPEATS * abs(self.position.c[1]))
 
     @property
     def effort(self) -> float:
@@ -41,10 +49,11 @@ class Held:
 class Holder:
     """A rig that is held as `Holding` says, with the mass by which its gains go."""
 
-    rig: Rig
+    rig: Guard
     holding: Holding
     mass: float
     harmonics: int = 3
+    size: float = 0.0  # of the first motion
     turns: int = 0  # of the drive, so far
 
     def stiffness(self, frequency: float) -> float:
@@ -60,6 +69,9 @@ class Holder:
         """March for whole turns, held to the reference or free."""
         controller = Controller(self.rig, *self.gains_at(frequency), smoothing=1.0 / (5.0 * frequency))
         self.turns += turns
+        if reference is not None:
+            size = max(self.size, float(np.linalg.norm(reference[1:])))
+            self.rig.force = self.holding.greatest_force or FORCE * self.stiffness(frequency) * size
         return controller.run(reference, frequency, turns)
 
     def hold(self, frequency: float, amplitude: float, reference: ComplexArray | None) -> Held:

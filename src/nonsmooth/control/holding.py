@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,7 +17,11 @@ TURNS = {"transient": 0, "settle": 1, "record": 3, "release": 0}
 
 @dataclass(frozen=True, kw_only=True)
 class Holding:
-    r"""Gains of the controller, and the turns of the drive that each measurement takes.
+    r"""Gains and limits of the controller, and the turns of the drive that each measurement takes.
+
+    Every reading and every force is checked. Where one is beyond its limit, no finite number, or the same for a whole
+    turn of the drive, and where the rig raises an exception, the force is set to zero before the next reading and the
+    points measured until then are the result.
 
     Parameters
     ----------
@@ -24,6 +29,11 @@ class Holding:
         The moving mass, from which the gains follow; where not given, the rig's attribute ``mass``.
     gains : (K_p, K_d), optional
         In place of the rule :math:`K_p = 0`, :math:`K_d = m \omega`.
+    greatest_force : float, optional
+        Of the actuator: a larger one is never commanded. Where not given, three times the force with which the
+        controller answers to a displacement of the motion's own size.
+    greatest_position : float or (low, high), optional
+        Range of the readings: up to this distance from 0, or from low to high. No limit where not given.
     harmonics : int, optional
         Of the reference; 20 where not given, fewer where the rig is read fewer than 50 times per turn.
     transient : int
@@ -44,6 +54,8 @@ class Holding:
 
     mass: float | None = None
     gains: tuple[float, float] | None = None
+    greatest_force: float | None = None
+    greatest_position: float | tuple[float, float] | None = None
     harmonics: int | None = None
     transient: int = 50
     settle: int = 5
@@ -55,13 +67,20 @@ class Holding:
         checked: dict[str, Any] = {name: whole_number(getattr(self, name), name, n) for name, n in TURNS.items()}
         if self.harmonics is not None:
             checked["harmonics"] = whole_number(self.harmonics, "harmonics", 1)
-        positive = {"tolerance": self.tolerance} | ({} if self.mass is None else {"mass": self.mass})
+        optional = {"mass": self.mass, "greatest_force": self.greatest_force}
+        positive = {"tolerance": self.tolerance} | {name: one for name, one in optional.items() if one is not None}
         for name, value in positive.items():
             if real_number(value, name) <= 0:
                 raise ValueError(f"{name} = {value!r} must be positive")
         checked["gains"] = _gains(self.gains)
+        checked["greatest_position"] = _range(self.greatest_position)
         for name, value in checked.items():
             object.__setattr__(self, name, value)
+
+    @property
+    def positions(self) -> tuple[float, float]:
+        """Least and greatest reading."""
+        return self.greatest_position or (-math.inf, math.inf)  # type: ignore[return-value]  # made a pair above
 
     def mass_of(self, rig: Any) -> float:
         """Mass from which the gains follow; 1 where they are given.
@@ -94,3 +113,16 @@ def _gains(given: Any) -> tuple[float, float] | None:
     if derivative <= 0:
         raise ValueError(f"K_d = {derivative:g}: without damping the controller holds nothing; give more than 0")
     return proportional, derivative
+
+
+def _range(given: Any) -> tuple[float, float] | None:
+    if given is None:
+        return None
+    pair = given if isinstance(given, tuple | list) else (-given, given) if isinstance(given, int | float) else ()
+    try:
+        low, high = (real_number(one, "greatest_position") for one in pair)
+    except (TypeError, ValueError):
+        raise ValueError(f"greatest_position = {shortened(given)}: give a number, or (low, high)") from None
+    if not low < high:
+        raise ValueError(f"greatest_position = {shortened(given)}: give a number above 0, or (low, high), low < high")
+    return low, high

@@ -17,6 +17,7 @@ import numpy as np
 
 from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.control.held import Held, Holder
+from nonsmooth.errors import SolveError
 
 __all__ = ["March", "Point"]
 
@@ -66,14 +67,20 @@ class March:
         return place, y[1:] - self.unknowns(held.position.c), held
 
     def converged(self, held: Held) -> bool:
-        """Return whether the control force has fallen to its noise, or below the tolerance."""
+        """Return whether the motion repeats and the control force has fallen to its noise, or below the tolerance."""
         least = self.tolerance * self.holder.stiffness(held.frequency) * self.size
-        return held.effort <= max(NOISE * held.effort_noise, least)
+        return held.repeats and held.effort <= max(NOISE * held.effort_noise, least)
 
     def start(self, free: Held) -> Point:
         """The first point, at a stable motion that was measured without control; measures the derivatives."""
         y = np.concatenate([[self.of(free) / self.scale], self.unknowns(free.position.c)])
         y, here, held = self.measure(y)
+        if not held.repeats:
+            raise SolveError(
+                "the first motion repeats with each turn of the drive, and no longer does when it is held to itself: "
+                "the controller shakes it; lower its gains, or read more often",
+                status="not_periodic",
+            )
         first = held.effort
         self._probe(y, here, PROBE)
         found = self._correct(y, self.plane[0], y, LONGEST, (y, here))

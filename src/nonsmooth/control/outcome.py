@@ -64,6 +64,8 @@ def branch_dataset(
     rows = [_motion(one.position.seen, one.frequency) for one in held]
     section, maximum, minimum = (np.array([row[i] for row in rows]).reshape(-1, 2) for i in range(3))
     uncertainty, across = np.array([_uncertainties(march, point) for point in points]).reshape(-1, 2).T
+    size = 0.5 * (maximum - minimum)[:, 0]
+    uncertainty = np.maximum(uncertainty, _beside_folds(size, along, across))
     unit = names.unit(names.position)
     force = names.unit("force")
     kind = np.array([one[0] for one in released], dtype=np.int8)
@@ -77,7 +79,7 @@ def branch_dataset(
         "section": (("point", "state"), section, {"long_name": "state at phase 0 of the drive"}),
         "maximum": (("point", "state"), maximum, {"long_name": "largest value along the orbit"}),
         "minimum": (("point", "state"), minimum, {"long_name": "smallest value along the orbit"}),
-        "amplitude": over(0.5 * (maximum - minimum)[:, 0], "half the peak-to-peak value", unit),
+        "amplitude": over(size, "half the peak-to-peak value", unit),
         "amplitude_uncertainty": over(uncertainty, "standard uncertainty of the amplitude at this parameter", unit),
         "parameter_uncertainty": over(
             across, "standard uncertainty of the parameter at this amplitude", names.unit(parameter)
@@ -104,7 +106,7 @@ def branch_dataset(
         "special_value_uncertainty": ("special", np.array([one[1] for one in folds]), {
             "long_name": "its standard uncertainty", "units": names.unit(parameter)}),
         "turns": ((), np.int64(march.holder.turns), {"long_name": "turns of the drive in all"}),
-        "ended_because": ((), ENDINGS[ending], {"long_name": "how the branch ends"}),
+        "ended_because": ((), ENDINGS.get(ending, ending), {"long_name": "how the branch ends"}),
     }  # fmt: skip
     coords: dict[str, Any] = {
         parameter: over(along, parameter, names.unit(parameter)),
@@ -148,6 +150,19 @@ def _uncertainties(march: March, point: Point) -> tuple[float, float]:
         direct = float(np.sum((slope * noise) ** 2)) if seen is size else 0.0
         spread.append(float(np.sqrt(scale**2 * np.sum(effect**2 * variance) + direct)))
     return spread[0], spread[1]
+
+
+def _beside_folds(size: FloatArray, along: FloatArray, across: FloatArray) -> FloatArray:
+    """Uncertainty of the amplitude by the slope of the branch between neighbours, and at a fold by its curvature.
+
+    The derivatives at a point, which its corrections have measured, say little there.
+    """
+    if len(size) < 3:
+        return np.zeros(len(size))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slope = np.gradient(along, size, edge_order=2)
+        found = np.minimum(across / np.abs(slope), np.sqrt(2.0 * across / np.abs(np.gradient(slope, size))))
+    return np.nan_to_num(found, posinf=0.0)
 
 
 def _folds(

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from nonsmooth.control.harmonics import fitted
 from nonsmooth.control.held import Held, Holder
 
 __all__ = ["STABLE", "UNKNOWN", "UNSTABLE", "release"]
 
 STABLE, UNSTABLE, UNKNOWN = 1, 0, -1
-PUSH = 0.01  # of the motion's first harmonic
+PUSH, LARGEST = 0.01, 0.05  # of the motion's first harmonic
+SEEN = 6.0  # times the noise of one turn: the least displacement
 FAR = 3.0  # times the displacement
 
 
 def release(holder: Holder, held: Held, turns: int) -> tuple[int, float]:
     """Hold a reference that is 1 % larger, let go, and watch the first harmonic for some turns of the drive.
+
+    More than 1 % where the noise of one turn asks for it, up to 5 %; beyond that nothing is seen.
 
     Returns
     -------
@@ -23,11 +28,15 @@ def release(holder: Holder, held: Held, turns: int) -> tuple[int, float]:
     float
         Mean factor by which the distance changed per turn.
     """
-    pushed = held.reference.copy()
-    pushed[1] *= 1.0 + PUSH
-    holder.run(held.frequency, pushed, holder.holding.settle)
     here = held.position.c[1]
-    displacement = PUSH * float(abs(here))
+    noise = held.position.u[1] * np.sqrt(2.0 * holder.holding.record)
+    push = max(PUSH, SEEN * float(noise / abs(here)))
+    if push > LARGEST:
+        return UNKNOWN, float("nan")
+    pushed = held.reference.copy()
+    pushed[1] *= 1.0 + push
+    holder.run(held.frequency, pushed, holder.holding.settle)
+    displacement = push * float(abs(here))
     distances: list[float] = []
     for _ in range(turns):
         seen = holder.run(held.frequency, None, 1)

@@ -55,9 +55,10 @@ def frequency_response(
     Returns
     -------
     xarray.Dataset
-        The sweep with ``amplitude`` and, over ``jump``: ``jump_value`` (the middle of the step in which the first
-        state's amplitude jumps), ``jump_step`` (its width, the uncertainty), ``jump_direction``, ``jump_start``,
-        ``jump_before`` and ``jump_after`` (amplitudes in the order of the sweep).
+        The sweep with ``amplitude`` and, over ``jump``: ``jump_variable`` (the state or output whose amplitude jumps,
+        the states first, in their order), ``jump_value`` (the middle of the step in which it does), ``jump_step`` (its
+        width, the uncertainty), ``jump_direction``, ``jump_start``, ``jump_before`` and ``jump_after`` (amplitudes in
+        the order of the sweep).
 
     Notes
     -----
@@ -78,22 +79,26 @@ def frequency_response(
     half = 0.5 * (swept["maximum"] - swept["minimum"])
     expanded = half.expand_dims([dim for dim, _ in full if dim not in half.dims]).transpose(*[dim for dim, _ in full])
     amplitude = expanded.values
-    names = np.atleast_1d(swept["direction"].values).astype(str)
+    heights = {str(state): amplitude[..., i] for i, state in enumerate(swept["state"].values)}
+    for output in system.outputs:
+        if f"{output}_maximum" in swept:
+            range_ = swept[f"{output}_maximum"] - swept[f"{output}_minimum"]
+            added = [dim for dim, _ in full[:3] if dim not in range_.dims]
+            heights[output] = 0.5 * range_.expand_dims(added).transpose(*[dim for dim, _ in full[:3]]).values
     x = np.asarray(swept[parameter].values, dtype=float)
-    found: list[tuple[Any, ...]] = []
-    for d, name in enumerate(names):
-        for k in range(amplitude.shape[1]):
-            order = np.argsort(-x if name == "down" else x, kind="stable")
-            for i in jumps_in(amplitude[d, k, order, 0]):
-                a, b = order[i], order[i + 1]
-                before, after = amplitude[d, k, a, 0], amplitude[d, k, b, 0]
-                found.append((0.5 * (x[a] + x[b]), abs(x[b] - x[a]), name, k, before, after))
-    columns = list(zip(*found, strict=True)) if found else [()] * 6
-    keys = ("value", "step", "direction", "start", "before", "after")
-    kinds = (float, float, str, int, float, float)
-    jumps: dict[str, np.ndarray] = {
-        key: np.array(column, dtype=kind) for key, column, kind in zip(keys, columns, kinds, strict=True)
-    }
+    rows = [
+        {"variable": name, "value": 0.5 * (x[a] + x[b]), "step": abs(x[b] - x[a]), "direction": str(word), "start": k,
+         "before": height[d, k, a], "after": height[d, k, b]}
+        for name, height in heights.items()
+        for d, word in enumerate(np.atleast_1d(swept["direction"].values))
+        for k in range(height.shape[1])
+        for order in [np.argsort(-x if word == "down" else x, kind="stable")]
+        for i in jumps_in(height[d, k, order])
+        for a, b in [(order[i], order[i + 1])]
+    ]  # fmt: skip
+    kinds = {"variable": str, "value": float, "step": float, "direction": str, "start": int, "before": float,
+             "after": float}  # fmt: skip
+    jumps: dict[str, Any] = {key: np.array([row[key] for row in rows], dtype=kind) for key, kind in kinds.items()}
     result = response(swept, amplitude=amplitude, jumps=jumps)
     record = read_provenance(swept) | {"verb": "frequency_response"}
     return with_short_record(result.assign_attrs(attribute(record)))

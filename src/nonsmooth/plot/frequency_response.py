@@ -51,7 +51,8 @@ def frequency_response(
     quantity
         ``"amplitude"`` (half the peak-to-peak value), ``"maximum"`` or ``"minimum"``.
     jumps
-        Mark each jump by a dotted arrow and its value of the parameter with ``digits`` significant digits.
+        Mark each jump of what is drawn by a dotted arrow and its value of the parameter with ``digits`` significant
+        digits.
     """
     variable_along(result, "amplitude", "frequency_response")
     if quantity not in ("amplitude", "maximum", "minimum"):
@@ -66,7 +67,7 @@ def frequency_response(
             one = heights.isel(direction=i) if "direction" in heights.dims else heights
             curves = one.transpose(parameter, ...).values.reshape(len(values), -1)
             for k, curve in enumerate(curves.T):
-                found = _intervals(values, curve, _jumps(result, direction, k))
+                found = _intervals(values, curve, _jumps(result, name, direction, k))
                 at = [i for _, i in found]
                 broken = np.insert(values, at, np.nan), np.insert(curve, at, np.nan)
                 drawn.plot(*broken, label=_WORDS[direction] if k == 0 else None, **_LOOKS[direction])
@@ -81,11 +82,14 @@ def frequency_response(
     return drawn
 
 
-def _jumps(result: xr.Dataset, direction: str, start: int) -> list[float]:
-    """The jumps of one curve: those of its direction and, where there are several starts, of its start."""
-    if "jump_value" not in result:
+def _jumps(result: xr.Dataset, name: str, direction: str, start: int) -> list[float]:
+    """The jumps of one curve: those of its state, its direction and, where there are several starts, of its start."""
+    first = str(result["state"].values[0])  # older results hold no others
+    if "jump_value" not in result or ("jump_variable" not in result and name != first):
         return []
     mine = result["jump_direction"].values == direction
+    if "jump_variable" in result:
+        mine = mine & (result["jump_variable"].values == name)
     if "jump_start" in result:
         mine = mine & (result["jump_start"].values == start)
     return [float(value) for value in result["jump_value"].values[mine]]

@@ -201,6 +201,9 @@ def response(swept: xr.Dataset, *, amplitude: ArrayLike, jumps: Mapping[str, Arr
         elif name == "value":
             attributes = {"long_name": f"{parameter} at the jump", "units": swept[parameter].attrs.get("units", "1")}
             variables["jump_value"] = ("jump", floats(values), attributes)
+        elif name == "variable":
+            attributes = {"long_name": "state or output whose amplitude jumps"}
+            variables["jump_variable"] = ("jump", strings(np.asarray(values, dtype=str)), attributes)
         else:
             variables[f"jump_{name}"] = ("jump", np.asarray(values))
     return swept.assign(variables)

@@ -193,3 +193,20 @@ def test_what_cannot_be_compared_is_refused() -> None:
     unforced = xr.Dataset({"u": (("time", "state"), u), "phase": motion["phase"]}, {"state": states})
     with pytest.raises(ValueError, match="no forcing period"):
         compare(unforced, valve, noise=np.ones(len(states)))
+
+
+@pytest.mark.parametrize(
+    ("rig", "theory", "words"),
+    [
+        (3.56, 3.6, "on either side of a flip: the predicted motion is doubled"),
+        (3.6, 3.56, "on either side of a flip: the measured motion is doubled"),
+        (3.6, 3.6, "the same"),
+        (3.6, 2.0, "others"),
+    ],
+)
+def test_a_rig_and_a_theory_on_either_side_of_a_flip(rig: float, theory: float, words: str) -> None:
+    """The motion of period 1 doubles between 3.56 and 3.58 rad/s; at 2 rad/s the mass does not reach the support."""
+    settings = {"rho": 0.14, "g": 0.02}
+    measured = record(MODEL.with_parameters(settings, omega=rig))
+    found = compare(measured, MODEL, settings={**settings, "omega": theory})
+    assert str(found["period_relation"].values).startswith(words)

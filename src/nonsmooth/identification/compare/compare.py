@@ -124,7 +124,8 @@ def compare(
         ``measured_halves_median``,
         ``measured_halves_p95`` (and of the theory), ``block``; ``wasserstein_distance`` for each state and
         ``wasserstein_distance_joint``; ``measured_period_number``, ``theory_period_number``,
-        ``coexisting_period_number``, ``period_agrees``, ``period_coexists``; ``draw_energy_distance``,
+        ``coexisting_period_number``, ``period_agrees``, ``period_coexists``, ``period_relation`` (in words; where rig
+        and theory lie on either side of a flip, that); ``draw_energy_distance``,
         ``draw_orbit_distance``, ``draw_period_number``, ``inside_band``, ``band_share``.
 
         *response*: ``measured_amplitude``, ``theory_at_run``, ``relative_difference`` over ``run``;

@@ -50,7 +50,7 @@ def compare_motion(
         predicted = from_result(model.theory, model.states, phases, grid, max_period)
     blurred = [points + noise * rng.standard_normal(points.shape) for points in predicted.sections]
     variables = _clouds(sections, blurred, predicted.sections, scale, splits, model.seed)
-    variables |= _periods(number, predicted)
+    variables |= _periods(number, predicted, sections[0], scale, model.states)
     if motions is not None and sorted(model.places) == list(range(len(motions.system.states))):
         predicted = _begun_with_the_measurement(motions, folded, number, predicted, grid)
     variables |= _orbits(folded, number, predicted, grid)
@@ -145,7 +145,15 @@ def _clouds(
     return variables
 
 
-def _periods(number: int, predicted: Prediction) -> dict[str, Any]:
+def _periods(
+    number: int, predicted: Prediction, section: FloatArray, scale: FloatArray, states: list[str]
+) -> dict[str, Any]:
+    words = "the same" if number == predicted.period_number else "others"
+    rows = [(number, section, "measured"), (predicted.period_number, predicted.sections[0], "predicted")]
+    (low, single, _), (high, doubled, whose) = sorted(rows, key=lambda row: row[0])
+    if low > 0 and high == 2 * low and (apart := _doubled(single, doubled, scale, low)) is not None:
+        by = ", ".join(f"{far:.2g} in {name}" for far, name in zip(apart, states, strict=True))
+        words = f"on either side of a flip: the {whose} motion is doubled, its section points part by {by}"
     coexisting = np.asarray(predicted.coexisting, dtype=np.int64)
     return {
         "measured_period_number": ((), np.int64(number), {"long_name": "measured period number (0: none found)"}),
@@ -157,7 +165,20 @@ def _periods(number: int, predicted: Prediction) -> dict[str, Any]:
             "long_name": "1 where the nearest predicted motion has the measured period number"}),
         "period_coexists": ((), np.int8(number in coexisting), {
             "long_name": "1 where the measured period number is among the predicted ones"}),
+        "period_relation": ((), words, {"long_name": "how the two period numbers lie to each other"}),
     }  # fmt: skip
+
+
+def _doubled(single: FloatArray, doubled: FloatArray, scale: FloatArray, number: int) -> FloatArray | None:
+    """Distances by which a flip has split the section points of an orbit; None where those are not near these.
+
+    Near: the middle of each pair is closer to a point of the orbit that is not doubled than the pair to each other.
+    """
+    points = np.array([single[k::number].mean(axis=0) for k in range(number)])
+    split = np.array([doubled[k :: 2 * number].mean(axis=0) for k in range(2 * number)])
+    middle, apart = 0.5 * (split[:number] + split[number:]), split[:number] - split[number:]
+    away = np.min(np.linalg.norm((middle[:, None] - points) / scale, axis=2), axis=1)
+    return np.abs(apart).max(axis=0) if np.linalg.norm(away) < np.linalg.norm(apart / scale) else None
 
 
 def _begun_with_the_measurement(

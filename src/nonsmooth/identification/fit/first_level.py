@@ -15,14 +15,14 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
-from nonsmooth.identification.arrow import settle
+from nonsmooth.identification.fit.first_modes import rechosen
 from nonsmooth.identification.fit.first_windows import first_windows, states_from_samples
+from nonsmooth.identification.fit.rough import alone, level, misfits, own_size
 from nonsmooth.identification.fit.windows import Window, Windows
 from nonsmooth.identification.pieces import State
 
-__all__ = ["LEAST", "level", "misfits", "settle_first", "settle_soft"]
+__all__ = ["settle_first", "settle_soft"]
 
-LEAST = 1e-13  # eigenvalue of the scaled normal matrix from which a direction counts as determined
 _ROUNDS = 10
 _PART = 1 / 3  # of the residuals: as how large the noise is taken
 _REACH = 4.0  # factor within which parameters stay about their guess at first
@@ -53,6 +53,9 @@ def settle_first(
         each = misfits(now, state)
         bad = each > _FAR * max(float(np.median(each)), 1.0)
         changed = not np.array_equal(bad, ~used)
+        if rechosen(now, theta, starts):
+            state, changed = now.residuals(theta, starts), True
+            each = misfits(now, state)
         if np.mean(bad) <= 0.5 and _mend(now, theta, starts, each, np.flatnonzero(bad), rng):
             state, changed = now.residuals(theta, starts), True
             each = misfits(now, state)
@@ -68,28 +71,6 @@ def settle_first(
     if not kept.pieces:
         raise SolveError("no window of the record can be simulated at the parameters that fit it best")
     return kept, theta, starts, kept.derivatives(theta, starts)
-
-
-def level(
-    problem: Windows, theta: FloatArray, starts: FloatArray, used: Any = None
-) -> tuple[FloatArray, FloatArray, State]:
-    """A rough fit on the way, in which the parameters are known to about their own size.
-
-    What windows so short do not tell then stays where it is: a coefficient of restitution of 1e8, tried where hardly an
-    impact was seen, makes a motion of hours.
-    """
-    if not np.isfinite(np.concatenate(problem.residuals(theta, starts).residuals)).all():
-        raise SolveError("a motion over longer windows does not come to its end")
-    u = problem.unknowns
-    used = np.ones(len(starts), dtype=bool) if used is None else used
-    known = u.precision + np.diag(_own_size(problem) ** -2.0)
-    found = settle(problem, theta, starts, 0.0, used, u.centre, known, 30, True, (u.low, u.high), LEAST)
-    return found[0], found[1], found[2]
-
-
-def _own_size(problem: Windows) -> FloatArray:
-    guess = problem.unknowns.guess
-    return np.where(guess != 0.0, np.abs(guess), np.inf)
 
 
 def settle_soft(problem: Windows, theta: FloatArray, starts: FloatArray) -> tuple[FloatArray, FloatArray, State]:
@@ -112,7 +93,7 @@ def _soft(problem: Windows, noise: FloatArray) -> Windows:
     """The problem with this noise; while that is not yet its own, the parameters stay about their guess."""
     if (noise <= problem.noise).all():
         return problem
-    u, size = problem.unknowns, _own_size(problem)
+    u, size = problem.unknowns, own_size(problem)
     near, far = np.where(size < np.inf, size / _REACH, -np.inf), _REACH * size
     low = np.maximum(u.low, np.where(u.guess > 0, near, -far))
     high = np.minimum(u.high, np.where(u.guess < 0, -near, far))
@@ -134,33 +115,15 @@ def _sizes(problem: Windows, state: State) -> FloatArray:
     return found
 
 
-def misfits(problem: Windows, state: State) -> FloatArray:
-    """Mean squared residual over the noise, of each window."""
-    return np.array([float(np.mean((r / problem.noise[w.readings[1]]) ** 2)) for w, r in _rows(problem, state)])
-
-
 def _mend(
     problem: Windows, theta: FloatArray, starts: FloatArray, each: FloatArray, bad: Any, rng: np.random.Generator
 ) -> bool:
     """Look for other starts (and modes) of the bad windows, in place; returns whether one was found."""
     found = False
-    fixed = replace(problem.unknowns, low=theta, high=theta, centre=theta)
     for i in bad:
-        best, cost = None, 0.7 * each[i]
-        trials = []
-        for window, start in _others(problem, theta, starts, int(i), rng):
-            one = replace(problem, pieces=[window], unknowns=fixed)
-            trials.append((float(misfits(one, one.residuals(theta, start[None, :]))[0]), window, start))
-        for _, window, start in sorted(trials, key=lambda row: row[0])[:3]:
-            one = replace(problem, pieces=[replace(window, start=start)], unknowns=fixed)
-            try:
-                _, moved, state = level(one, theta, start[None, :])
-            except SolveError:
-                continue
-            if (now := float(misfits(one, state)[0])) < cost:
-                best, cost = (one.pieces[0], moved[0]), now
-        if best is not None:
-            problem.pieces[i], starts[i], found = best[0], best[1], True
+        best = alone(problem, theta, _others(problem, theta, starts, int(i), rng), 3)
+        if best and best[0][0] < 0.7 * each[i]:
+            problem.pieces[i], starts[i], found = best[0][1], best[0][2], True
     return found
 
 

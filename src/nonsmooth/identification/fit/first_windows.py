@@ -83,11 +83,11 @@ def _of_record(
     which = problem.unknowns.of_run(i)
     shift = 0.0 if period is None or not problem.unknowns.phases else float(theta[which[-1]]) * period
     sizes = np.max(np.abs(np.nan_to_num(told)), axis=0)
-    time, mode, first, windows = record.time, 0, 0, []
+    time, mode, first, windows = record.time, problem.modes[i][0], 0, []
     while first < len(time) - 1:
         rest = time[-1] - time[first]
         until = time[-1] if rest < 1.75 * length else time[first] + 1.25 * length
-        end = int(np.searchsorted(time, until, "right"))
+        end = max(int(np.searchsorted(time, until, "right")), first + 2)  # across a gap that is longer than a window
         known = np.append(np.isfinite(told[first]), np.zeros(len(memory), dtype=bool))
         set_ = np.where(known, np.append(np.nan_to_num(told[first]), memory), z)
         begin = float(time[first]) - early
@@ -96,7 +96,7 @@ def _of_record(
             if motion is not None:
                 break
         if motion is None:  # the samples of this window come back when windows are joined
-            first, mode = max(end - 1, first + 1), 0
+            first, mode = max(end - 1, first + 1), problem.modes[i][0]
             continue
         sizes = np.maximum(sizes, np.abs(motion.z[:, :n_u]).max(axis=0))
         last = end if end == len(time) else first + _quiet(motion.time, motion.log.crossing_time, length)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.errors import SolveError
+from nonsmooth.errors import SolveError, shortened
 from nonsmooth.flow.arguments import check_system, real_number, whole_number, yes_or_no
 from nonsmooth.flow.starts import is_one_start, start_states
 from nonsmooth.identification.blas import one_blas_thread
@@ -26,6 +26,7 @@ __all__ = ["best_of", "fit", "problem_of"]
 
 _PHASES = 8  # first guesses of an unknown phase
 _LONGER = 3.3  # the other length of first windows, in every second try
+_LOSSES = {"linear": np.inf, "huber": 2.5}  # noise deviations from which on a residual counts linearly
 _MORE = 3  # guesses that are looked at, for each that is fitted
 
 
@@ -39,12 +40,14 @@ def fit(
     measured: Any = None,
     start: Any = None,
     free_start: bool = True,
+    mode: Any = None,
     priors: Any = None,
     settings: Any = None,
     runs: Sequence[str] | None = None,
     time: str = "time",
     window: float | None = None,
     profile: Sequence[str] = (),
+    loss: str = "linear",
     tries: int = 8,
     seed: int = 0,
     progress: Progress = True,
@@ -78,6 +81,9 @@ def fit(
         First guess of the states at the first sample; measured states need none.
     free_start : bool
         False: the motion begins exactly at ``start``.
+    mode : str or mapping of str to str, optional
+        Mode in which the recording begins, or each run of it. Where not given, each one is tried in which a motion may
+        begin there (a relay with hysteresis: both), and a note says which fits best and by how much.
     priors : mapping of str to (value, standard uncertainty), or ParameterSet, optional
         What is known before of the unknowns.
     settings : mapping or sequence, optional
@@ -91,6 +97,9 @@ def fit(
     profile : sequence of str
         Unknowns whose profile likelihood is computed, where the sum of squares may be no parabola within the
         uncertainty: a finding ``"<name>, profile"`` and a note give the 95 % limits.
+    loss : {"linear", "huber"}
+        ``"huber"``: residuals beyond 2.5 noise deviations count linearly, so that outliers hardly count. Outliers are
+        named in the notes either way.
     tries : int
         First guesses to try, the given one and others around it (or within the bounds), while none fits.
     seed : int
@@ -102,10 +111,10 @@ def fit(
     -------
     ParameterSet
         The parameters; in ``extra`` the unknowns of sensors, phases, starts (``"x(0)"``) and ``"<quantity>.noise"``.
-        The covariance takes the residuals' own correlation into account; a parameter that the recording does not
-        determine has an infinite uncertainty and says so in ``identifiability``. ``anomalies`` says where the model
-        fails.
-        ``.residuals`` is a Dataset of the readings, the fit and the residuals over ``sample``, drawn by
+        Coloured noise is weighted by its correlation from reading to reading, estimated with the rest, and the
+        covariance takes what is left of the residuals' own correlation into account; a parameter that the recording
+        does not determine has an infinite uncertainty and says so in ``identifiability``. ``anomalies`` says where the
+        model fails. ``.residuals`` is a Dataset of the readings, the fit and the residuals over ``sample``, drawn by
         ``ns.plot.identification.fit_residuals``.
 
     Raises
@@ -131,7 +140,7 @@ def fit(
     """
     from nonsmooth.identification.fit.outcome import outcome
 
-    problem = problem_of(system, recording, parameters, measured, priors, settings, runs, time)
+    problem = problem_of(system, recording, parameters, measured, priors, settings, runs, time, mode, loss)
     if start is not None and not is_one_start(start):
         raise ValueError("fit takes one first guess of the start, for all runs; settings= differ from run to run")
     begin = None if start is None else np.tile(start_states(system, start)[0], (len(problem.records), 1))
@@ -156,10 +165,11 @@ def fit(
 
 def problem_of(
     system: System, recording: Any, parameters: Any, measured: Any = None, priors: Any = None, settings: Any = None,
-    runs: Any = None, time: str = "time",
+    runs: Any = None, time: str = "time", mode: Any = None, loss: Any = "linear",
 ) -> Windows:  # fmt: skip
     """The problem, without windows; the noise is the records' own irregularity."""
     check_system(system, "fit")
+    from nonsmooth.identification.fit.first_modes import read_modes
     from nonsmooth.identification.fit.motion import Marcher
     from nonsmooth.identification.fit.records import irregularity, read_records
     from nonsmooth.identification.fit.unknowns import read_unknowns
@@ -170,11 +180,18 @@ def problem_of(
     sensors, records = read_records(system, recording, measured, runs=runs, time=time, settings=settings)
     labels = [record.name for record in records]
     unknowns = read_unknowns(system, sensors, parameters, priors, labels, [record.settings for record in records])
+    within = [[record.values[sensor.limit(y) == 0, c] for record in records for y in [record.values[:, c]]]
+              for c, sensor in enumerate(sensors.values())]  # fmt: skip
     irregular = np.array([
-        max(np.sqrt(np.mean([irregularity(record.values[:, c]) ** 2 for record in records])), sensor.floor, 1e-300)
-        for c, sensor in enumerate(sensors.values())
+        max(np.sqrt(np.mean([irregularity(y) ** 2 for y in readings])), sensor.floor, 1e-300)
+        for readings, sensor in zip(within, sensors.values(), strict=True)
     ])  # fmt: skip
-    return Windows(system, Marcher(system, unknowns.active), records, sensors, unknowns, irregular)
+    if loss not in _LOSSES:
+        raise ValueError(f"loss = {shortened(loss)}; allowed: {', '.join(map(repr, _LOSSES))}")
+    return Windows(
+        system, Marcher(system, unknowns.active), records, sensors, unknowns, irregular,
+        read_modes(system, mode, labels), np.zeros(len(sensors)), _LOSSES[loss],
+    )  # fmt: skip
 
 
 def best_of(

@@ -16,7 +16,10 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.identification.arrow import Unsettled, settle
-from nonsmooth.identification.fit.first_level import LEAST, level, settle_first
+from nonsmooth.identification.fit.first_level import settle_first
+from nonsmooth.identification.fit.first_modes import BETTER, other_beginnings, rechosen
+from nonsmooth.identification.fit.noise import colours, parts, robust_size, strange
+from nonsmooth.identification.fit.rough import LEAST, level
 from nonsmooth.identification.fit.windows import Window, Windows
 from nonsmooth.identification.pieces import State
 
@@ -47,9 +50,13 @@ class Grown:
     left : array (p,)
         That distance in each parameter.
     rms : float
-        Of the residuals, over the noise that the record's own irregularity shows.
+        Size of the residuals over that of noise of their correlation that the record's own irregularity shows.
+    missing : bool
+        Whether they have a structure that shows that the model is missing a part.
     stuck : bool
         Whether longer windows did not fit though neighbouring motions do not separate fast.
+    begins : tuple of (int, int, float)
+        Records that may begin in several modes: the record, its mode, by how much the next best raises chi^2.
     """
 
     problem: Windows
@@ -59,13 +66,20 @@ class Grown:
     short: float
     left: FloatArray
     rms: float
+    missing: bool = False
     stuck: bool = False
+    begins: tuple[tuple[int, int, float], ...] = ()
 
     @property
     def unused(self) -> int:
         """Number of readings in parts of the record that could not be simulated."""
         given = sum(int(np.isfinite(record.values).sum()) for record in self.problem.records)
         return given - sum(len(window.readings[0]) for window in self.problem.pieces)
+
+    @property
+    def whole(self) -> bool:
+        """Return whether one window holds each record."""
+        return len(self.problem.pieces) == len(self.problem.records)
 
     @property
     def rank(self) -> tuple[bool, bool, bool, float]:
@@ -77,12 +91,12 @@ class Grown:
         """Return whether the residuals are what the record's own irregularity leaves, and no more than noise.
 
         Where a record is sampled so coarsely that its irregularity is the motion itself, the residuals still have to
-        be independent.
+        be independent, and over windows with starts of their own they are not taken for coloured noise.
         """
         tau = [w.correlation(r) for w, r in zip(self.problem.pieces, self.state.residuals, strict=True)]
-        whole = len(self.problem.pieces) == len(self.problem.records)
         ends = not self.stuck and not self.unused and self.short <= SHORT
-        return self.rms <= _GOOD and ends and (whole or float(np.median(tau)) < _WHITE)
+        white = not self.problem.colour.any() and float(np.median(tau)) < _WHITE
+        return self.rms <= _GOOD and not self.missing and ends and (self.whole or white)
 
 
 def grow(
@@ -121,7 +135,8 @@ def grow(
         else:
             stuck = _spreads(now, starts, state) < _REGULAR
             break
-    final = _final(now, theta, starts, problem.noise, 2 if poor else _ROUNDS)
+    rounds = 2 if poor else _ROUNDS
+    final = _begun(_final(now, theta, starts, problem.noise, rounds), problem.noise, rounds)
     return replace(final, stuck=stuck)
 
 
@@ -133,8 +148,10 @@ def _longer_windows(
     if len(joined) == len(problem.pieces):
         return None
     trial = problem.of(joined)
+    starts = trial.starts
+    rechosen(trial, theta, starts)
     try:
-        found = level(trial, theta, trial.starts)
+        found = level(trial, theta, starts)
     except SolveError:
         return None
     if _reduced(trial, found[2]) > _WORSE * max(_reduced(problem, state), 1.0) or _spreads(trial, *found[1:]) > _CHAOS:
@@ -190,8 +207,10 @@ def _final(problem: Windows, theta: FloatArray, starts: FloatArray, irregular: F
     """The fit at its minimum, with the noise of each quantity from its residuals."""
     u, short, left = problem.unknowns, 0.0, np.zeros(len(theta))
     for _ in range(rounds):
+        colour = colours(problem, problem.plain.residuals(theta, starts))
+        problem, before = replace(problem, colour=colour), problem
         noise = _noise(problem, problem.residuals(theta, starts))
-        changed = float(np.max(np.abs(noise / problem.noise - 1.0)))
+        changed = float(max(np.max(np.abs(noise / before.noise - 1.0)), np.max(np.abs(colour - before.colour))))
         problem = replace(problem, noise=noise)
         try:
             theta, starts, _, _ = settle(
@@ -205,7 +224,37 @@ def _final(problem: Windows, theta: FloatArray, starts: FloatArray, irregular: F
         if changed < 0.02:
             break
     state = problem.residuals(theta, starts)
-    return Grown(problem, theta, starts, state, short, left, float(np.max(_noise(problem, state) / irregular)))
+    far, missing = strange(problem, problem.plain.residuals(theta, starts), state, irregular)
+    return Grown(problem, theta, starts, state, short, left, far, missing)
+
+
+def _begun(final: Grown, irregular: FloatArray, rounds: int) -> Grown:
+    """The fit with each record in the mode in which it fits best from its beginning, all unknowns free."""
+    begins = []
+    for i in range(len(final.problem.pieces)):
+        now, best = _chi2(final.problem, final.state), None
+        others = other_beginnings(final.problem, final.theta, final.starts, i)
+        if not others:
+            continue
+        least, mode = np.inf, final.problem.pieces[i].mode
+        for _, window, start in others:
+            pieces, starts = list(final.problem.pieces), final.starts.copy()
+            pieces[i], starts[i] = window, start
+            try:
+                theta, starts, state = level(final.problem.of(pieces), final.theta, starts)
+            except SolveError:
+                continue
+            if (far := _chi2(final.problem, state)) < least:
+                least, best = far, (final.problem.of(pieces), theta, starts)
+        if best is not None and least < now - BETTER:
+            final, mode = _final(*best, irregular, rounds), best[0].pieces[i].mode
+        begins.append((final.problem.pieces[i].record, mode, abs(least - now)))
+    return replace(final, begins=tuple(begins))
+
+
+def _chi2(problem: Windows, state: State) -> float:
+    rows = zip(state.residuals, problem.weights(state, 0.0), strict=True)
+    return sum(float(np.sum((r * weight) ** 2)) for r, weight in rows)
 
 
 def _noise(problem: Windows, state: State) -> FloatArray:
@@ -215,11 +264,10 @@ def _noise(problem: Windows, state: State) -> FloatArray:
     grow = total / max(total - free, 0.1 * total)
     found = np.empty(len(problem.sensors))
     for c, sensor in enumerate(problem.sensors.values()):
-        r = np.concatenate([
-            r[: len(w.readings[0])][w.readings[1] == c] for w, r in zip(problem.pieces, state.residuals, strict=True)
-        ])  # fmt: skip
+        r = np.concatenate([np.zeros(0), *parts(problem, state, c)])
         if sensor.noise is not None:
             found[c] = np.hypot(sensor.noise, sensor.floor)
         else:
-            found[c] = max(float(np.sqrt(np.mean(r**2) * grow)) if len(r) else 0.0, 0.5 * sensor.floor, 1e-300)
+            size = robust_size(r) if np.isfinite(problem.loss) else float(np.sqrt(np.mean(r**2))) if len(r) else 0.0
+            found[c] = max(size * float(np.sqrt(grow)), 0.5 * sensor.floor, 1e-300)
     return found

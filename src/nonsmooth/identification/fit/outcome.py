@@ -11,10 +11,12 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.arrow import inverted, reduced
 from nonsmooth.identification.finding import Estimate, Finding
-from nonsmooth.identification.fit.first_level import LEAST
+from nonsmooth.identification.fit.first_modes import BETTER
 from nonsmooth.identification.fit.growth import SHORT, Grown
+from nonsmooth.identification.fit.noise import OUTLYING, robust_size
 from nonsmooth.identification.fit.profile import profiled
 from nonsmooth.identification.fit.residuals import by_place, residual_data
+from nonsmooth.identification.fit.rough import LEAST
 from nonsmooth.identification.parameter_set import ParameterSet
 from nonsmooth.identification.sandwich import Sandwich, sandwich
 from nonsmooth.results.progress import Progress
@@ -25,7 +27,9 @@ if TYPE_CHECKING:
 __all__ = ["outcome"]
 
 _TOGETHER = 0.98  # correlation from which two parameters are said to be known only together
-_POOR = 2.0  # residuals over the record's own irregularity, from which the model is said not to be the motion
+_POOR = 2.0  # residuals over noise, from which the model is said not to be the motion
+_SHARED = 8  # readings that share the record's extreme value
+_FEW, _NAMED = 0.05, 6  # part of the readings that outliers are at most; outliers of which the times are named
 METHOD = (
     "least squares over windows with free starts, derivatives through every transition (Bock 1981); covariance from "
     "the scatter of the scores (Newey and West 1987)"
@@ -174,8 +178,17 @@ def _notes(grown: Grown, found: Sandwich, data: xr.Dataset) -> list[str]:
         notes = [
             f"{n} windows of about {length:.4g}, each with its own start: over longer ones the motion is not followed"
         ]
+    for c in range(len(problem.sensors)):
+        notes += _of_readings(grown, c, data)
     if found.correlation > 2.0:
         notes.append(f"the residuals correlate over {found.correlation:.3g} readings; the uncertainties account for it")
+    modes = list(problem.system.modes)
+    for record, mode, excess in grown.begins:
+        label = f"run {problem.records[record].name} begins" if records > 1 else "the record begins"
+        words = f"chi^2 is {excess:.3g} higher in any other" if np.isfinite(excess) else "it has no motion in any other"
+        if excess < BETTER:
+            words = f"chi^2 is only {excess:.2g} higher in another: the readings do not tell which"
+        notes.append(f"{label} in mode {modes[mode]!r}; {words}")
     places = [row for row in by_place(data) if row[2] >= 5]
     if len(places) > 1:
         notes.append(
@@ -184,13 +197,56 @@ def _notes(grown: Grown, found: Sandwich, data: xr.Dataset) -> list[str]:
     return notes
 
 
-def _anomalies(grown: Grown, data: xr.Dataset) -> list[str]:
+def _of_readings(grown: Grown, c: int, data: xr.Dataset) -> list[str]:
+    """Notes on the readings of a quantity: coloured noise, outliers, readings at a limit of the sensor."""
+    problem, name = grown.problem, list(grown.problem.sensors)[c]
+    mine, notes = data["quantity"].values == c, []
+    r, time = (data["measured"] - data["fitted"]).values[mine], data["time"].values[mine]
+    if problem.colour[c]:
+        notes.append(
+            f"the noise of {name} correlates by {problem.colour[c]:.2f} from reading to reading, and is weighed by that"
+        )
+    out = np.flatnonzero(np.abs(r) > OUTLYING * max(robust_size(r), problem.sensors[name].floor))
+    if 0 < len(out) < _FEW * len(r):
+        at = ", ".join(f"{t:.6g}" for t in time[out[:_NAMED]]) + (", ..." if len(out) > _NAMED else "")
+        weighed = "has weighed them down" if np.isfinite(problem.loss) else "weighs such readings down"
+        notes.append(f"{len(out)} outliers of {name}, {OUTLYING:g} noise deviations off or more, at t = {at}; "
+                     f"loss='huber' {weighed}")  # fmt: skip
+    at_limits = sum(int(np.count_nonzero(problem.limits(w)[w.readings[1] == c])) for w in problem.pieces)
+    if at_limits:
+        notes.append(f"{at_limits} readings of {name} are at a limit of its sensor: they count as there or beyond")
+    return notes
+
+
+def _ends(grown: Grown, data: xr.Dataset) -> list[str]:
+    """Sentences on quantities of which many readings share an extreme value that the fit exceeds."""
     found = []
-    if grown.rms > _POOR:
+    for c, (name, sensor) in enumerate(grown.problem.sensors.items()):
+        y, fitted = (data[column].values[data["quantity"].values == c] for column in ("measured", "fitted"))
+        for sign, word in ((1.0, "largest"), (-1.0, "smallest")):
+            end = sign * np.max(sign * y, initial=-np.inf)
+            beyond = sign * (fitted[y == end] - end)
+            if sensor.range is None and len(beyond) >= _SHARED and np.mean(beyond) > 0.5 * grown.problem.noise[c]:
+                found.append(
+                    f"{len(beyond)} readings of {name} share its {word} value, {end:.6g}, and the fit goes beyond it: "
+                    "if the sensor ends there, say so by Sensor(range=...)"
+                )
+    return found
+
+
+def _anomalies(grown: Grown, data: xr.Dataset) -> list[str]:
+    found = _ends(grown, data)
+    if grown.rms > _POOR or grown.missing:
         name, rms, _ = next(row for row in by_place(data) if row[2] >= min(5, data.sizes["sample"]))
         found.append(
-            f"the residuals are {grown.rms:.3g} times the record's own irregularity: the model does not describe this "
+            f"the residuals are {grown.rms:.3g} times the noise that the record's own irregularity shows"
+            f"{', with a structure that no noise has' if grown.missing else ''}: the model does not describe this "
             f"record, least of all in {name} ({rms:.2f} times the mean); the uncertainties do not hold"
+        )
+    elif grown.problem.colour.any() and not grown.whole:
+        found.append(
+            "the residuals over windows with starts of their own correlate: the noise is coloured, or the model lacks "
+            "a part, and windows so short do not tell which"
         )
     if grown.unused:
         found.append(

@@ -9,8 +9,8 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.arrow import Unsettled, inverted, settle
 from nonsmooth.identification.finding import Estimate, Finding
-from nonsmooth.identification.fit.first_level import LEAST
 from nonsmooth.identification.fit.growth import Grown
+from nonsmooth.identification.fit.rough import LEAST
 from nonsmooth.identification.profiles import Profile, profile_of
 from nonsmooth.results.progress import Progress, progress
 

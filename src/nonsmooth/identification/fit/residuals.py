@@ -32,7 +32,8 @@ def residual_data(grown: Grown, options: Mapping[str, Any]) -> xr.Dataset:
     system = _nominal(grown)
     labels, marks = _places(system)
     columns: dict[str, list[Any]] = {
-        name: [] for name in ("time", "run", "quantity", "window", "mode", "place", "measured", "fitted", "noise")
+        name: []
+        for name in ("time", "run", "quantity", "window", "mode", "place", "measured", "fitted", "beyond", "noise")
     }
     for i, (window, start) in enumerate(zip(problem.pieces, grown.starts, strict=True)):
         motion = problem.motion(theta, window, start)
@@ -50,7 +51,9 @@ def residual_data(grown: Grown, options: Mapping[str, Any]) -> xr.Dataset:
         columns["mode"].append(motion.mode[here])
         columns["place"].append(_of_samples(system, motion, marks)[here])
         columns["measured"].append(window.values[k, c])
-        columns["fitted"].append(predicted)
+        limits = np.array([sensor.range or (-np.inf, np.inf) for sensor in problem.sensors.values()])[c]
+        columns["fitted"].append(np.clip(predicted, *limits.T))
+        columns["beyond"].append(predicted - columns["fitted"][-1])
         columns["noise"].append(problem.noise[c])
     table = {name: np.concatenate(parts) for name, parts in columns.items()}
     quantities = list(problem.sensors)
@@ -67,8 +70,9 @@ def residual_data(grown: Grown, options: Mapping[str, Any]) -> xr.Dataset:
             "flag_values": np.arange(len(words)),
             "flag_meanings": " ".join(word.replace(" ", "_") for word in words),
         }
-    for name in ("measured", "fitted", "noise"):
+    for name in ("measured", "fitted", "beyond", "noise"):
         data[name].attrs["units"] = unit
+    data["beyond"].attrs["long_name"] = "how far the motion goes beyond the limits of the sensor"
     data["residual"].attrs = {"long_name": "residual over its standard deviation", "units": "1"}
     data = data.set_coords("time")
     return data.assign_attrs(provenance(labels_of(system), "fit", dict(options), method=problem.marcher.engine.name))

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
+from nonsmooth.errors import shortened
 from nonsmooth.flow.arguments import real_number
 from nonsmooth.system.names import unknown
 
@@ -42,6 +43,9 @@ class Sensor:
     noise : float, optional
         Standard deviation of a reading, without that of the resolution, where it is known; found from the residuals
         where not given.
+    range : (low, high), optional
+        Limits of the sensor, in units of the channel; infinite where there is none on a side. A reading at a limit says
+        that the quantity, with its noise, was there or beyond (a censored likelihood).
 
     Examples
     --------
@@ -56,6 +60,7 @@ class Sensor:
     delay: float = 0.0
     resolution: float = 0.0
     noise: float | None = None
+    range: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.channel, str):
@@ -68,6 +73,19 @@ class Sensor:
             raise ValueError(f"resolution = {self.resolution}: the distance of two readings is zero or more")
         if self.noise is not None and not real_number(self.noise, "noise") > 0:
             raise ValueError(f"noise = {self.noise}: a standard deviation is positive; leave it out where unknown")
+        if self.range is not None:
+            try:
+                low, high = map(float, self.range)
+            except (TypeError, ValueError):
+                raise ValueError(f"range = {shortened(self.range)}: give (low, high), the sensor's limits") from None
+            if not low < high:
+                raise ValueError(f"range = ({low:g}, {high:g}): the lower limit comes first")
+            object.__setattr__(self, "range", (low, high))
+
+    def limit(self, y: FloatArray) -> FloatArray:
+        """1 where a reading is at the upper limit, -1 at the lower one, else 0."""
+        low, high = self.range or (-np.inf, np.inf)
+        return (y >= high).astype(float) - (y <= low)
 
     @property
     def floor(self) -> float:

@@ -93,7 +93,9 @@ class Window:
 class Windows:
     """Windows of all records with the system, its sensors and the unknowns.
 
-    ``noise``: standard deviation of a reading of each quantity, rounding included.
+    ``noise``: standard deviation of a reading of each quantity, rounding included. ``modes``: in which each record
+    may begin, the first guess first. ``colour``: correlation of neighbouring readings of each quantity. ``loss``: noise
+    deviations from which on a residual counts linearly (Huber).
     """
 
     system: System
@@ -102,11 +104,19 @@ class Windows:
     sensors: Mapping[str, Sensor]
     unknowns: Unknowns
     noise: FloatArray
+    modes: list[tuple[int, ...]]
+    colour: FloatArray
+    loss: float = np.inf
     pieces: list[Window] = field(default_factory=list)
 
     def of(self, pieces: list[Window]) -> Windows:
         """The same problem with other windows."""
         return replace(self, pieces=pieces)
+
+    @property
+    def plain(self) -> Windows:
+        """The same problem with readings taken for independent."""
+        return replace(self, colour=np.zeros(len(self.sensors)))
 
     @cached_property
     def readouts(self) -> list[Readout]:
@@ -203,6 +213,46 @@ class Windows:
                 table[rows, p - 1] = sensor.gain * period * of_shift
         return predicted, table
 
+    def limits(self, window: Window) -> FloatArray:
+        """1 for each reading at the upper limit of its sensor, -1 at the lower one, else 0."""
+        k, c = window.readings
+        at = np.stack([sensor.limit(window.values[:, j]) for j, sensor in enumerate(self.sensors.values())], axis=1)
+        return np.asarray(at[k, c])
+
+    def _censored(
+        self, window: Window, r: FloatArray, table: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Residuals and derivatives where those at a limit are of the likelihood of being there or beyond."""
+        side = self.limits(window)
+        at = np.flatnonzero(side)
+        if not len(at):
+            return r, table
+        from scipy.special import log_ndtr
+
+        noise = self.noise[window.readings[1][at]]
+        z = -side[at] * r[at] / noise
+        far = np.sqrt(np.maximum(-2.0 * log_ndtr(z), 1e-300))
+        r, table = r.copy(), table.copy()
+        r[at] = side[at] * noise * far
+        ratio = np.exp(-0.5 * z**2 - log_ndtr(z)) / np.sqrt(2.0 * np.pi)  # density over probability
+        if len(table):
+            table[at] *= (ratio / far)[:, None]
+        return r, table
+
+    def _whitened(self, window: Window, rows: FloatArray) -> FloatArray:
+        """Rows of the readings as independent ones of the same size: each less what the one before tells of it."""
+        if not self.colour.any():
+            return rows
+        (k, c), plain, out = window.readings, self.limits(window) == 0, rows.copy()
+        for j in np.flatnonzero(self.colour):
+            at = np.flatnonzero((c == j) & plain)
+            if len(at) < 2:
+                continue
+            apart = np.diff(window.time[k[at]])
+            told = (self.colour[j] ** np.maximum(apart / np.median(apart), 0.2))[:, None]
+            out[at[1:]] = (rows[at[1:]] - told * rows[at[:-1]]) / np.sqrt(1.0 - told**2)
+        return out
+
     def residuals(self, theta: FloatArray, starts: FloatArray) -> State:
         """Residuals of all windows; not finite where a motion does not come to its end."""
         return self._state(theta, starts, False)
@@ -226,9 +276,11 @@ class Windows:
                 continue
             predicted, table = self.readings(theta, window, motion, slopes)
             state.fitted.append(predicted[:, None])
-            state.residuals.append(np.concatenate([window.values[k, c] - predicted, pulled]))
+            r, table = self._censored(window, window.values[k, c] - predicted, table)
+            state.residuals.append(np.concatenate([self._whitened(window, r[:, None])[:, 0], pulled]))
             if slopes:
                 table[~np.isfinite(table).all(axis=1)] = 0.0  # behind a graze, where there are no derivatives
+                table = self._whitened(window, table)
                 inner = np.zeros((len(k) + len(free), len(start)))
                 inner[: len(k), free] = table[:, p:][:, free]
                 inner[range(len(k), len(k) + len(free)), free] = 1.0
@@ -237,7 +289,12 @@ class Windows:
         return state
 
     def weights(self, state: State | None, spread: float) -> list[FloatArray]:
-        """One over the standard deviation of each row."""
-        return [
-            np.concatenate([1.0 / self.noise[w.readings[1]], 1.0 / w.spread[w.free]]) for w in self.pieces
-        ]  # fmt: skip
+        """One over the standard deviation of each row; less for those that the loss weighs down."""
+        found = []
+        for i, w in enumerate(self.pieces):
+            weight = 1.0 / self.noise[w.readings[1]]
+            if state is not None and np.isfinite(self.loss):
+                z = np.abs(state.residuals[i][: len(weight)] * weight)
+                weight = weight * np.sqrt(self.loss / np.maximum(z, self.loss))
+            found.append(np.concatenate([weight, 1.0 / w.spread[w.free]]))
+        return found

@@ -101,6 +101,8 @@ def range_of(swept: xr.Dataset, regime_wanted: int, direction: str | None = None
 def jumps(response: xr.Dataset, direction: str) -> list[Interval]:
     """The steps in which the amplitude jumps in one direction, at rising values."""
     here = response["jump_direction"].values.astype(str) == direction
+    if "jump_variable" in response:
+        here &= response["jump_variable"].values.astype(str) == "x"
     value, step = response["jump_value"].values[here], response["jump_step"].values[here]
     return sorted(
         (Interval(float(a - 0.5 * b), float(a + 0.5 * b)) for a, b in zip(value, step, strict=True)),

@@ -33,7 +33,10 @@ def small_jump(response: xr.Dataset, direction: str) -> Interval | None:
 
 
 def _by_size(response: xr.Dataset, direction: str, largest: bool) -> Interval | None:
-    here = response.isel(jump=np.flatnonzero(response["jump_direction"].values.astype(str) == direction))
+    mine = response["jump_direction"].values.astype(str) == direction
+    if "jump_variable" in response:
+        mine &= response["jump_variable"].values.astype(str) == "x"
+    here = response.isel(jump=np.flatnonzero(mine))
     if not here.sizes["jump"]:
         return None
     size = np.abs(here["jump_after"].values - here["jump_before"].values)

@@ -1,0 +1,83 @@
+r"""Noise of a fit: its size and its correlation from the residuals, and the structure that no such noise has.
+
+The noise of a quantity is taken for an autoregressive process of the first order: two readings a time :math:`\Delta t`
+apart correlate by :math:`\rho^{\Delta t / h}`, with h the median step. White noise has rho = 0.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from nonsmooth.arrays import FloatArray
+from nonsmooth.identification.fit.windows import Windows
+from nonsmooth.identification.pieces import State
+
+__all__ = ["OUTLYING", "colours", "parts", "robust_size", "strange"]
+
+OUTLYING = 6.0  # noise deviations, beyond which a reading is named
+_LEAST, _MOST = 0.1, 0.98  # correlation of neighbours: below it noise counts as white
+_SURE = 4.0  # standard errors of a correlation
+_PEAK = 12.0  # logarithm of the odds against a line of the spectrum in noise
+_LINES = 0.4  # part of the residuals in such lines
+_AWAY, _ODD = 0.12, 2.2  # distance of the summed spectrum from white noise's; the same times the root of its length
+_LARGE = 1.5  # residuals over the record's own irregularity
+
+
+def robust_size(r: FloatArray) -> float:
+    """Standard deviation of normal residuals, by their median size."""
+    return float(1.4826 * np.median(np.abs(r))) if len(r) else 0.0
+
+
+def _as_irregular(rho: float) -> float:
+    """Standard deviation of such noise over that of white noise of the same third differences."""
+    return float(np.sqrt(20.0 / (20.0 - 30.0 * rho + 12.0 * rho**2 - 2.0 * rho**3)))
+
+
+def colours(problem: Windows, state: State) -> FloatArray:
+    """Correlation of neighbouring residuals of each quantity, 0 where it is none; ``state``: not whitened."""
+    found = np.zeros(len(problem.sensors))
+    for c in range(len(found)):
+        rows = parts(problem, state, c)
+        cut = 5.0 * robust_size(np.concatenate([np.zeros(0), *rows]))
+        rows = [np.clip(r, -cut, cut) for r in rows]
+        power, n = sum(float(r @ r) for r in rows), sum(map(len, rows))
+        if power > 0.0:
+            rho = sum(float(r[1:] @ r[:-1]) for r in rows) / power
+            found[c] = min(rho, _MOST) if rho > max(_LEAST, _SURE / np.sqrt(n)) else 0.0
+    return found
+
+
+def strange(problem: Windows, plain: State, white: State, irregular: FloatArray) -> tuple[float, bool]:
+    """Size of the residuals over that of noise as irregular as the record, and whether the model lacks a part.
+
+    The size is that of one quantity, the worst, over that of noise of their correlation. A part is missing where
+    residuals larger than the irregularity have a structure that no such noise has: lines of the spectrum that hold
+    much of them, as those of a motion do, or another spectrum. ``plain`` and ``white``: residuals, and whitened ones.
+    """
+    worst, missing = 0.0, False
+    for c in range(len(problem.sensors)):
+        r, e = (np.concatenate([np.zeros(0), *parts(problem, one, c)]) for one in (plain, white))
+        if len(r) < 16:
+            continue
+        # outliers raise the one, readings that are rounded the other
+        size = min(robust_size(r), float(np.sqrt(np.mean(r**2)))) / irregular[c]
+        worst = max(worst, size / _as_irregular(problem.colour[c]))
+        missing = missing or (size > _LARGE and _has_structure(r, e))
+    return worst, missing
+
+
+def parts(problem: Windows, state: State, c: int) -> list[FloatArray]:
+    """Residuals of a quantity, window by window, without the readings at a limit of the sensor."""
+    rows = zip(problem.pieces, state.residuals, strict=True)
+    return [r[np.flatnonzero((w.readings[1] == c) & (problem.limits(w) == 0))] for w, r in rows]
+
+
+def _has_structure(r: FloatArray, e: FloatArray) -> bool:
+    """Return whether residuals ``r``, whitened ``e``, are no noise of their correlation."""
+    cut = [np.clip(x, -4.0 * robust_size(x), 4.0 * robust_size(x)) for x in (r, e)]
+    raw, white = (np.abs(np.fft.rfft(x)[1:]) ** 2 for x in cut)
+    if not white.sum() > 0.0:
+        return False
+    lines = white > (np.log(len(white)) + _PEAK) * white.mean()
+    away = np.abs(np.cumsum(white) / white.sum() - np.arange(1, len(white) + 1) / len(white)).max()
+    return bool(raw[lines].sum() > _LINES * raw.sum() or away > max(_AWAY, _ODD / np.sqrt(len(white))))

@@ -1,0 +1,132 @@
+"""Fits under coloured noise, with outliers, by sensors that end, across gaps; models that lack a term.
+
+The whole campaign: python -m pytest -m slow -s tests/identification/test_fit_noise.py
+"""
+
+import numpy as np
+import pytest
+from tests.identification import mode_cases, noise_cases
+from tests.identification.noise_cases import KINDS, LACKING, SYSTEMS, autoregressive
+
+import nonsmooth as ns
+from nonsmooth.identification.fit.sensors import Sensor
+
+MODEL = "the model does not describe"
+
+
+def relay(seed, change=lambda t, y, size, rng: y + size * rng.standard_normal(len(t))):
+    """A relay's motion with the readings that ``change`` makes of it."""
+    rng = np.random.default_rng(seed)
+    system, truth, find, t, clean, _ = noise_cases.motion("relay", rng, seed)
+    return noise_cases.off(system, truth, find, rng), find, t, change(t, clean, 0.01 * clean.std(), rng)
+
+
+@pytest.mark.parametrize("rho", [0.5, 0.9])
+def test_coloured_noise_is_no_failure_of_the_model(rho):
+    system, find, t, y = relay(2, lambda t, y, size, rng: y + size * autoregressive(len(t), rho, rng))
+    found = ns.fit(system, {"x": (t, y)}, find, progress=False)
+    said = [float(note.split("correlates by ")[1].split()[0]) for note in found.notes if "correlates by" in note]
+    assert not found.anomalies and len(said) == 1 and abs(said[0] - rho) < 0.15
+    far = [(found[k] - mode_cases.RELAY[k]) / found.uncertainty[k] for k in find]
+    assert np.max(np.abs(far)) < 3.5
+
+
+def test_the_uncertainty_of_a_constant_under_coloured_noise_is_that_of_the_closed_form():
+    # a constant read with noise of correlation rho: the variance of the mean is size^2 (1 + rho) / (1 - rho) / n
+    system = ns.System(
+        name="constant", states=["x", "v"], parameters={"q": 1.0}, modes={"only": lambda t, u, p: (u.v, -u.x)},
+        outputs={"y": lambda t, u, p: p.q + 0 * u.x},
+    )  # fmt: skip
+    n, rho, size, rng = 4000, 0.8, 0.02, np.random.default_rng(0)
+    y = 1.3 + size * autoregressive(n, rho, rng)
+    record, start = {"y": (np.arange(n) * 0.1, y)}, {"x": 0.0, "v": 0.0}
+    found = ns.fit(system, record, ["q"], start=start, free_start=False, progress=False)
+    assert found.uncertainty["q"] == pytest.approx(size * np.sqrt((1 + rho) / (1 - rho) / n), rel=0.2)
+
+
+def test_outliers_are_named_and_weighed_down_on_request():
+    places = np.array([40, 123, 200, 301])
+
+    def change(t, y, size, rng):
+        y = y + size * rng.standard_normal(len(t))
+        y[places] += size * np.array([30.0, 25.0, 40.0, 20.0])
+        return y
+
+    system, find, t, y = relay(4, change)
+    plain = ns.fit(system, {"x": (t, y)}, find, progress=False)
+    robust = ns.fit(system, {"x": (t, y)}, find, loss="huber", progress=False)
+    for found, word in ((plain, "weighs such"), (robust, "has weighed them down")):
+        note = next(note for note in found.notes if "outliers" in note)
+        assert note.startswith("4 outliers of x") and word in note
+        assert [float(one) for one in note.split("t = ")[1].split(";")[0].split(",")] == pytest.approx(t[places])
+        assert not found.anomalies
+    far = np.array([(robust[k] - mode_cases.RELAY[k]) / robust.uncertainty[k] for k in find])
+    assert np.abs(far).max() < 3.5
+    assert all(robust.uncertainty[k] < 0.6 * plain.uncertainty[k] for k in find)
+
+
+def test_a_sensor_that_ends_is_said_and_taken_as_what_it_is():
+    limits = []
+
+    def change(t, y, size, rng):
+        limits.append(float(np.quantile(y, 0.85)))
+        return np.minimum(y + size * rng.standard_normal(len(t)), limits[0])
+
+    system, find, t, y = relay(5, change)
+    right = ns.fit(system, {"x": (t, y)}, find, measured={"x": Sensor("x", range=(-np.inf, limits[0]))}, progress=False)
+    count = int((y == limits[0]).sum())
+    assert not right.anomalies and any(f"{count} readings of x are at a limit" in note for note in right.notes)
+    far = np.array([(right[k] - mode_cases.RELAY[k]) / right.uncertainty[k] for k in find])
+    assert np.abs(far).max() < 3.5
+    shown = right.residuals
+    assert float(shown["fitted"].max()) <= limits[0] and float(shown["beyond"].max()) > 0
+    wrong = ns.fit(system, {"x": (t, y)}, find, progress=False, tries=2)
+    assert any(f"{count} readings of x share its largest value" in one for one in wrong.anomalies)
+
+
+@pytest.mark.parametrize(("given", "message"), [((1, 0), "lower limit"), (3.0, "low, high"), (("a", 2), "low, high")])
+def test_ranges_that_are_none_are_answered(given, message):
+    with pytest.raises(ValueError, match=message):
+        Sensor("x", range=given)
+
+
+def test_a_loss_that_is_none_is_answered():
+    with pytest.raises(ValueError, match="'linear', 'huber'"):
+        ns.fit(mode_cases.relay(), {"x": (np.arange(20.0), np.arange(20.0))}, ["k"], loss="cauchy", progress=False)
+
+
+def test_a_gap_is_crossed_in_seconds():
+    case = noise_cases.CASES["gear pair"]
+    data, measured, _ = case.recording(0)
+    ((channel, (t, y)),) = data.items()
+    y[500:620] = np.nan  # longer than the first windows: the march over them stood still
+    found = ns.fit(case.guess(0), {channel: (t, y)}, case.find, measured=measured, progress=False)
+    far = [(found[k] - case.truth[k]) / found.uncertainty[k] for k in case.find]
+    assert not found.anomalies and np.max(np.abs(far)) < 3.5
+
+
+@pytest.mark.parametrize(("name", "kind"), [("gear pair", "AR .9"), ("bilinear oscillator", "white")])
+def test_a_term_that_the_model_lacks_is_said(name, kind):
+    found, effect = noise_cases.lacking(name, kind)
+    assert effect > 5 and any(MODEL in one for one in found.anomalies)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["white", "AR .9"])
+@pytest.mark.parametrize("name", LACKING)
+def test_every_term_that_the_model_lacks_is_said(name, kind):
+    found, effect = noise_cases.lacking(name, kind)
+    print(f"{name}, {kind}: {effect:.0f} noise deviations; {found.anomalies[0]}")
+    assert effect > 5 and found.anomalies
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_coverage(name, kind):
+    fits = [noise_cases.fitted(name, kind, seed) for seed in range(100, 140)]  # none of those it was written with
+    far = np.array([z for _, z in fits])
+    inside, rms = (np.abs(far) < 1.96).sum(axis=0), float(np.sqrt(np.mean(far**2)))
+    alarms = sum(any(MODEL in one for one in found.anomalies) for found, _ in fits)
+    print(f"{name}, {kind}: rms {rms:.2f}, inside {inside.tolist()} of 40, {alarms} alarms")
+    assert 0.7 < rms < 1.4 and (inside >= 34).all() and alarms <= 1  # 1 % over all
