@@ -248,7 +248,7 @@ class Growth(NamedTuple):
 
 
 class Seen(NamedTuple):
-    """What a run leaves behind: one of these, as its goal says."""
+    """Records that a run may leave behind; its goal says which."""
 
     kept: Any
     log: Any
@@ -256,7 +256,7 @@ class Seen(NamedTuple):
 
 
 class Call(NamedTuple):
-    """What is asked of a march, but for the system and what it leaves behind."""
+    """An order to a march, but for the system and the records that it leaves behind."""
 
     orders: Any  # whole numbers, at the places below
     reals: Any
