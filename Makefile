@@ -48,12 +48,13 @@ coverage-awkward: $(VENV)/.compiled-run  ## the same on rigs where much goes wro
 coverage-fit: $(VENV)/.compiled-test  ## fit ten systems to data of SciPy, 40 seeds each; writes docs/measured_coverage_fit.md
 	$(BIN)/python -m tests.identification.fit_coverage --seeds 0-39 --out docs/measured_coverage_fit.md
 
-check: $(VENV)/.installed-dev  ## ruff, mypy, import-linter, codespell, the prose of docstrings
+check: $(VENV)/.installed-dev  ## ruff, mypy, import-linter, codespell, the prose of docstrings, the weight of rooms
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/codespell README.md CHANGELOG.md CONTRIBUTING.md src tests docs benchmarks examples
 	$(BIN)/python tests/prose.py
+	$(BIN)/python tests/weight.py --check
 
 bench: $(VENV)/.compiled-bench  ## compare with other programs on the same work; writes benchmarks/results.md
 	$(BIN)/python benchmarks/run.py

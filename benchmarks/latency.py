@@ -59,6 +59,18 @@ model = ns.System(
 )
 ns.simulate(model, periods=20, transient=100)
 """
+# Masses in a row with stops: numbers of states that nothing was compiled for by itself.
+ROW = """
+n = {masses}
+K = 2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+names = [f"q{{i + 1}}" for i in range(n)]
+row = ns.mechanical(
+    np.eye(n).tolist(), (0.05 * K).tolist(), K.tolist(), parameters={{}}, coordinates=names,
+    forcing={{"q1": lambda t, p: 0.5 * np.cos(0.7 * t)}},
+    elements={{f"s_{{q}}": ns.elements.Stop(at=q, position=0.4, restitution=0.7) for q in names[n - {stops} :]}},
+)
+ns.simulate(row, periods=10)
+"""
 ORBIT = "ns.find_orbit(model, progress=False).floquet_multipliers"
 PENDULUM = {"first result": NONLINEAR.format(force="np.sin(x)"), "orbit with multipliers": ORBIT}
 DUFFING = {"first result": NONLINEAR.format(force="x - 0.4 * x**3"), "orbit with multipliers": ORBIT}
@@ -134,6 +146,9 @@ def measured() -> dict[str, Steps]:
     with tempfile.TemporaryDirectory() as folder:
         found["empty cache: the first simulate"] = seconds(SIMULATE, folder)
         found["warm cache: the first simulate"] = seconds(SIMULATE, folder)
+    for name, masses, stops in (("ten degrees of freedom with a stop", 10, 1), ("100 states with ten stops", 50, 10)):
+        with tempfile.TemporaryDirectory() as folder:
+            found[f"empty cache: {name}"] = seconds({"simulate": ROW.format(masses=masses, stops=stops)}, folder)
     with tempfile.TemporaryDirectory() as folder:
         found["empty cache: a first hour"] = seconds(ALL, folder)
         found["warm cache: a first hour"] = seconds(ALL, folder)
