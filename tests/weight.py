@@ -2,8 +2,8 @@
 """Weight of the source by room: files, classes, functions, lines, and tokens of code (no docstring, comment or layout).
 
 Tokens cannot be saved by longer lines or shorter words; what a reader must take in is counted, whatever its form:
-scripts of pages too, and text of generated code. Usage: python tests/weight.py [checkout] [another one to compare
-with], or python tests/weight.py --check: each room against its budget in tests/budgets.toml. A budget falls with the room, and
+scripts of pages too, and text of generated code. Usage: python tests/weight.py [checkout] [another to compare with], or
+python tests/weight.py --check: each room against its budget in tests/budgets.toml. A budget falls with the room, and
 rises only with a paragraph in docs/decisions.md that says what users got for it.
 """
 

@@ -15,7 +15,7 @@ from nonsmooth.system.mode import Mode
 from nonsmooth.system.system import System
 from nonsmooth.system.transition import Transition
 
-TIGHT: dict[str, dict[str, Any]] = {"taylor": {"rtol": 1e-14}, "rkf45": {"rtol": 1e-13}, "exact": {}}
+TIGHT: dict[str, dict[str, Any]] = {"taylor": {"rtol": 1e-14}, "rkf45": {"rtol": 1e-13}}
 
 
 def engine(system: System, method: str = "taylor", **options: Any) -> SeriesEngine:
@@ -354,10 +354,10 @@ def test_points_do_not_depend_on_how_they_are_chunked() -> None:
     np.testing.assert_array_equal(whole.maximum, parts.maximum)
 
 
-# --- the exact flow of any dimension
+# --- linear modes by series
 
 
-def test_exact_flow_of_four_states_against_the_matrix_exponential() -> None:
+def test_four_linear_states_against_the_matrix_exponential() -> None:
     from scipy.linalg import expm
 
     A = np.array([[0.1, 2.0, 0.0, 0.3], [-30.0, -0.2, 1.0, 0.0], [0.0, 0.5, -0.4, 5.0], [1.0, 0.0, -5.0, 0.0]])
@@ -366,12 +366,12 @@ def test_exact_flow_of_four_states_against_the_matrix_exponential() -> None:
         modes={"only": lambda t, u, p: tuple(A @ np.array(u) * p.g)},
     )  # fmt: skip
     start = [1.0, -1.0, 0.5, 2.0]
-    _, state = record(system, start, 3.0, method="exact")
+    _, state = record(system, start, 3.0, method="taylor", rtol=1e-15)
     truth = expm(3.0 * A) @ start
     np.testing.assert_allclose(state.u, truth, rtol=0, atol=1e-13 * np.abs(truth).max() * 3)
 
 
-def test_exact_flow_through_a_curved_surface() -> None:
+def test_linear_modes_through_a_curved_surface() -> None:
     """Problem L: two spirals, switching on the unit circle at t = 1 exactly; an indicator that is not affine."""
     w = 2 * np.pi
     system = System(
@@ -385,16 +385,31 @@ def test_exact_flow_through_a_curved_surface() -> None:
     )  # fmt: skip
     end = np.pi / 2
     truth = np.exp(end - 1) * np.array([np.cos(w * (end - 1)), -np.sin(w * (end - 1))])
-    for method, tolerance in (("exact", 1e-13), ("taylor", 1e-12), ("rkf45", 1e-10)):
+    for method, tolerance in (("taylor", 1e-12), ("rkf45", 1e-10)):
         log, state = record(system, [np.exp(-1.0), 0.0], end, method=method)
         np.testing.assert_allclose(state.u, truth, rtol=0, atol=tolerance * np.abs(truth).max())
         assert log.crossing_time == pytest.approx([1.0], abs=tolerance)
 
 
-def test_exact_refuses_nonlinear_modes() -> None:
-    system = System(states=("x",), parameters={"a": 1.0}, modes={"only": lambda t, u, p: (-p.a * u.x**3,)})
-    with pytest.raises(ValueError, match='use method="taylor"'):
-        engine(system, "exact").prepare(np.ones((1, 1)))
+def test_linear_modes_with_a_curved_surface_run_at_the_sharpest_tolerance() -> None:
+    """The exact flow is refused with a sentence that says by what such a system runs, as exactly."""
+    w = 2 * np.pi
+    system = System(
+        states=("x", "y"), parameters={"w": w},
+        modes={
+            "inner": lambda t, u, p: (u.x - p.w * u.y, p.w * u.x + u.y),
+            "outer": lambda t, u, p: (u.x + p.w * u.y, -p.w * u.x + u.y),
+        },
+        indicators={"circle": lambda t, u, p: u.x**2 + u.y**2 - 1.0},
+        transitions=[Transition("inner", "outer", when="circle > 0"), Transition("outer", "inner", when="circle < 0")],
+    )  # fmt: skip
+    with pytest.raises(ValueError, match="some indicator is not affine: such a system runs by Taylor .* at rtol = 1e-15"):
+        ns.simulate(system, duration=1.0, method="exact")
+    run = ns.simulate(system, duration=np.pi / 2, start=[np.exp(-1.0), 0.0])
+    angle = w * (np.pi / 2 - 1)
+    truth = np.exp(np.pi / 2 - 1) * np.array([np.cos(angle), -np.sin(angle)])
+    np.testing.assert_allclose(run["u"].values[-1], truth, rtol=0, atol=1e-13 * np.abs(truth).max())
+    assert float(run["crossing_time"].values[0]) == pytest.approx(1.0, abs=1e-13)
 
 
 # --- options
@@ -418,7 +433,7 @@ def test_order_follows_the_tolerance() -> None:
 
 @pytest.mark.parametrize("method", ["rkf45", "taylor", "exact"])
 def test_a_run_that_pauses_goes_on_where_it_stood(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    from nonsmooth.flow.engines import loop
+    from nonsmooth.flow.engines import march
 
     system = ns.models.discontinuous_support(omega=3.69, g=-0.0045, rho=0.29)
 
@@ -428,6 +443,6 @@ def test_a_run_that_pauses_goes_on_where_it_stood(method: str, monkeypatch: pyte
         return [swept.section.values, run.u.values, run.crossing_time.values]
 
     whole = runs()
-    monkeypatch.setattr(loop, "PATIENCE", 30)
+    monkeypatch.setattr(march, "PATIENCE", 30)
     for one, two in zip(whole, runs(), strict=True):
         np.testing.assert_array_equal(one, two)

@@ -127,17 +127,6 @@ def test_the_level_is_one_that_the_processor_has(monkeypatch, forgetting, has):
     assert level([name for name in v3.split() if name != "fma"] + has.split()) == ""
 
 
-def test_many_states_may_have_a_level_of_their_own(tmp_path, monkeypatch, forgetting):
-    """Few states keep the level that code has come for."""
-    v4, fewest = target.LEVELS["x86_64"]["x86-64-v4"], target.FEWEST_STATES["x86-64-v4"]
-    monkeypatch.setattr("platform.machine", lambda: "x86_64")
-    monkeypatch.setattr(target, "get_host_cpu_features", lambda: ",".join(f"+{name}" for name in v4.split()))
-    monkeypatch.setattr(target, "AHEAD", tmp_path)
-    (tmp_path / "x86-64-v3").mkdir()
-    levels = {states: target._Codegen("one", states)._get_host_cpu_name() for states in (0, fewest - 1, fewest)}
-    assert levels == {0: "x86-64-v3", fewest - 1: "x86-64-v3", fewest: "x86-64-v4"}
-
-
 def test_a_level_that_the_processor_lacks_is_refused(monkeypatch, forgetting):
     monkeypatch.setenv("NONSMOOTH_LEVEL", "x86-64-v9")
     with pytest.raises(ValueError, match=r"NONSMOOTH_LEVEL=x86-64-v9: this processor has"):

@@ -19,6 +19,7 @@ from numba.extending import intrinsic, models, register_model
 
 __all__ = [
     "FOUR", "apart", "four_at", "load", "number_at", "plus", "store", "sum_columns", "times", "whole_at", "write_four",
+    "write_number",
 ]  # fmt: skip
 
 FOUR = 4  # numbers of a vector that is a value in a kernel
@@ -188,6 +189,10 @@ def _plain_write(address: int, place: int, x: Any) -> None:
         c_double.from_address(address + 8 * (place + k)).value = x[k]
 
 
+def _plain_write_number(address: int, place: int, x: float) -> None:
+    c_double.from_address(address + 8 * place).value = x
+
+
 def _plain_load(D: Any, place: Any) -> Any:
     return D.reshape(-1)[place : place + FOUR].copy()
 
@@ -221,6 +226,7 @@ def _choose(compiled: Any, plain: Any) -> Any:
 apart = _choose(_apart, lambda: None)
 number_at = _choose(_reader(types.float64, ir.DoubleType()), _number)
 whole_at = _choose(_reader(types.int64, _whole), _whole_number)
+write_number = _choose(_write, _plain_write_number)
 four_at, write_four = _choose(_reader(_four, _vector), _plain_four), _choose(_write, _plain_write)
 load, store = _choose(_load_four, _plain_load), _choose(_store_four, _plain_store)
 times, plus = _choose(_times, _plain_times), _choose(_plus, _plain_plus)

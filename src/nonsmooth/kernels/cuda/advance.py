@@ -32,7 +32,7 @@ def go(motion, form, net, phase, limit, plan, transient, keep, out, scratch):
 
 
 @device
-def row_of(buffers, row):
+def arrays_of_row(buffers, row):
     """The arrays that ``go`` writes for one trajectory, from the buffers of all."""
     section, maximum, minimum, i_max, i_min, o_max, o_min, crossings, contacts, elapsed, times, modes, status = buffers
     return Kept(
@@ -69,6 +69,7 @@ def advance(jobs, rows, point, net, place, counts, plans, way, phase, limit, out
             n_transient, n_keep = n_transient + n_keep - 1 if apart > 0 else 0, 1
         motion = Motion(u[row], u[row, 0:0], clock[row], counters[row])
         plan, into = (plans[1], other) if leg > 0 else (plans[0], out)
-        code = go(motion, linear, Net(*net), phase, limit, plan, n_transient, n_keep, row_of(into, row), scratch)
+        buffers = arrays_of_row(into, row)
+        code = go(motion, linear, Net(*net), phase, limit, plan, n_transient, n_keep, buffers, scratch)
         if code != OK:
             break

@@ -159,7 +159,7 @@ def advance(jobs, rows, point, norms, plan, settings, place, counts, way, out):
     motion = Motion(u[j], memory[j, :N_MEMORY], clock[j], counters[j])
     points_kept, top, bottom = section[j : j + 1], maximum[j : j + 1], minimum[j : j + 1]
     seen = Kept(
-        points_kept, top[:, :N_U], bottom[:, :N_U], top[:, N_U : N_U + N_INDICATORS],
+        points_kept[:, :, :N_U], top[:, :N_U], bottom[:, :N_U], top[:, N_U : N_U + N_INDICATORS],
         bottom[:, N_U : N_U + N_INDICATORS], top[:, N_U + N_INDICATORS :], bottom[:, N_U + N_INDICATORS :],
         crossings[j : j + 1], contacts[j : j + 1], elapsed[j : j + 1], points_kept[:, :, N_U],
         points_kept[:, :, N_U + 1],

@@ -8,9 +8,8 @@ behind each other and go in vectors: masses in a row have five. A mode with too 
 moves by its propagators.
 """
 
-from math import fabs
-
 from nonsmooth.kernels.compile.cache import device, inline
+from nonsmooth.kernels.linear.sums import add_products, at, sum_sizes, sum_terms
 from nonsmooth.kernels.linear.tables import states_of, width_of
 
 BANDED = 32  # states from which on few entries make a series shorter than a propagator
@@ -65,9 +64,8 @@ def next_term(tables, mode, row, k):
     for r in range(n):
         row[k + 1, r] = 0.0
     for d in range(1, lines[mode, 0, 0] + 1):
-        offset = lines[mode, d, 0]
-        for r in range(lines[mode, d, 1], lines[mode, d, 2]):
-            row[k + 1, r] += bands[mode, d, r] * row[k, r + offset]
+        factors, from_ = at(bands, (mode * (n + m) + d) * n), at(row, k * row.shape[1] + lines[mode, d, 0])
+        add_products(at(row, (k + 1) * row.shape[1]), factors, from_, lines[mode, d, 1], lines[mode, d, 2])
     for j in range(n if k == 0 else n + 1, m):
         for r in range(lines[mode, n + j, 1], lines[mode, n + j, 2]):
             row[k + 1, r] += bands[mode, n + j, r] * row[k, j]
@@ -89,12 +87,7 @@ def expand(tables, work, mode):
             turn_by = step * rates[h]
             row[k, n + 1 + 2 * h] = -turn_by * row[k - 1, n + 2 + 2 * h]
             row[k, n + 2 + 2 * h] = turn_by * row[k - 1, n + 1 + 2 * h]
-    for j in range(m):
-        row[STEEP, j] = fabs(row[ORDER, j])
-    for k in range(ORDER - 1, 3, -1):
-        part = 1.0 / (k - 3)
-        for j in range(m):
-            row[STEEP, j] = row[STEEP, j] * part + fabs(row[k, j])
+    sum_sizes(at(row, STEEP * row.shape[1]), at(row, 0), row.shape[1], 4, ORDER, m)
     quick = 1.0 / (step * step * step * step)
     for j in range(m):
         row[STEEP, j] *= quick
@@ -103,12 +96,7 @@ def expand(tables, work, mode):
 @device
 def along(row, x, m, out):
     """w at a part x of the step, from the terms of its series."""
-    for j in range(m):
-        out[j] = row[ORDER, j]
-    for k in range(ORDER - 1, -1, -1):
-        part = x / (k + 1)
-        for j in range(m):
-            out[j] = out[j] * part + row[k, j]
+    sum_terms(at(out, 0), at(row, 0), row.shape[1], 0, ORDER, x, m)
 
 
 @device

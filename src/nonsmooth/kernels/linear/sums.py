@@ -17,8 +17,10 @@ from nonsmooth.kernels.compile.lanes import (
     times,
     whole_at,
     write_four,
+    write_number,
 )
 
+INVERSE = tuple(1.0 / k for k in range(1, 32))
 FEW = 8  # states of a condition that are summed one by one
 
 
@@ -98,6 +100,42 @@ def ends_of(row, some, w, w1, n, m):
         a, b, x, y = number_at(row, j), number_at(row, m + j), number_at(w, j), number_at(w1, j)
         g0, s0, g1, s1 = g0 + a * x, s0 + b * x, g1 + a * y, s1 + b * y
     return g0, s0, g1, s1
+
+
+@device
+def add_products(out, factors, row, first, last):
+    """out[r] += factors[r] row[r] for first <= r < last."""
+    apart()
+    for r in range(first, last):
+        write_number(out, r, number_at(out, r) + number_at(factors, r) * number_at(row, r))
+
+
+@device
+def sum_terms(out, rows, width, first, last, x, m):
+    """out[j] = sum_k x^(k - first) / (k - first)! rows[k, j] for first <= k <= last and j < m, by Horner's rule.
+
+    Up to three numbers behind the m-th are written as well, and read behind a row."""
+    apart()
+    for j in range(0, m, 2 * FOUR):
+        a, b = four_at(rows, last * width + j), four_at(rows, last * width + j + FOUR)
+        for k in range(last - 1, first - 1, -1):
+            part, place = x * INVERSE[k - first], k * width + j
+            a = plus(four_at(rows, place), part, a)
+            b = plus(four_at(rows, place + FOUR), part, b)
+        write_four(out, j, a)
+        if j + FOUR < m:
+            write_four(out, j + FOUR, b)
+
+
+@device
+def sum_sizes(out, rows, width, first, last, m):
+    """The same of the terms' sizes at x = 1."""
+    apart()
+    for j in range(m):
+        write_number(out, j, fabs(number_at(rows, last * width + j)))
+    for k in range(last - 1, first - 1, -1):
+        for j in range(m):
+            write_number(out, j, number_at(out, j) * INVERSE[k - first] + fabs(number_at(rows, k * width + j)))
 
 
 @summed
