@@ -158,7 +158,7 @@ def test_motion_without_damping_has_no_attractor(hasty) -> None:
     assert found.sizes["attractor"] == 0 and (found["label"] == -1).all()
 
 
-def test_a_chaotic_sea_is_no_attractor(hasty) -> None:
+def test_a_chaotic_sea_is_no_attractor() -> None:
     """(x, y) -> (1 - y + |x|, x) (smoothed) keeps areas; its exponent is positive, and neighbours stay in the sea."""
     found = ns.basins(
         kicked(lambda t, u, p: (1 - u.y + np.sqrt(u.x**2 + p.e), u.x), e=1e-4), {"x": [-1.0, 3.0], "y": [2.0]}, **QUIET

@@ -148,8 +148,8 @@ def test_states_that_only_follow_add_their_own_multipliers() -> None:
     for filtered in (False, True):
         system = oscillator_at_a_wall(filtered=filtered)
         points, rows = system.parameter_points({"F": F, "w": w}), np.arange(len(F))
-        settler = Settler(system, engine_for(system), section_plan(system, None)[1], 2000, 40, 16)
-        assert settler.linear is not None  # in one compiled call
+        settler = Settler(system, engine_for(system), section_plan(system, None)[1], 16_000, 40, 16)
+        assert settler.compiled is not None  # in one compiled call
         runs = settler.run(points, rows, np.zeros((len(F), len(system.states))))
         found.append((runs, *settler.exponents(points, rows, runs.last, runs.mode, 240, runs.maximum, runs.minimum)))
     (two, largest, _), (three, other, _) = found

@@ -403,7 +403,7 @@ def test_linear_modes_with_a_curved_surface_run_at_the_sharpest_tolerance() -> N
         indicators={"circle": lambda t, u, p: u.x**2 + u.y**2 - 1.0},
         transitions=[Transition("inner", "outer", when="circle > 0"), Transition("outer", "inner", when="circle < 0")],
     )  # fmt: skip
-    with pytest.raises(ValueError, match="some indicator is not affine: such a system runs by Taylor .* at rtol = 1e-15"):
+    with pytest.raises(ValueError, match="some indicator is not affine: .* Taylor series at rtol = 1e-15"):
         ns.simulate(system, duration=1.0, method="exact")
     run = ns.simulate(system, duration=np.pi / 2, start=[np.exp(-1.0), 0.0])
     angle = w * (np.pi / 2 - 1)

@@ -117,7 +117,11 @@ def gate() -> ns.System:
 
 @pytest.mark.parametrize(
     ("method", "settings", "width", "tolerance"),
-    [(method, settings, width, 1e-7) for method, settings in METHODS.items() for width in (1e-2, 1e-4, 1e-5)]
+    [
+        (method, settings, width, 1e-7)
+        for method, settings in {**METHODS, "auto": {}}.items() if method != "exact"  # the indicator is not affine
+        for width in (1e-2, 1e-4, 1e-5)
+    ]
     + [("taylor", {"step": 0.25, "rtol": 1e-12}, width, 1e-6) for width in (1e-2, 1e-4, 1e-5)]
     # The formula's own error on a step of 0.25, about 1e-9 in the indicator, is more than narrower passages rise.
     + [("rkf45", {"step": 0.25}, 1e-2, 1e-4)],

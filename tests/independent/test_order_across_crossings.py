@@ -132,10 +132,10 @@ def test_taylor_reaches_the_truth(name: str) -> None:
     assert found < 1e-11
 
 
-def test_exact_flow_of_two_spirals() -> None:
-    """The crossing lies at t = 1 exactly; the end state agrees to 1e-13 relative."""
+def test_linear_modes_of_two_spirals() -> None:
+    """Without a method asked for: the crossing lies at t = 1 exactly; the end state agrees to 1e-13 relative."""
     build, start, duration = CASES["two spirals"]
-    run = ns.simulate(build(), duration=duration, start=start, method="exact")
+    run = ns.simulate(build(), duration=duration, start=start)
     assert run["crossing_time"].values == pytest.approx([1.0], abs=1e-13)
     end = run["u"].transpose("time", "state").values[-1]
     assert np.linalg.norm(end - reference.SPIRAL_END) <= 1e-13 * np.linalg.norm(reference.SPIRAL_END)

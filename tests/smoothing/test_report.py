@@ -99,7 +99,7 @@ def ns_code(name: str) -> int:
 def test_exponents_of_chaos_are_those_of_long_runs() -> None:
     """The sum is the divergence: -(c + c_s f) / m with the share f of time in contact, in both systems alike."""
     system = ns.models.discontinuous_support(rho=0.33, g=0.0018, omega=11.15)
-    report = ns.smoothing_report(system, [1e-5], periods=500, progress=False).isel(band=0, eta=0)
+    report = ns.smoothing_report(system, [1e-5], periods=4000, progress=False).isel(band=0, eta=0)
     for exponents in (report.exponents.values, report.reference_exponents.values):
         assert exponents[0] > 0.5
         assert -0.87 / 0.838 - 0.6 / 0.838 < exponents.sum() < -0.87 / 0.838
