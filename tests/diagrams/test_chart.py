@@ -155,7 +155,7 @@ def test_states_that_only_follow_add_their_own_multipliers() -> None:
     (two, largest, _), (three, other, _) = found
     p = two.period_number
     assert len(set(p)) > 3
-    # a long chaotic transient ends sooner or later by its rounding (at F = 0.9, w = 0.5): compared where both have ended
+    # a long chaotic transient ends sooner or later by its rounding (F = 0.9, w = 0.5): compared where both have ended
     cycles = (p > 0) & (three.period_number > 0)
     assert cycles.sum() > 0.9 * (p > 0).sum()
     np.testing.assert_array_equal(three.period_number[cycles], p[cycles])
