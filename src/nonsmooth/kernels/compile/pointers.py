@@ -15,6 +15,7 @@ and 0.68.
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numba
@@ -96,6 +97,13 @@ def _read(builder: Any, pointer: Any) -> Any:
     return value
 
 
+@cache
+def _bytes_of(kind: Any) -> int:
+    """Bytes of a record of this type (LLVM takes a tenth of a millisecond to tell)."""
+    context = numba.core.registry.cpu_target.target_context
+    return int(context.get_abi_sizeof(context.get_value_type(kind)))
+
+
 class Block:
     """Memory for a record of some type, and the record while it stands there.
 
@@ -107,9 +115,7 @@ class Block:
         if _DISABLED:
             self.address: Any = []
         else:
-            context = numba.core.registry.cpu_target.target_context
-            size = context.get_abi_sizeof(context.get_value_type(kind))
-            self._room = np.zeros(size // 8 + 1, dtype=np.int64)
+            self._room = np.zeros(_bytes_of(kind) // 8 + 1, dtype=np.int64)
             self.address = self._room.ctypes.data
 
     def put(self, record: Any) -> Any:
