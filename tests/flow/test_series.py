@@ -371,10 +371,8 @@ def test_four_linear_states_against_the_matrix_exponential() -> None:
     np.testing.assert_allclose(state.u, truth, rtol=0, atol=1e-13 * np.abs(truth).max() * 3)
 
 
-def test_linear_modes_through_a_curved_surface() -> None:
-    """Problem L: two spirals, switching on the unit circle at t = 1 exactly; an indicator that is not affine."""
-    w = 2 * np.pi
-    system = System(
+def two_spirals(w: float) -> System:
+    return System(
         states=("x", "y"), parameters={"w": w},
         modes={
             "inner": lambda t, u, p: (u.x - p.w * u.y, p.w * u.x + u.y),
@@ -383,6 +381,12 @@ def test_linear_modes_through_a_curved_surface() -> None:
         indicators={"circle": lambda t, u, p: u.x**2 + u.y**2 - 1.0},
         transitions=[Transition("inner", "outer", when="circle > 0"), Transition("outer", "inner", when="circle < 0")],
     )  # fmt: skip
+
+
+def test_linear_modes_through_a_curved_surface() -> None:
+    """Problem L: two spirals, switching on the unit circle at t = 1 exactly; an indicator that is not affine."""
+    w = 2 * np.pi
+    system = two_spirals(w)
     end = np.pi / 2
     truth = np.exp(end - 1) * np.array([np.cos(w * (end - 1)), -np.sin(w * (end - 1))])
     for method, tolerance in (("taylor", 1e-12), ("rkf45", 1e-10)):
@@ -394,15 +398,7 @@ def test_linear_modes_through_a_curved_surface() -> None:
 def test_linear_modes_with_a_curved_surface_run_at_the_sharpest_tolerance() -> None:
     """The exact flow is refused with a sentence that says by what such a system runs, as exactly."""
     w = 2 * np.pi
-    system = System(
-        states=("x", "y"), parameters={"w": w},
-        modes={
-            "inner": lambda t, u, p: (u.x - p.w * u.y, p.w * u.x + u.y),
-            "outer": lambda t, u, p: (u.x + p.w * u.y, -p.w * u.x + u.y),
-        },
-        indicators={"circle": lambda t, u, p: u.x**2 + u.y**2 - 1.0},
-        transitions=[Transition("inner", "outer", when="circle > 0"), Transition("outer", "inner", when="circle < 0")],
-    )  # fmt: skip
+    system = two_spirals(w)
     with pytest.raises(ValueError, match="some indicator is not affine: .* Taylor series at rtol = 1e-15"):
         ns.simulate(system, duration=1.0, method="exact")
     run = ns.simulate(system, duration=np.pi / 2, start=[np.exp(-1.0), 0.0])
