@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
@@ -66,7 +67,7 @@ class March:
         self.rows.append(Row(curve, point, virtual, kind, **more))
 
 
-class Policy:
+class Policy(ABC):
     """Events that are searched for along the curves of a branch, and how the branch goes on or ends there.
 
     Attributes
@@ -87,9 +88,9 @@ class Policy:
         """List an event that a branch passes."""
         found.mark(met.name, step.curve, met.point, step.virtual and met.point.virtual)
 
+    @abstractmethod
     def behind(self, found: March, curve: Any, met: list[Met]) -> tuple[Any, Any] | None:
         """Record the boundaries ``met`` at one place; the curve and the point behind, or None."""
-        raise NotImplementedError
 
     def unseen(self, step: Step) -> Met | None:
         """The first place on a step that margins do not tell lies beyond a boundary."""
